@@ -1,0 +1,249 @@
+//! The question as the client writes it: words and units in the names, no arithmetic.
+//!
+//! A [`Case`] is only ever made by [`Case::read`](crate::contact::case::Case::read), which collects every fault of the
+//! JSON text at once. Lengths in mm, forces in N, stresses in MPa, creepages dimensionless, spin in 1/mm.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// One contact case: two bodies, how they are pressed together and how they roll.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Case {
+    /// Free text for people, at most 200 characters.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Free key–value pairs to find the case again, at most 32 of them.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    #[schema(required = false)]
+    pub labels: BTreeMap<String, String>,
+    /// Elastic constants of the two bodies.
+    pub material: Material,
+    /// Coulomb friction.
+    pub friction: Friction,
+    /// Where and how the bodies touch.
+    pub contact: Contact,
+    /// How hard they are pressed together; needed unless the contact carries its own pressure.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub load: Option<Load>,
+    /// One motion, a list of motions, or a sweep.
+    pub motion: Motions,
+    /// Method and accuracy; `{"method": "auto", "target_error": 0.005}` when left out.
+    #[schema(required = false)]
+    pub solver: Solver,
+    /// What to compute; `["resultants", "zones"]` when left out.
+    #[schema(required = false)]
+    pub outputs: Vec<Output>,
+}
+
+/// Elastic constants: one set for both bodies, or one for each.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum Material {
+    /// Both bodies are of the same material.
+    Same(Elastic),
+    /// The bodies differ; they are combined as in quasi-identical contact.
+    Pair {
+        /// The lower body (body 2, the rail).
+        lower: Elastic,
+        /// The upper body (body 1, the wheel).
+        upper: Elastic,
+    },
+}
+
+/// Isotropic linear elasticity. Exactly one of the two moduli is given.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct Elastic {
+    /// Shear modulus G in MPa, more than 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(exclusive_minimum = 0.0)]
+    pub shear_modulus_mpa: Option<f64>,
+    /// Young's modulus E in MPa, more than 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(exclusive_minimum = 0.0)]
+    pub young_modulus_mpa: Option<f64>,
+    /// Poisson's ratio, 0 to 0.5.
+    #[schema(minimum = 0.0, maximum = 0.5)]
+    pub poisson_ratio: f64,
+}
+
+/// Coulomb friction with one coefficient.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct Friction {
+    /// Friction coefficient, 0 to 100 (0 = frictionless).
+    #[schema(minimum = 0.0, maximum = 100.0)]
+    pub coefficient: f64,
+}
+
+/// Where the bodies touch.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[serde(tag = "type", rename_all = "snake_case")]
+pub enum Contact {
+    /// Relative radii of curvature: an elliptic patch after Hertz.
+    Radii {
+        /// Relative radius in the rolling direction, in mm.
+        #[schema(exclusive_minimum = 0.0)]
+        rolling_mm: f64,
+        /// Relative radius across the rolling direction, in mm.
+        #[schema(exclusive_minimum = 0.0)]
+        lateral_mm: f64,
+    },
+    /// An elliptic patch with Hertz's pressure.
+    Ellipse {
+        /// Semi-axis along the rolling direction, in mm.
+        #[schema(exclusive_minimum = 0.0)]
+        a_mm: f64,
+        /// Semi-axis across the rolling direction, in mm.
+        #[schema(exclusive_minimum = 0.0)]
+        b_mm: f64,
+    },
+    /// A given pressure on a grid; its positive part is the contact region, which may have several patches.
+    PressureGrid {
+        /// Strictly increasing coordinates along the rolling direction, in mm.
+        x_mm: Vec<f64>,
+        /// Strictly increasing coordinates across, in mm.
+        y_mm: Vec<f64>,
+        /// `pressure_mpa[j][i]` at `(x_mm[i], y_mm[j])`, not negative, 0 outside the contact.
+        pressure_mpa: Vec<Vec<f64>>,
+    },
+}
+
+/// How hard the bodies are pressed together; exactly one member is given.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct Load {
+    /// Normal force in N, more than 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(exclusive_minimum = 0.0)]
+    pub normal_force_n: Option<f64>,
+    /// Approach of distant points in mm, more than 0; counted from first touch.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(exclusive_minimum = 0.0)]
+    pub approach_mm: Option<f64>,
+}
+
+/// Rolling motion of the upper body relative to the lower one, divided by the rolling speed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Motion {
+    /// Longitudinal creepage, dimensionless.
+    pub creepage_x: f64,
+    /// Lateral creepage, dimensionless.
+    pub creepage_y: f64,
+    /// Spin in 1/mm.
+    pub spin_per_mm: f64,
+}
+
+/// One motion, a list of motions on the same patch, or a sweep.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum Motions {
+    /// One motion; components left out are 0, but at least one is written.
+    One(Motion),
+    /// Several motions on the same patch, solved in order.
+    Many(Vec<Motion>),
+    /// Motions generated from ranges.
+    Sweep {
+        /// What varies, and what stays.
+        sweep: Sweep,
+    },
+}
+
+/// Ranges of the motion's components. A component left out is 0.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct Sweep {
+    /// Longitudinal creepage.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub creepage_x: Option<Range>,
+    /// Lateral creepage.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub creepage_y: Option<Range>,
+    /// Spin in 1/mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spin_per_mm: Option<Range>,
+    /// `together` (default): all ranges have the same number of points and run side by side; `grid`: every
+    /// combination, the last named component fastest.
+    #[schema(required = false)]
+    pub combine: Combine,
+}
+
+/// How several ranges of a sweep are combined.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Combine {
+    /// Side by side; all ranges have equally many points.
+    #[default]
+    Together,
+    /// Every combination.
+    Grid,
+}
+
+/// Equally spaced values, both ends included.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct Range {
+    /// First value.
+    pub from: f64,
+    /// Last value.
+    pub to: f64,
+    /// Number of values, at least 1.
+    #[schema(minimum = 1)]
+    pub points: u32,
+}
+
+/// How to solve, and how exactly.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct Solver {
+    /// The method.
+    #[schema(required = false)]
+    pub method: Method,
+    /// Allowed error of the resultants relative to μN (moment: μN√(A/π)), 1e-4 to 0.5. Excludes `mesh`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.0001, maximum = 0.5)]
+    pub target_error: Option<f64>,
+    /// An explicit mesh instead of a target.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mesh: Option<MeshSize>,
+    /// Give up after this many seconds of solving.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(exclusive_minimum = 0.0)]
+    pub time_limit_s: Option<f64>,
+}
+
+/// The methods a client can choose; each is a file of that name in `contact/tangential`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// The best method for the case (today always `boundary_element`).
+    #[default]
+    Auto,
+    /// Semismooth Newton on the projected equations, strip-preconditioned GMRES.
+    BoundaryElement,
+    /// The method of Liu and Hsu: Newton–Raphson with two initial guesses.
+    LiuHsu,
+}
+
+/// An explicit mesh: equal strips, cosine-graded cells along x, no clustering.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct MeshSize {
+    /// Strips across each patch.
+    #[schema(minimum = 1)]
+    pub strips: u32,
+    /// Cells along x in each strip.
+    #[schema(minimum = 1)]
+    pub cells: u32,
+}
+
+/// What a case may ask for; nothing else is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Output {
+    /// Forces, moment, dissipated power.
+    Resultants,
+    /// Stick and slip zones: cells, areas, outlines.
+    Zones,
+    /// Tractions per cell.
+    Tractions,
+    /// Pressure per cell.
+    Pressure,
+    /// Slip per cell.
+    Slip,
+}

@@ -1,0 +1,71 @@
+//! What can go wrong in `contact`: a case that cannot be asked, and a solve that has no answer.
+
+use thiserror::Error;
+
+use crate::contact::case::Method;
+use crate::contact::monitor::Stop;
+
+/// One fault of a case: where it is, what was given, what is allowed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Fault {
+    /// JSON pointer (RFC 6901) to the faulty member; empty for the whole case.
+    pub pointer: String,
+    /// The value given and what is allowed, as a sentence.
+    pub detail: String,
+}
+
+/// Every fault of a case at once; never empty.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("the case has {} fault(s): {}", .0.len(), .0.iter().map(|f| format!("{}: {}", f.pointer, f.detail)).collect::<Vec<_>>().join("; "))]
+pub struct CaseError(pub Vec<Fault>);
+
+/// Why a solve gave no answer.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum SolveError {
+    /// The iteration ended without meeting its tolerance.
+    #[error(
+        "{} did not converge at motion {point}: residual {residual:.3e} after {iterations} iterations, {tolerance:.1e} was needed; {advice}",
+        .method.name()
+    )]
+    NotConverged {
+        /// The method that gave up.
+        method: Method,
+        /// Which motion of the case, counted from 0.
+        point: usize,
+        /// Iterations done.
+        iterations: usize,
+        /// Residual of the best iterate, relative to the traction scale of the case.
+        residual: f64,
+        /// Residual that was needed.
+        tolerance: f64,
+        /// What to try instead, as a clause.
+        advice: String,
+    },
+    /// The caller stopped the solve.
+    #[error("the solve was cancelled")]
+    Cancelled,
+    /// The time limit of the case was reached.
+    #[error("the solve ran out of time")]
+    OutOfTime,
+}
+
+impl From<Stop> for SolveError {
+    fn from(stop: Stop) -> Self {
+        match stop {
+            Stop::Cancelled => SolveError::Cancelled,
+            Stop::OutOfTime => SolveError::OutOfTime,
+        }
+    }
+}
+
+impl Method {
+    /// The word a client uses for this method.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::Auto => "auto",
+            Method::BoundaryElement => "boundary_element",
+            Method::LiuHsu => "liu_hsu",
+        }
+    }
+}

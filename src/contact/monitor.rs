@@ -1,0 +1,35 @@
+//! How a caller follows and stops a solve. The only clock `contact` has.
+
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+/// Why a solve was stopped from outside.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stop {
+    /// The caller no longer wants the answer.
+    Cancelled,
+    /// The time allowed for the case is used up.
+    OutOfTime,
+}
+
+/// Watches a solve. Called once per strip of an assembly and once per Krylov step, so it must be cheap.
+pub trait Monitor {
+    /// Takes note of the progress (0 to 1, rough) and says whether to go on.
+    fn tick(&self, progress: f64) -> ControlFlow<Stop>;
+    /// Time since the solve began.
+    fn elapsed(&self) -> Duration;
+}
+
+/// Never stops a solve and measures no time; for tests and for callers that just want the answer.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Unwatched;
+
+impl Monitor for Unwatched {
+    fn tick(&self, _progress: f64) -> ControlFlow<Stop> {
+        ControlFlow::Continue(())
+    }
+
+    fn elapsed(&self) -> Duration {
+        Duration::ZERO
+    }
+}

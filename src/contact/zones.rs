@@ -1,0 +1,14 @@
+//! Stick or slip per cell: the names, the areas and the outlines of the zones.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// What a cell of the contact patch does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Zone {
+    /// No relative slip.
+    Stick,
+    /// The friction bound is reached and the surfaces slip.
+    Slip,
+}

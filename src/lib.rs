@@ -1,0 +1,3 @@
+//! railhead: a rolling-contact stress service.
+
+pub mod contact;
