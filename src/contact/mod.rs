@@ -4,11 +4,13 @@
 
 pub mod case;
 pub mod error;
+pub mod influence;
 pub mod mesh;
 pub mod monitor;
 pub mod normal;
 pub mod problem;
 pub mod solution;
+pub mod tangential;
 pub mod zones;
 
 use serde_json::Value;

@@ -1,0 +1,5 @@
+//! How does it drag? Tractions and slips for given pressure and motion.
+
+pub mod boundary_element;
+pub mod equations;
+pub mod rules;
