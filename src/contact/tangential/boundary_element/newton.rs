@@ -119,6 +119,12 @@ impl<'a> Newton<'a> {
         sum / (PROJECTION * self.parameter.len().max(1) as f64)
     }
 
+    /// Number of cells with unknowns.
+    #[must_use]
+    pub fn cells(&self) -> usize {
+        self.equations.cells()
+    }
+
     /// Solves for the tractions, starting from those in `t`. Without convergence `t` holds the best iterate.
     ///
     /// # Errors
