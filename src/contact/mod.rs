@@ -7,6 +7,7 @@ pub mod error;
 pub mod mesh;
 pub mod monitor;
 pub mod normal;
+pub mod outputs;
 pub mod problem;
 pub mod solution;
 pub mod zones;
