@@ -8,6 +8,7 @@ pub mod influence;
 pub mod mesh;
 pub mod monitor;
 pub mod normal;
+pub mod outputs;
 pub mod problem;
 mod read;
 pub mod solution;

@@ -1,0 +1,8 @@
+//! What is derived from stored cell values: outlines of the zones, fields on a regular grid.
+//!
+//! Pure functions of [`PatchFields`](crate::contact::solution::PatchFields); nothing here solves anything.
+
+mod loops;
+pub mod outline;
+pub mod resample;
+mod segments;
