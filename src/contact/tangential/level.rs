@@ -23,6 +23,16 @@ pub struct Scale {
 }
 
 impl Scale {
+    /// Unit of slip: traction / G, or 1 without friction, where slips are the rigid ones.
+    #[must_use]
+    pub fn slip(&self) -> f64 {
+        if self.traction > 0.0 {
+            self.traction / self.shear_modulus
+        } else {
+            1.0
+        }
+    }
+
     /// A motion about the origin of the case becomes one about [`Scale::origin`], in units of rigid slip.
     #[must_use]
     pub fn motion(&self, motion: &Motion) -> Motion {

@@ -5,6 +5,7 @@ pub mod equations;
 pub mod full_slip;
 pub mod level;
 pub mod nested;
+pub mod point;
 pub mod rules;
 
 use crate::contact::monitor::Stop;
