@@ -4,6 +4,7 @@ mod carter;
 mod case_faults;
 mod case_mutations;
 mod cases;
+mod golden;
 mod hertz;
 mod kalker;
 mod laws;
