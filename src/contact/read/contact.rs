@@ -10,7 +10,7 @@ const SEMI_AXIS: Interval = Interval::positive(1e6, "mm");
 const NORMAL_FORCE: Interval = Interval::positive(1e12, "N");
 const APPROACH: Interval = Interval::positive(1e6, "mm");
 const COORDINATE: Interval = Interval::closed(-1e6, 1e6, "mm");
-const PRESSURE: Interval = Interval::closed(0.0, 1e9, "MPa");
+const PRESSURE: Interval = Interval::closed(0.0, 1e12, "MPa");
 /// Points of one axis of a grid.
 const AXIS_POINTS: std::ops::RangeInclusive<usize> = 2..=1000;
 /// Neighbouring coordinates of an axis are at least this far apart, relative to the length of the axis.
