@@ -4,6 +4,7 @@ mod carter;
 mod case_faults;
 mod case_mutations;
 mod cases;
+mod friction;
 mod golden;
 mod hertz;
 mod kalker;
