@@ -55,6 +55,9 @@ fn against_converged(wanted: &[&str]) -> (usize, Vec<String>) {
                     .expect("value and uncertainty")
             };
             let (reference, unc) = (number("value"), number("unc"));
+            // CONTACT's C33 lies 0.7 to 1.1 % below the recomputed table at a/b of a half and a fifth.
+            let low = name == "C33" && case.a_over_b() < 0.6;
+            let allowed = if low { allowed + 0.011 } else { allowed };
             compared += 1;
             if (value - reference).abs() > allowed * reference.abs() + unc {
                 let off = 100.0 * (value / reference - 1.0);
@@ -93,12 +96,17 @@ struct Row {
 }
 
 /// Compares with the table at `strips × cells`: within `allowed` for a/b ½…2, twice that for 0.2…5.
-fn against_table(wanted: &[(&str, f64)], strips: u32, cells: u32) -> Vec<String> {
+fn against_table(
+    wanted: &[(&str, f64)],
+    ratios: impl Fn(f64) -> bool,
+    strips: u32,
+    cells: u32,
+) -> Vec<String> {
     let rows: Vec<Row> = read("kalker.json");
     let mut failures = Vec::new();
     for row in rows
         .iter()
-        .filter(|row| row.a_over_b.max(1.0 / row.a_over_b) < 5.01)
+        .filter(|row| row.a_over_b.max(1.0 / row.a_over_b) < 5.01 && ratios(row.poisson_ratio))
     {
         let factor = if row.a_over_b.max(1.0 / row.a_over_b) < 2.01 {
             1.0
@@ -134,23 +142,25 @@ fn against_table(wanted: &[(&str, f64)], strips: u32, cells: u32) -> Vec<String>
 
 #[test]
 fn tiny_creepage_gives_kalkers_coefficients() {
-    let failures = against_table(&[("C11", 0.006), ("C22", 0.006), ("C23", 0.01)], 16, 16);
+    let wanted = [("C11", 0.006), ("C22", 0.006), ("C23", 0.01)];
+    let failures = against_table(&wanted, |_| true, 16, 16);
     assert_none("coefficients at 16 x 16 cells", &failures);
 }
 
 #[test]
 fn tiny_spin_gives_kalkers_moment_coefficient() {
-    let failures = against_table(&[("C33", 0.006)], 16, 16);
-    assert_none("C33 at 16 x 16 cells", &failures);
+    let failures = against_table(&[("C33", 0.006)], |nu| nu == 0.25, 16, 16);
+    assert_none("C33 at 16 x 16 cells, ν = ¼", &failures);
 }
 
 #[test]
-fn tiny_spin_gives_kalkers_moment_coefficient_with_many_strips() {
-    // The error of C33 is one of the strips, not of the cells along them.
-    assert_none(
-        "C33 with 64 strips of 16 cells",
-        &against_table(&[("C33", 0.006)], 64, 16),
-    );
+fn tiny_spin_gives_kalkers_moment_coefficient_at_the_ends_of_poissons_ratio() {
+    // With ν = 0 or ½ sixteen strips leave up to 1.5 % (2.5 % where slender); the table's own digits are 0.5 %.
+    let failures = against_table(&[("C33", 0.015)], |nu| nu != 0.25, 16, 16);
+    assert_none("C33 at 16 x 16 cells", &failures);
+    // The error is one of the strips, not of the cells along them.
+    let failures = against_table(&[("C33", 0.006)], |_| true, 64, 16);
+    assert_none("C33 with 64 strips of 16 cells", &failures);
 }
 
 #[test]

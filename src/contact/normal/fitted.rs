@@ -36,8 +36,9 @@ impl Fitted {
 /// Chords of one patch on the strips `(y, dy)`.
 ///
 /// The mid-line's chord is too long where the patch ends inside a strip, the mean chord (exact area) too short for the
-/// forces; half way between, the errors of the resultants on 62 Hertz cases fall from 0.0018 / 0.0037 to
-/// 0.0011 / 0.0026 (median / 90 % of μN, 16 × 16 cells). Where a strip has several chords the mid-line's are kept.
+/// forces. `(1 − θ)` of the one and θ of the other, `θ = ½ / (1 + ½ (a/b)²)` with the longest half chord a and the half
+/// width b of the patch, lowers the errors of the resultants on 62 Hertz cases by a third and Kalker's C33 with it.
+/// Where a strip has several chords the mid-line's are kept.
 #[must_use]
 pub fn chords(region: &Region, patch: usize, strips: &[(f64, f64)]) -> Vec<Fitted> {
     let lines = region.chords(patch, strips);
@@ -48,27 +49,31 @@ pub fn chords(region: &Region, patch: usize, strips: &[(f64, f64)]) -> Vec<Fitte
             .count()
             == 1
     };
-    lines
+    let longest = lines
         .iter()
-        .map(|line| {
-            let mean = if alone(line) {
-                mean_length(region, patch, line)
-            } else {
-                None
-            };
-            let length = line.right - line.left;
-            let half = 0.25 * (length + mean.unwrap_or(length));
-            let middle = 0.5 * (line.left + line.right);
-            Fitted {
-                chord: Chord {
-                    left: middle - half,
-                    right: middle + half,
-                    ..*line
-                },
-                line: *line,
-            }
-        })
-        .collect()
+        .map(|line| line.right - line.left)
+        .fold(0.0, f64::max);
+    let width: f64 = strips.iter().map(|(_, dy)| dy).sum();
+    let share = 0.5 / (1.0 + 0.5 * (longest / width).powi(2));
+    let fit = |line: &Chord| {
+        let mean = if alone(line) {
+            mean_length(region, patch, line)
+        } else {
+            None
+        };
+        let length = line.right - line.left;
+        let half = 0.5 * ((1.0 - share) * length + share * mean.unwrap_or(length));
+        let middle = 0.5 * (line.left + line.right);
+        Fitted {
+            chord: Chord {
+                left: middle - half,
+                right: middle + half,
+                ..*line
+            },
+            line: *line,
+        }
+    };
+    lines.iter().map(fit).collect()
 }
 
 /// Mean length of the chords over a strip; nothing if there is more than one on any of its lines.
@@ -122,7 +127,7 @@ mod tests {
             let (chords, lines) = area(strips);
             let error = |area: f64| (area - std::f64::consts::PI).abs();
             assert!(
-                error(chords) < 0.6 * error(lines),
+                error(chords) < 0.8 * error(lines),
                 "{strips} {chords} {lines}"
             );
         }
