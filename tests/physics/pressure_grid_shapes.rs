@@ -2,9 +2,10 @@
 
 use std::f64::consts::PI;
 
+use proptest::prelude::*;
 use railhead::contact::normal::prescribed::PressureField;
 
-use crate::pressure_samples::{Samples, strip_load};
+use crate::pressure_samples::{Samples, strip_load, strips};
 
 #[test]
 fn two_patches_keep_their_own_load() {
@@ -182,4 +183,75 @@ fn a_cut_contact_is_remarked() {
     assert!(cut[0].contains("does not fall to 0 at the edge"), "{cut:?}");
     let x_max = field.patches()[0].extent[1];
     assert!(x_max > 0.5 && x_max < 0.5 + 1.7 / 20.0, "{x_max}");
+}
+
+/// Any grid: axes with spacings over two decades, pressures over six, many zeros.
+fn any_grid() -> impl Strategy<Value = (Vec<f64>, Vec<f64>, Vec<Vec<f64>>)> {
+    let axis = |n: usize| {
+        let spacings = prop::collection::vec(-1.0..1.0_f64, n);
+        spacings.prop_map(|exponents| {
+            let sum = |at: &mut f64, exponent: f64| {
+                *at += 10.0_f64.powf(exponent);
+                Some(*at)
+            };
+            exponents.into_iter().scan(0.0, sum).collect::<Vec<f64>>()
+        })
+    };
+    let pressure = prop_oneof![3 => Just(0.0), 5 => (-3.0..3.0_f64).prop_map(|e| 10.0_f64.powf(e))];
+    (2..9_usize, 2..9_usize).prop_flat_map(move |(nx, ny)| {
+        let rows = prop::collection::vec(prop::collection::vec(pressure.clone(), nx), ny);
+        (axis(nx), axis(ny), rows)
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 500, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn any_grid_gives_sound_patches_and_chords((x, y, pressure) in any_grid()) {
+        let Ok((field, _)) = PressureField::new(&x, &y, &pressure) else {
+            prop_assert!(pressure.iter().flatten().all(|p| *p == 0.0));
+            return Ok(());
+        };
+        let width = |axis: &[f64], k: usize| {
+            let last = axis.len() - 1;
+            let step = |k: usize| axis[k] - axis[k - 1];
+            0.5 * (step(k.max(1)) + step((k + 1).min(last)))
+        };
+        let samples: f64 = (0..y.len())
+            .flat_map(|j| (0..x.len()).map(move |i| (i, j)))
+            .map(|(i, j)| pressure[j][i] * width(&x, i) * width(&y, j))
+            .sum();
+        let force: f64 = field.patches().iter().map(|patch| patch.normal_force).sum();
+        prop_assert!((force / samples - 1.0).abs() < 1e-12, "{force} {samples}");
+        for (k, patch) in field.patches().iter().enumerate() {
+            let [x_min, x_max, y_min, y_max] = patch.extent;
+            prop_assert!(x_min < x_max && y_min < y_max && patch.area > 0.0, "{patch:?}");
+            prop_assert!(patch.area <= (x_max - x_min) * (y_max - y_min) * 1.02, "{patch:?}");
+            let chords = field.chords(k, &strips(&field, k, 13));
+            prop_assert!(!chords.is_empty());
+            for pair in chords.windows(2) {
+                prop_assert!(pair[0].strip < pair[1].strip || pair[0].right < pair[1].left, "{pair:?}");
+            }
+            for chord in &chords {
+                let slack = 0.05 * (x_max - x_min);
+                prop_assert!(chord.left < chord.right && chord.patch == k);
+                prop_assert!(chord.left > x_min - slack && chord.right < x_max + slack, "{chord:?} {patch:?}");
+                let mean = field.mean_pressure(chord, chord.left, chord.right);
+                prop_assert!(mean > 0.0 && mean < 1e5, "{mean}");
+            }
+        }
+    }
+
+    #[test]
+    fn turning_the_grid_round_turns_the_patches((x, y, pressure) in any_grid()) {
+        let Ok((field, _)) = PressureField::new(&x, &y, &pressure) else {
+            return Ok(());
+        };
+        let back = |axis: &[f64]| axis.iter().rev().map(|x| -x).collect::<Vec<f64>>();
+        let rows: Vec<Vec<f64>> = pressure.iter().map(|row| row.iter().rev().copied().collect()).collect();
+        let (mirrored, _) = PressureField::new(&back(&x), &y, &rows).unwrap();
+        let total = |field: &PressureField| field.patches().iter().map(|patch| patch.area).sum::<f64>();
+        prop_assert!((total(&field) / total(&mirrored) - 1.0).abs() < 1e-6, "{} {}", total(&field), total(&mirrored));
+    }
 }

@@ -50,33 +50,19 @@ pub(super) fn label_samples(grid: &Grid, q: &[f64]) -> Result<(Vec<u8>, usize), 
 }
 
 /// Label of every cell between four samples, stored like the samples at its corner of smallest x and y: that of its
-/// corners, or else that of a neighbouring cell, so that the region may bulge out a little between samples.
+/// corners, of which no two belong to different patches.
 pub(super) fn label_cells(grid: &Grid, samples: &[u8]) -> Vec<u8> {
     let (nx, ny) = (grid.x.len(), grid.y.len());
-    let mut touching = vec![NOWHERE; nx * ny];
+    let mut labels = vec![NOWHERE; nx * ny];
     for j in 0..ny - 1 {
         for i in 0..nx - 1 {
-            let corners = [
-                j * nx + i,
-                j * nx + i + 1,
-                (j + 1) * nx + i,
-                (j + 1) * nx + i + 1,
-            ];
-            touching[corners[0]] = corners
+            let k = j * nx + i;
+            let corners = [k, k + 1, k + nx, k + nx + 1];
+            labels[k] = corners
                 .map(|k| samples[k])
                 .into_iter()
                 .min()
                 .unwrap_or(NOWHERE);
-        }
-    }
-    let mut labels = touching.clone();
-    for j in 1..ny - 1 {
-        for i in 1..nx - 1 {
-            if touching[j * nx + i] != NOWHERE {
-                continue;
-            }
-            let around = (j - 1..=j + 1).flat_map(|j| (i - 1..=i + 1).map(move |i| j * nx + i));
-            labels[j * nx + i] = around.map(|k| touching[k]).min().unwrap_or(NOWHERE);
         }
     }
     labels

@@ -10,23 +10,25 @@ use crate::contact::normal::prescribed::Grid;
 const RINGS: usize = 3;
 /// Value of samples farther out; the largest inside is 1.
 const FAR: f64 = -1.0;
-/// What is known of a sample.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum State {
-    /// Nothing yet.
+/// What is known of a sample, from least to best.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum State {
+    /// Nothing.
     Unknown,
-    /// Positive, or continued smoothly.
-    Known,
     /// Continued beyond a jump of pressure by repetition; a curve through the jump would fall without end.
     Step,
+    /// Continued from fewer than three samples, or limited.
+    Rough,
+    /// Positive, or continued by a parabola through smooth samples.
+    Smooth,
 }
 
 /// Replaces the zeros of `q` near positive samples by extrapolated values, none of them positive; `q` is scaled to at
-/// most 1 and stored as [`Grid`] says.
-pub(super) fn extend(grid: &Grid, q: &mut [f64]) {
+/// most 1 and stored as [`Grid`] says. Returns how each sample is known.
+pub(super) fn extend(grid: &Grid, q: &mut [f64]) -> Vec<State> {
     let state_of = |q: &f64| {
         if *q > 0.0 {
-            State::Known
+            State::Smooth
         } else {
             State::Unknown
         }
@@ -58,6 +60,7 @@ pub(super) fn extend(grid: &Grid, q: &mut [f64]) {
             *q = FAR;
         }
     }
+    states
 }
 
 /// Which samples have a positive one at most [`RINGS`] away along x and along y.
@@ -72,7 +75,8 @@ fn near_positive(grid: &Grid, q: &[f64]) -> Vec<bool> {
         .collect()
 }
 
-/// Value of the unknown sample `k`: the mean of the best extrapolations along the axes, if there is any.
+/// Value of the unknown sample `k` from the best extrapolations along the axes, if there is any: their harmonic mean,
+/// so that a weak patch is not squeezed by the steep end of a strong one beside it.
 fn continued(
     grid: &Grid,
     q: &[f64],
@@ -87,11 +91,12 @@ fn continued(
         (&grid.y, k / nx, nx as isize, -1),
         (&grid.y, k / nx, nx as isize, 1),
     ];
-    let (mut best, mut sum, mut count, mut step) = (0, 0.0, 0.0, false);
+    let (mut best, mut inverse_sum, mut count, mut state) = (0, 0.0, 0.0, State::Smooth);
     for (axis, at, stride, sign) in directions {
         // Up to three known samples in this direction, nearest first, as (coordinate, value).
         let mut known = [(0.0, 0.0); 3];
         let mut order = 0;
+        let mut worst = State::Smooth;
         while let Some(index) = at.checked_add_signed(sign * (order as isize + 1))
             && order < 3
             && index < axis.len()
@@ -101,52 +106,69 @@ fn continued(
                 break;
             }
             known[order] = (axis[index], q[sample]);
+            worst = worst.min(states[sample]);
             order += 1;
         }
         if order == 0 || order < best {
             continue;
         }
-        let nearest = k.wrapping_add_signed(sign * stride);
-        let (value, is_step) = match states[nearest] {
-            State::Step => (q[nearest], true),
-            _ if first_pass => edge_value(axis[at], &known[..order]),
-            _ => (
-                extrapolate(axis[at], &known[..order]).min(known[0].1),
-                false,
-            ),
-        };
         if order > best {
-            (best, sum, count, step) = (order, 0.0, 0.0, false);
+            (best, inverse_sum, count, state) = (order, 0.0, 0.0, State::Smooth);
         }
-        sum += value;
+        let known = &known[..order];
+        let nearest = states[k.wrapping_add_signed(sign * stride)];
+        let (value, how) = match nearest {
+            State::Step => (known[0].1, State::Step),
+            _ if first_pass => edge_value(axis[at], known),
+            _ => outward_value(axis[at], known),
+        };
+        // Zero stays zero.
+        inverse_sum += 1.0 / value.min(-1e-300);
         count += 1.0;
-        step |= is_step;
+        state = state.min(how).min(worst.max(State::Rough));
     }
-    let state = if step { State::Step } else { State::Known };
-    (best > 0).then_some((sum / count, state))
+    (best > 0).then_some((count / inverse_sum, state))
 }
 
-/// Value of the first sample outside, from one to three samples inside, and whether the pressure jumps there.
+/// Value of the first sample outside, from one to three samples inside, and how it is known.
 ///
 /// The value is never positive, so the edge lies between the last sample inside and the first outside. Where the
 /// pressure jumps (extrapolation stays well above 0) the edge is put half-way; in between the rule changes over
 /// smoothly.
-fn edge_value(at: f64, inside: &[(f64, f64)]) -> (f64, bool) {
+fn edge_value(at: f64, inside: &[(f64, f64)]) -> (f64, State) {
     const EDGE_AT_SAMPLE: f64 = 0.25;
     const JUMP: f64 = 0.75;
     let last = inside[0].1;
     if inside.len() == 1 {
-        return (-last, true);
+        return (-last, State::Step);
     }
-    let mut value = extrapolate(at, inside);
-    if value > 0.0 && inside.len() == 3 {
-        value = value.min(extrapolate(at, &inside[..2]));
-    }
+    let value = extrapolate(at, inside);
     if value <= 0.0 {
-        return (value, false);
+        return (
+            value,
+            if inside.len() == 3 {
+                State::Smooth
+            } else {
+                State::Rough
+            },
+        );
+    }
+    let value = value.min(extrapolate(at, &inside[..2]));
+    if value <= EDGE_AT_SAMPLE * last {
+        return (value.min(0.0), State::Rough);
     }
     let jump = (value / last - EDGE_AT_SAMPLE) / (JUMP - EDGE_AT_SAMPLE);
-    (-last * jump.clamp(0.0, 1.0), jump > 0.0)
+    (-last * jump.min(1.0), State::Step)
+}
+
+/// Value of a sample farther out, from one to three known ones; it does not rise outward.
+fn outward_value(at: f64, known: &[(f64, f64)]) -> (f64, State) {
+    let value = extrapolate(at, known);
+    let smooth = known.len() == 3 && value <= known[0].1;
+    (
+        value.min(known[0].1),
+        if smooth { State::Smooth } else { State::Rough },
+    )
 }
 
 /// Value at `at` of the polynomial of least degree through the points (Lagrange).
@@ -199,11 +221,11 @@ mod tests {
             let (value, _) = edge_value(2.0, &[(1.0, last), (0.0, next)]);
             assert!(value <= 0.0, "{next}: {value}");
         }
-        assert_eq!(edge_value(2.0, &[(1.0, last)]), (-last, true));
+        assert_eq!(edge_value(2.0, &[(1.0, last)]), (-last, State::Step));
         let flat = [(1.0, last), (0.0, last), (-1.0, last)];
-        assert_eq!(edge_value(2.0, &flat), (-last, true));
+        assert_eq!(edge_value(2.0, &flat), (-last, State::Step));
         // A parabola that reaches 0 just at the sample keeps its edge there in spite of rounding.
         let hertz = [(1.0, 3.0), (0.0, 4.0), (-1.0, 3.0 + 1e-15)];
-        assert_eq!(edge_value(2.0, &hertz), (0.0, false));
+        assert_eq!(edge_value(2.0, &hertz), (0.0, State::Rough));
     }
 }

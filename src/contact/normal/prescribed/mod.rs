@@ -14,7 +14,8 @@ mod shape;
 use crate::contact::mesh::Chord;
 use crate::contact::normal::Patch;
 use interpolation::{interval, weights};
-use line::{Direction, Line};
+use level_set::State;
+use line::Line;
 use shape::Shape;
 
 /// Patches of one grid.
@@ -36,7 +37,9 @@ pub struct PressureField {
     grid: Grid,
     /// Squared pressure relative to its largest value, continued below 0 outside the contact.
     q: Vec<f64>,
-    /// Patch of every cell of the grid.
+    /// Samples that are positive or continued by a parabola.
+    smooth: Vec<bool>,
+    /// Patch of every cell of the grid that touches one of its samples.
     cells: Vec<u8>,
     /// Largest pressure in MPa.
     pressure_max: f64,
@@ -79,15 +82,20 @@ impl PressureField {
         let mut field = PressureField {
             grid,
             q,
+            smooth: Vec::new(),
             cells,
             pressure_max,
             shapes: Vec::new(),
         };
         let mut shapes = field.shapes_from_samples(&samples, count);
         let warnings = field.warnings(&samples, &shapes);
-        level_set::extend(&field.grid, &mut field.q);
+        let states = level_set::extend(&field.grid, &mut field.q);
+        field.smooth = states
+            .into_iter()
+            .map(|state| state == State::Smooth)
+            .collect();
         for (label, shape) in shapes.iter_mut().enumerate() {
-            field.measure(label, shape);
+            (shape.patch.extent, shape.patch.area) = field.measure(label, shape);
         }
         field.shapes = shapes;
         Ok((field, warnings))
@@ -117,7 +125,7 @@ impl PressureField {
     pub fn chords(&self, patch: usize, strips: &[(f64, f64)]) -> Vec<Chord> {
         let mut chords = Vec::new();
         for (strip, &(y, dy)) in strips.iter().enumerate() {
-            let segments = self.line(patch, Direction::Rolling, y).segments();
+            let segments = self.segments(&self.shapes[patch], patch, y);
             chords.extend(segments.into_iter().map(|(left, right)| Chord {
                 patch,
                 strip,
@@ -145,7 +153,7 @@ impl PressureField {
         let j = self.row_interval(chord.y);
         let weights = weights(&self.grid.y, j, chord.y);
         let (first, last) = (self.column_interval(low), self.column_interval(high));
-        let cubic = |i: usize| line::cubic(x, i, |i| self.column_value(i, j, weights));
+        let cubic = |i: usize| line::cubic(x, i, |i| self.value_on_column(i, j, weights));
         if x0 == x1 {
             return self.pressure_max * cubic(first).at(low).sqrt();
         }
@@ -170,64 +178,83 @@ impl PressureField {
         self.pressure_max * integral / (x1 - x0)
     }
 
-    fn line(&self, patch: usize, direction: Direction, position: f64) -> Line<'_> {
-        self.line_of(&self.shapes[patch], patch, direction, position)
-    }
-
-    /// The values along a line through a patch, in the cells that may belong to it.
-    fn line_of(
-        &self,
-        shape: &Shape,
-        label: usize,
-        direction: Direction,
-        position: f64,
-    ) -> Line<'_> {
-        let nx = self.grid.x.len();
-        let (axis, cross_axis, range, cross_range, stride, cross_stride) = match direction {
-            Direction::Rolling => (
-                &self.grid.x,
-                &self.grid.y,
-                &shape.columns,
-                &shape.rows,
-                1,
-                nx,
-            ),
-            Direction::Across => (
-                &self.grid.y,
-                &self.grid.x,
-                &shape.rows,
-                &shape.columns,
-                nx,
-                1,
-            ),
-        };
-        let cross = interval(cross_axis, position);
-        let outside = cross_axis[cross] > position || cross_axis[cross + 1] < position;
-        if outside || !cross_range.contains(&cross) {
-            return Line::empty(axis);
+    /// Where the line at y lies in a patch: segments from smaller to larger x.
+    fn segments(&self, shape: &Shape, label: usize, y: f64) -> Vec<(f64, f64)> {
+        let Grid { x, y: rows } = &self.grid;
+        let j = interval(rows, y);
+        if rows[j] > y || rows[j + 1] < y || !shape.rows.contains(&j) {
+            return Vec::new();
         }
-        let weights = weights(cross_axis, cross, position);
-        let value = |k: usize| {
-            interpolated(weights, |m| {
-                self.q[k * stride + (cross - 1 + m) * cross_stride]
-            })
-        };
+        let t = (y - rows[j]) / (rows[j + 1] - rows[j]);
+        let weights = weights(rows, j, y);
         // One more node on either side for the tangents.
-        let nodes = range.start() - 1..=range.end() + 2;
-        Line {
-            axis,
+        let nodes = shape.columns.start() - 1..=shape.columns.end() + 2;
+        let line = Line {
+            axis: x,
             first: *nodes.start(),
-            values: nodes.map(value).collect(),
-            open: range
+            values: nodes.map(|i| self.value_on_column(i, j, weights)).collect(),
+            smooth: shape
+                .columns
                 .clone()
-                .map(|k| usize::from(self.cells[k * stride + cross * cross_stride]) == label)
+                .map(|i| self.is_smooth(i, j))
                 .collect(),
+            allowed: shape
+                .columns
+                .clone()
+                .map(|i| self.allowed(label, i, j, t))
+                .collect(),
+        };
+        line.segments()
+    }
+
+    /// The part of cell (i, j) along x that may belong to a patch, on the line at the fraction t of its width.
+    ///
+    /// Cells that touch a sample of the patch belong to it as a whole. The edge may bulge out of them by a little where
+    /// it is smooth and runs nearly parallel to the grid (by an eighth of the squared spacing over the radius); farther
+    /// out the curve is not to be trusted.
+    fn allowed(&self, label: usize, i: usize, j: usize, t: f64) -> [f64; 2] {
+        const BULGE: f64 = 0.125;
+        let nx = self.grid.x.len();
+        let cell = j * nx + i;
+        let touches = |cell: usize| usize::from(self.cells[cell]) == label;
+        if touches(cell) {
+            return [0.0, 1.0];
+        }
+        if !self.is_smooth(i, j) {
+            return [0.0, 0.0];
+        }
+        if (touches(cell - nx) && t <= BULGE) || (touches(cell + nx) && t >= 1.0 - BULGE) {
+            return [0.0, 1.0];
+        }
+        match (touches(cell - 1), touches(cell + 1)) {
+            (true, false) => [0.0, BULGE],
+            (false, true) => [1.0 - BULGE, 1.0],
+            _ => [0.0, 0.0],
         }
     }
 
-    fn column_value(&self, i: usize, j: usize, weights: [f64; 4]) -> f64 {
+    /// Are the four corners of cell (i, j) smooth?
+    fn is_smooth(&self, i: usize, j: usize) -> bool {
         let nx = self.grid.x.len();
-        interpolated(weights, |m| self.q[(j - 1 + m) * nx + i])
+        let k = j * nx + i;
+        [k, k + 1, k + nx, k + nx + 1]
+            .iter()
+            .all(|k| self.smooth[*k])
+    }
+
+    /// Value on column i between the rows j and j + 1.
+    fn value_on_column(&self, i: usize, j: usize, weights: [f64; 4]) -> f64 {
+        let nx = self.grid.x.len();
+        let k = j * nx + i;
+        let nodes = [k - nx, k, k + nx, k + 2 * nx];
+        let value: f64 = weights
+            .iter()
+            .zip(nodes)
+            .map(|(weight, k)| weight * self.q[k])
+            .sum();
+        let smooth = self.smooth[k] && self.smooth[k + nx];
+        let [low, high] = line::bounds(self.q[k], self.q[k + nx], smooth);
+        value.clamp(low, high)
     }
 
     fn row_interval(&self, y: f64) -> usize {
@@ -237,17 +264,6 @@ impl PressureField {
     fn column_interval(&self, x: f64) -> usize {
         interval(&self.grid.x, x).clamp(1, self.grid.x.len() - 3)
     }
-}
-
-/// Value between four nodes; between two positive ones it stays positive, whatever the curve does in between.
-fn interpolated(weights: [f64; 4], node: impl Fn(usize) -> f64) -> f64 {
-    let nodes: [f64; 4] = std::array::from_fn(node);
-    let value: f64 = weights
-        .iter()
-        .zip(nodes)
-        .map(|(weight, node)| weight * node)
-        .sum();
-    value.max(line::floor(nodes[1], nodes[2]))
 }
 
 /// An axis with [`PADDING`] more points on each side, spaced like the outermost ones.

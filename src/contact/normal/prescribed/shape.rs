@@ -5,11 +5,11 @@ use std::ops::RangeInclusive;
 
 use crate::contact::normal::Patch;
 use crate::contact::normal::prescribed::components::NOWHERE;
-use crate::contact::normal::prescribed::line::Direction;
 use crate::contact::normal::prescribed::{PADDING, PressureField};
 
-/// A patch with fewer samples along or across has an uncertain edge.
-const SAMPLES_ACROSS_MIN: usize = 4;
+/// A patch with fewer samples along or across has an uncertain edge, and a force off by more than about 2 %: measured
+/// on Hertz's pressure, the sum of the samples is off by up to 2 % with 9 of them, 0.5 % with 18.
+const SAMPLES_ACROSS_MIN: usize = 8;
 
 /// One patch and the cells it may occupy.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,53 +63,60 @@ impl PressureField {
             .collect()
     }
 
-    /// Extent and area of a patch, by lines through it.
-    pub(super) fn measure(&self, label: usize, shape: &mut Shape) {
-        let [x_min, x_max] = self.extent(shape, label, Direction::Across);
-        let [y_min, y_max] = self.extent(shape, label, Direction::Rolling);
-        shape.patch.extent = [x_min, x_max, y_min, y_max];
+    /// Extent `[x_min, x_max, y_min, y_max]` and area of a patch, by lines through it.
+    pub(super) fn measure(&self, label: usize, shape: &Shape) -> ([f64; 4], f64) {
+        let [y_min, y_max] = self.extent_across(shape, label);
         // Chords have a root at both ends of the patch, so the lines crowd there.
         let lines = 64 + 2 * shape.rows.clone().count();
         let (middle, half) = (0.5 * (y_min + y_max), 0.5 * (y_max - y_min));
         let step = PI / lines as f64;
-        let area: f64 = (0..lines)
-            .map(|n| {
-                let theta = (n as f64 + 0.5) * step;
-                let line = self.line_of(
-                    shape,
-                    label,
-                    Direction::Rolling,
-                    middle - half * theta.cos(),
-                );
-                let length: f64 = line
-                    .segments()
-                    .iter()
-                    .map(|(left, right)| right - left)
-                    .sum();
-                length * half * theta.sin() * step
-            })
-            .sum();
-        shape.patch.area = area;
+        let at = |n: f64| middle - half * (n * step).cos();
+        let ends = |y: f64| {
+            let segments = self.segments(shape, label, y);
+            let length: f64 = segments.iter().map(|(left, right)| right - left).sum();
+            let left = segments.first().map_or(f64::INFINITY, |first| first.0);
+            let right = segments.last().map_or(f64::NEG_INFINITY, |last| last.1);
+            (left, right, length)
+        };
+        let (mut x_min, mut x_max) = ((f64::INFINITY, 0.0), (f64::NEG_INFINITY, 0.0));
+        let mut widen = |n: f64, left: f64, right: f64| {
+            x_min = if left < x_min.0 { (left, n) } else { x_min };
+            x_max = if right > x_max.0 { (right, n) } else { x_max };
+        };
+        let mut area = 0.0;
+        for n in 0..lines {
+            let n = n as f64 + 0.5;
+            let (left, right, length) = ends(at(n));
+            area += length * half * (n * step).sin() * step;
+            widen(n, left, right);
+        }
+        // A rough patch may be longest just on a row of samples.
+        for y in self.grid.y.iter().filter(|y| y_min < **y && **y < y_max) {
+            let (left, right, _) = ends(*y);
+            widen(((middle - y) / half).acos() / step, left, right);
+        }
+        let (first, last) = (|n: f64| -ends(at(n)).0, |n: f64| ends(at(n)).1);
+        let bracket = |n: f64| [(n - 1.0).max(0.0), (n + 1.0).min(lines as f64)];
+        let extent = [
+            -maximum(bracket(x_min.1), first).max(-x_min.0),
+            maximum(bracket(x_max.1), last).max(x_max.0),
+            y_min,
+            y_max,
+        ];
+        (extent, area)
     }
 
-    /// First and last position of lines in `direction` that meet the patch.
-    fn extent(&self, shape: &Shape, label: usize, direction: Direction) -> [f64; 2] {
+    /// First and last y of lines that meet the patch.
+    fn extent_across(&self, shape: &Shape, label: usize) -> [f64; 2] {
         const STEPS: usize = 50;
-        let (axis, range) = match direction {
-            Direction::Rolling => (&self.grid.y, &shape.rows),
-            Direction::Across => (&self.grid.x, &shape.columns),
-        };
+        let y = &self.grid.y;
         // The outermost samples are two lines inside the range of cells (see `shapes_from_samples`).
-        let [first, last] = [*range.start(), *range.end() + 1];
+        let [first, last] = [*shape.rows.start(), *shape.rows.end() + 1];
         [(first, first + 2), (last, last - 2)].map(|(outside, inside)| {
-            let (mut outside, mut inside) = (axis[outside], axis[inside]);
+            let (mut outside, mut inside) = (y[outside], y[inside]);
             for _ in 0..STEPS {
                 let middle = 0.5 * (outside + inside);
-                if self
-                    .line_of(shape, label, direction, middle)
-                    .segments()
-                    .is_empty()
-                {
+                if self.segments(shape, label, middle).is_empty() {
                     outside = middle;
                 } else {
                     inside = middle;
@@ -137,10 +144,31 @@ impl PressureField {
             );
             if along.min(across) < SAMPLES_ACROSS_MIN {
                 warnings.push(format!(
-                    "patch {label} has only {along} by {across} samples of pressure; its edge is uncertain"
+                    "patch {label} has only {along} by {across} samples of pressure; its force and its edge are uncertain by some per cent"
                 ));
             }
         }
         warnings
     }
+}
+
+/// Largest value of a function with one hump in an interval, by golden section (Kiefer 1953).
+fn maximum([mut low, mut high]: [f64; 2], f: impl Fn(f64) -> f64) -> f64 {
+    const STEPS: usize = 40;
+    const SHORT: f64 = 0.381_966_011_250_105_1;
+    let point = |low: f64, high: f64, part: f64| low + part * (high - low);
+    let (mut left, mut right) = (point(low, high, SHORT), point(low, high, 1.0 - SHORT));
+    let (mut at_left, mut at_right) = (f(left), f(right));
+    for _ in 0..STEPS {
+        if at_left > at_right {
+            (high, right, at_right) = (right, left, at_left);
+            left = point(low, high, SHORT);
+            at_left = f(left);
+        } else {
+            (low, left, at_left) = (left, right, at_right);
+            right = point(low, high, 1.0 - SHORT);
+            at_right = f(right);
+        }
+    }
+    at_left.max(at_right)
 }
