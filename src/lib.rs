@@ -1,3 +1,4 @@
 //! railhead: a rolling-contact stress service.
 
 pub mod contact;
+pub mod jobs;
