@@ -1,0 +1,3 @@
+//! Does the service behave?
+
+mod contract;
