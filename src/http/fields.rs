@@ -12,7 +12,7 @@ use crate::contact::outputs::resample::resample;
 use crate::contact::solution::{PatchFields, PointFields};
 use crate::contact::zones::Zone;
 use crate::http::error::ApiError;
-use crate::http::jobs::JobId;
+use crate::http::job::JobId;
 use crate::http::problems::problems;
 use crate::http::query::{Query, whole};
 use crate::http::results::{INDEX, index, not_asked};

@@ -7,8 +7,9 @@ use utoipa::ToSchema;
 
 use crate::contact::case::{Method, Output};
 use crate::http::HttpOptions;
-use crate::http::jobs::{LIST_LIMIT_MAX, WAIT_MAX_SECONDS};
+use crate::http::jobs::WAIT_MAX_SECONDS;
 use crate::http::problems::Always;
+use crate::jobs::PAGE_MAX;
 
 /// What the service can do.
 #[derive(Debug, Serialize, ToSchema)]
@@ -100,7 +101,7 @@ pub async fn methods(State(options): State<HttpOptions>) -> Json<Abilities> {
         limits: RequestLimits {
             body_max_bytes: options.body_max_bytes,
             wait_max_seconds: WAIT_MAX_SECONDS,
-            list_limit_max: LIST_LIMIT_MAX,
+            list_limit_max: PAGE_MAX,
         },
         version: env!("CARGO_PKG_VERSION"),
     })

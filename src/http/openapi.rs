@@ -8,7 +8,7 @@ use utoipa::OpenApi;
 use utoipa::openapi::RefOr;
 use utoipa::openapi::example::ExampleBuilder;
 
-use crate::http::error::Problem;
+use crate::http::problem::Problem;
 use crate::http::resources;
 
 #[derive(OpenApi)]

@@ -3,7 +3,8 @@
 use axum::extract::Query as Pairs;
 use axum::http::Uri;
 
-use crate::http::error::{ApiError, Fault};
+use crate::http::error::ApiError;
+use crate::http::problem::Fault;
 
 /// The parameters of one request and the faults found in them so far.
 #[derive(Debug)]

@@ -12,7 +12,7 @@ use uuid::Uuid;
 use crate::contact::case::{Motion, Output};
 use crate::contact::solution::{ErrorEstimate, Origin, Solution, Total};
 use crate::http::error::{ApiError, Kind};
-use crate::http::jobs::JobId;
+use crate::http::job::JobId;
 use crate::http::problems::problems;
 use crate::http::query::{Query, whole};
 use crate::jobs::Jobs;

@@ -13,7 +13,7 @@ use crate::contact::solution::PatchFields;
 use crate::contact::zones::Zone;
 use crate::http::error::ApiError;
 use crate::http::fields::{Cells, FieldProblems, GriddedField, Selection, per_cell, write_json};
-use crate::http::jobs::JobId;
+use crate::http::job::JobId;
 use crate::http::results::{not_asked, require_index};
 use crate::jobs::Jobs;
 
