@@ -9,6 +9,7 @@ pub mod monitor;
 pub mod normal;
 pub mod outputs;
 pub mod problem;
+mod read;
 pub mod solution;
 pub mod zones;
 
@@ -22,9 +23,14 @@ use crate::contact::solution::{Fields, Solution};
 /// Reads and checks a case.
 ///
 /// # Errors
-/// Every fault of the case at once.
-pub fn check(_case: &Value, _limits: &Limits) -> Result<Problem, CaseError> {
-    todo!("read the case, then Problem::new")
+/// Every fault of the case at once: those of the text, and those of its sound parts against physics and limits.
+pub fn check(case: &Value, limits: &Limits) -> Result<Problem, CaseError> {
+    let (draft, mut faults) = read::draft(case);
+    if !faults.is_empty() {
+        faults.extend(draft.faults_beside(limits));
+        return Err(CaseError(faults));
+    }
+    Problem::new(&draft.complete().ok_or(CaseError(faults))?, limits)
 }
 
 /// Solves a checked case.

@@ -3,15 +3,26 @@
 pub mod hertz;
 pub mod prescribed;
 
+use crate::contact::case::{Contact, Load};
+use crate::contact::error::Fault;
 use crate::contact::mesh::Chord;
+use crate::contact::normal::hertz::{Ellipse, Pressing};
+use crate::contact::normal::prescribed::PressureField;
+
+/// Pressures in MPa, lengths in mm and ratios of semi-axes beyond which a patch is a mistake rather than a contact.
+const PRESSURE_MAX: f64 = 1e9;
+const PRESSURE_MIN: f64 = 1e-20;
+const SEMI_AXIS_MAX: f64 = 1e6;
+const SEMI_AXIS_MIN: f64 = 1e-9;
+const SLENDERNESS_MAX: f64 = 1e4;
 
 /// A contact region with its pressure.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Region {
     /// Hertz's ellipse, in closed form.
-    Ellipse(hertz::Ellipse),
+    Ellipse(Ellipse),
     /// A pressure given on a grid.
-    Grid(prescribed::PressureField),
+    Grid(PressureField),
 }
 
 /// What is known of one patch before anything is meshed.
@@ -32,6 +43,93 @@ pub struct Patch {
 }
 
 impl Region {
+    /// Hertz's ellipse for `radii` or `ellipse`, with the contact modulus `E*` in MPa.
+    ///
+    /// # Errors
+    /// A fault at `/load` or `/contact` if the patch is absurdly large, small, slender or heavily loaded.
+    pub fn hertz(contact: &Contact, load: &Load, contact_modulus: f64) -> Result<Region, Fault> {
+        let pressing = match (load.normal_force_n, load.approach_mm) {
+            (Some(force), _) => Pressing::Force(force),
+            (None, approach) => Pressing::Approach(approach.unwrap_or(f64::NAN)),
+        };
+        let ellipse = match *contact {
+            Contact::Radii {
+                rolling_mm,
+                lateral_mm,
+            } => Ellipse::of_radii(rolling_mm, lateral_mm, pressing, contact_modulus),
+            Contact::Ellipse { a_mm, b_mm } => {
+                Ellipse::of_semi_axes(a_mm, b_mm, pressing, contact_modulus)
+            }
+            Contact::PressureGrid { .. } => {
+                return Err(fault(
+                    "/contact/type",
+                    "a pressure_grid carries its own pressure".to_owned(),
+                ));
+            }
+        };
+        let [a, b] = [ellipse.a, ellipse.b];
+        let semi_axes = SEMI_AXIS_MIN..=SEMI_AXIS_MAX;
+        if !semi_axes.contains(&a) || !semi_axes.contains(&b) {
+            return Err(fault(
+                "/contact",
+                format!(
+                    "the semi-axes come out as {a:.3e} mm and {b:.3e} mm; {SEMI_AXIS_MIN:e} to {SEMI_AXIS_MAX:e} mm are allowed"
+                ),
+            ));
+        }
+        if a.max(b) > SLENDERNESS_MAX * a.min(b) {
+            return Err(fault(
+                "/contact",
+                format!(
+                    "the semi-axes {a:.3e} mm and {b:.3e} mm have the ratio {:.3e}; at most {SLENDERNESS_MAX:e} is allowed",
+                    a.max(b) / a.min(b)
+                ),
+            ));
+        }
+        if !(PRESSURE_MIN..=PRESSURE_MAX).contains(&ellipse.pressure_max) {
+            return Err(fault(
+                "/load",
+                format!(
+                    "the largest pressure comes out as {:.3e} MPa; {PRESSURE_MIN:e} to {PRESSURE_MAX:e} MPa are allowed",
+                    ellipse.pressure_max
+                ),
+            ));
+        }
+        Ok(Region::Ellipse(ellipse))
+    }
+
+    /// The region where a pressure given on a grid is positive, with remarks for the answer;
+    /// `pressure[j][i]` in MPa belongs to `(x[i], y[j])` in mm.
+    ///
+    /// # Errors
+    /// A fault in `/contact` if the grid has too many samples, no contact or too many patches.
+    pub fn prescribed(
+        x: &[f64],
+        y: &[f64],
+        pressure: &[Vec<f64>],
+        samples_max: usize,
+    ) -> Result<(Region, Vec<String>), Fault> {
+        let samples = x.len().saturating_mul(y.len());
+        if samples > samples_max {
+            return Err(fault(
+                "/contact/pressure_mpa",
+                format!("{samples} samples given; at most {samples_max} are allowed"),
+            ));
+        }
+        let (field, warnings) = PressureField::new(x, y, pressure)
+            .map_err(|detail| fault("/contact/pressure_mpa", detail))?;
+        Ok((Region::Grid(field), warnings))
+    }
+
+    /// Segments that a strip has on average, for each patch: more than 1 where patches are hollow or bent.
+    #[must_use]
+    pub fn segments_per_strip(&self) -> Vec<f64> {
+        match self {
+            Region::Ellipse(_) => vec![1.0],
+            Region::Grid(field) => field.segments_per_strip(),
+        }
+    }
+
     /// The patches, in order of their smallest y.
     #[must_use]
     pub fn patches(&self) -> Vec<Patch> {
@@ -60,5 +158,12 @@ impl Region {
             Region::Ellipse(ellipse) => ellipse.mean_pressure(chord, x0, x1),
             Region::Grid(field) => field.mean_pressure(chord, x0, x1),
         }
+    }
+}
+
+fn fault(pointer: &str, detail: String) -> Fault {
+    Fault {
+        pointer: pointer.to_owned(),
+        detail,
     }
 }

@@ -8,6 +8,21 @@ use crate::contact::normal::Patch;
 pub struct PressureField {}
 
 impl PressureField {
+    /// Finds the patches.
+    pub fn new(
+        _x: &[f64],
+        _y: &[f64],
+        _pressure: &[Vec<f64>],
+    ) -> Result<(PressureField, Vec<String>), String> {
+        todo!()
+    }
+
+    /// Segments per strip.
+    #[must_use]
+    pub fn segments_per_strip(&self) -> Vec<f64> {
+        todo!()
+    }
+
     /// The patches found, in order of their smallest y.
     #[must_use]
     pub fn patches(&self) -> Vec<Patch> {

@@ -1,0 +1,108 @@
+//! What a case will cost, estimated from its finest mesh before it is queued.
+
+use crate::contact::case::{MeshSize, Method};
+use crate::contact::error::Fault;
+use crate::contact::problem::{Cost, Limits, Problem, Resolution};
+
+/// The meshes of a solve that aims at a target, from coarse to fine.
+const TARGET_LEVELS: [MeshSize; 2] = [
+    MeshSize {
+        strips: 6,
+        cells: 12,
+    },
+    MeshSize {
+        strips: 12,
+        cells: 24,
+    },
+];
+/// Cells the dense method may use.
+const LIU_HSU_CELLS_MAX: f64 = 1000.0;
+/// Memory beside the influence coefficients, relative to them.
+const BYTES_BESIDE: f64 = 1.3;
+/// Dense square matrices the method of Liu and Hsu holds at once.
+const LIU_HSU_MATRICES: f64 = 4.0;
+/// Vectors per cell a solve holds, and doubles per cell and motion in the answer.
+const VECTORS_PER_CELL: f64 = 64.0;
+const FIELDS_PER_CELL: f64 = 6.0;
+
+impl Problem {
+    /// The meshes used one after the other, from coarse to fine.
+    #[must_use]
+    pub fn levels(&self) -> Vec<MeshSize> {
+        match self.resolution {
+            Resolution::Target(_) => TARGET_LEVELS.to_vec(),
+            Resolution::Mesh(size) => vec![size],
+        }
+    }
+
+    /// Estimated cost of solving this: the influence coefficients of the finest mesh and what stands beside them,
+    /// the matrices of the dense method, the fields of the answer. Seconds are rough.
+    #[must_use]
+    pub fn cost(&self) -> Cost {
+        let (cells, segments) = self.size();
+        let motions = self.motions.len() as f64;
+        let fields = cells * (VECTORS_PER_CELL + FIELDS_PER_CELL * motions) * 8.0;
+        let influence = 3.0 * cells * (cells + 2.0 * segments) * 8.0 * BYTES_BESIDE;
+        let (bytes, seconds) = match self.method {
+            Method::Auto | Method::BoundaryElement => {
+                (influence, 4e-9 * cells * cells * (10.0 + 50.0 * motions))
+            }
+            Method::LiuHsu => (
+                influence + (2.0 * cells).powi(2) * 8.0 * LIU_HSU_MATRICES,
+                4e-8 * cells * cells + 1e-10 * (2.0 * cells).powi(3) * 30.0 * motions,
+            ),
+        };
+        Cost {
+            bytes: (bytes + fields) as u64,
+            seconds,
+        }
+    }
+
+    /// Faults of a case that is too large for the limits or for its method.
+    pub(super) fn too_large(&self, limits: &Limits) -> Vec<Fault> {
+        let pointer = match self.resolution {
+            Resolution::Mesh(_) => "/solver/mesh",
+            Resolution::Target(_) => "/contact",
+        };
+        let mut faults = Vec::new();
+        let (cells, _) = self.size();
+        if self.method == Method::LiuHsu && cells > LIU_HSU_CELLS_MAX {
+            faults.push(Fault {
+                pointer: pointer.to_owned(),
+                detail: format!(
+                    "{cells:.0} cells over all patches; at most {LIU_HSU_CELLS_MAX} are allowed with liu_hsu, \
+                     use boundary_element for more"
+                ),
+            });
+        }
+        let bytes = self.cost().bytes;
+        if bytes > limits.memory_bytes {
+            let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
+            faults.push(Fault {
+                pointer: pointer.to_owned(),
+                detail: format!(
+                    "{cells:.0} cells over all patches and {} motions need about {:.0} MiB; at most {:.0} MiB are allowed for one case",
+                    self.motions.len(),
+                    mebibytes(bytes),
+                    mebibytes(limits.memory_bytes)
+                ),
+            });
+        }
+        faults
+    }
+
+    /// Cells and segments of the finest mesh over all patches.
+    fn size(&self) -> (f64, f64) {
+        let (mut cells, mut segments) = (0.0_f64, 0.0_f64);
+        for size in self.levels() {
+            let patches = self.region.segments_per_strip();
+            let level: f64 = patches
+                .iter()
+                .map(|per_strip| f64::from(size.strips) * per_strip)
+                .sum();
+            segments = segments.max(level);
+            cells = cells.max(level * f64::from(size.cells));
+        }
+        (cells, segments)
+    }
+}

@@ -1,0 +1,168 @@
+//! Writes out the motions of a case: sweeps become lists.
+
+use crate::contact::case::{Combine, Motion, Motions, Range, Sweep};
+use crate::contact::error::Fault;
+use crate::contact::problem::Limits;
+
+/// The motions in order, never empty. In a grid the last named component varies fastest, in the fixed order
+/// `creepage_x`, `creepage_y`, `spin_per_mm`.
+///
+/// # Errors
+/// A fault at `/motion` if there are more than the limits allow.
+pub(super) fn expand(motions: &Motions, limits: &Limits) -> Result<Vec<Motion>, Fault> {
+    let count = match motions {
+        Motions::One(_) => 1,
+        Motions::Many(list) => list.len() as u128,
+        Motions::Sweep { sweep } => sweep_length(sweep),
+    };
+    if count > limits.motions_max as u128 {
+        return Err(Fault {
+            pointer: "/motion".to_owned(),
+            detail: format!(
+                "{count} motions given; at most {} are allowed in one case",
+                limits.motions_max
+            ),
+        });
+    }
+    Ok(match motions {
+        Motions::One(motion) => vec![*motion],
+        Motions::Many(list) => list.clone(),
+        Motions::Sweep { sweep } => write_out(sweep),
+    })
+}
+
+fn ranges(sweep: &Sweep) -> [Option<Range>; 3] {
+    [sweep.creepage_x, sweep.creepage_y, sweep.spin_per_mm]
+}
+
+fn sweep_length(sweep: &Sweep) -> u128 {
+    let points = ranges(sweep)
+        .into_iter()
+        .flatten()
+        .map(|range| u128::from(range.points));
+    match sweep.combine {
+        Combine::Together => points.max().unwrap_or(0),
+        Combine::Grid => points.product(),
+    }
+}
+
+fn write_out(sweep: &Sweep) -> Vec<Motion> {
+    let values =
+        ranges(sweep).map(|range| range.map_or_else(|| vec![0.0], |range| range_values(&range)));
+    let [x, y, spin] = &values;
+    let motion = |i: usize, j: usize, k: usize| Motion {
+        creepage_x: x[i],
+        creepage_y: y[j],
+        spin_per_mm: spin[k],
+    };
+    match sweep.combine {
+        Combine::Together => (0..sweep_length(sweep) as usize)
+            // A component that is left out has one value, which serves every point.
+            .map(|n| {
+                motion(
+                    n.min(x.len() - 1),
+                    n.min(y.len() - 1),
+                    n.min(spin.len() - 1),
+                )
+            })
+            .collect(),
+        Combine::Grid => (0..x.len())
+            .flat_map(|i| (0..y.len()).map(move |j| (i, j)))
+            .flat_map(|(i, j)| (0..spin.len()).map(move |k| (i, j, k)))
+            .map(|(i, j, k)| motion(i, j, k))
+            .collect(),
+    }
+}
+
+/// Equally spaced values; the ends are exact.
+fn range_values(range: &Range) -> Vec<f64> {
+    let last = range.points.saturating_sub(1);
+    (0..range.points)
+        .map(|n| {
+            if n == 0 {
+                range.from
+            } else if n == last {
+                range.to
+            } else {
+                let t = f64::from(n) / f64::from(last);
+                range.from * (1.0 - t) + range.to * t
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn range(from: f64, to: f64, points: u32) -> Option<Range> {
+        Some(Range { from, to, points })
+    }
+
+    fn triple(motion: &Motion) -> [f64; 3] {
+        [motion.creepage_x, motion.creepage_y, motion.spin_per_mm]
+    }
+
+    #[test]
+    fn a_sweep_together_runs_side_by_side() {
+        let sweep = Sweep {
+            creepage_x: range(0.0, 0.004, 5),
+            creepage_y: None,
+            spin_per_mm: range(1.0, -1.0, 5),
+            combine: Combine::Together,
+        };
+        let list = expand(&Motions::Sweep { sweep }, &Limits::default()).unwrap();
+        assert_eq!(list.len(), 5);
+        assert_eq!(triple(&list[0]), [0.0, 0.0, 1.0]);
+        assert_eq!(triple(&list[2]), [0.002, 0.0, 0.0]);
+        assert_eq!(triple(&list[4]), [0.004, 0.0, -1.0]);
+    }
+
+    #[test]
+    fn in_a_grid_the_last_named_component_is_fastest() {
+        let sweep = Sweep {
+            creepage_x: range(1.0, 2.0, 2),
+            creepage_y: range(5.0, 5.0, 1),
+            spin_per_mm: range(7.0, 9.0, 3),
+            combine: Combine::Grid,
+        };
+        let list = expand(&Motions::Sweep { sweep }, &Limits::default()).unwrap();
+        let expected = [
+            [1.0, 7.0],
+            [1.0, 8.0],
+            [1.0, 9.0],
+            [2.0, 7.0],
+            [2.0, 8.0],
+            [2.0, 9.0],
+        ];
+        assert_eq!(list.len(), expected.len());
+        for (motion, [x, spin]) in list.iter().zip(expected) {
+            assert_eq!(triple(motion), [x, 5.0, spin]);
+        }
+    }
+
+    #[test]
+    fn the_limit_of_motions_is_kept_on_both_sides() {
+        let limits = Limits {
+            motions_max: 100,
+            ..Limits::default()
+        };
+        let grid = |n, m| Motions::Sweep {
+            sweep: Sweep {
+                creepage_x: range(0.0, 1.0, n),
+                creepage_y: range(0.0, 1.0, m),
+                spin_per_mm: None,
+                combine: Combine::Grid,
+            },
+        };
+        assert_eq!(expand(&grid(10, 10), &limits).unwrap().len(), 100);
+        let fault = expand(&grid(1_000_000, 1_000_000), &limits).unwrap_err();
+        assert_eq!(fault.pointer, "/motion");
+        assert!(
+            fault.detail.starts_with("1000000000000 motions"),
+            "{}",
+            fault.detail
+        );
+        assert!(expand(&grid(101, 1), &limits).is_err());
+    }
+}

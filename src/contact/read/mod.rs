@@ -1,0 +1,180 @@
+//! Reads a case from JSON and says everything that is wrong with it, at once.
+//!
+//! A member that is absent, of the wrong type, out of range, unknown or contradictory gets a fault with its JSON
+//! pointer (RFC 6901), the value received and what is allowed. Nothing is repaired.
+
+mod contact;
+mod material;
+mod motion;
+mod object;
+mod solver;
+
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+
+use crate::contact::case::{Case, Contact, Friction, Load, Material, Motions, Output, Solver};
+use crate::contact::error::{CaseError, Fault};
+use crate::contact::problem::{self, Limits};
+use object::{Faults, Interval, Object, join, shown};
+
+const NAME_LENGTH_MAX: usize = 200;
+const LABELS_MAX: usize = 32;
+const LABEL_KEY_LENGTH_MAX: usize = 64;
+const LABEL_VALUE_LENGTH_MAX: usize = 256;
+const FRICTION: Interval = Interval::closed(0.0, 100.0, "");
+
+/// What could be read of a case: the parts without a fault.
+///
+/// `None` in a required part means that it is faulty or absent; the fault is in the list that came with the draft.
+#[derive(Debug, Default)]
+pub(super) struct Draft {
+    name: Option<String>,
+    labels: BTreeMap<String, String>,
+    material: Option<Material>,
+    friction: Option<Friction>,
+    contact: Option<Contact>,
+    load: Option<Load>,
+    motion: Option<Motions>,
+    solver: Option<Solver>,
+    outputs: Option<Vec<Output>>,
+}
+
+impl Case {
+    /// Reads a case from JSON.
+    ///
+    /// Left-out `solver` and `outputs` get their defaults; `outputs` are sorted and named once.
+    ///
+    /// # Errors
+    /// Every fault of the text, at most the first hundred one by one.
+    pub fn read(value: &Value) -> Result<Case, CaseError> {
+        let (draft, faults) = draft(value);
+        draft
+            .complete()
+            .filter(|_| faults.is_empty())
+            .ok_or(CaseError(faults))
+    }
+}
+
+/// Reads what can be read, and lists the faults of the rest.
+pub(super) fn draft(value: &Value) -> (Draft, Vec<Fault>) {
+    let mut faults = Faults::default();
+    let draft = Object::open(value, String::new(), &mut faults)
+        .map(|mut case| read(&mut case))
+        .unwrap_or_default();
+    (draft, faults.into_list())
+}
+
+impl Draft {
+    /// Faults against physics and limits of the parts that could be read.
+    pub(super) fn faults_beside(&self, limits: &Limits) -> Vec<Fault> {
+        problem::faults_of_parts(
+            self.material.as_ref(),
+            self.contact.as_ref(),
+            self.load.as_ref(),
+            self.motion.as_ref(),
+            limits,
+        )
+    }
+
+    /// The case, if every required part could be read.
+    pub(super) fn complete(self) -> Option<Case> {
+        Some(Case {
+            name: self.name,
+            labels: self.labels,
+            material: self.material?,
+            friction: self.friction?,
+            contact: self.contact?,
+            load: self.load,
+            motion: self.motion?,
+            solver: self.solver?,
+            outputs: self.outputs?,
+        })
+    }
+}
+
+fn read(case: &mut Object) -> Draft {
+    case.only(
+        &[
+            "name", "labels", "material", "friction", "contact", "load", "motion", "solver",
+            "outputs",
+        ],
+        &[],
+    );
+    let name = case.text("name", NAME_LENGTH_MAX);
+    let labels = labels(case);
+    let material = material::read(case);
+    let friction = friction(case);
+    let contact = contact::read(case);
+    let load = contact::read_load(case);
+    let motion = motion::read(case);
+    let solver = solver::read(case);
+    let outputs = solver::read_outputs(case);
+    Draft {
+        name,
+        labels,
+        material,
+        friction,
+        contact,
+        load,
+        motion,
+        solver,
+        outputs,
+    }
+}
+
+fn friction(case: &mut Object) -> Option<Friction> {
+    let mut block = case.child("friction")?;
+    block.only(&["coefficient"], &[]);
+    let coefficient = block.required_number("coefficient", FRICTION)?;
+    Some(Friction { coefficient })
+}
+
+fn labels(case: &mut Object) -> BTreeMap<String, String> {
+    let mut labels = BTreeMap::new();
+    let Some(value) = case.value("labels") else {
+        return labels;
+    };
+    let pointer = case.pointer_to("labels");
+    let Value::Object(members) = value else {
+        case.fault(
+            "labels",
+            format!("{} given; an object of texts is needed", shown(value)),
+        );
+        return labels;
+    };
+    if members.len() > LABELS_MAX {
+        case.fault(
+            "labels",
+            format!(
+                "{} labels given; at most {LABELS_MAX} are allowed",
+                members.len()
+            ),
+        );
+        return labels;
+    }
+    for (key, value) in members {
+        let length = key.chars().count();
+        if length == 0 || length > LABEL_KEY_LENGTH_MAX {
+            case.faults().add(
+                join(&pointer, key),
+                format!(
+                    "a key of {length} characters given; 1 to {LABEL_KEY_LENGTH_MAX} are allowed"
+                ),
+            );
+        }
+        match value.as_str() {
+            Some(text) if text.chars().count() <= LABEL_VALUE_LENGTH_MAX => {
+                labels.insert(key.clone(), text.to_owned());
+            }
+            _ => case.faults().add(
+                join(&pointer, key),
+                format!(
+                    "{} given; a text of at most {LABEL_VALUE_LENGTH_MAX} characters is needed",
+                    shown(value)
+                ),
+            ),
+        }
+    }
+    labels
+}

@@ -1,0 +1,120 @@
+//! Reads `solver` and `outputs`: how to solve, how exactly, and what to answer.
+
+use crate::contact::case::{MeshSize, Method, Output, Solver};
+use crate::contact::problem::TARGET_ERROR_DEFAULT;
+use crate::contact::read::object::{Interval, Object, join, shown, word};
+
+const TARGET_ERROR: Interval = Interval::closed(1e-4, 0.5, "");
+const TIME_LIMIT: Interval = Interval::positive(86_400.0, "s");
+const MESH_SIDE_MAX: u32 = 1000;
+
+const METHODS: [(&str, Method); 3] = [
+    ("auto", Method::Auto),
+    ("boundary_element", Method::BoundaryElement),
+    ("liu_hsu", Method::LiuHsu),
+];
+const OUTPUTS: [(&str, Output); 5] = [
+    ("resultants", Output::Resultants),
+    ("zones", Output::Zones),
+    ("tractions", Output::Tractions),
+    ("pressure", Output::Pressure),
+    ("slip", Output::Slip),
+];
+const OUTPUTS_LATER: [&str; 2] = ["subsurface", "damage"];
+
+/// Reads the member `solver` of a case; left out, it is `auto` with the default target.
+pub(super) fn read(case: &mut Object) -> Option<Solver> {
+    if !case.has("solver") {
+        return Some(Solver {
+            method: Method::Auto,
+            target_error: Some(TARGET_ERROR_DEFAULT),
+            mesh: None,
+            time_limit_s: None,
+        });
+    }
+    let mut block = case.child("solver")?;
+    block.only(&["method", "target_error", "mesh", "time_limit_s"], &[]);
+    let method = block.word("method", &METHODS, &["fastsim"]);
+    let target_error = block.number("target_error", TARGET_ERROR);
+    let mesh = if block.has("mesh") {
+        mesh(&mut block)
+    } else {
+        None
+    };
+    let time_limit_s = block.number("time_limit_s", TIME_LIMIT);
+    if block.has("target_error") && block.has("mesh") {
+        block.fault(
+            "mesh",
+            "given together with target_error; exactly one of the two is allowed",
+        );
+    }
+    for (name, read) in [
+        ("method", method.is_some()),
+        ("target_error", target_error.is_some()),
+        ("mesh", mesh.is_some()),
+        ("time_limit_s", time_limit_s.is_some()),
+    ] {
+        if block.has(name) && !read {
+            return None;
+        }
+    }
+    Some(Solver {
+        method: method.unwrap_or_default(),
+        target_error: target_error.or(if mesh.is_none() {
+            Some(TARGET_ERROR_DEFAULT)
+        } else {
+            None
+        }),
+        mesh,
+        time_limit_s,
+    })
+}
+
+/// Reads the member `outputs` of a case: sorted, each once; left out, resultants and zones.
+pub(super) fn read_outputs(case: &mut Object) -> Option<Vec<Output>> {
+    let Some(value) = case.value("outputs") else {
+        return Some(vec![Output::Resultants, Output::Zones]);
+    };
+    let elements = value.as_array().filter(|elements| !elements.is_empty());
+    let Some(elements) = elements else {
+        let words = OUTPUTS.map(|(word, _)| word).join(", ");
+        case.fault(
+            "outputs",
+            format!(
+                "{} given; an array with at least one of {words} is needed",
+                shown(value)
+            ),
+        );
+        return None;
+    };
+    let pointer = case.pointer_to("outputs");
+    let faults = case.faults();
+    let read: Vec<Option<Output>> = elements
+        .iter()
+        .enumerate()
+        .map(|(k, element)| {
+            word(
+                element,
+                &join(&pointer, k),
+                &OUTPUTS,
+                &OUTPUTS_LATER,
+                faults,
+            )
+        })
+        .collect();
+    let mut outputs: Vec<Output> = read.into_iter().collect::<Option<_>>()?;
+    outputs.sort_unstable();
+    outputs.dedup();
+    Some(outputs)
+}
+
+fn mesh(block: &mut Object) -> Option<MeshSize> {
+    let mut block = block.child("mesh")?;
+    block.only(&["strips", "cells"], &[]);
+    let strips = block.required_count("strips", 1, MESH_SIDE_MAX);
+    let cells = block.required_count("cells", 1, MESH_SIDE_MAX);
+    Some(MeshSize {
+        strips: strips?,
+        cells: cells?,
+    })
+}

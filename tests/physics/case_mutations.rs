@@ -1,0 +1,163 @@
+//! Whatever is done to a case, it is answered with a problem or with faults that point into it.
+
+use proptest::prelude::*;
+use railhead::contact::check;
+use railhead::contact::problem::Limits;
+use serde_json::{Value, json};
+
+use crate::cases::{good, good_with, with};
+
+/// Every pointer of the value, depth first.
+fn pointers(value: &Value, here: &str, list: &mut Vec<String>) {
+    list.push(here.to_owned());
+    match value {
+        Value::Object(members) => {
+            for (name, value) in members {
+                let name = name.replace('~', "~0").replace('/', "~1");
+                pointers(value, &format!("{here}/{name}"), list);
+            }
+        }
+        Value::Array(elements) => {
+            for (k, value) in elements.iter().enumerate() {
+                pointers(value, &format!("{here}/{k}"), list);
+            }
+        }
+        _ => {}
+    }
+}
+
+fn some_value() -> impl Strategy<Value = Value> {
+    let scalar = prop_oneof![
+        Just(json!(null)),
+        any::<bool>().prop_map(|b| json!(b)),
+        any::<f64>().prop_map(|x| json!(x)),
+        (-310_i32..310).prop_map(|e| json!(10.0_f64.powi(e))),
+        (-3_i64..2000).prop_map(|n| json!(n)),
+        prop_oneof![
+            Just("radii"),
+            Just("ellipse"),
+            Just("pressure_grid"),
+            Just("gap_grid"),
+            Just("liu_hsu"),
+            Just("grid"),
+            Just("slip"),
+            Just("é~/")
+        ]
+        .prop_map(|word| json!(word)),
+    ];
+    scalar.prop_recursive(3, 12, 4, |inner| {
+        let name = prop_oneof![
+            Just("sweep"),
+            Just("from"),
+            Just("to"),
+            Just("points"),
+            Just("creepage_x"),
+            Just("lower"),
+            Just("upper"),
+            Just("type"),
+            Just("a_mm"),
+            Just("b_mm"),
+            Just("force_x_n"),
+            Just("mesh"),
+            Just("a/b~c"),
+            Just("")
+        ]
+        .prop_map(str::to_owned);
+        prop_oneof![
+            prop::collection::vec(inner.clone(), 0..4).prop_map(Value::Array),
+            prop::collection::vec((name, inner), 0..4)
+                .prop_map(|members| Value::Object(members.into_iter().collect())),
+        ]
+    })
+}
+
+/// Valid cases of every kind, so that mutations reach every reader.
+fn seeds() -> Vec<Value> {
+    let ellipse = with(
+        &good_with(
+            "/contact",
+            json!({ "type": "ellipse", "a_mm": 6, "b_mm": 3 }),
+        ),
+        "/motion",
+        Some(json!({ "sweep": { "combine": "grid",
+            "creepage_x": { "from": 0, "to": 0.01, "points": 3 },
+            "spin_per_mm": { "from": 0, "to": 0.01, "points": 2 } } })),
+    );
+    let pair = with(
+        &good_with(
+            "/material",
+            json!({
+            "lower": { "young_modulus_mpa": 210_000, "poisson_ratio": 0.3 },
+            "upper": { "young_modulus_mpa": 206_000, "poisson_ratio": 0.29 } }),
+        ),
+        "/solver",
+        Some(
+            json!({ "method": "liu_hsu", "mesh": { "strips": 8, "cells": 10 }, "time_limit_s": 10 }),
+        ),
+    );
+    vec![good(), ellipse, pair]
+}
+
+fn mutated() -> impl Strategy<Value = Value> {
+    let mutation = (
+        any::<prop::sample::Index>(),
+        prop::option::of(some_value()),
+        any::<bool>(),
+    );
+    let start = prop::sample::select(seeds());
+    (start, prop::collection::vec(mutation, 1..5)).prop_map(|(mut case, mutations)| {
+        for (index, value, beside) in mutations {
+            let mut list = Vec::new();
+            pointers(&case, "", &mut list);
+            let target = case.pointer_mut(&list[index.index(list.len())]).unwrap();
+            match (target, value) {
+                (Value::Object(members), Some(value)) if beside => {
+                    members.insert("a/b~c".to_owned(), value);
+                }
+                (Value::Array(elements), Some(value)) if beside => elements.push(value),
+                (Value::Object(members), None) => {
+                    let name = members
+                        .keys()
+                        .nth(index.index(members.len().max(1)))
+                        .cloned();
+                    name.map(|name| members.remove(&name));
+                }
+                (Value::Array(elements), None) => {
+                    elements.pop();
+                }
+                (target, Some(value)) => *target = value,
+                (_, None) => {}
+            }
+        }
+        case
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 3000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_mutation_of_a_case_panics(case in mutated()) {
+        if let Ok(problem) = check(&case, &Limits::default()) {
+            prop_assert!(!problem.motions.is_empty() && !problem.outputs.is_empty());
+            prop_assert!(problem.cost().bytes <= Limits::default().memory_bytes);
+            prop_assert!(problem.cost().seconds.is_finite());
+            for patch in problem.region.patches() {
+                prop_assert!(patch.normal_force.is_finite() && patch.normal_force > 0.0, "{patch:?}");
+                prop_assert!(patch.area.is_finite() && patch.area > 0.0, "{patch:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn every_fault_points_into_the_case(case in mutated()) {
+        if let Err(error) = check(&case, &Limits::default()) {
+            prop_assert!(!error.0.is_empty());
+            for fault in error.0 {
+                let parent = fault.pointer.rsplit_once('/').map_or("", |(parent, _)| parent);
+                prop_assert!(case.pointer(&fault.pointer).or(case.pointer(parent)).is_some(), "{fault:?} in {case}");
+                prop_assert!(!fault.detail.is_empty());
+            }
+        }
+    }
+}

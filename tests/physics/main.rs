@@ -1,0 +1,7 @@
+//! Does the physics hold?
+
+mod case_faults;
+mod case_mutations;
+mod cases;
+mod hertz;
+mod problem;

@@ -1,0 +1,170 @@
+//! A readable case is checked against physics and limits, and becomes a problem with remarks, costs and a digest.
+
+use serde_json::{Value, json};
+
+use crate::cases::{assert_fault, faults, good, good_with, problem, with};
+
+#[test]
+fn different_bodies_are_combined_with_a_remark_or_refused() {
+    let pair = |upper: f64, nu: f64| {
+        good_with(
+            "/material",
+            json!({
+                "lower": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
+                "upper": { "shear_modulus_mpa": upper, "poisson_ratio": nu }
+            }),
+        )
+    };
+    let remarks = problem(&pair(79_000.0, 0.29)).warnings;
+    assert_eq!(remarks.len(), 1);
+    assert!(remarks[0].contains("K = "), "{remarks:?}");
+    assert!(problem(&pair(82_000.0, 0.28)).warnings.is_empty());
+    assert_fault(&pair(23_000.0, 0.31), "/material", &["K = 0.1", "0.05"]);
+    assert_fault(
+        &good_with(
+            "/material",
+            json!({ "lower": { "shear_modulus_mpa": 1, "poisson_ratio": 0 }, "upper": { "shear_modulus_mpa": 1, "poisson_ratio": 0 }, "poisson_ratio": 0 }),
+        ),
+        "/material/poisson_ratio",
+        &["unknown"],
+    );
+}
+
+#[test]
+fn high_friction_is_solved_with_a_remark() {
+    assert!(
+        problem(&good_with("/friction/coefficient", json!(1.0)))
+            .warnings
+            .is_empty()
+    );
+    assert!(problem(&good_with("/friction/coefficient", json!(1.5))).warnings[0].contains("1.5"));
+}
+
+#[test]
+fn meshes_are_limited_by_method_and_memory() {
+    let meshed = |method: &str, strips: u32, cells: u32| {
+        good_with(
+            "/solver",
+            json!({ "method": method, "mesh": { "strips": strips, "cells": cells } }),
+        )
+    };
+    assert_eq!(faults(&meshed("liu_hsu", 25, 40)), []);
+    assert_fault(
+        &meshed("liu_hsu", 25, 41),
+        "/solver/mesh",
+        &["1025", "1000", "boundary_element"],
+    );
+    assert_eq!(faults(&meshed("boundary_element", 50, 100)), []);
+    assert_fault(
+        &meshed("boundary_element", 1000, 1000),
+        "/solver/mesh",
+        &["MiB", "2048 MiB"],
+    );
+    assert_fault(
+        &meshed("boundary_element", 1001, 1),
+        "/solver/mesh/strips",
+        &["1001", "1000"],
+    );
+}
+
+#[test]
+fn memory_estimates_grow_with_mesh_and_motions() {
+    let cost = |strips: u32, motions: u32| {
+        let mut case = good_with(
+            "/solver",
+            json!({ "mesh": { "strips": strips, "cells": 20 } }),
+        );
+        case["motion"] =
+            json!({ "sweep": { "creepage_x": { "from": 0, "to": 1, "points": motions } } });
+        problem(&case).cost()
+    };
+    let (small, large, many) = (cost(10, 2), cost(40, 2), cost(10, 200));
+    assert!(large.bytes > 10 * small.bytes && large.seconds > 10.0 * small.seconds);
+    assert!(many.bytes > small.bytes && many.seconds > 50.0 * small.seconds);
+    // 10 × 20 cells: three kernels of N² doubles are 0.96 MB.
+    assert!(
+        (960_000..2_000_000).contains(&small.bytes),
+        "{}",
+        small.bytes
+    );
+}
+
+#[test]
+fn absurd_contacts_are_refused_by_what_comes_out() {
+    let ellipse = |a: f64, b: f64, load: Value| {
+        with(
+            &good_with(
+                "/contact",
+                json!({ "type": "ellipse", "a_mm": a, "b_mm": b }),
+            ),
+            "/load",
+            Some(load),
+        )
+    };
+    assert_eq!(
+        faults(&ellipse(6.0, 4.0, json!({ "approach_mm": 0.1 }))),
+        []
+    );
+    assert_fault(
+        &ellipse(1e6, 1e-6, json!({ "normal_force_n": 1 })),
+        "/contact",
+        &["ratio"],
+    );
+    assert_fault(
+        &ellipse(1e-4, 1e-4, json!({ "normal_force_n": 1e12 })),
+        "/load",
+        &["MPa"],
+    );
+    assert_fault(
+        &ellipse(1e-300, 1e-300, json!({ "normal_force_n": 1e12 })),
+        "/contact",
+        &["semi-axes"],
+    );
+}
+
+#[test]
+fn the_digest_names_the_answer_and_nothing_else() {
+    let digest = |case: &Value| problem(case).digest;
+    let base = digest(&good());
+    assert_eq!(base.len(), 64);
+    assert_eq!(digest(&good_with("/name", json!("other"))), base);
+    assert_eq!(digest(&with(&good(), "/labels", None)), base);
+    assert_eq!(digest(&good_with("/motion/creepage_y", json!(-0.0))), base);
+    assert_eq!(digest(&with(&good(), "/motion/creepage_y", None)), base);
+    assert_eq!(
+        digest(&good_with(
+            "/outputs",
+            json!(["zones", "tractions", "resultants", "zones"])
+        )),
+        base
+    );
+    let list = json!([{ "creepage_x": 0.001, "spin_per_mm": 0.0004 }]);
+    assert_eq!(digest(&good_with("/motion", list)), base);
+    for (pointer, value) in [
+        ("/material/poisson_ratio", json!(0.280_000_000_1)),
+        ("/friction/coefficient", json!(0.31)),
+        ("/contact/rolling_mm", json!(461)),
+        ("/load/normal_force_n", json!(100_001)),
+        ("/motion/spin_per_mm", json!(0.0005)),
+        ("/solver/target_error", json!(0.01)),
+        ("/solver/method", json!("liu_hsu")),
+        ("/outputs", json!(["resultants"])),
+    ] {
+        assert_ne!(digest(&good_with(pointer, value)), base, "{pointer}");
+    }
+}
+
+#[test]
+fn limits_are_checked_beside_faults_of_the_text() {
+    let mut case = good_with("/friction/coefficient", json!(-1));
+    case["motion"] = json!({ "sweep": { "creepage_x": { "from": 0, "to": 1, "points": 20_000 } } });
+    case["material"] = json!({
+        "lower": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
+        "upper": { "shear_modulus_mpa": 23000, "poisson_ratio": 0.31 }
+    });
+    let pointers: Vec<String> = faults(&case)
+        .into_iter()
+        .map(|fault| fault.pointer)
+        .collect();
+    assert_eq!(pointers, ["/friction/coefficient", "/material", "/motion"]);
+}
