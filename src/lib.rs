@@ -1,4 +1,5 @@
 //! railhead: a rolling-contact stress service.
 
 pub mod contact;
+pub mod http;
 pub mod jobs;

@@ -1,9 +1,9 @@
 //! Does the service behave?
 
 mod cli;
+mod contract;
 mod crash;
 mod shutdown;
-mod standin;
 mod store;
 mod store_model;
 mod support;
