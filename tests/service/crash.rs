@@ -115,7 +115,7 @@ async fn every_acknowledged_job_succeeds_once_although_the_process_is_killed_twi
 #[tokio::test]
 async fn an_idempotency_key_outlives_the_process() {
     let folder = tempfile::tempdir().unwrap();
-    let case = long_case("once", 1);
+    let case = long_case("once", 2);
     let mut ids = BTreeSet::new();
     for _ in 0..2 {
         let service = Service::start(folder.path(), &[]);

@@ -154,7 +154,7 @@ async fn a_stopped_service_hands_its_running_job_to_the_next_one() {
     let waiting = service
         .request(Method::POST, "/v1/jobs")
         .header("Prefer", "wait=60");
-    let waiting = tokio::spawn(waiting.json(&long_case("behind", 1)).send());
+    let waiting = tokio::spawn(waiting.json(&long_case("behind", 2)).send());
     while service.get("/v1/jobs").await["jobs"]
         .as_array()
         .unwrap()
