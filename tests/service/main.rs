@@ -1,3 +1,7 @@
 //! Does the service behave?
 
+mod api;
 mod contract;
+mod errors;
+mod schema;
+mod server;

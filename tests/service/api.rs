@@ -1,0 +1,1 @@
+//! What clients do: submit, wait, list, look, fetch, cancel, delete.
