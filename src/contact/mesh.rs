@@ -3,6 +3,9 @@
 //! Cells are numbered segment by segment (segments sorted by patch, then y, then x), in each segment from the
 //! trailing end (smaller x) to the leading end (larger x).
 
+use std::f64::consts::PI;
+use std::ops::Range;
+
 /// The part of a strip's mid-line that lies in a patch, in mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Chord {
@@ -18,4 +21,267 @@ pub struct Chord {
     pub left: f64,
     /// Leading end.
     pub right: f64,
+}
+
+/// How cells and nodes divide a chord that is mapped to `−1 … 1`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grading {
+    /// The `n + 1` cell edges, from −1 to 1.
+    pub edges: Vec<f64>,
+    /// The `n` nodes, one inside each cell.
+    pub nodes: Vec<f64>,
+}
+
+impl Grading {
+    /// Edges `−cos(kπ/n)`, nodes at the mid-angles: cells gather at both ends, where traction has square roots.
+    #[must_use]
+    pub fn cosine(cells: usize) -> Grading {
+        let at = |k: f64| -(k * PI / cells as f64).cos();
+        let mut edges: Vec<f64> = (0..=cells).map(|k| at(k as f64)).collect();
+        let mut nodes: Vec<f64> = (0..cells).map(|k| at(k as f64 + 0.5)).collect();
+        // Exact mirror images: symmetry is recognised by comparing coordinates.
+        symmetrise(&mut edges);
+        symmetrise(&mut nodes);
+        Grading { edges, nodes }
+    }
+
+    /// Equal cells with the node in the middle.
+    #[must_use]
+    pub fn uniform(cells: usize) -> Grading {
+        let at = |k: f64| 2.0 * k / cells as f64 - 1.0;
+        let edges = (0..=cells).map(|k| at(k as f64)).collect();
+        let nodes = (0..cells).map(|k| at(k as f64 + 0.5)).collect();
+        Grading { edges, nodes }
+    }
+
+    /// Number of cells.
+    #[must_use]
+    pub fn cells(&self) -> usize {
+        self.nodes.len()
+    }
+}
+
+fn symmetrise(values: &mut [f64]) {
+    let n = values.len();
+    for i in 0..n / 2 {
+        let half = 0.5 * (values[n - 1 - i] - values[i]);
+        values[i] = -half;
+        values[n - 1 - i] = half;
+    }
+    if n % 2 == 1 {
+        values[n / 2] = 0.0;
+    }
+}
+
+/// A chord with its cells.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Segment {
+    /// The chord in mm.
+    pub chord: Chord,
+    /// The numbers of its cells.
+    pub cells: Range<usize>,
+}
+
+/// Strips of cells over all patches.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mesh {
+    /// The segments in the order of the cells.
+    pub segments: Vec<Segment>,
+    /// Trailing edge of each cell, in mm.
+    pub left: Vec<f64>,
+    /// Leading edge of each cell, in mm.
+    pub right: Vec<f64>,
+    /// Node of each cell, in mm: where displacement is observed and traction counted.
+    pub node: Vec<f64>,
+}
+
+impl Mesh {
+    /// Divides every chord in the same way. Chords come sorted by patch, then y, then x.
+    #[must_use]
+    pub fn new(chords: &[Chord], grading: &Grading) -> Mesh {
+        let n = grading.cells();
+        let mut mesh = Mesh {
+            segments: Vec::with_capacity(chords.len()),
+            left: Vec::with_capacity(chords.len() * n),
+            right: Vec::with_capacity(chords.len() * n),
+            node: Vec::with_capacity(chords.len() * n),
+        };
+        for chord in chords {
+            let start = mesh.node.len();
+            let centre = 0.5 * (chord.left + chord.right);
+            let half = 0.5 * (chord.right - chord.left);
+            for k in 0..n {
+                mesh.left.push(centre + half * grading.edges[k]);
+                mesh.right.push(centre + half * grading.edges[k + 1]);
+                mesh.node.push(centre + half * grading.nodes[k]);
+            }
+            mesh.segments.push(Segment {
+                chord: *chord,
+                cells: start..start + n,
+            });
+        }
+        mesh
+    }
+
+    /// Number of cells.
+    #[must_use]
+    pub fn cells(&self) -> usize {
+        self.node.len()
+    }
+
+    /// Area of every cell, in the square of the mesh's length unit.
+    #[must_use]
+    pub fn areas(&self) -> Vec<f64> {
+        let mut areas = Vec::with_capacity(self.cells());
+        for segment in &self.segments {
+            areas.extend(
+                segment
+                    .cells
+                    .clone()
+                    .map(|i| (self.right[i] - self.left[i]) * segment.chord.dy),
+            );
+        }
+        areas
+    }
+
+    /// y of every cell.
+    #[must_use]
+    pub fn rows(&self) -> Vec<f64> {
+        self.segments
+            .iter()
+            .flat_map(|s| s.cells.clone().map(|_| s.chord.y))
+            .collect()
+    }
+
+    /// The same mesh with all lengths multiplied by `factor` and moved so that `origin` becomes `(0, 0)` first.
+    #[must_use]
+    pub fn normalised(&self, origin: [f64; 2], factor: f64) -> Mesh {
+        let along = |values: &[f64]| values.iter().map(|x| (x - origin[0]) * factor).collect();
+        let segments = self.segments.iter().map(|s| Segment {
+            chord: Chord {
+                y: (s.chord.y - origin[1]) * factor,
+                dy: s.chord.dy * factor,
+                left: (s.chord.left - origin[0]) * factor,
+                right: (s.chord.right - origin[0]) * factor,
+                ..s.chord
+            },
+            cells: s.cells.clone(),
+        });
+        Mesh {
+            segments: segments.collect(),
+            left: along(&self.left),
+            right: along(&self.right),
+            node: along(&self.node),
+        }
+    }
+
+    /// The y about which segment `j` is the mirror image of segment `m − 1 − j` for every `j`, if there is one and
+    /// no segment is its own image. Lengths are compared to 1e-10 of the mesh's extent.
+    #[must_use]
+    pub fn mirror_line(&self) -> Option<f64> {
+        let m = self.segments.len();
+        if m == 0 || m % 2 == 1 {
+            return None;
+        }
+        let (first, last) = (&self.segments[0].chord, &self.segments[m - 1].chord);
+        let line = 0.5 * (first.y + last.y);
+        let extent = self
+            .segments
+            .iter()
+            .map(|s| (s.chord.y - line).abs().max(s.chord.right - s.chord.left));
+        let tolerance = 1e-10 * extent.fold(0.0, f64::max);
+        let alike = |j: usize| {
+            let (a, b) = (&self.segments[j], &self.segments[m - 1 - j]);
+            let close = |u: f64, v: f64| (u - v).abs() <= tolerance;
+            a.cells.len() == b.cells.len()
+                && close(a.chord.y + b.chord.y, 2.0 * line)
+                && close(a.chord.dy, b.chord.dy)
+                && close(a.chord.left, b.chord.left)
+                && close(a.chord.right, b.chord.right)
+                && !close(a.chord.y, b.chord.y)
+        };
+        (0..m / 2).all(alike).then_some(line)
+    }
+}
+
+/// `count` equal strips between `low` and `high` as `(y, dy)`, from smaller to larger y.
+#[must_use]
+pub fn equal_strips(low: f64, high: f64, count: usize) -> Vec<(f64, f64)> {
+    let dy = (high - low) / count as f64;
+    let middle = 0.5 * (low + high);
+    (0..count)
+        .map(|j| (middle + (j as f64 + 0.5 - 0.5 * count as f64) * dy, dy))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn circle(strips: usize) -> Vec<Chord> {
+        equal_strips(-1.0, 1.0, strips)
+            .into_iter()
+            .enumerate()
+            .map(|(strip, (y, dy))| {
+                let half = (1.0 - y * y).sqrt();
+                Chord {
+                    patch: 0,
+                    strip,
+                    y,
+                    dy,
+                    left: -half,
+                    right: half,
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn cells_fill_their_chord_without_gaps() {
+        for grading in [Grading::cosine(7), Grading::uniform(7)] {
+            let mesh = Mesh::new(&circle(4), &grading);
+            for segment in &mesh.segments {
+                let cells = segment.cells.clone();
+                assert!((mesh.left[cells.start] - segment.chord.left).abs() < 1e-15);
+                assert!((mesh.right[cells.end - 1] - segment.chord.right).abs() < 1e-15);
+                for i in cells.clone() {
+                    assert!(mesh.left[i] < mesh.node[i] && mesh.node[i] < mesh.right[i]);
+                }
+                for i in cells.start..cells.end - 1 {
+                    assert!((mesh.right[i] - mesh.left[i + 1]).abs() < 1e-15);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn strip_area_converges_to_the_circle_with_second_order() {
+        let error = |m: usize| {
+            let area: f64 = Mesh::new(&circle(m), &Grading::cosine(4))
+                .areas()
+                .iter()
+                .sum();
+            (area - PI).abs()
+        };
+        assert!(error(32) < error(16) / 2.5, "{} {}", error(16), error(32));
+    }
+
+    #[test]
+    fn even_strips_on_a_circle_have_a_mirror_line_and_odd_ones_have_none() {
+        assert_eq!(
+            Mesh::new(&circle(6), &Grading::cosine(5)).mirror_line(),
+            Some(0.0)
+        );
+        assert_eq!(
+            Mesh::new(&circle(5), &Grading::cosine(5)).mirror_line(),
+            None
+        );
+    }
+
+    #[test]
+    fn a_shifted_strip_breaks_the_mirror_line() {
+        let mut chords = circle(6);
+        chords[1].left += 1e-6;
+        assert_eq!(Mesh::new(&chords, &Grading::cosine(5)).mirror_line(), None);
+    }
 }

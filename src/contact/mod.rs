@@ -4,6 +4,7 @@
 
 pub mod case;
 pub mod error;
+pub mod influence;
 pub mod mesh;
 pub mod monitor;
 pub mod normal;
@@ -11,14 +12,18 @@ pub mod outputs;
 pub mod problem;
 mod read;
 pub mod solution;
+pub mod tangential;
 pub mod zones;
 
 use serde_json::Value;
 
 use crate::contact::error::{CaseError, SolveError};
-use crate::contact::monitor::Monitor;
-use crate::contact::problem::{Limits, Problem};
+use crate::contact::monitor::{Monitor, Watch};
+use crate::contact::outputs::assemble::assemble;
+use crate::contact::problem::{Elasticity, Limits, Problem};
 use crate::contact::solution::{Fields, Solution};
+use crate::contact::tangential::level::Level;
+use crate::contact::tangential::point;
 
 /// Reads and checks a case.
 ///
@@ -33,10 +38,31 @@ pub fn check(case: &Value, limits: &Limits) -> Result<Problem, CaseError> {
     Problem::new(&draft.complete().ok_or(CaseError(faults))?, limits)
 }
 
-/// Solves a checked case.
+/// Solves a checked case: mesh levels and their pressures, then every motion from the coarsest level to the finest.
 ///
 /// # Errors
 /// A named reason why there is no answer.
-pub fn solve(_problem: &Problem, _monitor: &dyn Monitor) -> Result<(Solution, Fields), SolveError> {
-    todo!("the recipe")
+pub fn solve(problem: &Problem, monitor: &dyn Monitor) -> Result<(Solution, Fields), SolveError> {
+    let watch = Watch::new(monitor, problem.time_limit, problem.motions.len());
+    let levels = problem.levels().into_iter().map(|size| {
+        let Elasticity {
+            shear_modulus,
+            poisson_ratio,
+            ..
+        } = problem.elasticity;
+        Level::new(
+            &problem.region,
+            size,
+            shear_modulus,
+            poisson_ratio,
+            problem.friction,
+        )
+    });
+    let levels: Vec<Level> = levels.collect();
+    let mut points = Vec::with_capacity(problem.motions.len());
+    for index in 0..problem.motions.len() {
+        points.push(point::solve(problem, &levels, index, &watch)?);
+        watch.advance();
+    }
+    Ok(assemble(problem, &levels[levels.len() - 1], &points))
 }

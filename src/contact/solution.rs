@@ -86,8 +86,8 @@ pub struct PointSolution {
     pub force_y_n: f64,
     /// Moment about the origin on the lower body in N·mm.
     pub moment_z_n_mm: f64,
-    /// Estimated absolute errors of the three resultants.
-    pub error_estimate: ErrorEstimate,
+    /// Estimated absolute errors of the three resultants; null where there is nothing to estimate them from.
+    pub error_estimate: Option<ErrorEstimate>,
     /// Area that sticks in mm²; absent unless zones were asked for.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub stick_area_mm2: Option<f64>,
@@ -177,8 +177,8 @@ pub struct Total {
     pub force_y_n: f64,
     /// Moment about the origin on the lower body in N·mm.
     pub moment_z_n_mm: f64,
-    /// Estimated absolute errors.
-    pub error_estimate: ErrorEstimate,
+    /// Estimated absolute errors; null where there is nothing to estimate them from.
+    pub error_estimate: Option<ErrorEstimate>,
 }
 
 /// The values per cell of all patches: what was asked for, nothing else.

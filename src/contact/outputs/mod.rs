@@ -2,7 +2,9 @@
 //!
 //! Pure functions of [`PatchFields`](crate::contact::solution::PatchFields); nothing here solves anything.
 
+pub mod assemble;
 mod loops;
 pub mod outline;
 pub mod resample;
+pub mod resultants;
 mod segments;

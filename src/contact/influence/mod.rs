@@ -1,0 +1,5 @@
+//! How does the surface give? Displacement caused by tractions on the cells of a mesh.
+
+pub mod coefficients;
+pub mod logarithm;
+pub mod strips;

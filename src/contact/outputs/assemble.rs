@@ -1,0 +1,335 @@
+//! From stage results to the answer a client reads: units put back, only what was asked for.
+
+use crate::contact::case::{Motion, Output};
+use crate::contact::normal::{Patch, Region};
+use crate::contact::outputs::resultants::Resultants;
+use crate::contact::problem::Problem;
+use crate::contact::solution::{
+    CombinedMaterial, ErrorEstimate, Fields, MeshReport, NormalisedMotion, Origin, PatchFields,
+    PatchSolution, PointFields, PointSolution, Solution, SolverReport, Total,
+};
+use crate::contact::tangential::level::Level;
+use crate::contact::tangential::point::Point;
+use crate::contact::zones::Zone;
+
+use crate::contact::problem::Resolution;
+
+/// Axes, origin and signs in one sentence.
+const FRAME: &str = "x along rolling (leading edge at larger x), y to the left, z up out of the lower body; forces, moments \
+                     and tractions act on the lower body, slip is that of the upper body relative to the lower one";
+
+/// Puts the answer together; `level` is the finest one, `points` has one entry per motion.
+#[must_use]
+pub fn assemble(problem: &Problem, level: &Level, points: &[Point]) -> (Solution, Fields) {
+    let patches = problem.region.patches();
+    let solution = Solution {
+        patches: (0..patches.len())
+            .map(|p| patch_solution(problem, level, &patches[p], p, points))
+            .collect(),
+        total: points
+            .iter()
+            .zip(&problem.motions)
+            .map(|(point, _)| total(problem, &patches, point))
+            .collect(),
+        warnings: warnings(problem, points),
+        origin: Origin {
+            x_mm: 0.0,
+            y_mm: 0.0,
+            meaning: match problem.region {
+                Region::Ellipse(_) => "centre of the contact ellipse",
+                Region::Grid(_) => "origin of the given coordinates, for all patches",
+            }
+            .to_owned(),
+        },
+        frame: FRAME.to_owned(),
+        material: CombinedMaterial {
+            shear_modulus_mpa: problem.elasticity.shear_modulus,
+            poisson_ratio: problem.elasticity.poisson_ratio,
+            difference_parameter: problem.elasticity.difference,
+        },
+        solver_version: env!("CARGO_PKG_VERSION").to_owned(),
+        case_digest: problem.digest.clone(),
+    };
+    let fields = Fields {
+        patches: (0..patches.len())
+            .map(|p| patch_fields(problem, level, p, points))
+            .collect(),
+    };
+    (
+        solution,
+        if wants_fields(problem) {
+            fields
+        } else {
+            Fields::default()
+        },
+    )
+}
+
+fn wants_fields(problem: &Problem) -> bool {
+    problem.outputs.iter().any(|o| *o != Output::Resultants)
+}
+
+fn patch_solution(
+    problem: &Problem,
+    level: &Level,
+    patch: &Patch,
+    index: usize,
+    points: &[Point],
+) -> PatchSolution {
+    PatchSolution {
+        normal_force_n: patch.normal_force,
+        approach_mm: patch.approach,
+        area_mm2: patch.area,
+        pressure_max_mpa: patch.pressure_max,
+        semi_axes_mm: patch.semi_axes,
+        extent_mm: patch.extent,
+        points: points
+            .iter()
+            .zip(&problem.motions)
+            .map(|(point, motion)| point_solution(problem, level, patch, index, point, motion))
+            .collect(),
+    }
+}
+
+fn point_solution(
+    problem: &Problem,
+    level: &Level,
+    patch: &Patch,
+    index: usize,
+    point: &Point,
+    motion: &Motion,
+) -> PointSolution {
+    let found = point.resultants[index];
+    let cells = level.patch_cells(index);
+    let traction = &point.tangential.traction;
+    let largest = cells
+        .clone()
+        .map(|i| traction[0][i].hypot(traction[1][i]))
+        .fold(0.0, f64::max);
+    let areas = problem
+        .wants(Output::Zones)
+        .then(|| zone_areas(level, patch, cells, &point.tangential.slips));
+    let power_x = motion.creepage_x * found.force_x;
+    let power_y = motion.creepage_y * found.force_y;
+    PointSolution {
+        motion: *motion,
+        normalised: normalised(problem, patch, motion),
+        force_x_n: found.force_x,
+        force_y_n: found.force_y,
+        moment_z_n_mm: found.moment_z,
+        error_estimate: point.errors[index]
+            .map(|e| absolute(problem, std::slice::from_ref(patch), e)),
+        stick_area_mm2: areas.map(|a| a.stick_area),
+        slip_area_mm2: areas.map(|a| a.slip_area),
+        stick_cells: areas.map(|a| a.stick_cells),
+        slip_cells: areas.map(|a| a.slip_cells),
+        traction_max_mpa: largest * level.scale.traction,
+        friction_power_n: power_x + power_y + motion.spin_per_mm * found.moment_z,
+        friction_power_without_spin_n: power_x.abs() + power_y.abs(),
+        solver: SolverReport {
+            method: point.method,
+            mesh: MeshReport {
+                strips: level.size.strips,
+                cells: level.size.cells,
+            },
+            iterations: point.work.iterations,
+            products: point.work.products,
+            residual: point.work.residual,
+            skipped: point.tangential.skipped.clone(),
+            seconds: point.seconds,
+        },
+        target_met: target_met(problem, point),
+        saturated: false,
+    }
+}
+
+/// Does the estimate of the sum over the patches stay within the target?
+fn target_met(problem: &Problem, point: &Point) -> Option<bool> {
+    let Resolution::Target(target) = problem.resolution else {
+        return None;
+    };
+    Some(
+        point
+            .errors
+            .last()
+            .copied()
+            .flatten()
+            .is_some_and(|e| e <= target),
+    )
+}
+
+#[derive(Clone, Copy)]
+struct ZoneAreas {
+    stick_cells: u32,
+    slip_cells: u32,
+    stick_area: f64,
+    slip_area: f64,
+}
+
+/// Counts and areas of the zones; areas are the cells' shares of the patch's area, so that they add up to it.
+fn zone_areas(
+    level: &Level,
+    patch: &Patch,
+    cells: std::ops::Range<usize>,
+    slips: &[bool],
+) -> ZoneAreas {
+    let mut zones = ZoneAreas {
+        stick_cells: 0,
+        slip_cells: 0,
+        stick_area: 0.0,
+        slip_area: 0.0,
+    };
+    for i in cells {
+        if slips[i] {
+            zones.slip_cells += 1;
+            zones.slip_area += level.area[i];
+        } else {
+            zones.stick_cells += 1;
+            zones.stick_area += level.area[i];
+        }
+    }
+    let factor = patch.area / (zones.stick_area + zones.slip_area);
+    zones.stick_area *= factor;
+    zones.slip_area *= factor;
+    zones
+}
+
+/// Creepages made dimensionless with E = 2G(1+ν) and c = √(A/π) (Kalker 1990; the seed uses half the longest strip).
+fn normalised(problem: &Problem, patch: &Patch, motion: &Motion) -> NormalisedMotion {
+    let c = (patch.area / std::f64::consts::PI).sqrt();
+    let bound = problem.friction * patch.normal_force;
+    let unit =
+        2.0 * problem.elasticity.shear_modulus / (1.0 - problem.elasticity.poisson_ratio) * c * c
+            / bound;
+    let scaled = |value: f64| (bound > 0.0).then_some(value * unit);
+    NormalisedMotion {
+        creepage_x: scaled(motion.creepage_x),
+        creepage_y: scaled(motion.creepage_y),
+        spin: scaled(motion.spin_per_mm * c),
+        length_mm: c,
+    }
+}
+
+/// A relative error as absolute ones. The moment's grows with the distance of the patches from the origin.
+fn absolute(problem: &Problem, patches: &[Patch], relative: f64) -> ErrorEstimate {
+    let (mut force, mut area, mut reach) = (0.0, 0.0, 0.0_f64);
+    for patch in patches {
+        force += problem.friction * patch.normal_force;
+        area += patch.area;
+        let middle = (0.5 * (patch.extent[0] + patch.extent[1]))
+            .hypot(0.5 * (patch.extent[2] + patch.extent[3]));
+        reach = reach.max(middle);
+    }
+    let length = (area / std::f64::consts::PI).sqrt();
+    ErrorEstimate {
+        force_x_n: relative * force,
+        force_y_n: relative * force,
+        moment_z_n_mm: relative * force * (length + reach),
+    }
+}
+
+fn total(problem: &Problem, patches: &[Patch], point: &Point) -> Total {
+    let sum = point
+        .resultants
+        .iter()
+        .fold(Resultants::default(), |sum, r| sum.plus(*r));
+    Total {
+        force_x_n: sum.force_x,
+        force_y_n: sum.force_y,
+        moment_z_n_mm: sum.moment_z,
+        error_estimate: point
+            .errors
+            .last()
+            .copied()
+            .flatten()
+            .map(|e| absolute(problem, patches, e)),
+    }
+}
+
+fn warnings(problem: &Problem, points: &[Point]) -> Vec<String> {
+    let mut warnings = problem.warnings.clone();
+    for (k, point) in points.iter().enumerate() {
+        warnings.extend(
+            point
+                .tangential
+                .warnings
+                .iter()
+                .map(|w| format!("motion {k}: {w}")),
+        );
+        if let (Resolution::Target(target), Some(false)) =
+            (problem.resolution, target_met(problem, point))
+        {
+            let estimate = point.errors.last().copied().flatten();
+            let reached = estimate.map_or("is unknown".to_owned(), |e| {
+                format!("is estimated at {e:.2e}")
+            });
+            warnings.push(format!(
+                "motion {k}: the error relative to μN {reached}, the target was {target}"
+            ));
+        }
+    }
+    warnings
+}
+
+fn patch_fields(problem: &Problem, level: &Level, patch: usize, points: &[Point]) -> PatchFields {
+    if !wants_fields(problem) {
+        return PatchFields::default();
+    }
+    let cells = level.patch_cells(patch);
+    let mesh = &level.mesh;
+    let mut fields = PatchFields::default();
+    for segment in mesh.segments.iter().filter(|s| s.chord.patch == patch) {
+        for i in segment.cells.clone() {
+            fields.x_mm.push(0.5 * (mesh.left[i] + mesh.right[i]));
+            fields.y_mm.push(segment.chord.y);
+            fields.dx_mm.push(mesh.right[i] - mesh.left[i]);
+            fields.dy_mm.push(segment.chord.dy);
+            fields
+                .strip
+                .push(u32::try_from(segment.chord.strip).unwrap_or(u32::MAX));
+        }
+    }
+    fields.pressure_mpa = problem
+        .wants(Output::Pressure)
+        .then(|| level.pressure[cells.clone()].to_vec());
+    fields.points = points
+        .iter()
+        .map(|point| point_fields(problem, level, cells.clone(), point))
+        .collect();
+    fields
+}
+
+fn point_fields(
+    problem: &Problem,
+    level: &Level,
+    cells: std::ops::Range<usize>,
+    point: &Point,
+) -> PointFields {
+    let answer = &point.tangential;
+    let scaled = |values: &[f64], factor: f64| {
+        values[cells.clone()]
+            .iter()
+            .map(|v| v * factor)
+            .collect::<Vec<_>>()
+    };
+    let traction = |k: usize| {
+        problem
+            .wants(Output::Tractions)
+            .then(|| scaled(&answer.traction[k], level.scale.traction))
+    };
+    let slip = |k: usize| {
+        problem
+            .wants(Output::Slip)
+            .then(|| scaled(&answer.slip[k], level.scale.slip()))
+    };
+    let zone = |slips: &bool| if *slips { Zone::Slip } else { Zone::Stick };
+    PointFields {
+        zone: problem
+            .wants(Output::Zones)
+            .then(|| answer.slips[cells.clone()].iter().map(zone).collect()),
+        traction_x_mpa: traction(0),
+        traction_y_mpa: traction(1),
+        slip_x: slip(0),
+        slip_y: slip(1),
+    }
+}

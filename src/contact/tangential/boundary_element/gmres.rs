@@ -1,0 +1,309 @@
+//! GMRES with right preconditioning (Saad & Schultz 1986): linear systems known only through products.
+
+use std::ops::ControlFlow;
+
+use crate::contact::monitor::Stop;
+
+/// Basis vectors kept before a restart.
+const BASIS_MAX: usize = 60;
+/// Restarts before giving up.
+const RESTARTS_MAX: usize = 3;
+
+/// Buffers that live as long as a solve.
+#[derive(Debug, Default)]
+pub struct Gmres {
+    basis: Vec<Vec<f64>>,
+    /// Upper triangle of the rotated Hessenberg matrix, column by column.
+    columns: Vec<Vec<f64>>,
+    rotations: Vec<(f64, f64)>,
+    rhs: Vec<f64>,
+    direction: Vec<f64>,
+    product: Vec<f64>,
+}
+
+/// How a linear solve went.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinearReport {
+    /// Products with the matrix.
+    pub products: u32,
+    /// Norm of the residual divided by that of the right-hand side.
+    pub residual: f64,
+}
+
+/// A linear system given by its action.
+pub trait LinearSystem {
+    /// `out = A x`.
+    fn product(&mut self, x: &[f64], out: &mut [f64]);
+    /// `x ← P⁻¹ x` with P close to A.
+    fn precondition(&mut self, x: &mut [f64]);
+    /// Called once per product; may stop the work.
+    fn tick(&mut self) -> ControlFlow<Stop>;
+}
+
+impl Gmres {
+    /// Improves `x` (which starts at zero) until the residual of `A x = b` has fallen by `tolerance`, or the limits
+    /// on basis size and restarts are reached; the report says how far it came.
+    ///
+    /// # Errors
+    /// Only if the system's `tick` stops the work.
+    pub fn solve(
+        &mut self,
+        system: &mut dyn LinearSystem,
+        b: &[f64],
+        tolerance: f64,
+        x: &mut [f64],
+    ) -> Result<LinearReport, Stop> {
+        x.fill(0.0);
+        let norm_b = norm(b);
+        let mut report = LinearReport {
+            products: 0,
+            residual: 0.0,
+        };
+        if norm_b == 0.0 {
+            return Ok(report);
+        }
+        self.direction.resize(b.len(), 0.0);
+        self.product.resize(b.len(), 0.0);
+        let mut residual = b.to_vec();
+        let mut beta = norm_b;
+        for restart in 0..=RESTARTS_MAX {
+            if restart > 0 {
+                system.product(x, &mut self.product);
+                report.products += 1;
+                for i in 0..b.len() {
+                    residual[i] = b[i] - self.product[i];
+                }
+                beta = norm(&residual);
+            }
+            if beta <= tolerance * norm_b {
+                break;
+            }
+            beta = self.cycle(system, &residual, beta, tolerance * norm_b, x, &mut report)?;
+            if beta <= tolerance * norm_b {
+                break;
+            }
+        }
+        report.residual = beta / norm_b;
+        Ok(report)
+    }
+
+    /// One Arnoldi cycle; returns the residual norm it reached.
+    fn cycle(
+        &mut self,
+        system: &mut dyn LinearSystem,
+        residual: &[f64],
+        beta: f64,
+        goal: f64,
+        x: &mut [f64],
+        report: &mut LinearReport,
+    ) -> Result<f64, Stop> {
+        self.columns.clear();
+        self.rotations.clear();
+        self.rhs.clear();
+        self.rhs.push(beta);
+        self.set_basis(0, residual, beta);
+        let mut k = 0;
+        while k < BASIS_MAX {
+            if let ControlFlow::Break(stop) = system.tick() {
+                return Err(stop);
+            }
+            self.direction.copy_from_slice(&self.basis[k]);
+            system.precondition(&mut self.direction);
+            system.product(&self.direction, &mut self.product);
+            report.products += 1;
+            let breakdown = self.orthogonalise(k);
+            k += 1;
+            if breakdown || self.rhs[k].abs() <= goal {
+                break;
+            }
+        }
+        self.add_solution(k, system, x);
+        Ok(self.rhs[k].abs())
+    }
+
+    fn set_basis(&mut self, k: usize, vector: &[f64], norm: f64) {
+        if self.basis.len() <= k {
+            self.basis.push(vec![0.0; vector.len()]);
+        }
+        let basis = &mut self.basis[k];
+        basis.resize(vector.len(), 0.0);
+        for (to, from) in basis.iter_mut().zip(vector) {
+            *to = from / norm;
+        }
+    }
+
+    /// Makes the newest product orthogonal to the basis (modified Gram–Schmidt), appends it, and applies the Givens
+    /// rotations. Returns true if nothing is left of it.
+    fn orthogonalise(&mut self, k: usize) -> bool {
+        let before = norm(&self.product);
+        let mut column = Vec::with_capacity(k + 1);
+        for basis in &self.basis[..=k] {
+            let h = dot(basis, &self.product);
+            for (p, b) in self.product.iter_mut().zip(basis) {
+                *p -= h * b;
+            }
+            column.push(h);
+        }
+        let rest = norm(&self.product);
+        for (i, (c, s)) in self.rotations.iter().enumerate() {
+            let (a, b) = (column[i], column[i + 1]);
+            column[i] = c * a + s * b;
+            column[i + 1] = c * b - s * a;
+        }
+        let length = column[k].hypot(rest);
+        let (c, s) = if length == 0.0 {
+            (1.0, 0.0)
+        } else {
+            (column[k] / length, rest / length)
+        };
+        column[k] = length;
+        self.columns.push(column);
+        self.rotations.push((c, s));
+        let last = self.rhs[k];
+        self.rhs[k] = c * last;
+        self.rhs.push(-s * last);
+        if rest <= 1e-14 * before {
+            return true;
+        }
+        let product = std::mem::take(&mut self.product);
+        self.set_basis(k + 1, &product, rest);
+        self.product = product;
+        false
+    }
+
+    /// `x ← x + P⁻¹ V y` with `y` from the triangular system.
+    fn add_solution(&mut self, k: usize, system: &mut dyn LinearSystem, x: &mut [f64]) {
+        let mut y = self.rhs[..k].to_vec();
+        for i in (0..k).rev() {
+            for j in i + 1..k {
+                y[i] -= self.columns[j][i] * y[j];
+            }
+            let pivot = self.columns[i][i];
+            y[i] = if pivot == 0.0 { 0.0 } else { y[i] / pivot };
+        }
+        self.direction.fill(0.0);
+        for (weight, basis) in y.iter().zip(&self.basis) {
+            for (d, b) in self.direction.iter_mut().zip(basis) {
+                *d += weight * b;
+            }
+        }
+        system.precondition(&mut self.direction);
+        for (to, d) in x.iter_mut().zip(&self.direction) {
+            *to += d;
+        }
+    }
+}
+
+/// Inner product in eight running sums, so that it can be vectorised and rounds alike everywhere.
+#[must_use]
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (chunks_a, chunks_b) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = chunks_a
+        .remainder()
+        .iter()
+        .zip(chunks_b.remainder())
+        .map(|(x, y)| x * y)
+        .sum();
+    for (x, y) in chunks_a.zip(chunks_b) {
+        for k in 0..8 {
+            sums[k] += x[k] * y[k];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}
+
+fn norm(a: &[f64]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Dense {
+        n: usize,
+        a: Vec<f64>,
+        diagonal: bool,
+    }
+
+    impl LinearSystem for Dense {
+        fn product(&mut self, x: &[f64], out: &mut [f64]) {
+            for i in 0..self.n {
+                out[i] = dot(&self.a[i * self.n..(i + 1) * self.n], x);
+            }
+        }
+
+        fn precondition(&mut self, x: &mut [f64]) {
+            if self.diagonal {
+                for i in 0..self.n {
+                    x[i] /= self.a[i * self.n + i];
+                }
+            }
+        }
+
+        fn tick(&mut self) -> ControlFlow<Stop> {
+            ControlFlow::Continue(())
+        }
+    }
+
+    fn nonsymmetric(n: usize, diagonal: bool) -> Dense {
+        let entry = |i: usize, j: usize| {
+            let wave = ((3 * i + 7 * j) as f64).sin() / (1.0 + i.abs_diff(j) as f64);
+            wave + if i == j { 4.0 + i as f64 } else { 0.0 }
+        };
+        Dense {
+            n,
+            a: (0..n * n).map(|k| entry(k / n, k % n)).collect(),
+            diagonal,
+        }
+    }
+
+    #[test]
+    fn the_residual_falls_to_the_tolerance_asked_for() {
+        for diagonal in [false, true] {
+            for n in [1, 5, 90] {
+                let mut system = nonsymmetric(n, diagonal);
+                let b: Vec<f64> = (0..n).map(|i| (i as f64).cos()).collect();
+                let mut x = vec![0.0; n];
+                let report = Gmres::default()
+                    .solve(&mut system, &b, 1e-10, &mut x)
+                    .unwrap();
+                let mut ax = vec![0.0; n];
+                system.product(&x, &mut ax);
+                let error: f64 = ax
+                    .iter()
+                    .zip(&b)
+                    .map(|(a, b)| (a - b).powi(2))
+                    .sum::<f64>()
+                    .sqrt();
+                assert!(
+                    error <= 1.1e-10 * norm(&b) && report.residual <= 1e-10,
+                    "{n} {error} {report:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_good_preconditioner_saves_products() {
+        let b = vec![1.0; 90];
+        let products = |diagonal| {
+            let mut x = vec![0.0; 90];
+            Gmres::default()
+                .solve(&mut nonsymmetric(90, diagonal), &b, 1e-8, &mut x)
+                .unwrap()
+                .products
+        };
+        assert!(products(true) < products(false));
+    }
+
+    #[test]
+    fn nothing_to_solve_costs_nothing() {
+        let mut x = vec![1.0; 5];
+        let report = Gmres::default()
+            .solve(&mut nonsymmetric(5, false), &[0.0; 5], 1e-8, &mut x)
+            .unwrap();
+        assert_eq!((report.products, x), (0, vec![0.0; 5]));
+    }
+}

@@ -1,0 +1,254 @@
+//! The fast solver: projection form, semismooth Newton, strip-preconditioned GMRES.
+//!
+//! Every level is solved twice: with the three-point rule from the given start, then with the trapezoid rule from
+//! that solution. Forces and tractions come from the trapezoid, whose resultants are the more exact; slips and zones
+//! from the three-point rule, whose slips are smooth; the difference of the two is a second opinion on the error.
+
+pub mod gmres;
+pub mod newton;
+pub mod strip_blocks;
+
+use crate::contact::case::Motion;
+use crate::contact::influence::strips::{Differences, Parity};
+use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::tangential::boundary_element::newton::{Convergence, FrictionLaw, Newton};
+use crate::contact::tangential::equations::Equations;
+use crate::contact::tangential::full_slip;
+use crate::contact::tangential::level::Level;
+use crate::contact::tangential::rules::Rule;
+use crate::contact::tangential::{Failure, Tangential, Work};
+
+/// Residual of the friction law that ends a solve, relative to the traction scale of the case.
+pub const TOLERANCE: f64 = 1e-6;
+
+/// Solves one motion (dimensionless, about the level's origin) on one level, starting from tractions per cell.
+///
+/// # Errors
+/// [`Failure::NotConverged`] if no start leads to a solution of the three-point rule; [`Failure::Stopped`] if the
+/// monitor stops the work. If only the trapezoid rule fails, the three-point tractions serve and a warning says so.
+pub fn solve(
+    level: &Level,
+    motion: &Motion,
+    start: Option<&[Vec<f64>; 2]>,
+    monitor: &dyn Monitor,
+) -> Result<Tangential, Failure> {
+    if let Some(answer) = full_slip::rigid_answer(level, motion) {
+        return Ok(answer);
+    }
+    let influence = level.influence(monitor)?;
+    let parity = level.parity(motion);
+    let mut solve = Solve::new(level, motion, influence, parity, monitor);
+    let mut skipped = Vec::new();
+    if parity.is_some() {
+        skipped.push("mirror symmetry of patch and motion: half the cells".to_owned());
+    } else if level.is_mirrored() {
+        skipped.push("mirror symmetry of the patch: half the influence".to_owned());
+    }
+    let mut t = solve.start(start);
+    let mirror = solve.mirror(&mut t, start.is_some())?;
+    if mirror.by_fixed_point {
+        skipped.push("everything slips: fixed point instead of Newton".to_owned());
+    }
+    let second = solve.expand(&t);
+    let mut warnings = Vec::new();
+    if !solve.trapezoid(&mut t)? {
+        warnings.push(
+            "the trapezoid rule did not converge; forces come from the three-point rule and their error is larger"
+                .to_owned(),
+        );
+    }
+    Ok(Tangential {
+        traction: solve.expand(&t),
+        second: Some(second),
+        slip: mirror.slip,
+        slips: mirror.slips,
+        work: solve.work,
+        skipped,
+        warnings,
+    })
+}
+
+/// What the three-point rule gave besides tractions.
+struct MirrorAnswer {
+    slip: [Vec<f64>; 2],
+    slips: Vec<bool>,
+    by_fixed_point: bool,
+}
+
+/// One motion on one level.
+struct Solve<'a> {
+    level: &'a Level,
+    motion: &'a Motion,
+    influence: &'a Differences,
+    parity: Option<Parity>,
+    bound: Vec<f64>,
+    area: Vec<f64>,
+    work: Work,
+    monitor: &'a dyn Monitor,
+}
+
+impl<'a> Solve<'a> {
+    fn new(
+        level: &'a Level,
+        motion: &'a Motion,
+        influence: &'a Differences,
+        parity: Option<Parity>,
+        monitor: &'a dyn Monitor,
+    ) -> Solve<'a> {
+        let padded = influence.padded(parity);
+        let resized = |values: &[f64]| {
+            let mut values = values.to_vec();
+            values.resize(padded.max(values.len()), 0.0);
+            values
+        };
+        Solve {
+            level,
+            motion,
+            influence,
+            parity,
+            bound: resized(&level.bound),
+            area: resized(&level.normalised.areas()),
+            work: Work::default(),
+            monitor,
+        }
+    }
+
+    fn equations(&self, rule: Rule) -> Equations<'a> {
+        Equations::new(rule, &self.level.normalised, self.influence, self.parity)
+    }
+
+    /// The start brought onto the unknowns, or zero tractions.
+    fn start(&self, start: Option<&[Vec<f64>; 2]>) -> Vec<f64> {
+        let padded = self.influence.padded(self.parity);
+        let mut t = vec![0.0; 2 * padded];
+        if let Some([x, y]) = start {
+            let unknowns = self.equations(Rule::Upwind).cells();
+            t[..unknowns].copy_from_slice(&x[..unknowns]);
+            t[padded..padded + unknowns].copy_from_slice(&y[..unknowns]);
+        }
+        t
+    }
+
+    /// Solves one rule from `t`; `shortcut` allows the fixed point.
+    fn rule(
+        &mut self,
+        newton: &mut Newton,
+        rigid: &[f64],
+        t: &mut [f64],
+        shortcut: bool,
+    ) -> Result<(Convergence, bool), Stop> {
+        let largest = rigid.iter().fold(0.0_f64, |m, w| m.max(w.abs()));
+        let law = FrictionLaw {
+            rigid,
+            bound: &self.bound,
+            area: &self.area,
+            scale: (largest * newton.compliance()).min(1.0),
+            tolerance: TOLERANCE,
+        };
+        let settled = if shortcut {
+            full_slip::fixed_point(newton, &law, t, self.monitor)?
+        } else {
+            None
+        };
+        let by_fixed_point = settled.is_some();
+        let report = match settled {
+            Some(report) => report,
+            None => newton.solve(&law, t, self.monitor)?,
+        };
+        self.work.add(Work {
+            iterations: report.iterations,
+            products: report.products,
+            residual: report.residual,
+        });
+        Ok((report, by_fixed_point))
+    }
+
+    /// The three-point rule: from the start, else from zero, else from the upwind solution.
+    fn mirror(&mut self, t: &mut [f64], started: bool) -> Result<MirrorAnswer, Failure> {
+        let equations = self.equations(Rule::Mirror);
+        let rigid = equations.rigid(self.motion);
+        let mut newton = Newton::new(&equations);
+        let (mut report, by_fixed_point) = self.rule(&mut newton, &rigid, t, true)?;
+        if !report.converged && started {
+            t.fill(0.0);
+            report = self.rule(&mut newton, &rigid, t, false)?.0;
+        }
+        if !report.converged {
+            t.fill(0.0);
+            self.upwind(t)?;
+            report = self.rule(&mut newton, &rigid, t, false)?.0;
+        }
+        if !report.converged {
+            return Err(Failure::NotConverged {
+                work: self.work,
+                tolerance: TOLERANCE,
+                advice: "try another mesh, with cells and strips of similar width".to_owned(),
+            });
+        }
+        let law = FrictionLaw {
+            rigid: &rigid,
+            bound: &self.bound,
+            area: &self.area,
+            scale: 1.0,
+            tolerance: TOLERANCE,
+        };
+        let half: Vec<f64> = (0..equations.cells())
+            .map(|i| f64::from(u8::from(newton.slips(&law, t, i))))
+            .collect();
+        let slips = if self.parity.is_some() {
+            self.level.unfold(&half, 1.0)
+        } else {
+            half
+        };
+        Ok(MirrorAnswer {
+            slip: self.expand(newton.slip()),
+            slips: slips.into_iter().map(|v| v > 0.5).collect(),
+            by_fixed_point,
+        })
+    }
+
+    fn upwind(&mut self, t: &mut [f64]) -> Result<bool, Stop> {
+        let equations = self.equations(Rule::Upwind);
+        let rigid = equations.rigid(self.motion);
+        let mut newton = Newton::new(&equations);
+        Ok(self.rule(&mut newton, &rigid, t, false)?.0.converged)
+    }
+
+    /// The trapezoid rule from the three-point solution in `t`, else from the upwind solution; if neither leads to a
+    /// solution `t` is as it was.
+    fn trapezoid(&mut self, t: &mut [f64]) -> Result<bool, Stop> {
+        let equations = self.equations(Rule::Trapezoid);
+        let rigid = equations.rigid(self.motion);
+        let mut newton = Newton::new(&equations);
+        let mut found = t.to_vec();
+        let residual = self.work.residual;
+        if !self
+            .rule(&mut newton, &rigid, &mut found, true)?
+            .0
+            .converged
+        {
+            found.fill(0.0);
+            self.upwind(&mut found)?;
+            if !self
+                .rule(&mut newton, &rigid, &mut found, false)?
+                .0
+                .converged
+            {
+                self.work.residual = residual;
+                return Ok(false);
+            }
+        }
+        t.copy_from_slice(&found);
+        Ok(true)
+    }
+
+    /// Values of the unknowns (x then y) as two vectors over the whole mesh.
+    fn expand(&self, values: &[f64]) -> [Vec<f64>; 2] {
+        let (x, y) = values.split_at(values.len() / 2);
+        match self.parity {
+            None => [x, y].map(|v| v[..self.level.mesh.cells()].to_vec()),
+            Some(Parity::Longitudinal) => [self.level.unfold(x, 1.0), self.level.unfold(y, -1.0)],
+            Some(Parity::Lateral) => [self.level.unfold(x, -1.0), self.level.unfold(y, 1.0)],
+        }
+    }
+}

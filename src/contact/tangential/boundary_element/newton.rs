@@ -1,0 +1,391 @@
+//! Semismooth Newton on the projected friction law `T = Π(T + r s(T))`, Π the projection on the disc of radius g.
+//!
+//! With `z = T + r s`: a cell sticks where `|z| ≤ g` (both components unknown, `s = 0`), and slips where `|z| > g`
+//! (`T = g d + τ t`, `d = z/|z|`, `t ⟂ d`, one unknown τ, one equation `t·s = D τ`, `D = (|z| − g)/(g r)`). Each step
+//! solves that linear system by GMRES with the segments' own blocks as preconditioner (Alart & Curnier 1991 for the
+//! projection form; `r = 0.3/M_ii` because larger values can cycle on fine meshes).
+
+use std::ops::ControlFlow;
+
+use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::tangential::boundary_element::gmres::{Gmres, LinearSystem};
+use crate::contact::tangential::boundary_element::strip_blocks::{OwnBlocks, StripBlocks};
+use crate::contact::tangential::equations::Equations;
+
+/// Projection parameter times `M_ii`.
+const PROJECTION: f64 = 0.3;
+/// Newton steps before giving up.
+const ITERATIONS_MAX: u32 = 60;
+/// A step is halved at most this often.
+const HALVINGS_MAX: u32 = 5;
+/// The residual may grow by this factor against the largest of the last steps before a step is halved.
+const GROWTH_ALLOWED: f64 = 1.5;
+
+/// What a solve needs besides the equations, all per cell, padded like the equations' vectors.
+#[derive(Debug, Clone, Copy)]
+pub struct FrictionLaw<'a> {
+    /// Rigid slip, x then y.
+    pub rigid: &'a [f64],
+    /// Friction bound g = μp.
+    pub bound: &'a [f64],
+    /// Area of every cell, the weight of its residual.
+    pub area: &'a [f64],
+    /// Traction scale of the case: residuals are relative to it.
+    pub scale: f64,
+    /// Residual to reach.
+    pub tolerance: f64,
+}
+
+/// How a solve ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Convergence {
+    /// Did the residual reach the tolerance?
+    pub converged: bool,
+    /// Newton steps.
+    pub iterations: u32,
+    /// Products of the influence with a vector.
+    pub products: u32,
+    /// Area-weighted root mean square of `T − Π(T + r s)`, relative to the scale of the case.
+    pub residual: f64,
+}
+
+/// The state of one Newton step: which cells slip, and in which direction.
+#[derive(Debug, Default)]
+pub struct Linearisation {
+    /// `(1, 0)` where a cell sticks, the unit tangent where it slips.
+    direction: Vec<(f64, f64)>,
+    /// D where a cell slips, −1 where it sticks.
+    stiffness: Vec<f64>,
+}
+
+impl Linearisation {
+    /// Does the cell slip?
+    #[must_use]
+    pub fn slips(&self, cell: usize) -> bool {
+        self.stiffness[cell] >= 0.0
+    }
+
+    /// Direction of the cell's first unknown.
+    #[must_use]
+    pub fn direction(&self, cell: usize) -> (f64, f64) {
+        self.direction[cell]
+    }
+
+    /// D of a slipping cell, 0 of a sticking one.
+    #[must_use]
+    pub fn stiffness(&self, cell: usize) -> f64 {
+        self.stiffness[cell].max(0.0)
+    }
+}
+
+/// Solver for one rule on one mesh; keeps its factors and buffers between solves.
+pub struct Newton<'a> {
+    equations: &'a Equations<'a>,
+    own: OwnBlocks,
+    /// Projection parameter r of every cell.
+    parameter: Vec<f64>,
+    blocks: StripBlocks,
+    gmres: Gmres,
+    linear: Linearisation,
+    slip: Vec<f64>,
+    scratch: Vec<f64>,
+    expanded: Vec<f64>,
+}
+
+impl<'a> Newton<'a> {
+    /// Prepares the own blocks and the buffers.
+    #[must_use]
+    pub fn new(equations: &'a Equations<'a>) -> Newton<'a> {
+        let own = OwnBlocks::new(equations);
+        let diagonal = own.diagonal(equations);
+        let length = 2 * equations.padded();
+        Newton {
+            equations,
+            parameter: diagonal.iter().map(|m| PROJECTION / m.abs()).collect(),
+            own,
+            blocks: StripBlocks::default(),
+            gmres: Gmres::default(),
+            linear: Linearisation::default(),
+            slip: vec![0.0; length],
+            scratch: vec![0.0; 2 * equations.row_count()],
+            expanded: vec![0.0; length],
+        }
+    }
+
+    /// A typical `1/M_ii`: the traction that one unit of slip causes on a cell.
+    #[must_use]
+    pub fn compliance(&self) -> f64 {
+        let sum: f64 = self.parameter.iter().sum();
+        sum / (PROJECTION * self.parameter.len().max(1) as f64)
+    }
+
+    /// Number of cells with unknowns.
+    #[must_use]
+    pub fn cells(&self) -> usize {
+        self.equations.cells()
+    }
+
+    /// Solves for the tractions, starting from those in `t`. Without convergence `t` holds the best iterate.
+    ///
+    /// # Errors
+    /// Only if the monitor stops the work.
+    pub fn solve(
+        &mut self,
+        law: &FrictionLaw,
+        t: &mut [f64],
+        monitor: &dyn Monitor,
+    ) -> Result<Convergence, Stop> {
+        let mut report = Convergence {
+            converged: false,
+            iterations: 0,
+            products: 0,
+            residual: f64::INFINITY,
+        };
+        let mut step = vec![0.0; t.len()];
+        let mut rhs = vec![0.0; t.len()];
+        let mut best = (f64::INFINITY, t.to_vec());
+        let mut recent = [0.0_f64; 3];
+        report.residual = self.evaluate(law, t, &mut report);
+        while report.iterations < ITERATIONS_MAX {
+            if report.residual < best.0 {
+                best.0 = report.residual;
+                best.1.copy_from_slice(t);
+            }
+            if report.residual <= law.tolerance {
+                report.converged = true;
+                break;
+            }
+            recent[report.iterations as usize % 3] = report.residual;
+            let before = t.to_vec();
+            self.linearise(law, t, &mut rhs, &mut report);
+            self.blocks.factor(&self.own, self.equations, &self.linear);
+            self.linear_step(
+                &rhs,
+                report.residual,
+                law.tolerance,
+                &mut step,
+                monitor,
+                &mut report,
+            )?;
+            let candidate = self.candidate(law, t, &step);
+            t.copy_from_slice(&candidate);
+            report.residual = self.evaluate(law, t, &mut report);
+            let allowed = GROWTH_ALLOWED * recent.iter().copied().fold(0.0, f64::max);
+            let mut halvings = 0;
+            while report.residual > allowed && halvings < HALVINGS_MAX {
+                halvings += 1;
+                let share = 0.5_f64.powi(halvings as i32);
+                for i in 0..t.len() {
+                    t[i] = before[i] + share * (candidate[i] - before[i]);
+                }
+                report.residual = self.evaluate(law, t, &mut report);
+            }
+            report.iterations += 1;
+        }
+        if !report.converged {
+            report.residual = best.0;
+            t.copy_from_slice(&best.1);
+        }
+        Ok(report)
+    }
+
+    /// The slips `q + M T` of the last evaluated iterate, x then y.
+    #[must_use]
+    pub fn slip(&self) -> &[f64] {
+        &self.slip
+    }
+
+    /// Does a cell of the last evaluated iterate slip?
+    #[must_use]
+    pub fn slips(&self, law: &FrictionLaw, t: &[f64], cell: usize) -> bool {
+        let padded = self.equations.padded();
+        let r = self.parameter[cell];
+        let (zx, zy) = (
+            t[cell] + r * self.slip[cell],
+            t[padded + cell] + r * self.slip[padded + cell],
+        );
+        zx.hypot(zy) > law.bound[cell]
+    }
+
+    /// Computes the slips of `t` and the residual of the projected law.
+    pub fn evaluate(&mut self, law: &FrictionLaw, t: &[f64], report: &mut Convergence) -> f64 {
+        let padded = self.equations.padded();
+        self.equations.elastic(t, &mut self.slip, &mut self.scratch);
+        report.products += 1;
+        for (s, q) in self.slip.iter_mut().zip(law.rigid) {
+            *s += q;
+        }
+        let (mut sum, mut weight) = (0.0, 0.0);
+        for i in 0..self.equations.cells() {
+            let (tx, ty, r) = (t[i], t[padded + i], self.parameter[i]);
+            let (zx, zy) = (tx + r * self.slip[i], ty + r * self.slip[padded + i]);
+            let length = zx.hypot(zy);
+            let shrink = if length > law.bound[i] {
+                law.bound[i] / length
+            } else {
+                1.0
+            };
+            sum += law.area[i] * ((tx - shrink * zx).powi(2) + (ty - shrink * zy).powi(2));
+            weight += law.area[i];
+        }
+        (sum / weight).sqrt() / law.scale
+    }
+
+    /// Sorts the cells into stick and slip by the last slips, moves `t` of slipping cells to the tangent of the disc,
+    /// and sets up the right-hand side there.
+    fn linearise(
+        &mut self,
+        law: &FrictionLaw,
+        t: &mut [f64],
+        rhs: &mut [f64],
+        report: &mut Convergence,
+    ) {
+        let (padded, cells) = (self.equations.padded(), self.equations.cells());
+        self.linear.direction.clear();
+        self.linear.stiffness.clear();
+        let mut moved = false;
+        for i in 0..cells {
+            let r = self.parameter[i];
+            let (zx, zy) = (
+                t[i] + r * self.slip[i],
+                t[padded + i] + r * self.slip[padded + i],
+            );
+            let (length, bound) = (zx.hypot(zy), law.bound[i]);
+            if length <= bound {
+                self.linear.direction.push((1.0, 0.0));
+                self.linear.stiffness.push(-1.0);
+                continue;
+            }
+            let (dx, dy) = (zx / length, zy / length);
+            self.linear.direction.push((-dy, dx));
+            // A cell without pressure has no freedom: an infinite stiffness would spoil the factors, a large one serves.
+            let stiffness = if bound > 0.0 {
+                (length - bound) / (bound * r)
+            } else {
+                1e12 / r
+            };
+            self.linear.stiffness.push(stiffness.min(1e12 / r));
+            let lift = bound - (dx * t[i] + dy * t[padded + i]);
+            if lift != 0.0 {
+                moved = true;
+                t[i] += lift * dx;
+                t[padded + i] += lift * dy;
+            }
+        }
+        if moved {
+            self.equations.elastic(t, &mut self.slip, &mut self.scratch);
+            report.products += 1;
+            for (s, q) in self.slip.iter_mut().zip(law.rigid) {
+                *s += q;
+            }
+        }
+        rhs.fill(0.0);
+        for i in 0..cells {
+            let (sx, sy) = (self.slip[i], self.slip[padded + i]);
+            if self.linear.slips(i) {
+                let (ux, uy) = self.linear.direction[i];
+                let along = ux * t[i] + uy * t[padded + i];
+                rhs[i] = self.linear.stiffness[i] * along - (ux * sx + uy * sy);
+            } else {
+                rhs[i] = -sx;
+                rhs[padded + i] = -sy;
+            }
+        }
+    }
+
+    /// Solves the linear system, only as exactly as the residual deserves.
+    fn linear_step(
+        &mut self,
+        rhs: &[f64],
+        residual: f64,
+        tolerance: f64,
+        step: &mut [f64],
+        monitor: &dyn Monitor,
+        report: &mut Convergence,
+    ) -> Result<(), Stop> {
+        let inner = (0.3 * tolerance / residual).clamp(1e-4, 3e-2);
+        let mut system = NewtonSystem {
+            equations: self.equations,
+            linear: &self.linear,
+            blocks: &mut self.blocks,
+            scratch: &mut self.scratch,
+            expanded: &mut self.expanded,
+            slip: &mut self.slip,
+            monitor,
+        };
+        report.products += self.gmres.solve(&mut system, rhs, inner, step)?.products;
+        Ok(())
+    }
+
+    /// `t` plus the step, slipping cells brought back to the circle.
+    fn candidate(&self, law: &FrictionLaw, t: &[f64], step: &[f64]) -> Vec<f64> {
+        let padded = self.equations.padded();
+        let mut next = t.to_vec();
+        for i in 0..self.equations.cells() {
+            if self.linear.slips(i) {
+                let (ux, uy) = self.linear.direction[i];
+                let (x, y) = (t[i] + ux * step[i], t[padded + i] + uy * step[i]);
+                let length = x.hypot(y);
+                let factor = if length > 0.0 {
+                    law.bound[i] / length
+                } else {
+                    0.0
+                };
+                next[i] = factor * x;
+                next[padded + i] = factor * y;
+            } else {
+                next[i] += step[i];
+                next[padded + i] += step[padded + i];
+            }
+        }
+        next
+    }
+}
+
+/// The linearised equations as GMRES sees them.
+struct NewtonSystem<'a> {
+    equations: &'a Equations<'a>,
+    linear: &'a Linearisation,
+    blocks: &'a mut StripBlocks,
+    scratch: &'a mut [f64],
+    expanded: &'a mut [f64],
+    slip: &'a mut [f64],
+    monitor: &'a dyn Monitor,
+}
+
+impl LinearSystem for NewtonSystem<'_> {
+    fn product(&mut self, x: &[f64], out: &mut [f64]) {
+        let (padded, cells) = (self.equations.padded(), self.equations.cells());
+        for i in 0..cells {
+            if self.linear.slips(i) {
+                let (ux, uy) = self.linear.direction[i];
+                self.expanded[i] = ux * x[i];
+                self.expanded[padded + i] = uy * x[i];
+            } else {
+                self.expanded[i] = x[i];
+                self.expanded[padded + i] = x[padded + i];
+            }
+        }
+        self.equations
+            .elastic(self.expanded, self.slip, self.scratch);
+        out.fill(0.0);
+        for i in 0..cells {
+            let (sx, sy) = (self.slip[i], self.slip[padded + i]);
+            if self.linear.slips(i) {
+                let (ux, uy) = self.linear.direction[i];
+                out[i] = ux * sx + uy * sy - self.linear.stiffness[i] * x[i];
+            } else {
+                out[i] = sx;
+                out[padded + i] = sy;
+            }
+        }
+    }
+
+    fn precondition(&mut self, x: &mut [f64]) {
+        self.blocks.apply(x);
+    }
+
+    fn tick(&mut self) -> ControlFlow<Stop> {
+        self.monitor.tick(0.0)
+    }
+}

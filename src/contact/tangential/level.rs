@@ -1,0 +1,232 @@
+//! One mesh level of a contact: cells, pressures and influence, shared by all motions and methods.
+
+use std::cell::OnceCell;
+use std::f64::consts::PI;
+
+use crate::contact::case::{MeshSize, Motion};
+use crate::contact::influence::strips::{Differences, Parity};
+use crate::contact::mesh::{Chord, Grading, Mesh, equal_strips};
+use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::normal::Region;
+
+/// The contact made dimensionless: lengths by `length`, tractions by `traction`, slips by `traction / G`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale {
+    /// Unit of length in mm: √(A/π) with A the area of all patches.
+    pub length: f64,
+    /// Unit of traction in MPa: μ times the largest pressure.
+    pub traction: f64,
+    /// Combined shear modulus in MPa.
+    pub shear_modulus: f64,
+    /// Where the dimensionless coordinates are 0, in mm: on the mirror line if there is one.
+    pub origin: [f64; 2],
+}
+
+impl Scale {
+    /// Unit of slip: traction / G, or 1 without friction, where slips are the rigid ones.
+    #[must_use]
+    pub fn slip(&self) -> f64 {
+        if self.traction > 0.0 {
+            self.traction / self.shear_modulus
+        } else {
+            1.0
+        }
+    }
+
+    /// A motion about the origin of the case becomes one about [`Scale::origin`], in units of rigid slip.
+    #[must_use]
+    pub fn motion(&self, motion: &Motion) -> Motion {
+        let unit = self.shear_modulus / self.traction;
+        Motion {
+            creepage_x: (motion.creepage_x - motion.spin_per_mm * self.origin[1]) * unit,
+            creepage_y: (motion.creepage_y + motion.spin_per_mm * self.origin[0]) * unit,
+            spin_per_mm: motion.spin_per_mm * self.length * unit,
+        }
+    }
+}
+
+/// A mesh with its pressures, and the influence once somebody needs it.
+#[derive(Debug)]
+pub struct Level {
+    /// Strips and cells asked for.
+    pub size: MeshSize,
+    /// The mesh in mm.
+    pub mesh: Mesh,
+    /// Pressure of every cell in MPa; the cells of a patch carry its normal force exactly.
+    pub pressure: Vec<f64>,
+    /// Area of every cell in mm².
+    pub area: Vec<f64>,
+    /// Units of the dimensionless problem.
+    pub scale: Scale,
+    /// The dimensionless mesh.
+    pub normalised: Mesh,
+    /// Friction bound of every cell, dimensionless.
+    pub bound: Vec<f64>,
+    poisson_ratio: f64,
+    mirrored: bool,
+    influence: OnceCell<Differences>,
+}
+
+impl Level {
+    /// Meshes every patch of the region with equal strips and cosine-graded cells.
+    ///
+    /// `poisson_ratio` and `shear_modulus` are the combined constants, `friction` is μ.
+    #[must_use]
+    pub fn new(
+        region: &Region,
+        size: MeshSize,
+        shear_modulus: f64,
+        poisson_ratio: f64,
+        friction: f64,
+    ) -> Level {
+        let patches = region.patches();
+        let mut chords: Vec<Chord> = Vec::new();
+        for (k, patch) in patches.iter().enumerate() {
+            let strips = equal_strips(patch.extent[2], patch.extent[3], size.strips as usize);
+            chords.extend(region.chords(k, &strips));
+        }
+        let mesh = Mesh::new(&chords, &Grading::cosine(size.cells as usize));
+        let area = mesh.areas();
+        let pressure = cell_pressures(region, &mesh, &area);
+        let mirror = mesh
+            .mirror_line()
+            .filter(|_| pressures_mirror(&mesh, &pressure));
+        let [x, y] = middle(&patches.iter().map(|p| p.extent).collect::<Vec<_>>());
+        let largest = patches.iter().map(|p| p.pressure_max).fold(0.0, f64::max);
+        let scale = Scale {
+            length: (patches.iter().map(|p| p.area).sum::<f64>() / PI).sqrt(),
+            traction: friction * largest,
+            shear_modulus,
+            origin: [x, mirror.unwrap_or(y)],
+        };
+        let normalised = mesh.normalised(scale.origin, 1.0 / scale.length);
+        let bound = pressure.iter().map(|p| p / largest).collect();
+        let influence = OnceCell::new();
+        Level {
+            size,
+            mesh,
+            pressure,
+            area,
+            scale,
+            normalised,
+            bound,
+            poisson_ratio,
+            mirrored: mirror.is_some(),
+            influence,
+        }
+    }
+
+    /// The influence of the dimensionless mesh; computed at the first call.
+    ///
+    /// # Errors
+    /// The monitor may stop the work.
+    pub fn influence(&self, monitor: &dyn Monitor) -> Result<&Differences, Stop> {
+        if let Some(influence) = self.influence.get() {
+            return Ok(influence);
+        }
+        let influence =
+            Differences::new(&self.normalised, self.poisson_ratio, self.mirrored, monitor)?;
+        Ok(self.influence.get_or_init(|| influence))
+    }
+
+    /// Which half of the unknowns a dimensionless motion moves, if the level has a mirror line and the motion only
+    /// one of the two.
+    #[must_use]
+    pub fn parity(&self, motion: &Motion) -> Option<Parity> {
+        if !self.mirrored {
+            return None;
+        }
+        let lateral = motion.creepage_y != 0.0 || motion.spin_per_mm != 0.0;
+        match (motion.creepage_x != 0.0, lateral) {
+            (_, false) => Some(Parity::Longitudinal),
+            (false, true) => Some(Parity::Lateral),
+            (true, true) => None,
+        }
+    }
+
+    /// Is half of the influence enough because patch and pressure are mirror-symmetric?
+    #[must_use]
+    pub fn is_mirrored(&self) -> bool {
+        self.mirrored
+    }
+
+    /// Cells of one patch.
+    #[must_use]
+    pub fn patch_cells(&self, patch: usize) -> std::ops::Range<usize> {
+        let mut cells = self
+            .mesh
+            .segments
+            .iter()
+            .filter(|s| s.chord.patch == patch)
+            .map(|s| s.cells.clone());
+        let Some(first) = cells.next() else {
+            return 0..0;
+        };
+        first.start..cells.last().map_or(first.end, |c| c.end)
+    }
+
+    /// Values of the first half of the segments continued to the mirrored half: `sign` is that of the image.
+    #[must_use]
+    pub fn unfold(&self, half: &[f64], sign: f64) -> Vec<f64> {
+        let cells = self.mesh.cells();
+        let mut values = vec![0.0; cells];
+        for segment in &self.mesh.segments[..self.mesh.segments.len() / 2] {
+            let image = cells - segment.cells.end;
+            for (k, i) in segment.cells.clone().enumerate() {
+                values[i] = half[i];
+                values[image + k] = sign * half[i];
+            }
+        }
+        values
+    }
+}
+
+/// Mean pressures of the cells, scaled patch by patch so that the cells carry the patch's normal force.
+fn cell_pressures(region: &Region, mesh: &Mesh, area: &[f64]) -> Vec<f64> {
+    let patches = region.patches();
+    let mut load = vec![0.0; patches.len()];
+    let mut pressure = vec![0.0; mesh.cells()];
+    for segment in &mesh.segments {
+        for i in segment.cells.clone() {
+            pressure[i] = region.mean_pressure(&segment.chord, mesh.left[i], mesh.right[i]);
+            load[segment.chord.patch] += pressure[i] * area[i];
+        }
+    }
+    for segment in &mesh.segments {
+        let patch = segment.chord.patch;
+        if load[patch] > 0.0 {
+            let factor = patches[patch].normal_force / load[patch];
+            pressure[segment.cells.clone()]
+                .iter_mut()
+                .for_each(|p| *p *= factor);
+        }
+    }
+    pressure
+}
+
+/// Are the pressures mirror images to 1e-9 of the largest?
+fn pressures_mirror(mesh: &Mesh, pressure: &[f64]) -> bool {
+    let tolerance = 1e-9 * pressure.iter().copied().fold(0.0, f64::max);
+    let m = mesh.segments.len();
+    mesh.segments[..m / 2]
+        .iter()
+        .zip(mesh.segments.iter().rev())
+        .all(|(here, there)| {
+            let pairs = pressure[here.cells.clone()]
+                .iter()
+                .zip(&pressure[there.cells.clone()]);
+            pairs.into_iter().all(|(a, b)| (a - b).abs() <= tolerance)
+        })
+}
+
+/// Middle of the box around all patches.
+fn middle(extents: &[[f64; 4]]) -> [f64; 2] {
+    let low = |k: usize| extents.iter().map(|e| e[k]).fold(f64::INFINITY, f64::min);
+    let high = |k: usize| {
+        extents
+            .iter()
+            .map(|e| e[k])
+            .fold(f64::NEG_INFINITY, f64::max)
+    };
+    [0.5 * (low(0) + high(1)), 0.5 * (low(2) + high(3))]
+}

@@ -1,0 +1,72 @@
+//! How does it drag? Tractions and slips for given pressure and motion.
+
+pub mod boundary_element;
+pub mod equations;
+pub mod full_slip;
+pub mod level;
+pub mod nested;
+pub mod point;
+pub mod rules;
+
+use crate::contact::monitor::Stop;
+
+/// The tangential answer on one level for one motion, dimensionless, one value per cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tangential {
+    /// Tractions along x and across, for forces.
+    pub traction: [Vec<f64>; 2],
+    /// A second opinion on the tractions from another discretisation rule, where there is one.
+    pub second: Option<[Vec<f64>; 2]>,
+    /// Slips along x and across.
+    pub slip: [Vec<f64>; 2],
+    /// Does the cell slip?
+    pub slips: Vec<bool>,
+    /// What it took.
+    pub work: Work,
+    /// Work that was recognised as unnecessary.
+    pub skipped: Vec<String>,
+    /// Remarks for the client.
+    pub warnings: Vec<String>,
+}
+
+/// Counted work of a solve.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Work {
+    /// Newton iterations.
+    pub iterations: u32,
+    /// Products of the influence with a vector.
+    pub products: u32,
+    /// Last residual of the friction law relative to the traction scale.
+    pub residual: f64,
+}
+
+impl Work {
+    /// Adds the counts of another solve; the residual is the later one's.
+    pub fn add(&mut self, later: Work) {
+        self.iterations += later.iterations;
+        self.products += later.products;
+        self.residual = later.residual;
+    }
+}
+
+/// Why there is no tangential answer.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Failure {
+    /// The caller stopped the work.
+    Stopped(Stop),
+    /// The iteration did not converge; the residual of its best iterate, what was needed, and advice as a clause.
+    NotConverged {
+        /// Work done.
+        work: Work,
+        /// Residual needed.
+        tolerance: f64,
+        /// What to try instead.
+        advice: String,
+    },
+}
+
+impl From<Stop> for Failure {
+    fn from(stop: Stop) -> Self {
+        Failure::Stopped(stop)
+    }
+}

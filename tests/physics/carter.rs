@@ -1,0 +1,65 @@
+//! The limit of a very wide patch: every strip is Carter's line contact.
+
+use railhead::contact::solution::{Fields, PatchFields};
+
+use crate::reference::{Ellipse, cases, solve};
+
+/// Half width over half length: end effects fall as its square.
+const WIDE: f64 = 1000.0;
+
+/// Σ T_x dx / (μ Σ p dx) of one strip.
+fn strip_force(patch: &PatchFields, strip: u32, friction: f64) -> f64 {
+    let traction = patch.points[0].traction_x_mpa.as_ref().unwrap();
+    let pressure = patch.pressure_mpa.as_ref().unwrap();
+    let cells = || (0..patch.strip.len()).filter(|&i| patch.strip[i] == strip);
+    let sum = |values: &[f64]| cells().map(|i| values[i] * patch.dx_mm[i]).sum::<f64>();
+    sum(traction) / (friction * sum(pressure))
+}
+
+fn central_strip(contact: &Ellipse, cells: u32) -> f64 {
+    let (_, Fields { patches }) = solve(&contact.case(9, cells));
+    strip_force(&patches[0], 4, contact.friction)
+}
+
+#[test]
+fn central_strip_of_a_very_wide_patch_carries_carters_force() {
+    let cases = cases("carter2d");
+    assert_eq!(cases.len(), 3);
+    for case in cases {
+        let b = WIDE * case.a_mm;
+        let load =
+            case.pressure_max_mpa.unwrap() * 2.0 * std::f64::consts::PI / 3.0 * case.a_mm * b;
+        let contact = Ellipse {
+            a_mm: case.a_mm,
+            b_mm: b,
+            normal_force_n: load,
+            friction: case.friction,
+            shear_modulus_mpa: case.shear_modulus_mpa,
+            poisson_ratio: case.poisson_ratio,
+            motion: [case.creepage_x, case.creepage_y, case.spin_per_mm],
+        };
+        let exact = case.carter_force_x.unwrap();
+        assert!((case.force_x.value - exact).abs() <= case.force_x.unc);
+        let [coarse, middle, fine] =
+            [8, 16, 32].map(|cells| (central_strip(&contact, cells) - exact).abs());
+        println!(
+            "{}: off by {coarse:.5}, {middle:.5}, {fine:.5} with 8, 16, 32 cells",
+            case.id
+        );
+        assert!(
+            middle < 0.01 + case.force_x.unc,
+            "{}: {middle:.5} with 16 cells",
+            case.id
+        );
+        assert!(
+            fine < 0.005 + case.force_x.unc,
+            "{}: {fine:.5} with 32 cells",
+            case.id
+        );
+        assert!(
+            fine < coarse,
+            "{}: {coarse:.5} with 8 cells, {fine:.5} with 32",
+            case.id
+        );
+    }
+}

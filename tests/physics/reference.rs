@@ -1,0 +1,206 @@
+//! Stored reference results, the cases that reproduce them, and the way from a case to its forces.
+
+use std::path::Path;
+
+use railhead::contact;
+use railhead::contact::monitor::Unwatched;
+use railhead::contact::problem::Limits;
+use railhead::contact::solution::{Fields, PointSolution, Solution};
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Value, json};
+
+/// The five classes of partial slip on an ellipse: 62 cases.
+pub const HERTZ_CLASSES: [&str; 5] = [
+    "hertz_long",
+    "hertz_lat",
+    "hertz_spin",
+    "hertz_longspin",
+    "hertz_xyspin",
+];
+
+/// A limit for vanishing element size, relative to μN (moment: μN√(ab)), and what it may be off by.
+#[derive(Debug, Clone, Copy, Deserialize)]
+pub struct Converged {
+    pub value: f64,
+    pub unc: f64,
+}
+
+/// A rolling contact solved elsewhere; fields and signs as in `tests/data/README.md`.
+#[derive(Debug, Clone, Deserialize)]
+pub struct ReferenceCase {
+    pub id: String,
+    pub a_mm: f64,
+    pub b_mm: Option<f64>,
+    pub normal_force_n: f64,
+    pub friction: f64,
+    pub shear_modulus_mpa: f64,
+    pub poisson_ratio: f64,
+    pub creepage_x: f64,
+    pub creepage_y: f64,
+    pub spin_per_mm: f64,
+    pub force_x: Converged,
+    pub force_y: Converged,
+    pub moment_z: Converged,
+    pub kalker: Option<serde_json::Map<String, Value>>,
+    pub pressure_max_mpa: Option<f64>,
+    pub carter_force_x: Option<f64>,
+}
+
+impl ReferenceCase {
+    /// Semi-axis across rolling of an elliptic patch.
+    pub fn b(&self) -> f64 {
+        self.b_mm.expect("an elliptic patch has two semi-axes")
+    }
+
+    /// Semi-axis along rolling over the one across.
+    pub fn a_over_b(&self) -> f64 {
+        self.a_mm / self.b()
+    }
+
+    /// The converged F_x, F_y, M_z.
+    pub fn converged(&self) -> [Converged; 3] {
+        [self.force_x, self.force_y, self.moment_z]
+    }
+
+    /// The same contact as a question to railhead on an explicit mesh.
+    pub fn ellipse(&self) -> Ellipse {
+        Ellipse {
+            a_mm: self.a_mm,
+            b_mm: self.b(),
+            normal_force_n: self.normal_force_n,
+            friction: self.friction,
+            shear_modulus_mpa: self.shear_modulus_mpa,
+            poisson_ratio: self.poisson_ratio,
+            motion: [self.creepage_x, self.creepage_y, self.spin_per_mm],
+        }
+    }
+}
+
+/// Reads a file of `tests/data`.
+pub fn read<T: DeserializeOwned>(name: &str) -> T {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/data")
+        .join(name);
+    let text = std::fs::read_to_string(&path)
+        .unwrap_or_else(|e| panic!("cannot read {}: {e}", path.display()));
+    serde_json::from_str(&text).unwrap_or_else(|e| panic!("{name}: {e}"))
+}
+
+/// All cases of one class.
+pub fn cases(class: &str) -> Vec<ReferenceCase> {
+    read(&format!("{class}.json"))
+}
+
+/// An elliptic contact to ask for.
+#[derive(Debug, Clone, Copy)]
+pub struct Ellipse {
+    pub a_mm: f64,
+    pub b_mm: f64,
+    pub normal_force_n: f64,
+    pub friction: f64,
+    pub shear_modulus_mpa: f64,
+    pub poisson_ratio: f64,
+    /// Creepages and spin in 1/mm.
+    pub motion: [f64; 3],
+}
+
+impl Ellipse {
+    /// A patch with 60 kN, steel, μ = 0.3 and √(ab) = 5 mm.
+    pub fn steel(a_over_b: f64, poisson_ratio: f64) -> Ellipse {
+        Ellipse {
+            a_mm: 5.0 * a_over_b.sqrt(),
+            b_mm: 5.0 / a_over_b.sqrt(),
+            normal_force_n: 60_000.0,
+            friction: 0.3,
+            shear_modulus_mpa: 82_000.0,
+            poisson_ratio,
+            motion: [0.0; 3],
+        }
+    }
+
+    /// The same contact with another motion.
+    pub fn moving(self, creepage_x: f64, creepage_y: f64, spin_per_mm: f64) -> Ellipse {
+        Ellipse {
+            motion: [creepage_x, creepage_y, spin_per_mm],
+            ..self
+        }
+    }
+
+    /// The same contact with creepages and spin in the dimensionless form
+    /// E c² ν/(μN(1−ν²)) and E c³ φ/(μN(1−ν²)), c = √(ab).
+    pub fn normalised(self, x: f64, y: f64, spin: f64) -> Ellipse {
+        let unit = self.limit() * (1.0 - self.poisson_ratio)
+            / (2.0 * self.shear_modulus_mpa * self.c().powi(2));
+        self.moving(x * unit, y * unit, spin * unit / self.c())
+    }
+
+    /// √(ab) in mm.
+    pub fn c(&self) -> f64 {
+        (self.a_mm * self.b_mm).sqrt()
+    }
+
+    /// μN in N.
+    pub fn limit(&self) -> f64 {
+        self.friction * self.normal_force_n
+    }
+
+    /// Hertz's largest pressure in MPa.
+    pub fn pressure_max(&self) -> f64 {
+        1.5 * self.normal_force_n / (std::f64::consts::PI * self.a_mm * self.b_mm)
+    }
+
+    /// The case as a client would write it, all outputs asked for.
+    pub fn case(&self, strips: u32, cells: u32) -> Value {
+        json!({
+            "material": { "shear_modulus_mpa": self.shear_modulus_mpa, "poisson_ratio": self.poisson_ratio },
+            "friction": { "coefficient": self.friction },
+            "contact": { "type": "ellipse", "a_mm": self.a_mm, "b_mm": self.b_mm },
+            "load": { "normal_force_n": self.normal_force_n },
+            "motion": {
+                "creepage_x": self.motion[0], "creepage_y": self.motion[1], "spin_per_mm": self.motion[2]
+            },
+            "solver": { "method": "boundary_element", "mesh": { "strips": strips, "cells": cells } },
+            "outputs": ["resultants", "zones", "tractions", "pressure", "slip"],
+        })
+    }
+
+    /// F_x/μN, F_y/μN and M_z/(μN√(ab)).
+    pub fn forces(&self, strips: u32, cells: u32) -> [f64; 3] {
+        self.relative(&solve(&self.case(strips, cells)).0.patches[0].points[0])
+    }
+
+    /// The resultants of a point relative to μN and μN√(ab).
+    pub fn relative(&self, point: &PointSolution) -> [f64; 3] {
+        let limit = self.limit();
+        [
+            point.force_x_n / limit,
+            point.force_y_n / limit,
+            point.moment_z_n_mm / (limit * self.c()),
+        ]
+    }
+}
+
+/// Checks and solves a case that has an answer.
+pub fn solve(case: &Value) -> (Solution, Fields) {
+    let problem =
+        contact::check(case, &Limits::default()).unwrap_or_else(|e| panic!("{e}\n{case}"));
+    contact::solve(&problem, &Unwatched).unwrap_or_else(|e| panic!("{e}\n{case}"))
+}
+
+/// Middle value; the lower one of two.
+pub fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted[(sorted.len() - 1) / 2]
+}
+
+/// Fails with one line per entry, if there is any.
+pub fn assert_none(what: &str, failures: &[String]) {
+    assert!(
+        failures.is_empty(),
+        "{what}: {} of them\n{}",
+        failures.len(),
+        failures.join("\n")
+    );
+}
