@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::jobs::error::JobsError;
+use crate::jobs::worker::heartbeat;
 use crate::jobs::{Shared, now_ms};
 
 /// Jobs looked up in one statement by the sweep.
@@ -10,7 +11,7 @@ const SWEEP_CHUNK: usize = 500;
 
 /// Takes jobs whose lease has run out from their workers, three times per lease, until the service drains.
 pub(super) async fn reap_expired(shared: Arc<Shared>) {
-    let mut beat = tokio::time::interval(shared.options.lease / 3);
+    let mut beat = tokio::time::interval(heartbeat(&shared));
     while shared
         .draining
         .run_until_cancelled(beat.tick())

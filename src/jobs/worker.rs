@@ -141,7 +141,7 @@ impl Worker {
             )));
         }
         let mut outcome = pin!(outcome);
-        let mut beat = interval(self.shared.options.lease / 3);
+        let mut beat = interval(heartbeat(&self.shared));
         beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let mut held = Lease::new(&self.shared);
         let mut told = false;
@@ -156,16 +156,19 @@ impl Worker {
                     ))));
                 }
                 _ = beat.tick() => self.beat(claim, watch, &mut held).await,
-                () = self.shared.stopping.cancelled(), if !told => watch.stop(Reason::Shutdown),
+                () = self.shared.stopping.cancelled(), if !told => {}
                 () = &mut patience, if told => {
                     tracing::warn!("the solver does not stop; its thread is left behind");
                     self.thread = SolverThread::start(&self.name)?;
                     return Ok(Outcome::Abandoned);
                 }
             }
+            let stopping = self.shared.stopping.is_cancelled();
+            if stopping {
+                watch.stop(Reason::Shutdown);
+            }
             // A cancelled solver may take its time, the lease bounds it; otherwise nobody waits for ever.
-            let give_up =
-                watch.reason() == Some(Reason::Lost) || self.shared.stopping.is_cancelled();
+            let give_up = stopping || held.lost;
             if give_up && !told {
                 told = true;
                 patience.set(sleep(PATIENCE));
@@ -178,7 +181,7 @@ impl Worker {
         let ticks = watch.ticks();
         if ticks == held.ticks {
             if now_ms() >= held.until {
-                watch.stop(Reason::Lost);
+                held.lose(watch);
             }
             return;
         }
@@ -191,15 +194,13 @@ impl Worker {
             .await
         {
             Ok(Renewal::Held { cancel_requested }) => {
-                *held = Lease {
-                    ticks,
-                    until: now.saturating_add(lease),
-                };
+                held.ticks = ticks;
+                held.until = now.saturating_add(lease);
                 if cancel_requested {
                     watch.stop(Reason::Cancel);
                 }
             }
-            Ok(Renewal::Lost) => watch.stop(Reason::Lost),
+            Ok(Renewal::Lost) => held.lose(watch),
             Err(error) => tracing::warn!(%error, "lease could not be renewed"),
         }
     }
@@ -322,6 +323,7 @@ impl Worker {
 struct Lease {
     ticks: u64,
     until: i64,
+    lost: bool,
 }
 
 impl Lease {
@@ -329,7 +331,14 @@ impl Lease {
         Lease {
             ticks: 0,
             until: now_ms().saturating_add(lease_ms(shared)),
+            lost: false,
         }
+    }
+
+    /// The lease is over, also for a solver that was told to stop for another reason before.
+    fn lose(&mut self, watch: &Watch) {
+        self.lost = true;
+        watch.stop(Reason::Lost);
     }
 }
 
@@ -362,6 +371,11 @@ impl Drop for Registered {
             running.remove(&self.id);
         }
     }
+}
+
+/// Time between two heartbeats of a worker, and between two looks of the reaper.
+pub(super) fn heartbeat(shared: &Shared) -> Duration {
+    (shared.options.lease / 3).max(Duration::from_millis(1))
 }
 
 fn lease_ms(shared: &Shared) -> i64 {

@@ -1,7 +1,15 @@
 //! Does the service behave?
 
 mod api;
+mod cli;
 mod contract;
+mod crash;
 mod errors;
 mod schema;
 mod server;
+mod shutdown;
+mod standin;
+mod store;
+mod store_model;
+mod support;
+mod worker;

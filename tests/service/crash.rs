@@ -1,0 +1,1 @@
+//! Does a job that was acknowledged survive the death of the process?
