@@ -61,8 +61,8 @@ pub struct PointResultants {
     force_y_n: f64,
     /// Moment about the origin in N·mm.
     moment_z_n_mm: f64,
-    /// Estimated absolute errors.
-    error_estimate: ErrorEstimate,
+    /// Estimated absolute errors; null where there is nothing to estimate them from.
+    error_estimate: Option<ErrorEstimate>,
     /// Dissipated power divided by rolling speed, in N.
     friction_power_n: f64,
     /// The same without the part of spin, as |ν_x F_x| + |ν_y F_y|, in N.

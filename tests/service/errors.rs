@@ -523,6 +523,54 @@ async fn failed_job_is_answered_with_its_reason_in_time() {
 }
 
 #[tokio::test]
+async fn field_that_was_not_asked_for_says_what_was() {
+    let server = Server::start().await;
+    let job = server.solve(&example("hertz-steel.case.json")).await;
+    let path = job["links"]["self"].as_str().expect("a link");
+    for part in ["pressure", "slip"] {
+        let answer = server.get(&format!("{path}/{part}")).await;
+        assert_problem(
+            &answer,
+            404,
+            "output-not-asked",
+            "`resultants`, `zones`, `tractions`",
+        );
+        assert!(
+            answer.json["detail"]
+                .as_str()
+                .is_some_and(|detail| detail.contains(&format!("`{part}`")))
+        );
+        assert!(
+            job["result"]["links"].get(part).is_none(),
+            "{part} is linked"
+        );
+    }
+    assert_eq!(
+        server
+            .get(
+                job["result"]["links"]["tractions"]
+                    .as_str()
+                    .expect("a link")
+            )
+            .await
+            .status,
+        200
+    );
+    let mut case = example("hertz-steel.case.json");
+    case["outputs"] = json!(["resultants"]);
+    let job = server.solve(&case).await;
+    let path = job["links"]["self"].as_str().expect("a link");
+    for part in ["zones", "tractions", "pressure", "slip"] {
+        assert_problem(
+            &server.get(&format!("{path}/{part}")).await,
+            404,
+            "output-not-asked",
+            "`resultants`",
+        );
+    }
+}
+
+#[tokio::test]
 async fn job_whose_workers_fall_silent_fails_as_lost() {
     let (release, held) = channel::<()>();
     let held = Mutex::new(held);

@@ -248,8 +248,14 @@ async fn a_solver_deaf_to_its_cancellation_is_left_behind() {
     jobs.cancel(deaf).await.unwrap();
     let next = jobs.submit(case("next"), None).await.unwrap().id;
     let at_most = Duration::from_secs(60);
-    assert_eq!(jobs.wait(deaf, at_most).await.unwrap().state, State::Cancelled);
-    assert_eq!(jobs.wait(next, at_most).await.unwrap().state, State::Succeeded);
+    assert_eq!(
+        jobs.wait(deaf, at_most).await.unwrap().state,
+        State::Cancelled
+    );
+    assert_eq!(
+        jobs.wait(next, at_most).await.unwrap().state,
+        State::Succeeded
+    );
     drop(release);
     jobs.shutdown(Duration::from_secs(10)).await;
 }
