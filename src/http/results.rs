@@ -61,7 +61,7 @@ pub struct PointResultants {
     force_y_n: f64,
     /// Moment about the origin in N·mm.
     moment_z_n_mm: f64,
-    /// Estimated absolute errors.
+    /// Estimated absolute errors; null where there is nothing to estimate them from.
     error_estimate: Option<ErrorEstimate>,
     /// Dissipated power divided by rolling speed, in N.
     friction_power_n: f64,

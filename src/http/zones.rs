@@ -34,9 +34,9 @@ pub struct ZoneCells {
     patch: usize,
     /// Number of the motion, counted from 0.
     point: usize,
-    /// Area that sticks in mm².
+    /// Area that sticks in mm²: the share of the sticking cells in the area of the patch.
     stick_area_mm2: f64,
-    /// Area that slips in mm².
+    /// Area that slips in mm², likewise; both add up to the area of the patch.
     slip_area_mm2: f64,
     /// Number of cells that stick.
     stick_cells: u32,

@@ -96,12 +96,16 @@ impl Jobs {
     /// that job exists.
     ///
     /// # Errors
-    /// [`JobsError::Case`], [`JobsError::QueueFull`], [`JobsError::IdempotencyConflict`], or a failed database.
+    /// [`JobsError::Case`], [`JobsError::QueueFull`], [`JobsError::IdempotencyConflict`], [`JobsError::Draining`], or a
+    /// failed database.
     pub async fn submit(
         &self,
         case: Value,
         idempotency_key: Option<String>,
     ) -> Result<Job, JobsError> {
+        if self.shared.draining.is_cancelled() {
+            return Err(JobsError::Draining);
+        }
         let jobs = self.clone();
         // Checking a large case is arithmetic; it stays off the threads that answer requests.
         let read = tokio::task::spawn_blocking(move || {

@@ -6,6 +6,8 @@ use crate::reference::{Ellipse, cases, solve};
 
 /// Half width over half length: end effects fall as its square.
 const WIDE: f64 = 1000.0;
+/// An odd number; the load of few strips on an ellipse is too large, so that its correction would lower the bound.
+const STRIPS: u32 = 31;
 
 /// Σ T_x dx / (μ Σ p dx) of one strip.
 fn strip_force(patch: &PatchFields, strip: u32, friction: f64) -> f64 {
@@ -17,8 +19,8 @@ fn strip_force(patch: &PatchFields, strip: u32, friction: f64) -> f64 {
 }
 
 fn central_strip(contact: &Ellipse, cells: u32) -> f64 {
-    let (_, Fields { patches }) = solve(&contact.case(9, cells));
-    strip_force(&patches[0], 4, contact.friction)
+    let (_, Fields { patches }) = solve(&contact.case(STRIPS, cells));
+    strip_force(&patches[0], STRIPS / 2, contact.friction)
 }
 
 #[test]
@@ -47,12 +49,12 @@ fn central_strip_of_a_very_wide_patch_carries_carters_force() {
             case.id
         );
         assert!(
-            middle < 0.01 + case.force_x.unc,
+            middle < 0.002 + case.force_x.unc,
             "{}: {middle:.5} with 16 cells",
             case.id
         );
         assert!(
-            fine < 0.005 + case.force_x.unc,
+            fine < 0.001 + case.force_x.unc,
             "{}: {fine:.5} with 32 cells",
             case.id
         );

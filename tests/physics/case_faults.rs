@@ -89,7 +89,7 @@ fn both_sides_of_every_range_are_kept() {
         (
             "/material/shear_modulus_mpa",
             vec![1e-3, 1e6],
-            vec![0.0, -82000.0, 1.1e9],
+            vec![0.0, -82000.0, 1.1e12],
         ),
         (
             "/material/poisson_ratio",

@@ -95,7 +95,16 @@ fn seeds() -> Vec<Value> {
             json!({ "method": "liu_hsu", "mesh": { "strips": 8, "cells": 10 }, "time_limit_s": 10 }),
         ),
     );
-    vec![good(), ellipse, pair]
+    let grid = with(
+        &good_with(
+            "/contact",
+            json!({ "type": "pressure_grid", "x_mm": [-1, 0, 1.5, 2], "y_mm": [0, 1, 2],
+            "pressure_mpa": [[0, 3, 1, 0], [2, 9, 1e-3, 0], [0, 1, 0, 4]] }),
+        ),
+        "/load",
+        None,
+    );
+    vec![good(), ellipse, pair, grid]
 }
 
 fn mutated() -> impl Strategy<Value = Value> {

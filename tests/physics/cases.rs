@@ -70,3 +70,8 @@ pub fn assert_fault(case: &Value, pointer: &str, words: &[&str]) {
         );
     }
 }
+
+/// The good case with another contact, which carries its own load.
+pub fn grid_case(contact: Value) -> Value {
+    with(&good_with("/contact", contact), "/load", None)
+}

@@ -1,8 +1,12 @@
 //! Does the service behave?
 
+mod api;
 mod cli;
 mod contract;
 mod crash;
+mod errors;
+mod schema;
+mod server;
 mod shutdown;
 mod store;
 mod store_model;

@@ -1,5 +1,6 @@
 //! How hard is it pressed? Contact region and pressure, whatever they come from.
 
+pub mod fitted;
 pub mod hertz;
 pub mod prescribed;
 
@@ -10,7 +11,7 @@ use crate::contact::normal::hertz::{Ellipse, Pressing};
 use crate::contact::normal::prescribed::PressureField;
 
 /// Pressures in MPa, lengths in mm and ratios of semi-axes beyond which a patch is a mistake rather than a contact.
-const PRESSURE_MAX: f64 = 1e9;
+const PRESSURE_MAX: f64 = 1e12;
 const PRESSURE_MIN: f64 = 1e-20;
 const SEMI_AXIS_MAX: f64 = 1e6;
 const SEMI_AXIS_MIN: f64 = 1e-9;

@@ -10,7 +10,7 @@ const SEMI_AXIS: Interval = Interval::positive(1e6, "mm");
 const NORMAL_FORCE: Interval = Interval::positive(1e12, "N");
 const APPROACH: Interval = Interval::positive(1e6, "mm");
 const COORDINATE: Interval = Interval::closed(-1e6, 1e6, "mm");
-const PRESSURE: Interval = Interval::closed(0.0, 1e9, "MPa");
+const PRESSURE: Interval = Interval::closed(0.0, 1e12, "MPa");
 /// Points of one axis of a grid.
 const AXIS_POINTS: std::ops::RangeInclusive<usize> = 2..=1000;
 /// Neighbouring coordinates of an axis are at least this far apart, relative to the length of the axis.
@@ -134,13 +134,10 @@ fn axis(block: &mut Object, name: &str) -> Option<Vec<f64>> {
         return None;
     };
     let pointer = block.pointer_to(name);
-    let axis = numbers(
-        elements,
-        &pointer,
-        COORDINATE,
-        &mut GRID_FAULTS_MAX.clone(),
-        block.faults(),
-    )?;
+    let mut refused = 0;
+    let axis = numbers(elements, &pointer, COORDINATE, &mut refused, block.faults());
+    count_rest(&pointer, COORDINATE, refused, block.faults());
+    let axis = axis?;
     let span = (axis[axis.len() - 1] - axis[0]).abs();
     let late = (1..axis.len()).find(|&i| axis[i] - axis[i - 1] <= SPACING_MIN * span);
     if let Some(i) = late {
@@ -199,41 +196,48 @@ fn samples(block: &mut Object, nx: Option<usize>, ny: Option<usize>) -> Option<V
         );
         return None;
     }
-    let mut left = GRID_FAULTS_MAX;
+    let mut refused = 0;
     let read: Vec<Option<Vec<f64>>> = rows
         .iter()
         .enumerate()
-        .map(|(j, row)| numbers(row, &join(&pointer, j), PRESSURE, &mut left, faults))
+        .map(|(j, row)| numbers(row, &join(&pointer, j), PRESSURE, &mut refused, faults))
         .collect();
+    count_rest(&pointer, PRESSURE, refused, faults);
     read.into_iter().collect()
 }
 
-/// Numbers of an array; only the first `left` faulty ones are listed, and one more entry says that there are others.
+/// Numbers of an array; faulty ones are counted in `refused`, and listed as long as they are few.
 fn numbers(
     elements: &[Value],
     pointer: &str,
     allowed: Interval,
-    left: &mut usize,
+    refused: &mut usize,
     faults: &mut Faults,
 ) -> Option<Vec<f64>> {
     let mut read = Vec::with_capacity(elements.len());
-    let mut more = 0_usize;
     for (i, value) in elements.iter().enumerate() {
         let good = value.as_f64().filter(|number| allowed.contains(*number));
         if let Some(good) = good {
             read.push(good + 0.0);
-        } else if *left > 0 {
-            *left -= 1;
+            continue;
+        }
+        *refused += 1;
+        if *refused <= GRID_FAULTS_MAX {
             number(value, &join(pointer, i), allowed, faults);
-        } else {
-            more += 1;
         }
     }
-    if more > 0 {
+    (read.len() == elements.len()).then_some(read)
+}
+
+/// Says how many faulty numbers were not listed.
+fn count_rest(pointer: &str, allowed: Interval, refused: usize, faults: &mut Faults) {
+    if refused > GRID_FAULTS_MAX {
         faults.add(
             pointer,
-            format!("{more} more values here are not allowed; {allowed} is needed"),
+            format!(
+                "{} more values here are not allowed; {allowed} is needed",
+                refused - GRID_FAULTS_MAX
+            ),
         );
     }
-    (read.len() == elements.len()).then_some(read)
 }

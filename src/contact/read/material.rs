@@ -3,7 +3,7 @@
 use crate::contact::case::{Elastic, Material};
 use crate::contact::read::object::{Interval, Object};
 
-const MODULUS: Interval = Interval::positive(1e9, "MPa");
+const MODULUS: Interval = Interval::positive(1e12, "MPa");
 const POISSON_RATIO: Interval = Interval::closed(0.0, 0.5, "");
 
 /// Reads the required member `material` of a case.

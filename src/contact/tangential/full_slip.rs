@@ -146,7 +146,7 @@ pub fn fixed_point(
         report.residual = newton.evaluate(law, t, &mut report);
         report.iterations += 1;
         if report.residual <= law.tolerance {
-            report.converged = (0..cells).all(|i| newton.slips(law, t, i));
+            report.converged = (0..cells).all(|i| newton.slips(law.bound, t, i));
             return Ok(report.converged.then_some(report));
         }
         follow(t, newton.slip());

@@ -8,6 +8,7 @@ use crate::contact::influence::strips::{Differences, Parity};
 use crate::contact::mesh::{Chord, Grading, Mesh, equal_strips};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::Region;
+use crate::contact::normal::fitted::{self, Fitted};
 
 /// The contact made dimensionless: lengths by `length`, tractions by `traction`, slips by `traction / G`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,14 +81,15 @@ impl Level {
         friction: f64,
     ) -> Level {
         let patches = region.patches();
-        let mut chords: Vec<Chord> = Vec::new();
+        let mut fitted: Vec<Fitted> = Vec::new();
         for (k, patch) in patches.iter().enumerate() {
             let strips = equal_strips(patch.extent[2], patch.extent[3], size.strips as usize);
-            chords.extend(region.chords(k, &strips));
+            fitted.extend(fitted::chords(region, k, &strips));
         }
+        let chords: Vec<Chord> = fitted.iter().map(|f| f.chord).collect();
         let mesh = Mesh::new(&chords, &Grading::cosine(size.cells as usize));
         let area = mesh.areas();
-        let pressure = cell_pressures(region, &mesh, &area);
+        let pressure = cell_pressures(region, &fitted, &mesh, &area);
         let mirror = mesh
             .mirror_line()
             .filter(|_| pressures_mirror(&mesh, &pressure));
@@ -182,13 +184,13 @@ impl Level {
 }
 
 /// Mean pressures of the cells, scaled patch by patch so that the cells carry the patch's normal force.
-fn cell_pressures(region: &Region, mesh: &Mesh, area: &[f64]) -> Vec<f64> {
+fn cell_pressures(region: &Region, fitted: &[Fitted], mesh: &Mesh, area: &[f64]) -> Vec<f64> {
     let patches = region.patches();
     let mut load = vec![0.0; patches.len()];
     let mut pressure = vec![0.0; mesh.cells()];
-    for segment in &mesh.segments {
+    for (segment, fitted) in mesh.segments.iter().zip(fitted) {
         for i in segment.cells.clone() {
-            pressure[i] = region.mean_pressure(&segment.chord, mesh.left[i], mesh.right[i]);
+            pressure[i] = fitted.mean_pressure(region, mesh.left[i], mesh.right[i]);
             load[segment.chord.patch] += pressure[i] * area[i];
         }
     }

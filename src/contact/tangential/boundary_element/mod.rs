@@ -1,8 +1,9 @@
 //! The fast solver: projection form, semismooth Newton, strip-preconditioned GMRES.
 //!
 //! Every level is solved twice: with the three-point rule from the given start, then with the trapezoid rule from
-//! that solution. Forces and tractions come from the trapezoid, whose resultants are the more exact; slips and zones
-//! from the three-point rule, whose slips are smooth; the difference of the two is a second opinion on the error.
+//! that solution. Tractions, zones and forces come from the trapezoid, whose resultants are the more exact; the size of
+//! the slip from the three-point rule, whose slips are smooth, along the traction as Coulomb's law demands; the
+//! difference of the two rules is a second opinion on the error.
 
 pub mod gmres;
 pub mod newton;
@@ -49,23 +50,62 @@ pub fn solve(
     if mirror.by_fixed_point {
         skipped.push("everything slips: fixed point instead of Newton".to_owned());
     }
-    let second = solve.expand(&t);
+    let by_mirror = solve.expand(&t);
     let mut warnings = Vec::new();
-    if !solve.trapezoid(&mut t)? {
-        warnings.push(
-            "the trapezoid rule did not converge; forces come from the three-point rule and their error is larger"
-                .to_owned(),
-        );
-    }
+    let (slips, second) = match solve.trapezoid(&mut t)? {
+        Some(slips) => (slips, Some(by_mirror)),
+        None => {
+            warnings.push(
+                "the trapezoid rule did not converge; forces come from the three-point rule and their error is larger"
+                    .to_owned(),
+            );
+            (mirror.slips, None)
+        }
+    };
+    let mut traction = solve.expand(&t);
+    let slip = obey_coulomb(&level.bound, &slips, &mut traction, &mirror.slip);
     Ok(Tangential {
-        traction: solve.expand(&t),
-        second: Some(second),
-        slip: mirror.slip,
-        slips: mirror.slips,
+        traction,
+        second,
+        slip,
+        slips,
         work: solve.work,
         skipped,
         warnings,
     })
+}
+
+/// Brings every traction into its disc (it may be outside by the solver's tolerance) and returns the slips: none in
+/// cells that stick, the part of the given slip along the traction in cells that slip.
+fn obey_coulomb(
+    bound: &[f64],
+    slips: &[bool],
+    traction: &mut [Vec<f64>; 2],
+    given: &[Vec<f64>; 2],
+) -> [Vec<f64>; 2] {
+    let mut slip = [vec![0.0; bound.len()], vec![0.0; bound.len()]];
+    for i in 0..bound.len() {
+        let length = traction[0][i].hypot(traction[1][i]);
+        if length == 0.0 {
+            // Without traction (no pressure) the slip is free.
+            if slips[i] {
+                slip[0][i] = given[0][i];
+                slip[1][i] = given[1][i];
+            }
+            continue;
+        }
+        let (dx, dy) = (traction[0][i] / length, traction[1][i] / length);
+        if slips[i] || length > bound[i] {
+            traction[0][i] = bound[i] * dx;
+            traction[1][i] = bound[i] * dy;
+        }
+        if slips[i] {
+            let along = (given[0][i] * dx + given[1][i] * dy).max(0.0);
+            slip[0][i] = along * dx;
+            slip[1][i] = along * dy;
+        }
+    }
+    slip
 }
 
 /// What the three-point rule gave besides tractions.
@@ -185,26 +225,24 @@ impl<'a> Solve<'a> {
                 advice: "try another mesh, with cells and strips of similar width".to_owned(),
             });
         }
-        let law = FrictionLaw {
-            rigid: &rigid,
-            bound: &self.bound,
-            area: &self.area,
-            scale: 1.0,
-            tolerance: TOLERANCE,
-        };
-        let half: Vec<f64> = (0..equations.cells())
-            .map(|i| f64::from(u8::from(newton.slips(&law, t, i))))
-            .collect();
-        let slips = if self.parity.is_some() {
-            self.level.unfold(&half, 1.0)
-        } else {
-            half
-        };
         Ok(MirrorAnswer {
             slip: self.expand(newton.slip()),
-            slips: slips.into_iter().map(|v| v > 0.5).collect(),
+            slips: self.zones(&newton, t),
             by_fixed_point,
         })
+    }
+
+    /// Which cells of the whole mesh slip, by the last iterate of `newton`.
+    fn zones(&self, newton: &Newton, t: &[f64]) -> Vec<bool> {
+        let slips: Vec<f64> = (0..newton.cells())
+            .map(|i| f64::from(u8::from(newton.slips(&self.bound, t, i))))
+            .collect();
+        let slips = if self.parity.is_some() {
+            self.level.unfold(&slips, 1.0)
+        } else {
+            slips
+        };
+        slips.into_iter().map(|v| v > 0.5).collect()
     }
 
     fn upwind(&mut self, t: &mut [f64]) -> Result<bool, Stop> {
@@ -214,9 +252,9 @@ impl<'a> Solve<'a> {
         Ok(self.rule(&mut newton, &rigid, t, false)?.0.converged)
     }
 
-    /// The trapezoid rule from the three-point solution in `t`, else from the upwind solution; if neither leads to a
-    /// solution `t` is as it was.
-    fn trapezoid(&mut self, t: &mut [f64]) -> Result<bool, Stop> {
+    /// The trapezoid rule from the three-point solution in `t`, else from the upwind solution; returns which cells
+    /// slip. If neither start leads to a solution `t` is as it was.
+    fn trapezoid(&mut self, t: &mut [f64]) -> Result<Option<Vec<bool>>, Stop> {
         let equations = self.equations(Rule::Trapezoid);
         let rigid = equations.rigid(self.motion);
         let mut newton = Newton::new(&equations);
@@ -235,11 +273,11 @@ impl<'a> Solve<'a> {
                 .converged
             {
                 self.work.residual = residual;
-                return Ok(false);
+                return Ok(None);
             }
         }
         t.copy_from_slice(&found);
-        Ok(true)
+        Ok(Some(self.zones(&newton, t)))
     }
 
     /// Values of the unknowns (x then y) as two vectors over the whole mesh.

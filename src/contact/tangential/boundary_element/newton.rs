@@ -197,14 +197,14 @@ impl<'a> Newton<'a> {
 
     /// Does a cell of the last evaluated iterate slip?
     #[must_use]
-    pub fn slips(&self, law: &FrictionLaw, t: &[f64], cell: usize) -> bool {
+    pub fn slips(&self, bound: &[f64], t: &[f64], cell: usize) -> bool {
         let padded = self.equations.padded();
         let r = self.parameter[cell];
         let (zx, zy) = (
             t[cell] + r * self.slip[cell],
             t[padded + cell] + r * self.slip[padded + cell],
         );
-        zx.hypot(zy) > law.bound[cell]
+        zx.hypot(zy) > bound[cell]
     }
 
     /// Computes the slips of `t` and the residual of the projected law.

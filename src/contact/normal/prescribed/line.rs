@@ -1,0 +1,119 @@
+//! Squared pressure along a straight grid-parallel line: where it is positive.
+
+use crate::contact::normal::prescribed::interpolation::Cubic;
+
+/// Values at the nodes of an axis, and the intervals that may belong to a patch.
+#[derive(Debug)]
+pub(super) struct Line<'f> {
+    pub(super) axis: &'f [f64],
+    /// Node of the axis that `values` starts with.
+    pub(super) first: usize,
+    pub(super) values: Vec<f64>,
+    /// For each interval from the second node on: are the samples around it smooth?
+    pub(super) smooth: Vec<bool>,
+    /// For each interval from the second node on: which part of it may belong to the patch, from 0 at its start to 1
+    /// at its end; nothing if the part is empty.
+    pub(super) allowed: Vec<[f64; 2]>,
+}
+
+/// A cubic that does not become negative between two positive ends.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Floored {
+    cubic: Cubic,
+    floor: f64,
+}
+
+impl Line<'_> {
+    /// The segments where the curve is positive, from smaller to larger coordinate.
+    pub(super) fn segments(&self) -> Vec<(f64, f64)> {
+        let mut segments: Vec<(f64, f64)> = Vec::new();
+        for (k, [from, to]) in self
+            .allowed
+            .iter()
+            .enumerate()
+            .filter(|(_, [from, to])| to > from)
+        {
+            let node = self.first + 1 + k;
+            let (low, high) = (self.axis[node], self.axis[node + 1]);
+            // The ends of a whole interval are its nodes to the last digit, so that segments join there.
+            let part = |s: f64, end: f64| {
+                if s == 0.0 || s == 1.0 {
+                    end
+                } else {
+                    low + s * (high - low)
+                }
+            };
+            let (from, to) = (part(*from, low), part(*to, high));
+            for (left, right) in self.positive_parts(k) {
+                let (left, right) = (left.max(from), right.min(to));
+                match segments.last_mut() {
+                    _ if left >= right => {}
+                    Some(last) if last.1 == left => last.1 = right,
+                    _ => segments.push((left, right)),
+                }
+            }
+        }
+        segments
+    }
+
+    /// Where the curve is positive in one interval.
+    fn positive_parts(&self, k: usize) -> Vec<(f64, f64)> {
+        let node = self.first + 1 + k;
+        let (low, high) = (self.axis[node], self.axis[node + 1]);
+        let values = [0, 1, 2, 3].map(|m| self.values[k + m]);
+        let [_, here, next, _] = values;
+        // Between two positive nodes the contact is whole: a gap there is not in the data.
+        if here > 0.0 && next > 0.0 {
+            return vec![(low, high)];
+        }
+        // Between two others a bulge is believed where it continues a smooth edge.
+        if here <= 0.0 && next <= 0.0 && !self.smooth[k] {
+            return Vec::new();
+        }
+        let mut parts = Vec::new();
+        let mut start = (here > 0.0).then_some(low);
+        for (at, positive) in Cubic::between(self.axis, node, values).sign_changes() {
+            if positive {
+                start = Some(at);
+            } else if let Some(start) = start.take() {
+                parts.push((start, at));
+            }
+        }
+        parts.extend(start.map(|start| (start, high)));
+        parts
+    }
+}
+
+/// The curve between nodes `i` and `i + 1` of the axis.
+pub(super) fn cubic(axis: &[f64], i: usize, value: impl Fn(usize) -> f64) -> Floored {
+    let values: [f64; 4] = std::array::from_fn(|k| value(i - 1 + k));
+    Floored {
+        cubic: Cubic::between(axis, i, values),
+        floor: bounds(values[1], values[2], true)[0],
+    }
+}
+
+/// Least and largest value of the curve between two nodes: if both are positive, a quarter of the lower one and no
+/// bound; if none is and they are not smooth, no bound and a quarter of the higher one.
+pub(super) fn bounds(left: f64, right: f64, smooth: bool) -> [f64; 2] {
+    let (lower, higher) = (left.min(right), left.max(right));
+    [
+        if lower > 0.0 {
+            0.25 * lower
+        } else {
+            f64::NEG_INFINITY
+        },
+        if higher > 0.0 || smooth {
+            f64::INFINITY
+        } else {
+            0.25 * higher
+        },
+    ]
+}
+
+impl Floored {
+    /// Value at x, never negative.
+    pub(super) fn at(&self, x: f64) -> f64 {
+        self.cubic.at(x).max(self.floor).max(0.0)
+    }
+}

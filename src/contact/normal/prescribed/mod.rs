@@ -1,0 +1,288 @@
+//! A pressure given by the client on a grid, brought onto strips without losing load.
+//!
+//! The contact is where the interpolated square of the pressure is positive: squared pressure falls linearly at the
+//! edge, so that edges are found well inside a grid spacing (see [`level_set`]), and Hertz's pressure is reproduced
+//! exactly. The force of a patch is the sum of its samples times their share of the grid; the mesh scales the
+//! pressures on its strips to carry just that.
+
+mod components;
+mod interpolation;
+mod level_set;
+mod line;
+mod shape;
+
+use crate::contact::mesh::Chord;
+use crate::contact::normal::Patch;
+use interpolation::{interval, weights};
+use level_set::State;
+use line::Line;
+use shape::Shape;
+
+/// Patches of one grid.
+pub(super) const PATCHES_MAX: usize = 64;
+/// Grid lines added on each side: the contact may reach half a spacing beyond the grid, the interpolation needs more.
+const PADDING: usize = 4;
+
+/// Coordinates of a rectangular grid in mm; the value at `(x[i], y[j])` is stored at `j * x.len() + i`.
+#[derive(Debug, Clone, PartialEq)]
+struct Grid {
+    x: Vec<f64>,
+    y: Vec<f64>,
+}
+
+/// Pressure samples on a rectangular grid and the patches they form.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PressureField {
+    /// The given grid with [`PADDING`] more lines on each side.
+    grid: Grid,
+    /// Squared pressure relative to its largest value, continued below 0 outside the contact.
+    q: Vec<f64>,
+    /// Samples that are positive or continued by a parabola.
+    smooth: Vec<bool>,
+    /// Patch of every cell of the grid that touches one of its samples.
+    cells: Vec<u8>,
+    /// Largest pressure in MPa.
+    pressure_max: f64,
+    shapes: Vec<Shape>,
+}
+
+impl PressureField {
+    /// Finds the patches of a pressure; `pressure[j][i]` in MPa belongs to `(x[i], y[j])` in mm.
+    ///
+    /// Axes increase strictly and have at least 2 points; pressures are finite and not negative. Returns the field and
+    /// remarks for the answer.
+    ///
+    /// # Errors
+    /// A sentence, if no pressure is positive or there are more than 64 patches.
+    pub fn new(
+        x: &[f64],
+        y: &[f64],
+        pressure: &[Vec<f64>],
+    ) -> Result<(PressureField, Vec<String>), String> {
+        let pressure_max = pressure.iter().flatten().copied().fold(0.0, f64::max);
+        let grid = Grid {
+            x: padded(x),
+            y: padded(y),
+        };
+        let mut q = vec![0.0; grid.x.len() * grid.y.len()];
+        for (j, row) in pressure.iter().enumerate() {
+            for (i, p) in row.iter().enumerate() {
+                q[(j + PADDING) * grid.x.len() + i + PADDING] = (p / pressure_max).powi(2);
+            }
+        }
+        if !q.iter().any(|q| *q > 0.0) {
+            return Err(
+                "no pressure more than 0 given; at least one is needed for a contact".to_owned(),
+            );
+        }
+        let (samples, count) = components::label_samples(&grid, &q).map_err(|count| {
+            format!("{count} separate patches found; at most {PATCHES_MAX} are allowed")
+        })?;
+        let cells = components::label_cells(&grid, &samples);
+        let mut field = PressureField {
+            grid,
+            q,
+            smooth: Vec::new(),
+            cells,
+            pressure_max,
+            shapes: Vec::new(),
+        };
+        let mut shapes = field.shapes_from_samples(&samples, count);
+        let warnings = field.warnings(&samples, &shapes);
+        let states = level_set::extend(&field.grid, &mut field.q);
+        field.smooth = states
+            .into_iter()
+            .map(|state| state == State::Smooth)
+            .collect();
+        for (label, shape) in shapes.iter_mut().enumerate() {
+            (shape.patch.extent, shape.patch.area) = field.measure(label, shape);
+        }
+        field.shapes = shapes;
+        Ok((field, warnings))
+    }
+
+    /// The patches found, in order of the smallest y of their samples.
+    ///
+    /// `normal_force` is the sum of the samples' pressures times the areas they stand for, which reach half-way to the
+    /// neighbouring samples; `area` is that of the interpolated region, `pressure_max` the largest sample.
+    #[must_use]
+    pub fn patches(&self) -> Vec<Patch> {
+        self.shapes.iter().map(|shape| shape.patch).collect()
+    }
+
+    /// Segments that a strip has on average, for each patch.
+    #[must_use]
+    pub fn segments_per_strip(&self) -> Vec<f64> {
+        self.shapes
+            .iter()
+            .map(|shape| shape.segments_per_strip)
+            .collect()
+    }
+
+    /// Chords of one patch on the given strips, each `(y, dy)` with its mid-line at y: none where the strip misses the
+    /// patch, several from smaller to larger x where the patch is hollow or bent.
+    #[must_use]
+    pub fn chords(&self, patch: usize, strips: &[(f64, f64)]) -> Vec<Chord> {
+        let mut chords = Vec::new();
+        for (strip, &(y, dy)) in strips.iter().enumerate() {
+            let segments = self.segments(&self.shapes[patch], patch, y);
+            chords.extend(segments.into_iter().map(|(left, right)| Chord {
+                patch,
+                strip,
+                y,
+                dy,
+                left,
+                right,
+            }));
+        }
+        chords
+    }
+
+    /// Mean of the interpolated pressure in MPa over `x0 < x < x1` on the line of a chord; 0 outside the chord. For
+    /// `x0 = x1` the pressure there.
+    ///
+    /// Gauss–Legendre quadrature of order 10 per grid interval in θ, with `x = c − h cos θ` on the chord, which
+    /// takes the roots at its ends into account; exact to about 1e-9 for Hertz's pressure.
+    #[must_use]
+    pub fn mean_pressure(&self, chord: &Chord, x0: f64, x1: f64) -> f64 {
+        let (low, high) = (x0.max(chord.left), x1.min(chord.right));
+        if low > high {
+            return 0.0;
+        }
+        let x = &self.grid.x;
+        let j = self.row_interval(chord.y);
+        let weights = weights(&self.grid.y, j, chord.y);
+        let (first, last) = (self.column_interval(low), self.column_interval(high));
+        let cubic = |i: usize| line::cubic(x, i, |i| self.value_on_column(i, j, weights));
+        if x0 == x1 {
+            return self.pressure_max * cubic(first).at(low).sqrt();
+        }
+        let half = 0.5 * (chord.right - chord.left);
+        let centre = 0.5 * (chord.right + chord.left);
+        let angle = |x: f64| {
+            let from_ends = ((x - chord.left).max(0.0), (chord.right - x).max(0.0));
+            (from_ends.0 * from_ends.1)
+                .sqrt()
+                .atan2(0.5 * (from_ends.1 - from_ends.0))
+        };
+        let mut integral = 0.0;
+        for i in first..=last {
+            let cubic = cubic(i);
+            let (from, to) = (angle(low.max(x[i])), angle(high.min(x[i + 1])));
+            if to > from {
+                let pressure =
+                    |theta: f64| cubic.at(centre - half * theta.cos()).sqrt() * theta.sin();
+                integral += half * gauss(from, to, pressure);
+            }
+        }
+        self.pressure_max * integral / (x1 - x0)
+    }
+
+    /// Where the line at y lies in a patch: segments from smaller to larger x.
+    fn segments(&self, shape: &Shape, label: usize, y: f64) -> Vec<(f64, f64)> {
+        let Grid { x, y: rows } = &self.grid;
+        let j = interval(rows, y);
+        if rows[j] > y || rows[j + 1] < y || !shape.rows.contains(&j) {
+            return Vec::new();
+        }
+        let t = (y - rows[j]) / (rows[j + 1] - rows[j]);
+        let weights = weights(rows, j, y);
+        // One more node on either side for the tangents.
+        let nodes = shape.columns.start() - 1..=shape.columns.end() + 2;
+        let line = Line {
+            axis: x,
+            first: *nodes.start(),
+            values: nodes.map(|i| self.value_on_column(i, j, weights)).collect(),
+            smooth: shape
+                .columns
+                .clone()
+                .map(|i| self.is_smooth(i, j))
+                .collect(),
+            allowed: shape
+                .columns
+                .clone()
+                .map(|i| self.allowed(label, i, j, t))
+                .collect(),
+        };
+        line.segments()
+    }
+
+    /// The part of cell (i, j) along x that may belong to a patch, on the line at the fraction t of its width.
+    ///
+    /// Cells that touch a sample of the patch belong to it as a whole. The edge may bulge out of them by a little where
+    /// it is smooth and runs nearly parallel to the grid (by an eighth of the squared spacing over the radius); farther
+    /// out the curve is not to be trusted.
+    fn allowed(&self, label: usize, i: usize, j: usize, t: f64) -> [f64; 2] {
+        const BULGE: f64 = 0.125;
+        let nx = self.grid.x.len();
+        let cell = j * nx + i;
+        let touches = |cell: usize| usize::from(self.cells[cell]) == label;
+        if touches(cell) {
+            return [0.0, 1.0];
+        }
+        if !self.is_smooth(i, j) {
+            return [0.0, 0.0];
+        }
+        if (touches(cell - nx) && t <= BULGE) || (touches(cell + nx) && t >= 1.0 - BULGE) {
+            return [0.0, 1.0];
+        }
+        match (touches(cell - 1), touches(cell + 1)) {
+            (true, false) => [0.0, BULGE],
+            (false, true) => [1.0 - BULGE, 1.0],
+            _ => [0.0, 0.0],
+        }
+    }
+
+    /// Are the four corners of cell (i, j) smooth?
+    fn is_smooth(&self, i: usize, j: usize) -> bool {
+        let nx = self.grid.x.len();
+        let k = j * nx + i;
+        [k, k + 1, k + nx, k + nx + 1]
+            .iter()
+            .all(|k| self.smooth[*k])
+    }
+
+    /// Value on column i between the rows j and j + 1.
+    fn value_on_column(&self, i: usize, j: usize, weights: [f64; 4]) -> f64 {
+        let nx = self.grid.x.len();
+        let k = j * nx + i;
+        let nodes = [k - nx, k, k + nx, k + 2 * nx];
+        let value: f64 = weights
+            .iter()
+            .zip(nodes)
+            .map(|(weight, k)| weight * self.q[k])
+            .sum();
+        let smooth = self.smooth[k] && self.smooth[k + nx];
+        let [low, high] = line::bounds(self.q[k], self.q[k + nx], smooth);
+        value.clamp(low, high)
+    }
+
+    fn row_interval(&self, y: f64) -> usize {
+        interval(&self.grid.y, y).clamp(1, self.grid.y.len() - 3)
+    }
+
+    fn column_interval(&self, x: f64) -> usize {
+        interval(&self.grid.x, x).clamp(1, self.grid.x.len() - 3)
+    }
+}
+
+/// An axis with [`PADDING`] more points on each side, spaced like the outermost ones.
+fn padded(axis: &[f64]) -> Vec<f64> {
+    let n = axis.len();
+    let (first, last) = (axis[1] - axis[0], axis[n - 1] - axis[n - 2]);
+    let before = (1..=PADDING).rev().map(|k| axis[0] - first * k as f64);
+    let after = (1..=PADDING).map(|k| axis[n - 1] + last * k as f64);
+    before.chain(axis.iter().copied()).chain(after).collect()
+}
+
+/// Gauss–Legendre quadrature with five points (Abramowitz and Stegun 1964, table 25.4).
+fn gauss(from: f64, to: f64, f: impl Fn(f64) -> f64) -> f64 {
+    const POINTS: [(f64, f64); 3] = [
+        (0.0, 0.568_888_888_888_888_9),
+        (0.538_469_310_105_683_1, 0.478_628_670_499_366_47),
+        (0.906_179_845_938_664, 0.236_926_885_056_189_08),
+    ];
+    let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
+    let pair = |(at, weight): (f64, f64)| weight * (f(middle - half * at) + f(middle + half * at));
+    half * (0.5 * pair(POINTS[0]) + pair(POINTS[1]) + pair(POINTS[2]))
+}
