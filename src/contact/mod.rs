@@ -58,7 +58,7 @@ pub fn solve(problem: &Problem, monitor: &dyn Monitor) -> Result<(Solution, Fiel
             problem.friction,
         )
     });
-    let levels: Vec<Level> = levels.collect();
+    let levels: Vec<Level> = levels.collect::<Result<_, _>>()?;
     let mut points = Vec::with_capacity(problem.motions.len());
     for index in 0..problem.motions.len() {
         points.push(point::solve(problem, &levels, index, &watch)?);

@@ -70,6 +70,7 @@ kinds! {
     Draining 503 "draining" "The service is shutting down" "The service takes no new jobs because it is shutting down; jobs already accepted are kept. Try again after `Retry-After` seconds."
     NotReady 503 "not-ready" "The service is not ready" "The job store cannot be reached at the moment."
     NotConverged 422 "not-converged" "The solver did not converge" "Only inside a job: the iteration ended without meeting its tolerance; `residual` and `iterations` belong to the best iterate, `detail` says what to try."
+    Unsolvable 422 "unsolvable" "The contact has no answer" "Only inside a job: the region cannot be meshed or the contact does not exist; the detail says why."
     OutOfTime 422 "out-of-time" "The solve ran out of time" "Only inside a job: the case's `solver.time_limit_s` was used up."
     SolverPanic 500 "solver-panic" "The solver failed" "Only inside a job: the solver stopped on a defect of its own. Other jobs are not affected."
     WorkerLost 500 "worker-lost" "The workers of this job were lost" "Only inside a job: each worker that took the job ended without an answer, as often as is allowed."

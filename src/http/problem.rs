@@ -94,6 +94,7 @@ impl Problem {
     pub fn of_job(job: &Job, failure: &Failure) -> Self {
         let kind = match failure.kind {
             FailureKind::NotConverged => Kind::NotConverged,
+            FailureKind::Unsolvable => Kind::Unsolvable,
             FailureKind::OutOfTime => Kind::OutOfTime,
             FailureKind::Panic => Kind::SolverPanic,
             FailureKind::WorkerLost => Kind::WorkerLost,

@@ -76,6 +76,8 @@ pub struct Failure {
 pub enum FailureKind {
     /// The iteration ended without meeting its tolerance.
     NotConverged,
+    /// The contact has no answer that the method could look for; the detail says why.
+    Unsolvable,
     /// The time limit of the case was reached.
     OutOfTime,
     /// The solver panicked; the fault is ours.
@@ -158,6 +160,9 @@ impl Failure {
         match error {
             SolveError::Cancelled => None,
             SolveError::OutOfTime => Some(Failure::new(FailureKind::OutOfTime, error.to_string())),
+            SolveError::Unmeshable { .. } => {
+                Some(Failure::new(FailureKind::Unsolvable, error.to_string()))
+            }
             SolveError::NotConverged {
                 residual,
                 iterations,

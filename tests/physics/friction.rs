@@ -58,7 +58,8 @@ fn one_rule(contact: &Ellipse, rule: Rule) -> Cells {
         elasticity.shear_modulus,
         elasticity.poisson_ratio,
         problem.friction,
-    );
+    )
+    .expect("a mesh");
     let motion: Motion = level.scale.motion(&problem.motions[0]);
     let influence = level.influence(&Unwatched).expect("never stopped");
     let equations = Equations::new(rule, &level.normalised, influence, None);
