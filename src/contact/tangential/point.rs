@@ -5,7 +5,7 @@ use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::Patch;
 use crate::contact::outputs::resultants::Resultants;
-use crate::contact::problem::Problem;
+use crate::contact::problem::{Problem, Resolution};
 use crate::contact::tangential::level::Level;
 use crate::contact::tangential::{Failure, Tangential, Work, boundary_element, full_slip, nested};
 
@@ -99,6 +99,14 @@ fn method_used(problem: &Problem) -> Method {
     }
 }
 
+/// Residual to reach: far below the target, since every iteration below it is for nothing.
+fn tolerance(problem: &Problem) -> f64 {
+    match problem.resolution {
+        Resolution::Target(target) => (0.02 * target).clamp(boundary_element::TOLERANCE, 1e-4),
+        Resolution::Mesh(_) => boundary_element::TOLERANCE,
+    }
+}
+
 fn named(failure: Failure, problem: &Problem, point: usize) -> SolveError {
     match failure {
         Failure::Stopped(stop) => stop.into(),
@@ -147,7 +155,7 @@ fn solve_level(
             values
         })
     });
-    boundary_element::solve(level, &motion, start.as_ref(), monitor)
+    boundary_element::solve(level, &motion, start.as_ref(), tolerance(problem), monitor)
 }
 
 /// Estimated errors of the patches and of their sum: the change from the level before where there is one, else the

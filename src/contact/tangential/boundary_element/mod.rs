@@ -19,7 +19,7 @@ use crate::contact::tangential::level::Level;
 use crate::contact::tangential::rules::Rule;
 use crate::contact::tangential::{Failure, Tangential, Work};
 
-/// Residual of the friction law that ends a solve, relative to the traction scale of the case.
+/// Residual of the friction law that ends a solve on an explicit mesh, relative to the traction scale of the case.
 pub const TOLERANCE: f64 = 1e-6;
 
 /// Solves one motion (dimensionless, about the level's origin) on one level, starting from tractions per cell.
@@ -31,6 +31,7 @@ pub fn solve(
     level: &Level,
     motion: &Motion,
     start: Option<&[Vec<f64>; 2]>,
+    tolerance: f64,
     monitor: &dyn Monitor,
 ) -> Result<Tangential, Failure> {
     if let Some(answer) = full_slip::rigid_answer(level, motion) {
@@ -38,7 +39,7 @@ pub fn solve(
     }
     let influence = level.influence(monitor)?;
     let parity = level.parity(motion);
-    let mut solve = Solve::new(level, motion, influence, parity, monitor);
+    let mut solve = Solve::new(level, motion, influence, parity, tolerance, monitor);
     let mut skipped = Vec::new();
     if parity.is_some() {
         skipped.push("mirror symmetry of patch and motion: half the cells".to_owned());
@@ -123,6 +124,7 @@ struct Solve<'a> {
     parity: Option<Parity>,
     bound: Vec<f64>,
     area: Vec<f64>,
+    tolerance: f64,
     work: Work,
     monitor: &'a dyn Monitor,
 }
@@ -133,6 +135,7 @@ impl<'a> Solve<'a> {
         motion: &'a Motion,
         influence: &'a Differences,
         parity: Option<Parity>,
+        tolerance: f64,
         monitor: &'a dyn Monitor,
     ) -> Solve<'a> {
         let padded = influence.padded(parity);
@@ -148,6 +151,7 @@ impl<'a> Solve<'a> {
             parity,
             bound: resized(&level.bound),
             area: resized(&level.normalised.areas()),
+            tolerance,
             work: Work::default(),
             monitor,
         }
@@ -183,7 +187,7 @@ impl<'a> Solve<'a> {
             bound: &self.bound,
             area: &self.area,
             scale: (largest * newton.compliance()).min(1.0),
-            tolerance: TOLERANCE,
+            tolerance: self.tolerance,
         };
         let settled = if shortcut {
             full_slip::fixed_point(newton, &law, t, self.monitor)?
@@ -221,7 +225,7 @@ impl<'a> Solve<'a> {
         if !report.converged {
             return Err(Failure::NotConverged {
                 work: self.work,
-                tolerance: TOLERANCE,
+                tolerance: self.tolerance,
                 advice: "try another mesh, with cells and strips of similar width".to_owned(),
             });
         }
