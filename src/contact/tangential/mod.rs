@@ -2,4 +2,5 @@
 
 pub mod boundary_element;
 pub mod equations;
+pub mod liu_hsu;
 pub mod rules;
