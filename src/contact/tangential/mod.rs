@@ -4,6 +4,7 @@ pub mod boundary_element;
 pub mod equations;
 pub mod full_slip;
 pub mod level;
+pub mod liu_hsu;
 pub mod nested;
 pub mod point;
 pub mod rules;
