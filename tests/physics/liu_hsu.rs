@@ -103,7 +103,7 @@ fn zones(contact: &Contact, rule: Rule, state: [f64; 3], t: &[f64]) -> Vec<bool>
     };
     newton.evaluate(&law, t, &mut unused);
     (0..equations.cells())
-        .map(|i| newton.slips(&law, t, i))
+        .map(|i| newton.slips(law.bound, t, i))
         .collect()
 }
 

@@ -10,6 +10,7 @@ use crate::contact::mesh::{Chord, Grading, Mesh, equal_strips};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::Region;
 use crate::contact::normal::fitted::{self, Fitted};
+use crate::contact::problem::{Elasticity, Problem};
 
 /// The contact made dimensionless: lengths by `length`, tractions by `traction`, slips by `traction / G`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,19 +71,17 @@ pub struct Level {
 }
 
 impl Level {
-    /// Meshes every patch of the region with equal strips and cosine-graded cells.
-    ///
-    /// `poisson_ratio` and `shear_modulus` are the combined constants, `friction` is μ.
+    /// Meshes every patch of the problem's region with equal strips and cosine-graded cells.
     ///
     /// # Errors
     /// [`SolveError::Unmeshable`] if no strip meets a patch.
-    pub fn new(
-        region: &Region,
-        size: MeshSize,
-        shear_modulus: f64,
-        poisson_ratio: f64,
-        friction: f64,
-    ) -> Result<Level, SolveError> {
+    pub fn new(problem: &Problem, size: MeshSize) -> Result<Level, SolveError> {
+        let (region, friction) = (&problem.region, problem.friction);
+        let Elasticity {
+            shear_modulus,
+            poisson_ratio,
+            ..
+        } = problem.elasticity;
         let patches = region.patches();
         let mut fitted: Vec<Fitted> = Vec::new();
         for (k, patch) in patches.iter().enumerate() {

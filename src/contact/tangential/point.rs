@@ -1,17 +1,24 @@
 //! One motion of a case, from the coarsest level to the finest, with an estimate of its error.
 
-use crate::contact::case::{Method, Motion};
+use crate::contact::case::{MeshSize, Method, Motion};
 use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::Patch;
 use crate::contact::outputs::resultants::Resultants;
 use crate::contact::problem::{Problem, Resolution};
 use crate::contact::tangential::level::Level;
-use crate::contact::tangential::{Failure, Tangential, Work, boundary_element, full_slip, nested};
+use crate::contact::tangential::{
+    Failure, Tangential, Work, boundary_element, full_slip, liu_hsu, nested,
+};
 
 /// On a single mesh the difference of the two rules times this covers the error (measured on Hertz contacts: it did
 /// in 95 % of the cases at 64 to 150 cells).
 const RULES_SAFETY: f64 = 2.5;
+/// The coarse mesh that gives the method of Liu and Hsu its spin pole: fewer than 30 cells, as they found.
+const POLE_MESH: MeshSize = MeshSize {
+    strips: 5,
+    cells: 5,
+};
 /// Relative error where everything slips along the rigid slip.
 const RIGID_ERROR: f64 = 1e-6;
 
@@ -134,6 +141,16 @@ fn solve_level(
 ) -> Result<Tangential, Failure> {
     if problem.friction == 0.0 {
         return Ok(full_slip::frictionless_answer(level, motion));
+    }
+    if problem.method == Method::LiuHsu {
+        let coarse = Level::new(problem, POLE_MESH).ok();
+        return liu_hsu::on_level::solve(
+            level,
+            coarse.as_ref(),
+            motion,
+            tolerance(problem),
+            monitor,
+        );
     }
     let motion = level.scale.motion(motion);
     let start = coarser.map(|(coarse, answer)| {

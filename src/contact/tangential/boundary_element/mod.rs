@@ -17,7 +17,7 @@ use crate::contact::tangential::equations::Equations;
 use crate::contact::tangential::full_slip;
 use crate::contact::tangential::level::Level;
 use crate::contact::tangential::rules::Rule;
-use crate::contact::tangential::{Failure, Tangential, Work};
+use crate::contact::tangential::{Failure, Tangential, Work, obey_coulomb};
 
 /// Residual of the friction law that ends a solve on an explicit mesh, relative to the traction scale of the case.
 pub const TOLERANCE: f64 = 1e-6;
@@ -74,39 +74,6 @@ pub fn solve(
         skipped,
         warnings,
     })
-}
-
-/// Brings every traction into its disc (it may be outside by the solver's tolerance) and returns the slips: none in
-/// cells that stick, the part of the given slip along the traction in cells that slip.
-fn obey_coulomb(
-    bound: &[f64],
-    slips: &[bool],
-    traction: &mut [Vec<f64>; 2],
-    given: &[Vec<f64>; 2],
-) -> [Vec<f64>; 2] {
-    let mut slip = [vec![0.0; bound.len()], vec![0.0; bound.len()]];
-    for i in 0..bound.len() {
-        let length = traction[0][i].hypot(traction[1][i]);
-        if length == 0.0 {
-            // Without traction (no pressure) the slip is free.
-            if slips[i] {
-                slip[0][i] = given[0][i];
-                slip[1][i] = given[1][i];
-            }
-            continue;
-        }
-        let (dx, dy) = (traction[0][i] / length, traction[1][i] / length);
-        if slips[i] || length > bound[i] {
-            traction[0][i] = bound[i] * dx;
-            traction[1][i] = bound[i] * dy;
-        }
-        if slips[i] {
-            let along = (given[0][i] * dx + given[1][i] * dy).max(0.0);
-            slip[0][i] = along * dx;
-            slip[1][i] = along * dy;
-        }
-    }
-    slip
 }
 
 /// What the three-point rule gave besides tractions.

@@ -66,6 +66,7 @@ pub mod active_set;
 pub mod dense;
 pub mod initial_guess;
 pub mod newton_raphson;
+pub mod on_level;
 pub mod spin_pole;
 pub mod stick_block;
 
