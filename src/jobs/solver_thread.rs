@@ -85,7 +85,7 @@ fn solve_case(shared: &Shared, watch: &Watch, body: &[u8]) -> Outcome {
         Ok(problem) => problem,
         Err(error) => return Outcome::Refused(error),
     };
-    watch.begin(problem.time_limit);
+    watch.begin();
     let (solution, fields) = match (shared.recipe.solve)(&problem, watch) {
         Ok(answer) => answer,
         Err(error) => return Outcome::Unsolved(error),

@@ -25,13 +25,14 @@ pub struct Watch {
     reason: AtomicU8,
     ticks: AtomicU64,
     progress: AtomicU64,
-    begun: OnceLock<(Instant, Option<Duration>)>,
+    begun: OnceLock<Instant>,
 }
 
 impl Watch {
-    /// Starts the clock of the solve, with the time allowed for it. Only the first call counts.
-    pub fn begin(&self, time_limit: Option<Duration>) {
-        self.begun.get_or_init(|| (Instant::now(), time_limit));
+    /// Starts the clock of the solve, against which `contact` holds the time limit of the case. Only the first call
+    /// counts.
+    pub fn begin(&self) {
+        self.begun.get_or_init(Instant::now);
     }
 
     /// Tells the solver to stop at its next tick.
@@ -76,18 +77,11 @@ impl Monitor for Watch {
         if self.reason().is_some() {
             return ControlFlow::Break(Stop::Cancelled);
         }
-        match self.begun.get() {
-            Some((start, Some(limit))) if start.elapsed() >= *limit => {
-                ControlFlow::Break(Stop::OutOfTime)
-            }
-            _ => ControlFlow::Continue(()),
-        }
+        ControlFlow::Continue(())
     }
 
     fn elapsed(&self) -> Duration {
-        self.begun
-            .get()
-            .map_or(Duration::ZERO, |(start, _)| start.elapsed())
+        self.begun.get().map_or(Duration::ZERO, Instant::elapsed)
     }
 }
 
@@ -107,14 +101,13 @@ mod tests {
     }
 
     #[test]
-    fn a_used_up_time_limit_stops_the_solve() {
+    fn the_clock_starts_once_and_with_the_solve() {
         let watch = Watch::default();
-        watch.begin(Some(Duration::ZERO));
-        watch.begin(None);
-        assert_eq!(watch.tick(0.1), ControlFlow::Break(Stop::OutOfTime));
-        let unlimited = Watch::default();
-        unlimited.begin(None);
-        assert_eq!(unlimited.tick(0.1), ControlFlow::Continue(()));
+        assert_eq!(watch.elapsed(), Duration::ZERO);
+        watch.begin();
+        let first = watch.elapsed();
+        watch.begin();
+        assert!(watch.elapsed() >= first);
     }
 
     #[test]

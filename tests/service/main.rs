@@ -8,7 +8,6 @@ mod errors;
 mod schema;
 mod server;
 mod shutdown;
-mod standin;
 mod store;
 mod store_model;
 mod support;

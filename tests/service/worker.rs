@@ -8,13 +8,13 @@ use railhead::contact::case::Method;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Monitor;
 use railhead::contact::problem::Problem;
+use railhead::contact::solve;
 use railhead::jobs::worker::Step;
 use railhead::jobs::{FailureKind, JobsError, Options, State};
 use serde_json::json;
 use tokio::sync::mpsc::unbounded_channel;
 
-use crate::standin;
-use crate::support::{answer_at_once, case, jobs_with, open};
+use crate::support::{case, jobs_with, open};
 
 /// Ticks until it is told to stop.
 fn tick_until_stopped(monitor: &dyn Monitor) -> SolveError {
@@ -29,11 +29,22 @@ fn tick_until_stopped(monitor: &dyn Monitor) -> SolveError {
 #[tokio::test]
 async fn a_solved_job_keeps_its_answer_and_its_remarks() {
     let folder = tempfile::tempdir().unwrap();
-    let jobs = jobs_with(folder.path(), answer_at_once).await;
+    let (answer, answers) = mpsc::channel();
+    let jobs = jobs_with(
+        folder.path(),
+        move |problem: &Problem, monitor: &dyn Monitor| {
+            let solved = solve(problem, monitor)?;
+            answer.send(solved.clone()).unwrap();
+            Ok(solved)
+        },
+    )
+    .await;
     let mut worker = jobs.worker("w").unwrap();
     assert_eq!(worker.step().await.unwrap(), Step::Idle);
 
-    let id = jobs.submit(case("one"), None).await.unwrap().id;
+    let mut remarkable = case("one");
+    remarkable["friction"]["coefficient"] = json!(1.5);
+    let id = jobs.submit(remarkable.clone(), None).await.unwrap().id;
     assert!(matches!(
         jobs.solution(id).await,
         Err(JobsError::NotReady(State::Queued))
@@ -43,7 +54,9 @@ async fn a_solved_job_keeps_its_answer_and_its_remarks() {
         Step::Ended(id, State::Succeeded)
     );
 
-    let (solution, fields) = standin::answer();
+    let (solution, fields) = answers.recv().unwrap();
+    assert!(!solution.warnings.is_empty());
+    assert!(fields.patches[0].points[0].traction_x_mpa.is_some());
     let job = jobs.get(id).await.unwrap();
     assert_eq!((job.state, job.attempt), (State::Succeeded, 1));
     assert_eq!(job.warnings, solution.warnings);
@@ -63,7 +76,7 @@ async fn a_solved_job_keeps_its_answer_and_its_remarks() {
     ));
     let submitted =
         serde_json::from_slice::<serde_json::Value>(&jobs.case(id).await.unwrap()).unwrap();
-    assert_eq!(submitted, case("one"));
+    assert_eq!(submitted, remarkable);
 
     jobs.delete(id).await.unwrap();
     assert!(matches!(jobs.solution(id).await, Err(JobsError::NotFound)));
@@ -73,9 +86,9 @@ async fn a_solved_job_keeps_its_answer_and_its_remarks() {
 #[tokio::test]
 async fn a_panic_fails_that_job_only() {
     let folder = tempfile::tempdir().unwrap();
-    let jobs = jobs_with(folder.path(), |problem: &Problem, _: &dyn Monitor| {
+    let jobs = jobs_with(folder.path(), |problem: &Problem, monitor: &dyn Monitor| {
         assert_ne!(problem.name.as_deref(), Some("bad"), "a cell without area");
-        Ok(standin::answer())
+        solve(problem, monitor)
     })
     .await;
     let bad = jobs.submit(case("bad"), None).await.unwrap().id;
@@ -155,12 +168,9 @@ async fn a_running_job_stops_when_it_is_cancelled() {
 #[tokio::test]
 async fn the_time_limit_of_a_case_ends_its_solve() {
     let folder = tempfile::tempdir().unwrap();
-    let jobs = jobs_with(folder.path(), |_: &Problem, monitor: &dyn Monitor| {
-        Err(tick_until_stopped(monitor))
-    })
-    .await;
+    let jobs = jobs_with(folder.path(), solve).await;
     let mut limited = case("limited");
-    limited["solver"]["time_limit_s"] = json!(0.01);
+    limited["solver"]["time_limit_s"] = json!(1e-6);
     let id = jobs.submit(limited, None).await.unwrap().id;
     jobs.worker("w").unwrap().step().await.unwrap();
     let failure = jobs.get(id).await.unwrap().failure.unwrap();
@@ -176,13 +186,13 @@ async fn a_ticking_solver_keeps_its_lease_and_shows_its_progress() {
         lease: Duration::from_millis(1_500),
         ..Options::new(folder.path())
     };
-    let jobs = open(options, move |_: &Problem, monitor: &dyn Monitor| {
+    let jobs = open(options, move |problem: &Problem, monitor: &dyn Monitor| {
         let may_finish = may_finish.lock().unwrap();
         while may_finish.try_recv().is_err() {
             assert!(monitor.tick(0.5).is_continue());
             std::thread::sleep(Duration::from_millis(1));
         }
-        Ok(standin::answer())
+        solve(problem, monitor)
     })
     .await;
     let id = jobs.submit(case("long"), None).await.unwrap().id;
@@ -206,13 +216,13 @@ async fn a_solver_that_hangs_loses_its_job_but_not_the_worker() {
         lease: Duration::from_millis(300),
         ..Options::new(folder.path())
     };
-    let jobs = open(options, move |_: &Problem, _: &dyn Monitor| {
+    let jobs = open(options, move |problem: &Problem, monitor: &dyn Monitor| {
         let first_time = released.lock().unwrap().take();
         if let Some(released) = first_time {
             // The first attempt hangs, without a tick, until the test is over.
             let _ = released.recv();
         }
-        Ok(standin::answer())
+        solve(problem, monitor)
     })
     .await;
     let id = jobs.submit(case("hangs once"), None).await.unwrap().id;
@@ -233,13 +243,13 @@ async fn a_solver_deaf_to_its_cancellation_is_left_behind() {
         lease: Duration::from_millis(300),
         ..Options::new(folder.path())
     };
-    let jobs = open(options, move |_: &Problem, _: &dyn Monitor| {
+    let jobs = open(options, move |problem: &Problem, monitor: &dyn Monitor| {
         let first_time = released.lock().unwrap().take();
         if let Some(released) = first_time {
             started.send(()).unwrap();
             let _ = released.recv();
         }
-        Ok(standin::answer())
+        solve(problem, monitor)
     })
     .await;
     let deaf = jobs.submit(case("deaf"), None).await.unwrap().id;
@@ -263,7 +273,7 @@ async fn a_solver_deaf_to_its_cancellation_is_left_behind() {
 #[tokio::test]
 async fn a_refused_case_is_not_stored() {
     let folder = tempfile::tempdir().unwrap();
-    let jobs = jobs_with(folder.path(), answer_at_once).await;
+    let jobs = jobs_with(folder.path(), solve).await;
     match jobs.submit(json!({}), Some("k".to_owned())).await {
         Err(JobsError::Case(faults)) => assert!(!faults.0.is_empty()),
         other => panic!("{other:?}"),
@@ -284,7 +294,7 @@ async fn the_same_key_gives_the_same_job_also_when_the_queue_is_full() {
         queue_max: 2,
         ..Options::new(folder.path())
     };
-    let jobs = open(options, answer_at_once).await;
+    let jobs = open(options, solve).await;
     let key = || Some("k".to_owned());
     let first = jobs.submit(case("one"), key()).await.unwrap();
     jobs.submit(case("two"), None).await.unwrap();
@@ -313,7 +323,7 @@ async fn a_pool_solves_everything_and_waiting_callers_hear_of_it() {
         workers: 3,
         ..Options::new(folder.path())
     };
-    let jobs = open(options, answer_at_once).await;
+    let jobs = open(options, solve).await;
     jobs.start().unwrap();
     let mut waiting = Vec::new();
     for number in 0..40 {
@@ -337,7 +347,7 @@ async fn a_pool_solves_everything_and_waiting_callers_hear_of_it() {
 #[tokio::test]
 async fn waiting_ends_with_the_time_allowed_and_for_unknown_jobs_at_once() {
     let folder = tempfile::tempdir().unwrap();
-    let jobs = jobs_with(folder.path(), answer_at_once).await;
+    let jobs = jobs_with(folder.path(), solve).await;
     let id = jobs.submit(case("never claimed"), None).await.unwrap().id;
     assert_eq!(
         jobs.wait(id, Duration::ZERO).await.unwrap().state,
@@ -365,7 +375,7 @@ async fn waiting_ends_with_the_time_allowed_and_for_unknown_jobs_at_once() {
 #[tokio::test]
 async fn results_without_a_job_are_swept_at_the_start() {
     let folder = tempfile::tempdir().unwrap();
-    let jobs = jobs_with(folder.path(), answer_at_once).await;
+    let jobs = jobs_with(folder.path(), solve).await;
     let kept = jobs.submit(case("kept"), None).await.unwrap().id;
     jobs.worker("w").unwrap().step().await.unwrap();
     let kept_file = only_solution(&folder.path().join("results"));
