@@ -16,6 +16,7 @@ use tracing::{Instrument, Span};
 use uuid::Uuid;
 
 use crate::contact::error::SolveError;
+use crate::contact::monitor::Monitor;
 use crate::jobs::error::JobsError;
 use crate::jobs::job::{Failure, FailureKind, Job, State};
 use crate::jobs::results::Encoded;
@@ -267,15 +268,17 @@ impl Worker {
         watch: &Watch,
         result: Encoded,
     ) -> Result<String, JobsError> {
-        // A slow disk shall not cost the lease; should it be lost all the same, the end of the job is fenced.
-        let lease = lease_ms(&self.shared);
-        if let Err(error) = self
-            .shared
-            .store
-            .renew(claim, watch.progress(), now_ms(), lease)
-            .await
-        {
-            tracing::warn!(%error, "lease could not be renewed");
+        // A slow disk shall not cost the lease of a long solve; should it be lost all the same, the end of the job is
+        // fenced. After a short solve the lease is as good as new.
+        if watch.elapsed() >= heartbeat(&self.shared) {
+            let lease = lease_ms(&self.shared);
+            let renewal = self
+                .shared
+                .store
+                .renew(claim, watch.progress(), now_ms(), lease);
+            if let Err(error) = renewal.await {
+                tracing::warn!(%error, "lease could not be renewed");
+            }
         }
         self.shared.results.put(claim, result).await
     }

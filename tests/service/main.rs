@@ -12,6 +12,7 @@ mod schema;
 mod server;
 mod shutdown;
 mod store;
+mod store_lists;
 mod store_model;
 mod support;
 mod worker;

@@ -6,19 +6,19 @@ use bytes::Bytes;
 use railhead::jobs::store::list::Filter;
 use railhead::jobs::store::sqlite::SqliteStore;
 use railhead::jobs::store::{Claim, Deleted, Ending, Enqueued, NewJob, Renewal};
-use railhead::jobs::{Failure, FailureKind, Job, JobsError, State};
+use railhead::jobs::{Failure, FailureKind, Job, State};
 use tempfile::TempDir;
 use uuid::Uuid;
 
 const LEASE: i64 = 1_000;
 
-struct Table {
-    store: SqliteStore,
+pub struct Table {
+    pub store: SqliteStore,
     folder: TempDir,
 }
 
 impl Table {
-    async fn new() -> Table {
+    pub async fn new() -> Table {
         let folder = tempfile::tempdir().unwrap();
         let store = SqliteStore::open(&folder.path().join("jobs.db"))
             .await
@@ -26,14 +26,14 @@ impl Table {
         Table { store, folder }
     }
 
-    async fn add(&self, new: NewJob) -> Job {
+    pub async fn add(&self, new: NewJob) -> Job {
         match self.store.enqueue(&new).await.unwrap() {
             Enqueued::Created(job) => job,
             other => panic!("{other:?}"),
         }
     }
 
-    async fn claim(&self, now: i64) -> Option<Claim> {
+    pub async fn claim(&self, now: i64) -> Option<Claim> {
         self.store.claim("w", now, LEASE).await.unwrap()
     }
 
@@ -42,7 +42,7 @@ impl Table {
     }
 }
 
-fn new_job() -> NewJob {
+pub fn new_job() -> NewJob {
     let id = Uuid::now_v7();
     NewJob {
         id,
@@ -55,7 +55,7 @@ fn new_job() -> NewJob {
     }
 }
 
-fn labelled(key: &str, value: &str) -> NewJob {
+pub fn labelled(key: &str, value: &str) -> NewJob {
     NewJob {
         labels: BTreeMap::from([(key.to_owned(), value.to_owned())]),
         ..new_job()
@@ -69,7 +69,7 @@ fn keyed(key: &str, digest: u8) -> NewJob {
     }
 }
 
-fn success() -> Ending {
+pub fn success() -> Ending {
     Ending::Succeeded {
         warnings: vec!["mind the gap".to_owned()],
         result_key: "results/1".to_owned(),
@@ -407,112 +407,6 @@ async fn only_an_ended_job_can_be_deleted_and_all_that_hung_on_it_goes() {
     };
     assert_eq!(table.store.list(&filter, None, 10).await.unwrap().jobs, []);
     assert!(table.store.existing(&[id]).await.unwrap().is_empty());
-}
-
-#[tokio::test]
-async fn pages_neither_repeat_nor_skip_while_jobs_arrive() {
-    let table = Table::new().await;
-    let mut expected = Vec::new();
-    for _ in 0..25 {
-        expected.insert(0, table.add(new_job()).await.id);
-    }
-    let filter = Filter::default();
-    let mut seen = Vec::new();
-    let mut cursor: Option<String> = None;
-    loop {
-        let page = table
-            .store
-            .list(&filter, cursor.as_deref(), 10)
-            .await
-            .unwrap();
-        seen.extend(page.jobs.iter().map(|job| job.id));
-        // A newcomer belongs before the first page; a job that ends stays where it is.
-        table.add(new_job()).await;
-        let claim = table.claim(0).await.unwrap();
-        table.store.finish(&claim, &success(), 1).await.unwrap();
-        match page.next_cursor {
-            Some(next) => cursor = Some(next),
-            None => break,
-        }
-    }
-    assert_eq!(seen, expected);
-}
-
-#[tokio::test]
-async fn a_full_last_page_has_no_next_one() {
-    let table = Table::new().await;
-    for _ in 0..4 {
-        table.add(new_job()).await;
-    }
-    for (limit, more) in [(3, true), (4, false), (5, false)] {
-        let page = table
-            .store
-            .list(&Filter::default(), None, limit)
-            .await
-            .unwrap();
-        assert_eq!(page.next_cursor.is_some(), more, "limit {limit}");
-    }
-}
-
-#[tokio::test]
-async fn filters_combine_and_windows_are_half_open() {
-    let table = Table::new().await;
-    let mut jobs = Vec::new();
-    for value in ["a", "b", "a", "b", "a", "b"] {
-        let id = Uuid::from_u128(((1_000 + jobs.len() as u128) << 80) | (7 << 76) | (2 << 62));
-        let new = NewJob {
-            id,
-            created_at: 1_000 + jobs.len() as i64,
-            ..labelled("line", value)
-        };
-        jobs.push(table.add(new).await.id);
-    }
-    table.claim(0).await.unwrap();
-    let ids = async |filter: &Filter| {
-        let page = table.store.list(filter, None, 100).await.unwrap();
-        page.jobs
-            .iter()
-            .map(|job| jobs.iter().position(|id| *id == job.id).unwrap())
-            .collect::<Vec<_>>()
-    };
-    let label = |value: &str| Some(("line".to_owned(), value.to_owned()));
-    let mut filter = Filter::default();
-    assert_eq!(ids(&filter).await, [5, 4, 3, 2, 1, 0]);
-    filter.label = label("a");
-    assert_eq!(ids(&filter).await, [4, 2, 0]);
-    filter.state = Some(State::Queued);
-    assert_eq!(ids(&filter).await, [4, 2]);
-    filter.label = None;
-    filter.created_after = Some(1_002);
-    filter.created_before = Some(1_005);
-    assert_eq!(ids(&filter).await, [4, 3, 2]);
-    filter.label = label("b");
-    assert_eq!(ids(&filter).await, [3]);
-    filter.label = label("c");
-    assert_eq!(ids(&filter).await, [0; 0]);
-}
-
-#[tokio::test]
-async fn a_cursor_of_another_filter_is_refused() {
-    let table = Table::new().await;
-    for _ in 0..3 {
-        table.add(new_job()).await;
-    }
-    let cursor = table
-        .store
-        .list(&Filter::default(), None, 1)
-        .await
-        .unwrap()
-        .next_cursor
-        .unwrap();
-    let other = Filter {
-        state: Some(State::Queued),
-        ..Filter::default()
-    };
-    for (filter, cursor) in [(&other, cursor.as_str()), (&Filter::default(), "nonsense")] {
-        let answer = table.store.list(filter, Some(cursor), 1).await;
-        assert!(matches!(answer, Err(JobsError::BadCursor)), "{answer:?}");
-    }
 }
 
 #[tokio::test]
