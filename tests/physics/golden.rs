@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use railhead::contact::case::Motion;
 use railhead::contact::influence::coefficients::{Rectangle, rectangle};
-use railhead::contact::influence::strips::{Differences, Parity};
+use railhead::contact::influence::strips::{Differences, Parity, Precision};
 use railhead::contact::mesh::{Chord, Grading, Mesh, equal_strips};
 use railhead::contact::monitor::Unwatched;
 use railhead::contact::tangential::boundary_element::newton::{FrictionLaw, Newton};
@@ -184,8 +184,9 @@ fn discrete_solutions_agree_to_nine_digits() {
     let mut failures = Vec::new();
     for name in ["circle", "long_ellipse", "egg"] {
         let region = Region::new(name);
-        let differences = Differences::new(&region.mesh, POISSON, false, &Unwatched)
-            .expect("nobody stops the assembly");
+        let differences =
+            Differences::new(&region.mesh, POISSON, false, Precision::Double, &Unwatched)
+                .expect("nobody stops the assembly");
         let load: f64 = region
             .pressure
             .iter()
@@ -227,9 +228,9 @@ fn discrete_solutions_agree_to_nine_digits() {
 #[test]
 fn folding_a_symmetric_mesh_does_not_move_the_discrete_solution() {
     let region = Region::new("circle");
-    let full = Differences::new(&region.mesh, POISSON, false, &Unwatched)
+    let full = Differences::new(&region.mesh, POISSON, false, Precision::Double, &Unwatched)
         .expect("nobody stops the assembly");
-    let folded = Differences::new(&region.mesh, POISSON, true, &Unwatched)
+    let folded = Differences::new(&region.mesh, POISSON, true, Precision::Double, &Unwatched)
         .expect("nobody stops the assembly");
     for (motion, parity) in [
         ([0.3, 0.0, 0.0], Parity::Longitudinal),
