@@ -22,3 +22,4 @@ mod reference;
 mod reference_hertz;
 mod regions;
 mod robustness;
+mod targets;
