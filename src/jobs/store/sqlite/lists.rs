@@ -77,7 +77,12 @@ fn page_query(filter: &Filter, after: Option<Uuid>, limit: u32) -> QueryBuilder<
         and(&mut query, "batch_id = ", batch.to_string());
     }
     if let Some(state) = filter.state {
-        and(&mut query, "state = ", state.name().to_owned());
+        // Within a batch the index of the batch is walked, not that of the state: a bare expression keeps it out.
+        let column = match filter.batch {
+            Some(_) => "state || '' = ",
+            None => "state = ",
+        };
+        and(&mut query, column, state.name().to_owned());
     }
     if let Some(first) = filter.id_from() {
         and(&mut query, &format!("{id} >= "), first.to_string());
