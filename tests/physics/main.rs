@@ -18,6 +18,7 @@ mod pressure_grid_faults;
 mod pressure_grid_shapes;
 mod pressure_samples;
 mod problem;
+mod profile_geometry;
 mod reference;
 mod reference_hertz;
 mod regions;

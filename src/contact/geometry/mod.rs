@@ -1,0 +1,8 @@
+//! Where do the bodies touch? Cross-sections of wheel and rail, their placement, and the gaps of their patches.
+
+pub mod contact_search;
+pub mod formats;
+pub mod profile;
+pub mod smoothing;
+pub mod wheel_rail;
+pub mod wheelset;
