@@ -2,8 +2,8 @@
 //!
 //! The rail is straight along x, so that the wheel meets it where its normal has no part along x: the wheel is
 //! replaced by the curve of those points, and the search is one in the plane across. Patches are the intervals in which the
-//! undeformed bodies overlap; the frame of a patch lies at the mean of its overlap, weighted with its power 3/2 (the
-//! overlapping volume), with the mean inclination of the rail. In that frame the gap is taken along the normal, exactly: the
+//! undeformed bodies overlap; the frame of a patch lies at the mean of its overlap, weighted with its square over the
+//! area (power 5/2 on a line), with the mean inclination of the rail. In that frame the gap is taken along the normal, exactly: the
 //! wheel as surface of revolution, the rail as cylinder.
 
 use crate::contact::geometry::wheel_rail::WheelRail;
@@ -82,19 +82,40 @@ impl<'g> Search<'g> {
     /// A sentence, if no part of the wheel lies above the rail.
     pub fn new(geometry: &'g WheelRail) -> Result<Search<'g>, String> {
         let [rail, wheel] = geometry.parameters(CURVE_STEP);
-        let rail: Vec<_> = rail.into_iter().map(|s| { let [y, z] = geometry.rail_at(s).at; Some([y, z, s]) }).collect();
-        let wheel: Vec<_> = wheel.into_iter().map(|s| geometry.lowest(s).map(|[_, y, z]| [y, -z, s])).collect();
+        let rail: Vec<_> = rail
+            .into_iter()
+            .map(|s| {
+                let [y, z] = geometry.rail_at(s).at;
+                Some([y, z, s])
+            })
+            .collect();
+        let wheel: Vec<_> = wheel
+            .into_iter()
+            .map(|s| geometry.lowest(s).map(|[_, y, z]| [y, -z, s]))
+            .collect();
         let (rail, wheel) = (envelope(&rail), envelope(&wheel));
         let first = rail.first.max(wheel.first);
-        let last = (rail.first + rail.points.len() as i64).min(wheel.first + wheel.points.len() as i64);
+        let last =
+            (rail.first + rail.points.len() as i64).min(wheel.first + wheel.points.len() as i64);
         let mut lines = Vec::new();
         for k in first..last {
-            let (below, above) = (rail.points[(k - rail.first) as usize], wheel.points[(k - wheel.first) as usize]);
+            let (below, above) = (
+                rail.points[(k - rail.first) as usize],
+                wheel.points[(k - wheel.first) as usize],
+            );
             if let (Some([z, rail]), Some([depth, wheel])) = (below, above) {
-                lines.push(Line { y: k as f64 * STEP, clearance: -depth - z, rail, wheel });
+                lines.push(Line {
+                    y: k as f64 * STEP,
+                    clearance: -depth - z,
+                    rail,
+                    wheel,
+                });
             }
         }
-        let least = lines.iter().map(|line| line.clearance).fold(f64::INFINITY, f64::min);
+        let least = lines
+            .iter()
+            .map(|line| line.clearance)
+            .fold(f64::INFINITY, f64::min);
         if lines.len() < 3 {
             return Err(
                 "no part of the wheel lies above the rail; check gauge, flange-back distance and position, lateral shift".to_owned(),
@@ -103,7 +124,11 @@ impl<'g> Search<'g> {
         for line in &mut lines {
             line.clearance -= least;
         }
-        Ok(Search { geometry, lines, touch: -least })
+        Ok(Search {
+            geometry,
+            lines,
+            touch: -least,
+        })
     }
 
     /// The frames of the patches when the wheel is lowered by `lowering` mm below first touch, from smaller to larger y.
@@ -111,7 +136,10 @@ impl<'g> Search<'g> {
     /// # Errors
     /// A sentence, if an overlap reaches the end of a profile.
     pub fn frames(&self, lowering: f64) -> Result<Vec<Frame>, String> {
-        self.overlaps(lowering)?.into_iter().map(|lines| Ok(self.frame(lines, lowering))).collect()
+        self.overlaps(lowering)?
+            .into_iter()
+            .map(|lines| Ok(self.frame(lines, lowering)))
+            .collect()
     }
 
     /// The gaps of the patches at the same height, each in its own frame.
@@ -128,16 +156,23 @@ impl<'g> Search<'g> {
     fn overlaps(&self, lowering: f64) -> Result<Vec<&[Line]>, String> {
         let inside = |line: &Line| line.clearance < lowering;
         let apart = |a: &Line, b: &Line| b.y - a.y > TOGETHER;
-        let places: Vec<usize> = (0..self.lines.len()).filter(|k| inside(&self.lines[*k])).collect();
+        let places: Vec<usize> = (0..self.lines.len())
+            .filter(|k| inside(&self.lines[*k]))
+            .collect();
         let intervals = places.chunk_by(|a, b| !apart(&self.lines[*a], &self.lines[*b]));
         let mut found = Vec::new();
         for interval in intervals {
             let (first, last) = (interval[0], interval[interval.len() - 1]);
-            let ends = |k: usize, next: Option<&Line>| next.is_none_or(|next| (next.y - self.lines[k].y).abs() > 1.5 * STEP);
+            let ends = |k: usize, next: Option<&Line>| {
+                next.is_none_or(|next| (next.y - self.lines[k].y).abs() > 1.5 * STEP)
+            };
             let before = first.checked_sub(1).map(|k| &self.lines[k]);
             if ends(first, before) || ends(last, self.lines.get(last + 1)) {
                 let line = self.lines[if ends(first, before) { first } else { last }];
-                let [rail, wheel] = [self.geometry.on_rail(line.rail), self.geometry.on_wheel(line.wheel)];
+                let [rail, wheel] = [
+                    self.geometry.on_rail(line.rail),
+                    self.geometry.on_wheel(line.wheel),
+                ];
                 return Err(format!(
                     "the contact reaches the end of a profile, at y = {:.2} mm on the rail and {:.2} mm on the wheel; the true contact is \
                      cut off, longer profiles are needed",
@@ -152,19 +187,26 @@ impl<'g> Search<'g> {
     fn frame(&self, lines: &[Line], lowering: f64) -> Frame {
         let (mut weight, mut y, mut angle) = (0.0, 0.0, 0.0);
         for line in lines {
-            let own = (lowering - line.clearance).max(0.0).powf(1.5);
+            let own = (lowering - line.clearance).max(0.0).powf(2.5);
             weight += own;
             y += own * line.y;
             angle += own * self.inclination(line.rail);
         }
         let y = y / weight;
-        let k = lines.partition_point(|line| line.y < y).clamp(1, lines.len() - 1);
+        let k = lines
+            .partition_point(|line| line.y < y)
+            .clamp(1, lines.len() - 1);
         let t = ((y - lines[k - 1].y) / (lines[k].y - lines[k - 1].y)).clamp(0.0, 1.0);
         let between = |of: fn(&Line) -> f64| of(&lines[k - 1]) * (1.0 - t) + of(&lines[k]) * t;
         let (rail, wheel) = (between(|line| line.rail), between(|line| line.wheel));
         let [y, z] = self.geometry.rail_at(rail).at;
         let x = self.geometry.lowest(wheel).map_or(0.0, |point| point[0]);
-        Frame { origin: [x, y, z], angle: angle / weight, rail, wheel }
+        Frame {
+            origin: [x, y, z],
+            angle: angle / weight,
+            rail,
+            wheel,
+        }
     }
 
     /// Turn about x that lays the track's y along the rail's surface.
@@ -183,19 +225,25 @@ impl<'g> Search<'g> {
             across = [across[0].min(v), across[1].max(v)];
             let overlap = (lowering - line.clearance).max(0.0);
             let half = (2.0 * self.geometry.meridian(line.wheel).radius * overlap).sqrt();
-            let middle = self.geometry.lowest(line.wheel).map_or(0.0, |point| point[0] - frame.origin[0]);
+            let middle = self
+                .geometry
+                .lowest(line.wheel)
+                .map_or(0.0, |point| point[0] - frame.origin[0]);
             along = [along[0].min(middle - half), along[1].max(middle + half)];
         }
         let widen = |[low, high]: [f64; 2]| {
             let margin = MARGIN * (high - low) + MARGIN_MM;
             [low - margin, high + margin]
         };
-        let [x, y] = [(widen(along), COLUMNS), (widen(across), ROWS)].map(|([low, high], count)| {
-            // Measured from the middle, so that a symmetric window has symmetric coordinates.
-            let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
-            let at = |k: usize| (2.0 * k as f64 - (count - 1) as f64) / (count - 1) as f64;
-            (0..count).map(|k| middle + half * at(k)).collect::<Vec<f64>>()
-        });
+        let [x, y] =
+            [(widen(along), COLUMNS), (widen(across), ROWS)].map(|([low, high], count)| {
+                // Measured from the middle, so that a symmetric window has symmetric coordinates.
+                let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+                let at = |k: usize| (2.0 * k as f64 - (count - 1) as f64) / (count - 1) as f64;
+                (0..count)
+                    .map(|k| middle + half * at(k))
+                    .collect::<Vec<f64>>()
+            });
         let y: Vec<f64> = y.into_iter().filter(|v| rail.reaches(*v)).collect();
         let heights: Vec<f64> = y.iter().map(|v| rail.height(*v)).collect();
         if y.len() < ROWS / 2 {
@@ -215,7 +263,11 @@ impl<'g> Search<'g> {
 
     /// Height of the wheel's surface over the plane of the frame, outward from the middle.
     fn wheel_heights(&self, frame: &Frame, lowering: f64, x: &[f64], y: &[f64]) -> Vec<Vec<f64>> {
-        let surface = WheelInFrame { geometry: self.geometry, frame, centre: self.touch - lowering };
+        let surface = WheelInFrame {
+            geometry: self.geometry,
+            frame,
+            centre: self.touch - lowering,
+        };
         let nearest = |axis: &[f64]| axis.partition_point(|at| *at < 0.0).min(axis.len() - 1);
         let middle = [nearest(x), nearest(y)];
         // With an odd number of columns over a symmetric window the middle one is x = 0, and both halves are alike.
@@ -232,7 +284,13 @@ impl<'g> Search<'g> {
             }
             first
         };
-        let start = fill(middle[1], Guess { height: 0.0, wheel: frame.wheel });
+        let start = fill(
+            middle[1],
+            Guess {
+                height: 0.0,
+                wheel: frame.wheel,
+            },
+        );
         let (up, down) = outward(middle[1], y.len());
         for order in [up, down] {
             let mut guess = start;
@@ -260,13 +318,20 @@ fn envelope(curve: &[Option<[f64; 3]>]) -> Envelope {
     let y = || curve.iter().flatten().map(|point| point[0] / STEP);
     let first = y().fold(f64::INFINITY, f64::min).ceil() as i64;
     let last = y().fold(f64::NEG_INFINITY, f64::max).floor() as i64;
-    let mut points: Vec<Option<[f64; 2]>> = vec![None; usize::try_from(last - first + 1).unwrap_or(0)];
+    let mut points: Vec<Option<[f64; 2]>> =
+        vec![None; usize::try_from(last - first + 1).unwrap_or(0)];
     for pair in curve.windows(2) {
-        let [Some(from), Some(to)] = pair else { continue };
+        let [Some(from), Some(to)] = pair else {
+            continue;
+        };
         let (low, high) = (from[0].min(to[0]) / STEP, from[0].max(to[0]) / STEP);
         for k in low.ceil() as i64..=high.floor() as i64 {
             let span = to[0] - from[0];
-            let t = if span == 0.0 { 0.0 } else { (k as f64 * STEP - from[0]) / span };
+            let t = if span == 0.0 {
+                0.0
+            } else {
+                (k as f64 * STEP - from[0]) / span
+            };
             let at = [1, 2].map(|part| from[part] + t * (to[part] - from[part]));
             let place = &mut points[(k - first) as usize];
             if place.is_none_or(|highest| at[0] > highest[0]) {
@@ -287,9 +352,15 @@ struct RailInFrame<'g> {
 
 impl<'g> RailInFrame<'g> {
     fn new(geometry: &'g WheelRail, frame: &'g Frame) -> Self {
-        let mut rail = RailInFrame { geometry, frame, samples: Vec::new() };
+        let mut rail = RailInFrame {
+            geometry,
+            frame,
+            samples: Vec::new(),
+        };
         let parameters = geometry.parameters(CURVE_STEP * 5.0)[0].clone();
-        let middle = parameters.partition_point(|s| *s < frame.rail).min(parameters.len() - 1);
+        let middle = parameters
+            .partition_point(|s| *s < frame.rail)
+            .min(parameters.len() - 1);
         let [tangent, _] = frame.axes();
         let sign = geometry.placement.side.sign();
         let along = |s: f64| {
@@ -298,9 +369,18 @@ impl<'g> RailInFrame<'g> {
         };
         let keeps = |k: &usize| along(parameters[*k]) > TANGENT_MIN;
         let (after, before) = outward(middle, parameters.len());
-        let before = before.into_iter().take_while(keeps).collect::<Vec<_>>().into_iter().rev();
-        let chosen = before.chain([middle]).chain(after.into_iter().take_while(keeps));
-        rail.samples = chosen.map(|k| [rail.local(parameters[k])[0], parameters[k]]).collect();
+        let before = before
+            .into_iter()
+            .take_while(keeps)
+            .collect::<Vec<_>>()
+            .into_iter()
+            .rev();
+        let chosen = before
+            .chain([middle])
+            .chain(after.into_iter().take_while(keeps));
+        rail.samples = chosen
+            .map(|k| [rail.local(parameters[k])[0], parameters[k]])
+            .collect();
         if sign < 0.0 {
             rail.samples.reverse();
         }
@@ -311,16 +391,23 @@ impl<'g> RailInFrame<'g> {
     fn local(&self, s: f64) -> [f64; 2] {
         let [y, z] = self.geometry.rail_at(s).at;
         let from = [y - self.frame.origin[1], z - self.frame.origin[2]];
-        self.frame.axes().map(|axis| axis[0] * from[0] + axis[1] * from[1])
+        self.frame
+            .axes()
+            .map(|axis| axis[0] * from[0] + axis[1] * from[1])
     }
 
     fn reaches(&self, v: f64) -> bool {
-        self.samples.len() > 1 && self.samples[0][0] <= v && v <= self.samples[self.samples.len() - 1][0]
+        self.samples.len() > 1
+            && self.samples[0][0] <= v
+            && v <= self.samples[self.samples.len() - 1][0]
     }
 
     /// Height over the plane at v, by bracketed secant steps along the curve.
     fn height(&self, v: f64) -> f64 {
-        let k = self.samples.partition_point(|sample| sample[0] < v).clamp(1, self.samples.len() - 1);
+        let k = self
+            .samples
+            .partition_point(|sample| sample[0] < v)
+            .clamp(1, self.samples.len() - 1);
         let [mut low, mut high] = [self.samples[k - 1], self.samples[k]];
         let mut at = [0.0; 2];
         for _ in 0..30 {
@@ -380,7 +467,8 @@ impl WheelInFrame<'_> {
             let circle = self.geometry.meridian(guess.wheel);
             let (miss_along, miss_radius) = (along - circle.along, radius - circle.radius);
             let determinant = -rise_along * circle.radius_slope + circle.along_slope * rise_radius;
-            let height = (-miss_radius * circle.along_slope + miss_along * circle.radius_slope) / determinant;
+            let height = (-miss_radius * circle.along_slope + miss_along * circle.radius_slope)
+                / determinant;
             let wheel = (miss_along * rise_radius - miss_radius * rise_along) / determinant;
             guess.height += height.clamp(-STEP_MAX, STEP_MAX);
             guess.wheel += wheel.clamp(-STEP_MAX, STEP_MAX);
@@ -388,7 +476,10 @@ impl WheelInFrame<'_> {
                 return guess;
             }
         }
-        Guess { height: start.height + 1.0, wheel: start.wheel }
+        Guess {
+            height: start.height + 1.0,
+            wheel: start.wheel,
+        }
     }
 }
 
@@ -397,7 +488,20 @@ impl WheelRail {
     /// height `centre`; negative where there is a gap.
     #[must_use]
     pub fn overlap(&self, frame: &Frame, centre: f64) -> f64 {
-        let surface = WheelInFrame { geometry: self, frame, centre };
-        -surface.height(0.0, 0.0, Guess { height: 0.0, wheel: frame.wheel }).height
+        let surface = WheelInFrame {
+            geometry: self,
+            frame,
+            centre,
+        };
+        -surface
+            .height(
+                0.0,
+                0.0,
+                Guess {
+                    height: 0.0,
+                    wheel: frame.wheel,
+                },
+            )
+            .height
     }
 }

@@ -94,16 +94,22 @@ impl Profile {
                  used?)"
             ));
         }
+        orient(body, &mut points, reading, &mut warnings)?;
+        straighten(&mut points, &mut warnings)?;
         let given = points.len();
         points.dedup_by(|after, before| distance(*after, *before) < NEAR);
         if points.len() < given {
-            warnings.push(format!("{} points nearer than {NEAR} mm to another one were merged", given - points.len()));
+            warnings.push(format!(
+                "{} points nearer than {NEAR} mm to another one were merged",
+                given - points.len()
+            ));
         }
         if points.len() < POINTS_MIN {
-            return Err(format!("{} different points given; at least {POINTS_MIN} are needed", points.len()));
+            return Err(format!(
+                "{} different points given; at least {POINTS_MIN} are needed",
+                points.len()
+            ));
         }
-        orient(body, &mut points, reading, &mut warnings)?;
-        straighten(&mut points, &mut warnings)?;
         if let Some([first, second]) = crossing(&points) {
             return Err(format!(
                 "the profile runs through itself near [{:.3}, {:.3}] and [{:.3}, {:.3}]; loops are refused",
@@ -148,7 +154,9 @@ impl Profile {
         let (sin, cos) = angle.sin_cos();
         let knots = self.y.knots();
         let at: Vec<[f64; 2]> = knots.iter().map(|s| self.at(*s).at).collect();
-        let part = |f: &dyn Fn(&[f64; 2]) -> f64| Spline::new(knots, &at.iter().map(f).collect::<Vec<_>>(), 0.0);
+        let part = |f: &dyn Fn(&[f64; 2]) -> f64| {
+            Spline::new(knots, &at.iter().map(f).collect::<Vec<_>>(), 0.0)
+        };
         Profile {
             y: part(&|p| cos * p[0] - sin * p[1]),
             z: part(&|p| sin * p[0] + cos * p[1]),
@@ -169,9 +177,15 @@ impl Profile {
 
 fn checked(points: &[[f64; 2]]) -> Result<Vec<[f64; 2]>, String> {
     if !(POINTS_MIN..=POINTS_MAX).contains(&points.len()) {
-        return Err(format!("{} points given; {POINTS_MIN} to {POINTS_MAX} are allowed", points.len()));
+        return Err(format!(
+            "{} points given; {POINTS_MIN} to {POINTS_MAX} are allowed",
+            points.len()
+        ));
     }
-    match points.iter().position(|point| !point.iter().all(|part| part.is_finite())) {
+    match points
+        .iter()
+        .position(|point| !point.iter().all(|part| part.is_finite()))
+    {
         Some(k) => Err(format!("point {k} is not finite")),
         None => Ok(points.to_vec()),
     }
@@ -182,7 +196,10 @@ fn distance(from: [f64; 2], to: [f64; 2]) -> f64 {
 }
 
 fn arc_length(points: &[[f64; 2]]) -> f64 {
-    points.windows(2).map(|pair| distance(pair[0], pair[1])).sum()
+    points
+        .windows(2)
+        .map(|pair| distance(pair[0], pair[1]))
+        .sum()
 }
 
 /// Brings the points to y toward the field side, z up, and increasing y from the first to the last.
@@ -196,7 +213,8 @@ fn orient(
         Some(up) => up,
         None => {
             let up = points_up(body, points).ok_or_else(|| {
-                "the shape does not tell whether z is positive up or down; state mirror_z".to_owned()
+                "the shape does not tell whether z is positive up or down; state mirror_z"
+                    .to_owned()
             })?;
             if up {
                 warnings.push("z was found to be positive up and has been mirrored".to_owned());
@@ -213,7 +231,9 @@ fn orient(
         (None, Body::Wheel) => {
             let mirrored = flange(points)[0] > middle(points);
             if mirrored {
-                warnings.push("the flange was found at positive y, so that y has been mirrored".to_owned());
+                warnings.push(
+                    "the flange was found at positive y, so that y has been mirrored".to_owned(),
+                );
             }
             mirrored
         }
@@ -234,7 +254,12 @@ fn middle(points: &[[f64; 2]]) -> f64 {
 
 /// The lowest point, z up.
 fn flange(points: &[[f64; 2]]) -> [f64; 2] {
-    points.iter().copied().fold([0.0, f64::INFINITY], |low, point| if point[1] < low[1] { point } else { low })
+    points
+        .iter()
+        .copied()
+        .fold([0.0, f64::INFINITY], |low, point| {
+            if point[1] < low[1] { point } else { low }
+        })
 }
 
 /// Is z of these points positive up? A rail falls off toward its sides, a wheel's flange stands out downward.
@@ -272,7 +297,10 @@ fn straighten(points: &mut Vec<[f64; 2]>, warnings: &mut Vec<String>) -> Result<
         }
     }
     if points.len() < given {
-        warnings.push(format!("{} points that ran back (zig-zag) were dropped", given - points.len()));
+        warnings.push(format!(
+            "{} points that ran back (zig-zag) were dropped",
+            given - points.len()
+        ));
     }
     Ok(())
 }

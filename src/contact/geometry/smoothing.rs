@@ -56,10 +56,14 @@ impl Spline {
             let i = k + 1;
             let own = column(i);
             band[0] = (step[i - 1] + step[i]) / 3.0;
-            band[0] += (0..3).map(|j| own[j] * own[j] * stiffness(i - 1 + j)).sum::<f64>();
+            band[0] += (0..3)
+                .map(|j| own[j] * own[j] * stiffness(i - 1 + j))
+                .sum::<f64>();
             if i + 1 < n - 1 {
                 let next = column(i + 1);
-                band[1] = step[i] / 6.0 + own[1] * next[0] * stiffness(i) + own[2] * next[1] * stiffness(i + 1);
+                band[1] = step[i] / 6.0
+                    + own[1] * next[0] * stiffness(i)
+                    + own[2] * next[1] * stiffness(i + 1);
             }
             if i + 2 < n - 1 {
                 band[2] = own[2] * column(i + 2)[0] * stiffness(i + 1);
@@ -103,7 +107,11 @@ impl Spline {
                 bend: 0.0,
             };
         }
-        let i = self.knots.partition_point(|knot| *knot <= s).clamp(1, self.knots.len() - 1) - 1;
+        let i = self
+            .knots
+            .partition_point(|knot| *knot <= s)
+            .clamp(1, self.knots.len() - 1)
+            - 1;
         let step = self.knots[i + 1] - self.knots[i];
         let (b, a) = ((s - self.knots[i]) / step, (self.knots[i + 1] - s) / step);
         let (bend_a, bend_b) = (self.bends[i], self.bends[i + 1]);
@@ -186,7 +194,10 @@ mod tests {
                 let values: Vec<f64> = knots.iter().map(|s| wave(*s)).collect();
                 let spline = Spline::new(&knots, &values, 2.0);
                 let found = spline.at(4.0).value;
-                assert!((found - kept).abs() < 0.02, "{step} {length}: {found} against {kept}");
+                assert!(
+                    (found - kept).abs() < 0.02,
+                    "{step} {length}: {found} against {kept}"
+                );
             }
         }
     }

@@ -88,7 +88,11 @@ impl WheelRail {
     /// # Errors
     /// A sentence, if the wheel's profile reaches its axle or is all beyond it.
     pub fn new(rail: Profile, wheel: Profile, placement: Placement) -> Result<WheelRail, String> {
-        let lowest = wheel.parameters(0.2).into_iter().map(|s| wheel.at(s).at[1]).fold(f64::NEG_INFINITY, f64::max);
+        let lowest = wheel
+            .parameters(0.2)
+            .into_iter()
+            .map(|s| wheel.at(s).at[1])
+            .fold(f64::NEG_INFINITY, f64::max);
         if lowest >= 0.9 * placement.rolling_radius {
             return Err(format!(
                 "the wheel's profile reaches {lowest:.1} mm toward the axle of a wheel of {} mm radius",
@@ -96,8 +100,15 @@ impl WheelRail {
             ));
         }
         let canted = rail.turned(placement.cant);
-        let places: Vec<[f64; 2]> = canted.parameters(0.05).into_iter().map(|s| canted.at(s).at).collect();
-        let top = places.iter().map(|at| at[1]).fold(f64::NEG_INFINITY, f64::max);
+        let places: Vec<[f64; 2]> = canted
+            .parameters(0.05)
+            .into_iter()
+            .map(|s| canted.at(s).at)
+            .collect();
+        let top = places
+            .iter()
+            .map(|at| at[1])
+            .fold(f64::NEG_INFINITY, f64::max);
         let gauge_point = places
             .iter()
             .filter(|at| at[1] >= top - placement.gauge_height)
@@ -113,7 +124,11 @@ impl WheelRail {
             wheel,
             rail_origin: [0.5 * placement.gauge - gauge_point, -top],
             axle,
-            forward: [across, -axle[0] * axle[1] / across, -axle[0] * axle[2] / across],
+            forward: [
+                across,
+                -axle[0] * axle[1] / across,
+                -axle[0] * axle[2] / across,
+            ],
             down: [0.0, axle[2] / across, -axle[1] / across],
         })
     }
@@ -143,7 +158,10 @@ impl WheelRail {
         let place = self.rail.at(s);
         let turn = |[y, z]: [f64; 2]| [sign * y, z];
         Place {
-            at: turn([place.at[0] + self.rail_origin[0], place.at[1] + self.rail_origin[1]]),
+            at: turn([
+                place.at[0] + self.rail_origin[0],
+                place.at[1] + self.rail_origin[1],
+            ]),
             slope: turn(place.slope),
             bend: turn(place.bend),
         }
@@ -175,7 +193,8 @@ impl WheelRail {
         }
         let cos = (1.0 - sin * sin).sqrt();
         let mut point = [0, 1, 2].map(|k| {
-            circle.along * self.axle[k] + circle.radius * (cos * self.down[k] + sin * self.forward[k])
+            circle.along * self.axle[k]
+                + circle.radius * (cos * self.down[k] + sin * self.forward[k])
         });
         point[1] += self.placement.lateral_shift;
         Some(point)
@@ -199,7 +218,11 @@ impl WheelRail {
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
         let named = |name: &str, profile: &Profile| -> Vec<String> {
-            profile.warnings.iter().map(|warning| format!("{name}: {warning}")).collect()
+            profile
+                .warnings
+                .iter()
+                .map(|warning| format!("{name}: {warning}"))
+                .collect()
         };
         [named("rail", &self.rail_given), named("wheel", &self.wheel)].concat()
     }

@@ -27,7 +27,12 @@ pub struct WheelsetMotion {
 /// Creepages `ν_x`, `ν_y` and the spin φ in 1/mm about the origin of a frame, with the wheel's centre at the height
 /// `centre` in mm.
 #[must_use]
-pub fn creepages(geometry: &WheelRail, frame: &Frame, centre: f64, motion: &WheelsetMotion) -> [f64; 3] {
+pub fn creepages(
+    geometry: &WheelRail,
+    frame: &Frame,
+    centre: f64,
+    motion: &WheelsetMotion,
+) -> [f64; 3] {
     let axle = geometry.axle();
     let [tangent, normal] = frame.axes();
     let overlap = geometry.overlap(frame, centre);

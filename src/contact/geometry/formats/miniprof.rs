@@ -20,14 +20,23 @@ pub(super) fn read(text: &str) -> Result<Contents, String> {
         }
         if let Some((name, value)) = line.split_once('=') {
             match name.trim() {
-                "ColumnDef" => columns = places(value).ok_or_else(|| unreadable(k, line, "a list with X and Y"))?,
+                "ColumnDef" => {
+                    columns =
+                        places(value).ok_or_else(|| unreadable(k, line, "a list with X and Y"))?
+                }
                 "XYPoints" => expected = value.trim().parse::<usize>().ok(),
                 _ => {}
             }
             continue;
         }
         let row = numbers(line).filter(|row| columns.iter().all(|column| *column < row.len()));
-        let row = row.ok_or_else(|| unreadable(k, line, "a line of finite numbers in the columns of ColumnDef"))?;
+        let row = row.ok_or_else(|| {
+            unreadable(
+                k,
+                line,
+                "a line of finite numbers in the columns of ColumnDef",
+            )
+        })?;
         contents.points.push(columns.map(|column| row[column]));
     }
     match expected {

@@ -68,7 +68,12 @@ pub(super) fn read(text: &str) -> Result<Contents, String> {
 impl Settings {
     /// Notes one setting; `None` if a known one has no number.
     fn take(&mut self, name: &str, value: &str) -> Option<()> {
-        let number = || value.parse::<f64>().ok().filter(|number| number.is_finite());
+        let number = || {
+            value
+                .parse::<f64>()
+                .ok()
+                .filter(|number| number.is_finite())
+        };
         let flag = || number().map(|number| number != 0.0);
         match name {
             "type" if !self.in_spline => self.wheel = Some(flag()?),
@@ -91,7 +96,9 @@ impl Settings {
     fn apply(&self, mut points: Vec<[f64; 2]>) -> Result<Contents, String> {
         let angle = self.rotate / self.per_radian;
         if angle.abs() > TAU {
-            return Err(format!("a rotation of {angle} rad is more than a whole turn"));
+            return Err(format!(
+                "a rotation of {angle} rad is more than a whole turn"
+            ));
         }
         let (sin, cos) = angle.sin_cos();
         for point in &mut points {
@@ -105,7 +112,8 @@ impl Settings {
             };
             within(0) && within(1)
         });
-        let scale = [0, 1].map(|k| 1000.0 / self.per_metre * if self.mirror[k] { -1.0 } else { 1.0 });
+        let scale =
+            [0, 1].map(|k| 1000.0 / self.per_metre * if self.mirror[k] { -1.0 } else { 1.0 });
         for point in &mut points {
             *point = [point[0] * scale[0], point[1] * scale[1]];
         }
