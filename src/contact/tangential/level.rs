@@ -183,7 +183,7 @@ impl Level {
         let Some(first) = cells.next() else {
             return 0..0;
         };
-        first.start..cells.last().map_or(first.end, |c| c.end)
+        first.start..cells.next_back().map_or(first.end, |c| c.end)
     }
 
     /// Values of the first half of the segments continued to the mirrored half: `sign` is that of the image.
