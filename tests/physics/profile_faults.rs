@@ -107,7 +107,7 @@ fn points_without_order_are_refused() {
     let shuffled: Vec<[f64; 2]> = (0..given.len())
         .map(|k| given[k * 97 % given.len()])
         .collect();
-    assert_eq!(given.len() % 97 != 0, true);
+    assert!(!given.len().is_multiple_of(97));
     assert!(rail(&shuffled).is_err());
 }
 

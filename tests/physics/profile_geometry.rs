@@ -1,7 +1,8 @@
 //! Do wheel and rail touch where they should?
 
-use railhead::contact::geometry::contact_search::{LocalGap, Search};
+use railhead::contact::geometry::contact_search::Search;
 use railhead::contact::geometry::formats::{self, Format};
+use railhead::contact::geometry::local_gap::LocalGap;
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
 use railhead::contact::geometry::wheel_rail::{Placement, Side, WheelRail};
 
@@ -181,9 +182,9 @@ fn left_and_right_are_mirror_images() {
 /// A cone on a cylinder: rail of radius 300 mm, wheel coned 1:20.
 fn cone_on_arc() -> [Profile; 2] {
     let arc = (-30..=30)
-        .map(|k| f64::from(k))
+        .map(f64::from)
         .map(|y| [y, 300.0 - (9e4 - y * y).sqrt()]);
-    let cone = (-60..=60).map(|k| f64::from(k)).map(|y| [y, -0.05 * y]);
+    let cone = (-60..=60).map(f64::from).map(|y| [y, -0.05 * y]);
     let rail = Profile::new(Body::Rail, &arc.collect::<Vec<_>>(), AS_GIVEN).unwrap();
     [
         rail,
