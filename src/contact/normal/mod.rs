@@ -2,6 +2,8 @@
 
 pub mod fitted;
 pub mod hertz;
+mod interpolation;
+pub mod non_hertzian;
 pub mod prescribed;
 
 use crate::contact::case::{Contact, Load};

@@ -6,14 +6,13 @@
 //! pressures on its strips to carry just that.
 
 mod components;
-mod interpolation;
 mod level_set;
 mod line;
 mod shape;
 
 use crate::contact::mesh::Chord;
 use crate::contact::normal::Patch;
-use interpolation::{interval, weights};
+use crate::contact::normal::interpolation::{interval, weights};
 use level_set::State;
 use line::Line;
 use shape::Shape;

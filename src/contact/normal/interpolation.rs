@@ -5,7 +5,7 @@
 
 /// A cubic `c0 + c1 s + c2 s² + c3 s³` on an interval, with s from 0 at its start to 1 at its end.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Cubic {
+pub(in crate::contact::normal) struct Cubic {
     start: f64,
     length: f64,
     coefficients: [f64; 4],
@@ -17,7 +17,7 @@ pub(super) struct Cubic {
 impl Cubic {
     /// The curve between nodes `i` and `i + 1` of the axis; `values` belong to the nodes `i − 1` to `i + 2`, which all
     /// have to exist.
-    pub(super) fn between(axis: &[f64], i: usize, values: [f64; 4]) -> Cubic {
+    pub(in crate::contact::normal) fn between(axis: &[f64], i: usize, values: [f64; 4]) -> Cubic {
         let [before, length, after] = [
             axis[i] - axis[i - 1],
             axis[i + 1] - axis[i],
@@ -41,13 +41,13 @@ impl Cubic {
     }
 
     /// Value at x.
-    pub(super) fn at(&self, x: f64) -> f64 {
+    pub(in crate::contact::normal) fn at(&self, x: f64) -> f64 {
         self.value((x - self.start) / self.length)
     }
 
     /// Points where the sign changes from or to positive, from smaller to larger x, each with the sign after it
     /// (`true` is positive). Accurate to a few units in the last place of x.
-    pub(super) fn sign_changes(&self) -> impl Iterator<Item = (f64, bool)> + use<> {
+    pub(in crate::contact::normal) fn sign_changes(&self) -> impl Iterator<Item = (f64, bool)> + use<> {
         let cubic = *self;
         let [first, second] = self.turning_points();
         let pieces = [(0.0, first), (first, second), (second, 1.0)];
@@ -106,7 +106,7 @@ impl Cubic {
 }
 
 /// Weights of the nodes `i − 1` to `i + 2` in the value of the curve at x between nodes `i` and `i + 1`.
-pub(super) fn weights(axis: &[f64], i: usize, x: f64) -> [f64; 4] {
+pub(in crate::contact::normal) fn weights(axis: &[f64], i: usize, x: f64) -> [f64; 4] {
     std::array::from_fn(|k| {
         let mut values = [0.0; 4];
         values[k] = 1.0;
@@ -115,7 +115,7 @@ pub(super) fn weights(axis: &[f64], i: usize, x: f64) -> [f64; 4] {
 }
 
 /// Index i of the interval from node `i` to `i + 1` that holds x; the first or last one for points outside.
-pub(super) fn interval(axis: &[f64], x: f64) -> usize {
+pub(in crate::contact::normal) fn interval(axis: &[f64], x: f64) -> usize {
     axis.partition_point(|node| *node <= x)
         .clamp(1, axis.len() - 1)
         - 1
