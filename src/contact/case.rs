@@ -126,10 +126,13 @@ pub struct Load {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Motion {
     /// Longitudinal creepage, dimensionless.
+    #[schema(required = false)]
     pub creepage_x: f64,
     /// Lateral creepage, dimensionless.
+    #[schema(required = false)]
     pub creepage_y: f64,
     /// Spin in 1/mm.
+    #[schema(required = false)]
     pub spin_per_mm: f64,
 }
 

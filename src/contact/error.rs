@@ -41,6 +41,16 @@ pub enum SolveError {
         /// What to try instead, as a clause.
         advice: String,
     },
+    /// No strip of the mesh meets the patch: its edge is too ragged or its samples too few.
+    #[error(
+        "none of the {strips} strips meets patch {patch}; give more strips, or a pressure with more samples"
+    )]
+    Unmeshable {
+        /// The patch, counted from 0.
+        patch: usize,
+        /// Strips of the mesh.
+        strips: u32,
+    },
     /// The caller stopped the solve.
     #[error("the solve was cancelled")]
     Cancelled,

@@ -20,7 +20,7 @@ use serde_json::Value;
 use crate::contact::error::{CaseError, SolveError};
 use crate::contact::monitor::{Monitor, Watch};
 use crate::contact::outputs::assemble::assemble;
-use crate::contact::problem::{Elasticity, Limits, Problem};
+use crate::contact::problem::{Limits, Problem};
 use crate::contact::solution::{Fields, Solution};
 use crate::contact::tangential::level::Level;
 use crate::contact::tangential::point;
@@ -44,21 +44,11 @@ pub fn check(case: &Value, limits: &Limits) -> Result<Problem, CaseError> {
 /// A named reason why there is no answer.
 pub fn solve(problem: &Problem, monitor: &dyn Monitor) -> Result<(Solution, Fields), SolveError> {
     let watch = Watch::new(monitor, problem.time_limit, problem.motions.len());
-    let levels = problem.levels().into_iter().map(|size| {
-        let Elasticity {
-            shear_modulus,
-            poisson_ratio,
-            ..
-        } = problem.elasticity;
-        Level::new(
-            &problem.region,
-            size,
-            shear_modulus,
-            poisson_ratio,
-            problem.friction,
-        )
-    });
-    let levels: Vec<Level> = levels.collect();
+    let levels = problem
+        .levels()
+        .into_iter()
+        .map(|size| Level::new(problem, size));
+    let levels: Vec<Level> = levels.collect::<Result<_, _>>()?;
     let mut points = Vec::with_capacity(problem.motions.len());
     for index in 0..problem.motions.len() {
         points.push(point::solve(problem, &levels, index, &watch)?);

@@ -51,14 +51,7 @@ fn one_rule(contact: &Ellipse, rule: Rule) -> Cells {
         strips: 12,
         cells: 12,
     };
-    let elasticity = problem.elasticity;
-    let level = Level::new(
-        &problem.region,
-        size,
-        elasticity.shear_modulus,
-        elasticity.poisson_ratio,
-        problem.friction,
-    );
+    let level = Level::new(&problem, size).expect("a mesh");
     let motion: Motion = level.scale.motion(&problem.motions[0]);
     let influence = level.influence(&Unwatched).expect("never stopped");
     let equations = Equations::new(rule, &level.normalised, influence, None);

@@ -112,3 +112,39 @@ fn patches_are_limited_in_number() {
         &["81 separate patches", "64"],
     );
 }
+
+#[test]
+fn absurd_grids_are_refused() {
+    let grid = |x: [f64; 3], y: [f64; 3], pressure: f64| {
+        let rows = [[0.0; 3], [0.0, pressure, 0.0], [0.0; 3]];
+        grid_case(json!({ "type": "pressure_grid", "x_mm": x, "y_mm": y, "pressure_mpa": rows }))
+    };
+    let unit = [-1.0, 0.0, 1.0];
+    assert_eq!(faults(&grid(unit, unit, 1.0)), []);
+    assert_fault(
+        &grid(unit, unit, 1e-30),
+        "/contact/pressure_mpa",
+        &["1e-20"],
+    );
+    assert_fault(
+        &grid(unit.map(|x| 1e-10 * x), unit, 1.0),
+        "/contact",
+        &["semi-axes"],
+    );
+    assert_fault(
+        &grid(unit.map(|x| 1e5 * x), unit, 1.0),
+        "/contact",
+        &["ratio"],
+    );
+    // Coordinates so far from 0 that their differences have no digits left.
+    assert_fault(
+        &grid([524_287.999_999_999_9, 524_288.0, 524_289.0], unit, 1.0),
+        "/contact/x_mm/1",
+        &["increase strictly"],
+    );
+    assert_fault(
+        &grid([0.0, 1e-10, 1.0], unit, 1.0),
+        "/contact/x_mm/1",
+        &["1e-9"],
+    );
+}

@@ -234,11 +234,10 @@ proptest! {
                 prop_assert!(pair[0].strip < pair[1].strip || pair[0].right < pair[1].left, "{pair:?}");
             }
             for chord in &chords {
-                let slack = 0.05 * (x_max - x_min);
                 prop_assert!(chord.left < chord.right && chord.patch == k);
-                prop_assert!(chord.left > x_min - slack && chord.right < x_max + slack, "{chord:?} {patch:?}");
+                prop_assert!(chord.left >= x_min && chord.right <= x_max, "{chord:?} {patch:?}");
                 let mean = field.mean_pressure(chord, chord.left, chord.right);
-                prop_assert!(mean > 0.0 && mean < 1e5, "{mean}");
+                prop_assert!(mean > 0.0 && mean <= 1.5e3, "{mean}");
             }
         }
     }
@@ -252,6 +251,6 @@ proptest! {
         let rows: Vec<Vec<f64>> = pressure.iter().map(|row| row.iter().rev().copied().collect()).collect();
         let (mirrored, _) = PressureField::new(&back(&x), &y, &rows).unwrap();
         let total = |field: &PressureField| field.patches().iter().map(|patch| patch.area).sum::<f64>();
-        prop_assert!((total(&field) / total(&mirrored) - 1.0).abs() < 1e-6, "{} {}", total(&field), total(&mirrored));
+        prop_assert!((total(&field) / total(&mirrored) - 1.0).abs() < 1e-4, "{} {}", total(&field), total(&mirrored));
     }
 }

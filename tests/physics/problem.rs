@@ -162,9 +162,18 @@ fn limits_are_checked_beside_faults_of_the_text() {
         "lower": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
         "upper": { "shear_modulus_mpa": 23000, "poisson_ratio": 0.31 }
     });
+    case["solver"] = json!({ "method": "liu_hsu", "mesh": { "strips": 40, "cells": 40 } });
     let pointers: Vec<String> = faults(&case)
         .into_iter()
         .map(|fault| fault.pointer)
         .collect();
-    assert_eq!(pointers, ["/friction/coefficient", "/material", "/motion"]);
+    assert_eq!(
+        pointers,
+        [
+            "/friction/coefficient",
+            "/material",
+            "/motion",
+            "/solver/mesh"
+        ]
+    );
 }

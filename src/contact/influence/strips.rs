@@ -225,6 +225,34 @@ impl Differences {
         (self.block(row, xx)[cell], self.block(row, yy)[cell])
     }
 
+    /// Any entry of the matrix that [`apply`](Self::apply) stands for, as `[xx, xy, yx, yy]`: the change of u_x per T_x
+    /// and per T_y, then of u_y. Without parity, rows and cells are counted over the whole mesh.
+    #[must_use]
+    pub fn entry(&self, parity: Option<Parity>, row: usize, cell: usize) -> [f64; 4] {
+        if self.is_folded() && parity.is_none() {
+            return self.unfolded_entry(row, cell);
+        }
+        self.roles(parity).map(|block| self.block(row, block)[cell])
+    }
+
+    /// An entry of the whole mesh from the stored half: a mirrored row sees the mirrored cell with `T_y` turned round.
+    fn unfolded_entry(&self, row: usize, cell: usize) -> [f64; 4] {
+        let (row, cell, side) = if row < self.row_count() {
+            (row, cell, 1.0)
+        } else {
+            let row = mirror_image(&self.first_row, row);
+            (row, mirror_image(&self.first_cell, cell), -1.0)
+        };
+        let (cell, sign) = if cell < self.first_cell[self.segments()] {
+            (cell, 0.5)
+        } else {
+            (mirror_image(&self.first_cell, cell), -0.5)
+        };
+        let part = |k: usize| 0.5 * self.block(row, k)[cell] + sign * self.block(row, k + 1)[cell];
+        let cross = side * part(2);
+        [part(0), cross, cross, part(4)]
+    }
+
     /// Displacement differences `out_x`, `out_y` (one value per row) caused by tractions `tx`, `ty`.
     ///
     /// Without parity, vectors cover the whole mesh: rows of the mirrored half follow in the order of their segments.
@@ -319,6 +347,18 @@ impl Differences {
                 out[image + k] = same[i] - opposite[i];
             }
         }
+    }
+}
+
+/// The place of `i` in the mirrored segment; `first` has the starts of the first half of the segments, and its end.
+fn mirror_image(first: &[usize], i: usize) -> usize {
+    let half = first[first.len() - 1];
+    if i < half {
+        let j = first.partition_point(|start| *start <= i) - 1;
+        2 * half - first[j + 1] + i - first[j]
+    } else {
+        let j = first.partition_point(|start| *start < 2 * half - i) - 1;
+        first[j] + first[j + 1] + i - 2 * half
     }
 }
 

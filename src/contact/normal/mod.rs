@@ -70,34 +70,7 @@ impl Region {
                 ));
             }
         };
-        let [a, b] = [ellipse.a, ellipse.b];
-        let semi_axes = SEMI_AXIS_MIN..=SEMI_AXIS_MAX;
-        if !semi_axes.contains(&a) || !semi_axes.contains(&b) {
-            return Err(fault(
-                "/contact",
-                format!(
-                    "the semi-axes come out as {a:.3e} mm and {b:.3e} mm; {SEMI_AXIS_MIN:e} to {SEMI_AXIS_MAX:e} mm are allowed"
-                ),
-            ));
-        }
-        if a.max(b) > SLENDERNESS_MAX * a.min(b) {
-            return Err(fault(
-                "/contact",
-                format!(
-                    "the semi-axes {a:.3e} mm and {b:.3e} mm have the ratio {:.3e}; at most {SLENDERNESS_MAX:e} is allowed",
-                    a.max(b) / a.min(b)
-                ),
-            ));
-        }
-        if !(PRESSURE_MIN..=PRESSURE_MAX).contains(&ellipse.pressure_max) {
-            return Err(fault(
-                "/load",
-                format!(
-                    "the largest pressure comes out as {:.3e} MPa; {PRESSURE_MIN:e} to {PRESSURE_MAX:e} MPa are allowed",
-                    ellipse.pressure_max
-                ),
-            ));
-        }
+        plausible(&ellipse.patch(), "/load")?;
         Ok(Region::Ellipse(ellipse))
     }
 
@@ -121,6 +94,9 @@ impl Region {
         }
         let (field, warnings) = PressureField::new(x, y, pressure)
             .map_err(|detail| fault("/contact/pressure_mpa", detail))?;
+        for patch in field.patches() {
+            plausible(&patch, "/contact/pressure_mpa")?;
+        }
         Ok((Region::Grid(field), warnings))
     }
 
@@ -162,6 +138,48 @@ impl Region {
             Region::Grid(field) => field.mean_pressure(chord, x0, x1),
         }
     }
+}
+
+/// Refuses a patch that is absurdly large, small, slender or heavily loaded; `load_pointer` is what loads it.
+fn plausible(patch: &Patch, load_pointer: &str) -> Result<(), Fault> {
+    let [x_min, x_max, y_min, y_max] = patch.extent;
+    let (a, b) = (0.5 * (x_max - x_min), 0.5 * (y_max - y_min));
+    let semi_axes = SEMI_AXIS_MIN..=SEMI_AXIS_MAX;
+    if !semi_axes.contains(&a) || !semi_axes.contains(&b) {
+        return Err(fault(
+            "/contact",
+            format!(
+                "a patch of {a:.3e} mm by {b:.3e} mm (semi-axes) comes out; {SEMI_AXIS_MIN:e} to {SEMI_AXIS_MAX:e} mm \
+                 are allowed"
+            ),
+        ));
+    }
+    if patch.area.is_nan() || patch.area <= 0.0 {
+        return Err(fault(
+            load_pointer,
+            "the edge of a patch cannot be told from these samples; a finer or more even grid is needed".to_owned(),
+        ));
+    }
+    if a.max(b) > SLENDERNESS_MAX * a.min(b) {
+        return Err(fault(
+            "/contact",
+            format!(
+                "a patch of {a:.3e} mm by {b:.3e} mm (semi-axes) comes out; a ratio of at most {SLENDERNESS_MAX:e} is \
+                 allowed"
+            ),
+        ));
+    }
+    if !(PRESSURE_MIN..=PRESSURE_MAX).contains(&patch.pressure_max) {
+        return Err(fault(
+            load_pointer,
+            format!(
+                "the largest pressure of a patch comes out as {:.3e} MPa; {PRESSURE_MIN:e} to {PRESSURE_MAX:e} MPa are \
+                 allowed",
+                patch.pressure_max
+            ),
+        ));
+    }
+    Ok(())
 }
 
 fn fault(pointer: &str, detail: String) -> Fault {

@@ -25,22 +25,41 @@ const LIU_HSU_MATRICES: f64 = 4.0;
 const VECTORS_PER_CELL: f64 = 64.0;
 const FIELDS_PER_CELL: f64 = 6.0;
 
+/// What decides how much a solve costs.
+#[derive(Debug, Clone)]
+pub(super) struct Size {
+    pub(super) method: Method,
+    pub(super) resolution: Resolution,
+    /// Segments per strip, for each patch.
+    pub(super) segments: Vec<f64>,
+    pub(super) motions: usize,
+}
+
 impl Problem {
     /// The meshes used one after the other, from coarse to fine.
     #[must_use]
     pub fn levels(&self) -> Vec<MeshSize> {
-        match self.resolution {
-            Resolution::Target(_) => TARGET_LEVELS.to_vec(),
-            Resolution::Mesh(size) => vec![size],
-        }
+        levels(self.resolution)
     }
 
     /// Estimated cost of solving this: the influence coefficients of the finest mesh and what stands beside them,
     /// the matrices of the dense method, the fields of the answer. Seconds are rough.
     #[must_use]
     pub fn cost(&self) -> Cost {
-        let (cells, segments) = self.size();
-        let motions = self.motions.len() as f64;
+        Size {
+            method: self.method,
+            resolution: self.resolution,
+            segments: self.region.segments_per_strip(),
+            motions: self.motions.len(),
+        }
+        .cost()
+    }
+}
+
+impl Size {
+    fn cost(&self) -> Cost {
+        let (cells, segments) = self.finest();
+        let motions = self.motions as f64;
         let fields = cells * (VECTORS_PER_CELL + FIELDS_PER_CELL * motions) * 8.0;
         let influence = 3.0 * cells * (cells + 2.0 * segments) * 8.0 * BYTES_BESIDE;
         let (bytes, seconds) = match self.method {
@@ -59,13 +78,13 @@ impl Problem {
     }
 
     /// Faults of a case that is too large for the limits or for its method.
-    pub(super) fn too_large(&self, limits: &Limits) -> Vec<Fault> {
+    pub(super) fn faults(&self, limits: &Limits) -> Vec<Fault> {
         let pointer = match self.resolution {
             Resolution::Mesh(_) => "/solver/mesh",
             Resolution::Target(_) => "/contact",
         };
         let mut faults = Vec::new();
-        let (cells, _) = self.size();
+        let (cells, _) = self.finest();
         if self.method == Method::LiuHsu && cells > LIU_HSU_CELLS_MAX {
             faults.push(Fault {
                 pointer: pointer.to_owned(),
@@ -81,8 +100,9 @@ impl Problem {
             faults.push(Fault {
                 pointer: pointer.to_owned(),
                 detail: format!(
-                    "{cells:.0} cells over all patches and {} motions need about {:.0} MiB; at most {:.0} MiB are allowed for one case",
-                    self.motions.len(),
+                    "{cells:.0} cells over all patches and {} motions need about {:.0} MiB; at most {:.0} MiB are \
+                     allowed for one case",
+                    self.motions,
                     mebibytes(bytes),
                     mebibytes(limits.memory_bytes)
                 ),
@@ -92,17 +112,21 @@ impl Problem {
     }
 
     /// Cells and segments of the finest mesh over all patches.
-    fn size(&self) -> (f64, f64) {
+    fn finest(&self) -> (f64, f64) {
+        let per_strip: f64 = self.segments.iter().sum();
         let (mut cells, mut segments) = (0.0_f64, 0.0_f64);
-        for size in self.levels() {
-            let patches = self.region.segments_per_strip();
-            let level: f64 = patches
-                .iter()
-                .map(|per_strip| f64::from(size.strips) * per_strip)
-                .sum();
+        for size in levels(self.resolution) {
+            let level = f64::from(size.strips) * per_strip;
             segments = segments.max(level);
             cells = cells.max(level * f64::from(size.cells));
         }
         (cells, segments)
+    }
+}
+
+fn levels(resolution: Resolution) -> Vec<MeshSize> {
+    match resolution {
+        Resolution::Target(_) => TARGET_LEVELS.to_vec(),
+        Resolution::Mesh(size) => vec![size],
     }
 }

@@ -12,10 +12,11 @@ use std::time::Duration;
 use serde::Serialize;
 
 use crate::contact::case::{
-    Case, Contact, Load, Material, MeshSize, Method, Motion, Motions, Output,
+    Case, Contact, Load, Material, MeshSize, Method, Motion, Motions, Output, Solver,
 };
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::normal::Region;
+use cost::Size;
 
 /// Allowed error of the resultants when nothing else is asked for, relative to μN.
 pub(super) const TARGET_ERROR_DEFAULT: f64 = 0.005;
@@ -107,37 +108,32 @@ impl Problem {
     /// # Errors
     /// Every fault found, each with its JSON pointer.
     pub fn new(case: &Case, limits: &Limits) -> Result<Problem, CaseError> {
-        let mut warnings = Vec::new();
-        let parts = Parts::new(
-            Some(&case.material),
-            Some(&case.contact),
-            case.load.as_ref(),
-            Some(&case.motion),
-            limits,
-        );
-        let Parts {
-            elasticity: Some(elasticity),
-            region: Some((region, region_warnings)),
-            motions: Some(motions),
-            ..
-        } = parts
-        else {
-            return Err(CaseError(parts.faults));
+        let given = Given {
+            material: Some(&case.material),
+            contact: Some(&case.contact),
+            load: case.load.as_ref(),
+            motion: Some(&case.motion),
+            solver: Some(&case.solver),
         };
-        warnings.extend(elasticity.warning());
+        let (parts, faults) = Parts::check(given, limits);
+        let (true, Some(elasticity), Some((region, remarks)), Some(motions)) = (
+            faults.is_empty(),
+            parts.elasticity,
+            parts.region,
+            parts.motions,
+        ) else {
+            return Err(CaseError(faults));
+        };
+        let mut warnings = Vec::from_iter(elasticity.warning());
         if case.friction.coefficient > FRICTION_USUAL_MAX {
             warnings.push(format!(
                 "the friction coefficient {} is more than {FRICTION_USUAL_MAX}",
                 case.friction.coefficient
             ));
         }
-        warnings.extend(region_warnings);
-        let resolution = match (case.solver.mesh, case.solver.target_error) {
-            (Some(size), _) => Resolution::Mesh(size),
-            (None, target) => Resolution::Target(target.unwrap_or(TARGET_ERROR_DEFAULT)),
-        };
-        let digest = digest(case, &elasticity, &motions, resolution);
-        let problem = Problem {
+        warnings.extend(remarks);
+        let digest = digest(case, &elasticity, &motions);
+        Ok(Problem {
             name: case.name.clone(),
             labels: case.labels.clone(),
             elasticity,
@@ -145,18 +141,12 @@ impl Problem {
             region,
             motions,
             method: case.solver.method,
-            resolution,
+            resolution: resolution(&case.solver),
             time_limit: case.solver.time_limit_s.map(Duration::from_secs_f64),
             outputs: case.outputs.clone(),
             warnings,
             digest,
-        };
-        let faults = problem.too_large(limits);
-        if faults.is_empty() {
-            Ok(problem)
-        } else {
-            Err(CaseError(faults))
-        }
+        })
     }
 
     /// Is this output asked for?
@@ -166,86 +156,103 @@ impl Problem {
     }
 }
 
-/// The faults of those parts of a case that can be checked although others are faulty; `None` is not checked.
-pub(super) fn faults_of_parts(
-    material: Option<&Material>,
-    contact: Option<&Contact>,
-    load: Option<&Load>,
-    motion: Option<&Motions>,
-    limits: &Limits,
-) -> Vec<Fault> {
-    // Without its load a region cannot be told; its absence is a fault of its own.
-    let needs_load = matches!(
-        contact,
-        Some(Contact::Radii { .. } | Contact::Ellipse { .. })
-    );
-    let contact = contact.filter(|_| !needs_load || load.is_some());
-    Parts::new(material, contact, load, motion, limits).faults
+/// Those parts of a case that could be read.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Given<'a> {
+    pub(super) material: Option<&'a Material>,
+    pub(super) contact: Option<&'a Contact>,
+    pub(super) load: Option<&'a Load>,
+    pub(super) motion: Option<&'a Motions>,
+    pub(super) solver: Option<&'a Solver>,
+}
+
+/// Faults of the parts of a case that can be checked although others are faulty.
+pub(super) fn faults_of(given: Given, limits: &Limits) -> Vec<Fault> {
+    // Without its load a region cannot be told; that is a fault already.
+    let carries_load = matches!(given.contact, Some(Contact::PressureGrid { .. }));
+    let contact = given
+        .contact
+        .filter(|_| carries_load || given.load.is_some());
+    Parts::check(Given { contact, ..given }, limits).1
 }
 
 /// The parts of a problem, checked as far as they are independent of each other.
+#[derive(Debug)]
 struct Parts {
     elasticity: Option<Elasticity>,
     region: Option<(Region, Vec<String>)>,
     motions: Option<Vec<Motion>>,
-    faults: Vec<Fault>,
 }
 
 impl Parts {
-    fn new(
-        material: Option<&Material>,
-        contact: Option<&Contact>,
-        load: Option<&Load>,
-        motion: Option<&Motions>,
-        limits: &Limits,
-    ) -> Parts {
+    fn check(given: Given, limits: &Limits) -> (Parts, Vec<Fault>) {
         let mut faults = Vec::new();
-        let elasticity = material.and_then(|material| match Elasticity::combine(material) {
-            Ok(elasticity) => Some(elasticity),
-            Err(fault) => {
-                faults.push(fault);
-                None
-            }
-        });
-        let region = match (contact, load, &elasticity) {
-            (
-                Some(Contact::PressureGrid {
-                    x_mm,
-                    y_mm,
-                    pressure_mpa,
-                }),
-                _,
-                _,
-            ) => Some(Region::prescribed(
-                x_mm,
-                y_mm,
-                pressure_mpa,
-                limits.samples_max,
-            )),
-            (Some(contact), Some(load), Some(elasticity)) => {
-                let modulus = elasticity.contact_modulus();
-                Some(Region::hertz(contact, load, modulus).map(|region| (region, Vec::new())))
-            }
-            (Some(_), None, _) => Some(Err(Fault {
-                pointer: "/load".to_owned(),
-                detail: "missing; exactly one of normal_force_n, approach_mm is needed".to_owned(),
-            })),
-            _ => None,
-        };
-        let region = region.and_then(|region| region.map_err(|fault| faults.push(fault)).ok());
-        let motions = motion.and_then(|motion| match motions::expand(motion, limits) {
-            Ok(list) => Some(list),
-            Err(fault) => {
-                faults.push(fault);
-                None
-            }
-        });
-        Parts {
+        let elasticity = given.material.map(Elasticity::combine);
+        let elasticity = elasticity.and_then(|elasticity| keep(elasticity, &mut faults));
+        let region = region(given.contact, given.load, elasticity.as_ref(), limits);
+        let region = region.and_then(|region| keep(region, &mut faults));
+        let motions = given.motion.map(|motion| motions::expand(motion, limits));
+        let motions = motions.and_then(|motions| keep(motions, &mut faults));
+        if let Some(solver) = given.solver {
+            let size = Size {
+                method: solver.method,
+                resolution: resolution(solver),
+                // What is not known counts as the least it can be.
+                segments: region
+                    .as_ref()
+                    .map_or_else(|| vec![1.0], |(region, _)| region.segments_per_strip()),
+                motions: motions.as_ref().map_or(1, Vec::len),
+            };
+            faults.extend(size.faults(limits));
+        }
+        let parts = Parts {
             elasticity,
             region,
             motions,
-            faults,
-        }
+        };
+        (parts, faults)
+    }
+}
+
+fn keep<T>(result: Result<T, Fault>, faults: &mut Vec<Fault>) -> Option<T> {
+    result.map_err(|fault| faults.push(fault)).ok()
+}
+
+/// The region and its remarks, if all that it depends on is known.
+fn region(
+    contact: Option<&Contact>,
+    load: Option<&Load>,
+    elasticity: Option<&Elasticity>,
+    limits: &Limits,
+) -> Option<Result<(Region, Vec<String>), Fault>> {
+    let contact = contact?;
+    if let Contact::PressureGrid {
+        x_mm,
+        y_mm,
+        pressure_mpa,
+    } = contact
+    {
+        return Some(Region::prescribed(
+            x_mm,
+            y_mm,
+            pressure_mpa,
+            limits.samples_max,
+        ));
+    }
+    let Some(load) = load else {
+        return Some(Err(Fault {
+            pointer: "/load".to_owned(),
+            detail: "missing; exactly one of normal_force_n, approach_mm is needed".to_owned(),
+        }));
+    };
+    let region = Region::hertz(contact, load, elasticity?.contact_modulus());
+    Some(region.map(|region| (region, Vec::new())))
+}
+
+fn resolution(solver: &Solver) -> Resolution {
+    match (solver.mesh, solver.target_error) {
+        (Some(size), _) => Resolution::Mesh(size),
+        (None, target) => Resolution::Target(target.unwrap_or(TARGET_ERROR_DEFAULT)),
     }
 }
 
@@ -266,12 +273,11 @@ struct Canonical<'a> {
 }
 
 /// Hexadecimal BLAKE3 digest of the canonical case.
-fn digest(
-    case: &Case,
-    elasticity: &Elasticity,
-    motions: &[Motion],
-    resolution: Resolution,
-) -> String {
+fn digest(case: &Case, elasticity: &Elasticity, motions: &[Motion]) -> String {
+    let target_error = match resolution(&case.solver) {
+        Resolution::Target(target) => Some(target),
+        Resolution::Mesh(_) => None,
+    };
     let canonical = Canonical {
         solver_version: env!("CARGO_PKG_VERSION"),
         elasticity: [
@@ -284,10 +290,7 @@ fn digest(
         load: case.load.as_ref(),
         motions,
         method: case.solver.method,
-        target_error: match resolution {
-            Resolution::Target(target) => Some(target),
-            Resolution::Mesh(_) => None,
-        },
+        target_error,
         mesh: case.solver.mesh,
         time_limit_s: case.solver.time_limit_s,
         outputs: &case.outputs,

@@ -13,8 +13,12 @@ const COORDINATE: Interval = Interval::closed(-1e6, 1e6, "mm");
 const PRESSURE: Interval = Interval::closed(0.0, 1e12, "MPa");
 /// Points of one axis of a grid.
 const AXIS_POINTS: std::ops::RangeInclusive<usize> = 2..=1000;
-/// Neighbouring coordinates of an axis are at least this far apart, relative to the length of the axis.
+/// Neighbouring coordinates of an axis are at least this far apart, relative to the length of the axis and to the
+/// largest coordinate: closer ones cannot be told apart in the arithmetic.
 const SPACING_MIN: f64 = 1e-9;
+const SPACING_TO_COORDINATE_MIN: f64 = 1e-12;
+/// Neighbouring spacings differ by at most this factor; the edge of the contact cannot be told from more uneven samples.
+const SPACING_RATIO_MAX: f64 = 1000.0;
 /// Faulty values of one grid that are listed one by one.
 const GRID_FAULTS_MAX: usize = 5;
 
@@ -138,15 +142,33 @@ fn axis(block: &mut Object, name: &str) -> Option<Vec<f64>> {
     let axis = numbers(elements, &pointer, COORDINATE, &mut refused, block.faults());
     count_rest(&pointer, COORDINATE, refused, block.faults());
     let axis = axis?;
-    let span = (axis[axis.len() - 1] - axis[0]).abs();
-    let late = (1..axis.len()).find(|&i| axis[i] - axis[i - 1] <= SPACING_MIN * span);
+    let (first, last) = (axis[0], axis[axis.len() - 1]);
+    let largest = first.abs().max(last.abs());
+    let least = (SPACING_MIN * (last - first).abs()).max(SPACING_TO_COORDINATE_MIN * largest);
+    let late = (1..axis.len()).find(|&i| axis[i] - axis[i - 1] <= least);
     if let Some(i) = late {
         block.faults().add(
             join(&pointer, i),
             format!(
-                "{} given after {}; coordinates have to increase strictly, by at least {SPACING_MIN:e} of the length of the axis",
+                "{} given after {}; coordinates have to increase strictly, here by more than {least:e} mm",
                 axis[i],
                 axis[i - 1]
+            ),
+        );
+        return None;
+    }
+    let uneven = axis.windows(3).position(|at| {
+        let (before, after) = (at[1] - at[0], at[2] - at[1]);
+        before.max(after) > SPACING_RATIO_MAX * before.min(after)
+    });
+    if let Some(i) = uneven {
+        block.faults().add(
+            join(&pointer, i + 2),
+            format!(
+                "{} given after {} and {}; neighbouring spacings may differ by a factor of at most {SPACING_RATIO_MAX}",
+                axis[i + 2],
+                axis[i],
+                axis[i + 1]
             ),
         );
         return None;

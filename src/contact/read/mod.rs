@@ -15,7 +15,7 @@ use serde_json::Value;
 
 use crate::contact::case::{Case, Contact, Friction, Load, Material, Motions, Output, Solver};
 use crate::contact::error::{CaseError, Fault};
-use crate::contact::problem::{self, Limits};
+use crate::contact::problem::{self, Given, Limits};
 use object::{Faults, Interval, Object, join, shown};
 
 const NAME_LENGTH_MAX: usize = 200;
@@ -68,13 +68,14 @@ pub(super) fn draft(value: &Value) -> (Draft, Vec<Fault>) {
 impl Draft {
     /// Faults against physics and limits of the parts that could be read.
     pub(super) fn faults_beside(&self, limits: &Limits) -> Vec<Fault> {
-        problem::faults_of_parts(
-            self.material.as_ref(),
-            self.contact.as_ref(),
-            self.load.as_ref(),
-            self.motion.as_ref(),
-            limits,
-        )
+        let given = Given {
+            material: self.material.as_ref(),
+            contact: self.contact.as_ref(),
+            load: self.load.as_ref(),
+            motion: self.motion.as_ref(),
+            solver: self.solver.as_ref(),
+        };
+        problem::faults_of(given, limits)
     }
 
     /// The case, if every required part could be read.

@@ -3,9 +3,12 @@
 //! Everything is dimensionless: lengths by the scale of the patch, tractions by a reference traction P, slips by P/G.
 //! Vectors hold all x components, then all y components, each padded with zeros to the operator's length.
 
+use std::ops::ControlFlow;
+
 use crate::contact::case::Motion;
 use crate::contact::influence::strips::{Differences, Parity};
 use crate::contact::mesh::Mesh;
+use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::tangential::rules::{Rule, Stencil};
 
 /// A rule on a mesh with its influence: the linear map from tractions to slips.
@@ -155,9 +158,104 @@ impl<'a> Equations<'a> {
         blocks
     }
 
+    /// The whole map `M` as a matrix over the cells without padding, column by column: the x components of all cells
+    /// come before the y components, in rows and in columns. For small meshes: it has `(2 × cells)²` values.
+    ///
+    /// # Errors
+    /// The monitor is asked every few columns and may stop the work.
+    pub fn dense(&self, monitor: &dyn Monitor) -> Result<Vec<f64>, Stop> {
+        let n = self.cells();
+        let mut matrix = vec![0.0; 4 * n * n];
+        let (from_x, from_y) = matrix.split_at_mut(2 * n * n);
+        let columns = from_x
+            .chunks_exact_mut(2 * n)
+            .zip(from_y.chunks_exact_mut(2 * n));
+        let mut differences: [Vec<f64>; 4] = Default::default();
+        for (cell, (from_x, from_y)) in columns.enumerate() {
+            if cell % 64 == 0
+                && let ControlFlow::Break(stop) = monitor.tick(0.0)
+            {
+                return Err(stop);
+            }
+            let ((xx, yx), (xy, yy)) = (from_x.split_at_mut(n), from_y.split_at_mut(n));
+            for ((stencil, cells), rows) in self.stencils.iter().zip(&self.cells).zip(&self.rows) {
+                differences.iter_mut().for_each(Vec::clear);
+                for row in rows.clone() {
+                    let entry = self.differences.entry(self.parity, row, cell);
+                    for (list, value) in differences.iter_mut().zip(entry) {
+                        list.push(value);
+                    }
+                }
+                for (list, slip) in differences
+                    .iter()
+                    .zip([&mut *xx, &mut *xy, &mut *yx, &mut *yy])
+                {
+                    stencil.elastic(list, &mut slip[cells.clone()]);
+                }
+            }
+        }
+        Ok(matrix)
+    }
+
     /// Entries of the influence that one product touches.
     #[must_use]
     pub fn entries(&self) -> usize {
         self.differences.entries(self.parity)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::mesh::{Chord, Grading, equal_strips};
+    use crate::contact::monitor::Unwatched;
+
+    #[test]
+    fn the_dense_matrix_acts_like_the_map_in_every_storage() {
+        let chords: Vec<Chord> = equal_strips(-0.6, 0.6, 4)
+            .into_iter()
+            .enumerate()
+            .map(|(strip, (y, dy))| Chord {
+                patch: 0,
+                strip,
+                y,
+                dy,
+                left: -1.0 + y * y,
+                right: 0.8 - y * y,
+            })
+            .collect();
+        let mesh = Mesh::new(&chords, &Grading::cosine(5));
+        for folded in [false, true] {
+            let differences = Differences::new(&mesh, 0.3, folded, &Unwatched).unwrap();
+            for (rule, parity) in [
+                (Rule::Upwind, None),
+                (Rule::Mirror, None),
+                (Rule::Trapezoid, None),
+                (Rule::Trapezoid, Some(Parity::Longitudinal)),
+                (Rule::Trapezoid, Some(Parity::Lateral)),
+            ] {
+                let equations = Equations::new(rule, &mesh, &differences, parity);
+                let (n, padded) = (equations.cells(), equations.padded());
+                let place = |i: usize| if i < n { i } else { padded + i - n };
+                let matrix = equations.dense(&Unwatched).unwrap();
+                let mut t = vec![0.0; 2 * padded];
+                for i in 0..2 * n {
+                    t[place(i)] = (1.0 + 3.7 * i as f64).sin();
+                }
+                let mut slip = vec![0.0; 2 * padded];
+                let mut scratch = vec![0.0; 2 * equations.row_count()];
+                equations.elastic(&t, &mut slip, &mut scratch);
+                for row in 0..2 * n {
+                    let product: f64 = (0..2 * n)
+                        .map(|column| matrix[column * 2 * n + row] * t[place(column)])
+                        .sum();
+                    assert!(
+                        (product - slip[place(row)]).abs() < 1e-12,
+                        "{rule:?} {parity:?} {row}: {product} {}",
+                        slip[place(row)]
+                    );
+                }
+            }
+        }
     }
 }

@@ -4,11 +4,13 @@ use std::cell::OnceCell;
 use std::f64::consts::PI;
 
 use crate::contact::case::{MeshSize, Motion};
+use crate::contact::error::SolveError;
 use crate::contact::influence::strips::{Differences, Parity};
 use crate::contact::mesh::{Chord, Grading, Mesh, equal_strips};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::Region;
 use crate::contact::normal::fitted::{self, Fitted};
+use crate::contact::problem::{Elasticity, Problem};
 
 /// The contact made dimensionless: lengths by `length`, tractions by `traction`, slips by `traction / G`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,22 +71,29 @@ pub struct Level {
 }
 
 impl Level {
-    /// Meshes every patch of the region with equal strips and cosine-graded cells.
+    /// Meshes every patch of the problem's region with equal strips and cosine-graded cells.
     ///
-    /// `poisson_ratio` and `shear_modulus` are the combined constants, `friction` is μ.
-    #[must_use]
-    pub fn new(
-        region: &Region,
-        size: MeshSize,
-        shear_modulus: f64,
-        poisson_ratio: f64,
-        friction: f64,
-    ) -> Level {
+    /// # Errors
+    /// [`SolveError::Unmeshable`] if no strip meets a patch.
+    pub fn new(problem: &Problem, size: MeshSize) -> Result<Level, SolveError> {
+        let (region, friction) = (&problem.region, problem.friction);
+        let Elasticity {
+            shear_modulus,
+            poisson_ratio,
+            ..
+        } = problem.elasticity;
         let patches = region.patches();
         let mut fitted: Vec<Fitted> = Vec::new();
         for (k, patch) in patches.iter().enumerate() {
             let strips = equal_strips(patch.extent[2], patch.extent[3], size.strips as usize);
-            fitted.extend(fitted::chords(region, k, &strips));
+            let chords = fitted::chords(region, k, &strips);
+            if chords.is_empty() {
+                return Err(SolveError::Unmeshable {
+                    patch: k,
+                    strips: size.strips,
+                });
+            }
+            fitted.extend(chords);
         }
         let chords: Vec<Chord> = fitted.iter().map(|f| f.chord).collect();
         let mesh = Mesh::new(&chords, &Grading::cosine(size.cells as usize));
@@ -104,7 +113,7 @@ impl Level {
         let normalised = mesh.normalised(scale.origin, 1.0 / scale.length);
         let bound = pressure.iter().map(|p| p / largest).collect();
         let influence = OnceCell::new();
-        Level {
+        Ok(Level {
             size,
             mesh,
             pressure,
@@ -115,7 +124,7 @@ impl Level {
             poisson_ratio,
             mirrored: mirror.is_some(),
             influence,
-        }
+        })
     }
 
     /// The influence of the dimensionless mesh; computed at the first call.

@@ -4,6 +4,7 @@ pub mod boundary_element;
 pub mod equations;
 pub mod full_slip;
 pub mod level;
+pub mod liu_hsu;
 pub mod nested;
 pub mod point;
 pub mod rules;
@@ -69,4 +70,37 @@ impl From<Stop> for Failure {
     fn from(stop: Stop) -> Self {
         Failure::Stopped(stop)
     }
+}
+
+/// Brings every traction into its disc (it may be outside by the solver's tolerance) and returns the slips: none in
+/// cells that stick, the part of the given slip along the traction in cells that slip.
+pub(crate) fn obey_coulomb(
+    bound: &[f64],
+    slips: &[bool],
+    traction: &mut [Vec<f64>; 2],
+    given: &[Vec<f64>; 2],
+) -> [Vec<f64>; 2] {
+    let mut slip = [vec![0.0; bound.len()], vec![0.0; bound.len()]];
+    for i in 0..bound.len() {
+        let length = traction[0][i].hypot(traction[1][i]);
+        if length == 0.0 {
+            // Without traction (no pressure) the slip is free.
+            if slips[i] {
+                slip[0][i] = given[0][i];
+                slip[1][i] = given[1][i];
+            }
+            continue;
+        }
+        let (dx, dy) = (traction[0][i] / length, traction[1][i] / length);
+        if slips[i] || length > bound[i] {
+            traction[0][i] = bound[i] * dx;
+            traction[1][i] = bound[i] * dy;
+        }
+        if slips[i] {
+            let along = (given[0][i] * dx + given[1][i] * dy).max(0.0);
+            slip[0][i] = along * dx;
+            slip[1][i] = along * dy;
+        }
+    }
+    slip
 }

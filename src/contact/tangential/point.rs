@@ -1,17 +1,24 @@
 //! One motion of a case, from the coarsest level to the finest, with an estimate of its error.
 
-use crate::contact::case::{Method, Motion};
+use crate::contact::case::{MeshSize, Method, Motion};
 use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::Patch;
 use crate::contact::outputs::resultants::Resultants;
-use crate::contact::problem::Problem;
+use crate::contact::problem::{Problem, Resolution};
 use crate::contact::tangential::level::Level;
-use crate::contact::tangential::{Failure, Tangential, Work, boundary_element, full_slip, nested};
+use crate::contact::tangential::{
+    Failure, Tangential, Work, boundary_element, full_slip, liu_hsu, nested,
+};
 
 /// On a single mesh the difference of the two rules times this covers the error (measured on Hertz contacts: it did
 /// in 95 % of the cases at 64 to 150 cells).
 const RULES_SAFETY: f64 = 2.5;
+/// The coarse mesh that gives the method of Liu and Hsu its spin pole: fewer than 30 cells, as they found.
+const POLE_MESH: MeshSize = MeshSize {
+    strips: 5,
+    cells: 5,
+};
 /// Relative error where everything slips along the rigid slip.
 const RIGID_ERROR: f64 = 1e-6;
 
@@ -99,6 +106,14 @@ fn method_used(problem: &Problem) -> Method {
     }
 }
 
+/// Residual to reach: far below the target, since every iteration below it is for nothing.
+fn tolerance(problem: &Problem) -> f64 {
+    match problem.resolution {
+        Resolution::Target(target) => (0.02 * target).clamp(boundary_element::TOLERANCE, 1e-4),
+        Resolution::Mesh(_) => boundary_element::TOLERANCE,
+    }
+}
+
 fn named(failure: Failure, problem: &Problem, point: usize) -> SolveError {
     match failure {
         Failure::Stopped(stop) => stop.into(),
@@ -127,6 +142,16 @@ fn solve_level(
     if problem.friction == 0.0 {
         return Ok(full_slip::frictionless_answer(level, motion));
     }
+    if problem.method == Method::LiuHsu {
+        let coarse = Level::new(problem, POLE_MESH).ok();
+        return liu_hsu::on_level::solve(
+            level,
+            coarse.as_ref(),
+            motion,
+            tolerance(problem),
+            monitor,
+        );
+    }
     let motion = level.scale.motion(motion);
     let start = coarser.map(|(coarse, answer)| {
         // Tractions relative to the friction bound vary less than tractions do.
@@ -147,7 +172,7 @@ fn solve_level(
             values
         })
     });
-    boundary_element::solve(level, &motion, start.as_ref(), monitor)
+    boundary_element::solve(level, &motion, start.as_ref(), tolerance(problem), monitor)
 }
 
 /// Estimated errors of the patches and of their sum: the change from the level before where there is one, else the

@@ -16,11 +16,11 @@ pub(super) struct Line<'f> {
     pub(super) allowed: Vec<[f64; 2]>,
 }
 
-/// A cubic that does not become negative between two positive ends.
+/// A cubic kept within the bounds that its ends suggest.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Floored {
+pub(super) struct Bounded {
     cubic: Cubic,
-    floor: f64,
+    bounds: [f64; 2],
 }
 
 impl Line<'_> {
@@ -85,35 +85,41 @@ impl Line<'_> {
 }
 
 /// The curve between nodes `i` and `i + 1` of the axis.
-pub(super) fn cubic(axis: &[f64], i: usize, value: impl Fn(usize) -> f64) -> Floored {
+pub(super) fn cubic(axis: &[f64], i: usize, value: impl Fn(usize) -> f64) -> Bounded {
     let values: [f64; 4] = std::array::from_fn(|k| value(i - 1 + k));
-    Floored {
+    Bounded {
         cubic: Cubic::between(axis, i, values),
-        floor: bounds(values[1], values[2], true)[0],
+        bounds: bounds(values[1], values[2], true),
     }
 }
 
-/// Least and largest value of the curve between two nodes: if both are positive, a quarter of the lower one and no
-/// bound; if none is and they are not smooth, no bound and a quarter of the higher one.
+/// Least and largest value of the curve between two nodes.
+///
+/// If both are positive it stays above a quarter of the lower one; if none is and they are not smooth, below a quarter
+/// of the higher one, so not positive. It never exceeds twice the largest sample, which is 1: pressure between samples
+/// is larger than on them by some per cent, more comes from very unequal spacing.
 pub(super) fn bounds(left: f64, right: f64, smooth: bool) -> [f64; 2] {
+    const LARGEST: f64 = 2.0;
     let (lower, higher) = (left.min(right), left.max(right));
-    [
-        if lower > 0.0 {
-            0.25 * lower
-        } else {
-            f64::NEG_INFINITY
-        },
-        if higher > 0.0 || smooth {
-            f64::INFINITY
-        } else {
-            0.25 * higher
-        },
-    ]
+    let low = if lower > 0.0 {
+        0.25 * lower
+    } else {
+        f64::NEG_INFINITY
+    };
+    let high = if higher > 0.0 || smooth {
+        LARGEST
+    } else {
+        0.25 * higher
+    };
+    [low, high]
 }
 
-impl Floored {
+impl Bounded {
     /// Value at x, never negative.
     pub(super) fn at(&self, x: f64) -> f64 {
-        self.cubic.at(x).max(self.floor).max(0.0)
+        self.cubic
+            .at(x)
+            .clamp(self.bounds[0], self.bounds[1])
+            .max(0.0)
     }
 }

@@ -1,7 +1,7 @@
 //! A pressure given by the client on a grid, brought onto strips without losing load.
 //!
 //! The contact is where the interpolated square of the pressure is positive: squared pressure falls linearly at the
-//! edge, so that edges are found well inside a grid spacing (see [`level_set`]), and Hertz's pressure is reproduced
+//! edge, so that edges are found well inside a grid spacing (see `level_set.rs`), and Hertz's pressure is reproduced
 //! exactly. The force of a patch is the sum of its samples times their share of the grid; the mesh scales the
 //! pressures on its strips to carry just that.
 
@@ -122,10 +122,15 @@ impl PressureField {
     /// patch, several from smaller to larger x where the patch is hollow or bent.
     #[must_use]
     pub fn chords(&self, patch: usize, strips: &[(f64, f64)]) -> Vec<Chord> {
+        let shape = &self.shapes[patch];
+        let [x_min, x_max, ..] = shape.patch.extent;
         let mut chords = Vec::new();
         for (strip, &(y, dy)) in strips.iter().enumerate() {
-            let segments = self.segments(&self.shapes[patch], patch, y);
-            chords.extend(segments.into_iter().map(|(left, right)| Chord {
+            // Between the lines that told the extent, rough data may reach a little farther; the extent is kept to.
+            let within = |(left, right): (f64, f64)| (left.max(x_min), right.min(x_max));
+            let segments = self.segments(shape, patch, y).into_iter().map(within);
+            let segments = segments.filter(|(left, right)| right > left);
+            chords.extend(segments.map(|(left, right)| Chord {
                 patch,
                 strip,
                 y,

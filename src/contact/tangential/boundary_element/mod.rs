@@ -17,9 +17,9 @@ use crate::contact::tangential::equations::Equations;
 use crate::contact::tangential::full_slip;
 use crate::contact::tangential::level::Level;
 use crate::contact::tangential::rules::Rule;
-use crate::contact::tangential::{Failure, Tangential, Work};
+use crate::contact::tangential::{Failure, Tangential, Work, obey_coulomb};
 
-/// Residual of the friction law that ends a solve, relative to the traction scale of the case.
+/// Residual of the friction law that ends a solve on an explicit mesh, relative to the traction scale of the case.
 pub const TOLERANCE: f64 = 1e-6;
 
 /// Solves one motion (dimensionless, about the level's origin) on one level, starting from tractions per cell.
@@ -31,6 +31,7 @@ pub fn solve(
     level: &Level,
     motion: &Motion,
     start: Option<&[Vec<f64>; 2]>,
+    tolerance: f64,
     monitor: &dyn Monitor,
 ) -> Result<Tangential, Failure> {
     if let Some(answer) = full_slip::rigid_answer(level, motion) {
@@ -38,7 +39,7 @@ pub fn solve(
     }
     let influence = level.influence(monitor)?;
     let parity = level.parity(motion);
-    let mut solve = Solve::new(level, motion, influence, parity, monitor);
+    let mut solve = Solve::new(level, motion, influence, parity, tolerance, monitor);
     let mut skipped = Vec::new();
     if parity.is_some() {
         skipped.push("mirror symmetry of patch and motion: half the cells".to_owned());
@@ -75,39 +76,6 @@ pub fn solve(
     })
 }
 
-/// Brings every traction into its disc (it may be outside by the solver's tolerance) and returns the slips: none in
-/// cells that stick, the part of the given slip along the traction in cells that slip.
-fn obey_coulomb(
-    bound: &[f64],
-    slips: &[bool],
-    traction: &mut [Vec<f64>; 2],
-    given: &[Vec<f64>; 2],
-) -> [Vec<f64>; 2] {
-    let mut slip = [vec![0.0; bound.len()], vec![0.0; bound.len()]];
-    for i in 0..bound.len() {
-        let length = traction[0][i].hypot(traction[1][i]);
-        if length == 0.0 {
-            // Without traction (no pressure) the slip is free.
-            if slips[i] {
-                slip[0][i] = given[0][i];
-                slip[1][i] = given[1][i];
-            }
-            continue;
-        }
-        let (dx, dy) = (traction[0][i] / length, traction[1][i] / length);
-        if slips[i] || length > bound[i] {
-            traction[0][i] = bound[i] * dx;
-            traction[1][i] = bound[i] * dy;
-        }
-        if slips[i] {
-            let along = (given[0][i] * dx + given[1][i] * dy).max(0.0);
-            slip[0][i] = along * dx;
-            slip[1][i] = along * dy;
-        }
-    }
-    slip
-}
-
 /// What the three-point rule gave besides tractions.
 struct MirrorAnswer {
     slip: [Vec<f64>; 2],
@@ -123,6 +91,7 @@ struct Solve<'a> {
     parity: Option<Parity>,
     bound: Vec<f64>,
     area: Vec<f64>,
+    tolerance: f64,
     work: Work,
     monitor: &'a dyn Monitor,
 }
@@ -133,6 +102,7 @@ impl<'a> Solve<'a> {
         motion: &'a Motion,
         influence: &'a Differences,
         parity: Option<Parity>,
+        tolerance: f64,
         monitor: &'a dyn Monitor,
     ) -> Solve<'a> {
         let padded = influence.padded(parity);
@@ -148,6 +118,7 @@ impl<'a> Solve<'a> {
             parity,
             bound: resized(&level.bound),
             area: resized(&level.normalised.areas()),
+            tolerance,
             work: Work::default(),
             monitor,
         }
@@ -183,7 +154,7 @@ impl<'a> Solve<'a> {
             bound: &self.bound,
             area: &self.area,
             scale: (largest * newton.compliance()).min(1.0),
-            tolerance: TOLERANCE,
+            tolerance: self.tolerance,
         };
         let settled = if shortcut {
             full_slip::fixed_point(newton, &law, t, self.monitor)?
@@ -221,7 +192,7 @@ impl<'a> Solve<'a> {
         if !report.converged {
             return Err(Failure::NotConverged {
                 work: self.work,
-                tolerance: TOLERANCE,
+                tolerance: self.tolerance,
                 advice: "try another mesh, with cells and strips of similar width".to_owned(),
             });
         }

@@ -18,6 +18,10 @@ const PROJECTION: f64 = 0.3;
 const ITERATIONS_MAX: u32 = 60;
 /// A step is halved at most this often.
 const HALVINGS_MAX: u32 = 5;
+/// Tractions this close to the tangents of their discs, relative to the residual, are left where they are.
+const LIFT_NEGLIGIBLE: f64 = 0.1;
+/// A linear system is solved at most this exactly, and at least that.
+const INNER_TOLERANCE: (f64, f64) = (1e-4, 1e-1);
 /// The residual may grow by this factor against the largest of the last steps before a step is halved.
 const GROWTH_ALLOWED: f64 = 1.5;
 
@@ -87,6 +91,8 @@ pub struct Newton<'a> {
     blocks: StripBlocks,
     gmres: Gmres,
     linear: Linearisation,
+    /// What brings each slipping cell from its traction to the tangent of its disc.
+    lift: Vec<(f64, f64)>,
     slip: Vec<f64>,
     scratch: Vec<f64>,
     expanded: Vec<f64>,
@@ -106,6 +112,7 @@ impl<'a> Newton<'a> {
             blocks: StripBlocks::default(),
             gmres: Gmres::default(),
             linear: Linearisation::default(),
+            lift: vec![(0.0, 0.0); equations.cells()],
             slip: vec![0.0; length],
             scratch: vec![0.0; 2 * equations.row_count()],
             expanded: vec![0.0; length],
@@ -240,10 +247,11 @@ impl<'a> Newton<'a> {
         rhs: &mut [f64],
         report: &mut Convergence,
     ) {
+        let residual = report.residual;
         let (padded, cells) = (self.equations.padded(), self.equations.cells());
         self.linear.direction.clear();
         self.linear.stiffness.clear();
-        let mut moved = false;
+        let (mut lifted, mut weight) = (0.0, 0.0);
         for i in 0..cells {
             let r = self.parameter[i];
             let (zx, zy) = (
@@ -251,9 +259,11 @@ impl<'a> Newton<'a> {
                 t[padded + i] + r * self.slip[padded + i],
             );
             let (length, bound) = (zx.hypot(zy), law.bound[i]);
+            weight += law.area[i];
             if length <= bound {
                 self.linear.direction.push((1.0, 0.0));
                 self.linear.stiffness.push(-1.0);
+                self.lift[i] = (0.0, 0.0);
                 continue;
             }
             let (dx, dy) = (zx / length, zy / length);
@@ -266,13 +276,15 @@ impl<'a> Newton<'a> {
             };
             self.linear.stiffness.push(stiffness.min(1e12 / r));
             let lift = bound - (dx * t[i] + dy * t[padded + i]);
-            if lift != 0.0 {
-                moved = true;
-                t[i] += lift * dx;
-                t[padded + i] += lift * dy;
-            }
+            self.lift[i] = (lift * dx, lift * dy);
+            lifted += law.area[i] * lift * lift;
         }
-        if moved {
+        // Near the solution the tangent differs from the circle by less than the step will leave over.
+        if (lifted / weight).sqrt() > LIFT_NEGLIGIBLE * residual * law.scale {
+            for (i, (x, y)) in self.lift[..cells].iter().enumerate() {
+                t[i] += x;
+                t[padded + i] += y;
+            }
             self.equations.elastic(t, &mut self.slip, &mut self.scratch);
             report.products += 1;
             for (s, q) in self.slip.iter_mut().zip(law.rigid) {
@@ -303,7 +315,7 @@ impl<'a> Newton<'a> {
         monitor: &dyn Monitor,
         report: &mut Convergence,
     ) -> Result<(), Stop> {
-        let inner = (0.3 * tolerance / residual).clamp(1e-4, 3e-2);
+        let inner = (0.3 * tolerance / residual).clamp(INNER_TOLERANCE.0, INNER_TOLERANCE.1);
         let mut system = NewtonSystem {
             equations: self.equations,
             linear: &self.linear,

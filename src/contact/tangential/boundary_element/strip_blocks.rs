@@ -1,9 +1,9 @@
 //! The preconditioner: every segment's own block of the Newton matrix, factored on its own.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::lu::partial_pivoting::{factor, solve};
-use faer::perm::PermRef;
-use faer::{Conj, MatMut, MatRef, Par};
+use faer::linalg::lu::partial_pivoting::factor;
+use faer::{MatMut, Par};
+use pulp::{Arch, NullaryFnOnce};
 
 use crate::contact::tangential::boundary_element::newton::Linearisation;
 use crate::contact::tangential::equations::Equations;
@@ -41,79 +41,112 @@ impl OwnBlocks {
 }
 
 /// Factored blocks of one Newton step.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub struct StripBlocks {
     factors: Vec<f64>,
-    pivots: Vec<usize>,
-    pivots_inverse: Vec<usize>,
-    /// Position of every unknown of every segment in a full vector.
+    /// Position in a full vector of every unknown of every block, in the order of the block's pivot rows.
+    pivot_places: Vec<usize>,
+    /// Position of every unknown in its own order.
     places: Vec<usize>,
-    /// Start of each segment in `places`, and one more.
+    /// Start of each block in `places`, and one more.
     starts: Vec<usize>,
-    /// Start of each segment's matrix in `factors`.
+    /// Start of each block's matrix in `factors`.
     offsets: Vec<usize>,
     gathered: Vec<f64>,
-    stack: Option<MemBuffer>,
+    scratch: Scratch,
+}
+
+/// Buffers of the factorisation.
+#[derive(Default)]
+struct Scratch {
+    pivots: Vec<usize>,
+    pivots_inverse: Vec<usize>,
+    stack: Option<(usize, MemBuffer)>,
+}
+
+impl std::fmt::Debug for Scratch {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Scratch")
+    }
 }
 
 impl StripBlocks {
-    /// Builds and factors the blocks of a linearisation.
+    /// Builds and factors the blocks of a linearisation: one block per segment, or one for each component where
+    /// nothing slips (sticking x and y do not touch each other inside a segment).
     pub fn factor(&mut self, own: &OwnBlocks, equations: &Equations, linear: &Linearisation) {
         self.places.clear();
+        self.pivot_places.clear();
         self.starts.clear();
         self.offsets.clear();
         self.factors.clear();
         let padded = equations.padded();
-        let mut largest = 0;
         for (j, (xx, yy)) in own.blocks.iter().enumerate() {
             let cells = equations.segment(j);
-            let start = self.places.len();
-            self.starts.push(start);
-            self.offsets.push(self.factors.len());
-            self.places.extend(cells.clone());
-            self.places.extend(
-                cells
-                    .clone()
-                    .filter(|i| !linear.slips(*i))
-                    .map(|i| padded + i),
-            );
-            let size = self.places.len() - start;
-            largest = largest.max(size);
-            self.fill_block(xx, yy, cells.start, cells.len(), linear, size);
+            if cells.clone().any(|i| linear.slips(i)) {
+                let start = self.open_block();
+                self.places.extend(cells.clone());
+                self.places.extend(
+                    cells
+                        .clone()
+                        .filter(|i| !linear.slips(*i))
+                        .map(|i| padded + i),
+                );
+                let size = self.places.len() - start;
+                self.fill_block(xx, yy, cells.start, cells.len(), linear, size);
+                self.close_block(start);
+            } else {
+                for (matrix, shift) in [(xx, 0), (yy, padded)] {
+                    let start = self.open_block();
+                    self.places.extend(cells.clone().map(|i| shift + i));
+                    self.factors.extend_from_slice(matrix);
+                    self.close_block(start);
+                }
+            }
         }
         self.starts.push(self.places.len());
-        self.pivots.resize(self.places.len(), 0);
-        self.pivots_inverse.resize(self.places.len(), 0);
-        self.gathered.resize(largest, 0.0);
-        let request = factor::lu_in_place_scratch::<usize, f64>(
-            largest,
-            largest,
-            Par::Seq,
-            Default::default(),
-        )
-        .or(solve::solve_in_place_scratch::<usize, f64>(
-            largest,
-            1,
-            Par::Seq,
-        ));
-        let mut buffer = MemBuffer::new(request);
-        for j in 0..own.blocks.len() {
-            let (start, size) = (self.starts[j], self.starts[j + 1] - self.starts[j]);
-            let matrix = &mut self.factors[self.offsets[j]..self.offsets[j] + size * size];
-            factor::lu_in_place(
-                MatMut::from_column_major_slice_mut(matrix, size, size),
-                &mut self.pivots[start..start + size],
-                &mut self.pivots_inverse[start..start + size],
-                Par::Seq,
-                MemStack::new(&mut buffer),
-                Default::default(),
-            );
-        }
-        self.stack = Some(buffer);
     }
 
-    /// Appends one block: first one unknown per cell (T_x where it sticks, the tangential change where it slips),
-    /// then T_y of the cells that stick.
+    fn open_block(&mut self) -> usize {
+        let start = self.places.len();
+        self.starts.push(start);
+        self.offsets.push(self.factors.len());
+        start
+    }
+
+    /// Factors the newest block, whose matrix is complete.
+    fn close_block(&mut self, start: usize) {
+        let size = self.places.len() - start;
+        let scratch = &mut self.scratch;
+        scratch.pivots.resize(size, 0);
+        scratch.pivots_inverse.resize(size, 0);
+        if scratch
+            .stack
+            .as_ref()
+            .is_none_or(|(largest, _)| *largest < size)
+        {
+            let request =
+                factor::lu_in_place_scratch::<usize, f64>(size, size, Par::Seq, Default::default());
+            scratch.stack = Some((size, MemBuffer::new(request)));
+        }
+        let Some((_, stack)) = scratch.stack.as_mut() else {
+            return;
+        };
+        let offset = self.offsets[self.offsets.len() - 1];
+        factor::lu_in_place(
+            MatMut::from_column_major_slice_mut(&mut self.factors[offset..], size, size),
+            &mut scratch.pivots[..size],
+            &mut scratch.pivots_inverse[..size],
+            Par::Seq,
+            MemStack::new(stack),
+            Default::default(),
+        );
+        self.pivot_places
+            .extend(scratch.pivots.iter().map(|row| self.places[start + row]));
+        self.gathered.resize(self.gathered.len().max(size), 0.0);
+    }
+
+    /// Fills one block: first one unknown per cell (T_x where it sticks, the tangential change where it slips), then
+    /// T_y of the cells that stick.
     fn fill_block(
         &mut self,
         xx: &[f64],
@@ -146,8 +179,8 @@ impl StripBlocks {
         for (c, column) in stick.iter().enumerate() {
             let yy = &yy[column * n..(column + 1) * n];
             let out = &mut block[(n + c) * size..(n + c + 1) * size];
-            for row in 0..n {
-                out[row] = linear.direction(first + row).1 * yy[row];
+            for (row, value) in yy.iter().enumerate() {
+                out[row] = linear.direction(first + row).1 * value;
             }
             for (k, row) in stick.iter().enumerate() {
                 out[n + k] = yy[*row];
@@ -155,38 +188,57 @@ impl StripBlocks {
         }
     }
 
-    /// `x ← P⁻¹ x`, segment by segment.
+    /// `x ← P⁻¹ x`, block by block.
     pub fn apply(&mut self, x: &mut [f64]) {
-        let Some(buffer) = self.stack.as_mut() else {
-            return;
-        };
-        for j in 0..self.offsets.len() {
-            let range = self.starts[j]..self.starts[j + 1];
+        Arch::new().dispatch(Substitution { blocks: self, x });
+    }
+}
+
+/// Forward and backward substitution in all blocks, column by column: each step is one update of contiguous values.
+struct Substitution<'a> {
+    blocks: &'a mut StripBlocks,
+    x: &'a mut [f64],
+}
+
+impl NullaryFnOnce for Substitution<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Substitution { blocks, x } = self;
+        for j in 0..blocks.offsets.len() {
+            let range = blocks.starts[j]..blocks.starts[j + 1];
             let size = range.len();
-            let places = &self.places[range.clone()];
-            let gathered = &mut self.gathered[..size];
-            for (to, place) in gathered.iter_mut().zip(places) {
+            let matrix = &blocks.factors[blocks.offsets[j]..blocks.offsets[j] + size * size];
+            let values = &mut blocks.gathered[..size];
+            for (to, place) in values.iter_mut().zip(&blocks.pivot_places[range.clone()]) {
                 *to = x[*place];
             }
-            let matrix = &self.factors[self.offsets[j]..self.offsets[j] + size * size];
-            let factors = MatRef::from_column_major_slice(matrix, size, size);
-            let permutation = PermRef::new_checked(
-                &self.pivots[range.clone()],
-                &self.pivots_inverse[range.clone()],
-                size,
-            );
-            solve::solve_in_place_with_conj(
-                factors,
-                factors,
-                permutation,
-                Conj::No,
-                MatMut::from_column_major_slice_mut(gathered, size, 1),
-                Par::Seq,
-                MemStack::new(buffer),
-            );
-            for (from, place) in gathered.iter().zip(places) {
+            for column in 0..size {
+                let (head, below) = values.split_at_mut(column + 1);
+                subtract(
+                    below,
+                    head[column],
+                    &matrix[column * size + column + 1..(column + 1) * size],
+                );
+            }
+            for column in (0..size).rev() {
+                let (above, rest) = values.split_at_mut(column);
+                let value = rest[0] / matrix[column * size + column];
+                rest[0] = value;
+                subtract(above, value, &matrix[column * size..column * size + column]);
+            }
+            for (from, place) in values.iter().zip(&blocks.places[range]) {
                 x[*place] = *from;
             }
         }
+    }
+}
+
+/// `values −= factor × column`.
+#[inline(always)]
+fn subtract(values: &mut [f64], factor: f64, column: &[f64]) {
+    for (value, entry) in values.iter_mut().zip(column) {
+        *value -= factor * entry;
     }
 }

@@ -1,0 +1,63 @@
+//! What benches share: a clock that ignores other processes, medians, and the unit of machine speed.
+
+use cpu_time::ThreadTime;
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::lu::partial_pivoting::factor;
+use faer::{Mat, Par};
+
+/// Seconds this thread spends on a core for one call of `work`.
+pub fn seconds_of<T>(work: impl FnOnce() -> T) -> (f64, T) {
+    let clock = ThreadTime::now();
+    let answer = work();
+    (clock.elapsed().as_secs_f64(), answer)
+}
+
+/// Median of the values.
+pub fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// Value below which a share of the values lies.
+pub fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[((values.len() as f64 * share) as usize).min(values.len() - 1)]
+}
+
+/// Seconds of one 500 × 500 f64 LU, factored in place: the unit of machine speed.
+pub fn lu_seconds() -> f64 {
+    let n = 500;
+    let matrix = Mat::<f64>::from_fn(n, n, |i, j| {
+        ((7 * i + 3 * j) as f64).sin() + if i == j { 20.0 } else { 0.0 }
+    });
+    let mut work = matrix.clone();
+    let (mut pivots, mut inverse) = (vec![0usize; n], vec![0usize; n]);
+    let mut buffer = MemBuffer::new(factor::lu_in_place_scratch::<usize, f64>(
+        n,
+        n,
+        Par::Seq,
+        Default::default(),
+    ));
+    let once = |work: &mut Mat<f64>,
+                pivots: &mut [usize],
+                inverse: &mut [usize],
+                buffer: &mut MemBuffer| {
+        work.copy_from(&matrix);
+        seconds_of(|| {
+            factor::lu_in_place(
+                work.as_mut(),
+                pivots,
+                inverse,
+                Par::Seq,
+                MemStack::new(buffer),
+                Default::default(),
+            );
+        })
+        .0
+    };
+    median(
+        (0..31)
+            .map(|_| once(&mut work, &mut pivots, &mut inverse, &mut buffer))
+            .collect(),
+    )
+}

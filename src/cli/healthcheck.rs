@@ -1,0 +1,99 @@
+//! Is a running service ready? One plain HTTP request, for containers without other tools.
+
+use std::io::{Read, Write};
+use std::net::{TcpStream, ToSocketAddrs};
+use std::process::ExitCode;
+use std::time::Duration;
+
+use anyhow::{Context, bail};
+
+/// How long each step may take.
+const PATIENCE: Duration = Duration::from_secs(3);
+/// Enough for the status line.
+const ANSWER_BYTES: u64 = 1024;
+
+/// Asks `url`; succeeds if the answer is 200.
+pub(super) fn run(url: &str) -> anyhow::Result<ExitCode> {
+    let (authority, path) = parse(url)?;
+    let status = ask(&authority, &path).with_context(|| format!("no answer from {url}"))?;
+    if status != 200 {
+        bail!("{url} answered {status}");
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Splits `http://host[:port][/path]` into `host:port` and path.
+fn parse(url: &str) -> anyhow::Result<(String, String)> {
+    let rest = url
+        .strip_prefix("http://")
+        .with_context(|| format!("{url:?} does not begin with http://"))?;
+    let (authority, path) = match rest.find('/') {
+        Some(at) => rest.split_at(at),
+        None => (rest, "/"),
+    };
+    if authority.is_empty() || url.contains(|c: char| c.is_whitespace() || c.is_control()) {
+        bail!("{url:?} is not a URL");
+    }
+    // A colon inside brackets belongs to an IPv6 address, not to a port.
+    let has_port = authority.rfind(':') > authority.rfind(']');
+    let authority = if has_port {
+        authority.to_owned()
+    } else {
+        format!("{authority}:80")
+    };
+    Ok((authority, path.to_owned()))
+}
+
+fn ask(authority: &str, path: &str) -> anyhow::Result<u16> {
+    let mut reason = anyhow::anyhow!("{authority} has no address");
+    for address in authority.to_socket_addrs()? {
+        match TcpStream::connect_timeout(&address, PATIENCE) {
+            Ok(stream) => return status(stream, authority, path),
+            Err(error) => reason = error.into(),
+        }
+    }
+    Err(reason)
+}
+
+fn status(mut stream: TcpStream, authority: &str, path: &str) -> anyhow::Result<u16> {
+    stream.set_read_timeout(Some(PATIENCE))?;
+    stream.set_write_timeout(Some(PATIENCE))?;
+    write!(
+        stream,
+        "GET {path} HTTP/1.1\r\nHost: {authority}\r\nConnection: close\r\n\r\n"
+    )?;
+    let mut answer = Vec::new();
+    stream.take(ANSWER_BYTES).read_to_end(&mut answer)?;
+    let line = String::from_utf8_lossy(&answer);
+    let code = line
+        .strip_prefix("HTTP/1.")
+        .and_then(|rest| rest.split_whitespace().nth(1));
+    code.and_then(|code| code.parse().ok())
+        .context("the answer is not HTTP")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hosts_ports_and_paths_are_told_apart() {
+        for (url, authority, path) in [
+            ("http://127.0.0.1:8080/readyz", "127.0.0.1:8080", "/readyz"),
+            ("http://localhost", "localhost:80", "/"),
+            ("http://[::1]/readyz", "[::1]:80", "/readyz"),
+            ("http://[::1]:81/a/b?c", "[::1]:81", "/a/b?c"),
+        ] {
+            assert_eq!(parse(url).unwrap(), (authority.to_owned(), path.to_owned()));
+        }
+        for url in [
+            "https://localhost",
+            "localhost:80",
+            "http://",
+            "http://a b/",
+            "http://a/\r\nX: y",
+        ] {
+            assert!(parse(url).is_err(), "{url:?}");
+        }
+    }
+}

@@ -1,0 +1,227 @@
+//! What can be started, and with which settings? Every command, flag and environment variable.
+
+mod healthcheck;
+mod serve;
+mod solve;
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::thread::available_parallelism;
+use std::time::Duration;
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::contact::problem::Limits;
+use crate::http;
+use crate::telemetry::LogFormat;
+
+/// Rolling-contact stress service: tractions, stick and slip zones and forces between wheel and rail.
+#[derive(Debug, Parser)]
+#[command(name = "railhead", version, about)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// What can be started.
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Serve the HTTP API and solve what is submitted.
+    Serve(ServeArgs),
+    /// Solve one case without a server; the result goes to standard output.
+    ///
+    /// Exit code 0: solved; 1: no answer; 2: the case is faulty.
+    Solve(SolveArgs),
+    /// Ask a running service whether it is ready; exit code 0 if it is, 1 if not.
+    Healthcheck(HealthcheckArgs),
+    /// Print the contract of the HTTP API (OpenAPI 3.1, JSON).
+    Openapi,
+}
+
+/// Settings of `serve`.
+#[derive(Debug, Clone, Args)]
+pub struct ServeArgs {
+    /// Address and port to listen on; port 0 takes a free one, which the log event `listening` names.
+    #[arg(
+        long,
+        env = "RAILHEAD_LISTEN",
+        default_value = "127.0.0.1:8080",
+        value_name = "ADDRESS:PORT"
+    )]
+    pub listen: SocketAddr,
+    /// Folder of the job table and the results; created if it is not there. One process at a time.
+    #[arg(
+        long,
+        env = "RAILHEAD_DATA_DIR",
+        default_value = "./railhead-data",
+        value_name = "FOLDER"
+    )]
+    pub data_dir: PathBuf,
+    /// Number of jobs solved at the same time, each on a thread of its own [default: cores − 1, at least 1].
+    #[arg(long, env = "RAILHEAD_WORKERS", value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub workers: Option<u16>,
+    #[command(flatten)]
+    pub case: CaseArgs,
+    /// Attempts at a job whose worker is lost each time, before it fails.
+    #[arg(long, env = "RAILHEAD_ATTEMPTS_MAX", default_value_t = 5, value_name = "N",
+          value_parser = clap::value_parser!(u32).range(1..))]
+    pub attempts_max: u32,
+    /// Queued jobs beyond which new ones are turned away.
+    #[arg(long, env = "RAILHEAD_QUEUE_MAX", default_value_t = 300_000, value_name = "N",
+          value_parser = clap::value_parser!(u64).range(1..))]
+    pub queue_max: u64,
+    /// Seconds a running job may go on after the service was told to stop; then it goes back to the queue.
+    #[arg(
+        long,
+        env = "RAILHEAD_SHUTDOWN_GRACE_S",
+        default_value_t = 10,
+        value_name = "SECONDS"
+    )]
+    pub shutdown_grace_s: u32,
+    #[command(flatten)]
+    pub log: LogArgs,
+}
+
+/// Settings of `solve`.
+#[derive(Debug, Clone, Args)]
+pub struct SolveArgs {
+    /// File with the case as JSON, or `-` for standard input.
+    #[arg(value_name = "CASE.JSON")]
+    pub file: PathBuf,
+    #[command(flatten)]
+    pub case: CaseArgs,
+}
+
+/// What one case may use.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct CaseArgs {
+    /// Estimated memory beyond which a case is refused, in MiB.
+    #[arg(long, env = "RAILHEAD_MEMORY_LIMIT_MB", default_value_t = 2048, value_name = "MIB",
+          value_parser = clap::value_parser!(u64).range(1..=1 << 30))]
+    pub memory_limit_mb: u64,
+}
+
+/// Settings of `healthcheck`.
+#[derive(Debug, Clone, Args)]
+pub struct HealthcheckArgs {
+    /// What to ask; only plain `http://` is possible.
+    #[arg(
+        long,
+        env = "RAILHEAD_HEALTHCHECK_URL",
+        default_value = "http://127.0.0.1:8080/readyz",
+        value_name = "URL"
+    )]
+    pub url: String,
+}
+
+/// How to log.
+#[derive(Debug, Clone, Args)]
+pub struct LogArgs {
+    /// How a log line looks.
+    #[arg(long, env = "RAILHEAD_LOG_FORMAT", value_enum, default_value = "text")]
+    pub log_format: LogFormat,
+    /// What is logged, for example `info,railhead::jobs=debug`.
+    #[arg(
+        long,
+        env = "RAILHEAD_LOG",
+        default_value = "info",
+        value_name = "FILTER"
+    )]
+    pub log: String,
+}
+
+impl ServeArgs {
+    /// Workers as asked for, or one less than there are cores.
+    fn worker_count(&self) -> usize {
+        self.workers.map_or_else(
+            || available_parallelism().map_or(1, |cores| cores.get().saturating_sub(1).max(1)),
+            usize::from,
+        )
+    }
+
+    fn shutdown_grace(&self) -> Duration {
+        Duration::from_secs(u64::from(self.shutdown_grace_s))
+    }
+}
+
+impl CaseArgs {
+    fn limits(self) -> Limits {
+        Limits {
+            memory_bytes: self.memory_limit_mb << 20,
+            ..Limits::default()
+        }
+    }
+}
+
+/// Reads the command line, does what it says, and returns the exit code.
+#[must_use]
+pub fn run() -> ExitCode {
+    let done = match Cli::parse().command {
+        Command::Serve(args) => serve::run(&args),
+        Command::Solve(args) => solve::run(&args),
+        Command::Healthcheck(args) => healthcheck::run(&args.url),
+        Command::Openapi => print(&http::openapi_json()),
+    };
+    done.unwrap_or_else(|error| {
+        complain(&format!("{error:#}"));
+        ExitCode::FAILURE
+    })
+}
+
+/// Writes to standard output; a reader that has gone away is no fault of ours.
+fn print(text: &str) -> anyhow::Result<ExitCode> {
+    use std::io::{ErrorKind, Write};
+    let mut out = std::io::stdout().lock();
+    match writeln!(out, "{}", text.trim_end()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(ExitCode::SUCCESS),
+    }
+}
+
+/// Writes one line to standard error.
+fn complain(text: &str) {
+    use std::io::Write;
+    // If even standard error is closed there is nobody left to tell.
+    let _ = writeln!(std::io::stderr(), "railhead: {text}");
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn every_setting_of_a_service_has_its_variable() {
+        let command = Cli::command();
+        let serve = command.find_subcommand("serve").unwrap();
+        for arg in serve
+            .get_arguments()
+            .filter(|arg| arg.get_long() != Some("help"))
+        {
+            let flag = arg.get_long().unwrap();
+            let variable = format!("RAILHEAD_{}", flag.to_uppercase().replace('-', "_"));
+            assert_eq!(
+                arg.get_env().and_then(|name| name.to_str()),
+                Some(variable.as_str())
+            );
+        }
+    }
+
+    #[test]
+    fn without_flags_one_core_is_left_to_the_service() {
+        let Command::Serve(args) = Cli::try_parse_from(["railhead", "serve"]).unwrap().command
+        else {
+            panic!("serve was asked for");
+        };
+        let cores = available_parallelism().unwrap().get();
+        assert_eq!(args.worker_count(), if cores > 1 { cores - 1 } else { 1 });
+        assert!(Cli::try_parse_from(["railhead", "serve", "--workers", "0"]).is_err());
+    }
+}

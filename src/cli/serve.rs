@@ -1,0 +1,116 @@
+//! The HTTP API with local workers: start and stop order.
+//!
+//! Start: logs, data folder (locked, migrated, jobs of a dead process taken back), workers, listener. The event
+//! `listening` with the bound address says that requests are answered.
+//!
+//! Stop, on SIGTERM or SIGINT: not ready and nobody waits any more; no new connections; open requests end; running jobs
+//! get their grace period, then go back to the queue uncounted; the data folder is closed. A second signal ends the
+//! process at once, which loses nothing either: the next start takes the running jobs back.
+
+use std::process::ExitCode;
+use std::time::Duration;
+
+use anyhow::Context;
+use tokio::net::TcpListener;
+use tokio::signal::unix::{Signal, SignalKind, signal};
+use tokio::time::{Instant, timeout};
+use tokio_util::sync::CancellationToken;
+
+use crate::cli::ServeArgs;
+use crate::http::{self, HttpOptions};
+use crate::jobs::{Jobs, Options};
+use crate::telemetry;
+
+/// How long open requests may take to end once the service stops.
+const REQUESTS_END_WITHIN: Duration = Duration::from_secs(5);
+/// Exit code of a process that was told to stop twice, as shells count a SIGINT.
+const STOPPED_AT_ONCE: i32 = 130;
+
+/// Serves until a signal says stop.
+pub(super) fn run(args: &ServeArgs) -> anyhow::Result<ExitCode> {
+    telemetry::start(args.log.log_format, &args.log.log)?;
+    tokio::runtime::Builder::new_multi_thread()
+        .enable_all()
+        .thread_name("railhead-async")
+        .build()
+        .context("the async runtime could not be started")?
+        .block_on(serve(args))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+async fn serve(args: &ServeArgs) -> anyhow::Result<()> {
+    let mut signals = Signals::listen()?;
+    let workers = args.worker_count();
+    let jobs = Jobs::open(Options {
+        workers,
+        limits: args.case.limits(),
+        attempts_max: args.attempts_max,
+        queue_max: args.queue_max,
+        ..Options::new(&args.data_dir)
+    })
+    .await?;
+    let listener = TcpListener::bind(args.listen)
+        .await
+        .with_context(|| format!("cannot listen on {}", args.listen))?;
+    jobs.start()?;
+    let address = listener.local_addr()?;
+    tracing::info!(%address, workers, data_dir = %args.data_dir.display(), "listening");
+
+    let stop = CancellationToken::new();
+    let router = http::router(jobs.clone(), HttpOptions::default());
+    let server =
+        axum::serve(listener, router).with_graceful_shutdown(stop.clone().cancelled_owned());
+    let mut server = tokio::spawn(server.into_future());
+
+    let name = tokio::select! {
+        name = signals.next() => name,
+        ended = &mut server => {
+            // The listener never ends by itself; if it does the jobs are still handed back.
+            jobs.shutdown(args.shutdown_grace()).await;
+            return ended?.context("the listener failed");
+        }
+    };
+    tracing::info!(signal = name, "stopping");
+    tokio::spawn(async move {
+        let name = signals.next().await;
+        tracing::warn!(signal = name, "stopping at once");
+        std::process::exit(STOPPED_AT_ONCE);
+    });
+    let start = Instant::now();
+    jobs.drain();
+    stop.cancel();
+    // Requests first, for they need the job table; running jobs go on meanwhile.
+    match timeout(REQUESTS_END_WITHIN, &mut server).await {
+        Ok(ended) => ended?.context("the listener failed")?,
+        Err(_) => {
+            tracing::warn!("some requests did not end and are cut off");
+            server.abort();
+        }
+    }
+    jobs.shutdown(args.shutdown_grace().saturating_sub(start.elapsed()))
+        .await;
+    tracing::info!("stopped");
+    Ok(())
+}
+
+/// The signals that stop a service.
+struct Signals {
+    terminate: Signal,
+    interrupt: Signal,
+}
+
+impl Signals {
+    fn listen() -> anyhow::Result<Signals> {
+        Ok(Signals {
+            terminate: signal(SignalKind::terminate()).context("SIGTERM cannot be received")?,
+            interrupt: signal(SignalKind::interrupt()).context("SIGINT cannot be received")?,
+        })
+    }
+
+    async fn next(&mut self) -> &'static str {
+        tokio::select! {
+            _ = self.terminate.recv() => "SIGTERM",
+            _ = self.interrupt.recv() => "SIGINT",
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! One case in, its result out; no server, no data folder.
+
+use std::io::Read;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use anyhow::Context;
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+
+use crate::cli::{SolveArgs, complain, print};
+use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::solution::{Fields, PatchFields, PointFields, Solution};
+use crate::contact::{check, solve};
+
+/// Exit code for a case that is faulty.
+const FAULTY_CASE: u8 = 2;
+
+/// Measures the time of a solve and never stops it: whoever waits at a terminal stops the process.
+struct Clock(Instant);
+
+impl Monitor for Clock {
+    fn tick(&self, _progress: f64) -> ControlFlow<Stop> {
+        ControlFlow::Continue(())
+    }
+
+    fn elapsed(&self) -> Duration {
+        self.0.elapsed()
+    }
+}
+
+/// What is printed: the solution, with the values per cell beside it.
+#[derive(Serialize)]
+struct Printed<'a> {
+    #[serde(flatten)]
+    solution: &'a Solution,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fields: Option<Value>,
+}
+
+/// Solves the case of a file and prints the result; the values per cell, if asked for, are its member `fields`.
+pub(super) fn run(args: &SolveArgs) -> anyhow::Result<ExitCode> {
+    let text =
+        read(&args.file).with_context(|| format!("{} cannot be read", args.file.display()))?;
+    let case: Value = match serde_json::from_slice(&text) {
+        Ok(case) => case,
+        Err(error) => {
+            complain(&format!("{} is not JSON: {error}", args.file.display()));
+            return Ok(ExitCode::from(FAULTY_CASE));
+        }
+    };
+    let problem = match check(&case, &args.case.limits()) {
+        Ok(problem) => problem,
+        Err(faults) => {
+            for fault in &faults.0 {
+                let place = if fault.pointer.is_empty() {
+                    "the case"
+                } else {
+                    &fault.pointer
+                };
+                complain(&format!("{place}: {}", fault.detail));
+            }
+            return Ok(ExitCode::from(FAULTY_CASE));
+        }
+    };
+    let (solution, fields) = solve(&problem, &Clock(Instant::now()))?;
+    let result = Printed {
+        solution: &solution,
+        fields: (!fields.patches.is_empty()).then(|| fields_json(&fields)),
+    };
+    print(&serde_json::to_string_pretty(&result)?)
+}
+
+fn read(file: &Path) -> std::io::Result<Vec<u8>> {
+    if file == Path::new("-") {
+        let mut text = Vec::new();
+        std::io::stdin().read_to_end(&mut text)?;
+        return Ok(text);
+    }
+    std::fs::read(file)
+}
+
+/// One entry per patch, with the names the API uses; what was not computed is absent.
+fn fields_json(fields: &Fields) -> Value {
+    fields.patches.iter().map(patch_json).collect()
+}
+
+fn patch_json(cells: &PatchFields) -> Value {
+    let mut members = Map::new();
+    members.insert("x_mm".to_owned(), json!(cells.x_mm));
+    members.insert("y_mm".to_owned(), json!(cells.y_mm));
+    members.insert("dx_mm".to_owned(), json!(cells.dx_mm));
+    members.insert("dy_mm".to_owned(), json!(cells.dy_mm));
+    members.insert("strip".to_owned(), json!(cells.strip));
+    if let Some(pressure) = &cells.pressure_mpa {
+        members.insert("pressure_mpa".to_owned(), json!(pressure));
+    }
+    members.insert(
+        "points".to_owned(),
+        cells.points.iter().map(point_json).collect(),
+    );
+    Value::Object(members)
+}
+
+fn point_json(values: &PointFields) -> Value {
+    let mut members = Map::new();
+    if let Some(zone) = &values.zone {
+        members.insert("zone".to_owned(), json!(zone));
+    }
+    for (name, array) in [
+        ("traction_x_mpa", &values.traction_x_mpa),
+        ("traction_y_mpa", &values.traction_y_mpa),
+        ("slip_x", &values.slip_x),
+        ("slip_y", &values.slip_y),
+    ] {
+        if let Some(array) = array {
+            members.insert(name.to_owned(), json!(array));
+        }
+    }
+    Value::Object(members)
+}

@@ -1,0 +1,138 @@
+//! The method on a mesh level of a case, as the recipe calls it.
+
+use crate::contact::case::Motion;
+use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::tangential::boundary_element::newton::{FrictionLaw, Newton};
+use crate::contact::tangential::equations::Equations;
+use crate::contact::tangential::full_slip;
+use crate::contact::tangential::level::Level;
+use crate::contact::tangential::liu_hsu::{Outcome, Stage, solve_by_upwind};
+use crate::contact::tangential::rules::Rule;
+use crate::contact::tangential::{Failure, Tangential, Work, obey_coulomb};
+
+/// Solves one motion (about the origin of the case) with the trapezoid rule, the spin pole from the level `coarse`
+/// (without it, guess 2 is left out).
+///
+/// # Errors
+/// [`Failure::NotConverged`] with the residual of the tractions it ended on; [`Failure::Stopped`].
+pub fn solve(
+    level: &Level,
+    coarse: Option<&Level>,
+    motion: &Motion,
+    tolerance: f64,
+    monitor: &dyn Monitor,
+) -> Result<Tangential, Failure> {
+    let here = level.scale.motion(motion);
+    if let Some(answer) = full_slip::rigid_answer(level, &here) {
+        return Ok(answer);
+    }
+    let fine = Prepared::new(level, Rule::Trapezoid, &here, monitor)?;
+    let upwind = Prepared::new(level, Rule::Upwind, &here, monitor)?;
+    let coarse = match coarse {
+        Some(level) => {
+            let motion = level.scale.motion(motion);
+            Some(Prepared::new(level, Rule::Trapezoid, &motion, monitor)?)
+        }
+        None => None,
+    };
+    let mut t = vec![0.0; 2 * fine.equations.padded()];
+    let outcome = solve_by_upwind(
+        &fine.stage(tolerance),
+        &upwind.stage(tolerance),
+        coarse.as_ref().map(|c| c.stage(tolerance)).as_ref(),
+        &mut t,
+        monitor,
+    )?;
+    let work = work(&outcome);
+    if !outcome.converged {
+        return Err(Failure::NotConverged {
+            work,
+            tolerance,
+            advice: outcome.advice(),
+        });
+    }
+    let cells = level.mesh.cells();
+    let padded = fine.equations.padded();
+    let halves = |v: &[f64]| [v[..cells].to_vec(), v[padded..padded + cells].to_vec()];
+    let mut traction = halves(&t);
+    let slip = obey_coulomb(
+        &level.bound,
+        &outcome.slips,
+        &mut traction,
+        &halves(&outcome.slip),
+    );
+    Ok(Tangential {
+        traction,
+        second: None,
+        slip,
+        slips: outcome.slips,
+        work,
+        skipped: Vec::new(),
+        warnings: Vec::new(),
+    })
+}
+
+fn work(outcome: &Outcome) -> Work {
+    let iterations = u32::try_from(outcome.newton_iterations()).unwrap_or(u32::MAX);
+    Work {
+        iterations,
+        products: 0,
+        residual: outcome.residual,
+    }
+}
+
+/// The equations of one rule on a level with everything a [`Stage`] borrows.
+struct Prepared<'a> {
+    level: &'a Level,
+    equations: Equations<'a>,
+    motion: Motion,
+    rigid: Vec<f64>,
+    bound: Vec<f64>,
+    area: Vec<f64>,
+    y: Vec<f64>,
+    scale: f64,
+}
+
+impl<'a> Prepared<'a> {
+    fn new(
+        level: &'a Level,
+        rule: Rule,
+        motion: &Motion,
+        monitor: &dyn Monitor,
+    ) -> Result<Prepared<'a>, Stop> {
+        let equations = Equations::new(rule, &level.normalised, level.influence(monitor)?, None);
+        let padded = equations.padded();
+        let resized = |mut values: Vec<f64>| {
+            values.resize(padded, 0.0);
+            values
+        };
+        let rigid = equations.rigid(motion);
+        let largest = rigid.iter().fold(0.0_f64, |m, w| m.max(w.abs()));
+        let compliance = Newton::new(&equations).compliance();
+        Ok(Prepared {
+            bound: resized(level.bound.clone()),
+            area: resized(level.normalised.areas()),
+            y: level.normalised.rows(),
+            scale: (largest * compliance).min(1.0),
+            motion: *motion,
+            level,
+            equations,
+            rigid,
+        })
+    }
+
+    fn stage(&self, tolerance: f64) -> Stage<'_> {
+        Stage {
+            equations: &self.equations,
+            law: FrictionLaw {
+                rigid: &self.rigid,
+                bound: &self.bound,
+                area: &self.area,
+                scale: self.scale,
+                tolerance,
+            },
+            nodes: (&self.level.normalised.node, &self.y),
+            motion: self.motion,
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! `/v1/cases/check`: is this a case, and what would it cost? Makes no job.
+
+use axum::Json;
+use axum::extract::State;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::contact::case::{Case, Method, Output};
+use crate::http::body::JsonBody;
+use crate::http::error::ApiError;
+use crate::http::problems::problems;
+use crate::jobs::Jobs;
+
+/// A case that can be solved, and its expected cost.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct CheckedCase {
+    /// Digest of everything that determines the answer; cases with equal digests have equal answers.
+    digest: String,
+    /// The method the case asks for.
+    method: Method,
+    /// What will be computed.
+    outputs: Vec<Output>,
+    /// Number of motions.
+    motions: usize,
+    /// Expected cost.
+    estimate: Estimate,
+    /// What the client should know before using the numbers.
+    warnings: Vec<String>,
+}
+
+/// Expected cost of a case, rough.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct Estimate {
+    /// Peak memory in bytes.
+    bytes: u64,
+    /// Solve time on one core, in s.
+    seconds: f64,
+}
+
+problems! {
+    /// What `POST /v1/cases/check` can fail with.
+    CheckProblems: MalformedJson, UnreadableBody, BodyTimeout, BodyTooLarge, UnsupportedMediaType, FaultyCase
+}
+
+/// Checks a case and estimates its cost, without making a job.
+#[utoipa::path(
+    post,
+    path = "/v1/cases/check",
+    tag = "cases",
+    operation_id = "check_case",
+    request_body(content = Case, description = "One case", content_type = "application/json"),
+    responses((status = 200, description = "The case can be solved", body = CheckedCase), CheckProblems)
+)]
+pub async fn check(
+    State(jobs): State<Jobs>,
+    JsonBody(case): JsonBody,
+) -> Result<Json<CheckedCase>, ApiError> {
+    // A large grid takes long enough to check that it must not hold up other requests.
+    let checked = tokio::task::spawn_blocking(move || {
+        jobs.check(&case).map(|problem| {
+            let cost = problem.cost();
+            CheckedCase {
+                digest: problem.digest.clone(),
+                method: problem.method,
+                outputs: problem.outputs.clone(),
+                motions: problem.motions.len(),
+                estimate: Estimate {
+                    bytes: cost.bytes,
+                    seconds: cost.seconds,
+                },
+                warnings: problem.warnings,
+            }
+        })
+    });
+    let checked = checked.await.map_err(|error| ApiError::internal(&error))?;
+    Ok(Json(checked?))
+}

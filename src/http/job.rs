@@ -1,0 +1,135 @@
+//! One job as the client sees it, and its id in a path.
+
+use std::collections::BTreeMap;
+
+use axum::extract::{FromRequestParts, Path};
+use axum::http::request::Parts;
+use serde::Serialize;
+use utoipa::ToSchema;
+use uuid::Uuid;
+
+use crate::http::error::{ApiError, Kind};
+use crate::http::problem::Problem;
+use crate::http::results::JobResult;
+use crate::jobs::job::{Job, State as JobState};
+
+/// A job as the client sees it. Times are RFC 3339 in UTC with milliseconds.
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Job)]
+pub struct JobAnswer {
+    /// Identifier; sorts by time of submission.
+    #[schema(value_type = String, format = "uuid")]
+    id: String,
+    /// Where the job stands.
+    state: JobState,
+    /// Free text of the case.
+    name: Option<String>,
+    /// Labels of the case.
+    labels: BTreeMap<String, String>,
+    /// The batch that the job belongs to; null for a job submitted alone.
+    #[schema(format = "uuid")]
+    batch_id: Option<String>,
+    /// Time of submission.
+    #[schema(format = "date-time", example = "2026-01-31T09:30:00.000Z")]
+    created_at: String,
+    /// Start of the current or last attempt; null while queued.
+    #[schema(format = "date-time")]
+    started_at: Option<String>,
+    /// End of the job; null before it.
+    #[schema(format = "date-time")]
+    ended_at: Option<String>,
+    /// Attempts made, the current one included.
+    attempt: u32,
+    /// Rough progress.
+    #[schema(minimum = 0.0, maximum = 1.0)]
+    progress: f64,
+    /// What the client should know before using the numbers.
+    warnings: Vec<String>,
+    /// Why the job failed; null unless it did.
+    error: Option<Problem>,
+    /// Where to go from here.
+    links: BTreeMap<String, String>,
+    /// The result; only in the answer to `Prefer: wait`, when the job succeeded in time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    result: Option<JobResult>,
+}
+
+impl JobAnswer {
+    /// Shows a job.
+    #[must_use]
+    pub fn new(job: Job, result: Option<JobResult>) -> Self {
+        let error = job
+            .failure
+            .as_ref()
+            .map(|failure| Problem::of_job(&job, failure));
+        JobAnswer {
+            id: job.id.to_string(),
+            state: job.state,
+            links: links(&job),
+            name: job.name,
+            labels: job.labels,
+            batch_id: None,
+            created_at: rfc3339(job.created_at),
+            started_at: job.started_at.map(rfc3339),
+            ended_at: job.ended_at.map(rfc3339),
+            attempt: job.attempt,
+            progress: job.progress,
+            warnings: job.warnings,
+            error,
+            result,
+        }
+    }
+}
+
+/// What can be done with a job in its present state.
+fn links(job: &Job) -> BTreeMap<String, String> {
+    let own = format!("/v1/jobs/{}", job.id);
+    let mut links = BTreeMap::from([("case".to_owned(), format!("{own}/case"))]);
+    if job.state == JobState::Succeeded {
+        links.insert("result".to_owned(), format!("{own}/result"));
+    }
+    if !job.state.ended() {
+        links.insert("cancel".to_owned(), format!("{own}/cancel"));
+    }
+    links.insert("self".to_owned(), own);
+    links
+}
+
+/// Milliseconds since 1970 as RFC 3339 in UTC, for example `2026-01-31T09:30:00.000Z`.
+fn rfc3339(epoch_ms: i64) -> String {
+    jiff::Timestamp::from_millisecond(epoch_ms)
+        .map_or_else(|_| epoch_ms.to_string(), |time| format!("{time:.3}"))
+}
+
+/// The id in the path. A text that is no id names no job, so it is answered like an unknown one.
+#[derive(Debug, Clone, Copy)]
+pub struct JobId(pub Uuid);
+
+impl<S: Send + Sync> FromRequestParts<S> for JobId {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+        let Path(text) = Path::<String>::from_request_parts(parts, state)
+            .await
+            .map_err(|rejection| ApiError::new(Kind::JobNotFound, rejection.body_text()))?;
+        let id = Uuid::try_parse(&text).map_err(|_| {
+            ApiError::new(
+                Kind::JobNotFound,
+                format!("`{text}` is no job id; ids are UUIDs"),
+            )
+        })?;
+        tracing::Span::current().record("job", tracing::field::display(id));
+        Ok(JobId(id))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_have_milliseconds_and_are_in_utc() {
+        assert_eq!(rfc3339(1_769_851_800_000), "2026-01-31T09:30:00.000Z");
+        assert_eq!(rfc3339(1_769_851_800_007), "2026-01-31T09:30:00.007Z");
+    }
+}

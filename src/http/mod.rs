@@ -1,0 +1,118 @@
+//! What may a client ask? The route list, the limits and the layers around every request.
+//!
+//! Handlers translate: they read a request, call [`Jobs`] and answer. Nothing is computed here.
+
+mod accept;
+mod body;
+mod cases;
+mod error;
+mod fields;
+mod health;
+mod job;
+mod jobs;
+mod methods;
+mod openapi;
+mod problem;
+mod problems;
+mod query;
+mod results;
+mod trace;
+mod zones;
+
+use std::time::Duration;
+
+use axum::Router;
+use axum::extract::{DefaultBodyLimit, FromRef};
+use axum::http::Uri;
+use axum::middleware::from_fn;
+use axum::response::Redirect;
+use axum::routing::get;
+use tower_http::catch_panic::CatchPanicLayer;
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+use utoipa_swagger_ui::{Config, SwaggerUi};
+
+use crate::http::error::{ApiError, Kind};
+use crate::jobs::Jobs;
+
+pub use crate::http::openapi::openapi_json;
+
+/// What one request may cost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct HttpOptions {
+    /// Largest body of one case in bytes.
+    pub body_max_bytes: usize,
+    /// Time for a body to arrive whole.
+    pub body_timeout: Duration,
+}
+
+impl Default for HttpOptions {
+    fn default() -> Self {
+        HttpOptions {
+            body_max_bytes: 8 << 20,
+            body_timeout: Duration::from_secs(60),
+        }
+    }
+}
+
+/// What every handler can reach.
+#[derive(Clone, FromRef)]
+struct Shared {
+    jobs: Jobs,
+    options: HttpOptions,
+}
+
+/// The whole API, ready to be served.
+pub fn router(jobs: Jobs, options: HttpOptions) -> Router {
+    let (resources, _) = resources().split_for_parts();
+    let contract = SwaggerUi::new("/docs").config(
+        // The validator badge would ask a server on the internet.
+        Config::from("/openapi.json")
+            .validator_url("none")
+            .try_it_out_enabled(true),
+    );
+    resources
+        .merge(contract)
+        .route("/", get(|| async { Redirect::temporary("/docs/") }))
+        .fallback(|uri: Uri| async move { error::unknown_route(uri.path()) })
+        .method_not_allowed_fallback(method_not_allowed)
+        .layer(DefaultBodyLimit::max(options.body_max_bytes))
+        .layer(CatchPanicLayer::custom(trace::answer_panic))
+        .layer(from_fn(error::name_instance))
+        .layer(trace::span_layer())
+        .layer(from_fn(trace::carry_request_id))
+        .with_state(Shared { jobs, options })
+}
+
+/// Every documented route, in the order of the contract.
+fn resources() -> OpenApiRouter<Shared> {
+    let v1 = OpenApiRouter::with_openapi(openapi::head())
+        .routes(routes!(jobs::submit, jobs::list))
+        .routes(routes!(jobs::look, jobs::delete))
+        .routes(routes!(jobs::cancel))
+        .routes(routes!(jobs::case))
+        .routes(routes!(results::result))
+        .routes(routes!(results::resultants))
+        .routes(routes!(zones::zones))
+        .routes(routes!(fields::tractions))
+        .routes(routes!(fields::pressure))
+        .routes(routes!(fields::slip))
+        .routes(routes!(cases::check))
+        .routes(routes!(methods::methods))
+        .routes(routes!(problems::list))
+        .routes(routes!(problems::explain))
+        .route_layer(from_fn(accept::require_json));
+    v1.routes(routes!(health::alive))
+        .routes(routes!(health::ready))
+        .routes(routes!(openapi::contract))
+}
+
+async fn method_not_allowed(method: axum::http::Method, uri: Uri) -> ApiError {
+    ApiError::new(
+        Kind::MethodNotAllowed,
+        format!(
+            "`{method}` is not possible on `{}`; the header `Allow` lists what is",
+            uri.path()
+        ),
+    )
+}

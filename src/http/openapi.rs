@@ -1,0 +1,112 @@
+//! The contract: an OpenAPI 3.1 document made from the handlers and their types, with the examples of `api/examples`.
+
+use std::sync::LazyLock;
+
+use axum::http::header;
+use axum::response::{IntoResponse, Response};
+use utoipa::OpenApi;
+use utoipa::openapi::RefOr;
+use utoipa::openapi::example::ExampleBuilder;
+
+use crate::http::problem::Problem;
+use crate::http::resources;
+
+#[derive(OpenApi)]
+#[openapi(
+    info(
+        title = "railhead",
+        description = "Rolling-contact stress service: describe how two bodies touch, press and roll, and get tractions, stick and slip zones and forces.\n\nUnits are part of every name: mm, N, MPa; creepages are dimensionless, spin is in 1/mm. x is along rolling, y to the left, z up; forces and tractions act on the lower body. Times are RFC 3339 in UTC. Every failure is a problem (RFC 9457) with a `type` that explains itself.",
+        license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
+    ),
+    tags(
+        (name = "jobs", description = "Submit cases and follow them"),
+        (name = "results", description = "What came out, part by part"),
+        (name = "cases", description = "What can be asked"),
+        (name = "service", description = "State of the service, its problems and this document")
+    ),
+    components(schemas(Problem))
+)]
+struct Head;
+
+/// The part of the document that no route carries.
+pub fn head() -> utoipa::openapi::OpenApi {
+    Head::openapi()
+}
+
+/// Cases that the document shows: name, summary, text.
+const EXAMPLES: [(&str, &str, &str); 4] = [
+    (
+        "hertz-steel",
+        "A wheel on a rail by its radii, with both creepages and spin",
+        include_str!("../../api/examples/hertz-steel.case.json"),
+    ),
+    (
+        "spin",
+        "An ellipse with lateral creepage and spin",
+        include_str!("../../api/examples/spin.case.json"),
+    ),
+    (
+        "pressure-grid",
+        "A given pressure over a patch of any shape",
+        include_str!("../../api/examples/pressure-grid.case.json"),
+    ),
+    (
+        "sweep",
+        "A creep curve: many motions on the same patch",
+        include_str!("../../api/examples/sweep.case.json"),
+    ),
+];
+
+static DOCUMENT: LazyLock<String> = LazyLock::new(|| {
+    let (_, mut document) = resources().split_for_parts();
+    for path in ["/v1/jobs", "/v1/cases/check"] {
+        add_examples(&mut document, path);
+    }
+    let text = document.to_pretty_json();
+    // Only a map with keys that are not strings cannot be written; the document has none.
+    text.map(|text| text + "\n").unwrap_or_default()
+});
+
+/// The contract as JSON text, ending with a line break; the same as `api/openapi.json`.
+#[must_use]
+pub fn openapi_json() -> String {
+    DOCUMENT.clone()
+}
+
+fn add_examples(document: &mut utoipa::openapi::OpenApi, path: &str) {
+    let item = document.paths.paths.get_mut(path);
+    let operation = item.and_then(|item| item.post.as_mut());
+    let Some(RefOr::T(body)) = operation.and_then(|operation| operation.request_body.as_mut())
+    else {
+        return;
+    };
+    let Some(RefOr::T(content)) = body.content.get_mut("application/json") else {
+        return;
+    };
+    for (name, summary, text) in EXAMPLES {
+        let Ok(value) = serde_json::from_str::<serde_json::Value>(text) else {
+            continue;
+        };
+        let example = ExampleBuilder::new()
+            .summary(summary)
+            .value(Some(value))
+            .build();
+        content.examples.insert(name.to_owned(), RefOr::T(example));
+    }
+}
+
+/// This document.
+#[utoipa::path(
+    get,
+    path = "/openapi.json",
+    tag = "service",
+    operation_id = "get_contract",
+    responses((status = 200, description = "The contract in OpenAPI 3.1", body = serde_json::Value))
+)]
+pub async fn contract() -> Response {
+    (
+        [(header::CONTENT_TYPE, "application/json")],
+        DOCUMENT.as_str(),
+    )
+        .into_response()
+}

@@ -1,0 +1,81 @@
+//! What can go wrong between a client's wish and a job.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+use crate::contact::error::CaseError;
+use crate::jobs::job::{Job, State};
+
+/// Every way a call of [`Jobs`](crate::jobs::Jobs) can fail.
+#[derive(Debug, Error)]
+pub enum JobsError {
+    /// The case cannot be asked; every fault is named.
+    #[error(transparent)]
+    Case(#[from] CaseError),
+    /// The queue is full; nothing was stored.
+    #[error("the queue holds {queue_max} jobs, which is its limit; try again later")]
+    QueueFull {
+        /// Bound of queued jobs.
+        queue_max: u64,
+    },
+    /// The idempotency key was used before with another case.
+    #[error("this idempotency key was used before with another case")]
+    IdempotencyConflict,
+    /// There is no such job.
+    #[error("there is no such job")]
+    NotFound,
+    /// The job must end first.
+    #[error("the job is {}; only an ended job can be deleted, cancel it first", .0.name())]
+    NotEnded(State),
+    /// There is no result yet.
+    #[error("the job is {}; its result is not there yet", .0.name())]
+    NotReady(State),
+    /// The job ended without a result; the job says why.
+    #[error("the job ended as {} and has no result", .0.state.name())]
+    NotSucceeded(Box<Job>),
+    /// The patch asked for is not among the stored fields.
+    #[error("there is no such patch; fields are stored for {patches} patch(es)")]
+    NoSuchPatch {
+        /// Patches with stored fields; 0 if the case asked for no field.
+        patches: usize,
+    },
+    /// The motion asked for is not among the stored fields.
+    #[error("there is no such point; fields are stored for {points} point(s)")]
+    NoSuchPoint {
+        /// Motions of the case.
+        points: usize,
+    },
+    /// The cursor was not made by this service, or for another filter.
+    #[error("the cursor is not one of ours, or belongs to another filter")]
+    BadCursor,
+    /// The service is about to stop.
+    #[error("the service is shutting down")]
+    Draining,
+    /// Another process uses the data folder.
+    #[error("the data folder {} is in use by another process", .0.display())]
+    DataDirInUse(PathBuf),
+    /// The data folder cannot be used.
+    #[error("the data folder {} cannot be used: {source}", path.display())]
+    DataDir {
+        /// The folder or file in question.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// A solver thread could not be started.
+    #[error("a solver thread could not be started: {0}")]
+    Thread(std::io::Error),
+    /// The database failed.
+    #[error("the job table failed: {0}")]
+    Database(#[from] sqlx::Error),
+    /// The job table cannot be brought to the form this version needs.
+    #[error("the job table cannot be migrated: {0}")]
+    Migration(#[from] sqlx::migrate::MigrateError),
+    /// Reading or writing a stored result failed.
+    #[error("the stored results failed: {0}")]
+    Results(#[from] object_store::Error),
+    /// Something stored cannot be read back.
+    #[error("stored data is damaged: {0}")]
+    Damaged(String),
+}

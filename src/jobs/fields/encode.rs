@@ -1,0 +1,130 @@
+//! Fields into their stored form.
+
+use std::io::{Cursor, Error, Result, Write};
+
+use crate::contact::solution::Fields;
+use crate::contact::zones::Zone;
+use crate::jobs::fields::{Block, Header, Kind, MAGIC, PREFIX_BYTES};
+
+const ZSTD_LEVEL: i32 = 3;
+
+/// Brings fields into their stored form.
+///
+/// # Errors
+/// Compression ran out of memory.
+pub fn encode(fields: &Fields) -> Result<Vec<u8>> {
+    let mut blocks = Blocks {
+        list: Vec::new(),
+        body: Vec::new(),
+    };
+    for (patch, cells) in fields.patches.iter().enumerate() {
+        blocks.push_f64(patch, None, "x_mm", Some(&cells.x_mm))?;
+        blocks.push_f64(patch, None, "y_mm", Some(&cells.y_mm))?;
+        blocks.push_f64(patch, None, "dx_mm", Some(&cells.dx_mm))?;
+        blocks.push_f64(patch, None, "dy_mm", Some(&cells.dy_mm))?;
+        let strips = cells
+            .strip
+            .iter()
+            .flat_map(|v| v.to_le_bytes())
+            .collect::<Vec<_>>();
+        blocks.push(patch, None, "strip", Kind::U32, &strips, cells.strip.len())?;
+        blocks.push_f64(patch, None, "pressure_mpa", cells.pressure_mpa.as_ref())?;
+        for (point, values) in cells.points.iter().enumerate() {
+            if let Some(zones) = &values.zone {
+                let codes = zones
+                    .iter()
+                    .map(|zone| zone_code(*zone))
+                    .collect::<Vec<_>>();
+                blocks.push(patch, Some(point), "zone", Kind::U8, &codes, codes.len())?;
+            }
+            blocks.push_f64(
+                patch,
+                Some(point),
+                "traction_x_mpa",
+                values.traction_x_mpa.as_ref(),
+            )?;
+            blocks.push_f64(
+                patch,
+                Some(point),
+                "traction_y_mpa",
+                values.traction_y_mpa.as_ref(),
+            )?;
+            blocks.push_f64(patch, Some(point), "slip_x", values.slip_x.as_ref())?;
+            blocks.push_f64(patch, Some(point), "slip_y", values.slip_y.as_ref())?;
+        }
+    }
+    let header = serde_json::to_vec(&Header {
+        points: fields
+            .patches
+            .iter()
+            .map(|patch| patch.points.len())
+            .collect(),
+        blocks: blocks.list,
+    })?;
+    let header_length = u32::try_from(header.len()).map_err(Error::other)?;
+    let mut file = Vec::with_capacity(PREFIX_BYTES + header.len() + blocks.body.len());
+    file.extend_from_slice(MAGIC);
+    file.extend_from_slice(&header_length.to_le_bytes());
+    file.extend_from_slice(&header);
+    file.extend_from_slice(&blocks.body);
+    Ok(file)
+}
+
+/// Blocks in the making.
+struct Blocks {
+    list: Vec<Block>,
+    body: Vec<u8>,
+}
+
+impl Blocks {
+    fn push_f64(
+        &mut self,
+        patch: usize,
+        point: Option<usize>,
+        name: &str,
+        v: Option<&Vec<f64>>,
+    ) -> Result<()> {
+        let Some(values) = v else { return Ok(()) };
+        let bytes = values
+            .iter()
+            .flat_map(|v| v.to_le_bytes())
+            .collect::<Vec<_>>();
+        self.push(patch, point, name, Kind::F64, &bytes, values.len())
+    }
+
+    fn push(
+        &mut self,
+        patch: usize,
+        point: Option<usize>,
+        name: &str,
+        kind: Kind,
+        values: &[u8],
+        count: usize,
+    ) -> Result<()> {
+        let offset = self.body.len();
+        let mut target = Cursor::new(&mut self.body);
+        target.set_position(offset as u64);
+        let mut encoder = zstd::Encoder::new(target, ZSTD_LEVEL)?;
+        encoder.include_checksum(true)?;
+        encoder.set_pledged_src_size(Some(values.len() as u64))?;
+        encoder.write_all(values)?;
+        encoder.finish()?;
+        self.list.push(Block {
+            patch,
+            point,
+            name: name.to_owned(),
+            kind,
+            count,
+            offset: offset as u64,
+            bytes: (self.body.len() - offset) as u64,
+        });
+        Ok(())
+    }
+}
+
+fn zone_code(zone: Zone) -> u8 {
+    match zone {
+        Zone::Stick => 0,
+        Zone::Slip => 1,
+    }
+}

@@ -1,0 +1,217 @@
+//! A job: its identity, its states and the moves between them.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+use uuid::Uuid;
+
+use crate::contact::error::SolveError;
+
+/// What is known of one job. Times are epoch milliseconds (UTC).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Job {
+    /// UUIDv7; sorts by time of submission.
+    pub id: Uuid,
+    /// Where it stands.
+    pub state: State,
+    /// Free text of the client.
+    pub name: Option<String>,
+    /// Labels of the client.
+    pub labels: BTreeMap<String, String>,
+    /// Time of submission.
+    pub created_at: i64,
+    /// Start of the current or last attempt; absent while queued.
+    pub started_at: Option<i64>,
+    /// End of the job; absent before it.
+    pub ended_at: Option<i64>,
+    /// Attempts that count, from 1 once running; an attempt handed back by a graceful shutdown does not count.
+    pub attempt: u32,
+    /// 0 to 1, rough; written at most with each heartbeat.
+    pub progress: f64,
+    /// What the client should know before using the numbers; filled on success.
+    pub warnings: Vec<String>,
+    /// Why there is no answer; present exactly when the state is `failed`.
+    pub failure: Option<Failure>,
+    /// Grows with every change that a client can see.
+    pub version: u64,
+}
+
+/// Where a job stands.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, ToSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum State {
+    /// Waits for a worker.
+    Queued,
+    /// A worker is on it.
+    Running,
+    /// Ended with an answer.
+    Succeeded,
+    /// Ended without an answer.
+    Failed,
+    /// Ended because the client asked for it.
+    Cancelled,
+}
+
+/// Why a job has no answer.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Failure {
+    /// The kind of failure.
+    pub kind: FailureKind,
+    /// What happened, as a sentence.
+    pub detail: String,
+    /// Residual of the best iterate, relative to the traction scale of the case, where a solve did not converge.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub residual: Option<f64>,
+    /// Iterations done, where a solve did not converge.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub iterations: Option<u32>,
+}
+
+/// The kinds of failure a client can meet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FailureKind {
+    /// The iteration ended without meeting its tolerance.
+    NotConverged,
+    /// The contact has no answer that the method could look for; the detail says why.
+    Unsolvable,
+    /// The time limit of the case was reached.
+    OutOfTime,
+    /// The solver panicked; the fault is ours.
+    Panic,
+    /// Every allowed attempt ended with the loss of its worker.
+    WorkerLost,
+    /// The service could not do its part, for example store the result.
+    Internal,
+}
+
+impl State {
+    /// Every state, in the order a job meets them.
+    pub const ALL: [State; 5] = [
+        State::Queued,
+        State::Running,
+        State::Succeeded,
+        State::Failed,
+        State::Cancelled,
+    ];
+
+    /// The word for this state in the database, the API and the logs.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            State::Queued => "queued",
+            State::Running => "running",
+            State::Succeeded => "succeeded",
+            State::Failed => "failed",
+            State::Cancelled => "cancelled",
+        }
+    }
+
+    /// The state of that name, if there is one.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<State> {
+        State::ALL.into_iter().find(|state| state.name() == name)
+    }
+
+    /// Nothing will change any more.
+    #[must_use]
+    pub fn ended(self) -> bool {
+        matches!(self, State::Succeeded | State::Failed | State::Cancelled)
+    }
+
+    /// May a job move from this state to `next`? An ended job never moves again.
+    #[must_use]
+    pub fn may_become(self, next: State) -> bool {
+        match self {
+            State::Queued => matches!(next, State::Running | State::Cancelled),
+            State::Running => next != State::Running,
+            State::Succeeded | State::Failed | State::Cancelled => false,
+        }
+    }
+}
+
+impl Failure {
+    /// A failure without figures.
+    #[must_use]
+    pub fn new(kind: FailureKind, detail: impl Into<String>) -> Failure {
+        Failure {
+            kind,
+            detail: detail.into(),
+            residual: None,
+            iterations: None,
+        }
+    }
+
+    /// Every allowed attempt lost its worker.
+    #[must_use]
+    pub fn worker_lost(attempts_max: u32) -> Failure {
+        Failure::new(
+            FailureKind::WorkerLost,
+            format!("the worker was lost on every one of the {attempts_max} allowed attempts"),
+        )
+    }
+
+    /// The failure a solver error stands for; a cancelled solve is no failure.
+    #[must_use]
+    pub fn of_solve(error: &SolveError) -> Option<Failure> {
+        match error {
+            SolveError::Cancelled => None,
+            SolveError::OutOfTime => Some(Failure::new(FailureKind::OutOfTime, error.to_string())),
+            SolveError::Unmeshable { .. } => {
+                Some(Failure::new(FailureKind::Unsolvable, error.to_string()))
+            }
+            SolveError::NotConverged {
+                residual,
+                iterations,
+                ..
+            } => Some(Failure {
+                kind: FailureKind::NotConverged,
+                detail: error.to_string(),
+                residual: Some(*residual),
+                iterations: Some(u32::try_from(*iterations).unwrap_or(u32::MAX)),
+            }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_states_come_back_as_states() {
+        for state in State::ALL {
+            assert_eq!(State::from_name(state.name()), Some(state));
+            assert_eq!(serde_json::to_value(state).unwrap(), state.name());
+        }
+        assert_eq!(State::from_name("canceled"), None);
+    }
+
+    #[test]
+    fn an_ended_job_never_moves_again() {
+        for from in State::ALL {
+            for to in State::ALL {
+                if from.ended() {
+                    assert!(!from.may_become(to), "{from:?} must not become {to:?}");
+                }
+            }
+        }
+        assert!(State::Queued.may_become(State::Running));
+        assert!(State::Running.may_become(State::Queued));
+        assert!(!State::Queued.may_become(State::Succeeded));
+    }
+
+    #[test]
+    fn a_failure_survives_the_database_form() {
+        let failure = Failure {
+            residual: Some(3.5e-4),
+            iterations: Some(40),
+            ..Failure::new(FailureKind::NotConverged, "no convergence")
+        };
+        let text = serde_json::to_string(&failure).unwrap();
+        assert_eq!(serde_json::from_str::<Failure>(&text).unwrap(), failure);
+    }
+}

@@ -1,0 +1,176 @@
+//! How the jobs room is opened, started and stopped.
+
+use std::fs::{File, TryLockError};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use tokio::sync::{Notify, broadcast};
+use tokio::time::timeout;
+use tokio_util::sync::CancellationToken;
+use tokio_util::task::TaskTracker;
+
+use crate::contact::problem::Limits;
+use crate::jobs::error::JobsError;
+use crate::jobs::recipe::Recipe;
+use crate::jobs::results::Results;
+use crate::jobs::store::sqlite::SqliteStore;
+use crate::jobs::worker::Worker;
+use crate::jobs::{Jobs, Shared, housekeeping, now_ms};
+
+/// How long a shutdown waits for workers that were told to stop, beyond their own patience.
+const STOPPED_WITHIN: Duration = Duration::from_secs(10);
+
+/// How jobs are kept and worked on.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Folder of the job table and the results; created if it is not there.
+    pub data_dir: PathBuf,
+    /// Number of workers, each with a solver thread of its own.
+    pub workers: usize,
+    /// What one case may use.
+    pub limits: Limits,
+    /// How long a worker may be silent before its job is given away.
+    pub lease: Duration,
+    /// Attempts at a job before it fails as `worker_lost`.
+    pub attempts_max: u32,
+    /// Bound of queued jobs.
+    pub queue_max: u64,
+}
+
+impl Options {
+    /// The defaults for a data folder: one worker, a lease of 30 s, 5 attempts, 300 000 queued jobs.
+    #[must_use]
+    pub fn new(data_dir: impl Into<PathBuf>) -> Options {
+        Options {
+            data_dir: data_dir.into(),
+            workers: 1,
+            limits: Limits::default(),
+            lease: Duration::from_secs(30),
+            attempts_max: 5,
+            queue_max: 300_000,
+        }
+    }
+}
+
+impl Jobs {
+    /// Opens a data folder: locks it, brings the job table to the newest form, and puts the `running` jobs of a dead
+    /// process back into the queue (or ends them, if their attempts are used up). Nothing is solved before
+    /// [`Jobs::start`].
+    ///
+    /// # Errors
+    /// The folder is in use by another process, or cannot be used.
+    pub async fn open(options: Options) -> Result<Jobs, JobsError> {
+        Jobs::open_with(options, Recipe::contact()).await
+    }
+
+    /// As [`Jobs::open`], with another recipe.
+    ///
+    /// # Errors
+    /// As [`Jobs::open`].
+    pub async fn open_with(options: Options, recipe: Recipe) -> Result<Jobs, JobsError> {
+        let lock = lock(&options.data_dir)?;
+        let store = SqliteStore::open(&options.data_dir.join("jobs.db")).await?;
+        let results = Results::open(&options.data_dir)?;
+        let taken_back = store.reap(i64::MAX, now_ms(), options.attempts_max).await?;
+        for (id, state) in taken_back {
+            tracing::info!(job = %id, state = state.name(), "job of a dead process taken back");
+        }
+        let queued = store.queued(options.queue_max).await?;
+        let (ended, _) = broadcast::channel(1024);
+        Ok(Jobs {
+            shared: Arc::new(Shared {
+                options,
+                recipe,
+                store,
+                results,
+                wake: Notify::new(),
+                ended,
+                running: Mutex::default(),
+                draining: CancellationToken::new(),
+                stopping: CancellationToken::new(),
+                tasks: TaskTracker::new(),
+                queued_at_most: tokio::sync::Mutex::new(queued),
+                lock: Mutex::new(Some(lock)),
+            }),
+        })
+    }
+
+    /// Starts the workers, the reaper of expired leases and the sweep of orphaned results.
+    ///
+    /// # Errors
+    /// A solver thread could not be started.
+    pub fn start(&self) -> Result<(), JobsError> {
+        for number in 0..self.shared.options.workers.max(1) {
+            let worker = self.worker(&format!("solver-{number}"))?;
+            self.shared.tasks.spawn(worker.run());
+        }
+        self.shared
+            .tasks
+            .spawn(housekeeping::reap_expired(self.shared.clone()));
+        self.shared
+            .tasks
+            .spawn(housekeeping::sweep_orphans(self.shared.clone()));
+        Ok(())
+    }
+
+    /// One worker that is not part of the pool; its [`step`](Worker::step) is called by whoever holds it.
+    ///
+    /// # Errors
+    /// Its thread could not be started.
+    pub fn worker(&self, name: &str) -> Result<Worker, JobsError> {
+        Worker::new(self.shared.clone(), name)
+    }
+
+    /// Announces the end: not ready any more, no new claims, nobody waits any longer. Running jobs go on.
+    pub fn drain(&self) {
+        self.shared.draining.cancel();
+    }
+
+    /// Stops claiming, gives running jobs `grace` to end, hands the rest back to the queue uncounted, and closes.
+    pub async fn shutdown(&self, grace: Duration) {
+        self.drain();
+        self.shared.tasks.close();
+        if timeout(grace, self.shared.tasks.wait()).await.is_err() {
+            self.shared.stopping.cancel();
+            if timeout(STOPPED_WITHIN, self.shared.tasks.wait())
+                .await
+                .is_err()
+            {
+                tracing::warn!(
+                    "some workers did not stop; their jobs will be taken back at the next start"
+                );
+            }
+        }
+        self.shared.store.close().await;
+        drop(
+            self.shared
+                .lock
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .take(),
+        );
+    }
+}
+
+/// Creates the data folder if needed and takes it for this process alone. The system frees the lock when the process
+/// ends, however it ends.
+fn lock(data_dir: &Path) -> Result<File, JobsError> {
+    let failed = |path: &Path, source| JobsError::DataDir {
+        path: path.to_owned(),
+        source,
+    };
+    std::fs::create_dir_all(data_dir).map_err(|source| failed(data_dir, source))?;
+    let path = data_dir.join("lock");
+    let file = File::options()
+        .create(true)
+        .truncate(false)
+        .write(true)
+        .open(&path)
+        .map_err(|source| failed(&path, source))?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(JobsError::DataDirInUse(data_dir.to_owned())),
+        Err(TryLockError::Error(source)) => Err(failed(&path, source)),
+    }
+}

@@ -1,0 +1,349 @@
+//! Who solves what, when, and what became of it? [`Jobs`] is all that the outside may call.
+//!
+//! A job is a row of the job table ([`store`]); its case hangs on the row, its result lies outside the table
+//! ([`results`], [`fields`]). Workers ([`worker`]) claim the oldest queued job under a lease, solve it on a thread of
+//! their own and finish it; a claim's lease number fences every later write. [`lifecycle`] opens, starts
+//! and stops all this. A process that dies leaves `running` rows,
+//! which go back to the queue when the data folder is opened again.
+
+pub mod error;
+pub mod fields;
+mod housekeeping;
+mod idempotency;
+pub mod job;
+pub mod lifecycle;
+pub mod recipe;
+pub mod results;
+mod solver_thread;
+pub mod store;
+pub mod watch;
+pub mod worker;
+
+use std::collections::HashMap;
+use std::fs::File;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use bytes::Bytes;
+use serde_json::Value;
+use tokio::sync::{Notify, broadcast};
+use tokio::time::{Instant, timeout, timeout_at};
+use tokio_util::sync::CancellationToken;
+use tokio_util::task::TaskTracker;
+use uuid::Uuid;
+
+use crate::contact::error::CaseError;
+use crate::contact::problem::Problem;
+use crate::contact::solution::{PatchFields, Solution};
+pub use crate::jobs::error::JobsError;
+pub use crate::jobs::job::{Failure, FailureKind, Job, State};
+pub use crate::jobs::lifecycle::Options;
+use crate::jobs::recipe::Recipe;
+use crate::jobs::results::Results;
+pub use crate::jobs::store::list::{Filter, Page};
+use crate::jobs::store::sqlite::SqliteStore;
+use crate::jobs::store::{Deleted, Enqueued, NewJob, StoredResult};
+use crate::jobs::watch::{Reason, Watch};
+
+/// Longest list page.
+pub const PAGE_MAX: u32 = 1000;
+/// How often a waiting caller looks again although nothing was announced.
+const LOOK_AGAIN: Duration = Duration::from_secs(1);
+/// How long a readiness check waits for the database.
+const READY_WITHIN: Duration = Duration::from_secs(2);
+/// Jobs: submit, look, list, wait, cancel, fetch. A cheap handle; clones share everything.
+#[derive(Debug, Clone)]
+pub struct Jobs {
+    shared: Arc<Shared>,
+}
+
+/// What every handle and every worker shares.
+#[derive(Debug)]
+struct Shared {
+    options: Options,
+    recipe: Recipe,
+    store: SqliteStore,
+    results: Results,
+    /// Wakes an idle worker; a hint only, workers also look by themselves.
+    wake: Notify,
+    /// Announces ended jobs; a hint only, waiting callers also look by themselves.
+    ended: broadcast::Sender<Uuid>,
+    /// The attempts of this process.
+    running: Mutex<HashMap<Uuid, Arc<Watch>>>,
+    /// Set when the service is about to stop: no new claims, not ready, no more waiting.
+    draining: CancellationToken,
+    /// Set when the grace period is over: running jobs are handed back.
+    stopping: CancellationToken,
+    tasks: TaskTracker,
+    /// Upper bound of the number of queued jobs, recounted when it reaches the limit.
+    queued_at_most: tokio::sync::Mutex<u64>,
+    /// Held as long as this process uses the data folder.
+    lock: Mutex<Option<File>>,
+}
+
+impl Jobs {
+    /// Checks a case against the limits of this service.
+    ///
+    /// # Errors
+    /// Every fault of the case.
+    pub fn check(&self, case: &Value) -> Result<Problem, CaseError> {
+        (self.shared.recipe.check)(case, &self.shared.options.limits)
+    }
+
+    /// Checks a case and queues it. Once this returns the job survives the death of the process.
+    ///
+    /// With an idempotency key the same case gives the same job again, however often it is submitted, for as long as
+    /// that job exists.
+    ///
+    /// # Errors
+    /// [`JobsError::Case`], [`JobsError::QueueFull`], [`JobsError::IdempotencyConflict`], [`JobsError::Draining`], or a
+    /// failed database.
+    pub async fn submit(
+        &self,
+        case: Value,
+        idempotency_key: Option<String>,
+    ) -> Result<Job, JobsError> {
+        if self.shared.draining.is_cancelled() {
+            return Err(JobsError::Draining);
+        }
+        let jobs = self.clone();
+        // Checking a large case is arithmetic; it stays off the threads that answer requests.
+        let read = tokio::task::spawn_blocking(move || {
+            let idempotency = idempotency_key.map(|key| (key, idempotency::digest(&case)));
+            (jobs.check(&case), serde_json::to_vec(&case), idempotency)
+        });
+        let (problem, body, idempotency) = read
+            .await
+            .map_err(|error| JobsError::Damaged(error.to_string()))?;
+        if let Some((key, digest)) = &idempotency
+            && let Some(enqueued) = self.shared.store.by_key(key, digest).await?
+        {
+            return replayed(enqueued);
+        }
+        let problem = problem?;
+        let id = Uuid::now_v7();
+        let new = NewJob {
+            id,
+            created_at: created_at(id),
+            name: problem.name,
+            labels: problem.labels,
+            method: problem.method.name().to_owned(),
+            body: Bytes::from(body.map_err(|error| JobsError::Damaged(error.to_string()))?),
+            idempotency,
+        };
+        self.admit().await?;
+        let job = replayed(self.shared.store.enqueue(&new).await?)?;
+        self.shared.wake.notify_one();
+        tracing::info!(job = %job.id, method = new.method, "job queued");
+        Ok(job)
+    }
+
+    /// Looks at a job.
+    ///
+    /// # Errors
+    /// [`JobsError::NotFound`], or a failed database.
+    pub async fn get(&self, id: Uuid) -> Result<Job, JobsError> {
+        self.shared.store.get(id).await?.ok_or(JobsError::NotFound)
+    }
+
+    /// Waits until a job has ended, but not longer than `at_most`, and returns it as it then is. Returns at once when
+    /// the service is about to stop.
+    ///
+    /// # Errors
+    /// [`JobsError::NotFound`], or a failed database.
+    pub async fn wait(&self, id: Uuid, at_most: Duration) -> Result<Job, JobsError> {
+        let until = Instant::now() + at_most;
+        // Subscribe first, then look: what ends in between is announced.
+        let mut ended = self.shared.ended.subscribe();
+        loop {
+            let job = self.get(id).await?;
+            if job.state.ended() || Instant::now() >= until || self.shared.draining.is_cancelled() {
+                return Ok(job);
+            }
+            let announced = async {
+                // A lagging receiver may have missed the announcement, so it looks again as well.
+                while ended.recv().await.is_ok_and(|ended| ended != id) {}
+            };
+            tokio::select! {
+                _ = timeout_at(until.min(Instant::now() + LOOK_AGAIN), announced) => {}
+                () = self.shared.draining.cancelled() => {}
+            }
+        }
+    }
+
+    /// One page of a list, newest first; `limit` is brought into 1 to [`PAGE_MAX`].
+    ///
+    /// # Errors
+    /// [`JobsError::BadCursor`], or a failed database.
+    pub async fn list(
+        &self,
+        filter: &Filter,
+        cursor: Option<&str>,
+        limit: u32,
+    ) -> Result<Page, JobsError> {
+        self.shared
+            .store
+            .list(filter, cursor, limit.clamp(1, PAGE_MAX))
+            .await
+    }
+
+    /// Cancels a job: a queued one ends at once, a running one at the next tick of its solver, an ended one stays as
+    /// it is. Returns the job as it then is.
+    ///
+    /// # Errors
+    /// [`JobsError::NotFound`], or a failed database.
+    pub async fn cancel(&self, id: Uuid) -> Result<Job, JobsError> {
+        let job = self
+            .shared
+            .store
+            .cancel(id, now_ms())
+            .await?
+            .ok_or(JobsError::NotFound)?;
+        if job.state.ended() {
+            self.shared.announce(id);
+        } else if let Some(watch) = self.shared.running().get(&id) {
+            // A worker that registers later reads the wish from the table.
+            watch.stop(Reason::Cancel);
+        }
+        Ok(job)
+    }
+
+    /// Removes an ended job with its case and results.
+    ///
+    /// # Errors
+    /// [`JobsError::NotEnded`], [`JobsError::NotFound`], or a failed database.
+    pub async fn delete(&self, id: Uuid) -> Result<(), JobsError> {
+        match self.shared.store.delete(id).await? {
+            Deleted::NotEnded(state) => Err(JobsError::NotEnded(state)),
+            Deleted::NotFound => Err(JobsError::NotFound),
+            Deleted::Done => {
+                if let Err(error) = self.shared.results.remove(id, None).await {
+                    tracing::warn!(job = %id, %error, "results of a deleted job left behind until the next start");
+                }
+                Ok(())
+            }
+        }
+    }
+
+    /// The case of a job as submitted, as JSON text.
+    ///
+    /// # Errors
+    /// [`JobsError::NotFound`], or a failed database.
+    pub async fn case(&self, id: Uuid) -> Result<Bytes, JobsError> {
+        let (body, _) = self
+            .shared
+            .store
+            .case(id)
+            .await?
+            .ok_or(JobsError::NotFound)?;
+        Ok(body)
+    }
+
+    /// The answer of a succeeded job, without fields.
+    ///
+    /// # Errors
+    /// [`JobsError::NotReady`], [`JobsError::NotSucceeded`], [`JobsError::NotFound`], or a failed store.
+    pub async fn solution(&self, id: Uuid) -> Result<Solution, JobsError> {
+        let stored = self.stored(id).await?;
+        self.shared.results.solution(&stored).await
+    }
+
+    /// The cells of one patch with the values of every motion; reads no other patch.
+    ///
+    /// # Errors
+    /// [`JobsError::NoSuchPatch`], else as [`Jobs::solution`].
+    pub async fn patch_fields(&self, id: Uuid, patch: usize) -> Result<PatchFields, JobsError> {
+        let stored = self.stored(id).await?;
+        self.shared.results.patch_fields(&stored, patch, None).await
+    }
+
+    /// The cells of one patch with the values of one motion, the only entry of `points`; reads nothing else.
+    ///
+    /// # Errors
+    /// [`JobsError::NoSuchPatch`], [`JobsError::NoSuchPoint`], else as [`Jobs::solution`].
+    pub async fn point_fields(
+        &self,
+        id: Uuid,
+        patch: usize,
+        point: usize,
+    ) -> Result<PatchFields, JobsError> {
+        let stored = self.stored(id).await?;
+        self.shared
+            .results
+            .patch_fields(&stored, patch, Some(point))
+            .await
+    }
+
+    /// Can this service take requests? A round trip to the database.
+    ///
+    /// # Errors
+    /// [`JobsError::Draining`], or a database that fails or does not answer in time.
+    pub async fn ready(&self) -> Result<(), JobsError> {
+        if self.shared.draining.is_cancelled() {
+            return Err(JobsError::Draining);
+        }
+        timeout(READY_WITHIN, self.shared.store.ping())
+            .await
+            .unwrap_or(Err(JobsError::Database(sqlx::Error::PoolTimedOut)))
+    }
+
+    /// Where the result of a job lies.
+    async fn stored(&self, id: Uuid) -> Result<StoredResult, JobsError> {
+        let (job, stored) = self
+            .shared
+            .store
+            .result(id)
+            .await?
+            .ok_or(JobsError::NotFound)?;
+        match stored {
+            Some(stored) => Ok(stored),
+            None if job.state.ended() => Err(JobsError::NotSucceeded(Box::new(job))),
+            None => Err(JobsError::NotReady(job.state)),
+        }
+    }
+
+    /// Takes a place in the queue. The bound is exact: the figure kept here is never below the true one, and the queue
+    /// is counted before anybody is turned away.
+    async fn admit(&self) -> Result<(), JobsError> {
+        let queue_max = self.shared.options.queue_max;
+        let mut at_most = self.shared.queued_at_most.lock().await;
+        if *at_most >= queue_max {
+            *at_most = self.shared.store.queued(queue_max).await?;
+        }
+        if *at_most >= queue_max {
+            return Err(JobsError::QueueFull { queue_max });
+        }
+        *at_most += 1;
+        Ok(())
+    }
+}
+
+impl Shared {
+    /// The attempts of this process.
+    fn running(&self) -> std::sync::MutexGuard<'_, HashMap<Uuid, Arc<Watch>>> {
+        self.running.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Tells waiting callers that a job has ended.
+    fn announce(&self, id: Uuid) {
+        // Nobody listening is no error.
+        let _ = self.ended.send(id);
+    }
+}
+
+/// The job an idempotency key stands for, or the new one.
+fn replayed(enqueued: Enqueued) -> Result<Job, JobsError> {
+    match enqueued {
+        Enqueued::Created(job) | Enqueued::Existing(job) => Ok(job),
+        Enqueued::Conflict => Err(JobsError::IdempotencyConflict),
+    }
+}
+
+/// The time of submission is the one inside the id, so that order by id is order by time.
+fn created_at(id: Uuid) -> i64 {
+    i64::try_from(id.as_u128() >> 80).unwrap_or(0)
+}
+
+fn now_ms() -> i64 {
+    jiff::Timestamp::now().as_millisecond()
+}

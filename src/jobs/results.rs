@@ -1,0 +1,284 @@
+//! Stored results: blobs outside the job table, in a folder of the data folder.
+//!
+//! Keys are `results/{yyyy}/{mm}/{job}/{lease number}/{name}`, year and month those of the job's submission (UTC). The
+//! lease number in the key makes a late write of a worker that lost its lease harmless. Blobs are written, and
+//! synced to the disk, before the job is called succeeded.
+
+use std::path::{Path as FilePath, PathBuf};
+use std::sync::Arc;
+
+use bytes::Bytes;
+use object_store::local::LocalFileSystem;
+use object_store::path::Path;
+use object_store::{ObjectStore, ObjectStoreExt, PutPayload};
+use uuid::Uuid;
+
+use crate::contact::solution::{PatchFields, Solution};
+use crate::jobs::error::JobsError;
+use crate::jobs::fields::{Header, PREFIX_BYTES, header_length};
+use crate::jobs::store::{Claim, StoredResult};
+
+const SOLUTION: &str = "solution.json";
+const FIELDS: &str = "fields.bin";
+
+/// A result in its stored form.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Encoded {
+    /// The solution as JSON.
+    pub solution: Bytes,
+    /// The fields as [`encode`](crate::jobs::fields::encode) writes them, if the case asked for any.
+    pub fields: Option<Bytes>,
+}
+
+/// The place where results are kept.
+#[derive(Debug, Clone)]
+pub struct Results {
+    blobs: Arc<dyn ObjectStore>,
+    root: PathBuf,
+}
+
+impl Results {
+    /// Keeps results below `root`, which is created if it is not there.
+    ///
+    /// # Errors
+    /// The folder cannot be created or read.
+    pub fn open(root: &FilePath) -> Result<Results, JobsError> {
+        std::fs::create_dir_all(root).map_err(|source| JobsError::DataDir {
+            path: root.to_owned(),
+            source,
+        })?;
+        let blobs = LocalFileSystem::new_with_prefix(root)?.with_fsync(true);
+        Ok(Results {
+            blobs: Arc::new(blobs),
+            root: root.to_owned(),
+        })
+    }
+
+    /// Stores a result and returns the folder it lies in; durable once it returns.
+    ///
+    /// # Errors
+    /// The result could not be written.
+    pub async fn put(&self, claim: &Claim, result: Encoded) -> Result<String, JobsError> {
+        let folder = job_folder(claim.id).join(claim.lease_number.to_string());
+        if let Some(fields) = result.fields {
+            self.blobs
+                .put(&folder.clone().join(FIELDS), PutPayload::from_bytes(fields))
+                .await?;
+        }
+        self.blobs
+            .put(
+                &folder.clone().join(SOLUTION),
+                PutPayload::from_bytes(result.solution),
+            )
+            .await?;
+        Ok(folder.to_string())
+    }
+
+    /// Reads a stored solution.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    pub async fn solution(&self, stored: &StoredResult) -> Result<Solution, JobsError> {
+        let path = Path::from(stored.key.as_str()).join(SOLUTION);
+        let bytes = self.blobs.get(&path).await?.bytes().await?;
+        serde_json::from_slice(&bytes)
+            .map_err(|error| JobsError::Damaged(format!("{path}: {error}")))
+    }
+
+    /// Reads the cells of one patch, with the values of one motion or of all of them, and nothing else.
+    ///
+    /// # Errors
+    /// There is no such patch or motion, or the fields cannot be read.
+    pub async fn patch_fields(
+        &self,
+        stored: &StoredResult,
+        patch: usize,
+        point: Option<usize>,
+    ) -> Result<PatchFields, JobsError> {
+        if patch >= stored.field_patches {
+            return Err(JobsError::NoSuchPatch {
+                patches: stored.field_patches,
+            });
+        }
+        let path = Path::from(stored.key.as_str()).join(FIELDS);
+        let damaged = |error: String| JobsError::Damaged(format!("{path}: {error}"));
+        let prefix = self.blobs.get_range(&path, 0..PREFIX_BYTES as u64).await?;
+        let body = (PREFIX_BYTES + header_length(&prefix).map_err(damaged)?) as u64;
+        let header = Header::read(
+            &self
+                .blobs
+                .get_range(&path, PREFIX_BYTES as u64..body)
+                .await?,
+        )
+        .map_err(damaged)?;
+        let points = header.points(patch);
+        if point.is_some_and(|point| point >= points) {
+            return Err(JobsError::NoSuchPoint { points });
+        }
+        let ranges: Vec<_> = header
+            .ranges(patch, point)
+            .into_iter()
+            .map(|range| range.start + body..range.end + body)
+            .collect();
+        let pieces = self.blobs.get_ranges(&path, &ranges).await?;
+        // Decompression is arithmetic; it stays off the threads that answer requests.
+        let decoded =
+            tokio::task::spawn_blocking(move || header.decode(patch, point, &pieces.concat()))
+                .await;
+        decoded
+            .map_err(|error| JobsError::Damaged(error.to_string()))?
+            .map_err(damaged)
+    }
+
+    /// Removes what is stored for a job, except the folder `keep`.
+    ///
+    /// # Errors
+    /// Something could not be removed; the next sweep will try again.
+    pub async fn remove(&self, job: Uuid, keep: Option<&str>) -> Result<(), JobsError> {
+        let folder = job_folder(job);
+        let attempts = self.blobs.list_with_delimiter(Some(&folder)).await?;
+        for attempt in attempts.common_prefixes {
+            if keep == Some(attempt.as_ref()) {
+                continue;
+            }
+            for blob in self
+                .blobs
+                .list_with_delimiter(Some(&attempt))
+                .await?
+                .objects
+            {
+                self.blobs.delete(&blob.location).await?;
+            }
+            self.scrub(&attempt).await?;
+        }
+        if keep.is_none() {
+            self.scrub(&folder).await?;
+        }
+        Ok(())
+    }
+
+    /// The jobs for which something is stored, month by month.
+    ///
+    /// # Errors
+    /// The store cannot be listed.
+    pub async fn jobs_by_month(&self) -> Result<Vec<Vec<Uuid>>, JobsError> {
+        let mut months = Vec::new();
+        for year in self
+            .blobs
+            .list_with_delimiter(Some(&Path::from("results")))
+            .await?
+            .common_prefixes
+        {
+            for month in self
+                .blobs
+                .list_with_delimiter(Some(&year))
+                .await?
+                .common_prefixes
+            {
+                let jobs = self
+                    .blobs
+                    .list_with_delimiter(Some(&month))
+                    .await?
+                    .common_prefixes;
+                let ids = jobs
+                    .iter()
+                    .filter_map(|job| Uuid::try_parse(job.filename()?).ok());
+                months.push(ids.collect());
+            }
+        }
+        Ok(months)
+    }
+
+    /// Removes an emptied local folder with what a killed process may have left half-written in it, which the blob
+    /// store does not show.
+    async fn scrub(&self, folder: &Path) -> Result<(), JobsError> {
+        let path = self.root.join(folder.as_ref());
+        match tokio::fs::remove_dir_all(&path).await {
+            Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
+                Err(JobsError::DataDir { path, source })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Where everything stored for a job lies.
+fn job_folder(id: Uuid) -> Path {
+    let seconds = id.get_timestamp().map_or(0, |time| time.to_unix().0);
+    let time = i64::try_from(seconds)
+        .ok()
+        .and_then(|s| jiff::Timestamp::from_second(s).ok());
+    let date = time
+        .unwrap_or_default()
+        .to_zoned(jiff::tz::TimeZone::UTC)
+        .date();
+    Path::from(format!(
+        "results/{:04}/{:02}/{id}",
+        date.year(),
+        date.month()
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn claim(id: Uuid, lease_number: u64) -> Claim {
+        Claim {
+            id,
+            attempt: 1,
+            lease_number,
+            method: "auto".to_owned(),
+        }
+    }
+
+    fn encoded(text: &'static str) -> Encoded {
+        Encoded {
+            solution: Bytes::from_static(text.as_bytes()),
+            fields: Some(Bytes::from_static(b"fields")),
+        }
+    }
+
+    #[test]
+    fn a_job_lies_in_the_month_of_its_submission() {
+        // 2024-02-29T23:59:59.999Z in milliseconds, the leading 48 bits of a UUIDv7.
+        let id = Uuid::from_u128((1_709_251_199_999_u128 << 80) | (7 << 76) | (2 << 62) | 1);
+        assert_eq!(job_folder(id).to_string(), format!("results/2024/02/{id}"));
+    }
+
+    #[tokio::test]
+    async fn attempts_are_kept_apart_and_removed_one_by_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let results = Results::open(folder.path()).unwrap();
+        let id = Uuid::now_v7();
+        let first = results.put(&claim(id, 1), encoded("1")).await.unwrap();
+        let second = results.put(&claim(id, 2), encoded("2")).await.unwrap();
+        assert_ne!(first, second);
+        // What a process killed in the middle of a write leaves behind.
+        std::fs::write(folder.path().join(&first).join("fields.bin#1"), b"half").unwrap();
+
+        results.remove(id, Some(&second)).await.unwrap();
+        assert!(!folder.path().join(&first).exists());
+        assert!(folder.path().join(&second).join(SOLUTION).exists());
+        assert_eq!(results.jobs_by_month().await.unwrap(), vec![vec![id]]);
+
+        results.remove(id, None).await.unwrap();
+        assert_eq!(
+            results.jobs_by_month().await.unwrap().concat(),
+            Vec::<Uuid>::new()
+        );
+        results.remove(id, None).await.unwrap();
+    }
+
+    #[tokio::test]
+    async fn a_result_without_fields_has_no_patches() {
+        let folder = tempfile::tempdir().unwrap();
+        let results = Results::open(folder.path()).unwrap();
+        let stored = StoredResult {
+            key: "results/2026/01/none/1".to_owned(),
+            field_patches: 0,
+        };
+        let answer = results.patch_fields(&stored, 0, None).await;
+        assert!(matches!(answer, Err(JobsError::NoSuchPatch { patches: 0 })));
+    }
+}

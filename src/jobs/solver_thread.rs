@@ -1,0 +1,118 @@
+//! The thread on which a worker's arithmetic runs, and what is done there.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc;
+
+use bytes::Bytes;
+
+use crate::contact::error::{CaseError, SolveError};
+use crate::jobs::Shared;
+use crate::jobs::error::JobsError;
+use crate::jobs::fields;
+use crate::jobs::job::{Failure, FailureKind};
+use crate::jobs::results::Encoded;
+use crate::jobs::watch::Watch;
+
+/// Stack of a solver thread.
+const STACK_BYTES: usize = 16 << 20;
+
+/// What came out of the solver thread.
+#[derive(Debug)]
+pub(super) enum Outcome {
+    /// The answer in its stored form.
+    Solved {
+        result: Encoded,
+        warnings: Vec<String>,
+        field_patches: u32,
+    },
+    /// The solver gave up or was stopped.
+    Unsolved(SolveError),
+    /// The case no longer passes its checks.
+    Refused(CaseError),
+    /// The fault is ours.
+    Broken(Failure),
+    /// The solver did not listen and was left behind.
+    Abandoned,
+}
+
+/// Something to compute.
+pub(super) type Task = Box<dyn FnOnce() + Send>;
+
+/// A thread that does arithmetic, one task after the other, until its handle is dropped.
+#[derive(Debug)]
+pub(super) struct SolverThread {
+    tasks: mpsc::Sender<Task>,
+}
+
+impl SolverThread {
+    /// Starts a thread of this name.
+    pub(super) fn start(name: &str) -> Result<SolverThread, JobsError> {
+        let (tasks, todo) = mpsc::channel::<Task>();
+        std::thread::Builder::new()
+            .name(name.to_owned())
+            .stack_size(STACK_BYTES)
+            .spawn(move || {
+                while let Ok(task) = todo.recv() {
+                    task();
+                }
+            })
+            .map_err(JobsError::Thread)?;
+        Ok(SolverThread { tasks })
+    }
+
+    /// Hands a task over; `false` if the thread is gone.
+    pub(super) fn give(&self, task: Task) -> bool {
+        self.tasks.send(task).is_ok()
+    }
+}
+
+/// Solves a case; a panic becomes a failure and the thread stays usable.
+pub(super) fn solve_guarded(shared: &Shared, watch: &Watch, body: &[u8]) -> Outcome {
+    catch_unwind(AssertUnwindSafe(|| solve_case(shared, watch, body))).unwrap_or_else(|payload| {
+        let detail = format!("the solver panicked: {}", panic_text(payload.as_ref()));
+        Outcome::Broken(Failure::new(FailureKind::Panic, detail))
+    })
+}
+
+fn solve_case(shared: &Shared, watch: &Watch, body: &[u8]) -> Outcome {
+    let internal = |detail: String| Outcome::Broken(Failure::new(FailureKind::Internal, detail));
+    let case = match serde_json::from_slice(body) {
+        Ok(case) => case,
+        Err(error) => return internal(format!("the stored case is damaged: {error}")),
+    };
+    let problem = match (shared.recipe.check)(&case, &shared.options.limits) {
+        Ok(problem) => problem,
+        Err(error) => return Outcome::Refused(error),
+    };
+    watch.begin();
+    let (solution, fields) = match (shared.recipe.solve)(&problem, watch) {
+        Ok(answer) => answer,
+        Err(error) => return Outcome::Unsolved(error),
+    };
+    let field_patches = u32::try_from(fields.patches.len()).unwrap_or(u32::MAX);
+    let packed = match field_patches {
+        0 => Ok(None),
+        _ => fields::encode(&fields).map(|bytes| Some(Bytes::from(bytes))),
+    };
+    match (serde_json::to_vec(&solution), packed) {
+        (Ok(json), Ok(fields)) => Outcome::Solved {
+            result: Encoded {
+                solution: Bytes::from(json),
+                fields,
+            },
+            warnings: solution.warnings,
+            field_patches,
+        },
+        (Err(error), _) => internal(format!("the solution cannot be written as JSON: {error}")),
+        (_, Err(error)) => internal(format!("the fields cannot be packed: {error}")),
+    }
+}
+
+fn panic_text(payload: &(dyn Any + Send)) -> &str {
+    payload
+        .downcast_ref::<&str>()
+        .copied()
+        .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("no message")
+}

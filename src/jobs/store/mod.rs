@@ -1,0 +1,108 @@
+//! What a job table must promise: the words its calls are made of. One database is one file here.
+//!
+//! Every call takes the current time as an argument (epoch milliseconds), so that tests need no clock. Every write
+//! after a claim names the claim's lease number; a write whose lease number is no longer the job's changes nothing
+//! and says so. The lease number only grows, also when an attempt is handed back uncounted.
+
+pub mod list;
+pub mod sqlite;
+
+use std::collections::BTreeMap;
+
+use bytes::Bytes;
+use uuid::Uuid;
+
+use crate::jobs::job::{Failure, Job, State};
+
+/// A job about to be queued.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NewJob {
+    /// UUIDv7.
+    pub id: Uuid,
+    /// Time of submission.
+    pub created_at: i64,
+    /// Free text of the client.
+    pub name: Option<String>,
+    /// Labels of the client.
+    pub labels: BTreeMap<String, String>,
+    /// The method asked for, for the logs.
+    pub method: String,
+    /// The case as submitted, as JSON text.
+    pub body: Bytes,
+    /// The client's idempotency key with the digest of the case.
+    pub idempotency: Option<(String, [u8; 32])>,
+}
+
+/// What became of an attempt to queue a job.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Enqueued {
+    /// The job is queued.
+    Created(Job),
+    /// The idempotency key already stands for this job, with the same case.
+    Existing(Job),
+    /// The idempotency key already stands for another case.
+    Conflict,
+}
+
+/// The right to work on a job, until the lease runs out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Claim {
+    /// The job.
+    pub id: Uuid,
+    /// Attempts counted so far, this one included.
+    pub attempt: u32,
+    /// The fencing token: number of claims ever made of this job.
+    pub lease_number: u64,
+    /// The method asked for.
+    pub method: String,
+}
+
+/// The answer to a heartbeat.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Renewal {
+    /// The lease is extended.
+    Held {
+        /// The client asked to cancel.
+        cancel_requested: bool,
+    },
+    /// The job was given away or has ended: stop and discard.
+    Lost,
+}
+
+/// How an attempt ends.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Ending {
+    /// The result is stored.
+    Succeeded {
+        /// Remarks of the solution.
+        warnings: Vec<String>,
+        /// Folder of the stored result.
+        result_key: String,
+        /// Patches with stored fields.
+        field_patches: u32,
+    },
+    /// There is no answer.
+    Failed(Failure),
+    /// The client no longer wanted it.
+    Cancelled,
+}
+
+/// Where a result lies.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StoredResult {
+    /// Folder of the stored result.
+    pub key: String,
+    /// Patches with stored fields; 0 if there is no fields object.
+    pub field_patches: usize,
+}
+
+/// What became of a wish to delete a job.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Deleted {
+    /// The row and all that hung on it are gone.
+    Done,
+    /// It has not ended.
+    NotEnded(State),
+    /// There was none.
+    NotFound,
+}

@@ -1,0 +1,281 @@
+//! The job table on one machine, embedded: SQLite with one writing connection and a pool of readers.
+//!
+//! One writer, because SQLite's busy handler has no queue and starves somebody when several connections write; the
+//! pool's own queue is fair. `synchronous=FULL`, because a job that was acknowledged must survive a power cut. Every
+//! transaction that writes begins with `BEGIN IMMEDIATE`: a deferred one that reads first fails at once when it
+//! turns into a writer. The statements keep to what PostgreSQL understands too.
+//!
+//! Here: opening, and what a client asks for. [`claims`] holds what workers ask for, [`lists`] the lists.
+
+pub mod claims;
+pub mod lists;
+mod rows;
+
+use std::path::Path;
+use std::time::Duration;
+
+use bytes::Bytes;
+use sqlx::migrate::{Migration, MigrationType, Migrator};
+use sqlx::sqlite::{
+    SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous,
+};
+use sqlx::{Row, SqlSafeStr};
+use uuid::Uuid;
+
+use crate::jobs::error::JobsError;
+use crate::jobs::job::Job;
+use crate::jobs::store::sqlite::rows::{job_columns, read_job, to_json};
+use crate::jobs::store::{Deleted, Enqueued, NewJob, StoredResult};
+
+const READERS: u32 = 4;
+const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// The embedded job table.
+#[derive(Debug, Clone)]
+pub struct SqliteStore {
+    writer: SqlitePool,
+    readers: SqlitePool,
+}
+
+impl SqliteStore {
+    /// Opens the database file, creates it if there is none, and brings it to the newest form.
+    ///
+    /// # Errors
+    /// The file cannot be opened, or was written by a newer version.
+    pub async fn open(file: &Path) -> Result<SqliteStore, JobsError> {
+        let options = SqliteConnectOptions::new()
+            .filename(file)
+            .create_if_missing(true)
+            .journal_mode(SqliteJournalMode::Wal)
+            .synchronous(SqliteSynchronous::Full)
+            .busy_timeout(BUSY_TIMEOUT)
+            .foreign_keys(true);
+        let pool = |connections: u32| {
+            SqlitePoolOptions::new()
+                .max_connections(connections)
+                .idle_timeout(None)
+                .max_lifetime(None)
+                .test_before_acquire(false)
+        };
+        let writer = pool(1).connect_with(options.clone()).await?;
+        migrations().run(&writer).await?;
+        let readers = pool(READERS).connect_with(options.read_only(true)).await?;
+        Ok(SqliteStore { writer, readers })
+    }
+
+    /// Closes every connection; the write-ahead log is folded into the database.
+    pub async fn close(&self) {
+        self.readers.close().await;
+        self.writer.close().await;
+    }
+
+    /// A round trip to the database.
+    ///
+    /// # Errors
+    /// The database does not answer.
+    pub async fn ping(&self) -> Result<(), JobsError> {
+        sqlx::query("SELECT 1 FROM jobs LIMIT 1")
+            .fetch_optional(&self.readers)
+            .await?;
+        Ok(())
+    }
+
+    /// Queues a job, or finds the one its idempotency key already stands for. Durable once it returns.
+    ///
+    /// # Errors
+    /// The database failed; nothing was stored.
+    pub async fn enqueue(&self, new: &NewJob) -> Result<Enqueued, JobsError> {
+        let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
+        let id = new.id.to_string();
+        let row = sqlx::query(concat!(
+            "INSERT INTO jobs (id, state, name, labels, method, created_at) \
+             VALUES ($1, 'queued', $2, $3, $4, $5) RETURNING ",
+            job_columns!()
+        ))
+        .bind(&id)
+        .bind(&new.name)
+        .bind(to_json(&new.labels)?)
+        .bind(&new.method)
+        .bind(new.created_at)
+        .fetch_one(&mut *transaction)
+        .await?;
+        if let Some((key, digest)) = &new.idempotency {
+            let inserted = sqlx::query(
+                "INSERT INTO idempotency_keys (key, digest, job_id) VALUES ($1, $2, $3) ON CONFLICT (key) DO NOTHING",
+            )
+            .bind(key)
+            .bind(digest.as_slice())
+            .bind(&id)
+            .execute(&mut *transaction)
+            .await?;
+            if inserted.rows_affected() == 0 {
+                transaction.rollback().await?;
+                let found = self.by_key(key, digest).await?;
+                // The job of the key was deleted in between; the client's next try will find the key free.
+                return found.ok_or(JobsError::IdempotencyConflict);
+            }
+        }
+        sqlx::query("INSERT INTO cases (job_id, body) VALUES ($1, $2)")
+            .bind(&id)
+            .bind(new.body.as_ref())
+            .execute(&mut *transaction)
+            .await?;
+        for (key, value) in &new.labels {
+            sqlx::query("INSERT INTO job_labels (key, value, job_id) VALUES ($1, $2, $3)")
+                .bind(key)
+                .bind(value)
+                .bind(&id)
+                .execute(&mut *transaction)
+                .await?;
+        }
+        transaction.commit().await?;
+        Ok(Enqueued::Created(read_job(&row)?))
+    }
+
+    /// What an idempotency key stands for, if it was used.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn by_key(
+        &self,
+        key: &str,
+        digest: &[u8; 32],
+    ) -> Result<Option<Enqueued>, JobsError> {
+        let row = sqlx::query(concat!(
+            "SELECT ",
+            job_columns!(),
+            ", digest FROM idempotency_keys JOIN jobs ON jobs.id = idempotency_keys.job_id WHERE key = $1"
+        ))
+        .bind(key)
+        .fetch_optional(&self.readers)
+        .await?;
+        let Some(row) = row else { return Ok(None) };
+        let stored: Vec<u8> = row.try_get("digest")?;
+        Ok(Some(if stored == digest {
+            Enqueued::Existing(read_job(&row)?)
+        } else {
+            Enqueued::Conflict
+        }))
+    }
+
+    /// Number of queued jobs, counted no further than `at_most`.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn queued(&self, at_most: u64) -> Result<u64, JobsError> {
+        let count: i64 = sqlx::query_scalar(
+            "SELECT COUNT(*) FROM (SELECT 1 FROM jobs WHERE state = 'queued' LIMIT $1) AS waiting",
+        )
+        .bind(i64::try_from(at_most).unwrap_or(i64::MAX))
+        .fetch_one(&self.readers)
+        .await?;
+        Ok(u64::try_from(count).unwrap_or(0))
+    }
+
+    /// Cancels a queued job at once and asks the worker of a running one to stop; an ended job stays as it is.
+    /// Returns the job as it then is, `None` if there is none.
+    ///
+    /// # Errors
+    /// The database failed; nothing changed.
+    pub async fn cancel(&self, id: Uuid, now: i64) -> Result<Option<Job>, JobsError> {
+        let row = sqlx::query(concat!(
+            "UPDATE jobs SET state = CASE WHEN state = 'queued' THEN 'cancelled' ELSE state END, \
+             ended_at = CASE WHEN state = 'queued' THEN $1 ELSE NULL END, \
+             cancel_requested = 1, version = version + 1 \
+             WHERE id = $2 AND cancel_requested = 0 AND state IN ('queued', 'running') RETURNING ",
+            job_columns!()
+        ))
+        .bind(now)
+        .bind(id.to_string())
+        .fetch_optional(&self.writer)
+        .await?;
+        match row {
+            Some(row) => read_job(&row).map(Some),
+            None => self.get(id).await,
+        }
+    }
+
+    /// Removes an ended job with its case, labels and idempotency key.
+    ///
+    /// # Errors
+    /// The database failed; nothing changed.
+    pub async fn delete(&self, id: Uuid) -> Result<Deleted, JobsError> {
+        let gone = sqlx::query(
+            "DELETE FROM jobs WHERE id = $1 AND state IN ('succeeded', 'failed', 'cancelled')",
+        )
+        .bind(id.to_string())
+        .execute(&self.writer)
+        .await?;
+        if gone.rows_affected() > 0 {
+            return Ok(Deleted::Done);
+        }
+        let job = self.get(id).await?;
+        Ok(job.map_or(Deleted::NotFound, |job| Deleted::NotEnded(job.state)))
+    }
+
+    /// Looks at one job.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn get(&self, id: Uuid) -> Result<Option<Job>, JobsError> {
+        let row = sqlx::query(concat!(
+            "SELECT ",
+            job_columns!(),
+            " FROM jobs WHERE id = $1"
+        ))
+        .bind(id.to_string())
+        .fetch_optional(&self.readers)
+        .await?;
+        row.as_ref().map(read_job).transpose()
+    }
+
+    /// The case of a job as submitted, and whether its cancellation was asked for.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn case(&self, id: Uuid) -> Result<Option<(Bytes, bool)>, JobsError> {
+        let row = sqlx::query(
+            "SELECT body, cancel_requested FROM cases JOIN jobs ON jobs.id = cases.job_id WHERE job_id = $1",
+        )
+        .bind(id.to_string())
+        .fetch_optional(&self.readers)
+        .await?;
+        let Some(row) = row else { return Ok(None) };
+        let body: Vec<u8> = row.try_get("body")?;
+        Ok(Some((Bytes::from(body), row.try_get("cancel_requested")?)))
+    }
+
+    /// A job with the place of its result, if it has one.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn result(&self, id: Uuid) -> Result<Option<(Job, Option<StoredResult>)>, JobsError> {
+        let row = sqlx::query(concat!(
+            "SELECT ",
+            job_columns!(),
+            ", result_key, field_patches FROM jobs WHERE id = $1"
+        ))
+        .bind(id.to_string())
+        .fetch_optional(&self.readers)
+        .await?;
+        let Some(row) = row else { return Ok(None) };
+        let patches: u32 = row.try_get("field_patches")?;
+        let key: Option<String> = row.try_get("result_key")?;
+        let stored = key.map(|key| StoredResult {
+            key,
+            field_patches: patches as usize,
+        });
+        Ok(Some((read_job(&row)?, stored)))
+    }
+}
+
+/// The forms the job table has had; a new one is added at the end, an old one is never edited.
+fn migrations() -> Migrator {
+    Migrator::with_migrations(vec![Migration::new(
+        1,
+        "jobs".into(),
+        MigrationType::Simple,
+        include_str!("schema.sql").into_sql_str(),
+        false,
+    )])
+}

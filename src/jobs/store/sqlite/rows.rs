@@ -1,0 +1,60 @@
+//! Rows of the job table as the words of this room, and back.
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+use uuid::Uuid;
+
+use crate::jobs::error::JobsError;
+use crate::jobs::job::{Job, State};
+
+/// The columns a [`Job`] is read from.
+macro_rules! job_columns {
+    () => {
+        "id, state, name, labels, created_at, started_at, ended_at, attempt, progress, warnings, failure, version"
+    };
+}
+pub(super) use job_columns;
+
+/// Reads a row that has the columns of `job_columns`.
+pub(super) fn read_job(row: &SqliteRow) -> Result<Job, JobsError> {
+    let failure: Option<String> = row.try_get("failure")?;
+    Ok(Job {
+        id: read_id(row)?,
+        state: read_state(row)?,
+        name: row.try_get("name")?,
+        labels: from_json(row.try_get("labels")?)?,
+        created_at: row.try_get("created_at")?,
+        started_at: row.try_get("started_at")?,
+        ended_at: row.try_get("ended_at")?,
+        attempt: row.try_get("attempt")?,
+        progress: row.try_get("progress")?,
+        warnings: from_json(row.try_get("warnings")?)?,
+        failure: failure.as_deref().map(from_json).transpose()?,
+        version: read_count(row, "version")?,
+    })
+}
+
+pub(super) fn read_id(row: &SqliteRow) -> Result<Uuid, JobsError> {
+    let text: &str = row.try_get("id")?;
+    Uuid::try_parse(text).map_err(|error| JobsError::Damaged(format!("job id {text:?}: {error}")))
+}
+
+pub(super) fn read_state(row: &SqliteRow) -> Result<State, JobsError> {
+    let name: &str = row.try_get("state")?;
+    State::from_name(name).ok_or_else(|| JobsError::Damaged(format!("job state {name:?}")))
+}
+
+pub(super) fn read_count(row: &SqliteRow, column: &str) -> Result<u64, JobsError> {
+    let count: i64 = row.try_get(column)?;
+    u64::try_from(count).map_err(|_| JobsError::Damaged(format!("{column} is {count}")))
+}
+
+pub(super) fn to_json<T: Serialize>(value: &T) -> Result<String, JobsError> {
+    serde_json::to_string(value).map_err(|error| JobsError::Damaged(error.to_string()))
+}
+
+fn from_json<T: DeserializeOwned>(text: &str) -> Result<T, JobsError> {
+    serde_json::from_str(text).map_err(|error| JobsError::Damaged(format!("{text:.80}: {error}")))
+}

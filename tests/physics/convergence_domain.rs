@@ -1,0 +1,142 @@
+//! Where `liu_hsu` converges, counted over the same motions on every region.
+
+use railhead::contact::mesh::Grading;
+use railhead::contact::monitor::Unwatched;
+use railhead::contact::tangential::liu_hsu::active_set::{Attempt, Exit};
+use railhead::contact::tangential::liu_hsu::initial_guess::Guess;
+use railhead::contact::tangential::liu_hsu::{coarse_pole, solve_by_upwind, solve_with};
+use railhead::contact::tangential::rules::Rule;
+
+use crate::regions::{Contact, Region, motion};
+
+/// Normalised motions: creepage 0 to 3 in four directions, spin 0 to 20; 218 of them.
+pub fn motions() -> Vec<[f64; 3]> {
+    let root = std::f64::consts::FRAC_1_SQRT_2;
+    let mut motions = Vec::new();
+    for spin in [0.0, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0] {
+        if spin > 0.0 {
+            motions.push([0.0, 0.0, spin]);
+        }
+        for size in [0.1, 0.3, 0.6, 1.0, 2.0, 3.0] {
+            for [x, y] in [[1.0, 0.0], [0.0, 1.0], [0.0, -1.0], [root, root]] {
+                // Without spin the third direction is the second one turned round.
+                if spin > 0.0 || y >= 0.0 {
+                    motions.push([size * x, size * y, spin]);
+                }
+            }
+        }
+    }
+    motions
+}
+
+/// How many motions converged, and how the others ended.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Counts {
+    pub motions: usize,
+    /// Guess 1 alone.
+    pub guess_1: usize,
+    /// Guess 2 alone, about the pole of a coarse mesh; without spin there is none, and guess 1 counts.
+    pub guess_2: usize,
+    /// The continued tractions alone.
+    pub continued: usize,
+    /// Guess 1, then guess 2: the paper.
+    pub paper: usize,
+    /// All there is: the paper, then the continued run, for other rules than upwind from an upwind solution.
+    pub shipped: usize,
+    /// Ends of the three alone: Newton–Raphson diverged, zones repeat, anything else.
+    pub failures: [[usize; 3]; 3],
+    /// Divisions and Newton–Raphson steps of the converged runs of the three.
+    pub work: [[u32; 2]; 3],
+}
+
+impl Counts {
+    /// One row of a table.
+    pub fn row(&self) -> String {
+        let per_run = |k: usize, runs: usize| {
+            let [outer, newton] = self.work[k].map(|w| f64::from(w) / runs.max(1) as f64);
+            let [diverged, repeated, other] = self.failures[k];
+            format!("{outer:.1} + {newton:.1}, {diverged}/{repeated}/{other}")
+        };
+        format!(
+            "{:3} | {:3} | {:3} | {:3} | {:3} of {} | {} | {} | {}",
+            self.guess_1,
+            self.guess_2,
+            self.continued,
+            self.paper,
+            self.shipped,
+            self.motions,
+            per_run(0, self.guess_1),
+            per_run(1, self.guess_2),
+            per_run(2, self.continued),
+        )
+    }
+}
+
+/// Runs every guess alone on each motion. The coarse mesh has 25 cells or fewer.
+pub fn count(region: Region, rule: Rule, mesh: (usize, &Grading), motions: &[[f64; 3]]) -> Counts {
+    let per_patch = |strips: usize| {
+        if region == Region::TwoCircles {
+            strips / 2
+        } else {
+            strips
+        }
+    };
+    let fine = Contact::new(region, per_patch(mesh.0), mesh.1);
+    let coarse = Contact::new(region, per_patch(5), &Grading::uniform(5));
+    let (on_fine, on_coarse) = (fine.equations(rule), coarse.equations(rule));
+    let on_upwind = fine.equations(Rule::Upwind);
+    let mut counts = Counts {
+        motions: motions.len(),
+        ..Counts::default()
+    };
+    let mut t = vec![0.0; 2 * on_fine.padded()];
+    for state in motions {
+        let motion = motion(*state);
+        let (rigid, rigid_coarse) = (on_fine.rigid(&motion), on_coarse.rigid(&motion));
+        let stage = fine.stage(&on_fine, &rigid, motion, 1e-8);
+        let first_stage = coarse.stage(&on_coarse, &rigid_coarse, motion, 1e-8);
+        let pole = coarse_pole(&first_stage, &Unwatched).unwrap();
+        let mut converges = [false; 3];
+        for (k, guess) in [
+            Guess::RigidSlip,
+            pole.map_or(Guess::RigidSlip, Guess::SpinPole),
+            Guess::Continued,
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            t.fill(0.0);
+            let outcome = solve_with(&stage, guess, &mut t, &Unwatched).unwrap();
+            converges[k] = outcome.converged;
+            counts.note(k, outcome.last());
+        }
+        counts.guess_1 += usize::from(converges[0]);
+        counts.guess_2 += usize::from(converges[1]);
+        counts.continued += usize::from(converges[2]);
+        let paper = converges[0] || converges[1];
+        counts.paper += usize::from(paper);
+        let rigid = on_upwind.rigid(&motion);
+        let upwind = fine.stage(&on_upwind, &rigid, motion, 1e-8);
+        t.fill(0.0);
+        let shipped = paper
+            || solve_by_upwind(&stage, &upwind, None, &mut t, &Unwatched)
+                .unwrap()
+                .converged;
+        counts.shipped += usize::from(shipped);
+    }
+    counts
+}
+
+impl Counts {
+    fn note(&mut self, k: usize, attempt: &Attempt) {
+        match attempt.exit {
+            Exit::Converged => {
+                self.work[k][0] += attempt.outer_iterations;
+                self.work[k][1] += attempt.newton_iterations;
+            }
+            Exit::NewtonDiverged => self.failures[k][0] += 1,
+            Exit::ZonesRepeat => self.failures[k][1] += 1,
+            _ => self.failures[k][2] += 1,
+        }
+    }
+}

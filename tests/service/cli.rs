@@ -1,0 +1,196 @@
+//! Do the commands do what they say?
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Output, Stdio};
+
+use serde_json::{Value, json};
+
+use crate::support::{Service, case, railhead};
+
+fn example(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("api/examples")
+        .join(name)
+}
+
+/// Runs `railhead solve -` on a text.
+fn solve(text: &str) -> Output {
+    let mut child = railhead()
+        .args(["solve", "-"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    child
+        .stdin
+        .take()
+        .unwrap()
+        .write_all(text.as_bytes())
+        .unwrap();
+    child.wait_with_output().unwrap()
+}
+
+fn complaints(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+#[test]
+fn a_case_is_solved_without_a_server() {
+    let file = example("hertz-steel.case.json");
+    let output = railhead().arg("solve").arg(&file).output().unwrap();
+    assert!(output.status.success(), "{}", complaints(&output));
+    let from_file: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(from_file["total"][0]["force_x_n"].as_f64().unwrap().abs() > 1.0);
+    assert!(
+        from_file["patches"][0]["points"][0]["slip_area_mm2"]
+            .as_f64()
+            .unwrap()
+            > 0.0
+    );
+
+    let from_input = solve(&std::fs::read_to_string(file).unwrap());
+    let from_input: Value = serde_json::from_slice(&from_input.stdout).unwrap();
+    assert_eq!(from_input["total"], from_file["total"]);
+    assert_eq!(from_input["case_digest"], from_file["case_digest"]);
+}
+
+#[test]
+fn values_per_cell_come_along_only_if_asked_for() {
+    let mut asked = case("with fields");
+    asked["outputs"] = json!(["zones", "tractions", "slip", "pressure"]);
+    let answer: Value = serde_json::from_slice(&solve(&asked.to_string()).stdout).unwrap();
+    let cells = answer["fields"][0]["x_mm"].as_array().unwrap().len();
+    assert!(cells > 0);
+    assert_eq!(
+        answer["fields"][0]["pressure_mpa"]
+            .as_array()
+            .unwrap()
+            .len(),
+        cells
+    );
+    for name in [
+        "zone",
+        "traction_x_mpa",
+        "traction_y_mpa",
+        "slip_x",
+        "slip_y",
+    ] {
+        let values = answer["fields"][0]["points"][0][name].as_array().unwrap();
+        assert_eq!(values.len(), cells, "{name}");
+    }
+    asked["outputs"] = json!(["resultants"]);
+    let answer: Value = serde_json::from_slice(&solve(&asked.to_string()).stdout).unwrap();
+    assert_eq!(answer.get("fields"), None);
+}
+
+#[test]
+fn a_faulty_case_names_every_fault_and_exits_with_2() {
+    let output = railhead()
+        .arg("solve")
+        .arg(example("faulty.case.json"))
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert_eq!(output.stdout, b"");
+    let faults = complaints(&output);
+    assert!(faults.lines().count() > 1, "{faults}");
+    assert!(
+        faults.lines().all(|line| line.starts_with("railhead: /")),
+        "{faults}"
+    );
+
+    let broken = solve("{\"name\": ");
+    assert_eq!(broken.status.code(), Some(2));
+    assert!(
+        complaints(&broken).contains("line 1 column 9"),
+        "{}",
+        complaints(&broken)
+    );
+}
+
+#[test]
+fn a_case_without_answer_exits_with_1() {
+    let mut hurried = case("hurried");
+    hurried["solver"]["time_limit_s"] = json!(1e-9);
+    let output = solve(&hurried.to_string());
+    assert_eq!(output.status.code(), Some(1));
+    assert!(
+        complaints(&output).contains("out of time"),
+        "{}",
+        complaints(&output)
+    );
+
+    let output = railhead().args(["solve", "no/such.json"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(
+        complaints(&output).contains("no/such.json"),
+        "{}",
+        complaints(&output)
+    );
+}
+
+#[test]
+fn the_contract_can_be_printed() {
+    let output = railhead().arg("openapi").output().unwrap();
+    assert!(output.status.success());
+    let printed = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(
+        printed.trim_end(),
+        railhead::http::openapi_json().trim_end()
+    );
+}
+
+#[test]
+fn a_health_check_tells_a_ready_service_from_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &[]);
+    let check = |url: &str| {
+        railhead()
+            .args(["healthcheck", "--url", url])
+            .output()
+            .unwrap()
+    };
+    let url = |path: &str| format!("http://{}{path}", service.address());
+    let (ready, elsewhere) = (url("/readyz"), url("/nothing"));
+    assert!(check(&ready).status.success());
+    let wrong = check(&elsewhere);
+    assert_eq!(wrong.status.code(), Some(1));
+    assert!(complaints(&wrong).contains("404"), "{}", complaints(&wrong));
+    service.kill();
+    assert_eq!(check(&ready).status.code(), Some(1));
+}
+
+#[test]
+fn settings_come_from_the_environment_too_and_flags_win() {
+    let folder = tempfile::tempdir().unwrap();
+    let serve = |flags: &[&str]| {
+        let mut command = railhead();
+        command
+            .arg("serve")
+            .args(flags)
+            .env("RAILHEAD_DATA_DIR", folder.path());
+        command
+            .env("RAILHEAD_LISTEN", "127.0.0.1:1:1")
+            .output()
+            .unwrap()
+    };
+    let output = serve(&[]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        complaints(&output).contains("127.0.0.1:1:1"),
+        "{}",
+        complaints(&output)
+    );
+
+    let running = Service::start(folder.path(), &[]);
+    let output = serve(&["--listen", "127.0.0.1:0"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(
+        complaints(&output).contains("in use"),
+        "{}",
+        complaints(&output)
+    );
+    running.kill();
+}

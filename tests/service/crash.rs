@@ -1,0 +1,133 @@
+//! Does a job that was acknowledged survive the death of the process?
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use reqwest::Method;
+use serde_json::Value;
+
+use crate::support::{Service, long_case, pause};
+
+const JOBS: usize = 50;
+/// Motions per job: enough to be met while running.
+const MOTIONS: u32 = 8;
+
+async fn count(service: &Service, state: &str) -> usize {
+    let list = service
+        .get(&format!("/v1/jobs?limit=1000&state={state}"))
+        .await;
+    list["jobs"].as_array().unwrap().len()
+}
+
+/// Waits until so many jobs have succeeded while another is running.
+async fn until_busy(service: &Service, succeeded: usize) {
+    while count(service, "succeeded").await < succeeded || count(service, "running").await == 0 {
+        assert!(count(service, "failed").await == 0, "no job may fail");
+        pause().await;
+    }
+}
+
+/// The succeeded jobs as the API shows them, by id.
+async fn succeeded(service: &Service) -> BTreeMap<String, Value> {
+    let list = service.get("/v1/jobs?limit=1000&state=succeeded").await;
+    let jobs = list["jobs"].as_array().unwrap().iter();
+    jobs.map(|job| (job["id"].as_str().unwrap().to_owned(), job.clone()))
+        .collect()
+}
+
+/// The folders below `results` that hold a solution, one entry per job and attempt.
+fn stored_solutions(folder: &Path) -> Vec<String> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.extend(stored_solutions(&path));
+        } else if path.file_name().unwrap() == "solution.json" {
+            let job = path
+                .parent()
+                .unwrap()
+                .parent()
+                .unwrap()
+                .file_name()
+                .unwrap();
+            found.push(job.to_str().unwrap().to_owned());
+        }
+    }
+    found
+}
+
+#[tokio::test]
+async fn every_acknowledged_job_succeeds_once_although_the_process_is_killed_twice() {
+    let folder = tempfile::tempdir().unwrap();
+    let flags = ["--workers", "2"];
+    let service = Service::start(folder.path(), &flags);
+    let mut ids = BTreeSet::new();
+    for number in 0..JOBS {
+        ids.insert(
+            service
+                .submit(&long_case(&format!("case {number}"), MOTIONS))
+                .await,
+        );
+    }
+    assert_eq!(ids.len(), JOBS);
+
+    until_busy(&service, 3).await;
+    let before_first = succeeded(&service).await;
+    service.kill();
+
+    let service = Service::start(folder.path(), &flags);
+    until_busy(&service, before_first.len() + 3).await;
+    let before_second = succeeded(&service).await;
+    service.kill();
+
+    let service = Service::start(folder.path(), &flags);
+    while count(&service, "succeeded").await < JOBS {
+        assert_eq!(count(&service, "failed").await, 0);
+        pause().await;
+    }
+    let after = succeeded(&service).await;
+    assert_eq!(after.keys().cloned().collect::<BTreeSet<_>>(), ids);
+    for earlier in [before_first, before_second] {
+        for (id, job) in earlier {
+            assert_eq!(after[&id], job, "what had succeeded was not touched again");
+        }
+    }
+    let attempts = after.values().map(|job| job["attempt"].as_u64().unwrap());
+    assert!(
+        attempts.sum::<u64>() > JOBS as u64,
+        "the kills met running jobs"
+    );
+
+    for id in &ids {
+        let result = service.get(&format!("/v1/jobs/{id}/result")).await;
+        assert_eq!(result["total"].as_array().unwrap().len(), MOTIONS as usize);
+        assert!(result["total"][0]["force_x_n"].as_f64().unwrap() != 0.0);
+    }
+    let mut stored = stored_solutions(&folder.path().join("results"));
+    stored.sort_unstable();
+    assert_eq!(
+        stored,
+        ids.into_iter().collect::<Vec<_>>(),
+        "one result per job"
+    );
+}
+
+#[tokio::test]
+async fn an_idempotency_key_outlives_the_process() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = long_case("once", 2);
+    let mut ids = BTreeSet::new();
+    for _ in 0..2 {
+        let service = Service::start(folder.path(), &[]);
+        let submit = service
+            .request(Method::POST, "/v1/jobs")
+            .header("Idempotency-Key", "k1");
+        let answer = submit.json(&case).send().await.unwrap();
+        let status = answer.status();
+        let job: Value = answer.json().await.unwrap();
+        assert!(status.is_success(), "{status}: {job}");
+        ids.insert(job["id"].as_str().unwrap().to_owned());
+        service.kill();
+    }
+    assert_eq!(ids.len(), 1);
+}

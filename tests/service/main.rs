@@ -1,0 +1,18 @@
+//! Does the service behave?
+
+mod api;
+mod cli;
+mod contract;
+mod crash;
+mod documents;
+mod errors;
+mod requests;
+mod results;
+mod schema;
+mod server;
+mod shutdown;
+mod store;
+mod store_lists;
+mod store_model;
+mod support;
+mod worker;

@@ -1,0 +1,264 @@
+//! Requests that cannot be read: bodies, queries and headers.
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use reqwest::Method;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+
+use crate::errors::assert_problem;
+use crate::server::{Server, Setup, example, example_text};
+
+#[tokio::test]
+async fn malformed_json_is_answered_with_its_position() {
+    let server = Server::idle().await;
+    let deep = "[".repeat(10_000);
+    for (body, line, word) in [
+        ("", 1, "EOF"),
+        ("{\n  \"name\": \"x\",\n}", 3, "trailing comma"),
+        ("{\"friction\": NaN}", 1, "expected value"),
+        (
+            "{\"friction\": {\"coefficient\": 1e999}}",
+            1,
+            "out of range",
+        ),
+        ("{\n\"name\": \"a\",\n\"name\": \"b\"}", 3, "written twice"),
+        (deep.as_str(), 1, "recursion limit"),
+    ] {
+        for path in ["/v1/jobs", "/v1/cases/check"] {
+            let raw = |request: reqwest::RequestBuilder| {
+                request
+                    .header("content-type", "application/json")
+                    .body(body.to_owned())
+            };
+            let answer = server.send(Method::POST, path, raw).await;
+            assert_problem(&answer, 400, "malformed-json", word);
+            assert_eq!(answer.json["line"], line, "{}", answer.text);
+            assert!(answer.json["column"].is_u64(), "{}", answer.text);
+        }
+    }
+}
+
+#[tokio::test]
+async fn body_must_be_declared_as_json() {
+    let server = Server::idle().await;
+    let case = example_text("spin.case.json");
+    for content_type in [
+        None,
+        Some("text/plain"),
+        Some("application/x-www-form-urlencoded"),
+        Some("jsonapplication/"),
+    ] {
+        let answer = server
+            .send(Method::POST, "/v1/jobs", |request| {
+                let request = request.body(case.clone());
+                content_type.map_or(request.try_clone().expect("a request"), |name| {
+                    request.header("content-type", name)
+                })
+            })
+            .await;
+        assert_problem(&answer, 415, "unsupported-media-type", "application/json");
+    }
+    let charset = |request: reqwest::RequestBuilder| {
+        request
+            .header("content-type", "Application/JSON; charset=utf-8")
+            .body(case.clone())
+    };
+    assert_eq!(
+        server.send(Method::POST, "/v1/jobs", charset).await.status,
+        202
+    );
+}
+
+#[tokio::test]
+async fn body_size_is_limited_exactly() {
+    let case = example_text("spin.case.json");
+    let mut setup = Setup::new();
+    setup.working = false;
+    setup.http.body_max_bytes = case.len();
+    let server = setup.start().await;
+    let send = |body: String| {
+        server.send(Method::POST, "/v1/jobs", |request| {
+            request
+                .header("content-type", "application/json")
+                .body(body)
+        })
+    };
+    assert_eq!(send(case.clone()).await.status, 202);
+    assert_problem(
+        &send(format!("{case} ")).await,
+        413,
+        "body-too-large",
+        &case.len().to_string(),
+    );
+}
+
+/// Writes raw bytes to the service and reads the whole answer.
+async fn raw(server: &Server, request: &str) -> String {
+    let mut stream = tokio::net::TcpStream::connect(server.address)
+        .await
+        .expect("a connection");
+    stream
+        .write_all(request.as_bytes())
+        .await
+        .expect("the request is written");
+    let mut answer = Vec::new();
+    stream
+        .read_to_end(&mut answer)
+        .await
+        .expect("the answer is read");
+    String::from_utf8_lossy(&answer).into_owned()
+}
+
+const RAW_HEAD: &str =
+    "POST /v1/jobs HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Type: application/json\r\n";
+
+#[tokio::test]
+async fn body_of_unknown_length_is_limited_too() {
+    let mut setup = Setup::new();
+    setup.http.body_max_bytes = 100;
+    let server = setup.start().await;
+    let chunk = format!("c8\r\n{}\r\n0\r\n\r\n", " ".repeat(200));
+    let answer = raw(
+        &server,
+        &format!("{RAW_HEAD}Transfer-Encoding: chunked\r\n\r\n{chunk}"),
+    )
+    .await;
+    assert!(
+        answer.starts_with("HTTP/1.1 413") && answer.contains("/problems/body-too-large"),
+        "{answer}"
+    );
+}
+
+#[tokio::test]
+async fn body_that_never_comes_is_given_up() {
+    let mut setup = Setup::new();
+    setup.http.body_timeout = Duration::from_millis(20);
+    let server = setup.start().await;
+    let answer = raw(&server, &format!("{RAW_HEAD}Content-Length: 10\r\n\r\n{{")).await;
+    assert!(
+        answer.starts_with("HTTP/1.1 408") && answer.contains("/problems/body-timeout"),
+        "{answer}"
+    );
+}
+
+#[tokio::test]
+async fn body_that_breaks_is_refused() {
+    let server = Server::idle().await;
+    let answer = raw(
+        &server,
+        &format!("{RAW_HEAD}Transfer-Encoding: chunked\r\n\r\nno chunk\r\n"),
+    )
+    .await;
+    assert!(
+        answer.starts_with("HTTP/1.1 400") && answer.contains("/problems/unreadable-body"),
+        "{answer}"
+    );
+}
+
+#[tokio::test]
+async fn bad_query_names_every_parameter_with_its_value() {
+    let server = Server::idle().await;
+    let answer = server.get("/v1/jobs?limit=0&state=done&label=x&created_after=yesterday&colour=red&cursor=a&cursor=b").await;
+    assert_problem(&answer, 400, "bad-query", "1 to 1000");
+    let errors = answer.json["errors"].as_array().expect("errors");
+    let named: BTreeSet<&str> = errors
+        .iter()
+        .filter_map(|error| error["parameter"].as_str())
+        .collect();
+    assert_eq!(
+        named,
+        BTreeSet::from([
+            "limit",
+            "state",
+            "label",
+            "created_after",
+            "colour",
+            "cursor"
+        ]),
+        "{}",
+        answer.text
+    );
+    let state = errors
+        .iter()
+        .find(|error| error["parameter"] == "state")
+        .expect("the fault of `state`");
+    let detail = state["detail"].as_str().expect("a detail");
+    assert!(
+        detail.contains("`done`")
+            && detail.contains("queued, running, succeeded, failed, cancelled"),
+        "{detail}"
+    );
+    assert_problem(
+        &server.get("/v1/jobs?limit=1001").await,
+        400,
+        "bad-query",
+        "1001",
+    );
+    assert_problem(
+        &server.get("/v1/jobs?cursor=unheard-of").await,
+        400,
+        "bad-query",
+        "cursor",
+    );
+    assert_eq!(
+        server.get("/v1/jobs?limit=1000.0").await.status,
+        200,
+        "an integral float is a whole number"
+    );
+    let path = server.submit(&example("spin.case.json")).await;
+    for query in [
+        "grid=1x5",
+        "grid=5",
+        "grid=5x1001",
+        "grid=-5x5",
+        "point=-1",
+        "patch=0.5",
+        "points=1",
+    ] {
+        let name = query.split('=').next().expect("a name");
+        assert_problem(
+            &server.get(&format!("{path}/tractions?{query}")).await,
+            400,
+            "bad-query",
+            name,
+        );
+    }
+}
+
+#[tokio::test]
+async fn bad_idempotency_keys_are_refused() {
+    let server = Server::idle().await;
+    let send = |key: String| {
+        server.send(Method::POST, "/v1/jobs", |request| {
+            request
+                .header("idempotency-key", key)
+                .json(&example("spin.case.json"))
+        })
+    };
+    assert_problem(&send("x".repeat(256)).await, 400, "bad-header", "255");
+    assert_problem(&send(String::new()).await, 400, "bad-header", "255");
+    assert_eq!(send("x".repeat(255)).await.status, 202);
+}
+
+#[tokio::test]
+async fn answers_that_exclude_json_are_refused() {
+    let server = Server::idle().await;
+    for path in ["/v1/jobs", "/v1/methods", "/v1/jobs/x/result"] {
+        let answer = server
+            .send(Method::GET, path, |request| {
+                request.header("accept", "text/csv")
+            })
+            .await;
+        assert_problem(&answer, 406, "not-acceptable", "text/csv");
+    }
+    let browser = "text/html,application/xhtml+xml,*/*;q=0.8";
+    assert_eq!(
+        server
+            .send(Method::GET, "/v1/jobs", |request| request
+                .header("accept", browser))
+            .await
+            .status,
+        200
+    );
+}

@@ -1,0 +1,287 @@
+//! What comes out: fields, zones, grids and sweeps, against each other and against the real solver.
+
+use serde_json::{Value, json};
+
+use crate::server::{Server, example};
+
+/// The numbers of an array.
+fn numbers(value: &Value) -> Vec<f64> {
+    let items = value
+        .as_array()
+        .unwrap_or_else(|| panic!("{value} is no array"));
+    items
+        .iter()
+        .map(|item| {
+            item.as_f64()
+                .unwrap_or_else(|| panic!("{item} is no number"))
+        })
+        .collect()
+}
+
+/// A number.
+pub fn number(value: &Value) -> f64 {
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+/// The path of a job.
+pub fn path_of(job: &Value) -> String {
+    job["links"]["self"].as_str().expect("a link").to_owned()
+}
+
+fn assert_close(left: f64, right: f64, scale: f64, what: &str) {
+    assert!(
+        (left - right).abs() <= 1e-9 * scale,
+        "{what}: {left} and {right} differ"
+    );
+}
+
+#[tokio::test]
+async fn fields_add_up_to_the_resultants() {
+    let server = Server::start().await;
+    let job = server.solve(&example("spin.case.json")).await;
+    let path = path_of(&job);
+    let patch = &job["result"]["patches"][0];
+    let point = &patch["points"][0];
+    let load = number(&patch["normal_force_n"]);
+    let resultants = server.get(&format!("{path}/resultants")).await.json;
+    for name in [
+        "force_x_n",
+        "force_y_n",
+        "moment_z_n_mm",
+        "friction_power_n",
+    ] {
+        assert_eq!(
+            resultants["patches"][0]["points"][0][name], point[name],
+            "{name}"
+        );
+    }
+    let sum = |cells: &Value, name: &str| -> f64 {
+        let (dx, dy) = (numbers(&cells["dx_mm"]), numbers(&cells["dy_mm"]));
+        numbers(&cells[name])
+            .iter()
+            .zip(dx.iter().zip(&dy))
+            .map(|(value, (dx, dy))| value * dx * dy)
+            .sum()
+    };
+    let tractions = server
+        .get(&format!("{path}/tractions?point=0&patch=0"))
+        .await
+        .json;
+    assert_close(
+        sum(&tractions["cells"], "traction_x_mpa"),
+        number(&point["force_x_n"]),
+        load,
+        "force x",
+    );
+    assert_close(
+        sum(&tractions["cells"], "traction_y_mpa"),
+        number(&point["force_y_n"]),
+        load,
+        "force y",
+    );
+    let pressure = server.get(&format!("{path}/pressure")).await.json;
+    assert_close(
+        sum(&pressure["cells"], "pressure_mpa"),
+        load,
+        load,
+        "normal force",
+    );
+    assert!(
+        tractions["cells"].get("pressure_mpa").is_none(),
+        "a field answers its own values only"
+    );
+    let slip = server.get(&format!("{path}/slip")).await.json;
+    assert_eq!(
+        numbers(&slip["cells"]["slip_x"]).len(),
+        numbers(&pressure["cells"]["pressure_mpa"]).len()
+    );
+}
+
+/// Area inside closed polygons; holes count negative.
+fn area(polygons: &Value) -> f64 {
+    let polygons = polygons
+        .as_array()
+        .expect("polygons")
+        .iter()
+        .map(|polygon| {
+            let corners: Vec<Vec<f64>> = polygon
+                .as_array()
+                .expect("corners")
+                .iter()
+                .map(numbers)
+                .collect();
+            let next = corners.iter().cycle().skip(1);
+            corners
+                .iter()
+                .zip(next)
+                .map(|(a, b)| 0.5 * (a[0] * b[1] - b[0] * a[1]))
+                .sum::<f64>()
+        });
+    polygons.sum()
+}
+
+#[tokio::test]
+async fn outlines_enclose_the_areas_of_the_zones() {
+    let server = Server::start().await;
+    let job = server.solve(&example("hertz-steel.case.json")).await;
+    let zones = server.get(&format!("{}/zones", path_of(&job))).await.json;
+    let (stick, slip) = (
+        number(&zones["stick_area_mm2"]),
+        number(&zones["slip_area_mm2"]),
+    );
+    assert!(
+        stick > 1.0 && slip > 1.0,
+        "the patch sticks on {stick} and slips on {slip} mm²"
+    );
+    let patch = &job["result"]["patches"][0];
+    assert_eq!(
+        (
+            &patch["points"][0]["stick_area_mm2"],
+            &patch["points"][0]["slip_area_mm2"]
+        ),
+        (&zones["stick_area_mm2"], &zones["slip_area_mm2"])
+    );
+    assert_close(stick + slip, number(&patch["area_mm2"]), 1.0, "both areas");
+    let cells = area(&zones["outlines"]["stick"]) + area(&zones["outlines"]["slip"]);
+    let words = zones["cells"]["zone"].as_array().expect("zones");
+    for (word, count, expected) in [
+        ("stick", &zones["stick_cells"], stick),
+        ("slip", &zones["slip_cells"], slip),
+    ] {
+        assert_eq!(
+            words.iter().filter(|zone| **zone == word).count() as u64,
+            count.as_u64().expect("a count"),
+            "{word}"
+        );
+        // The areas are shares of the patch's area, which the cells approximate.
+        let share = area(&zones["outlines"][word]) / cells;
+        let expected = expected / (stick + slip);
+        assert!(
+            (share - expected).abs() < 1e-9,
+            "{word}: the outline encloses {share} of the cells, not {expected}"
+        );
+    }
+    let whole = area(&zones["outlines"]["patch"]);
+    let contact = number(&patch["area_mm2"]);
+    assert!(
+        (whole - contact).abs() < 0.02 * contact,
+        "the outline of the patch encloses {whole}, not {contact}"
+    );
+}
+
+#[tokio::test]
+async fn grid_is_ordered_by_y_then_x_and_empty_outside() {
+    let server = Server::start().await;
+    let path = path_of(&server.solve(&example("spin.case.json")).await);
+    let pressure = server
+        .get(&format!("{path}/pressure?grid=21x11"))
+        .await
+        .json;
+    let (x, y) = (numbers(&pressure["x_mm"]), numbers(&pressure["y_mm"]));
+    assert_eq!((x.len(), y.len()), (21, 11));
+    assert!(x.is_sorted() && y.is_sorted());
+    // The ellipse of the example has semi-axes of 8 mm and 4 mm.
+    for (row, y) in pressure["pressure_mpa"]
+        .as_array()
+        .expect("rows")
+        .iter()
+        .zip(&y)
+    {
+        assert_eq!(row.as_array().expect("a row").len(), 21);
+        for (value, x) in row.as_array().expect("a row").iter().zip(&x) {
+            let inside = (x / 8.0).powi(2) + (y / 4.0).powi(2);
+            match value.as_f64() {
+                Some(value) => assert!(inside < 1.1 && value > 0.0, "{value} MPa at ({x}, {y})"),
+                None => assert!(inside > 0.9 && value.is_null(), "nothing at ({x}, {y})"),
+            }
+        }
+    }
+    let peak = number(&pressure["pressure_mpa"][5][10]);
+    assert!(
+        (peak - 1.5 * 82_000.0 / (std::f64::consts::PI * 32.0)).abs() < 0.03 * peak,
+        "Hertz's peak is {peak} MPa"
+    );
+    for (part, name) in [
+        ("tractions", "traction_y_mpa"),
+        ("slip", "slip_y"),
+        ("zones", "zone"),
+    ] {
+        let field = server.get(&format!("{path}/{part}?grid=4x3")).await.json;
+        let rows = field[name]
+            .as_array()
+            .unwrap_or_else(|| panic!("{part} has no {name}: {field}"));
+        assert!(
+            rows.len() == 3
+                && rows
+                    .iter()
+                    .all(|row| row.as_array().is_some_and(|row| row.len() == 4)),
+            "{part}"
+        );
+        assert!(
+            rows[1][1].is_number() || rows[1][1] == "stick" || rows[1][1] == "slip",
+            "{part}: {}",
+            rows[1][1]
+        );
+    }
+}
+
+#[tokio::test]
+async fn each_motion_of_a_sweep_is_fetched_by_its_number() {
+    let server = Server::start().await;
+    let job = server.solve(&example("sweep.case.json")).await;
+    let path = path_of(&job);
+    let all = server.get(&format!("{path}/resultants")).await.json;
+    let forces: Vec<f64> = all["total"]
+        .as_array()
+        .expect("totals")
+        .iter()
+        .map(|total| number(&total["force_x_n"]).abs())
+        .collect();
+    assert_eq!(forces.len(), 11);
+    assert!(
+        forces[0].abs() < 1e-6 && forces.is_sorted(),
+        "a creep curve rises from 0: {forces:?}"
+    );
+    let one = server
+        .get(&format!("{path}/resultants?point=10&patch=0"))
+        .await
+        .json;
+    assert_eq!(one["total"], json!([all["total"][10]]));
+    assert_eq!(
+        one["patches"][0]["points"],
+        json!([all["patches"][0]["points"][10]])
+    );
+    let slipping = async |point: u32| {
+        number(
+            &server
+                .get(&format!("{path}/zones?point={point}"))
+                .await
+                .json["slip_area_mm2"],
+        )
+    };
+    assert!(slipping(10).await > slipping(1).await);
+    for query in [
+        "zones?point=11",
+        "zones?patch=1",
+        "resultants?point=11",
+        "resultants?patch=1",
+    ] {
+        let answer = server.get(&format!("{path}/{query}")).await;
+        assert_eq!(
+            (answer.status, &answer.json["type"]),
+            (400, &json!("/problems/bad-query")),
+            "{query}"
+        );
+    }
+    for query in ["point=11", "patch=1"] {
+        let fields = path_of(&server.solve(&example("spin.case.json")).await);
+        let answer = server.get(&format!("{fields}/tractions?{query}")).await;
+        assert_eq!(
+            (answer.status, &answer.json["type"]),
+            (400, &json!("/problems/bad-query")),
+            "{query}"
+        );
+    }
+}

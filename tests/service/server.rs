@@ -1,0 +1,187 @@
+//! A service in this process, on a port of its own with a data folder of its own, and a client for it.
+
+use std::net::SocketAddr;
+use std::path::Path;
+use std::sync::Arc;
+
+use railhead::contact::error::SolveError;
+use railhead::contact::monitor::Monitor;
+use railhead::contact::problem::Problem;
+use railhead::contact::solution::{Fields, Solution};
+use railhead::http::{HttpOptions, router};
+use railhead::jobs::recipe::Recipe;
+use railhead::jobs::{Jobs, Options};
+use reqwest::header::HeaderMap;
+use reqwest::{Method, RequestBuilder};
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::schema::assert_documented;
+
+/// A running service. It ends with the test's runtime.
+pub struct Server {
+    pub jobs: Jobs,
+    pub address: SocketAddr,
+    client: reqwest::Client,
+    _folder: TempDir,
+}
+
+/// What to start.
+pub struct Setup {
+    pub options: Options,
+    pub http: HttpOptions,
+    pub recipe: Recipe,
+    /// Without workers every job stays queued.
+    pub working: bool,
+    folder: TempDir,
+}
+
+/// An answer. `json` is null where the body is not JSON.
+#[derive(Debug)]
+pub struct Answer {
+    pub status: u16,
+    pub headers: HeaderMap,
+    pub text: String,
+    pub json: Value,
+}
+
+impl Setup {
+    /// The defaults: real physics, one worker.
+    pub fn new() -> Setup {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        Setup {
+            options: Options::new(folder.path()),
+            http: HttpOptions::default(),
+            recipe: Recipe::contact(),
+            working: true,
+            folder,
+        }
+    }
+
+    /// Replaces the solver, for failures that the real one cannot be made to have.
+    pub fn solving(
+        mut self,
+        solve: impl Fn(&Problem, &dyn Monitor) -> Result<(Solution, Fields), SolveError>
+        + Send
+        + Sync
+        + 'static,
+    ) -> Setup {
+        self.recipe.solve = Arc::new(solve);
+        self
+    }
+
+    pub async fn start(self) -> Server {
+        let jobs = Jobs::open_with(self.options, self.recipe)
+            .await
+            .expect("the data folder opens");
+        if self.working {
+            jobs.start().expect("workers start");
+        }
+        let listener = tokio::net::TcpListener::bind("127.0.0.1:0")
+            .await
+            .expect("a free port");
+        let address = listener.local_addr().expect("an address");
+        let service = router(jobs.clone(), self.http);
+        tokio::spawn(async move { axum::serve(listener, service).await });
+        Server {
+            jobs,
+            address,
+            client: reqwest::Client::builder()
+                .redirect(reqwest::redirect::Policy::none())
+                .build()
+                .expect("a client"),
+            _folder: self.folder,
+        }
+    }
+}
+
+impl Server {
+    /// A service with real physics and one worker.
+    pub async fn start() -> Server {
+        Setup::new().start().await
+    }
+
+    /// A service that takes jobs and never solves them.
+    pub async fn idle() -> Server {
+        let mut setup = Setup::new();
+        setup.working = false;
+        setup.start().await
+    }
+
+    /// Sends a request as `shape` completes it, and checks the answer against the contract.
+    pub async fn send(
+        &self,
+        method: Method,
+        path: &str,
+        shape: impl FnOnce(RequestBuilder) -> RequestBuilder,
+    ) -> Answer {
+        let request = self
+            .client
+            .request(method.clone(), format!("http://{}{path}", self.address));
+        let response = shape(request).send().await.expect("an answer");
+        let status = response.status().as_u16();
+        let headers = response.headers().clone();
+        let text = response.text().await.expect("a body");
+        let answer = Answer {
+            status,
+            json: serde_json::from_str(&text).unwrap_or(Value::Null),
+            headers,
+            text,
+        };
+        assert_documented(
+            method.as_str(),
+            path,
+            status,
+            answer.header("content-type"),
+            &answer.json,
+        );
+        answer
+    }
+
+    pub async fn get(&self, path: &str) -> Answer {
+        self.send(Method::GET, path, |request| request).await
+    }
+
+    pub async fn delete(&self, path: &str) -> Answer {
+        self.send(Method::DELETE, path, |request| request).await
+    }
+
+    pub async fn post(&self, path: &str, body: &Value) -> Answer {
+        self.send(Method::POST, path, |request| request.json(body))
+            .await
+    }
+
+    /// Submits a case without waiting; answers the path of the job.
+    pub async fn submit(&self, case: &Value) -> String {
+        let answer = self.post("/v1/jobs", case).await;
+        assert_eq!(answer.status, 202, "{}", answer.text);
+        answer.header("location").expect("a location").to_owned()
+    }
+
+    /// Submits a case and waits for its end; answers the job.
+    pub async fn solve(&self, case: &Value) -> Value {
+        let waiting = |request: RequestBuilder| request.header("prefer", "wait=60").json(case);
+        let answer = self.send(Method::POST, "/v1/jobs", waiting).await;
+        assert_eq!(answer.status, 200, "{}", answer.text);
+        answer.json
+    }
+}
+
+impl Answer {
+    pub fn header(&self, name: &str) -> Option<&str> {
+        self.headers.get(name).and_then(|value| value.to_str().ok())
+    }
+}
+
+/// The text of a file in `api/examples`.
+pub fn example_text(file: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("api/examples")
+        .join(file);
+    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// A file in `api/examples`.
+pub fn example(file: &str) -> Value {
+    serde_json::from_str(&example_text(file)).expect("an example is JSON")
+}

@@ -1,0 +1,427 @@
+//! Does the job table keep its promises? One suite for every store.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use bytes::Bytes;
+use railhead::jobs::store::list::Filter;
+use railhead::jobs::store::sqlite::SqliteStore;
+use railhead::jobs::store::{Claim, Deleted, Ending, Enqueued, NewJob, Renewal};
+use railhead::jobs::{Failure, FailureKind, Job, State};
+use tempfile::TempDir;
+use uuid::Uuid;
+
+const LEASE: i64 = 1_000;
+
+pub struct Table {
+    pub store: SqliteStore,
+    folder: TempDir,
+}
+
+impl Table {
+    pub async fn new() -> Table {
+        let folder = tempfile::tempdir().unwrap();
+        let store = SqliteStore::open(&folder.path().join("jobs.db"))
+            .await
+            .unwrap();
+        Table { store, folder }
+    }
+
+    pub async fn add(&self, new: NewJob) -> Job {
+        match self.store.enqueue(&new).await.unwrap() {
+            Enqueued::Created(job) => job,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    pub async fn claim(&self, now: i64) -> Option<Claim> {
+        self.store.claim("w", now, LEASE).await.unwrap()
+    }
+
+    async fn state(&self, id: Uuid) -> State {
+        self.store.get(id).await.unwrap().unwrap().state
+    }
+}
+
+pub fn new_job() -> NewJob {
+    let id = Uuid::now_v7();
+    NewJob {
+        id,
+        created_at: i64::try_from(id.as_u128() >> 80).unwrap(),
+        name: Some("a case".to_owned()),
+        labels: BTreeMap::new(),
+        method: "auto".to_owned(),
+        body: Bytes::from_static(b"{}"),
+        idempotency: None,
+    }
+}
+
+pub fn labelled(key: &str, value: &str) -> NewJob {
+    NewJob {
+        labels: BTreeMap::from([(key.to_owned(), value.to_owned())]),
+        ..new_job()
+    }
+}
+
+fn keyed(key: &str, digest: u8) -> NewJob {
+    NewJob {
+        idempotency: Some((key.to_owned(), [digest; 32])),
+        ..new_job()
+    }
+}
+
+pub fn success() -> Ending {
+    Ending::Succeeded {
+        warnings: vec!["mind the gap".to_owned()],
+        result_key: "results/1".to_owned(),
+        field_patches: 2,
+    }
+}
+
+fn failure() -> Ending {
+    Ending::Failed(Failure::new(FailureKind::Panic, "boom"))
+}
+
+#[tokio::test]
+async fn a_job_comes_back_as_it_was_queued() {
+    let table = Table::new().await;
+    let new = NewJob {
+        body: Bytes::from_static("{\"name\":\"Weiche ½\"}".as_bytes()),
+        ..labelled("line", "A12")
+    };
+    let job = table.add(new.clone()).await;
+    assert_eq!(table.store.get(new.id).await.unwrap(), Some(job.clone()));
+    assert_eq!(job.state, State::Queued);
+    assert_eq!((job.name, job.labels), (new.name, new.labels));
+    assert_eq!(
+        (job.created_at, job.started_at, job.ended_at),
+        (new.created_at, None, None)
+    );
+    assert_eq!((job.attempt, job.failure), (0, None));
+    assert_eq!(
+        table.store.case(new.id).await.unwrap(),
+        Some((new.body, false))
+    );
+    assert_eq!(table.store.get(Uuid::now_v7()).await.unwrap(), None);
+    assert_eq!(table.store.case(Uuid::now_v7()).await.unwrap(), None);
+}
+
+#[tokio::test]
+async fn jobs_are_claimed_oldest_first_and_each_once() {
+    let table = Table::new().await;
+    let mut ids = Vec::new();
+    for _ in 0..60 {
+        ids.push(table.add(new_job()).await.id);
+    }
+    let first = table.claim(0).await.unwrap();
+    assert_eq!(
+        (first.id, first.attempt, first.lease_number),
+        (ids[0], 1, 1)
+    );
+
+    let claimers = (0..8).map(|_| {
+        let store = table.store.clone();
+        tokio::spawn(async move {
+            let mut claimed = Vec::new();
+            while let Some(claim) = store.claim("w", 0, LEASE).await.unwrap() {
+                claimed.push(claim.id);
+            }
+            claimed
+        })
+    });
+    let mut claimed = Vec::new();
+    for claimer in claimers.collect::<Vec<_>>() {
+        let ids = claimer.await.unwrap();
+        assert!(
+            ids.is_sorted(),
+            "each claimer meets the jobs in their order"
+        );
+        claimed.extend(ids);
+    }
+    claimed.sort_unstable();
+    assert_eq!(claimed, ids[1..]);
+}
+
+#[tokio::test]
+async fn a_job_ends_once_and_says_how() {
+    let table = Table::new().await;
+    for (ending, state) in [
+        (success(), State::Succeeded),
+        (failure(), State::Failed),
+        (Ending::Cancelled, State::Cancelled),
+    ] {
+        table.add(new_job()).await;
+        let claim = table.claim(5).await.unwrap();
+        let job = table
+            .store
+            .finish(&claim, &ending, 9)
+            .await
+            .unwrap()
+            .unwrap();
+        assert_eq!(
+            (job.state, job.started_at, job.ended_at),
+            (state, Some(5), Some(9))
+        );
+        assert_eq!(job.failure.is_some(), state == State::Failed);
+        let (_, stored) = table.store.result(claim.id).await.unwrap().unwrap();
+        assert_eq!(stored.is_some(), state == State::Succeeded);
+        if state == State::Succeeded {
+            assert_eq!(job.warnings, ["mind the gap"]);
+            assert!((job.progress - 1.0).abs() < f64::EPSILON);
+            assert_eq!(stored.unwrap().field_patches, 2);
+        }
+        for late in [success(), failure(), Ending::Cancelled] {
+            assert_eq!(table.store.finish(&claim, &late, 10).await.unwrap(), None);
+        }
+        assert_eq!(table.state(claim.id).await, state);
+    }
+}
+
+#[tokio::test]
+async fn a_lease_ends_at_its_time_and_not_before() {
+    let table = Table::new().await;
+    let id = table.add(new_job()).await.id;
+    let claim = table.claim(100).await.unwrap();
+    assert_eq!(table.store.reap(1_099, 1_099, 5).await.unwrap(), []);
+    let renewed = table.store.renew(&claim, 0.25, 1_000, LEASE).await.unwrap();
+    assert_eq!(
+        renewed,
+        Renewal::Held {
+            cancel_requested: false
+        }
+    );
+    assert_eq!(table.store.reap(1_999, 1_999, 5).await.unwrap(), []);
+    assert_eq!(
+        table.store.reap(2_000, 2_000, 5).await.unwrap(),
+        [(id, State::Queued)]
+    );
+    let job = table.store.get(id).await.unwrap().unwrap();
+    assert_eq!(
+        (job.state, job.attempt, job.started_at),
+        (State::Queued, 1, None)
+    );
+}
+
+#[tokio::test]
+async fn a_worker_that_lost_its_lease_changes_nothing() {
+    let table = Table::new().await;
+    let id = table.add(new_job()).await.id;
+    let stale = table.claim(0).await.unwrap();
+    table.store.reap(LEASE, LEASE, 5).await.unwrap();
+    let queued = table.store.get(id).await.unwrap();
+    for claimed_again in [false, true] {
+        if claimed_again {
+            assert_eq!(table.claim(LEASE).await.unwrap().attempt, 2);
+        }
+        let before = table.store.get(id).await.unwrap();
+        assert_eq!(before == queued, !claimed_again);
+        assert_eq!(
+            table.store.renew(&stale, 0.9, LEASE, LEASE).await.unwrap(),
+            Renewal::Lost
+        );
+        assert_eq!(
+            table.store.finish(&stale, &success(), LEASE).await.unwrap(),
+            None
+        );
+        assert_eq!(table.store.release(&stale, LEASE).await.unwrap(), None);
+        assert_eq!(table.store.get(id).await.unwrap(), before);
+    }
+}
+
+#[tokio::test]
+async fn an_attempt_handed_back_does_not_count_but_still_fences() {
+    let table = Table::new().await;
+    let id = table.add(new_job()).await.id;
+    let first = table.claim(0).await.unwrap();
+    assert_eq!(
+        table.store.release(&first, 1).await.unwrap(),
+        Some(State::Queued)
+    );
+    let queued = table.store.get(id).await.unwrap().unwrap();
+    assert_eq!((queued.attempt, queued.started_at), (0, None));
+
+    let second = table.claim(2).await.unwrap();
+    assert_eq!((second.attempt, second.lease_number), (1, 2));
+    assert_eq!(
+        table.store.finish(&first, &success(), 3).await.unwrap(),
+        None
+    );
+    assert!(
+        table
+            .store
+            .finish(&second, &success(), 3)
+            .await
+            .unwrap()
+            .is_some()
+    );
+}
+
+#[tokio::test]
+async fn a_job_that_loses_every_worker_fails_after_the_allowed_attempts() {
+    let table = Table::new().await;
+    let id = table.add(new_job()).await.id;
+    for attempt in 1..=3 {
+        assert_eq!(table.claim(0).await.unwrap().attempt, attempt);
+        let expected = if attempt < 3 {
+            State::Queued
+        } else {
+            State::Failed
+        };
+        assert_eq!(
+            table.store.reap(LEASE, 7_000, 3).await.unwrap(),
+            [(id, expected)]
+        );
+    }
+    let job = table.store.get(id).await.unwrap().unwrap();
+    assert_eq!(job.failure.unwrap().kind, FailureKind::WorkerLost);
+    assert_eq!((job.attempt, job.ended_at), (3, Some(7_000)));
+    assert_eq!(table.claim(0).await, None);
+}
+
+#[tokio::test]
+async fn cancelling_ends_a_queued_job_asks_a_running_one_and_leaves_an_ended_one() {
+    let table = Table::new().await;
+    let queued = table.add(new_job()).await;
+    let cancelled = table.store.cancel(queued.id, 4).await.unwrap().unwrap();
+    assert_eq!(
+        (cancelled.state, cancelled.ended_at),
+        (State::Cancelled, Some(4))
+    );
+    assert_eq!(table.claim(0).await, None);
+    assert_eq!(
+        table.store.cancel(queued.id, 5).await.unwrap(),
+        Some(cancelled)
+    );
+
+    let running = table.add(new_job()).await.id;
+    let claim = table.claim(0).await.unwrap();
+    let asked = table.store.cancel(running, 6).await.unwrap().unwrap();
+    assert_eq!((asked.state, asked.ended_at), (State::Running, None));
+    assert_eq!(table.store.cancel(running, 7).await.unwrap(), Some(asked));
+    assert!(table.store.case(running).await.unwrap().unwrap().1);
+    let renewed = table.store.renew(&claim, 0.5, 8, LEASE).await.unwrap();
+    assert_eq!(
+        renewed,
+        Renewal::Held {
+            cancel_requested: true
+        }
+    );
+    let ended = table.store.finish(&claim, &success(), 9).await.unwrap();
+    assert_eq!(table.store.cancel(running, 10).await.unwrap(), ended);
+    assert_eq!(table.store.cancel(Uuid::now_v7(), 0).await.unwrap(), None);
+}
+
+#[tokio::test]
+async fn a_cancelled_job_never_goes_back_to_the_queue() {
+    let table = Table::new().await;
+    let lost = table.add(new_job()).await.id;
+    table.claim(0).await.unwrap();
+    table.store.cancel(lost, 1).await.unwrap();
+    assert_eq!(
+        table.store.reap(LEASE, LEASE, 1).await.unwrap(),
+        [(lost, State::Cancelled)]
+    );
+
+    let released = table.add(new_job()).await.id;
+    let claim = table.claim(0).await.unwrap();
+    table.store.cancel(released, 1).await.unwrap();
+    assert_eq!(
+        table.store.release(&claim, 2).await.unwrap(),
+        Some(State::Cancelled)
+    );
+    for id in [lost, released] {
+        let job = table.store.get(id).await.unwrap().unwrap();
+        assert_eq!((job.state, job.failure), (State::Cancelled, None));
+        assert!(job.ended_at.is_some());
+    }
+}
+
+#[tokio::test]
+async fn one_idempotency_key_makes_one_job() {
+    let table = Table::new().await;
+    let tries = (0..16).map(|_| {
+        let store = table.store.clone();
+        tokio::spawn(async move { store.enqueue(&keyed("k", 1)).await.unwrap() })
+    });
+    let mut ids = BTreeSet::new();
+    let mut created = 0;
+    for enqueued in tries.collect::<Vec<_>>() {
+        match enqueued.await.unwrap() {
+            Enqueued::Created(job) => {
+                created += 1;
+                ids.insert(job.id);
+            }
+            Enqueued::Existing(job) => {
+                ids.insert(job.id);
+            }
+            Enqueued::Conflict => panic!("the cases are the same"),
+        }
+    }
+    assert_eq!((created, ids.len()), (1, 1));
+    assert_eq!(table.store.queued(100).await.unwrap(), 1);
+
+    assert_eq!(
+        table.store.enqueue(&keyed("k", 2)).await.unwrap(),
+        Enqueued::Conflict
+    );
+    assert_eq!(
+        table.store.by_key("k", &[2; 32]).await.unwrap(),
+        Some(Enqueued::Conflict)
+    );
+    assert_eq!(table.store.by_key("other", &[1; 32]).await.unwrap(), None);
+    assert!(matches!(
+        table.store.enqueue(&keyed("other", 2)).await.unwrap(),
+        Enqueued::Created(_)
+    ));
+}
+
+#[tokio::test]
+async fn only_an_ended_job_can_be_deleted_and_all_that_hung_on_it_goes() {
+    let table = Table::new().await;
+    let new = NewJob {
+        idempotency: Some(("k".to_owned(), [1; 32])),
+        ..labelled("line", "A12")
+    };
+    let id = table.add(new).await.id;
+    assert_eq!(
+        table.store.delete(id).await.unwrap(),
+        Deleted::NotEnded(State::Queued)
+    );
+    let claim = table.claim(0).await.unwrap();
+    assert_eq!(
+        table.store.delete(id).await.unwrap(),
+        Deleted::NotEnded(State::Running)
+    );
+    table.store.finish(&claim, &success(), 1).await.unwrap();
+    assert_eq!(
+        table.store.existing(&[Uuid::now_v7(), id]).await.unwrap(),
+        [id]
+    );
+    assert_eq!(table.store.delete(id).await.unwrap(), Deleted::Done);
+    assert_eq!(table.store.delete(id).await.unwrap(), Deleted::NotFound);
+
+    assert_eq!(table.store.case(id).await.unwrap(), None);
+    assert_eq!(table.store.by_key("k", &[1; 32]).await.unwrap(), None);
+    let filter = Filter {
+        label: Some(("line".to_owned(), "A12".to_owned())),
+        ..Filter::default()
+    };
+    assert_eq!(table.store.list(&filter, None, 10).await.unwrap().jobs, []);
+    assert!(table.store.existing(&[id]).await.unwrap().is_empty());
+}
+
+#[tokio::test]
+async fn the_table_outlives_its_process() {
+    let table = Table::new().await;
+    let id = table.add(keyed("k", 1)).await.id;
+    let claim = table.claim(0).await.unwrap();
+    let before = table.store.get(id).await.unwrap();
+    // Not closed: the second opening finds what a killed process would leave.
+    let again = SqliteStore::open(&table.folder.path().join("jobs.db"))
+        .await
+        .unwrap();
+    assert_eq!(again.get(id).await.unwrap(), before);
+    assert!(
+        matches!(again.enqueue(&keyed("k", 1)).await.unwrap(), Enqueued::Existing(job) if job.id == id)
+    );
+    assert!(again.finish(&claim, &success(), 1).await.unwrap().is_some());
+}

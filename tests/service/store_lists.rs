@@ -1,0 +1,114 @@
+//! Do lists of jobs show every job once, whatever the filter and whatever happens meanwhile?
+
+use railhead::jobs::store::NewJob;
+use railhead::jobs::store::list::Filter;
+use railhead::jobs::{JobsError, State};
+use uuid::Uuid;
+
+use crate::store::{Table, labelled, new_job, success};
+
+#[tokio::test]
+async fn pages_neither_repeat_nor_skip_while_jobs_arrive() {
+    let table = Table::new().await;
+    let mut expected = Vec::new();
+    for _ in 0..25 {
+        expected.insert(0, table.add(new_job()).await.id);
+    }
+    let filter = Filter::default();
+    let mut seen = Vec::new();
+    let mut cursor: Option<String> = None;
+    loop {
+        let page = table
+            .store
+            .list(&filter, cursor.as_deref(), 10)
+            .await
+            .unwrap();
+        seen.extend(page.jobs.iter().map(|job| job.id));
+        // A newcomer belongs before the first page; a job that ends stays where it is.
+        table.add(new_job()).await;
+        let claim = table.claim(0).await.unwrap();
+        table.store.finish(&claim, &success(), 1).await.unwrap();
+        match page.next_cursor {
+            Some(next) => cursor = Some(next),
+            None => break,
+        }
+    }
+    assert_eq!(seen, expected);
+}
+
+#[tokio::test]
+async fn a_full_last_page_has_no_next_one() {
+    let table = Table::new().await;
+    for _ in 0..4 {
+        table.add(new_job()).await;
+    }
+    for (limit, more) in [(3, true), (4, false), (5, false)] {
+        let page = table
+            .store
+            .list(&Filter::default(), None, limit)
+            .await
+            .unwrap();
+        assert_eq!(page.next_cursor.is_some(), more, "limit {limit}");
+    }
+}
+
+#[tokio::test]
+async fn filters_combine_and_windows_are_half_open() {
+    let table = Table::new().await;
+    let mut jobs = Vec::new();
+    for value in ["a", "b", "a", "b", "a", "b"] {
+        let id = Uuid::from_u128(((1_000 + jobs.len() as u128) << 80) | (7 << 76) | (2 << 62));
+        let new = NewJob {
+            id,
+            created_at: 1_000 + jobs.len() as i64,
+            ..labelled("line", value)
+        };
+        jobs.push(table.add(new).await.id);
+    }
+    table.claim(0).await.unwrap();
+    let ids = async |filter: &Filter| {
+        let page = table.store.list(filter, None, 100).await.unwrap();
+        page.jobs
+            .iter()
+            .map(|job| jobs.iter().position(|id| *id == job.id).unwrap())
+            .collect::<Vec<_>>()
+    };
+    let label = |value: &str| Some(("line".to_owned(), value.to_owned()));
+    let mut filter = Filter::default();
+    assert_eq!(ids(&filter).await, [5, 4, 3, 2, 1, 0]);
+    filter.label = label("a");
+    assert_eq!(ids(&filter).await, [4, 2, 0]);
+    filter.state = Some(State::Queued);
+    assert_eq!(ids(&filter).await, [4, 2]);
+    filter.label = None;
+    filter.created_after = Some(1_002);
+    filter.created_before = Some(1_005);
+    assert_eq!(ids(&filter).await, [4, 3, 2]);
+    filter.label = label("b");
+    assert_eq!(ids(&filter).await, [3]);
+    filter.label = label("c");
+    assert_eq!(ids(&filter).await, [0; 0]);
+}
+
+#[tokio::test]
+async fn a_cursor_of_another_filter_is_refused() {
+    let table = Table::new().await;
+    for _ in 0..3 {
+        table.add(new_job()).await;
+    }
+    let cursor = table
+        .store
+        .list(&Filter::default(), None, 1)
+        .await
+        .unwrap()
+        .next_cursor
+        .unwrap();
+    let other = Filter {
+        state: Some(State::Queued),
+        ..Filter::default()
+    };
+    for (filter, cursor) in [(&other, cursor.as_str()), (&Filter::default(), "nonsense")] {
+        let answer = table.store.list(filter, Some(cursor), 1).await;
+        assert!(matches!(answer, Err(JobsError::BadCursor)), "{answer:?}");
+    }
+}

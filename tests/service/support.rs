@@ -1,0 +1,218 @@
+//! Starting what is under test: the jobs room in this process, or the real program beside it.
+
+use std::io::{BufRead, BufReader};
+use std::net::SocketAddr;
+use std::path::Path;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::{Arc, Mutex, mpsc};
+use std::time::Duration;
+
+use railhead::contact::error::SolveError;
+use railhead::contact::monitor::Monitor;
+use railhead::contact::problem::Problem;
+use railhead::contact::solution::{Fields, Solution};
+use railhead::jobs::recipe::Recipe;
+use railhead::jobs::{Jobs, Options};
+use reqwest::{Method, RequestBuilder};
+use serde_json::{Value, json};
+
+/// A case of the handbook: a new wheel on the crown of a rail.
+pub fn case(name: &str) -> Value {
+    json!({
+        "name": name,
+        "labels": { "line": "A12" },
+        "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
+        "friction": { "coefficient": 0.3 },
+        "contact": { "type": "radii", "rolling_mm": 460, "lateral_mm": 300 },
+        "load": { "normal_force_n": 100_000 },
+        "motion": { "creepage_x": 0.001, "creepage_y": 0.0, "spin_per_mm": 0.0004 },
+        "solver": { "method": "boundary_element", "mesh": { "strips": 6, "cells": 6 } },
+        "outputs": ["resultants", "zones", "tractions"]
+    })
+}
+
+/// Jobs on a data folder, solved by the given function.
+pub async fn jobs_with<F>(data_dir: &Path, solve: F) -> Jobs
+where
+    F: Fn(&Problem, &dyn Monitor) -> Result<(Solution, Fields), SolveError> + Send + Sync + 'static,
+{
+    open(Options::new(data_dir), solve).await
+}
+
+/// Jobs with options of one's own, solved by the given function.
+pub async fn open<F>(options: Options, solve: F) -> Jobs
+where
+    F: Fn(&Problem, &dyn Monitor) -> Result<(Solution, Fields), SolveError> + Send + Sync + 'static,
+{
+    let recipe = Recipe {
+        solve: Arc::new(solve),
+        ..Recipe::contact()
+    };
+    Jobs::open_with(options, recipe).await.unwrap()
+}
+
+/// The real program, serving on a free port. Killed when dropped.
+pub struct Service {
+    child: Child,
+    address: SocketAddr,
+    log: Arc<Mutex<Vec<Value>>>,
+    client: reqwest::Client,
+}
+
+impl Service {
+    /// Starts `railhead serve` on a data folder and returns when it listens.
+    pub fn start(data_dir: &Path, flags: &[&str]) -> Service {
+        let mut child = railhead()
+            .args(["serve", "--listen", "127.0.0.1:0", "--log-format", "json"])
+            .arg("--data-dir")
+            .arg(data_dir)
+            .args(flags)
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let lines = BufReader::new(child.stderr.take().unwrap()).lines();
+        let log = Arc::new(Mutex::new(Vec::new()));
+        let (listening, address) = mpsc::channel();
+        std::thread::spawn({
+            let log = log.clone();
+            move || {
+                for line in lines.map_while(Result::ok) {
+                    let event: Value =
+                        serde_json::from_str(&line).unwrap_or_else(|_| json!({ "message": line }));
+                    if event["message"] == "listening" {
+                        let address = event["address"].as_str().unwrap().parse().unwrap();
+                        let _ = listening.send(address);
+                    }
+                    log.lock().unwrap().push(event);
+                }
+            }
+        });
+        let address = address
+            .recv_timeout(Duration::from_secs(60))
+            .unwrap_or_else(|_| panic!("no `listening` in {:?}", log.lock().unwrap()));
+        Service {
+            child,
+            address,
+            log,
+            client: reqwest::Client::new(),
+        }
+    }
+
+    /// The address it listens on.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// A request to this service.
+    pub fn request(&self, method: Method, path: &str) -> RequestBuilder {
+        let url = format!("http://{}{path}", self.address);
+        self.client.request(method, url)
+    }
+
+    /// The JSON answer to a GET that has to succeed.
+    pub async fn get(&self, path: &str) -> Value {
+        let answer = self.request(Method::GET, path).send().await.unwrap();
+        assert_eq!(answer.status(), 200, "{path}");
+        answer.json().await.unwrap()
+    }
+
+    /// Submits a case and returns the id of its job.
+    pub async fn submit(&self, case: &Value) -> String {
+        let answer = self
+            .request(Method::POST, "/v1/jobs")
+            .json(case)
+            .send()
+            .await
+            .unwrap();
+        assert_eq!(answer.status(), 202);
+        let job: Value = answer.json().await.unwrap();
+        job["id"].as_str().unwrap().to_owned()
+    }
+
+    /// Waits until a job is in a state; it may not end in another one.
+    pub async fn until(&self, id: &str, state: &str) -> Value {
+        loop {
+            let job = self.get(&format!("/v1/jobs/{id}")).await;
+            if job["state"] == state {
+                return job;
+            }
+            let going_on = job["state"] == "queued" || job["state"] == "running";
+            assert!(going_on, "{state} was expected: {job}");
+            pause().await;
+        }
+    }
+
+    /// How many log events carry this message.
+    pub fn logged(&self, message: &str) -> usize {
+        let log = self.log.lock().unwrap();
+        log.iter()
+            .filter(|event| event["message"] == message)
+            .count()
+    }
+
+    /// Ends it with SIGKILL.
+    pub fn kill(mut self) {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
+    }
+
+    /// Sends a signal by name.
+    pub fn signal(&self, name: &str) {
+        let id = self.child.id().to_string();
+        assert!(
+            Command::new("kill")
+                .args(["-s", name, &id])
+                .status()
+                .unwrap()
+                .success()
+        );
+    }
+
+    /// Waits until it has ended by itself.
+    pub fn wait(mut self) -> ExitStatus {
+        self.child.wait().unwrap()
+    }
+}
+
+impl Drop for Service {
+    fn drop(&mut self) {
+        // It may have ended already.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Between two looks at a service that can only be asked.
+pub async fn pause() {
+    tokio::time::sleep(Duration::from_millis(5)).await;
+}
+
+/// The real program, without settings of the surroundings.
+pub fn railhead() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_railhead"));
+    for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("RAILHEAD_")) {
+        command.env_remove(name);
+    }
+    command
+}
+
+/// A case that keeps a worker busy for a good part of a second: several motions on a fine mesh.
+pub fn long_case(name: &str, motions: u32) -> Value {
+    let mut case = case(name);
+    case["motion"] = json!({ "sweep": {
+        "creepage_x": { "from": 0.0002, "to": 0.0008, "points": motions },
+        "spin_per_mm": { "from": 0.0001, "to": 0.0003, "points": motions }
+    } });
+    case["solver"] = json!({ "method": "boundary_element", "mesh": { "strips": 16, "cells": 16 } });
+    case["outputs"] = json!(["resultants", "zones"]);
+    case
+}
+
+/// A case that no test waits for: the most motions there may be, on a fine mesh.
+pub fn endless_case(name: &str) -> Value {
+    let mut case = long_case(name, 10_000);
+    case["solver"]["mesh"] = json!({ "strips": 32, "cells": 32 });
+    case
+}

@@ -1,0 +1,424 @@
+//! Do workers solve what is queued, and survive what they solve?
+
+use std::ops::ControlFlow;
+use std::sync::{Mutex, mpsc};
+use std::time::Duration;
+
+use railhead::contact::case::Method;
+use railhead::contact::error::SolveError;
+use railhead::contact::monitor::Monitor;
+use railhead::contact::problem::Problem;
+use railhead::contact::solve;
+use railhead::jobs::worker::Step;
+use railhead::jobs::{FailureKind, JobsError, Options, State};
+use serde_json::json;
+use tokio::sync::mpsc::unbounded_channel;
+
+use crate::support::{case, jobs_with, open};
+
+/// Ticks until it is told to stop.
+fn tick_until_stopped(monitor: &dyn Monitor) -> SolveError {
+    loop {
+        if let ControlFlow::Break(stop) = monitor.tick(0.5) {
+            return stop.into();
+        }
+        std::thread::yield_now();
+    }
+}
+
+#[tokio::test]
+async fn a_solved_job_keeps_its_answer_and_its_remarks() {
+    let folder = tempfile::tempdir().unwrap();
+    let (answer, answers) = mpsc::channel();
+    let jobs = jobs_with(
+        folder.path(),
+        move |problem: &Problem, monitor: &dyn Monitor| {
+            let solved = solve(problem, monitor)?;
+            answer.send(solved.clone()).unwrap();
+            Ok(solved)
+        },
+    )
+    .await;
+    let mut worker = jobs.worker("w").unwrap();
+    assert_eq!(worker.step().await.unwrap(), Step::Idle);
+
+    let mut remarkable = case("one");
+    remarkable["friction"]["coefficient"] = json!(1.5);
+    let id = jobs.submit(remarkable.clone(), None).await.unwrap().id;
+    assert!(matches!(
+        jobs.solution(id).await,
+        Err(JobsError::NotReady(State::Queued))
+    ));
+    assert_eq!(
+        worker.step().await.unwrap(),
+        Step::Ended(id, State::Succeeded)
+    );
+
+    let (solution, fields) = answers.recv().unwrap();
+    assert!(!solution.warnings.is_empty());
+    assert!(fields.patches[0].points[0].traction_x_mpa.is_some());
+    let job = jobs.get(id).await.unwrap();
+    assert_eq!((job.state, job.attempt), (State::Succeeded, 1));
+    assert_eq!(job.warnings, solution.warnings);
+    assert_eq!(jobs.solution(id).await.unwrap(), solution);
+    assert_eq!(jobs.patch_fields(id, 0).await.unwrap(), fields.patches[0]);
+    assert_eq!(
+        jobs.point_fields(id, 0, 0).await.unwrap(),
+        fields.patches[0]
+    );
+    assert!(matches!(
+        jobs.patch_fields(id, 1).await,
+        Err(JobsError::NoSuchPatch { patches: 1 })
+    ));
+    assert!(matches!(
+        jobs.point_fields(id, 0, 1).await,
+        Err(JobsError::NoSuchPoint { points: 1 })
+    ));
+    let submitted =
+        serde_json::from_slice::<serde_json::Value>(&jobs.case(id).await.unwrap()).unwrap();
+    assert_eq!(submitted, remarkable);
+
+    jobs.delete(id).await.unwrap();
+    assert!(matches!(jobs.solution(id).await, Err(JobsError::NotFound)));
+    assert_eq!(files_below(&folder.path().join("results")), 0);
+}
+
+#[tokio::test]
+async fn a_panic_fails_that_job_only() {
+    let folder = tempfile::tempdir().unwrap();
+    let jobs = jobs_with(folder.path(), |problem: &Problem, monitor: &dyn Monitor| {
+        assert_ne!(problem.name.as_deref(), Some("bad"), "a cell without area");
+        solve(problem, monitor)
+    })
+    .await;
+    let bad = jobs.submit(case("bad"), None).await.unwrap().id;
+    let good = jobs.submit(case("good"), None).await.unwrap().id;
+    let mut worker = jobs.worker("w").unwrap();
+    assert_eq!(
+        worker.step().await.unwrap(),
+        Step::Ended(bad, State::Failed)
+    );
+    assert_eq!(
+        worker.step().await.unwrap(),
+        Step::Ended(good, State::Succeeded)
+    );
+
+    let job = jobs.get(bad).await.unwrap();
+    let failure = job.failure.unwrap();
+    assert_eq!(failure.kind, FailureKind::Panic);
+    assert!(
+        failure.detail.contains("a cell without area"),
+        "{}",
+        failure.detail
+    );
+    match jobs.solution(bad).await {
+        Err(JobsError::NotSucceeded(job)) => assert_eq!(job.id, bad),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[tokio::test]
+async fn a_solve_without_convergence_fails_with_its_residual() {
+    let folder = tempfile::tempdir().unwrap();
+    let jobs = jobs_with(folder.path(), |_: &Problem, _: &dyn Monitor| {
+        Err(SolveError::NotConverged {
+            method: Method::LiuHsu,
+            point: 0,
+            iterations: 40,
+            residual: 3e-3,
+            tolerance: 1e-8,
+            advice: "try boundary_element".to_owned(),
+        })
+    })
+    .await;
+    let id = jobs.submit(case("hard"), None).await.unwrap().id;
+    jobs.worker("w").unwrap().step().await.unwrap();
+    let failure = jobs.get(id).await.unwrap().failure.unwrap();
+    assert_eq!(failure.kind, FailureKind::NotConverged);
+    assert_eq!(
+        (failure.residual, failure.iterations),
+        (Some(3e-3), Some(40))
+    );
+    assert!(
+        failure.detail.contains("boundary_element"),
+        "{}",
+        failure.detail
+    );
+}
+
+#[tokio::test]
+async fn a_running_job_stops_when_it_is_cancelled() {
+    let folder = tempfile::tempdir().unwrap();
+    let (started, mut has_started) = unbounded_channel();
+    let jobs = jobs_with(folder.path(), move |_: &Problem, monitor: &dyn Monitor| {
+        started.send(()).unwrap();
+        Err(tick_until_stopped(monitor))
+    })
+    .await;
+    let id = jobs.submit(case("long"), None).await.unwrap().id;
+    let mut worker = jobs.worker("w").unwrap();
+    let step = tokio::spawn(async move { worker.step().await.unwrap() });
+    has_started.recv().await.unwrap();
+    assert_eq!(jobs.cancel(id).await.unwrap().state, State::Running);
+    assert_eq!(step.await.unwrap(), Step::Ended(id, State::Cancelled));
+    let job = jobs.cancel(id).await.unwrap();
+    assert_eq!((job.state, job.failure), (State::Cancelled, None));
+}
+
+#[tokio::test]
+async fn the_time_limit_of_a_case_ends_its_solve() {
+    let folder = tempfile::tempdir().unwrap();
+    let jobs = jobs_with(folder.path(), solve).await;
+    let mut limited = case("limited");
+    limited["solver"]["time_limit_s"] = json!(1e-6);
+    let id = jobs.submit(limited, None).await.unwrap().id;
+    jobs.worker("w").unwrap().step().await.unwrap();
+    let failure = jobs.get(id).await.unwrap().failure.unwrap();
+    assert_eq!(failure.kind, FailureKind::OutOfTime);
+}
+
+#[tokio::test]
+async fn a_ticking_solver_keeps_its_lease_and_shows_its_progress() {
+    let folder = tempfile::tempdir().unwrap();
+    let (finish, may_finish) = mpsc::channel::<()>();
+    let may_finish = Mutex::new(may_finish);
+    let options = Options {
+        lease: Duration::from_millis(1_500),
+        ..Options::new(folder.path())
+    };
+    let jobs = open(options, move |problem: &Problem, monitor: &dyn Monitor| {
+        let may_finish = may_finish.lock().unwrap();
+        while may_finish.try_recv().is_err() {
+            assert!(monitor.tick(0.5).is_continue());
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        solve(problem, monitor)
+    })
+    .await;
+    let id = jobs.submit(case("long"), None).await.unwrap().id;
+    jobs.start().unwrap();
+    // Two heartbeats reach the table: the version grows with the claim and with the first progress only.
+    while jobs.get(id).await.unwrap().progress < 0.5 {
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    finish.send(()).unwrap();
+    let job = jobs.wait(id, Duration::from_secs(60)).await.unwrap();
+    assert_eq!((job.state, job.attempt), (State::Succeeded, 1));
+    jobs.shutdown(Duration::from_secs(10)).await;
+}
+
+#[tokio::test]
+async fn a_solver_that_hangs_loses_its_job_but_not_the_worker() {
+    let folder = tempfile::tempdir().unwrap();
+    let (release, released) = mpsc::channel::<()>();
+    let released = Mutex::new(Some(released));
+    let options = Options {
+        lease: Duration::from_millis(300),
+        ..Options::new(folder.path())
+    };
+    let jobs = open(options, move |problem: &Problem, monitor: &dyn Monitor| {
+        let first_time = released.lock().unwrap().take();
+        if let Some(released) = first_time {
+            // The first attempt hangs, without a tick, until the test is over.
+            let _ = released.recv();
+        }
+        solve(problem, monitor)
+    })
+    .await;
+    let id = jobs.submit(case("hangs once"), None).await.unwrap().id;
+    jobs.start().unwrap();
+    let job = jobs.wait(id, Duration::from_secs(60)).await.unwrap();
+    assert_eq!((job.state, job.attempt), (State::Succeeded, 2));
+    drop(release);
+    jobs.shutdown(Duration::from_secs(10)).await;
+}
+
+#[tokio::test]
+async fn a_solver_deaf_to_its_cancellation_is_left_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    let (started, mut has_started) = unbounded_channel();
+    let (release, released) = mpsc::channel::<()>();
+    let released = Mutex::new(Some(released));
+    let options = Options {
+        lease: Duration::from_millis(300),
+        ..Options::new(folder.path())
+    };
+    let jobs = open(options, move |problem: &Problem, monitor: &dyn Monitor| {
+        let first_time = released.lock().unwrap().take();
+        if let Some(released) = first_time {
+            started.send(()).unwrap();
+            let _ = released.recv();
+        }
+        solve(problem, monitor)
+    })
+    .await;
+    let deaf = jobs.submit(case("deaf"), None).await.unwrap().id;
+    jobs.start().unwrap();
+    has_started.recv().await.unwrap();
+    jobs.cancel(deaf).await.unwrap();
+    let next = jobs.submit(case("next"), None).await.unwrap().id;
+    let at_most = Duration::from_secs(60);
+    assert_eq!(
+        jobs.wait(deaf, at_most).await.unwrap().state,
+        State::Cancelled
+    );
+    assert_eq!(
+        jobs.wait(next, at_most).await.unwrap().state,
+        State::Succeeded
+    );
+    drop(release);
+    jobs.shutdown(Duration::from_secs(10)).await;
+}
+
+#[tokio::test]
+async fn a_refused_case_is_not_stored() {
+    let folder = tempfile::tempdir().unwrap();
+    let jobs = jobs_with(folder.path(), solve).await;
+    match jobs.submit(json!({}), Some("k".to_owned())).await {
+        Err(JobsError::Case(faults)) => assert!(!faults.0.is_empty()),
+        other => panic!("{other:?}"),
+    }
+    assert_eq!(
+        jobs.list(&Default::default(), None, 10).await.unwrap().jobs,
+        []
+    );
+    jobs.submit(case("repaired"), Some("k".to_owned()))
+        .await
+        .unwrap();
+}
+
+#[tokio::test]
+async fn the_same_key_gives_the_same_job_also_when_the_queue_is_full() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = Options {
+        queue_max: 2,
+        ..Options::new(folder.path())
+    };
+    let jobs = open(options, solve).await;
+    let key = || Some("k".to_owned());
+    let first = jobs.submit(case("one"), key()).await.unwrap();
+    jobs.submit(case("two"), None).await.unwrap();
+    let full = jobs.submit(case("three"), None).await;
+    assert!(
+        matches!(full, Err(JobsError::QueueFull { queue_max: 2 })),
+        "{full:?}"
+    );
+    assert_eq!(jobs.submit(case("one"), key()).await.unwrap(), first);
+    let conflict = jobs.submit(case("other"), key()).await;
+    assert!(
+        matches!(conflict, Err(JobsError::IdempotencyConflict)),
+        "{conflict:?}"
+    );
+
+    jobs.worker("w").unwrap().step().await.unwrap();
+    jobs.submit(case("three"), None).await.unwrap();
+    let full = jobs.submit(case("four"), None).await;
+    assert!(matches!(full, Err(JobsError::QueueFull { .. })), "{full:?}");
+}
+
+#[tokio::test]
+async fn a_pool_solves_everything_and_waiting_callers_hear_of_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = Options {
+        workers: 3,
+        ..Options::new(folder.path())
+    };
+    let jobs = open(options, solve).await;
+    jobs.start().unwrap();
+    let mut waiting = Vec::new();
+    for number in 0..40 {
+        let id = jobs
+            .submit(case(&number.to_string()), None)
+            .await
+            .unwrap()
+            .id;
+        let jobs = jobs.clone();
+        waiting.push(tokio::spawn(async move {
+            jobs.wait(id, Duration::from_secs(60)).await.unwrap()
+        }));
+    }
+    for job in waiting {
+        let job = job.await.unwrap();
+        assert_eq!((job.state, job.attempt), (State::Succeeded, 1));
+    }
+    jobs.shutdown(Duration::from_secs(10)).await;
+}
+
+#[tokio::test]
+async fn waiting_ends_with_the_time_allowed_and_for_unknown_jobs_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let jobs = jobs_with(folder.path(), solve).await;
+    let id = jobs.submit(case("never claimed"), None).await.unwrap().id;
+    assert_eq!(
+        jobs.wait(id, Duration::ZERO).await.unwrap().state,
+        State::Queued
+    );
+    assert_eq!(
+        jobs.wait(id, Duration::from_millis(20))
+            .await
+            .unwrap()
+            .state,
+        State::Queued
+    );
+    let unknown = jobs
+        .wait(uuid::Uuid::now_v7(), Duration::from_secs(3600))
+        .await;
+    assert!(matches!(unknown, Err(JobsError::NotFound)));
+    let waiting = tokio::spawn({
+        let jobs = jobs.clone();
+        async move { jobs.wait(id, Duration::from_secs(3600)).await.unwrap() }
+    });
+    jobs.cancel(id).await.unwrap();
+    assert_eq!(waiting.await.unwrap().state, State::Cancelled);
+}
+
+#[tokio::test]
+async fn results_without_a_job_are_swept_at_the_start() {
+    let folder = tempfile::tempdir().unwrap();
+    let jobs = jobs_with(folder.path(), solve).await;
+    let kept = jobs.submit(case("kept"), None).await.unwrap().id;
+    jobs.worker("w").unwrap().step().await.unwrap();
+    let kept_file = only_solution(&folder.path().join("results"));
+    let orphan = uuid::Uuid::now_v7().to_string();
+    let orphan = kept_file
+        .to_str()
+        .unwrap()
+        .replace(&kept.to_string(), &orphan);
+    let orphan = std::path::PathBuf::from(orphan);
+    std::fs::create_dir_all(orphan.parent().unwrap()).unwrap();
+    std::fs::copy(&kept_file, &orphan).unwrap();
+
+    jobs.start().unwrap();
+    while orphan.parent().unwrap().parent().unwrap().exists() {
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    jobs.shutdown(Duration::from_secs(10)).await;
+    assert!(kept_file.exists());
+}
+
+fn files_below(folder: &std::path::Path) -> usize {
+    let Ok(entries) = std::fs::read_dir(folder) else {
+        return 0;
+    };
+    entries
+        .map(|entry| entry.unwrap().path())
+        .map(|path| if path.is_dir() { files_below(&path) } else { 1 })
+        .sum()
+}
+
+fn only_solution(folder: &std::path::Path) -> std::path::PathBuf {
+    let mut path = folder.to_owned();
+    while path.is_dir() {
+        path = if path.join("solution.json").exists() {
+            path.join("solution.json")
+        } else {
+            std::fs::read_dir(&path)
+                .unwrap()
+                .next()
+                .unwrap()
+                .unwrap()
+                .path()
+        };
+    }
+    path
+}
