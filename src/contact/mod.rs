@@ -38,12 +38,14 @@ pub fn check(case: &Value, limits: &Limits) -> Result<Problem, CaseError> {
     Problem::new(&draft.complete().ok_or(CaseError(faults))?, limits)
 }
 
-/// Solves a checked case: mesh levels and their pressures, then every motion from the coarsest level to the finest.
+/// Solves a checked case: region and pressure where they are not known yet, mesh levels and their pressures, then every motion from the coarsest level to the finest.
 ///
 /// # Errors
 /// A named reason why there is no answer.
 pub fn solve(problem: &Problem, monitor: &dyn Monitor) -> Result<(Solution, Fields), SolveError> {
     let watch = Watch::new(monitor, problem.time_limit, problem.motions.len());
+    let problem = problem.pressed(&watch)?;
+    let problem = problem.as_ref();
     let levels = problem
         .levels()
         .into_iter()

@@ -1,6 +1,6 @@
 //! The gap between the undeformed bodies: samples, and a smooth surface through them.
 
-use crate::contact::normal::interpolation::{interval, weights};
+use crate::contact::normal::interpolation::{Cubic, interval, sober_slopes};
 
 /// Distance of the undeformed surfaces in mm, both bodies together, over the contact plane.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,24 +21,20 @@ pub enum Gap {
 /// Beyond the first and the last sample there is nothing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
-    axis: Axis,
-    /// Values at the nodes of the axis, the two added ones included.
+    axis: Vec<f64>,
     values: Vec<f64>,
+    slopes: Vec<f64>,
 }
 
 /// A surface with continuous derivatives through samples on a rectangular grid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Surface {
-    x: Axis,
-    y: Axis,
-    /// Values at the nodes, the added ones included; node (i, j) at `j * x.nodes.len() + i`.
+    x: Vec<f64>,
+    y: Vec<f64>,
+    /// Sample (i, j) at `j * x.len() + i`.
     values: Vec<f64>,
-}
-
-/// Coordinates of samples, with one node added on each side: the interpolation needs two neighbours everywhere.
-#[derive(Debug, Clone, PartialEq)]
-struct Axis {
-    nodes: Vec<f64>,
+    /// Slopes along y, stored alike.
+    slopes: Vec<f64>,
 }
 
 /// Where the gap is known, `[low, high]` in mm along x and y; infinite where it is given by a formula.
@@ -64,19 +60,17 @@ impl Gap {
     #[must_use]
     pub fn window(&self) -> Window {
         match self {
-            Gap::Profile { across, .. } => {
-                [[f64::NEG_INFINITY, f64::INFINITY], across.axis.range()]
-            }
-            Gap::Grid(surface) => [surface.x.range(), surface.y.range()],
+            Gap::Profile { across, .. } => [[f64::NEG_INFINITY, f64::INFINITY], range(&across.axis)],
+            Gap::Grid(surface) => [range(&surface.x), range(&surface.y)],
         }
     }
 
-    /// Coordinates of the samples along x and y, without the added nodes; none where a formula holds.
+    /// Coordinates of the samples along x and y; none where a formula holds.
     #[must_use]
     pub fn samples(&self) -> [&[f64]; 2] {
         match self {
-            Gap::Profile { across, .. } => [&[], across.axis.given()],
-            Gap::Grid(surface) => [surface.x.given(), surface.y.given()],
+            Gap::Profile { across, .. } => [&[], &across.axis],
+            Gap::Grid(surface) => [&surface.x, &surface.y],
         }
     }
 
@@ -100,151 +94,122 @@ impl Gap {
     /// The least and the largest sample; along x = 0 for a profile.
     #[must_use]
     pub fn extremes(&self) -> [f64; 2] {
-        let given: Box<dyn Iterator<Item = f64> + '_> = match self {
-            Gap::Profile { across, .. } => {
-                Box::new(across.values[1..across.values.len() - 1].iter().copied())
-            }
-            Gap::Grid(surface) => {
-                let width = surface.x.nodes.len();
-                let rows = surface.values.chunks_exact(width);
-                Box::new(
-                    rows.skip(1)
-                        .take(surface.y.nodes.len() - 2)
-                        .flat_map(move |row| row[1..width - 1].iter().copied()),
-                )
-            }
+        let values = match self {
+            Gap::Profile { across, .. } => &across.values,
+            Gap::Grid(surface) => &surface.values,
         };
-        given.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
-            [low.min(value), high.max(value)]
+        let start = [f64::INFINITY, f64::NEG_INFINITY];
+        values.iter().fold(start, |[low, high], value| {
+            [low.min(*value), high.max(*value)]
         })
+    }
+
+    /// Where the least sample lies, if none inside the data is as small.
+    #[must_use]
+    pub fn least_at_edge(&self) -> Option<String> {
+        let place = |name: &str, at: f64| format!("{name} = {at} mm");
+        let least = self.extremes()[0];
+        match self {
+            Gap::Profile { across, .. } => {
+                let last = across.values.len() - 1;
+                let inside = (1..last).any(|k| across.values[k] <= least);
+                let at = if across.values[0] <= least { 0 } else { last };
+                (!inside).then(|| place("y", across.axis[at]))
+            }
+            Gap::Grid(Surface { x, y, values, .. }) => {
+                let low = |k: usize| values[k] <= least;
+                let at_edge = |k: usize, n: usize| k == 0 || k + 1 == n;
+                let cell = |k: usize| (k % x.len(), k / x.len());
+                let inside = |k: usize| !at_edge(cell(k).0, x.len()) && !at_edge(cell(k).1, y.len());
+                if (0..values.len()).any(|k| low(k) && inside(k)) {
+                    return None;
+                }
+                let (i, j) = (0..values.len()).find(|k| low(*k)).map(cell)?;
+                Some(if at_edge(i, x.len()) {
+                    place("x", x[i])
+                } else {
+                    place("y", y[j])
+                })
+            }
+        }
     }
 
     /// Is the gap its own mirror image about y = 0, sample by sample?
     #[must_use]
     pub fn is_mirrored(&self) -> bool {
-        let mirrored = |axis: &Axis| {
-            let nodes = &axis.nodes;
-            nodes.iter().zip(nodes.iter().rev()).all(|(a, b)| *a == -b)
-        };
+        let mirrored = |axis: &[f64]| axis.iter().zip(axis.iter().rev()).all(|(a, b)| *a == -b);
         match self {
             Gap::Profile { across, .. } => {
                 let values = &across.values;
                 mirrored(&across.axis) && values.iter().zip(values.iter().rev()).all(|(a, b)| a == b)
             }
             Gap::Grid(surface) => {
-                let rows = surface.values.chunks_exact(surface.x.nodes.len());
+                let rows = surface.values.chunks_exact(surface.x.len());
                 mirrored(&surface.y) && rows.clone().zip(rows.rev()).all(|(a, b)| a == b)
             }
         }
     }
 }
 
-impl Axis {
-    fn new(given: &[f64]) -> Axis {
-        let n = given.len();
-        let mut nodes = Vec::with_capacity(n + 2);
-        nodes.push(2.0 * given[0] - given[1]);
-        nodes.extend_from_slice(given);
-        nodes.push(2.0 * given[n - 1] - given[n - 2]);
-        Axis { nodes }
-    }
-
-    fn given(&self) -> &[f64] {
-        &self.nodes[1..self.nodes.len() - 1]
-    }
-
-    fn range(&self) -> [f64; 2] {
-        let given = self.given();
-        [given[0], given[given.len() - 1]]
-    }
-
-    /// The interval that holds a point, and the weights of the four nodes around it.
-    fn weights(&self, at: f64) -> (usize, [f64; 4]) {
-        let i = interval(&self.nodes, at).clamp(1, self.nodes.len() - 3);
-        (i - 1, weights(&self.nodes, i, at))
-    }
-
-    /// Value at the added node before (`first`) or after the given ones: on the parabola through the three nearest
-    /// samples, on the line if there are only two.
-    fn beyond(&self, first: bool, value: impl Fn(usize) -> f64) -> f64 {
-        let n = self.nodes.len();
-        let near = |k: usize| if first { k } else { n - 1 - k };
-        let [x0, x1, x2] = [0, 1, 2].map(|k| self.nodes[near(k)]);
-        let [v1, v2] = [1, 2].map(|k| value(near(k)));
-        let line = v1 + (v2 - v1) * (x0 - x1) / (x2 - x1);
-        if n < 5 {
-            return line;
-        }
-        let (x3, v3) = (self.nodes[near(3)], value(near(3)));
-        let slopes = [(v2 - v1) / (x2 - x1), (v3 - v2) / (x3 - x2)];
-        line + (slopes[1] - slopes[0]) / (x3 - x1) * (x0 - x1) * (x0 - x2)
-    }
-}
-
 impl Curve {
-    fn new(given: &[f64], samples: &[f64]) -> Curve {
-        let axis = Axis::new(given);
-        let mut values = Vec::with_capacity(samples.len() + 2);
-        values.push(0.0);
-        values.extend_from_slice(samples);
-        values.push(0.0);
-        values[0] = axis.beyond(true, |k| values[k]);
-        let last = axis.beyond(false, |k| values[k]);
-        values[samples.len() + 1] = last;
-        Curve { axis, values }
+    fn new(axis: &[f64], values: &[f64]) -> Curve {
+        Curve {
+            slopes: sober_slopes(axis, values),
+            axis: axis.to_vec(),
+            values: values.to_vec(),
+        }
     }
 
     fn at(&self, at: f64) -> f64 {
-        let (first, weights) = self.axis.weights(at);
-        dot(weights, &self.values[first..first + 4])
+        value_on(&self.axis, &self.values, &self.slopes, at)
     }
 }
 
 impl Surface {
     fn new(x: &[f64], y: &[f64], samples: &[Vec<f64>]) -> Surface {
-        let (x, y) = (Axis::new(x), Axis::new(y));
-        let width = x.nodes.len();
-        let mut values = vec![0.0; width * y.nodes.len()];
-        for (row, samples) in values[width..].chunks_exact_mut(width).zip(samples) {
-            row[1..width - 1].copy_from_slice(samples);
-            row[0] = x.beyond(true, |k| row[k]);
-            row[width - 1] = x.beyond(false, |k| row[k]);
+        let mut slopes = vec![0.0; x.len() * y.len()];
+        for i in 0..x.len() {
+            let column: Vec<f64> = samples.iter().map(|row| row[i]).collect();
+            for (j, slope) in sober_slopes(y, &column).into_iter().enumerate() {
+                slopes[j * x.len() + i] = slope;
+            }
         }
-        let last = (y.nodes.len() - 1) * width;
-        for i in 0..width {
-            values[i] = y.beyond(true, |k| values[k * width + i]);
-            values[last + i] = y.beyond(false, |k| values[k * width + i]);
+        Surface {
+            x: x.to_vec(),
+            y: y.to_vec(),
+            values: samples.concat(),
+            slopes,
         }
-        Surface { x, y, values }
     }
 
     fn on(&self, x: &[f64], y: &[f64]) -> Vec<f64> {
-        let width = self.x.nodes.len();
-        let places: Vec<(usize, [f64; 4])> = x.iter().map(|x| self.x.weights(*x)).collect();
-        // Only the columns that some point needs are brought to a line.
-        let low = places.iter().map(|(first, _)| *first).min().unwrap_or(0);
-        let high = places.iter().map(|(first, _)| first + 4).max().unwrap_or(0);
-        let mut line = vec![0.0; width];
+        let width = self.x.len();
         let mut out = Vec::with_capacity(x.len() * y.len());
         for y in y {
-            let (first, weights) = self.y.weights(*y);
-            let row = |k: usize| &self.values[(first + k) * width..(first + k + 1) * width];
-            let [a, b, c, d] = [row(0), row(1), row(2), row(3)];
-            for i in low..high {
-                line[i] = dot(weights, &[a[i], b[i], c[i], d[i]]);
-            }
-            out.extend(
-                places
-                    .iter()
-                    .map(|(first, weights)| dot(*weights, &line[*first..first + 4])),
-            );
+            let j = interval(&self.y, *y);
+            let (here, next) = (j * width, (j + 1) * width);
+            let line: Vec<f64> = (0..width)
+                .map(|i| {
+                    let values = [here, next].map(|row| self.values[row + i]);
+                    let slopes = [here, next].map(|row| self.slopes[row + i]);
+                    Cubic::with_slopes(&self.y, j, values, slopes).at(*y)
+                })
+                .collect();
+            let slopes = sober_slopes(&self.x, &line);
+            out.extend(x.iter().map(|x| value_on(&self.x, &line, &slopes, *x)));
         }
         out
     }
 }
 
-fn dot(weights: [f64; 4], values: &[f64]) -> f64 {
-    weights[0] * values[0] + weights[1] * values[1] + weights[2] * values[2] + weights[3] * values[3]
+fn range(axis: &[f64]) -> [f64; 2] {
+    [axis[0], axis[axis.len() - 1]]
+}
+
+/// Value of the curve with these values and slopes at the nodes of the axis.
+fn value_on(axis: &[f64], values: &[f64], slopes: &[f64], at: f64) -> f64 {
+    let i = interval(axis, at);
+    Cubic::with_slopes(axis, i, [values[i], values[i + 1]], [slopes[i], slopes[i + 1]]).at(at)
 }
 
 #[cfg(test)]
@@ -286,6 +251,26 @@ mod tests {
         let found = gap.on(&[0.0, 10.0], &[2.5]);
         assert!((found[0] - 0.5).abs() < 1e-15 && (found[1] - 0.6).abs() < 1e-15);
         assert_eq!(gap.extremes(), [0.2, 0.6]);
+    }
+
+    #[test]
+    fn a_jump_does_not_make_the_curve_swing_below_the_samples() {
+        let y: Vec<f64> = (-20..=20).map(|k| 0.25 * f64::from(k)).collect();
+        let gap: Vec<f64> = y
+            .iter()
+            .map(|y| if *y > 2.0 { 1e3 } else { 0.002 * y * y })
+            .collect();
+        let curve = Gap::profile(500.0, &y, &gap);
+        for k in 0..=1000 {
+            let at = -5.0 + 0.01 * f64::from(k);
+            let found = curve.on(&[0.0], &[at])[0];
+            let parabola = 0.002 * at * at;
+            if at <= 1.75 {
+                assert!((found - parabola).abs() < 1e-12, "{at} {found}");
+            } else {
+                assert!(found > parabola - 1e-3, "{at} {found}");
+            }
+        }
     }
 
     #[test]
