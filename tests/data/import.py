@@ -191,7 +191,6 @@ def gap_profiles():
             assert (given["material"]["G"], given["material"]["nu"], given["mu"]) == (82000.0, 0.28, 0.3)
             out.append(converged_pressed({
                 "id": record["id"],
-                "class": record["cls"],
                 "rolling_mm": 460.0,
                 "across": gap_across(given["geometry"]),
                 "window_y_mm": [window["yl"], window["yh"]],
@@ -210,21 +209,24 @@ def gap_grids():
         given = record["input"]
         assert (given["G"], given["nu"], given["mu"]) == (82000.0, 0.28, 0.3)
         for patch in record["patches"]:
-            if "fields_file" not in patch:
+            # With two patches that far apart the program lets them influence each other only in part.
+            if "fields_file" not in patch or record["id"] == "prof_y5_10kN_bench":
                 continue
-            table = json.loads(gzip.decompress((SOURCE / "reference" / patch["fields_file"]).read_bytes()))["table"]
+            fields = json.loads(gzip.decompress((SOURCE / "reference" / patch["fields_file"]).read_bytes()))
+            table = fields["table"]
             mx, my, gap = table["mx"], table["my"], table["cols"]["h"]
             converged = patch["converged"]
             level = 1.3 * converged["approach_mm"]["value"]
             low = [k for k in range(mx * my) if gap[k] < level]
             columns = range(max(min(k % mx for k in low) - 3, 0), min(max(k % mx for k in low) + 4, mx))
             rows = range(max(min(k // mx for k in low) - 3, 0), min(max(k // mx for k in low) + 4, my))
+            # Every grid of the program counts the distance from its own least sample, so does the approach.
+            converged["approach_mm"]["value"] = fields["approach_mm"]
             out.append(converged_pressed({
                 "id": record["id"],
-                "class": record["cls"],
                 "x_mm": [round(table["xc1"] + i * table["dx"], 6) for i in columns],
                 "y_mm": [round(table["yc1"] + j * table["dy"], 6) for j in rows],
-                "gap_mm": [[round(min(gap[j * mx + i], 1.0), 7) for i in columns] for j in rows],
+                "gap_mm": [[round(gap[j * mx + i], 7) for i in columns] for j in rows],
                 "normal_force_n": converged["Fn_N"]["value"],
                 "creepage_x": converged["xi"]["value"],
                 "creepage_y": converged["eta"]["value"],

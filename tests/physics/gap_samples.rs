@@ -29,7 +29,11 @@ impl Across {
                     let to = if k == last { f64::INFINITY } else { to };
                     let (low, high) = (from.max(y.min(0.0)), to.min(y.max(0.0)));
                     let at = |t: f64| (y - t).powi(2) / (2.0 * radius);
-                    if low < high { (at(low) - at(high)).abs() } else { 0.0 }
+                    if low < high {
+                        (at(low) - at(high)).abs()
+                    } else {
+                        0.0
+                    }
                 };
                 (0..arcs.len()).map(part).sum()
             }
@@ -80,7 +84,6 @@ pub fn grid(x: &[f64], y: &[f64], gap: impl Fn(f64, f64) -> f64) -> Value {
 #[derive(Debug, Clone, Deserialize)]
 pub struct GapReference {
     pub id: String,
-    pub class: String,
     pub rolling_mm: Option<f64>,
     pub across: Option<Across>,
     pub window_y_mm: Option<[f64; 2]>,
@@ -119,7 +122,11 @@ impl GapReference {
         }
         let across = self.across.as_ref().expect("a profile has a gap across");
         let [low, high] = self.window_y_mm.expect("a profile has a window");
-        let y = spread(low - 2.0, high + 2.0, 1 + ((high - low + 4.0) / 0.1) as usize);
+        let y = spread(
+            low - 2.0,
+            high + 2.0,
+            1 + ((high - low + 4.0) / 0.1) as usize,
+        );
         profile(self.rolling_mm.expect("a radius"), &y, |y| across.at(y))
     }
 

@@ -7,6 +7,8 @@ mod cases;
 mod convergence_domain;
 mod equations;
 mod friction;
+mod gap_faults;
+mod gap_hertz;
 mod gap_reference;
 mod gap_samples;
 mod golden;

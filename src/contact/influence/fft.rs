@@ -164,11 +164,7 @@ fn coefficients(nx: usize, ny: usize, dx: f64, dy: f64, contact_modulus: f64) ->
     // The corners lie half a cell before and after the centres; neighbouring cells share them.
     let corner = |p: f64, q: f64| p * (q / p.abs()).asinh() + q * (p / q.abs()).asinh();
     let at = |i: usize, d: f64| (i as f64 - 0.5) * d;
-    let line = |j: usize| -> Vec<f64> {
-        (0..=nx)
-            .map(|i| corner(at(i, dx), at(j, dy)))
-            .collect()
-    };
+    let line = |j: usize| -> Vec<f64> { (0..=nx).map(|i| corner(at(i, dx), at(j, dy))).collect() };
     let mut out = Vec::with_capacity(nx * ny);
     let mut below = line(0);
     for j in 0..ny {

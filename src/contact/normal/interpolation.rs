@@ -70,7 +70,9 @@ impl Cubic {
 
     /// Points where the sign changes from or to positive, from smaller to larger x, each with the sign after it
     /// (`true` is positive). Accurate to a few units in the last place of x.
-    pub(in crate::contact::normal) fn sign_changes(&self) -> impl Iterator<Item = (f64, bool)> + use<> {
+    pub(in crate::contact::normal) fn sign_changes(
+        &self,
+    ) -> impl Iterator<Item = (f64, bool)> + use<> {
         let cubic = *self;
         let [first, second] = self.turning_points();
         let pieces = [(0.0, first), (first, second), (second, 1.0)];
@@ -162,7 +164,10 @@ pub(in crate::contact::normal) fn sober_slopes(axis: &[f64], values: &[f64]) -> 
     let bend = |k: usize| 2.0 * (rises[k] - rises[k - 1]) / (axis[k + 1] - axis[k - 1]);
     let bends: Vec<f64> = (0..n).map(|k| bend(k.clamp(1, n - 2))).collect();
     let allowed = |k: usize| {
-        BEND_MAX * bends[k.saturating_sub(1)].abs().min(bends[(k + 1).min(n - 1)].abs())
+        BEND_MAX
+            * bends[k.saturating_sub(1)]
+                .abs()
+                .min(bends[(k + 1).min(n - 1)].abs())
     };
     // Share of the parabola in a slope.
     let trust = |k: usize| {

@@ -38,7 +38,9 @@ pub fn assemble(problem: &Problem, level: &Level, points: &[Point]) -> (Solution
             y_mm: 0.0,
             meaning: match problem.region {
                 Region::Ellipse(_) => "centre of the contact ellipse",
-                Region::Gap(_) | Region::Grid(_) => "origin of the given coordinates, for all patches",
+                Region::Gap(_) | Region::Grid(_) => {
+                    "origin of the given coordinates, for all patches"
+                }
             }
             .to_owned(),
         },

@@ -146,11 +146,7 @@ pub(super) fn read_load(case: &mut Object) -> Option<Load> {
     })
 }
 
-type Grid = (
-    Option<Vec<f64>>,
-    Option<Vec<f64>>,
-    Option<Vec<Vec<f64>>>,
-);
+type Grid = (Option<Vec<f64>>, Option<Vec<f64>>, Option<Vec<Vec<f64>>>);
 
 /// Both axes of a grid and its samples.
 fn grid(block: &mut Object, quantity: Quantity) -> Grid {

@@ -60,7 +60,9 @@ impl Gap {
     #[must_use]
     pub fn window(&self) -> Window {
         match self {
-            Gap::Profile { across, .. } => [[f64::NEG_INFINITY, f64::INFINITY], range(&across.axis)],
+            Gap::Profile { across, .. } => {
+                [[f64::NEG_INFINITY, f64::INFINITY], range(&across.axis)]
+            }
             Gap::Grid(surface) => [range(&surface.x), range(&surface.y)],
         }
     }
@@ -120,7 +122,8 @@ impl Gap {
                 let low = |k: usize| values[k] <= least;
                 let at_edge = |k: usize, n: usize| k == 0 || k + 1 == n;
                 let cell = |k: usize| (k % x.len(), k / x.len());
-                let inside = |k: usize| !at_edge(cell(k).0, x.len()) && !at_edge(cell(k).1, y.len());
+                let inside =
+                    |k: usize| !at_edge(cell(k).0, x.len()) && !at_edge(cell(k).1, y.len());
                 if (0..values.len()).any(|k| low(k) && inside(k)) {
                     return None;
                 }
@@ -141,7 +144,8 @@ impl Gap {
         match self {
             Gap::Profile { across, .. } => {
                 let values = &across.values;
-                mirrored(&across.axis) && values.iter().zip(values.iter().rev()).all(|(a, b)| a == b)
+                mirrored(&across.axis)
+                    && values.iter().zip(values.iter().rev()).all(|(a, b)| a == b)
             }
             Gap::Grid(surface) => {
                 let rows = surface.values.chunks_exact(surface.x.len());
@@ -209,7 +213,13 @@ fn range(axis: &[f64]) -> [f64; 2] {
 /// Value of the curve with these values and slopes at the nodes of the axis.
 fn value_on(axis: &[f64], values: &[f64], slopes: &[f64], at: f64) -> f64 {
     let i = interval(axis, at);
-    Cubic::with_slopes(axis, i, [values[i], values[i + 1]], [slopes[i], slopes[i + 1]]).at(at)
+    Cubic::with_slopes(
+        axis,
+        i,
+        [values[i], values[i + 1]],
+        [slopes[i], slopes[i + 1]],
+    )
+    .at(at)
 }
 
 #[cfg(test)]
@@ -240,7 +250,10 @@ mod tests {
         for (j, y) in across.iter().enumerate() {
             for (i, x) in at.iter().enumerate() {
                 let found = values[j * at.len() + i];
-                assert!((found - paraboloid(*x, *y)).abs() < 1e-14, "{x} {y} {found}");
+                assert!(
+                    (found - paraboloid(*x, *y)).abs() < 1e-14,
+                    "{x} {y} {found}"
+                );
             }
         }
     }

@@ -102,7 +102,11 @@ impl Grid {
         if self.mirrored {
             let width = self.cells[0];
             let (low, high) = values.split_at_mut(self.cells[1].div_ceil(2) * width);
-            for (image, row) in high.chunks_exact_mut(width).rev().zip(low.chunks_exact(width)) {
+            for (image, row) in high
+                .chunks_exact_mut(width)
+                .rev()
+                .zip(low.chunks_exact(width))
+            {
                 image.copy_from_slice(row);
             }
         }
@@ -170,7 +174,11 @@ impl Grid {
     pub(super) fn sides_in_contact(&self, pressure: &[f64]) -> Vec<Side> {
         let [nx, ny] = self.cells;
         let touches = |side: &Side| {
-            let last = if side.upper { self.cells[side.axis] - 1 } else { 0 };
+            let last = if side.upper {
+                self.cells[side.axis] - 1
+            } else {
+                0
+            };
             (0..nx * ny).any(|k| pressure[k] > 0.0 && [k % nx, k / nx][side.axis] == last)
         };
         let all = [(0, false), (0, true), (1, false), (1, true)];
@@ -201,7 +209,13 @@ impl Grid {
     }
 
     /// The box around all cells that touch or nearly do (closer than `near`), and the cells that resolve what is in it.
-    pub(super) fn wanted(&self, pressed: &Pressed, near: f64, resolution: Resolution, limits: Window) -> Wanted {
+    pub(super) fn wanted(
+        &self,
+        pressed: &Pressed,
+        near: f64,
+        resolution: Resolution,
+        limits: Window,
+    ) -> Wanted {
         let width = self.cells[0];
         let cell = |k: usize| [k % width, k / width];
         let mut whole = Extent::default();

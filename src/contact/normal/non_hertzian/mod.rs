@@ -140,7 +140,8 @@ impl GapContact {
         {
             return Err(Failure::NoAnswer(no_touch(approach, reach.least)));
         }
-        let first = |reach: &Reach| Grid::new(reach.window, [CELLS_FIRST; 2], self.gap.is_mirrored());
+        let first =
+            |reach: &Reach| Grid::new(reach.window, [CELLS_FIRST; 2], self.gap.is_mirrored());
         let mut grid = first(&reach);
         let mut solved: Option<(Grid, Pressed)> = None;
         let mut iterations = 0;
@@ -199,12 +200,25 @@ impl GapContact {
     ) -> Result<Pressed, Failure> {
         let gap = grid.gap(&self.gap);
         let (start, tolerance) = match before {
-            Some((coarse, pressed)) => (grid.interpolate(coarse, &pressed.pressure, &gap), TOLERANCE),
-            None => (grid.first_pressure(&gap, reach, self.contact_modulus), TOLERANCE_FIRST),
+            Some((coarse, pressed)) => {
+                (grid.interpolate(coarse, &pressed.pressure, &gap), TOLERANCE)
+            }
+            None => (
+                grid.first_pressure(&gap, reach, self.contact_modulus),
+                TOLERANCE_FIRST,
+            ),
         };
         let mut influence = grid.influence(self.contact_modulus);
         let cell = grid.step[0] * grid.step[1];
-        let mut pressed = press(&mut influence, &gap, cell, self.pressing, start, tolerance, monitor)?;
+        let mut pressed = press(
+            &mut influence,
+            &gap,
+            cell,
+            self.pressing,
+            start,
+            tolerance,
+            monitor,
+        )?;
         if grid.mirrored {
             grid.symmetrise(&mut pressed.pressure);
         }
@@ -270,7 +284,8 @@ impl GapContact {
                      half-spaces do not describe",
                     2.0 * a
                 ));
-            } else if depth > APPROACH_USUAL_MAX * a.min(b) {
+            }
+            if depth > APPROACH_USUAL_MAX * a.min(b) {
                 remarks.push(format!(
                     "the bodies overlap by {depth:.3e} mm, against a half width of {:.3e} mm of patch {k}: strains are too large \
                      for linear elasticity",

@@ -46,9 +46,7 @@ pub(super) fn reach(gap: &Gap, pressing: Pressing, contact_modulus: f64) -> Reac
         least = look.least;
         level = match pressing {
             Pressing::Approach(approach) => approach,
-            Pressing::Force(force) => {
-                look.least + MARGIN * look.depth(force / contact_modulus)
-            }
+            Pressing::Force(force) => look.least + MARGIN * look.depth(force / contact_modulus),
         };
         let mut next = look.below(level, limits);
         if let Gap::Profile { rolling, .. } = gap
@@ -111,12 +109,16 @@ impl Look {
             .values
             .iter()
             .enumerate()
-            .map(|(k, value)| (value - self.least, shares[0][k % width] * shares[1][k / width]))
+            .map(|(k, value)| {
+                (
+                    value - self.least,
+                    shares[0][k % width] * shares[1][k / width],
+                )
+            })
             .collect();
         cells.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let carried = |area: f64, depth: f64| {
-            4.0 / 3.0 * (area / std::f64::consts::PI).sqrt() * depth
-        };
+        let carried =
+            |area: f64, depth: f64| 4.0 / 3.0 * (area / std::f64::consts::PI).sqrt() * depth;
         let mut area = 0.0;
         for (height, share) in cells {
             area += share;
@@ -197,7 +199,12 @@ mod tests {
                 let hertz = Ellipse::of_radii(rolling, lateral, pressing, modulus);
                 let (y, values) = parabola(lateral, 40.0 * hertz.b);
                 let reach = reach(&Gap::profile(rolling, &y, &values), pressing, modulus);
-                assert!(reach.level > hertz.approach, "{} {}", reach.level, hertz.approach);
+                assert!(
+                    reach.level > hertz.approach,
+                    "{} {}",
+                    reach.level,
+                    hertz.approach
+                );
                 for (range, half) in reach.window.into_iter().zip([hertz.a, hertz.b]) {
                     assert!(range[0] < -half && range[1] > half, "{range:?} {half}");
                     assert!(length(range) < 2.0 * 2.6 * half, "{range:?} {half}");
