@@ -19,11 +19,11 @@ use serde_json::Value;
 
 use crate::contact::error::{CaseError, SolveError};
 use crate::contact::monitor::{Monitor, Watch};
-use crate::contact::outputs::assemble::assemble;
+use crate::contact::outputs::assemble::{assemble, wants_fields};
 use crate::contact::problem::{Limits, Problem};
 use crate::contact::solution::{Fields, Solution};
-use crate::contact::tangential::level::Level;
-use crate::contact::tangential::point;
+use crate::contact::tangential::ladder::Ladder;
+use crate::contact::tangential::point::{self, Point};
 
 /// Reads and checks a case.
 ///
@@ -38,7 +38,8 @@ pub fn check(case: &Value, limits: &Limits) -> Result<Problem, CaseError> {
     Problem::new(&draft.complete().ok_or(CaseError(faults))?, limits)
 }
 
-/// Solves a checked case: region and pressure where they are not known yet, mesh levels and their pressures, then every motion from the coarsest level to the finest.
+/// Solves a checked case: region and pressure where they are not known yet, then every motion from a coarse mesh level
+/// up to the first that meets the target.
 ///
 /// # Errors
 /// A named reason why there is no answer.
@@ -46,15 +47,39 @@ pub fn solve(problem: &Problem, monitor: &dyn Monitor) -> Result<(Solution, Fiel
     let watch = Watch::new(monitor, problem.time_limit, problem.motions.len());
     let problem = problem.pressed(&watch)?;
     let problem = problem.as_ref();
-    let levels = problem
-        .levels()
-        .into_iter()
-        .map(|size| Level::new(problem, size));
-    let levels: Vec<Level> = levels.collect::<Result<_, _>>()?;
+    let mut ladder = Ladder::new(problem);
     let mut points = Vec::with_capacity(problem.motions.len());
     for index in 0..problem.motions.len() {
-        points.push(point::solve(problem, &levels, index, &watch)?);
+        points.push(point::solve(problem, &mut ladder, index, &watch)?);
         watch.advance();
     }
-    Ok(assemble(problem, &levels[levels.len() - 1], &points))
+    if wants_fields(problem) {
+        points = on_one_level(problem, &mut ladder, points, &watch)?;
+    }
+    if let (Some(first), Some(normal)) = (points.first_mut(), problem.normal) {
+        // What all motions share is charged to the first.
+        first.seconds += normal.seconds;
+    }
+    Ok(assemble(problem, &ladder, &points))
+}
+
+/// Brings every point to the finest level that any of them needed: the fields of a patch share their cells.
+fn on_one_level(
+    problem: &Problem,
+    ladder: &mut Ladder,
+    points: Vec<Point>,
+    monitor: &dyn Monitor,
+) -> Result<Vec<Point>, SolveError> {
+    let cells = |point: &Point| ladder.get(point.level).mesh.cells();
+    let Some(finest) = points.iter().max_by_key(|p| cells(p)).map(|p| p.level) else {
+        return Ok(points);
+    };
+    let size = ladder.get(finest).size;
+    let lift = |(index, point): (usize, Point)| {
+        if point.level == finest {
+            return Ok(point);
+        }
+        point::climb(problem, ladder, index, size, Some(point), monitor)
+    };
+    points.into_iter().enumerate().map(lift).collect()
 }

@@ -66,13 +66,13 @@ pub fn steel(contact: Value, load: Value, motion: [f64; 3]) -> Value {
 }
 
 /// A profile sampled on `y`.
-pub fn profile(rolling: f64, y: &[f64], across: impl Fn(f64) -> f64) -> Value {
+pub fn profile(rolling: f64, y: &[f64], mut across: impl FnMut(f64) -> f64) -> Value {
     let gap: Vec<f64> = y.iter().map(|y| across(*y)).collect();
     json!({ "type": "gap_profile", "rolling_mm": rolling, "y_mm": y, "gap_mm": gap })
 }
 
 /// A gap sampled on `x` and `y`.
-pub fn grid(x: &[f64], y: &[f64], gap: impl Fn(f64, f64) -> f64) -> Value {
+pub fn grid(x: &[f64], y: &[f64], mut gap: impl FnMut(f64, f64) -> f64) -> Value {
     let rows: Vec<Vec<f64>> = y
         .iter()
         .map(|y| x.iter().map(|x| gap(*x, *y)).collect())

@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 
 use railhead::contact::case::Motion;
-use railhead::contact::influence::strips::Differences;
+use railhead::contact::influence::strips::{Differences, Precision};
 use railhead::contact::mesh::{Chord, Grading, Mesh, equal_strips};
 use railhead::contact::monitor::Unwatched;
 use railhead::contact::tangential::boundary_element::newton::{Convergence, FrictionLaw, Newton};
@@ -104,7 +104,8 @@ impl Contact {
     /// Meshes a region with `strips` strips per patch; the bound is taken at the node of each cell.
     pub fn new(region: Region, strips: usize, grading: &Grading) -> Contact {
         let mesh = Mesh::new(&region.chords(strips), grading);
-        let differences = Differences::new(&mesh, NU, false, &Unwatched).unwrap();
+        let differences =
+            Differences::new(&mesh, NU, false, Precision::Double, &Unwatched).unwrap();
         let (x, y) = (mesh.node.clone(), mesh.rows());
         let mut bound: Vec<f64> = x
             .iter()

@@ -232,6 +232,10 @@ async fn failed_job_is_answered_with_its_reason_in_time() {
             advice: "try `boundary_element`".to_owned(),
         }),
         Some("out of time") => Err(SolveError::OutOfTime),
+        Some("no strips") => Err(SolveError::Unmeshable {
+            patch: 0,
+            strips: 2,
+        }),
         _ => panic!("a defect of the solver"),
     });
     let server = setup.start().await;
@@ -239,6 +243,7 @@ async fn failed_job_is_answered_with_its_reason_in_time() {
     for (name, status, kind) in [
         ("no convergence", 422, "not-converged"),
         ("out of time", 422, "out-of-time"),
+        ("no strips", 422, "unsolvable"),
         ("defect", 500, "solver-panic"),
     ] {
         case["name"] = json!(name);

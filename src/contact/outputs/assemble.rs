@@ -8,6 +8,7 @@ use crate::contact::solution::{
     CombinedMaterial, ErrorEstimate, Fields, MeshReport, NormalisedMotion, Origin, PatchFields,
     PatchSolution, PointFields, PointSolution, Solution, SolverReport, Total,
 };
+use crate::contact::tangential::ladder::Ladder;
 use crate::contact::tangential::level::Level;
 use crate::contact::tangential::point::Point;
 use crate::contact::zones::Zone;
@@ -18,13 +19,13 @@ use crate::contact::problem::Resolution;
 const FRAME: &str = "x along rolling (leading edge at larger x), y to the left, z up out of the lower body; forces, moments \
                      and tractions act on the lower body, slip is that of the upper body relative to the lower one";
 
-/// Puts the answer together; `level` is the finest one, `points` has one entry per motion.
+/// Puts the answer together; `points` has one entry per motion, all of one level if fields are wanted.
 #[must_use]
-pub fn assemble(problem: &Problem, level: &Level, points: &[Point]) -> (Solution, Fields) {
+pub fn assemble(problem: &Problem, ladder: &Ladder, points: &[Point]) -> (Solution, Fields) {
     let patches = problem.region.patches();
     let solution = Solution {
         patches: (0..patches.len())
-            .map(|p| patch_solution(problem, level, &patches[p], p, points))
+            .map(|p| patch_solution(problem, ladder, &patches[p], p, points))
             .collect(),
         total: points
             .iter()
@@ -55,7 +56,7 @@ pub fn assemble(problem: &Problem, level: &Level, points: &[Point]) -> (Solution
     };
     let fields = Fields {
         patches: (0..patches.len())
-            .map(|p| patch_fields(problem, level, p, points))
+            .map(|p| patch_fields(problem, ladder.get(points[0].level), p, points))
             .collect(),
     };
     (
@@ -68,13 +69,15 @@ pub fn assemble(problem: &Problem, level: &Level, points: &[Point]) -> (Solution
     )
 }
 
-fn wants_fields(problem: &Problem) -> bool {
+/// Is anything asked for that has a value per cell?
+#[must_use]
+pub fn wants_fields(problem: &Problem) -> bool {
     problem.outputs.iter().any(|o| *o != Output::Resultants)
 }
 
 fn patch_solution(
     problem: &Problem,
-    level: &Level,
+    ladder: &Ladder,
     patch: &Patch,
     index: usize,
     points: &[Point],
@@ -89,7 +92,16 @@ fn patch_solution(
         points: points
             .iter()
             .zip(&problem.motions)
-            .map(|(point, motion)| point_solution(problem, level, patch, index, point, motion))
+            .map(|(point, motion)| {
+                point_solution(
+                    problem,
+                    ladder.get(point.level),
+                    patch,
+                    index,
+                    point,
+                    motion,
+                )
+            })
             .collect(),
     }
 }
@@ -262,7 +274,7 @@ fn warnings(problem: &Problem, points: &[Point]) -> Vec<String> {
         if let (Resolution::Target(target), Some(false)) =
             (problem.resolution, target_met(problem, point))
         {
-            let estimate = point.errors.last().copied().flatten();
+            let estimate = point.error();
             let reached = estimate.map_or("is unknown".to_owned(), |e| {
                 format!("is estimated at {e:.2e}")
             });

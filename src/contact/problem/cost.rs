@@ -4,17 +4,15 @@ use crate::contact::case::{MeshSize, Method};
 use crate::contact::error::Fault;
 use crate::contact::problem::{Cost, Limits, Problem, Resolution};
 
-/// The meshes of a solve that aims at a target, from coarse to fine.
-const TARGET_LEVELS: [MeshSize; 2] = [
-    MeshSize {
-        strips: 6,
-        cells: 12,
-    },
-    MeshSize {
-        strips: 12,
-        cells: 24,
-    },
-];
+/// Cells of the finest mesh that a target may lead to, and of that of the dense method.
+const TARGET_CELLS_MAX: f64 = 2048.0;
+const TARGET_DENSE: MeshSize = MeshSize {
+    strips: 12,
+    cells: 24,
+};
+/// Cells that a target of 0.02 costs on average, all levels added, and how they grow as it falls.
+const TARGET_CELLS: f64 = 160.0;
+const TARGET_GROWTH: f64 = 0.65;
 /// Cells the dense method may use.
 const LIU_HSU_CELLS_MAX: f64 = 1000.0;
 /// Memory beside the influence coefficients, relative to them.
@@ -36,12 +34,6 @@ pub(super) struct Size {
 }
 
 impl Problem {
-    /// The meshes used one after the other, from coarse to fine.
-    #[must_use]
-    pub fn levels(&self) -> Vec<MeshSize> {
-        levels(self.resolution)
-    }
-
     /// Estimated cost of solving this: the influence coefficients of the finest mesh and what stands beside them,
     /// the matrices of the dense method, the fields of the answer. Seconds are rough.
     #[must_use]
@@ -64,11 +56,12 @@ impl Size {
         let influence = 3.0 * cells * (cells + 2.0 * segments) * 8.0 * BYTES_BESIDE;
         let (bytes, seconds) = match self.method {
             Method::Auto | Method::BoundaryElement => {
-                (influence, 4e-9 * cells * cells * (10.0 + 50.0 * motions))
+                let usual = self.usual_cells(cells);
+                (influence, 1e-9 * usual * usual * (10.0 + 50.0 * motions))
             }
             Method::LiuHsu => (
                 influence + (2.0 * cells).powi(2) * 8.0 * LIU_HSU_MATRICES,
-                4e-8 * cells * cells + 1e-10 * (2.0 * cells).powi(3) * 30.0 * motions,
+                4e-8 * cells * cells + 3e-11 * (2.0 * cells).powi(3) * 30.0 * motions,
             ),
         };
         Cost {
@@ -114,19 +107,26 @@ impl Size {
     /// Cells and segments of the finest mesh over all patches.
     fn finest(&self) -> (f64, f64) {
         let per_strip: f64 = self.segments.iter().sum();
-        let (mut cells, mut segments) = (0.0_f64, 0.0_f64);
-        for size in levels(self.resolution) {
-            let level = f64::from(size.strips) * per_strip;
-            segments = segments.max(level);
-            cells = cells.max(level * f64::from(size.cells));
-        }
-        (cells, segments)
+        let size = match (self.resolution, self.method) {
+            (Resolution::Mesh(size), _) => size,
+            (Resolution::Target(_), Method::LiuHsu) => TARGET_DENSE,
+            (Resolution::Target(_), _) => {
+                // The cells are shared out among the patches; hollow ones have several segments in a strip.
+                let share = TARGET_CELLS_MAX / self.segments.len() as f64;
+                return (share * per_strip, share.sqrt() * per_strip);
+            }
+        };
+        let segments = f64::from(size.strips) * per_strip;
+        (segments * f64::from(size.cells), segments)
     }
-}
 
-fn levels(resolution: Resolution) -> Vec<MeshSize> {
-    match resolution {
-        Resolution::Target(_) => TARGET_LEVELS.to_vec(),
-        Resolution::Mesh(size) => vec![size],
+    /// Cells that set the time: those of the mesh, or what the target costs on average.
+    fn usual_cells(&self, finest: f64) -> f64 {
+        match (self.resolution, self.method) {
+            (Resolution::Target(target), Method::Auto | Method::BoundaryElement) => {
+                finest.min(TARGET_CELLS * (0.02 / target).powf(TARGET_GROWTH))
+            }
+            _ => finest,
+        }
     }
 }

@@ -207,6 +207,7 @@ impl<'a> Equations<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::influence::strips::Precision;
     use crate::contact::mesh::{Chord, Grading, equal_strips};
     use crate::contact::monitor::Unwatched;
 
@@ -226,7 +227,8 @@ mod tests {
             .collect();
         let mesh = Mesh::new(&chords, &Grading::cosine(5));
         for folded in [false, true] {
-            let differences = Differences::new(&mesh, 0.3, folded, &Unwatched).unwrap();
+            let differences =
+                Differences::new(&mesh, 0.3, folded, Precision::Double, &Unwatched).unwrap();
             for (rule, parity) in [
                 (Rule::Upwind, None),
                 (Rule::Mirror, None),

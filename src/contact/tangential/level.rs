@@ -5,12 +5,15 @@ use std::f64::consts::PI;
 
 use crate::contact::case::{MeshSize, Motion};
 use crate::contact::error::SolveError;
-use crate::contact::influence::strips::{Differences, Parity};
+use crate::contact::influence::strips::{Differences, Parity, Precision};
 use crate::contact::mesh::{Chord, Grading, Mesh, equal_strips};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::Region;
 use crate::contact::normal::fitted::{self, Fitted};
-use crate::contact::problem::{Elasticity, Problem};
+use crate::contact::problem::{Elasticity, Problem, Resolution};
+
+/// Targets from here on are met with a matrix in single precision.
+const SINGLE_PRECISION_FROM: f64 = 5e-4;
 
 /// The contact made dimensionless: lengths by `length`, tractions by `traction`, slips by `traction / G`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,6 +69,7 @@ pub struct Level {
     /// Friction bound of every cell, dimensionless.
     pub bound: Vec<f64>,
     poisson_ratio: f64,
+    precision: Precision,
     mirrored: bool,
     influence: OnceCell<Differences>,
 }
@@ -122,6 +126,7 @@ impl Level {
             normalised,
             bound,
             poisson_ratio,
+            precision: precision(problem),
             mirrored: mirror.is_some(),
             influence,
         })
@@ -135,8 +140,13 @@ impl Level {
         if let Some(influence) = self.influence.get() {
             return Ok(influence);
         }
-        let influence =
-            Differences::new(&self.normalised, self.poisson_ratio, self.mirrored, monitor)?;
+        let influence = Differences::new(
+            &self.normalised,
+            self.poisson_ratio,
+            self.mirrored,
+            self.precision,
+            monitor,
+        )?;
         Ok(self.influence.get_or_init(|| influence))
     }
 
@@ -173,7 +183,7 @@ impl Level {
         let Some(first) = cells.next() else {
             return 0..0;
         };
-        first.start..cells.last().map_or(first.end, |c| c.end)
+        first.start..cells.next_back().map_or(first.end, |c| c.end)
     }
 
     /// Values of the first half of the segments continued to the mirrored half: `sign` is that of the image.
@@ -189,6 +199,14 @@ impl Level {
             }
         }
         values
+    }
+}
+
+/// Single precision serves any target that the residuals of single precision can meet.
+fn precision(problem: &Problem) -> Precision {
+    match problem.resolution {
+        Resolution::Target(target) if target >= SINGLE_PRECISION_FROM => Precision::Single,
+        _ => Precision::Double,
     }
 }
 

@@ -2,7 +2,9 @@
 
 pub mod boundary_element;
 pub mod equations;
+pub mod estimate;
 pub mod full_slip;
+pub mod ladder;
 pub mod level;
 pub mod liu_hsu;
 pub mod nested;

@@ -3,35 +3,34 @@
 use crate::contact::case::{MeshSize, Method, Motion};
 use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::Patch;
 use crate::contact::outputs::resultants::Resultants;
 use crate::contact::problem::{Problem, Resolution};
+use crate::contact::tangential::estimate::{self, Errors, Finer};
+use crate::contact::tangential::ladder::{CELLS_FIRST, CELLS_MAX, Ladder, Regime};
 use crate::contact::tangential::level::Level;
 use crate::contact::tangential::{
     Failure, Tangential, Work, boundary_element, full_slip, liu_hsu, nested,
 };
 
-/// On a single mesh the difference of the two rules times this covers the error (measured on Hertz contacts: it did
-/// in 95 % of the cases at 64 to 150 cells).
-const RULES_SAFETY: f64 = 2.5;
 /// The coarse mesh that gives the method of Liu and Hsu its spin pole: fewer than 30 cells, as they found.
 const POLE_MESH: MeshSize = MeshSize {
     strips: 5,
     cells: 5,
 };
-/// Relative error where everything slips along the rigid slip.
-const RIGID_ERROR: f64 = 1e-6;
+/// The next level has this many times the cells: twice where the target is near, else four times.
+const NEAR: f64 = 1.8;
 
-/// The answer for one motion on the finest level.
+/// The answer for one motion on the finest level it needed.
 #[derive(Debug, Clone)]
 pub struct Point {
     /// Tractions, slips and zones.
     pub tangential: Tangential,
+    /// The number of that level in the ladder.
+    pub level: usize,
     /// Resultants of every patch about the origin of the case.
     pub resultants: Vec<Resultants>,
-    /// Estimated error of every patch relative to its μN (moment: μN√(A/π) about its middle), then that of the sum;
-    /// nothing where there is no second opinion.
-    pub errors: Vec<Option<f64>>,
+    /// Estimated errors, see [`estimate::errors`].
+    pub errors: Errors,
     /// Work over all levels.
     pub work: Work,
     /// The method that was used.
@@ -40,57 +39,99 @@ pub struct Point {
     pub seconds: f64,
 }
 
-/// Solves motion `index` of the problem on the levels, each started from the one before.
+impl Point {
+    /// Estimated error of the sum over the patches.
+    #[must_use]
+    pub fn error(&self) -> Option<f64> {
+        self.errors.last().copied().flatten()
+    }
+}
+
+/// Solves motion `index` of the problem, from the coarsest level up to the first that meets the target, each started from
+/// the one before.
 ///
 /// # Errors
 /// Why there is no answer.
 pub fn solve(
     problem: &Problem,
-    levels: &[Level],
+    ladder: &mut Ladder,
     index: usize,
     monitor: &dyn Monitor,
 ) -> Result<Point, SolveError> {
-    let began = monitor.elapsed();
-    let motion = problem.motions[index];
-    let mut work = Work::default();
-    let mut answers: Vec<Tangential> = Vec::with_capacity(levels.len());
-    for (k, level) in levels.iter().enumerate() {
-        let coarser = k.checked_sub(1).map(|c| (&levels[c], &answers[c]));
-        let answer = solve_level(problem, level, &motion, coarser, monitor)
-            .map_err(|f| named(f, problem, index))?;
-        work.add(answer.work);
-        answers.push(answer);
+    let sizes = Ladder::fixed_sizes(problem);
+    let first = match &sizes {
+        Some(sizes) => sizes[0],
+        None => ladder.size(CELLS_FIRST, Regime::Unknown),
+    };
+    let mut point = climb(problem, ladder, index, first, None, monitor)?;
+    match (sizes, problem.resolution) {
+        (Some(sizes), _) => {
+            for size in &sizes[1..] {
+                point = climb(problem, ladder, index, *size, Some(point), monitor)?;
+            }
+        }
+        (None, Resolution::Mesh(_)) => {}
+        (None, Resolution::Target(target)) => {
+            let mut cells = CELLS_FIRST;
+            while let Some(error) = point.error().filter(|e| *e > target) {
+                cells *= if error <= NEAR * target { 2 } else { 4 };
+                if cells > CELLS_MAX {
+                    break;
+                }
+                let spinning = problem.motions[index].spin_per_mm != 0.0;
+                let regime = estimate::regime(ladder.get(point.level), &point.tangential, spinning);
+                let size = ladder.size(cells, regime);
+                point = climb(problem, ladder, index, size, Some(point), monitor)?;
+            }
+        }
     }
-    let patches = problem.region.patches();
-    let resultants = |k: usize, traction: &[Vec<f64>; 2]| -> Vec<Resultants> {
-        (0..patches.len())
-            .map(|p| Resultants::of_patch(&levels[k], traction, p))
-            .collect()
-    };
-    let finest = levels.len() - 1;
-    let found = resultants(finest, &answers[finest].traction);
-    let by_rules = answers[finest]
-        .second
+    Ok(point)
+}
+
+/// Solves motion `index` on the level of one size, from the point of a coarser one if there is one.
+///
+/// # Errors
+/// Why there is no answer.
+pub fn climb(
+    problem: &Problem,
+    ladder: &mut Ladder,
+    index: usize,
+    size: MeshSize,
+    coarser: Option<Point>,
+    monitor: &dyn Monitor,
+) -> Result<Point, SolveError> {
+    let began = monitor.elapsed();
+    let number = ladder.level(size)?;
+    let level = ladder.get(number);
+    let below = coarser
         .as_ref()
-        .map(|t| resultants(finest, t));
-    let by_levels = finest
-        .checked_sub(1)
-        .map(|k| resultants(k, &answers[k].traction));
-    let errors = errors(
-        problem,
-        &patches,
-        &found,
-        by_levels.as_deref(),
-        by_rules.as_deref(),
-        &answers[finest],
-    );
-    let Some(tangential) = answers.pop() else {
-        unreachable!("a case has at least one level")
-    };
-    let seconds = (monitor.elapsed() - began).as_secs_f64();
+        .map(|point| (ladder.get(point.level), &point.tangential));
+    let tangential = solve_level(problem, level, &problem.motions[index], below, monitor)
+        .map_err(|f| named(f, problem, index))?;
+    let patches = problem.region.patches().len();
+    let resultants: Vec<Resultants> = (0..patches)
+        .map(|p| Resultants::of_patch(level, &tangential.traction, p))
+        .collect();
+    let finer = coarser.as_ref().map(|point| Finer {
+        coarser: &point.resultants,
+        cells_ratio: level.mesh.cells() as f64 / ladder.get(point.level).mesh.cells() as f64,
+        other_kind: estimate::regime(
+            level,
+            &tangential,
+            problem.motions[index].spin_per_mm != 0.0,
+        ) == Regime::Spinning,
+    });
+    // Levels of nearly the same size say nothing about each other.
+    let finer = finer.filter(|f| f.cells_ratio > 1.3);
+    let errors = estimate::errors(problem, level, &tangential, &resultants, finer);
+    let mut work = coarser.as_ref().map_or(Work::default(), |point| point.work);
+    work.add(tangential.work);
+    let seconds =
+        (monitor.elapsed() - began).as_secs_f64() + coarser.map_or(0.0, |point| point.seconds);
     Ok(Point {
         tangential,
-        resultants: found,
+        level: number,
+        resultants,
         errors,
         work,
         method: method_used(problem),
@@ -173,59 +214,4 @@ fn solve_level(
         })
     });
     boundary_element::solve(level, &motion, start.as_ref(), tolerance(problem), monitor)
-}
-
-/// Estimated errors of the patches and of their sum: the change from the level before where there is one, else the
-/// difference of the two rules with a safety factor.
-fn errors(
-    problem: &Problem,
-    patches: &[Patch],
-    found: &[Resultants],
-    by_levels: Option<&[Resultants]>,
-    by_rules: Option<&[Resultants]>,
-    answer: &Tangential,
-) -> Vec<Option<f64>> {
-    if problem.friction == 0.0 {
-        return vec![Some(0.0); patches.len() + 1];
-    }
-    if answer.second.is_none() && answer.work.products == 0 {
-        let still = !answer.slips.iter().any(|s| *s);
-        return vec![Some(if still { 0.0 } else { RIGID_ERROR }); patches.len() + 1];
-    }
-    let (other, factor) = match (by_levels, by_rules) {
-        (Some(other), _) => (other, 1.0),
-        (None, Some(other)) => (other, RULES_SAFETY),
-        (None, None) => return vec![None; patches.len() + 1],
-    };
-    let middle = |p: &Patch| {
-        [
-            0.5 * (p.extent[0] + p.extent[1]),
-            0.5 * (p.extent[2] + p.extent[3]),
-        ]
-    };
-    let mut errors: Vec<Option<f64>> = Vec::with_capacity(patches.len() + 1);
-    let (mut sum, mut sum_other) = (Resultants::default(), Resultants::default());
-    let (mut force, mut area, mut centre) = (0.0, 0.0, [0.0, 0.0]);
-    for ((patch, found), other) in patches.iter().zip(found).zip(other) {
-        let bound = problem.friction * patch.normal_force;
-        let at = middle(patch);
-        let length = (patch.area / std::f64::consts::PI).sqrt();
-        errors.push(Some(
-            factor * found.about(at).distance(&other.about(at), bound, length),
-        ));
-        sum = sum.plus(*found);
-        sum_other = sum_other.plus(*other);
-        force += bound;
-        area += patch.area;
-        centre = [centre[0] + bound * at[0], centre[1] + bound * at[1]];
-    }
-    let centre = centre.map(|c| c / force);
-    let length = (area / std::f64::consts::PI).sqrt();
-    errors.push(Some(
-        factor
-            * sum
-                .about(centre)
-                .distance(&sum_other.about(centre), force, length),
-    ));
-    errors
 }

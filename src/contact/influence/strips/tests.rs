@@ -118,7 +118,8 @@ fn products_agree_with_the_closed_forms() {
         scattered(),
     ] {
         for nu in [0.0, 0.28, 0.5] {
-            let differences = Differences::new(&mesh, nu, false, &Unwatched).unwrap();
+            let differences =
+                Differences::new(&mesh, nu, false, Precision::Double, &Unwatched).unwrap();
             let (ux, uy) = applied(&differences, &mesh);
             let (tx, ty) = tractions(&mesh, mesh.cells());
             let (expected_x, expected_y) = by_closed_form(&mesh, nu, &tx, &ty);
@@ -138,9 +139,9 @@ fn products_agree_with_the_closed_forms() {
 
 #[test]
 fn a_folded_matrix_gives_the_same_products_as_the_full_one() {
-    for mesh in [ellipse(1.0, 2.0, 6, 8), ellipse(3.0, 1.0, 4, 16)] {
-        let full = Differences::new(&mesh, 0.3, false, &Unwatched).unwrap();
-        let folded = Differences::new(&mesh, 0.3, true, &Unwatched).unwrap();
+    for mesh in [ellipse(1.0, 2.0, 6, 16), ellipse(3.0, 1.0, 4, 16)] {
+        let full = Differences::new(&mesh, 0.3, false, Precision::Double, &Unwatched).unwrap();
+        let folded = Differences::new(&mesh, 0.3, true, Precision::Double, &Unwatched).unwrap();
         let (expected_x, expected_y) = applied(&full, &mesh);
         let (ux, uy) = applied(&folded, &mesh);
         assert!(largest_gap(&ux, &expected_x) < 1e-13 && largest_gap(&uy, &expected_y) < 1e-13);
@@ -149,9 +150,22 @@ fn a_folded_matrix_gives_the_same_products_as_the_full_one() {
 }
 
 #[test]
+fn single_precision_keeps_six_digits() {
+    for folded in [false, true] {
+        let mesh = ellipse(1.5, 1.0, 6, 8);
+        let double = Differences::new(&mesh, 0.3, folded, Precision::Double, &Unwatched).unwrap();
+        let single = Differences::new(&mesh, 0.3, folded, Precision::Single, &Unwatched).unwrap();
+        let (expected_x, expected_y) = applied(&double, &mesh);
+        let (ux, uy) = applied(&single, &mesh);
+        assert!(largest_gap(&ux, &expected_x) < 1e-6 && largest_gap(&uy, &expected_y) < 1e-6);
+        assert!(ux != expected_x, "it is another matrix");
+    }
+}
+
+#[test]
 fn one_parity_needs_half_the_cells_only() {
     let mesh = ellipse(1.5, 1.0, 6, 8);
-    let folded = Differences::new(&mesh, 0.3, true, &Unwatched).unwrap();
+    let folded = Differences::new(&mesh, 0.3, true, Precision::Double, &Unwatched).unwrap();
     let half = mesh.cells() / 2;
     for (parity, sign_x, sign_y) in [
         (Parity::Longitudinal, 1.0, -1.0),
@@ -191,6 +205,12 @@ fn a_stop_is_seen_between_segments() {
             std::time::Duration::ZERO
         }
     }
-    let stopped = Differences::new(&ellipse(1.0, 1.0, 4, 4), 0.3, false, &Stopped);
+    let stopped = Differences::new(
+        &ellipse(1.0, 1.0, 4, 4),
+        0.3,
+        false,
+        Precision::Double,
+        &Stopped,
+    );
     assert_eq!(stopped.map(|_| ()), Err(Stop::Cancelled));
 }

@@ -270,28 +270,32 @@ impl GapContact {
         Ok(Next::Grid(finer))
     }
 
-    /// Remarks on contacts for which a half-space is a poor likeness of the bodies.
+    /// Remarks on contacts for which a half-space is a poor likeness of the bodies; the patch that carries most decides.
     fn remarks(&self, field: &PressureField, depth: f64) -> Vec<String> {
+        let patches = field.patches();
+        let heaviest = patches
+            .iter()
+            .max_by(|a, b| a.normal_force.total_cmp(&b.normal_force));
+        let Some([x_min, x_max, y_min, y_max]) = heaviest.map(|patch| patch.extent) else {
+            return Vec::new();
+        };
+        let (a, b) = (0.5 * (x_max - x_min), 0.5 * (y_max - y_min));
         let mut remarks = Vec::new();
-        for (k, patch) in field.patches().iter().enumerate() {
-            let [x_min, x_max, y_min, y_max] = patch.extent;
-            let (a, b) = (0.5 * (x_max - x_min), 0.5 * (y_max - y_min));
-            if let Gap::Profile { rolling, .. } = self.gap
-                && a > HALF_LENGTH_USUAL_MAX * rolling
-            {
-                remarks.push(format!(
-                    "patch {k} is {:.3} mm long, against a rolling radius of {rolling} mm: the bodies are nearly conformal, which \
-                     half-spaces do not describe",
-                    2.0 * a
-                ));
-            }
-            if depth > APPROACH_USUAL_MAX * a.min(b) {
-                remarks.push(format!(
-                    "the bodies overlap by {depth:.3e} mm, against a half width of {:.3e} mm of patch {k}: strains are too large \
-                     for linear elasticity",
-                    a.min(b)
-                ));
-            }
+        if let Gap::Profile { rolling, .. } = self.gap
+            && a > HALF_LENGTH_USUAL_MAX * rolling
+        {
+            remarks.push(format!(
+                "the contact is {:.3} mm long, against a rolling radius of {rolling} mm: the bodies are nearly conformal, which \
+                 half-spaces do not describe",
+                2.0 * a
+            ));
+        }
+        if depth > APPROACH_USUAL_MAX * a.min(b) {
+            remarks.push(format!(
+                "the bodies overlap by {depth:.3e} mm, against a half width of {:.3e} mm of the contact: strains are too large \
+                 for linear elasticity",
+                a.min(b)
+            ));
         }
         remarks
     }

@@ -229,15 +229,15 @@ mod tests {
 
     impl LinearSystem for Dense {
         fn product(&mut self, x: &[f64], out: &mut [f64]) {
-            for i in 0..self.n {
-                out[i] = dot(&self.a[i * self.n..(i + 1) * self.n], x);
+            for (out, row) in out.iter_mut().zip(self.a.chunks_exact(self.n)) {
+                *out = dot(row, x);
             }
         }
 
         fn precondition(&mut self, x: &mut [f64]) {
             if self.diagonal {
-                for i in 0..self.n {
-                    x[i] /= self.a[i * self.n + i];
+                for (x, pivot) in x.iter_mut().zip(self.a.iter().step_by(self.n + 1)) {
+                    *x /= pivot;
                 }
             }
         }

@@ -16,6 +16,8 @@ use crate::contact::tangential::equations::Equations;
 const PROJECTION: f64 = 0.3;
 /// Newton steps before giving up.
 const ITERATIONS_MAX: u32 = 60;
+/// The first steps are never halved: far from the solution the residual may grow for a step or two.
+const FREE_STEPS: u32 = 8;
 /// A step is halved at most this often.
 const HALVINGS_MAX: u32 = 5;
 /// Tractions this close to the tangents of their discs, relative to the residual, are left where they are.
@@ -152,6 +154,7 @@ impl<'a> Newton<'a> {
         let mut rhs = vec![0.0; t.len()];
         let mut best = (f64::INFINITY, t.to_vec());
         let mut recent = [0.0_f64; 3];
+        let mut last = f64::INFINITY;
         report.residual = self.evaluate(law, t, &mut report);
         while report.iterations < ITERATIONS_MAX {
             if report.residual < best.0 {
@@ -166,18 +169,17 @@ impl<'a> Newton<'a> {
             let before = t.to_vec();
             self.linearise(law, t, &mut rhs, &mut report);
             self.blocks.factor(&self.own, self.equations, &self.linear);
-            self.linear_step(
-                &rhs,
-                report.residual,
-                law.tolerance,
-                &mut step,
-                monitor,
-                &mut report,
-            )?;
+            let inner = inner_tolerance(report.residual, last, law.tolerance);
+            self.linear_step(&rhs, inner, &mut step, monitor, &mut report)?;
+            last = report.residual;
             let candidate = self.candidate(law, t, &step);
             t.copy_from_slice(&candidate);
             report.residual = self.evaluate(law, t, &mut report);
-            let allowed = GROWTH_ALLOWED * recent.iter().copied().fold(0.0, f64::max);
+            let allowed = if report.iterations < FREE_STEPS {
+                f64::INFINITY
+            } else {
+                GROWTH_ALLOWED * recent.iter().copied().fold(0.0, f64::max)
+            };
             let mut halvings = 0;
             while report.residual > allowed && halvings < HALVINGS_MAX {
                 halvings += 1;
@@ -305,17 +307,15 @@ impl<'a> Newton<'a> {
         }
     }
 
-    /// Solves the linear system, only as exactly as the residual deserves.
+    /// Solves the linear system to a relative tolerance.
     fn linear_step(
         &mut self,
         rhs: &[f64],
-        residual: f64,
         tolerance: f64,
         step: &mut [f64],
         monitor: &dyn Monitor,
         report: &mut Convergence,
     ) -> Result<(), Stop> {
-        let inner = (0.3 * tolerance / residual).clamp(INNER_TOLERANCE.0, INNER_TOLERANCE.1);
         let mut system = NewtonSystem {
             equations: self.equations,
             linear: &self.linear,
@@ -325,7 +325,10 @@ impl<'a> Newton<'a> {
             slip: &mut self.slip,
             monitor,
         };
-        report.products += self.gmres.solve(&mut system, rhs, inner, step)?.products;
+        report.products += self
+            .gmres
+            .solve(&mut system, rhs, tolerance, step)?
+            .products;
         Ok(())
     }
 
@@ -352,6 +355,19 @@ impl<'a> Newton<'a> {
         }
         next
     }
+}
+
+/// How exactly a linear system deserves to be solved: loosely while the zones still move, then as the squared progress
+/// of the residual (Eisenstat & Walker 1996, choice 2), never beyond what the end needs.
+fn inner_tolerance(residual: f64, last: f64, goal: f64) -> f64 {
+    let progress = if last.is_finite() {
+        0.5 * (residual / last).powi(2)
+    } else {
+        1.0
+    };
+    progress
+        .max(0.3 * goal / residual)
+        .clamp(INNER_TOLERANCE.0, INNER_TOLERANCE.1)
 }
 
 /// The linearised equations as GMRES sees them.

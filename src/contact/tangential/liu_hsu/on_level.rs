@@ -73,9 +73,8 @@ pub fn solve(
 }
 
 fn work(outcome: &Outcome) -> Work {
-    let iterations = u32::try_from(outcome.newton_iterations()).unwrap_or(u32::MAX);
     Work {
-        iterations,
+        iterations: outcome.newton_iterations(),
         products: 0,
         residual: outcome.residual,
     }

@@ -1,0 +1,110 @@
+//! Which meshes a case climbs: sizes from the number of cells and the shape of the patch, made once and shared by all
+//! motions.
+
+use crate::contact::case::{MeshSize, Method};
+use crate::contact::error::SolveError;
+use crate::contact::problem::{Problem, Resolution};
+use crate::contact::tangential::level::Level;
+
+/// Cells of the first level.
+pub const CELLS_FIRST: u32 = 64;
+/// Cells of the finest level a target may ask for.
+pub const CELLS_MAX: u32 = 2048;
+/// Fewest strips, and cells in one, that the rules are good for.
+const SIDE_MIN: f64 = 4.0;
+
+/// What the tractions of a motion look like, as far as the mesh should know.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Regime {
+    /// Nothing is known yet.
+    Unknown,
+    /// A stick zone of some size.
+    Sticking,
+    /// Hardly any stick, and tractions that turn about a point in the patch.
+    Spinning,
+}
+
+impl Regime {
+    /// Cells along a strip divided by strips, for a patch of half-length a and half-width b. The exponents lie on flat
+    /// optima over 62 Hertz contacts with a/b from 0.2 to 5.
+    fn shape(self, a_over_b: f64) -> f64 {
+        match self {
+            Regime::Unknown => 1.25 * a_over_b.powf(0.45),
+            Regime::Sticking => 1.3 * a_over_b.powf(0.3),
+            Regime::Spinning => 1.2 * a_over_b.powf(0.6),
+        }
+    }
+}
+
+/// The levels of a case that exist so far.
+#[derive(Debug)]
+pub struct Ladder<'a> {
+    problem: &'a Problem,
+    levels: Vec<Level>,
+    /// Length over width of the patch that carries most.
+    a_over_b: f64,
+    patches: f64,
+}
+
+impl<'a> Ladder<'a> {
+    /// No levels yet.
+    #[must_use]
+    pub fn new(problem: &'a Problem) -> Ladder<'a> {
+        let patches = problem.region.patches();
+        let heaviest = patches
+            .iter()
+            .max_by(|a, b| a.normal_force.total_cmp(&b.normal_force));
+        let a_over_b = heaviest.map_or(1.0, |p| {
+            (p.extent[1] - p.extent[0]) / (p.extent[3] - p.extent[2])
+        });
+        Ladder {
+            problem,
+            levels: Vec::new(),
+            a_over_b,
+            patches: patches.len() as f64,
+        }
+    }
+
+    /// The sizes of a case that does not climb: an explicit mesh, or the two levels of the dense method.
+    #[must_use]
+    pub fn fixed_sizes(problem: &Problem) -> Option<Vec<MeshSize>> {
+        let size = |strips, cells| MeshSize { strips, cells };
+        match (problem.resolution, problem.method) {
+            (Resolution::Mesh(size), _) => Some(vec![size]),
+            (Resolution::Target(_), Method::LiuHsu) => Some(vec![size(6, 12), size(12, 24)]),
+            (Resolution::Target(_), _) => None,
+        }
+    }
+
+    /// The size with about so many cells over all patches, an even number of strips.
+    #[must_use]
+    pub fn size(&self, cells: u32, regime: Regime) -> MeshSize {
+        let cells = f64::from(cells) / self.patches;
+        let shape = regime.shape(self.a_over_b);
+        let strips =
+            (2.0 * (0.5 * (cells / shape).sqrt()).round()).clamp(SIDE_MIN, cells.max(SIDE_MIN));
+        let along = (cells / strips).round().max(SIDE_MIN);
+        MeshSize {
+            strips: strips as u32,
+            cells: along as u32,
+        }
+    }
+
+    /// The number of the level of this size; it is made if it is not there.
+    ///
+    /// # Errors
+    /// If no strip meets a patch.
+    pub fn level(&mut self, size: MeshSize) -> Result<usize, SolveError> {
+        if let Some(found) = self.levels.iter().position(|level| level.size == size) {
+            return Ok(found);
+        }
+        self.levels.push(Level::new(self.problem, size)?);
+        Ok(self.levels.len() - 1)
+    }
+
+    /// A level by its number.
+    #[must_use]
+    pub fn get(&self, level: usize) -> &Level {
+        &self.levels[level]
+    }
+}

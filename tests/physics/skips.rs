@@ -1,0 +1,154 @@
+//! Work that a case does not need is left out, and the answer does not move.
+
+use railhead::contact;
+use railhead::contact::influence::strips::{Differences, Precision};
+use railhead::contact::monitor::Unwatched;
+use railhead::contact::problem::{Limits, Problem};
+use railhead::contact::solution::PointSolution;
+use railhead::contact::tangential::boundary_element;
+use railhead::contact::tangential::boundary_element::newton::{FrictionLaw, Newton};
+use railhead::contact::tangential::equations::Equations;
+use railhead::contact::tangential::level::Level;
+use railhead::contact::tangential::rules::Rule;
+
+use crate::reference::{Ellipse, solve};
+
+const STRIPS: u32 = 10;
+const CELLS: u32 = 12;
+
+fn answered(contact: &Ellipse) -> PointSolution {
+    solve(&contact.case(STRIPS, CELLS)).0.patches[0].points[0].clone()
+}
+
+/// Largest difference between the door's tractions and those of a plain Newton solve of the trapezoid rule over the
+/// whole mesh in double precision, relative to the friction bound.
+fn distance_to_plain_newton(contact: &Ellipse) -> f64 {
+    let case = contact.case(STRIPS, CELLS);
+    let problem: Problem = contact::check(&case, &Limits::default()).expect("a valid case");
+    let size = railhead::contact::case::MeshSize {
+        strips: STRIPS,
+        cells: CELLS,
+    };
+    let level = Level::new(&problem, size).expect("a mesh");
+    let motion = level.scale.motion(&problem.motions[0]);
+    let shortened =
+        boundary_element::solve(&level, &motion, None, 1e-9, &Unwatched).expect("a solution");
+
+    let nu = problem.elasticity.poisson_ratio;
+    let whole = Differences::new(&level.normalised, nu, false, Precision::Double, &Unwatched)
+        .expect("never stopped");
+    let mut t = vec![0.0; 2 * whole.padded(None)];
+    for rule in [Rule::Mirror, Rule::Trapezoid] {
+        let equations = Equations::new(rule, &level.normalised, &whole, None);
+        let resized = |values: &[f64]| {
+            let mut values = values.to_vec();
+            values.resize(equations.padded(), 0.0);
+            values
+        };
+        let (rigid, bound, area) = (
+            equations.rigid(&motion),
+            resized(&level.bound),
+            resized(&level.area),
+        );
+        let law = FrictionLaw {
+            rigid: &rigid,
+            bound: &bound,
+            area: &area,
+            scale: 1.0,
+            tolerance: 1e-9,
+        };
+        let report = Newton::new(&equations)
+            .solve(&law, &mut t, &Unwatched)
+            .expect("never stopped");
+        assert!(report.converged, "{rule:?}: {report:?}");
+    }
+    let padded = t.len() / 2;
+    (0..level.mesh.cells())
+        .map(|i| (shortened.traction[0][i] - t[i]).hypot(shortened.traction[1][i] - t[padded + i]))
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn nothing_is_solved_without_creepage() {
+    let point = answered(&Ellipse::steel(1.5, 0.28).normalised(0.0, 0.0, 0.0));
+    assert_eq!(
+        (point.force_x_n, point.force_y_n, point.moment_z_n_mm),
+        (0.0, 0.0, 0.0)
+    );
+    assert_eq!((point.solver.iterations, point.solver.products), (0, 0));
+    assert!(
+        point.solver.skipped[0].contains("nothing to solve"),
+        "{:?}",
+        point.solver.skipped
+    );
+    assert_eq!(point.slip_area_mm2, Some(0.0));
+    // A creepage of a trillionth of saturation is solved, and is as good as none.
+    let near = answered(&Ellipse::steel(1.5, 0.28).normalised(1e-12, 0.0, 0.0));
+    assert!(
+        near.solver.products > 0 && near.force_x_n > 0.0 && near.force_x_n < 1e-6,
+        "{near:?}"
+    );
+}
+
+#[test]
+fn mirror_symmetry_halves_the_work_and_does_not_move_the_answer() {
+    for (motion, words) in [
+        ([0.3, 0.0, 0.0], "half the cells"),
+        ([0.0, 0.4, 0.8], "half the cells"),
+        ([0.3, 0.2, 0.8], "half the influence"),
+    ] {
+        let contact = Ellipse::steel(0.7, 0.28).normalised(motion[0], motion[1], motion[2]);
+        let skipped = answered(&contact).solver.skipped;
+        assert!(skipped.iter().any(|s| s.contains(words)), "{skipped:?}");
+        let distance = distance_to_plain_newton(&contact);
+        assert!(distance < 1e-6, "{motion:?}: {distance:e}");
+    }
+}
+
+#[test]
+fn full_slip_needs_no_newton_and_does_not_move_the_answer() {
+    for motion in [[60.0, 0.0, 0.0], [80.0, -40.0, 3.0]] {
+        let contact = Ellipse::steel(1.4, 0.28).normalised(motion[0], motion[1], motion[2]);
+        let point = answered(&contact);
+        let words = "fixed point instead of Newton";
+        assert!(
+            point.solver.skipped.iter().any(|s| s.contains(words)),
+            "{:?}",
+            point.solver.skipped
+        );
+        assert_eq!(point.stick_area_mm2, Some(0.0));
+        let distance = distance_to_plain_newton(&contact);
+        assert!(distance < 1e-6, "{motion:?}: {distance:e}");
+    }
+}
+
+#[test]
+fn overwhelming_slip_needs_no_influence_and_does_not_move_the_answer() {
+    for (a_over_b, nu) in [(0.05, 0.5), (1.0, 0.0), (1.0, 0.28), (20.0, 0.5)] {
+        let contact = Ellipse::steel(a_over_b, nu).normalised(3e7, 2e7, 0.0);
+        let point = answered(&contact);
+        assert_eq!(point.solver.products, 0, "{:?}", point.solver.skipped);
+        assert!(point.solver.skipped[0].contains("million times"));
+        let distance = distance_to_plain_newton(&contact);
+        assert!(distance < 1e-6, "a/b {a_over_b}: {distance:e}");
+    }
+}
+
+#[test]
+fn without_friction_slip_is_rigid_and_nothing_pulls() {
+    let contact = Ellipse {
+        friction: 0.0,
+        ..Ellipse::steel(1.0, 0.28).moving(0.001, 0.002, 0.0)
+    };
+    let (solution, fields) = solve(&contact.case(STRIPS, CELLS));
+    let point = &solution.patches[0].points[0];
+    assert_eq!(
+        (point.force_x_n, point.force_y_n, point.friction_power_n),
+        (0.0, 0.0, 0.0)
+    );
+    let slip = fields.patches[0].points[0]
+        .slip_x
+        .as_ref()
+        .expect("was asked for");
+    assert!(slip.iter().all(|s| (s - 0.001).abs() < 1e-15));
+}

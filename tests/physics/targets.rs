@@ -1,0 +1,121 @@
+//! A target is met, and the estimate of the error is honest.
+
+use serde_json::json;
+
+use crate::reference::{HERTZ_CLASSES, ReferenceCase, cases, median, solve};
+
+/// True and estimated error relative to μN, and the cells of the finest mesh, for one case and target.
+struct Outcome {
+    id: String,
+    truth: f64,
+    uncertainty: f64,
+    estimate: f64,
+    met: Option<bool>,
+}
+
+fn outcome(case: &ReferenceCase, target: f64) -> Outcome {
+    let ellipse = case.ellipse();
+    let mut question = ellipse.case(1, 1);
+    question["solver"] = json!({ "target_error": target });
+    question["outputs"] = json!(["resultants"]);
+    let (solution, _) = solve(&question);
+    let point = &solution.patches[0].points[0];
+    let found = ellipse.relative(point);
+    let converged = case.converged();
+    let truth = (0..3)
+        .map(|k| (found[k] - converged[k].value).abs())
+        .fold(0.0, f64::max);
+    let uncertainty = converged.iter().map(|c| c.unc).fold(0.0, f64::max);
+    let estimate = point.error_estimate.expect("an estimate").force_x_n / ellipse.limit();
+    Outcome {
+        id: case.id.clone(),
+        truth,
+        uncertainty,
+        estimate,
+        met: point.target_met,
+    }
+}
+
+fn outcomes(target: f64) -> Vec<Outcome> {
+    HERTZ_CLASSES
+        .iter()
+        .flat_map(|class| cases(class))
+        .map(|case| outcome(&case, target))
+        .collect()
+}
+
+#[test]
+fn targets_are_met_and_estimates_cover_the_error() {
+    for target in [0.02, 0.005, 0.001] {
+        let all = outcomes(target);
+        let missed: Vec<&Outcome> = all
+            .iter()
+            .filter(|o| o.truth > target + o.uncertainty)
+            .collect();
+        let uncovered: Vec<&Outcome> = all
+            .iter()
+            .filter(|o| o.truth > o.estimate + o.uncertainty)
+            .collect();
+        let ratios: Vec<f64> = all.iter().map(|o| o.estimate / o.truth.max(1e-6)).collect();
+        let certified = all.iter().filter(|o| o.met == Some(true)).count();
+        println!(
+            "target {target}: {} of {} met, {} covered, {certified} certified, median estimate/true {:.1}, median error {:.5}",
+            all.len() - missed.len(),
+            all.len(),
+            all.len() - uncovered.len(),
+            median(&ratios),
+            median(&all.iter().map(|o| o.truth).collect::<Vec<_>>())
+        );
+        for o in missed.iter().chain(&uncovered) {
+            println!(
+                "  {}: error {:.5} ± {:.5}, estimate {:.5}",
+                o.id, o.truth, o.uncertainty, o.estimate
+            );
+        }
+        assert!(
+            missed.len() * 50 <= all.len(),
+            "more than 2 % of the cases miss {target}"
+        );
+        assert!(
+            uncovered.len() * 20 <= all.len(),
+            "more than 5 % of the estimates at {target} are too small"
+        );
+    }
+}
+
+#[test]
+fn a_target_out_of_reach_is_said_and_not_hidden() {
+    let case = cases("hertz_spin")
+        .into_iter()
+        .find(|c| c.id.contains("ab5"))
+        .expect("a slender patch with spin");
+    let mut question = case.ellipse().case(1, 1);
+    question["solver"] = json!({ "target_error": 1e-4 });
+    let (solution, _) = solve(&question);
+    assert_eq!(solution.patches[0].points[0].target_met, Some(false));
+    assert!(
+        solution
+            .warnings
+            .iter()
+            .any(|w| w.contains("the target was 0.0001")),
+        "{:?}",
+        solution.warnings
+    );
+}
+
+#[test]
+fn a_looser_target_costs_fewer_cells() {
+    let case = &cases("hertz_longspin")[0];
+    let cells = |target: f64| {
+        let mut question = case.ellipse().case(1, 1);
+        question["solver"] = json!({ "target_error": target });
+        let mesh = solve(&question).0.patches[0].points[0].solver.mesh;
+        mesh.strips * mesh.cells
+    };
+    assert!(
+        cells(0.05) < cells(0.002),
+        "{} {}",
+        cells(0.05),
+        cells(0.002)
+    );
+}
