@@ -98,6 +98,26 @@ pub enum Contact {
         #[schema(exclusive_minimum = 0.0)]
         b_mm: f64,
     },
+    /// A gap measured across the rolling direction between bodies that are circular along it:
+    /// `x²/(2 rolling_mm) + gap(y)`. Region and pressure are found.
+    GapProfile {
+        /// Relative radius in the rolling direction, in mm.
+        #[schema(exclusive_minimum = 0.0)]
+        rolling_mm: f64,
+        /// Strictly increasing coordinates across, in mm.
+        y_mm: Vec<f64>,
+        /// Distance of the undeformed surfaces at `y_mm` and x = 0, in mm; any constant may be added.
+        gap_mm: Vec<f64>,
+    },
+    /// Any gap on a grid. Region and pressure are found; outside the grid there is no contact.
+    GapGrid {
+        /// Strictly increasing coordinates along the rolling direction, in mm.
+        x_mm: Vec<f64>,
+        /// Strictly increasing coordinates across, in mm.
+        y_mm: Vec<f64>,
+        /// Distance of the undeformed surfaces, in mm: `gap_mm[j][i]` at `(x_mm[i], y_mm[j])`; any constant may be added.
+        gap_mm: Vec<Vec<f64>>,
+    },
     /// A given pressure on a grid; its positive part is the contact region, which may have several patches.
     PressureGrid {
         /// Strictly increasing coordinates along the rolling direction, in mm.
@@ -116,9 +136,9 @@ pub struct Load {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(exclusive_minimum = 0.0)]
     pub normal_force_n: Option<f64>,
-    /// Approach of distant points in mm, more than 0; counted from first touch.
+    /// Approach of distant points in mm. For `radii` and `ellipse` it counts from first touch and is more than 0; for gaps it
+    /// counts from gap = 0 of the given data and is more than the least gap.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(exclusive_minimum = 0.0)]
     pub approach_mm: Option<f64>,
 }
 

@@ -51,6 +51,12 @@ pub enum SolveError {
         /// Strips of the mesh.
         strips: u32,
     },
+    /// There is no region and pressure to go on with.
+    #[error("the normal problem has no answer: {reason}")]
+    NormalProblem {
+        /// Why, as a clause.
+        reason: String,
+    },
     /// The caller stopped the solve.
     #[error("the solve was cancelled")]
     Cancelled,

@@ -39,13 +39,15 @@ pub fn check(case: &Value, limits: &Limits) -> Result<Problem, CaseError> {
     Problem::new(&draft.complete().ok_or(CaseError(faults))?, limits)
 }
 
-/// Solves a checked case: every motion from a coarse mesh level up to the first that
-/// meets the target.
+/// Solves a checked case: region and pressure where they are not known yet, then every motion from a coarse mesh level
+/// up to the first that meets the target.
 ///
 /// # Errors
 /// A named reason why there is no answer.
 pub fn solve(problem: &Problem, monitor: &dyn Monitor) -> Result<(Solution, Fields), SolveError> {
     let watch = Watch::new(monitor, problem.time_limit, problem.motions.len());
+    let problem = problem.pressed(&watch)?;
+    let problem = problem.as_ref();
     let mut ladder = Ladder::new(problem);
     let mut points = Vec::with_capacity(problem.motions.len());
     for index in 0..problem.motions.len() {
@@ -54,6 +56,10 @@ pub fn solve(problem: &Problem, monitor: &dyn Monitor) -> Result<(Solution, Fiel
     }
     if wants_fields(problem) {
         points = on_one_level(problem, &mut ladder, points, &watch)?;
+    }
+    if let (Some(first), Some(normal)) = (points.first_mut(), problem.normal) {
+        // What all motions share is charged to the first.
+        first.seconds += normal.seconds;
     }
     Ok(assemble(problem, &ladder, &points))
 }

@@ -18,6 +18,9 @@ pub struct Solution {
     pub total: Vec<Total>,
     /// What the client should know before using the numbers.
     pub warnings: Vec<String>,
+    /// How region and pressure were found; absent where they were known beforehand.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub normal: Option<NormalReport>,
     /// The point that rigid slip and moments refer to, and where it is.
     pub origin: Origin,
     /// The frame in words.
@@ -28,6 +31,20 @@ pub struct Solution {
     pub solver_version: String,
     /// Digest of the canonical case; equal cases have equal digests.
     pub case_digest: String,
+}
+
+/// How the normal problem of a gap was solved.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct NormalReport {
+    /// Cells of the finest grid along x and y.
+    pub cells: [u32; 2],
+    /// Iterations over all grids.
+    pub iterations: u32,
+    /// Largest violation of the contact conditions on the finest grid (distance in the contact, overlap outside), relative
+    /// to the deepest overlap of the undeformed surfaces.
+    pub residual: f64,
+    /// Wall time in s.
+    pub seconds: f64,
 }
 
 /// Origin of moments and rigid slip.

@@ -153,6 +153,16 @@ fn contacts() -> Vec<ContactAbility> {
             summary: "An elliptic patch of given semi-axes with Hertz's pressure.",
         },
         ContactAbility {
+            name: "gap_profile",
+            needs_load: true,
+            summary: "A gap measured across, between bodies that are circular along rolling: region and pressure are found.",
+        },
+        ContactAbility {
+            name: "gap_grid",
+            needs_load: true,
+            summary: "Any gap on a grid: region and pressure are found, in one or several patches.",
+        },
+        ContactAbility {
             name: "pressure_grid",
             needs_load: false,
             summary: "A given pressure on a grid; its positive part is the contact, in one or several patches.",

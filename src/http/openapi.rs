@@ -35,7 +35,7 @@ pub fn head() -> utoipa::openapi::OpenApi {
 }
 
 /// Cases that the document shows: name, summary, text.
-const EXAMPLES: [(&str, &str, &str); 4] = [
+const EXAMPLES: [(&str, &str, &str); 7] = [
     (
         "hertz-steel",
         "A wheel on a rail by its radii, with both creepages and spin",
@@ -45,6 +45,21 @@ const EXAMPLES: [(&str, &str, &str); 4] = [
         "spin",
         "An ellipse with lateral creepage and spin",
         include_str!("../../api/examples/spin.case.json"),
+    ),
+    (
+        "uic60-crown",
+        "A wheel on a UIC60-like crown of arcs, as a measured gap: region and pressure are found",
+        include_str!("../../api/examples/uic60-crown.case.json"),
+    ),
+    (
+        "area-132re-crown",
+        "A coned wheel on an AREA-132RE-like crown, touching beside the middle",
+        include_str!("../../api/examples/area-132re-crown.case.json"),
+    ),
+    (
+        "two-patches",
+        "A gap on a grid with two contact patches",
+        include_str!("../../api/examples/two-patches.case.json"),
     ),
     (
         "pressure-grid",

@@ -162,7 +162,7 @@ impl Failure {
         match error {
             SolveError::Cancelled => None,
             SolveError::OutOfTime => Some(Failure::new(FailureKind::OutOfTime, error.to_string())),
-            SolveError::Unmeshable { .. } => {
+            SolveError::Unmeshable { .. } | SolveError::NormalProblem { .. } => {
                 Some(Failure::new(FailureKind::Unsolvable, error.to_string()))
             }
             SolveError::NotConverged {

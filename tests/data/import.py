@@ -3,9 +3,11 @@
 
 usage: import.py SOURCE    (SOURCE holds domain.md, seed-method.md, seed-method-figures.json and reference/)
 """
+import gzip
 import json
 import math
 import pathlib
+import re
 import sys
 
 SOURCE = pathlib.Path(sys.argv[1])
@@ -152,9 +154,92 @@ def kernels():
     (TARGET / "kernels.json").write_text("{\n" + ",\n".join(parts) + "\n}\n")
 
 
+PRESSED = [("approach_mm", "approach_mm"), ("area_mm2", "area_mm2"), ("pmax_MPa", "pressure_max_mpa")]
+
+
+def converged_pressed(out, converged):
+    """Approach, area and largest pressure, and the resultants (body 2), with their uncertainties."""
+    for theirs, ours in PRESSED:
+        out[ours] = {key: converged[theirs][key] for key in ("value", "unc")}
+    for theirs, ours in [("Fx_N", "force_x_n"), ("Fy_N", "force_y_n"), ("Mz_Nmm", "moment_z_n_mm")]:
+        out[ours] = {"value": flipped(converged[theirs]["value"]), "unc": converged[theirs]["unc"]}
+    return out
+
+
+def gap_across(geometry):
+    """The gap at x = 0 as arcs, as a polynomial, or as the least of several parabolas."""
+    if geometry["type"] == "radii_y":
+        assert geometry["Rx"] == 460
+        return {"arcs": geometry["segments"]}
+    expression = geometry["expr"].replace(" ", "")
+    assert expression.startswith("x**2/920.0+")
+    parabolas = re.findall(r"\(y([+-][\d.]+)\)\*\*2/([\d.]+)(?:\+([\d.]+))?", expression)
+    if parabolas:
+        # Least of (y − y0)²/d + offset, as [y0, d, offset].
+        return {"parabolas": [[-float(y0), float(d), float(offset or 0)] for y0, d, offset in parabolas]}
+    square = re.search(r"y\*\*2/([\d.]+)", expression)
+    fourth = re.search(r"([\d.e-]+)\*y\*\*4", expression)
+    return {"powers": [1 / float(square[1]) if square else 0.0, float(fourth[1])]}
+
+
+def gap_profiles():
+    out = []
+    for name in ["nonhertz_radii", "nonhertz_quartic", "nonhertz_two"]:
+        for record in json.loads((SOURCE / f"reference/{name}.json").read_text()):
+            given = record["input"]
+            window = given["window"]
+            assert (given["material"]["G"], given["material"]["nu"], given["mu"]) == (82000.0, 0.28, 0.3)
+            out.append(converged_pressed({
+                "id": record["id"],
+                "rolling_mm": 460.0,
+                "across": gap_across(given["geometry"]),
+                "window_y_mm": [window["yl"], window["yh"]],
+                "normal_force_n": given["load"]["FN"],
+                "creepage_x": given["creepage"]["xi"],
+                "creepage_y": given["creepage"]["eta"],
+                "spin_per_mm": given["creepage"]["phi"],
+            }, record["converged"]))
+    write_lines("gap_profiles.json", out)
+
+
+def gap_grids():
+    """Undeformed distances of wheel on rail, cut to the box (three cells wider) where they are below 1.3 times the approach."""
+    out = []
+    for record in json.loads((SOURCE / "reference/profile_module1.json").read_text()):
+        given = record["input"]
+        assert (given["G"], given["nu"], given["mu"]) == (82000.0, 0.28, 0.3)
+        for patch in record["patches"]:
+            # With two patches that far apart the program lets them influence each other only in part.
+            if "fields_file" not in patch or record["id"] == "prof_y5_10kN_bench":
+                continue
+            fields = json.loads(gzip.decompress((SOURCE / "reference" / patch["fields_file"]).read_bytes()))
+            table = fields["table"]
+            mx, my, gap = table["mx"], table["my"], table["cols"]["h"]
+            converged = patch["converged"]
+            level = 1.3 * converged["approach_mm"]["value"]
+            low = [k for k in range(mx * my) if gap[k] < level]
+            columns = range(max(min(k % mx for k in low) - 3, 0), min(max(k % mx for k in low) + 4, mx))
+            rows = range(max(min(k // mx for k in low) - 3, 0), min(max(k // mx for k in low) + 4, my))
+            # Every grid of the program counts the distance from its own least sample, so does the approach.
+            converged["approach_mm"]["value"] = fields["approach_mm"]
+            out.append(converged_pressed({
+                "id": record["id"],
+                "x_mm": [round(table["xc1"] + i * table["dx"], 6) for i in columns],
+                "y_mm": [round(table["yc1"] + j * table["dy"], 6) for j in rows],
+                "gap_mm": [[round(gap[j * mx + i], 7) for i in columns] for j in rows],
+                "normal_force_n": converged["Fn_N"]["value"],
+                "creepage_x": converged["xi"]["value"],
+                "creepage_y": converged["eta"]["value"],
+                "spin_per_mm": converged["phi"]["value"],
+            }, converged))
+    write_lines("gap_grids.json", out)
+
+
 for name in CLASSES:
     records = json.loads((SOURCE / f"reference/{name}.json").read_text())
     write_lines(f"{name}.json", [reference_case(r) for r in records])
 timing()
 kalker()
 kernels()
+gap_profiles()
+gap_grids()

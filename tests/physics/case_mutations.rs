@@ -104,7 +104,17 @@ fn seeds() -> Vec<Value> {
         "/load",
         None,
     );
-    vec![good(), ellipse, pair, grid]
+    let profile = good_with(
+        "/contact",
+        json!({ "type": "gap_profile", "rolling_mm": 460,
+            "y_mm": [-20, -10, 0, 10, 20], "gap_mm": [0.7, 0.2, 0, 0.2, 0.7] }),
+    );
+    let gap = good_with(
+        "/contact",
+        json!({ "type": "gap_grid", "x_mm": [-20, 0, 20], "y_mm": [-20, 0, 20],
+            "gap_mm": [[1, 0.5, 1], [0.5, 0, 0.5], [1, 0.5, 1]] }),
+    );
+    vec![good(), ellipse, pair, grid, profile, gap]
 }
 
 fn mutated() -> impl Strategy<Value = Value> {

@@ -11,11 +11,11 @@ use crate::reference::{Ellipse, assert_none};
 const ITERATIONS_PER_RULE: u32 = 25;
 
 /// SplitMix64 (Steele, Lea, Flood 2014): the same motions on every machine.
-struct Random(u64);
+pub struct Random(pub u64);
 
 impl Random {
     /// Uniform from 0 to 1.
-    fn part(&mut self) -> f64 {
+    pub fn part(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -23,12 +23,12 @@ impl Random {
         ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.part()
     }
 
     /// Every decade equally likely.
-    fn decades(&mut self, low: f64, high: f64) -> f64 {
+    pub fn decades(&mut self, low: f64, high: f64) -> f64 {
         low * (high / low).powf(self.part())
     }
 }

@@ -71,6 +71,8 @@ async fn methods_name_every_word_of_the_contract() {
         let file = match contact["name"].as_str() {
             Some("radii") => "hertz-steel.case.json",
             Some("ellipse") => "spin.case.json",
+            Some("gap_profile") => "uic60-crown.case.json",
+            Some("gap_grid") => "two-patches.case.json",
             Some("pressure_grid") => "pressure-grid.case.json",
             other => panic!("{other:?} has no example"),
         };

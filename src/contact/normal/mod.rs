@@ -2,12 +2,16 @@
 
 pub mod fitted;
 pub mod hertz;
+mod interpolation;
+pub mod non_hertzian;
 pub mod prescribed;
 
 use crate::contact::case::{Contact, Load};
 use crate::contact::error::Fault;
 use crate::contact::mesh::Chord;
 use crate::contact::normal::hertz::{Ellipse, Pressing};
+use crate::contact::normal::non_hertzian::GapContact;
+use crate::contact::normal::non_hertzian::gap::Gap;
 use crate::contact::normal::prescribed::PressureField;
 
 /// Pressures in MPa, lengths in mm and ratios of semi-axes beyond which a patch is a mistake rather than a contact.
@@ -22,8 +26,10 @@ const SLENDERNESS_MAX: f64 = 1e4;
 pub enum Region {
     /// Hertz's ellipse, in closed form.
     Ellipse(Ellipse),
-    /// A pressure given on a grid.
+    /// A pressure on a grid.
     Grid(PressureField),
+    /// A gap: region and pressure have to be found first, until then there are no patches.
+    Gap(Box<GapContact>),
 }
 
 /// What is known of one patch before anything is meshed.
@@ -49,10 +55,7 @@ impl Region {
     /// # Errors
     /// A fault at `/load` or `/contact` if the patch is absurdly large, small, slender or heavily loaded.
     pub fn hertz(contact: &Contact, load: &Load, contact_modulus: f64) -> Result<Region, Fault> {
-        let pressing = match (load.normal_force_n, load.approach_mm) {
-            (Some(force), _) => Pressing::Force(force),
-            (None, approach) => Pressing::Approach(approach.unwrap_or(f64::NAN)),
-        };
+        let pressing = pressing(load);
         let ellipse = match *contact {
             Contact::Radii {
                 rolling_mm,
@@ -61,10 +64,10 @@ impl Region {
             Contact::Ellipse { a_mm, b_mm } => {
                 Ellipse::of_semi_axes(a_mm, b_mm, pressing, contact_modulus)
             }
-            Contact::PressureGrid { .. } => {
+            Contact::GapProfile { .. } | Contact::GapGrid { .. } | Contact::PressureGrid { .. } => {
                 return Err(fault(
                     "/contact/type",
-                    "a pressure_grid carries its own pressure".to_owned(),
+                    "neither gaps nor pressures on a grid make an ellipse".to_owned(),
                 ));
             }
         };
@@ -98,12 +101,54 @@ impl Region {
         Ok((Region::Grid(field), warnings))
     }
 
-    /// Segments that a strip has on average, for each patch: more than 1 where patches are hollow or bent.
+    /// The region of a gap, yet to be found, with the contact modulus `E*` in MPa.
+    ///
+    /// # Errors
+    /// A fault if the gap has too many samples, no least value inside, or an approach that does not reach it; or if the
+    /// contact is no gap.
+    pub fn gap(
+        contact: &Contact,
+        load: &Load,
+        contact_modulus: f64,
+        samples_max: usize,
+    ) -> Result<Region, Fault> {
+        let (gap, samples) = match contact {
+            Contact::GapProfile {
+                rolling_mm,
+                y_mm,
+                gap_mm,
+            } => (Gap::profile(*rolling_mm, y_mm, gap_mm), y_mm.len()),
+            Contact::GapGrid { x_mm, y_mm, gap_mm } => {
+                let samples = x_mm.len().saturating_mul(y_mm.len());
+                (Gap::grid(x_mm, y_mm, gap_mm), samples)
+            }
+            _ => return Err(fault("/contact/type", "not a gap".to_owned())),
+        };
+        if samples > samples_max {
+            return Err(fault(
+                "/contact/gap_mm",
+                format!("{samples} samples given; at most {samples_max} are allowed"),
+            ));
+        }
+        let contact = GapContact {
+            gap,
+            pressing: pressing(load),
+            contact_modulus,
+        };
+        contact
+            .check()
+            .map_err(|(pointer, reason)| fault(pointer, reason))?;
+        Ok(Region::Gap(Box::new(contact)))
+    }
+
+    /// Segments that a strip has on average, for each patch: more than 1 where patches are hollow or bent. A gap counts as
+    /// one plain patch until its region is found.
     #[must_use]
     pub fn segments_per_strip(&self) -> Vec<f64> {
         match self {
             Region::Ellipse(_) => vec![1.0],
             Region::Grid(field) => field.segments_per_strip(),
+            Region::Gap(_) => vec![1.0],
         }
     }
 
@@ -113,6 +158,7 @@ impl Region {
         match self {
             Region::Ellipse(ellipse) => vec![ellipse.patch()],
             Region::Grid(field) => field.patches(),
+            Region::Gap(_) => Vec::new(),
         }
     }
 
@@ -125,6 +171,7 @@ impl Region {
         match self {
             Region::Ellipse(ellipse) => ellipse.chords(strips),
             Region::Grid(field) => field.chords(patch, strips),
+            Region::Gap(_) => Vec::new(),
         }
     }
 
@@ -134,6 +181,7 @@ impl Region {
         match self {
             Region::Ellipse(ellipse) => ellipse.mean_pressure(chord, x0, x1),
             Region::Grid(field) => field.mean_pressure(chord, x0, x1),
+            Region::Gap(_) => 0.0,
         }
     }
 }
@@ -178,6 +226,13 @@ fn plausible(patch: &Patch, load_pointer: &str) -> Result<(), Fault> {
         ));
     }
     Ok(())
+}
+
+fn pressing(load: &Load) -> Pressing {
+    match (load.normal_force_n, load.approach_mm) {
+        (Some(force), _) => Pressing::Force(force),
+        (None, approach) => Pressing::Approach(approach.unwrap_or(f64::NAN)),
+    }
 }
 
 fn fault(pointer: &str, detail: String) -> Fault {

@@ -33,12 +33,15 @@ pub fn assemble(problem: &Problem, ladder: &Ladder, points: &[Point]) -> (Soluti
             .map(|(point, _)| total(problem, &patches, point))
             .collect(),
         warnings: warnings(problem, points),
+        normal: problem.normal,
         origin: Origin {
             x_mm: 0.0,
             y_mm: 0.0,
             meaning: match problem.region {
                 Region::Ellipse(_) => "centre of the contact ellipse",
-                Region::Grid(_) => "origin of the given coordinates, for all patches",
+                Region::Gap(_) | Region::Grid(_) => {
+                    "origin of the given coordinates, for all patches"
+                }
             }
             .to_owned(),
         },

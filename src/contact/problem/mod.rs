@@ -5,6 +5,7 @@
 mod cost;
 mod elasticity;
 mod motions;
+mod press;
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -16,6 +17,7 @@ use crate::contact::case::{
 };
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::normal::Region;
+use crate::contact::solution::NormalReport;
 use cost::Size;
 
 /// Allowed error of the resultants when nothing else is asked for, relative to μN.
@@ -89,6 +91,10 @@ pub struct Problem {
     pub outputs: Vec<Output>,
     /// Remarks that go into the answer.
     pub warnings: Vec<String>,
+    /// How region and pressure were found, where they were not known beforehand.
+    pub normal: Option<NormalReport>,
+    /// Memory the solve may use, in bytes.
+    pub memory_bytes: u64,
     /// Hexadecimal digest of everything that determines the answer, the solver version included.
     pub digest: String,
 }
@@ -145,6 +151,8 @@ impl Problem {
             time_limit: case.solver.time_limit_s.map(Duration::from_secs_f64),
             outputs: case.outputs.clone(),
             warnings,
+            normal: None,
+            memory_bytes: limits.memory_bytes,
             digest,
         })
     }
@@ -245,7 +253,12 @@ fn region(
             detail: "missing; exactly one of normal_force_n, approach_mm is needed".to_owned(),
         }));
     };
-    let region = Region::hertz(contact, load, elasticity?.contact_modulus());
+    let modulus = elasticity?.contact_modulus();
+    if let Contact::GapProfile { .. } | Contact::GapGrid { .. } = contact {
+        let region = Region::gap(contact, load, modulus, limits.samples_max);
+        return Some(region.map(|region| (region, Vec::new())));
+    }
+    let region = Region::hertz(contact, load, modulus);
     Some(region.map(|region| (region, Vec::new())))
 }
 

@@ -7,6 +7,7 @@ mod contact;
 mod material;
 mod motion;
 mod object;
+mod samples;
 mod solver;
 
 use std::collections::BTreeMap;

@@ -1,6 +1,6 @@
 //! Squared pressure along a straight grid-parallel line: where it is positive.
 
-use crate::contact::normal::prescribed::interpolation::Cubic;
+use crate::contact::normal::interpolation::Cubic;
 
 /// Values at the nodes of an axis, and the intervals that may belong to a patch.
 #[derive(Debug)]

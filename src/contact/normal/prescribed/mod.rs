@@ -6,14 +6,14 @@
 //! pressures on its strips to carry just that.
 
 mod components;
-mod interpolation;
+mod computed;
 mod level_set;
 mod line;
 mod shape;
 
 use crate::contact::mesh::Chord;
 use crate::contact::normal::Patch;
-use interpolation::{interval, weights};
+use crate::contact::normal::interpolation::{interval, weights};
 use level_set::State;
 use line::Line;
 use shape::Shape;
@@ -44,6 +44,8 @@ pub struct PressureField {
     /// Largest pressure in MPa.
     pressure_max: f64,
     shapes: Vec<Shape>,
+    /// The patch that is the mirror image about y = 0 of each one; empty if the pressure has no such symmetry.
+    images: Vec<usize>,
 }
 
 impl PressureField {
@@ -75,6 +77,19 @@ impl PressureField {
                 "no pressure more than 0 given; at least one is needed for a contact".to_owned(),
             );
         }
+        let (mut field, samples) = PressureField::from_squares(grid, q, pressure_max)?;
+        let warnings = field.warnings(&samples, &field.shapes);
+        field.find_edges();
+        Ok((field, warnings))
+    }
+
+    /// A field whose patches have no region yet, and the patch of every sample; `q` is as in [`PressureField::q`] with 0
+    /// outside the contact.
+    fn from_squares(
+        grid: Grid,
+        q: Vec<f64>,
+        pressure_max: f64,
+    ) -> Result<(PressureField, Vec<u8>), String> {
         let (samples, count) = components::label_samples(&grid, &q).map_err(|count| {
             format!("{count} separate patches found; at most {PATCHES_MAX} are allowed")
         })?;
@@ -86,19 +101,26 @@ impl PressureField {
             cells,
             pressure_max,
             shapes: Vec::new(),
+            images: Vec::new(),
         };
-        let mut shapes = field.shapes_from_samples(&samples, count);
-        let warnings = field.warnings(&samples, &shapes);
-        let states = level_set::extend(&field.grid, &mut field.q);
-        field.smooth = states
+        field.shapes = field.shapes_from_samples(&samples, count);
+        field.images = field.find_images(&samples);
+        Ok((field, samples))
+    }
+
+    /// Continues the squared pressures beyond the contact and measures the region of every patch.
+    fn find_edges(&mut self) {
+        let states = level_set::extend(&self.grid, &mut self.q);
+        self.smooth = states
             .into_iter()
             .map(|state| state == State::Smooth)
             .collect();
-        for (label, shape) in shapes.iter_mut().enumerate() {
-            (shape.patch.extent, shape.patch.area) = field.measure(label, shape);
+        for label in 0..self.shapes.len() {
+            let (extent, area) = self.measure(label, &self.shapes[label]);
+            let patch = &mut self.shapes[label].patch;
+            (patch.extent, patch.area) = (extent, area);
         }
-        field.shapes = shapes;
-        Ok((field, warnings))
+        self.make_images_alike();
     }
 
     /// The patches found, in order of the smallest y of their samples.
@@ -123,13 +145,12 @@ impl PressureField {
     /// patch, several from smaller to larger x where the patch is hollow or bent.
     #[must_use]
     pub fn chords(&self, patch: usize, strips: &[(f64, f64)]) -> Vec<Chord> {
-        let shape = &self.shapes[patch];
-        let [x_min, x_max, ..] = shape.patch.extent;
+        let [x_min, x_max, ..] = self.shapes[patch].patch.extent;
         let mut chords = Vec::new();
         for (strip, &(y, dy)) in strips.iter().enumerate() {
             // Between the lines that told the extent, rough data may reach a little farther; the extent is kept to.
             let within = |(left, right): (f64, f64)| (left.max(x_min), right.min(x_max));
-            let segments = self.segments(shape, patch, y).into_iter().map(within);
+            let segments = self.segments(patch, y).into_iter().map(within);
             let segments = segments.filter(|(left, right)| right > left);
             chords.extend(segments.map(|(left, right)| Chord {
                 patch,
@@ -155,8 +176,13 @@ impl PressureField {
             return 0.0;
         }
         let x = &self.grid.x;
-        let j = self.row_interval(chord.y);
-        let weights = weights(&self.grid.y, j, chord.y);
+        let y = if self.images.is_empty() {
+            chord.y
+        } else {
+            chord.y.abs()
+        };
+        let j = self.row_interval(y);
+        let weights = weights(&self.grid.y, j, y);
         let (first, last) = (self.column_interval(low), self.column_interval(high));
         let cubic = |i: usize| line::cubic(x, i, |i| self.value_on_column(i, j, weights));
         if x0 == x1 {
@@ -184,7 +210,12 @@ impl PressureField {
     }
 
     /// Where the line at y lies in a patch: segments from smaller to larger x.
-    fn segments(&self, shape: &Shape, label: usize, y: f64) -> Vec<(f64, f64)> {
+    fn segments(&self, label: usize, y: f64) -> Vec<(f64, f64)> {
+        let (label, y) = match self.images.get(label) {
+            Some(image) if y < 0.0 => (*image, -y),
+            _ => (label, y),
+        };
+        let shape = &self.shapes[label];
         let Grid { x, y: rows } = &self.grid;
         let j = interval(rows, y);
         if rows[j] > y || rows[j + 1] < y || !shape.rows.contains(&j) {

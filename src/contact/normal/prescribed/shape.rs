@@ -72,7 +72,7 @@ impl PressureField {
         let step = PI / lines as f64;
         let at = |n: f64| middle - half * (n * step).cos();
         let ends = |y: f64| {
-            let segments = self.segments(shape, label, y);
+            let segments = self.segments(label, y);
             let length: f64 = segments.iter().map(|(left, right)| right - left).sum();
             let left = segments.first().map_or(f64::INFINITY, |first| first.0);
             let right = segments.last().map_or(f64::NEG_INFINITY, |last| last.1);
@@ -116,7 +116,7 @@ impl PressureField {
             let (mut outside, mut inside) = (y[outside], y[inside]);
             for _ in 0..STEPS {
                 let middle = 0.5 * (outside + inside);
-                if self.segments(shape, label, middle).is_empty() {
+                if self.segments(label, middle).is_empty() {
                     outside = middle;
                 } else {
                     inside = middle;

@@ -5,7 +5,7 @@
 
 /// A cubic `c0 + c1 s + c2 s² + c3 s³` on an interval, with s from 0 at its start to 1 at its end.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Cubic {
+pub(in crate::contact::normal) struct Cubic {
     start: f64,
     length: f64,
     coefficients: [f64; 4],
@@ -17,7 +17,7 @@ pub(super) struct Cubic {
 impl Cubic {
     /// The curve between nodes `i` and `i + 1` of the axis; `values` belong to the nodes `i − 1` to `i + 2`, which all
     /// have to exist.
-    pub(super) fn between(axis: &[f64], i: usize, values: [f64; 4]) -> Cubic {
+    pub(in crate::contact::normal) fn between(axis: &[f64], i: usize, values: [f64; 4]) -> Cubic {
         let [before, length, after] = [
             axis[i] - axis[i - 1],
             axis[i + 1] - axis[i],
@@ -40,14 +40,39 @@ impl Cubic {
         }
     }
 
+    /// The curve between nodes `i` and `i + 1` of the axis with the given values and slopes at them.
+    pub(in crate::contact::normal) fn with_slopes(
+        axis: &[f64],
+        i: usize,
+        values: [f64; 2],
+        slopes: [f64; 2],
+    ) -> Cubic {
+        let length = axis[i + 1] - axis[i];
+        let rise = values[1] - values[0];
+        let [start, end] = slopes.map(|slope| length * slope);
+        Cubic {
+            start: axis[i],
+            length,
+            coefficients: [
+                values[0],
+                start,
+                3.0 * rise - 2.0 * start - end,
+                start + end - 2.0 * rise,
+            ],
+            end: values[1],
+        }
+    }
+
     /// Value at x.
-    pub(super) fn at(&self, x: f64) -> f64 {
+    pub(in crate::contact::normal) fn at(&self, x: f64) -> f64 {
         self.value((x - self.start) / self.length)
     }
 
     /// Points where the sign changes from or to positive, from smaller to larger x, each with the sign after it
     /// (`true` is positive). Accurate to a few units in the last place of x.
-    pub(super) fn sign_changes(&self) -> impl Iterator<Item = (f64, bool)> + use<> {
+    pub(in crate::contact::normal) fn sign_changes(
+        &self,
+    ) -> impl Iterator<Item = (f64, bool)> + use<> {
         let cubic = *self;
         let [first, second] = self.turning_points();
         let pieces = [(0.0, first), (first, second), (second, 1.0)];
@@ -106,7 +131,7 @@ impl Cubic {
 }
 
 /// Weights of the nodes `i − 1` to `i + 2` in the value of the curve at x between nodes `i` and `i + 1`.
-pub(super) fn weights(axis: &[f64], i: usize, x: f64) -> [f64; 4] {
+pub(in crate::contact::normal) fn weights(axis: &[f64], i: usize, x: f64) -> [f64; 4] {
     std::array::from_fn(|k| {
         let mut values = [0.0; 4];
         values[k] = 1.0;
@@ -115,10 +140,63 @@ pub(super) fn weights(axis: &[f64], i: usize, x: f64) -> [f64; 4] {
 }
 
 /// Index i of the interval from node `i` to `i + 1` that holds x; the first or last one for points outside.
-pub(super) fn interval(axis: &[f64], x: f64) -> usize {
+pub(in crate::contact::normal) fn interval(axis: &[f64], x: f64) -> usize {
     axis.partition_point(|node| *node <= x)
         .clamp(1, axis.len() - 1)
         - 1
+}
+
+/// Slopes at the nodes of a curve through at least 2 values.
+///
+/// Those of the parabola through a node and its neighbours, unless this bends more than [`BEND_MAX`] times as much as
+/// the ones at both neighbouring nodes: then there is a jump or a kink, and the slope goes over to a mean in which the
+/// less steep side has the greater weight, so that the curve does not swing beyond the values. At the ends the
+/// parabola of the next node is continued.
+pub(in crate::contact::normal) fn sober_slopes(axis: &[f64], values: &[f64]) -> Vec<f64> {
+    const BEND_MAX: f64 = 8.0;
+    let n = axis.len();
+    let rises: Vec<f64> = (1..n)
+        .map(|k| (values[k] - values[k - 1]) / (axis[k] - axis[k - 1]))
+        .collect();
+    if n == 2 {
+        return vec![rises[0]; 2];
+    }
+    let bend = |k: usize| 2.0 * (rises[k] - rises[k - 1]) / (axis[k + 1] - axis[k - 1]);
+    let bends: Vec<f64> = (0..n).map(|k| bend(k.clamp(1, n - 2))).collect();
+    let allowed = |k: usize| {
+        BEND_MAX
+            * bends[k.saturating_sub(1)]
+                .abs()
+                .min(bends[(k + 1).min(n - 1)].abs())
+    };
+    // Share of the parabola in a slope.
+    let trust = |k: usize| {
+        let (bend, allowed) = (bends[k].abs(), allowed(k));
+        if bend <= allowed { 1.0 } else { allowed / bend }
+    };
+    let slope = |k: usize| {
+        let (before, after) = (rises[k - 1], rises[k]);
+        let parabola = tangent(
+            axis[k] - axis[k - 1],
+            axis[k + 1] - axis[k],
+            values[k] - values[k - 1],
+            values[k + 1] - values[k],
+        );
+        let trust = trust(k);
+        if trust == 1.0 {
+            return parabola;
+        }
+        let steepness = before.abs() + after.abs();
+        let mean = (before * after.abs() + after * before.abs()) / steepness;
+        trust * parabola + (1.0 - trust) * mean
+    };
+    let mut slopes: Vec<f64> = vec![0.0; n];
+    for (k, value) in slopes.iter_mut().enumerate().take(n - 1).skip(1) {
+        *value = slope(k);
+    }
+    slopes[0] = rises[0] - 0.5 * trust(1) * bends[1] * (axis[1] - axis[0]);
+    slopes[n - 1] = rises[n - 2] + 0.5 * trust(n - 2) * bends[n - 2] * (axis[n - 1] - axis[n - 2]);
+    slopes
 }
 
 /// Slope at a node of the parabola through it and its neighbours at distances `before` and `after`, over which the

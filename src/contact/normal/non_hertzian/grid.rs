@@ -1,0 +1,323 @@
+//! Equal rectangles over a box of the contact plane, and what the contact looks like on them.
+
+use std::f64::consts::PI;
+
+use crate::contact::influence::fft::Convolution;
+use crate::contact::normal::non_hertzian::gap::{Gap, Window};
+use crate::contact::normal::non_hertzian::gradients::Pressed;
+use crate::contact::normal::non_hertzian::window::Reach;
+
+/// Most cells along either axis.
+const CELLS_MAX: usize = 200;
+/// A box that turned out too small grows by this part of its length.
+const GROWTH: f64 = 0.25;
+
+/// Cells of a box; cell (i, j) is stored at `j * cells[0] + i`.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Grid {
+    /// Middle of the box in mm.
+    middle: [f64; 2],
+    /// Size of a cell in mm.
+    pub(super) step: [f64; 2],
+    /// Number of cells along x and y.
+    pub(super) cells: [usize; 2],
+    /// The gap is its own mirror image about y = 0, and so is the grid.
+    pub(super) mirrored: bool,
+}
+
+/// One of the four sides of a box.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Side {
+    axis: usize,
+    /// The end of larger coordinates.
+    upper: bool,
+}
+
+/// How fine the next grid should be, and where.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Wanted {
+    pub(super) window: Window,
+    pub(super) cells: [usize; 2],
+}
+
+/// How many cells are wanted across what.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Resolution {
+    /// Across everything in contact.
+    pub(super) contact: f64,
+    /// Across the smallest patch that counts.
+    pub(super) patch: f64,
+    /// Patches with a smaller part of the load do not count.
+    pub(super) share_min: f64,
+}
+
+impl Side {
+    /// The side in words, with its coordinate in the limits of the data.
+    pub(super) fn place(self, limits: Window) -> String {
+        let name = ["x", "y"][self.axis];
+        format!("{name} = {} mm", limits[self.axis][usize::from(self.upper)])
+    }
+}
+
+impl Grid {
+    /// The grid of so many cells (at most 200 along either axis) over a window; made symmetric about y = 0 if `mirrored`.
+    pub(super) fn new(window: Window, cells: [usize; 2], mirrored: bool) -> Grid {
+        let cells = cells.map(|n| n.clamp(4, CELLS_MAX));
+        let mut middle = window.map(|[low, high]| 0.5 * (low + high));
+        let mut length = window.map(|[low, high]| high - low);
+        if mirrored {
+            let [low, high] = window[1];
+            (middle[1], length[1]) = (0.0, 2.0 * high.max(-low));
+        }
+        Grid {
+            middle,
+            step: [0, 1].map(|k| length[k] / cells[k] as f64),
+            cells,
+            mirrored,
+        }
+    }
+
+    /// Coordinates of the centres along an axis.
+    pub(super) fn centres(&self, axis: usize) -> Vec<f64> {
+        let n = self.cells[axis] as f64;
+        // Written so that a middle of 0 gives exact mirror images.
+        (0..self.cells[axis])
+            .map(|i| self.middle[axis] + (i as f64 + 0.5 - 0.5 * n) * self.step[axis])
+            .collect()
+    }
+
+    fn range(&self, axis: usize) -> [f64; 2] {
+        let half = 0.5 * self.cells[axis] as f64 * self.step[axis];
+        [self.middle[axis] - half, self.middle[axis] + half]
+    }
+
+    pub(super) fn influence(&self, contact_modulus: f64) -> Convolution {
+        let ([nx, ny], [dx, dy]) = (self.cells, self.step);
+        Convolution::new(nx, ny, dx, dy, contact_modulus)
+    }
+
+    /// The gap at the centres.
+    pub(super) fn gap(&self, gap: &Gap) -> Vec<f64> {
+        let mut values = gap.on(&self.centres(0), &self.centres(1));
+        if self.mirrored {
+            let width = self.cells[0];
+            let (low, high) = values.split_at_mut(self.cells[1].div_ceil(2) * width);
+            for (image, row) in high
+                .chunks_exact_mut(width)
+                .rev()
+                .zip(low.chunks_exact(width))
+            {
+                image.copy_from_slice(row);
+            }
+        }
+        values
+    }
+
+    /// Replaces a value and its mirror image by their mean.
+    pub(super) fn symmetrise(&self, values: &mut [f64]) {
+        let [width, rows] = self.cells;
+        for j in 0..rows / 2 {
+            for i in 0..width {
+                let (here, there) = (j * width + i, (rows - 1 - j) * width + i);
+                let mean = 0.5 * (values[here] + values[there]);
+                (values[here], values[there]) = (mean, mean);
+            }
+        }
+    }
+
+    /// A pressure to start from: Hertz's law over the region that overlaps by more than half of the approach.
+    pub(super) fn first_pressure(&self, gap: &[f64], reach: &Reach, modulus: f64) -> Vec<f64> {
+        let least = gap.iter().copied().fold(f64::INFINITY, f64::min);
+        let depth = (reach.level - least).max(1e-3 * (reach.level - reach.least));
+        let part = |h: &f64| (1.0 - 2.0 * (h - least) / depth).max(0.0);
+        let inside = gap.iter().filter(|h| part(h) > 0.0).count();
+        let radius = (inside as f64 * self.step[0] * self.step[1] / PI).sqrt();
+        let largest = 2.0 * modulus * depth / (PI * radius);
+        gap.iter().map(|h| largest * part(h).sqrt()).collect()
+    }
+
+    /// Pressures of another grid at the centres of this one, bilinear, 0 beyond it.
+    pub(super) fn interpolate(&self, other: &Grid, pressure: &[f64], gap: &[f64]) -> Vec<f64> {
+        let places = [0, 1].map(|axis| -> Vec<(isize, f64)> {
+            let first = other.range(axis)[0] + 0.5 * other.step[axis];
+            self.centres(axis)
+                .into_iter()
+                .map(|x| {
+                    let at = (x - first) / other.step[axis];
+                    (at.floor() as isize, at - at.floor())
+                })
+                .collect()
+        });
+        let value = |i: isize, j: isize| {
+            let inside = |k: isize, axis: usize| (0..other.cells[axis] as isize).contains(&k);
+            if inside(i, 0) && inside(j, 1) {
+                pressure[j as usize * other.cells[0] + i as usize]
+            } else {
+                0.0
+            }
+        };
+        let mut out = Vec::with_capacity(self.cells[0] * self.cells[1]);
+        for &(j, v) in &places[1] {
+            for &(i, u) in &places[0] {
+                let row = |j: isize| (1.0 - u) * value(i, j) + u * value(i + 1, j);
+                out.push((1.0 - v) * row(j) + v * row(j + 1));
+            }
+        }
+        if out.iter().all(|p| *p == 0.0) {
+            let deepest = (0..gap.len()).min_by(|a, b| gap[*a].total_cmp(&gap[*b]));
+            out[deepest.unwrap_or(0)] = pressure.iter().copied().fold(0.0, f64::max);
+        }
+        out
+    }
+
+    /// Sides whose outermost cells are in contact.
+    pub(super) fn sides_in_contact(&self, pressure: &[f64]) -> Vec<Side> {
+        let [nx, ny] = self.cells;
+        let touches = |side: &Side| {
+            let last = if side.upper {
+                self.cells[side.axis] - 1
+            } else {
+                0
+            };
+            (0..nx * ny).any(|k| pressure[k] > 0.0 && [k % nx, k / nx][side.axis] == last)
+        };
+        let all = [(0, false), (0, true), (1, false), (1, true)];
+        let sides = all.map(|(axis, upper)| Side { axis, upper });
+        sides.into_iter().filter(touches).collect()
+    }
+
+    /// Does this side lie at the limit of the data?
+    pub(super) fn ends_at(&self, side: Side, limits: Window) -> bool {
+        let end = usize::from(side.upper);
+        (self.range(side.axis)[end] - limits[side.axis][end]).abs() < 0.5 * self.step[side.axis]
+    }
+
+    /// A grid that reaches farther out on some sides, with cells of about the same size.
+    pub(super) fn enlarged(&self, sides: &[Side], limits: Window) -> Grid {
+        let mut window = [self.range(0), self.range(1)];
+        for side in sides {
+            let end = usize::from(side.upper);
+            let growth = GROWTH * self.cells[side.axis] as f64 * self.step[side.axis];
+            window[side.axis][end] += if side.upper { growth } else { -growth };
+        }
+        let window = within(window, limits);
+        let cells = [0, 1].map(|k| {
+            let [low, high] = window[k];
+            ((high - low) / self.step[k]).round() as usize
+        });
+        Grid::new(window, cells, self.mirrored)
+    }
+
+    /// The box around all cells that touch or nearly do (closer than `near`), and the cells that resolve what is in it.
+    pub(super) fn wanted(
+        &self,
+        pressed: &Pressed,
+        near: f64,
+        resolution: Resolution,
+        limits: Window,
+    ) -> Wanted {
+        let width = self.cells[0];
+        let cell = |k: usize| [k % width, k / width];
+        let mut whole = Extent::default();
+        for k in (0..pressed.pressure.len()).filter(|k| pressed.distance[*k] < near) {
+            whole.add(cell(k));
+        }
+        let mut contact = Extent::default();
+        let total: f64 = pressed.pressure.iter().sum();
+        let mut steps = [f64::INFINITY; 2];
+        for patch in self.patches(&pressed.pressure) {
+            let mut extent = Extent::default();
+            patch.iter().for_each(|k| extent.add(cell(*k)));
+            patch.iter().for_each(|k| contact.add(cell(*k)));
+            let load: f64 = patch.iter().map(|k| pressed.pressure[*k]).sum();
+            if load >= resolution.share_min * total {
+                for k in 0..2 {
+                    steps[k] = steps[k].min(extent.length(k) * self.step[k] / resolution.patch);
+                }
+            }
+        }
+        let mut wanted = Wanted {
+            window: [[0.0; 2]; 2],
+            cells: [0; 2],
+        };
+        for k in 0..2 {
+            let step = steps[k].min(contact.length(k) * self.step[k] / resolution.contact);
+            let margin = (0.3 * self.step[k]).max(1.5 * step);
+            let low = self.range(k)[0];
+            wanted.window[k] = [
+                low + whole.0[k][0] as f64 * self.step[k] - margin,
+                low + (whole.0[k][1] + 1) as f64 * self.step[k] + margin,
+            ];
+        }
+        wanted.window = within(wanted.window, limits);
+        for k in 0..2 {
+            let step = steps[k].min(contact.length(k) * self.step[k] / resolution.contact);
+            let [low, high] = wanted.window[k];
+            wanted.cells[k] = (((high - low) / step).ceil() as usize).clamp(4, CELLS_MAX);
+        }
+        wanted
+    }
+
+    /// Cells in contact, patch by patch; cells hang together over edges and corners.
+    fn patches(&self, pressure: &[f64]) -> Vec<Vec<usize>> {
+        let [nx, ny] = self.cells;
+        let mut seen = vec![false; nx * ny];
+        let mut patches = Vec::new();
+        for start in 0..nx * ny {
+            if seen[start] || pressure[start] <= 0.0 {
+                continue;
+            }
+            seen[start] = true;
+            let mut patch = vec![start];
+            let mut next = 0;
+            while let Some(&k) = patch.get(next) {
+                next += 1;
+                let (i, j) = (k % nx, k / nx);
+                for j in j.saturating_sub(1)..(j + 2).min(ny) {
+                    for i in i.saturating_sub(1)..(i + 2).min(nx) {
+                        let neighbour = j * nx + i;
+                        if !seen[neighbour] && pressure[neighbour] > 0.0 {
+                            seen[neighbour] = true;
+                            patch.push(neighbour);
+                        }
+                    }
+                }
+            }
+            patches.push(patch);
+        }
+        patches
+    }
+}
+
+/// First and last cell along both axes.
+#[derive(Debug, Clone, Copy)]
+struct Extent([[usize; 2]; 2]);
+
+impl Default for Extent {
+    fn default() -> Extent {
+        Extent([[usize::MAX, 0]; 2])
+    }
+}
+
+impl Extent {
+    fn add(&mut self, cell: [usize; 2]) {
+        for (range, i) in self.0.iter_mut().zip(cell) {
+            *range = [range[0].min(i), range[1].max(i)];
+        }
+    }
+
+    /// Cells from the first to the last.
+    fn length(&self, axis: usize) -> f64 {
+        let [first, last] = self.0[axis];
+        (last + 1).saturating_sub(first) as f64
+    }
+}
+
+fn within(window: Window, limits: Window) -> Window {
+    [0, 1].map(|k| {
+        [
+            window[k][0].max(limits[k][0]),
+            window[k][1].min(limits[k][1]),
+        ]
+    })
+}

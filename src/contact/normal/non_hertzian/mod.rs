@@ -1,0 +1,326 @@
+//! Any gap: contact region and pressure under a load or an approach.
+//!
+//! A box that holds the contact is found by looking at the gap, the pressure on ever finer grids of that box by
+//! conjugate gradients, each grid started from the one before and shrunk to the contact. At the end the edges are
+//! placed between the cells.
+
+mod edges;
+pub mod gap;
+mod gradients;
+mod grid;
+mod window;
+
+use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::normal::hertz::Pressing;
+use crate::contact::normal::non_hertzian::gap::Gap;
+use crate::contact::normal::non_hertzian::gradients::{Pressed, press};
+use crate::contact::normal::non_hertzian::grid::{Grid, Resolution, Side};
+use crate::contact::normal::non_hertzian::window::{Reach, reach, reach_of_level};
+use crate::contact::normal::prescribed::PressureField;
+
+/// Cells of the first grid along either axis.
+const CELLS_FIRST: usize = 32;
+/// How fine the last grid is at least.
+const RESOLUTION: Resolution = Resolution {
+    contact: 44.0,
+    patch: 24.0,
+    share_min: 0.02,
+};
+/// A grid with cells larger than wanted by less than this factor (inverse) will do.
+const COARSER_MAX: f64 = 0.8;
+/// A rough gap is looked at more closely until neither the approach nor the largest pressure change by more than this.
+const APPROACH_CHANGE: f64 = 0.003;
+const PRESSURE_CHANGE: f64 = 0.02;
+/// How much finer the next grid is.
+const REFINEMENT: f64 = 1.6;
+/// Violation of the contact conditions relative to the deepest overlap, on the first grid and on the others.
+const TOLERANCE_FIRST: f64 = 1e-3;
+const TOLERANCE: f64 = 2e-5;
+/// Grids tried; each is larger, shifted or finer than the one before.
+const GRIDS_MAX: usize = 12;
+/// Cells outside the contact that nearly touch, relative to the deepest overlap, belong to the next grid.
+const NEAR: f64 = 0.03;
+/// A patch longer than this part of the rolling radius (half against whole) is no half-space contact.
+const HALF_LENGTH_USUAL_MAX: f64 = 0.3;
+/// So is an approach that is more than this part of the patch's smaller half width.
+const APPROACH_USUAL_MAX: f64 = 0.15;
+
+/// Two bodies with a gap between them, pressed together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GapContact {
+    /// The gap of the undeformed bodies.
+    pub gap: Gap,
+    /// Force, or approach counted from gap = 0.
+    pub pressing: Pressing,
+    /// Contact modulus `E* = G/(1−ν)` in MPa.
+    pub contact_modulus: f64,
+}
+
+/// The contact of a gap.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Found {
+    /// Region and pressure.
+    pub field: PressureField,
+    /// How it was found.
+    pub report: Report,
+    /// Remarks for the answer.
+    pub warnings: Vec<String>,
+}
+
+/// How a normal problem was solved.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Report {
+    /// Cells of the last grid along x and y.
+    pub cells: [usize; 2],
+    /// Iterations over all grids.
+    pub iterations: u32,
+    /// Largest violation of the contact conditions on the last grid, relative to the deepest overlap of the undeformed
+    /// surfaces: distance in the contact, overlap outside.
+    pub residual: f64,
+}
+
+/// Why a gap has no contact to show.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Failure {
+    /// A reason, as a sentence.
+    NoAnswer(String),
+    /// The caller stopped the work.
+    Stopped(Stop),
+}
+
+impl From<gradients::Failure> for Failure {
+    fn from(failure: gradients::Failure) -> Failure {
+        match failure {
+            gradients::Failure::Stopped(stop) => Failure::Stopped(stop),
+            gradients::Failure::NotConverged(residual) => Failure::NoAnswer(format!(
+                "the pressure did not converge: the contact conditions are violated by {residual:.1e} of the overlap"
+            )),
+        }
+    }
+}
+
+impl GapContact {
+    /// What is wrong with the gap, as far as its samples tell without solving.
+    ///
+    /// # Errors
+    /// A JSON pointer into the case and a sentence, if the gap has no least value inside or the approach does not
+    /// reach it.
+    pub fn check(&self) -> Result<(), (&'static str, String)> {
+        let [least, largest] = self.gap.extremes();
+        let gap = |reason: String| Err(("/contact/gap_mm", reason));
+        if least == largest {
+            return gap(format!(
+                "the gap is {least} mm everywhere; a least gap inside is needed"
+            ));
+        }
+        if let Some(place) = self.gap.least_at_edge() {
+            return gap(format!(
+                "the least gap, {least} mm, lies at the edge of the data, at {place}; a least gap inside is needed"
+            ));
+        }
+        match self.pressing {
+            Pressing::Approach(approach) if approach <= least => {
+                Err(("/load/approach_mm", no_touch(approach, least)))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Finds region and pressure.
+    ///
+    /// Measured on Hertz's contact and on crowns of arcs: approach within 0.02 %, area within 0.3 %, largest pressure
+    /// within 0.3 %.
+    ///
+    /// # Errors
+    /// A reason why there is no answer; or the monitor stopped the work.
+    pub fn solve(&self, monitor: &dyn Monitor) -> Result<Found, Failure> {
+        let mut reach = reach(&self.gap, self.pressing, self.contact_modulus);
+        if let Pressing::Approach(approach) = self.pressing
+            && approach <= reach.least
+        {
+            return Err(Failure::NoAnswer(no_touch(approach, reach.least)));
+        }
+        let first =
+            |reach: &Reach| Grid::new(reach.window, [CELLS_FIRST; 2], self.gap.is_mirrored());
+        let mut grid = first(&reach);
+        let mut solved: Option<(Grid, Pressed)> = None;
+        let mut iterations = 0;
+        let mut settled = false;
+        for _ in 0..GRIDS_MAX {
+            let pressed = self.press(&grid, solved.as_ref(), &reach, monitor)?;
+            iterations += pressed.iterations;
+            let next = if pressed.approach > reach.level {
+                // The estimate was too small: parts of the gap beyond the box may touch as well.
+                let depth = pressed.approach - reach.least;
+                reach = reach_of_level(&self.gap, pressed.approach + 0.2 * depth);
+                Next::Grid(first(&reach))
+            } else {
+                let before = solved.as_ref().map(|(_, pressed)| pressed);
+                self.next_grid(&grid, &pressed, before, pressed.approach - reach.least)?
+            };
+            solved = Some((grid, pressed));
+            match next {
+                Next::Grid(next) => grid = next,
+                Next::Settled => {
+                    settled = true;
+                    break;
+                }
+                Next::Rough => break,
+            }
+        }
+        let Some((grid, pressed)) = solved else {
+            unreachable!("at least one grid is tried")
+        };
+        let mut warnings = Vec::new();
+        if !settled {
+            warnings.push(
+                "the gap is rough: pressure and region still change with the grid of the normal problem".to_owned(),
+            );
+        }
+        let report = Report {
+            cells: grid.cells,
+            iterations,
+            residual: pressed.residual,
+        };
+        let field = field(&grid, &pressed).map_err(Failure::NoAnswer)?;
+        warnings.extend(self.remarks(&field, pressed.approach - reach.least));
+        Ok(Found {
+            field,
+            report,
+            warnings,
+        })
+    }
+
+    fn press(
+        &self,
+        grid: &Grid,
+        before: Option<&(Grid, Pressed)>,
+        reach: &Reach,
+        monitor: &dyn Monitor,
+    ) -> Result<Pressed, Failure> {
+        let gap = grid.gap(&self.gap);
+        let (start, tolerance) = match before {
+            Some((coarse, pressed)) => {
+                (grid.interpolate(coarse, &pressed.pressure, &gap), TOLERANCE)
+            }
+            None => (
+                grid.first_pressure(&gap, reach, self.contact_modulus),
+                TOLERANCE_FIRST,
+            ),
+        };
+        let mut influence = grid.influence(self.contact_modulus);
+        let cell = grid.step[0] * grid.step[1];
+        let mut pressed = press(
+            &mut influence,
+            &gap,
+            cell,
+            self.pressing,
+            start,
+            tolerance,
+            monitor,
+        )?;
+        if grid.mirrored {
+            grid.symmetrise(&mut pressed.pressure);
+        }
+        Ok(pressed)
+    }
+
+    /// What to do after a grid: enlarge it, refine it, or be content.
+    fn next_grid(
+        &self,
+        grid: &Grid,
+        pressed: &Pressed,
+        before: Option<&Pressed>,
+        depth: f64,
+    ) -> Result<Next, Failure> {
+        let limits = self.gap.window();
+        let (cut, short): (Vec<Side>, Vec<Side>) = grid
+            .sides_in_contact(&pressed.pressure)
+            .into_iter()
+            .partition(|side| grid.ends_at(*side, limits));
+        if !short.is_empty() {
+            return Ok(Next::Grid(grid.enlarged(&short, limits)));
+        }
+        let wanted = grid.wanted(pressed, NEAR * depth, RESOLUTION, limits);
+        let finer = Grid::new(wanted.window, wanted.cells, grid.mirrored);
+        if (0..2).any(|k| finer.step[k] < COARSER_MAX * grid.step[k]) {
+            return Ok(Next::Grid(finer));
+        }
+        if let Some(side) = cut.first() {
+            return Err(Failure::NoAnswer(format!(
+                "the contact reaches the edge {} of the given gap, so that the true contact is cut off; give the gap \
+                 farther out",
+                side.place(limits)
+            )));
+        }
+        let Some(before) = before else {
+            return Ok(Next::Settled);
+        };
+        let largest = |pressed: &Pressed| pressed.pressure.iter().copied().fold(0.0, f64::max);
+        if (pressed.approach - before.approach).abs() <= APPROACH_CHANGE * depth
+            && (largest(before) / largest(pressed) - 1.0).abs() <= PRESSURE_CHANGE
+        {
+            return Ok(Next::Settled);
+        }
+        let cells = grid.cells.map(|n| (n as f64 * REFINEMENT) as usize);
+        let finer = Grid::new(wanted.window, cells, grid.mirrored);
+        if (0..2).all(|k| finer.step[k] > COARSER_MAX * grid.step[k]) {
+            return Ok(Next::Rough);
+        }
+        Ok(Next::Grid(finer))
+    }
+
+    /// Remarks on contacts for which a half-space is a poor likeness of the bodies; the patch that carries most decides.
+    fn remarks(&self, field: &PressureField, depth: f64) -> Vec<String> {
+        let patches = field.patches();
+        let heaviest = patches
+            .iter()
+            .max_by(|a, b| a.normal_force.total_cmp(&b.normal_force));
+        let Some([x_min, x_max, y_min, y_max]) = heaviest.map(|patch| patch.extent) else {
+            return Vec::new();
+        };
+        let (a, b) = (0.5 * (x_max - x_min), 0.5 * (y_max - y_min));
+        let mut remarks = Vec::new();
+        if let Gap::Profile { rolling, .. } = self.gap
+            && a > HALF_LENGTH_USUAL_MAX * rolling
+        {
+            remarks.push(format!(
+                "the contact is {:.3} mm long, against a rolling radius of {rolling} mm: the bodies are nearly conformal, which \
+                 half-spaces do not describe",
+                2.0 * a
+            ));
+        }
+        if depth > APPROACH_USUAL_MAX * a.min(b) {
+            remarks.push(format!(
+                "the bodies overlap by {depth:.3e} mm, against a half width of {:.3e} mm of the contact: strains are too large \
+                 for linear elasticity",
+                a.min(b)
+            ));
+        }
+        remarks
+    }
+}
+
+fn no_touch(approach: f64, least: f64) -> String {
+    format!(
+        "the bodies do not touch: the approach of {approach} mm is not more than the least gap of {least} mm"
+    )
+}
+
+/// The pressures of a grid as a field with edges between its cells.
+fn field(grid: &Grid, pressed: &Pressed) -> Result<PressureField, String> {
+    PressureField::of_solution(
+        &grid.centres(0),
+        &grid.centres(1),
+        &edges::squares(grid.cells[0], &pressed.pressure),
+        &pressed.pressure,
+        pressed.approach,
+    )
+}
+
+/// What follows a grid.
+enum Next {
+    Grid(Grid),
+    Settled,
+    Rough,
+}
