@@ -63,7 +63,6 @@ fn compare(failures: &mut Vec<String>, contact: Value, load: Value, ellipse: &El
     case["solver"] = json!({ "mesh": { "strips": 16, "cells": 16 } });
     let (solution, _) = solve(&case);
     let found = differences(&solution, ellipse, force);
-    println!("{name}: {found:+.5?}");
     for k in 0..5 {
         if found[k].abs() > ALLOWED[k] {
             failures.push(format!("{name}: {} off by {:+.5}", NAMES[k], found[k]));

@@ -20,7 +20,6 @@ fn failures(case: &GapReference) -> Vec<String> {
     let mut failures = Vec::new();
     let mut compare = |name: &str, found: f64, expected: Converged, scale: f64, allowed: f64| {
         let (error, unc) = ((found - expected.value) / scale, expected.unc / scale);
-        println!("{} {name}: {error:+.5} ± {unc:.5}", case.id);
         if error.abs() > allowed + unc {
             failures.push(format!(
                 "{} {name}: {found} for {} is off by {error:+.5} ± {unc:.5}, {allowed} is allowed",

@@ -1,8 +1,11 @@
 //! Whatever the gap: a contact that satisfies the contact conditions, or a reason.
 
+use std::ops::ControlFlow;
+use std::time::Duration;
+
 use railhead::contact::error::SolveError;
 use railhead::contact::influence::coefficients::{Rectangle, rectangle};
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::{Monitor, Stop, Unwatched};
 use railhead::contact::normal::non_hertzian::gap::Gap;
 use railhead::contact::problem::Limits;
 use railhead::contact::solution::{Fields, Solution};
@@ -158,61 +161,98 @@ fn distance_inside(sample: &Sample, solution: &Solution, fields: &Fields) -> f64
     largest / (approach - least)
 }
 
+/// How a random gap ended.
+enum Outcome {
+    /// A contact, with the distance of [`distance_inside`].
+    Solved(Solution, f64),
+    Refused(String),
+}
+
+fn solve(sample: &Sample) -> Result<Outcome, String> {
+    let load = json!({ "normal_force_n": sample.force });
+    let mut case = steel(sample.contact.clone(), load, [0.001, 0.0, 0.0]);
+    case["solver"] = json!({ "mesh": { "strips": 12, "cells": 14 } });
+    case["outputs"] = json!(["pressure"]);
+    let problem = match check(&case, &Limits::default()) {
+        Ok(problem) => problem,
+        Err(error) => return Ok(Outcome::Refused(error.to_string())),
+    };
+    match contact::solve(&problem, &Unwatched) {
+        Ok((solution, fields)) => {
+            let distance = distance_inside(sample, &solution, &fields);
+            Ok(Outcome::Solved(solution, distance))
+        }
+        Err(SolveError::NormalProblem { reason }) => Ok(Outcome::Refused(reason)),
+        Err(error) => Err(format!("{}: {error}", sample.name)),
+    }
+}
+
 #[test]
 fn random_gaps_end_in_a_sound_contact_or_a_reason() {
-    let all = samples(320);
     let mut failures = Vec::new();
-    let (mut solved, mut refused, mut distances) = (0, Vec::new(), Vec::new());
-    for sample in &all {
-        let mut case = steel(
-            sample.contact.clone(),
-            json!({ "normal_force_n": sample.force }),
-            [0.001, 0.0, 0.0],
-        );
-        case["solver"] = json!({ "mesh": { "strips": 12, "cells": 14 } });
-        case["outputs"] = json!(["pressure"]);
-        let problem = match check(&case, &Limits::default()) {
-            Ok(problem) => problem,
-            Err(error) => {
-                refused.push(format!("{}: {error}", sample.name));
-                continue;
+    let mut distances = Vec::new();
+    let mut refused = 0;
+    for sample in samples(320) {
+        match solve(&sample) {
+            Err(failure) => failures.push(failure),
+            Ok(Outcome::Refused(reason)) => {
+                refused += 1;
+                // Loads up to 30 MN press some contacts beyond the data; nothing else is wrong with these gaps.
+                if !reason.contains("cut off") {
+                    failures.push(format!("{}: {reason}", sample.name));
+                }
             }
-        };
-        match contact::solve(&problem, &Unwatched) {
-            Ok((solution, fields)) => {
-                solved += 1;
+            Ok(Outcome::Solved(solution, distance)) => {
                 let report = solution.normal.expect("a report on the normal problem");
                 let load: f64 = solution.patches.iter().map(|p| p.normal_force_n).sum();
-                let distance = distance_inside(sample, &solution, &fields);
-                println!(
-                    "{} {distance:.4} {report:?} {} {:?}",
-                    sample.name,
-                    solution.patches.len(),
-                    solution.warnings
-                );
                 if report.residual > 1e-3 {
                     failures.push(format!("{}: residual {}", sample.name, report.residual));
                 }
                 if (load / sample.force - 1.0).abs() > 1e-6 {
                     failures.push(format!("{}: carries {load}", sample.name));
                 }
-                let alone = solution.patches.len() == 1;
-                if alone && !sample.rough {
-                    distances.push((distance, sample.name.clone()));
+                if solution.patches.len() == 1 && !sample.rough {
+                    distances.push((distance, sample.name));
                 }
             }
-            Err(SolveError::NormalProblem { reason }) => {
-                refused.push(format!("{}: {reason}", sample.name));
-            }
-            Err(error) => failures.push(format!("{}: {error}", sample.name)),
         }
     }
-    distances.sort_by(|a, b| b.0.total_cmp(&a.0));
-    println!(
-        "{solved} solved; largest distances {:?} median {:?}",
-        &distances[..30],
-        distances[distances.len() / 2]
-    );
-    println!("{}", refused.join("\n"));
     assert_none("unsound", &failures);
+    assert!(refused <= 40, "{refused} refused");
+    // The tangential mesh of 12 strips makes most of these distances.
+    distances.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let at = |share: f64| &distances[((distances.len() - 1) as f64 * share) as usize];
+    for (share, allowed) in [(0.5, 0.008), (0.95, 0.02), (1.0, 0.06)] {
+        assert!(
+            at(share).0 < allowed,
+            "{share} of the gaps: {:?}",
+            at(share)
+        );
+    }
+}
+
+#[test]
+fn a_solve_of_a_rough_gap_can_be_stopped() {
+    let sample = samples(4).pop().expect("a rough gap");
+    let load = json!({ "normal_force_n": sample.force });
+    let mut case = steel(sample.contact, load, [0.001, 0.0, 0.0]);
+    case["solver"] = json!({ "time_limit_s": 1.0 });
+    let problem = check(&case, &Limits::default()).expect("a valid case");
+    let late = Late(std::cell::Cell::new(0));
+    assert_eq!(contact::solve(&problem, &late), Err(SolveError::OutOfTime));
+    assert!(late.0.get() < 20, "{} looks at the clock", late.0.get());
+}
+
+/// A clock that passes the limit of a second after ten looks.
+struct Late(std::cell::Cell<u32>);
+
+impl Monitor for Late {
+    fn tick(&self, _progress: f64) -> ControlFlow<Stop> {
+        ControlFlow::Continue(())
+    }
+
+    fn elapsed(&self) -> Duration {
+        self.0.set(self.0.get() + 1);
+        Duration::from_millis(if self.0.get() > 10 { 1500 } else { 0 })
+    }
 }

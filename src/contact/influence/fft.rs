@@ -6,6 +6,9 @@ use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 
+/// Rows that are moved to the columns together, so that whole cache lines are used.
+const BLOCK: usize = 8;
+
 /// Normal displacement at the centres of `nx` by `ny` equal rectangles caused by uniform pressures on them, both bodies
 /// together.
 ///
@@ -20,6 +23,8 @@ pub struct Convolution {
     width: usize,
     /// Padded length along y.
     height: usize,
+    /// Coefficient of a cell's own pressure.
+    own: f64,
     /// Transform of the coefficients (real, as they are even), divided by the size of the padded grid; column by column.
     spectrum: Vec<f64>,
     forward: Arc<dyn RealToComplex<f64>>,
@@ -27,7 +32,8 @@ pub struct Convolution {
     columns_forward: Arc<dyn Fft<f64>>,
     columns_backward: Arc<dyn Fft<f64>>,
     row: Vec<f64>,
-    row_spectrum: Vec<Complex<f64>>,
+    /// Spectra of a block of rows.
+    spectra: Vec<Complex<f64>>,
     columns: Vec<Complex<f64>>,
     scratch: Vec<Complex<f64>>,
 }
@@ -56,33 +62,39 @@ impl Convolution {
             ny,
             width,
             height,
+            own: 0.0,
             spectrum: vec![0.0; half * height],
             forward,
             backward,
             columns_forward,
             columns_backward,
             row: vec![0.0; width],
-            row_spectrum: vec![zero; half],
+            spectra: vec![zero; half * BLOCK],
             columns: vec![zero; half * height],
             scratch: vec![zero; scratch.into_iter().max().unwrap_or(0)],
         };
-        convolution.transform_coefficients(&coefficients(nx, ny, dx, dy, contact_modulus));
+        let coefficients = coefficients(nx, ny, dx, dy, contact_modulus);
+        convolution.own = coefficients[0];
+        convolution.transform_coefficients(&coefficients);
         convolution
     }
 
-    /// Coefficient of a cell's own pressure in its displacement, in mm/MPa, for cells of this size.
+    /// Displacement at the centre of a cell per unit of its own pressure, in mm/MPa.
     #[must_use]
-    pub fn own(dx: f64, dy: f64, contact_modulus: f64) -> f64 {
-        coefficients(1, 1, dx, dy, contact_modulus)[0]
+    pub fn own(&self) -> f64 {
+        self.own
     }
 
     /// Displacement in mm at every centre for pressures in MPa.
     pub fn apply(&mut self, pressure: &[f64], displacement: &mut [f64]) {
-        let rows = pressure.chunks_exact(self.nx).enumerate();
-        for (j, values) in rows.take(self.ny) {
-            self.row[..self.nx].copy_from_slice(values);
-            self.row[self.nx..].fill(0.0);
-            self.transform_row(j);
+        let nx = self.nx;
+        for (block, rows) in pressure.chunks(nx * BLOCK).enumerate() {
+            for (k, values) in rows.chunks_exact(nx).enumerate() {
+                self.row[..nx].copy_from_slice(values);
+                self.row[nx..].fill(0.0);
+                self.transform_row(k);
+            }
+            self.store_rows(block * BLOCK, rows.len() / nx);
         }
         self.clear_rows_from(self.ny);
         self.transform_columns(&self.columns_forward.clone());
@@ -90,33 +102,54 @@ impl Convolution {
             *value *= *factor;
         }
         self.transform_columns(&self.columns_backward.clone());
-        for (j, values) in displacement.chunks_exact_mut(self.nx).enumerate() {
-            for (i, value) in self.row_spectrum.iter_mut().enumerate() {
-                *value = self.columns[i * self.height + j];
+        for (block, rows) in displacement.chunks_mut(nx * BLOCK).enumerate() {
+            self.fetch_rows(block * BLOCK, rows.len() / nx);
+            for (k, values) in rows.chunks_exact_mut(nx).enumerate() {
+                self.transform_row_back(k);
+                values.copy_from_slice(&self.row[..nx]);
             }
-            // The transform of real values has no imaginary part there, except for rounding.
-            self.row_spectrum[0].im = 0.0;
-            self.row_spectrum[self.width / 2].im = 0.0;
-            let done = self.backward.process_with_scratch(
-                &mut self.row_spectrum,
-                &mut self.row,
-                &mut self.scratch,
-            );
-            debug_assert!(done.is_ok());
-            values.copy_from_slice(&self.row[..self.nx]);
         }
     }
 
-    /// Transforms the row in work into line `j` of the columns.
-    fn transform_row(&mut self, j: usize) {
-        let done = self.forward.process_with_scratch(
-            &mut self.row,
-            &mut self.row_spectrum,
-            &mut self.scratch,
-        );
+    /// Transforms the row in work into spectrum `k` of the block.
+    fn transform_row(&mut self, k: usize) {
+        let half = self.width / 2 + 1;
+        let spectrum = &mut self.spectra[k * half..(k + 1) * half];
+        let done = self
+            .forward
+            .process_with_scratch(&mut self.row, spectrum, &mut self.scratch);
         debug_assert!(done.is_ok());
-        for (i, value) in self.row_spectrum.iter().enumerate() {
-            self.columns[i * self.height + j] = *value;
+    }
+
+    /// Transforms spectrum `k` of the block into the row in work.
+    fn transform_row_back(&mut self, k: usize) {
+        let half = self.width / 2 + 1;
+        let spectrum = &mut self.spectra[k * half..(k + 1) * half];
+        // The transform of real values has no imaginary part there, except for rounding.
+        (spectrum[0].im, spectrum[half - 1].im) = (0.0, 0.0);
+        let done = self
+            .backward
+            .process_with_scratch(spectrum, &mut self.row, &mut self.scratch);
+        debug_assert!(done.is_ok());
+    }
+
+    /// Stores `count` spectra of the block as lines of the columns from `first` on.
+    fn store_rows(&mut self, first: usize, count: usize) {
+        let half = self.width / 2 + 1;
+        for (i, column) in self.columns.chunks_exact_mut(self.height).enumerate() {
+            for k in 0..count {
+                column[first + k] = self.spectra[k * half + i];
+            }
+        }
+    }
+
+    /// The reverse of [`Convolution::store_rows`].
+    fn fetch_rows(&mut self, first: usize, count: usize) {
+        let half = self.width / 2 + 1;
+        for (i, column) in self.columns.chunks_exact(self.height).enumerate() {
+            for k in 0..count {
+                self.spectra[k * half + i] = column[first + k];
+            }
         }
     }
 
@@ -143,7 +176,8 @@ impl Convolution {
                     self.row[self.width - i] = value;
                 }
             }
-            self.transform_row(j);
+            self.transform_row(0);
+            self.store_rows(j, 1);
         }
         for column in self.columns.chunks_exact_mut(height) {
             for j in 1..ny {
@@ -253,7 +287,7 @@ mod tests {
 
     #[test]
     fn a_cell_acts_on_itself_as_the_closed_form_says() {
-        let own = Convolution::own(0.3, 0.2, 2.0);
+        let own = Convolution::new(3, 2, 0.3, 0.2, 2.0).own();
         let cell = Rectangle {
             x0: -0.15,
             x1: 0.15,

@@ -78,7 +78,15 @@ pub fn solve(
                 }
                 let spinning = problem.motions[index].spin_per_mm != 0.0;
                 let regime = estimate::regime(ladder.get(point.level), &point.tangential, spinning);
-                let size = ladder.size(cells.round() as u32, regime);
+                let mut size = ladder.size(cells.round() as u32, regime);
+                let before = ladder.get(point.level).size.strips;
+                if size.strips == before {
+                    // Levels with the same strips say nothing about the strips.
+                    size = MeshSize {
+                        strips: before + 2,
+                        cells: (size.cells * before).div_ceil(before + 2),
+                    };
+                }
                 point = climb(problem, ladder, index, size, Some(point), monitor)?;
             }
         }

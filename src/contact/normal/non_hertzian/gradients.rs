@@ -84,7 +84,7 @@ pub(super) fn press(
         last = square;
         work.direction(&p, factor);
         influence.apply(&work.t, &mut work.r);
-        let step = work.step(&p, pressing);
+        let step = work.step(&p, pressing, influence.own());
         (follow, fresh) = work.advance(&mut p, step);
         let scale = scale_to(&mut p, pressing, cell);
         if fresh {
@@ -118,9 +118,9 @@ impl Work {
     /// Puts `u + h − δ` into the distances and returns δ; with a force it makes the mean over the contact 0.
     fn distances(&mut self, p: &[f64], gap: &[f64], pressing: Pressing) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
-        for k in 0..p.len() {
+        for (k, p) in p.iter().enumerate() {
             self.g[k] = self.u[k] + gap[k];
-            if p[k] > 0.0 {
+            if *p > 0.0 {
                 sum += self.g[k];
                 count += 1.0;
             }
@@ -145,8 +145,8 @@ impl Work {
     }
 
     fn direction(&mut self, p: &[f64], factor: f64) {
-        for k in 0..p.len() {
-            self.t[k] = if p[k] > 0.0 {
+        for (k, p) in p.iter().enumerate() {
+            self.t[k] = if *p > 0.0 {
                 self.g[k] + factor * self.t[k]
             } else {
                 0.0
@@ -154,8 +154,8 @@ impl Work {
         }
     }
 
-    /// Length of the step that leaves no distance along the direction.
-    fn step(&mut self, p: &[f64], pressing: Pressing) -> f64 {
+    /// Length of the step that leaves no distance along the direction; `own` is what a cell's pressure displaces itself.
+    fn step(&self, p: &[f64], pressing: Pressing, own: f64) -> f64 {
         let mean = match pressing {
             Pressing::Force(_) => {
                 let (mut sum, mut count) = (0.0, 0.0);
@@ -168,13 +168,16 @@ impl Work {
             Pressing::Approach(_) => 0.0,
         };
         let (mut above, mut below) = (0.0, 0.0);
-        for k in 0..p.len() {
-            if p[k] > 0.0 {
-                above += self.g[k] * self.t[k];
-                below += (self.r[k] - mean) * self.t[k];
-            }
+        for (k, _) in p.iter().enumerate().filter(|(_, p)| **p > 0.0) {
+            above += self.g[k] * self.t[k];
+            below += (self.r[k] - mean) * self.t[k];
         }
-        above / below
+        // A single cell under a force leaves nothing to minimise; its own stiffness lets others in.
+        if below > 0.0 && above > 0.0 {
+            above / below
+        } else {
+            1.0 / own
+        }
     }
 
     /// Takes the step. Says whether the next direction may build on this one (no cell came into contact) and whether the
@@ -200,5 +203,69 @@ impl Work {
             }
         }
         (follow, fresh)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::monitor::Unwatched;
+
+    const CELLS: usize = 24;
+    const STEP: f64 = 0.5;
+    const MODULUS: f64 = 115_000.0;
+
+    fn paraboloid() -> Vec<f64> {
+        let at = |i: usize| (i as f64 - 11.3) * STEP;
+        (0..CELLS * CELLS)
+            .map(|k| at(k % CELLS).powi(2) / 900.0 + at(k / CELLS).powi(2) / 600.0)
+            .collect()
+    }
+
+    fn solved(pressing: Pressing, start: Vec<f64>) -> Pressed {
+        let mut influence = Convolution::new(CELLS, CELLS, STEP, STEP, MODULUS);
+        let gap = paraboloid();
+        press(
+            &mut influence,
+            &gap,
+            STEP * STEP,
+            pressing,
+            start,
+            1e-9,
+            &Unwatched,
+        )
+        .unwrap()
+    }
+
+    #[test]
+    fn the_start_does_not_decide_the_pressure() {
+        let even = solved(Pressing::Force(5e4), vec![1.0; CELLS * CELLS]);
+        let mut corner = vec![0.0; CELLS * CELLS];
+        corner[3] = 7.0;
+        let far = solved(Pressing::Force(5e4), corner);
+        let largest = even.pressure.iter().copied().fold(0.0, f64::max);
+        for (a, b) in even.pressure.iter().zip(&far.pressure) {
+            assert!((a - b).abs() < 1e-5 * largest, "{a} {b}");
+        }
+        assert!((even.pressure.iter().sum::<f64>() * STEP * STEP / 5e4 - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn force_and_approach_are_two_names_for_one_contact() {
+        let by_force = solved(Pressing::Force(5e4), vec![1.0; CELLS * CELLS]);
+        let approach = Pressing::Approach(by_force.approach);
+        let by_approach = solved(approach, vec![1.0; CELLS * CELLS]);
+        let sum = |pressed: &Pressed| pressed.pressure.iter().sum::<f64>();
+        assert!((sum(&by_approach) / sum(&by_force) - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn nothing_overlaps_and_only_touching_cells_press() {
+        let pressed = solved(Pressing::Force(5e4), vec![1.0; CELLS * CELLS]);
+        let depth = pressed.approach;
+        for (p, g) in pressed.pressure.iter().zip(&pressed.distance) {
+            assert!(*p >= 0.0 && *g >= -1e-8 * depth);
+            assert!(*p == 0.0 || g.abs() < 1e-8 * depth, "{p} {g}");
+        }
     }
 }

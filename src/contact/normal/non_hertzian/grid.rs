@@ -231,31 +231,27 @@ impl Grid {
             patch.iter().for_each(|k| contact.add(cell(*k)));
             let load: f64 = patch.iter().map(|k| pressed.pressure[*k]).sum();
             if load >= resolution.share_min * total {
-                for k in 0..2 {
-                    steps[k] = steps[k].min(extent.length(k) * self.step[k] / resolution.patch);
+                for (k, step) in steps.iter_mut().enumerate() {
+                    *step = step.min(extent.length(k) * self.step[k] / resolution.patch);
                 }
             }
         }
-        let mut wanted = Wanted {
-            window: [[0.0; 2]; 2],
-            cells: [0; 2],
-        };
-        for k in 0..2 {
-            let step = steps[k].min(contact.length(k) * self.step[k] / resolution.contact);
-            let margin = (0.3 * self.step[k]).max(1.5 * step);
+        let window = [0, 1].map(|k| {
+            steps[k] = steps[k].min(contact.length(k) * self.step[k] / resolution.contact);
+            let margin = (0.3 * self.step[k]).max(1.5 * steps[k]);
             let low = self.range(k)[0];
-            wanted.window[k] = [
-                low + whole.0[k][0] as f64 * self.step[k] - margin,
-                low + (whole.0[k][1] + 1) as f64 * self.step[k] + margin,
-            ];
-        }
-        wanted.window = within(wanted.window, limits);
-        for k in 0..2 {
-            let step = steps[k].min(contact.length(k) * self.step[k] / resolution.contact);
-            let [low, high] = wanted.window[k];
-            wanted.cells[k] = (((high - low) / step).ceil() as usize).clamp(4, CELLS_MAX);
-        }
-        wanted
+            let [first, last] = whole.0[k].map(|i| i as f64);
+            [
+                low + first * self.step[k] - margin,
+                low + (last + 1.0) * self.step[k] + margin,
+            ]
+        });
+        let window = within(window, limits);
+        let cells = [0, 1].map(|k| {
+            let [low, high] = window[k];
+            (((high - low) / steps[k]).ceil() as usize).clamp(4, CELLS_MAX)
+        });
+        Wanted { window, cells }
     }
 
     /// Cells in contact, patch by patch; cells hang together over edges and corners.

@@ -28,14 +28,15 @@ const RESOLUTION: Resolution = Resolution {
 };
 /// A grid with cells larger than wanted by less than this factor (inverse) will do.
 const COARSER_MAX: f64 = 0.8;
-/// A rough gap is looked at more closely until neither the approach nor the largest pressure change by more than this.
-const APPROACH_CHANGE: f64 = 0.003;
-const PRESSURE_CHANGE: f64 = 0.02;
+/// A rough gap is looked at more closely until neither the approach nor the largest pressure change by more than this,
+/// times the ratio of the cells' sizes.
+const APPROACH_CHANGE: f64 = 0.002;
+const PRESSURE_CHANGE: f64 = 0.015;
 /// How much finer the next grid is.
 const REFINEMENT: f64 = 1.6;
 /// Violation of the contact conditions relative to the deepest overlap, on the first grid and on the others.
 const TOLERANCE_FIRST: f64 = 1e-3;
-const TOLERANCE: f64 = 2e-5;
+const TOLERANCE: f64 = 1e-4;
 /// Grids tried; each is larger, shifted or finer than the one before.
 const GRIDS_MAX: usize = 12;
 /// Cells outside the contact that nearly touch, relative to the deepest overlap, belong to the next grid.
@@ -155,8 +156,8 @@ impl GapContact {
                 reach = reach_of_level(&self.gap, pressed.approach + 0.2 * depth);
                 Next::Grid(first(&reach))
             } else {
-                let before = solved.as_ref().map(|(_, pressed)| pressed);
-                self.next_grid(&grid, &pressed, before, pressed.approach - reach.least)?
+                let depth = pressed.approach - reach.least;
+                self.next_grid(&grid, &pressed, solved.as_ref(), depth)?
             };
             solved = Some((grid, pressed));
             match next {
@@ -230,7 +231,7 @@ impl GapContact {
         &self,
         grid: &Grid,
         pressed: &Pressed,
-        before: Option<&Pressed>,
+        before: Option<&(Grid, Pressed)>,
         depth: f64,
     ) -> Result<Next, Failure> {
         let limits = self.gap.window();
@@ -256,9 +257,11 @@ impl GapContact {
         let Some(before) = before else {
             return Ok(Next::Settled);
         };
+        let (coarse, before) = before;
+        let ratio = (coarse.step[0] / grid.step[0]).max(coarse.step[1] / grid.step[1]);
         let largest = |pressed: &Pressed| pressed.pressure.iter().copied().fold(0.0, f64::max);
-        if (pressed.approach - before.approach).abs() <= APPROACH_CHANGE * depth
-            && (largest(before) / largest(pressed) - 1.0).abs() <= PRESSURE_CHANGE
+        if (pressed.approach - before.approach).abs() <= APPROACH_CHANGE * ratio * depth
+            && (largest(before) / largest(pressed) - 1.0).abs() <= PRESSURE_CHANGE * ratio
         {
             return Ok(Next::Settled);
         }
