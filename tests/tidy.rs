@@ -183,14 +183,16 @@ fn every_file_says_what_it_is_for_and_stays_readable() {
 }
 
 #[test]
-fn every_example_is_used_by_a_test() {
-    let tests: String = sources("tests").into_iter().map(|(_, text)| text).collect();
+fn every_example_is_a_case_that_can_be_asked_or_the_faulty_one() {
     for entry in fs::read_dir(root().join("api/examples")).expect("the examples") {
-        let name = entry
-            .expect("an entry")
-            .file_name()
-            .into_string()
-            .expect("a plain name");
-        assert!(tests.contains(&name), "no test uses api/examples/{name}");
+        let path = entry.expect("an entry").path();
+        let name = path.display().to_string();
+        let text = fs::read_to_string(&path).expect("an example");
+        let value = serde_json::from_str(&text).expect("an example is JSON");
+        if name.ends_with(".case.json") {
+            let limits = railhead::contact::problem::Limits::default();
+            let checked = railhead::contact::check(&value, &limits);
+            assert_eq!(checked.is_err(), name.contains("faulty"), "{name}");
+        }
     }
 }
