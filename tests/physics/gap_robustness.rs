@@ -1,5 +1,11 @@
 //! Whatever the gap: a contact that satisfies the contact conditions, or a reason.
 
+#![allow(
+    clippy::needless_range_loop,
+    clippy::large_enum_variant,
+    reason = "cells are addressed by number in several lists; outcomes are few"
+)]
+
 use std::ops::ControlFlow;
 use std::time::Duration;
 
