@@ -1,5 +1,7 @@
 //! What benches share: a clock that ignores other processes, medians, and the unit of machine speed.
 
+#![allow(dead_code, reason = "every bench uses its part")]
+
 use cpu_time::ThreadTime;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::lu::partial_pivoting::factor;
