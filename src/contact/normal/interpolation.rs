@@ -148,7 +148,7 @@ pub(in crate::contact::normal) fn interval(axis: &[f64], x: f64) -> usize {
 
 /// Slopes at the nodes of a curve through at least 2 values.
 ///
-/// Those of the parabola through a node and its neighbours, unless this bends more than [`BEND_MAX`] times as much as
+/// Those of the parabola through a node and its neighbours, unless this bends more than a fixed number of times as much as
 /// the ones at both neighbouring nodes: then there is a jump or a kink, and the slope goes over to a mean in which the
 /// less steep side has the greater weight, so that the curve does not swing beyond the values. At the ends the
 /// parabola of the next node is continued.
