@@ -96,6 +96,16 @@ fn stages_of_contact_use_only_the_stages_before_them() {
             ],
         ),
         (
+            "src/contact/geometry",
+            &[
+                "contact::influence",
+                "contact::normal",
+                "contact::tangential",
+                "contact::outputs",
+                "contact::problem",
+            ],
+        ),
+        (
             "src/contact/influence",
             &[
                 "contact::normal",

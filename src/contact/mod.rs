@@ -4,6 +4,7 @@
 
 pub mod case;
 pub mod error;
+pub mod geometry;
 pub mod influence;
 pub mod mesh;
 pub mod monitor;

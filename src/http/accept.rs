@@ -1,4 +1,4 @@
-//! Content negotiation: JSON is what there is, so a request that excludes it is refused.
+//! Content negotiation: JSON unless a resource offers more.
 
 use axum::extract::Request;
 use axum::http::{HeaderMap, header};
@@ -20,32 +20,108 @@ pub async fn require_json(request: Request, next: Next) -> Response {
     ApiError::new(Kind::NotAcceptable, detail).into_response()
 }
 
-/// Does `Accept` (RFC 9110, section 12.5.1) allow `application/json`? The most specific range decides; without the
-/// header everything is allowed.
-fn accepts_json(headers: &HeaderMap) -> bool {
-    if !headers.contains_key(header::ACCEPT) {
-        return true;
+/// A form in which something can be answered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// `application/x-ndjson`: one JSON value per line.
+    Ndjson,
+    /// `text/csv`.
+    Csv,
+}
+
+impl Format {
+    /// The name that `?format=` takes.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Format::Ndjson => "ndjson",
+            Format::Csv => "csv",
+        }
     }
-    let mut decision = (0, false);
+
+    /// The content type of the answer.
+    #[must_use]
+    pub fn media_type(self) -> &'static str {
+        match self {
+            Format::Ndjson => "application/x-ndjson",
+            Format::Csv => "text/csv; charset=utf-8",
+        }
+    }
+
+    /// The format of that name, if it is offered.
+    #[must_use]
+    pub fn named(name: &str, offered: &[Format]) -> Option<Format> {
+        offered.iter().copied().find(|format| format.name() == name)
+    }
+}
+
+/// The format to answer in: the one that was named, else the one that `Accept` likes best, the first one offered among
+/// equals.
+///
+/// # Errors
+/// `not-acceptable`: `Accept` excludes all that are offered.
+pub fn choose(
+    headers: &HeaderMap,
+    named: Option<Format>,
+    offered: &[Format],
+) -> Result<Format, ApiError> {
+    if let Some(format) = named {
+        return Ok(format);
+    }
+    let essence = |format: Format| format.media_type().split(';').next().unwrap_or_default();
+    let mut best = None;
+    for format in offered.iter().copied() {
+        let quality = quality(headers, essence(format));
+        if quality > best.map_or(0.0, |(_, quality)| quality) {
+            best = Some((format, quality));
+        }
+    }
+    best.map(|(format, _)| format).ok_or_else(|| {
+        let offered: Vec<String> = offered
+            .iter()
+            .map(|format| format!("`{}`", essence(*format)))
+            .collect();
+        let given: Vec<&str> = accept_values(headers).collect();
+        let detail = format!(
+            "`Accept` is `{}`; this resource answers {}",
+            given.join(", "),
+            offered.join(", ")
+        );
+        ApiError::new(Kind::NotAcceptable, detail)
+    })
+}
+
+/// Does `Accept` allow `application/json`?
+fn accepts_json(headers: &HeaderMap) -> bool {
+    quality(headers, "application/json") > 0.0
+}
+
+/// How much `Accept` likes a media type (RFC 9110, section 12.5.1), 0 to 1. The most specific range decides; without
+/// the header everything is liked.
+fn quality(headers: &HeaderMap, media_type: &str) -> f64 {
+    if !headers.contains_key(header::ACCEPT) {
+        return 1.0;
+    }
+    let family = media_type.split('/').next().unwrap_or_default();
+    let mut decision = (0, 0.0);
     for range in accept_values(headers).flat_map(|value| value.split(',')) {
         let mut parts = range.split(';').map(str::trim);
-        let specificity = match parts
-            .next()
-            .unwrap_or_default()
-            .to_ascii_lowercase()
-            .as_str()
-        {
-            "application/json" => 3,
-            "application/*" => 2,
-            "*/*" => 1,
-            _ => continue,
+        let range = parts.next().unwrap_or_default().to_ascii_lowercase();
+        let specificity = if range == media_type {
+            3
+        } else if range.strip_suffix("/*") == Some(family) {
+            2
+        } else if range == "*/*" {
+            1
+        } else {
+            continue;
         };
         let quality = parts
             .filter_map(|part| part.split_once('='))
             .find(|(name, _)| name.trim().eq_ignore_ascii_case("q"))
             .map_or(1.0, |(_, value)| value.trim().parse().unwrap_or(0.0));
         if specificity >= decision.0 {
-            decision = (specificity, quality > 0.0);
+            decision = (specificity, quality);
         }
     }
     decision.1

@@ -38,19 +38,31 @@ where
 /// # Errors
 /// `malformed-json` with its position.
 pub fn read_json(text: &[u8]) -> Result<Value, ApiError> {
-    serde_json::from_slice::<Strict>(text)
-        .map(|Strict(value)| value)
-        .map_err(|error| ApiError::malformed(&error))
+    read_strict(text).map_err(|error| ApiError::malformed(&error))
+}
+
+/// As [`read_json`], with the parser's own error.
+///
+/// # Errors
+/// The text is not JSON.
+pub fn read_strict(text: &[u8]) -> Result<Value, serde_json::Error> {
+    serde_json::from_slice::<Strict>(text).map(|Strict(value)| value)
+}
+
+/// The media type of a body without its parameters, in small letters; empty if none is given.
+#[must_use]
+pub fn essence(headers: &HeaderMap) -> String {
+    let given = headers.get(header::CONTENT_TYPE);
+    let text = given.map_or("", |value| value.to_str().unwrap_or("?"));
+    let essence = text.split(';').next().unwrap_or_default();
+    essence.trim().to_ascii_lowercase()
 }
 
 fn require_json(headers: &HeaderMap) -> Result<(), ApiError> {
     let given = headers
         .get(header::CONTENT_TYPE)
         .map(|value| value.to_str().unwrap_or("?"));
-    let essence = given
-        .and_then(|value| value.split(';').next())
-        .map_or("", str::trim);
-    let subtype = essence.to_ascii_lowercase();
+    let subtype = essence(headers);
     if subtype == "application/json"
         || (subtype.starts_with("application/") && subtype.ends_with("+json"))
     {

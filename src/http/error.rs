@@ -53,17 +53,19 @@ kinds! {
     UnreadableBody 400 "unreadable-body" "The body could not be read" "The connection ended or broke before the whole body had arrived."
     UnknownRoute 404 "unknown-route" "There is nothing at this address" "The path names no resource of this service; `/openapi.json` lists all of them."
     JobNotFound 404 "job-not-found" "There is no such job" "No job has this id; it was never made here, or it was deleted."
+    BatchNotFound 404 "batch-not-found" "There is no such batch" "No batch has this id; it was never made here, or it was deleted."
     OutputNotAsked 404 "output-not-asked" "This output was not asked for" "The case did not ask for this output, so it was not computed; submit the case again with the output named in `outputs`."
     MethodNotAllowed 405 "method-not-allowed" "This method is not allowed here" "The resource exists, but not for this HTTP method; the header `Allow` lists those it has."
-    NotAcceptable 406 "not-acceptable" "Only JSON can be answered" "The header `Accept` excludes `application/json`, which is what this resource answers."
+    NotAcceptable 406 "not-acceptable" "This form cannot be answered" "The header `Accept` excludes every form in which this resource can be answered; the detail names them. Most answer `application/json` only."
     BodyTimeout 408 "body-timeout" "The body came too slowly" "The whole body did not arrive within the allowed time."
     ResultNotReady 409 "result-not-ready" "The job has not ended" "The job is queued or running, so there is no result yet; ask again after `Retry-After` seconds, or submit with `Prefer: wait=N`."
     JobFailed 409 "job-failed" "The job failed" "The job ended without a result; the member `error` of the job says why."
     JobCancelled 409 "job-cancelled" "The job was cancelled" "The job was cancelled before it had a result."
     JobNotEnded 409 "job-not-ended" "The job has not ended" "Only an ended job can be deleted; cancel it first."
-    BodyTooLarge 413 "body-too-large" "The body is too large" "The body exceeds the size that this service accepts for one case."
-    UnsupportedMediaType 415 "unsupported-media-type" "The body is not declared as JSON" "A case is sent with `Content-Type: application/json`."
+    BodyTooLarge 413 "body-too-large" "The body is too large" "The body exceeds the size that this service accepts for one case, or for a batch; or a batch has too many cases."
+    UnsupportedMediaType 415 "unsupported-media-type" "The body is not declared as JSON" "A case is sent with `Content-Type: application/json`, a batch also with `application/x-ndjson`."
     FaultyCase 422 "faulty-case" "The case has faults" "The body is JSON but not a case that can be solved; `errors` names every fault by its JSON pointer, with the value given and what is allowed."
+    FaultyBatch 422 "faulty-batch" "The batch has faults" "The body holds no cases, or some of them have faults: `errors` names every fault by a JSON pointer that begins with the place of its case (counted from 0), and by its line in NDJSON. Nothing was stored; with `?accept=valid` the good cases are taken."
     IdempotencyConflict 422 "idempotency-conflict" "The idempotency key belongs to another case" "The `Idempotency-Key` was used before with a different body; use a new key for a new case."
     Internal 500 "internal" "The service failed" "Something went wrong inside the service; its log has the reason under the request id in the header `x-request-id`."
     QueueFull 503 "queue-full" "The queue is full" "The service holds as many unfinished jobs as it may; nothing was stored, try again after `Retry-After` seconds."
@@ -126,6 +128,25 @@ impl ApiError {
         failure
     }
 
+    /// An element of an array that is not JSON, with its place in the array.
+    #[must_use]
+    pub fn malformed_element(index: u32, error: &serde_json::Error) -> Self {
+        ApiError::new(
+            Kind::MalformedJson,
+            format!(
+                "the body is not JSON: element {index} (counted from 0): {error}, within the element"
+            ),
+        )
+    }
+
+    /// A batch that is refused; `faults` names its faulty cases.
+    #[must_use]
+    pub fn faulty_batch(detail: String, faults: Vec<Fault>) -> Self {
+        let mut failure = ApiError::new(Kind::FaultyBatch, detail);
+        failure.problem.errors = faults;
+        failure
+    }
+
     /// A query with faults; `faults` is not empty.
     #[must_use]
     pub fn bad_query(faults: Vec<Fault>) -> Self {
@@ -162,6 +183,7 @@ impl ApiError {
             pointer: None,
             parameter: None,
             header: Some(name.to_owned()),
+            line: None,
             detail,
         }];
         failure
@@ -181,6 +203,7 @@ impl From<CaseError> for ApiError {
                 pointer: Some(fault.pointer),
                 parameter: None,
                 header: None,
+                line: None,
                 detail: fault.detail,
             })
             .collect();
@@ -193,6 +216,7 @@ impl From<JobsError> for ApiError {
         match error {
             JobsError::Case(faults) => faults.into(),
             JobsError::NotFound => ApiError::new(Kind::JobNotFound, "no job has this id"),
+            JobsError::BatchNotFound => ApiError::new(Kind::BatchNotFound, "no batch has this id"),
             JobsError::NotReady(state) => ApiError::new(
                 Kind::ResultNotReady,
                 format!("the job is {}, so there is no result yet", state.name()),

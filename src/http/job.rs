@@ -68,7 +68,7 @@ impl JobAnswer {
             links: links(&job),
             name: job.name,
             labels: job.labels,
-            batch_id: None,
+            batch_id: job.batch_id.map(|id| id.to_string()),
             created_at: rfc3339(job.created_at),
             started_at: job.started_at.map(rfc3339),
             ended_at: job.ended_at.map(rfc3339),
@@ -96,7 +96,7 @@ fn links(job: &Job) -> BTreeMap<String, String> {
 }
 
 /// Milliseconds since 1970 as RFC 3339 in UTC, for example `2026-01-31T09:30:00.000Z`.
-fn rfc3339(epoch_ms: i64) -> String {
+pub fn rfc3339(epoch_ms: i64) -> String {
     jiff::Timestamp::from_millisecond(epoch_ms)
         .map_or_else(|_| epoch_ms.to_string(), |time| format!("{time:.3}"))
 }
@@ -109,18 +109,36 @@ impl<S: Send + Sync> FromRequestParts<S> for JobId {
     type Rejection = ApiError;
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
-        let Path(text) = Path::<String>::from_request_parts(parts, state)
-            .await
-            .map_err(|rejection| ApiError::new(Kind::JobNotFound, rejection.body_text()))?;
-        let id = Uuid::try_parse(&text).map_err(|_| {
-            ApiError::new(
-                Kind::JobNotFound,
-                format!("`{text}` is no job id; ids are UUIDs"),
-            )
-        })?;
+        let id = read_id(parts, state, Kind::JobNotFound, "job").await?;
         tracing::Span::current().record("job", tracing::field::display(id));
         Ok(JobId(id))
     }
+}
+
+/// The id of a batch in the path.
+#[derive(Debug, Clone, Copy)]
+pub struct BatchId(pub Uuid);
+
+impl<S: Send + Sync> FromRequestParts<S> for BatchId {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+        let id = read_id(parts, state, Kind::BatchNotFound, "batch").await?;
+        Ok(BatchId(id))
+    }
+}
+
+async fn read_id<S: Send + Sync>(
+    parts: &mut Parts,
+    state: &S,
+    kind: Kind,
+    what: &str,
+) -> Result<Uuid, ApiError> {
+    let Path(text) = Path::<String>::from_request_parts(parts, state)
+        .await
+        .map_err(|rejection| ApiError::new(kind, rejection.body_text()))?;
+    Uuid::try_parse(&text)
+        .map_err(|_| ApiError::new(kind, format!("`{text}` is no {what} id; ids are UUIDs")))
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
+use uuid::Uuid;
 
 use crate::contact::case::Case;
 use crate::http::body::JsonBody;
@@ -137,7 +138,11 @@ fn preferred_wait(headers: &HeaderMap) -> Option<u32> {
     waits.next().map(|seconds| seconds.min(WAIT_MAX_SECONDS))
 }
 
-fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, ApiError> {
+/// The idempotency key of a request, if it has one.
+///
+/// # Errors
+/// It is too long, empty, or given twice.
+pub fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, ApiError> {
     let Some(value) = headers.get(&IDEMPOTENCY_KEY) else {
         return Ok(None);
     };
@@ -167,6 +172,7 @@ problems! {
     operation_id = "list_jobs",
     params(
         ("state" = Option<JobState>, Query, description = "Only jobs in this state"),
+        ("batch" = Option<String>, Query, description = "Only jobs of this batch", format = "uuid"),
         ("label" = Option<String>, Query, description = "Only jobs with this label, written `key:value`", example = "line:A12"),
         ("created_after" = Option<String>, Query, description = "Only jobs submitted at or after this time (RFC 3339)", example = "2026-01-31T09:30:00Z"),
         ("created_before" = Option<String>, Query, description = "Only jobs submitted before this time (RFC 3339)"),
@@ -180,6 +186,7 @@ pub async fn list(State(jobs): State<Jobs>, uri: Uri) -> Result<Json<JobPage>, A
         &uri,
         &[
             "state",
+            "batch",
             "label",
             "created_after",
             "created_before",
@@ -194,6 +201,9 @@ pub async fn list(State(jobs): State<Jobs>, uri: Uri) -> Result<Json<JobPage>, A
             &JobState::ALL.map(JobState::name).join(", "),
             JobState::from_name,
         ),
+        batch: query.take("batch", "the id of a batch", |text| {
+            Uuid::try_parse(text).ok()
+        }),
         label: query.take("label", "`key:value`", |text| {
             let (key, value) = text.split_once(':')?;
             Some((key.to_owned(), value.to_owned()))

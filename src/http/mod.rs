@@ -3,8 +3,11 @@
 //! Handlers translate: they read a request, call [`Jobs`] and answer. Nothing is computed here.
 
 mod accept;
+mod batch_results;
+mod batches;
 mod body;
 mod cases;
+mod elements;
 mod error;
 mod fields;
 mod health;
@@ -42,8 +45,12 @@ pub use crate::http::openapi::openapi_json;
 pub struct HttpOptions {
     /// Largest body of one case in bytes.
     pub body_max_bytes: usize,
-    /// Time for a body to arrive whole.
+    /// Time for a body to arrive whole; for a batch, time between two pieces.
     pub body_timeout: Duration,
+    /// Largest body of a batch in bytes.
+    pub batch_max_bytes: u64,
+    /// Most cases of a batch.
+    pub batch_max_cases: u32,
 }
 
 impl Default for HttpOptions {
@@ -51,6 +58,8 @@ impl Default for HttpOptions {
         HttpOptions {
             body_max_bytes: 8 << 20,
             body_timeout: Duration::from_secs(60),
+            batch_max_bytes: 1 << 30,
+            batch_max_cases: 200_000,
         }
     }
 }
@@ -91,6 +100,9 @@ fn resources() -> OpenApiRouter<Shared> {
         .routes(routes!(jobs::look, jobs::delete))
         .routes(routes!(jobs::cancel))
         .routes(routes!(jobs::case))
+        .routes(routes!(batches::submit))
+        .routes(routes!(batches::look))
+        .routes(routes!(batches::cancel))
         .routes(routes!(results::result))
         .routes(routes!(results::resultants))
         .routes(routes!(zones::zones))
@@ -102,7 +114,8 @@ fn resources() -> OpenApiRouter<Shared> {
         .routes(routes!(problems::list))
         .routes(routes!(problems::explain))
         .route_layer(from_fn(accept::require_json));
-    v1.routes(routes!(health::alive))
+    v1.routes(routes!(batch_results::results))
+        .routes(routes!(health::alive))
         .routes(routes!(health::ready))
         .routes(routes!(openapi::contract))
 }

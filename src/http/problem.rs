@@ -54,6 +54,9 @@ pub struct Fault {
     /// Name of a request header.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub header: Option<String>,
+    /// Line of the body that holds the faulty case of a batch, counted from 1; only of NDJSON.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub line: Option<u64>,
     /// The value given and what is allowed.
     pub detail: String,
 }
@@ -66,6 +69,7 @@ impl Fault {
             pointer: None,
             parameter: Some(name.to_owned()),
             header: None,
+            line: None,
             detail: detail.into(),
         }
     }

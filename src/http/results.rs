@@ -98,14 +98,24 @@ pub async fn result(
 /// The job is unknown, has not ended or has no result.
 pub async fn result_of(jobs: &Jobs, id: Uuid) -> Result<JobResult, ApiError> {
     let solution = jobs.solution(id).await?;
-    let own = format!("/v1/jobs/{id}");
-    let mut links = BTreeMap::from([("resultants".to_owned(), format!("{own}/resultants"))]);
-    for output in outputs_asked(jobs, id).await? {
-        let name = name_of(output);
-        links.insert(name.to_owned(), format!("{own}/{name}"));
-    }
-    links.insert("job".to_owned(), own);
+    let outputs = outputs_asked(jobs, id).await?;
+    let outputs: Vec<&str> = outputs.into_iter().map(name_of).collect();
+    let links = JobResult::links(id, &outputs);
     Ok(JobResult { solution, links })
+}
+
+impl JobResult {
+    /// The links of the result of a job whose case asked for these outputs.
+    #[must_use]
+    pub fn links(id: Uuid, outputs: &[impl AsRef<str>]) -> BTreeMap<String, String> {
+        let own = format!("/v1/jobs/{id}");
+        let mut links = BTreeMap::from([("resultants".to_owned(), format!("{own}/resultants"))]);
+        for name in outputs.iter().map(AsRef::as_ref) {
+            links.insert(name.to_owned(), format!("{own}/{name}"));
+        }
+        links.insert("job".to_owned(), own);
+        links
+    }
 }
 
 problems! {

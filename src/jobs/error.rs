@@ -25,6 +25,9 @@ pub enum JobsError {
     /// There is no such job.
     #[error("there is no such job")]
     NotFound,
+    /// There is no such batch.
+    #[error("there is no such batch")]
+    BatchNotFound,
     /// The job must end first.
     #[error("the job is {}; only an ended job can be deleted, cancel it first", .0.name())]
     NotEnded(State),

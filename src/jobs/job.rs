@@ -19,6 +19,8 @@ pub struct Job {
     pub name: Option<String>,
     /// Labels of the client.
     pub labels: BTreeMap<String, String>,
+    /// The batch it belongs to, if it was submitted in one.
+    pub batch_id: Option<Uuid>,
     /// Time of submission.
     pub created_at: i64,
     /// Start of the current or last attempt; absent while queued.

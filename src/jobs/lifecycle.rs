@@ -36,10 +36,15 @@ pub struct Options {
     pub attempts_max: u32,
     /// Bound of queued jobs.
     pub queue_max: u64,
+    /// Most jobs a worker claims together, if they are small; 1 means no groups.
+    pub group_max: usize,
+    /// Results up to this size in bytes are kept in the database, larger ones in folders.
+    pub small_result_max_bytes: usize,
 }
 
 impl Options {
-    /// The defaults for a data folder: one worker, a lease of 30 s, 5 attempts, 300 000 queued jobs.
+    /// The defaults for a data folder: one worker, a lease of 30 s, 5 attempts, 300 000 queued jobs,
+    /// groups of 64, results up to 32 KiB in the database.
     #[must_use]
     pub fn new(data_dir: impl Into<PathBuf>) -> Options {
         Options {
@@ -49,6 +54,8 @@ impl Options {
             lease: Duration::from_secs(30),
             attempts_max: 5,
             queue_max: 300_000,
+            group_max: 64,
+            small_result_max_bytes: 32 << 10,
         }
     }
 }
@@ -72,6 +79,10 @@ impl Jobs {
         let lock = lock(&options.data_dir)?;
         let store = SqliteStore::open(&options.data_dir.join("jobs.db")).await?;
         let results = Results::open(&options.data_dir)?;
+        let incomplete = store.drop_incomplete_batches().await?;
+        if incomplete > 0 {
+            tracing::info!(incomplete, "batches that were never acknowledged removed");
+        }
         let taken_back = store.reap(i64::MAX, now_ms(), options.attempts_max).await?;
         for (id, state) in taken_back {
             tracing::info!(job = %id, state = state.name(), "job of a dead process taken back");

@@ -6,8 +6,11 @@
 //! and stops all this. A process that dies leaves `running` rows,
 //! which go back to the queue when the data folder is opened again.
 
+pub mod batch;
 pub mod error;
+mod fetch;
 pub mod fields;
+mod group;
 mod housekeeping;
 mod idempotency;
 pub mod job;
@@ -15,6 +18,7 @@ pub mod lifecycle;
 pub mod recipe;
 pub mod results;
 mod solver_thread;
+mod spool;
 pub mod store;
 pub mod watch;
 pub mod worker;
@@ -32,9 +36,9 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use uuid::Uuid;
 
+use crate::contact::case::Output;
 use crate::contact::error::CaseError;
 use crate::contact::problem::Problem;
-use crate::contact::solution::{PatchFields, Solution};
 pub use crate::jobs::error::JobsError;
 pub use crate::jobs::job::{Failure, FailureKind, Job, State};
 pub use crate::jobs::lifecycle::Options;
@@ -42,7 +46,7 @@ use crate::jobs::recipe::Recipe;
 use crate::jobs::results::Results;
 pub use crate::jobs::store::list::{Filter, Page};
 use crate::jobs::store::sqlite::SqliteStore;
-use crate::jobs::store::{Deleted, Enqueued, NewJob, StoredResult};
+use crate::jobs::store::{Deleted, Enqueued, NewJob};
 use crate::jobs::watch::{Reason, Watch};
 
 /// Longest list page.
@@ -121,6 +125,7 @@ impl Jobs {
             return replayed(enqueued);
         }
         let problem = problem?;
+        let (outputs, cost_us) = (problem.outputs.clone(), cost_us(&problem));
         let id = Uuid::now_v7();
         let new = NewJob {
             id,
@@ -128,10 +133,12 @@ impl Jobs {
             name: problem.name,
             labels: problem.labels,
             method: problem.method.name().to_owned(),
+            outputs: outputs_text(&outputs),
+            cost_us,
             body: Bytes::from(body.map_err(|error| JobsError::Damaged(error.to_string()))?),
             idempotency,
         };
-        self.admit().await?;
+        self.admit(1).await?;
         let job = replayed(self.shared.store.enqueue(&new).await?)?;
         self.shared.wake.notify_one();
         tracing::info!(job = %job.id, method = new.method, "job queued");
@@ -225,55 +232,6 @@ impl Jobs {
         }
     }
 
-    /// The case of a job as submitted, as JSON text.
-    ///
-    /// # Errors
-    /// [`JobsError::NotFound`], or a failed database.
-    pub async fn case(&self, id: Uuid) -> Result<Bytes, JobsError> {
-        let (body, _) = self
-            .shared
-            .store
-            .case(id)
-            .await?
-            .ok_or(JobsError::NotFound)?;
-        Ok(body)
-    }
-
-    /// The answer of a succeeded job, without fields.
-    ///
-    /// # Errors
-    /// [`JobsError::NotReady`], [`JobsError::NotSucceeded`], [`JobsError::NotFound`], or a failed store.
-    pub async fn solution(&self, id: Uuid) -> Result<Solution, JobsError> {
-        let stored = self.stored(id).await?;
-        self.shared.results.solution(&stored).await
-    }
-
-    /// The cells of one patch with the values of every motion; reads no other patch.
-    ///
-    /// # Errors
-    /// [`JobsError::NoSuchPatch`], else as [`Jobs::solution`].
-    pub async fn patch_fields(&self, id: Uuid, patch: usize) -> Result<PatchFields, JobsError> {
-        let stored = self.stored(id).await?;
-        self.shared.results.patch_fields(&stored, patch, None).await
-    }
-
-    /// The cells of one patch with the values of one motion, the only entry of `points`; reads nothing else.
-    ///
-    /// # Errors
-    /// [`JobsError::NoSuchPatch`], [`JobsError::NoSuchPoint`], else as [`Jobs::solution`].
-    pub async fn point_fields(
-        &self,
-        id: Uuid,
-        patch: usize,
-        point: usize,
-    ) -> Result<PatchFields, JobsError> {
-        let stored = self.stored(id).await?;
-        self.shared
-            .results
-            .patch_fields(&stored, patch, Some(point))
-            .await
-    }
-
     /// Can this service take requests? A round trip to the database.
     ///
     /// # Errors
@@ -287,33 +245,18 @@ impl Jobs {
             .unwrap_or(Err(JobsError::Database(sqlx::Error::PoolTimedOut)))
     }
 
-    /// Where the result of a job lies.
-    async fn stored(&self, id: Uuid) -> Result<StoredResult, JobsError> {
-        let (job, stored) = self
-            .shared
-            .store
-            .result(id)
-            .await?
-            .ok_or(JobsError::NotFound)?;
-        match stored {
-            Some(stored) => Ok(stored),
-            None if job.state.ended() => Err(JobsError::NotSucceeded(Box::new(job))),
-            None => Err(JobsError::NotReady(job.state)),
-        }
-    }
-
-    /// Takes a place in the queue. The bound is exact: the figure kept here is never below the true one, and the queue
+    /// Takes places in the queue. The bound is exact: the figure kept here is never below the true one, and the queue
     /// is counted before anybody is turned away.
-    async fn admit(&self) -> Result<(), JobsError> {
+    async fn admit(&self, jobs: u64) -> Result<(), JobsError> {
         let queue_max = self.shared.options.queue_max;
         let mut at_most = self.shared.queued_at_most.lock().await;
-        if *at_most >= queue_max {
+        if *at_most + jobs > queue_max {
             *at_most = self.shared.store.queued(queue_max).await?;
         }
-        if *at_most >= queue_max {
+        if *at_most + jobs > queue_max {
             return Err(JobsError::QueueFull { queue_max });
         }
-        *at_most += 1;
+        *at_most += jobs;
         Ok(())
     }
 }
@@ -336,6 +279,24 @@ fn replayed(enqueued: Enqueued) -> Result<Job, JobsError> {
     match enqueued {
         Enqueued::Created(job) | Enqueued::Existing(job) => Ok(job),
         Enqueued::Conflict => Err(JobsError::IdempotencyConflict),
+    }
+}
+
+/// The names of outputs as a JSON list.
+fn outputs_text(outputs: &[Output]) -> String {
+    serde_json::to_string(outputs).unwrap_or_default()
+}
+
+/// Expected solve time in µs.
+fn cost_us(problem: &Problem) -> u32 {
+    let microseconds = (problem.cost().seconds * 1e6).clamp(1.0, f64::from(i32::MAX));
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "clamped to what a u32 holds; a NaN becomes 0"
+    )]
+    {
+        microseconds as u32
     }
 }
 

@@ -13,10 +13,10 @@ use object_store::path::Path;
 use object_store::{ObjectStore, ObjectStoreExt, PutPayload};
 use uuid::Uuid;
 
-use crate::contact::solution::{PatchFields, Solution};
+use crate::contact::solution::PatchFields;
 use crate::jobs::error::JobsError;
 use crate::jobs::fields::{Header, PREFIX_BYTES, header_length};
-use crate::jobs::store::{Claim, StoredResult};
+use crate::jobs::store::Claim;
 
 const SOLUTION: &str = "solution.json";
 const FIELDS: &str = "fields.bin";
@@ -28,6 +28,44 @@ pub struct Encoded {
     pub solution: Bytes,
     /// The fields as [`encode`](crate::jobs::fields::encode) writes them, if the case asked for any.
     pub fields: Option<Bytes>,
+}
+
+impl Encoded {
+    /// Size in bytes.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.solution.len() + self.fields.as_ref().map_or(0, Bytes::len)
+    }
+
+    /// The cells of one patch, with the values of one motion or of all of them.
+    ///
+    /// # Errors
+    /// There is no such motion, or the fields cannot be read.
+    pub fn patch_fields(
+        &self,
+        patch: usize,
+        point: Option<usize>,
+    ) -> Result<PatchFields, JobsError> {
+        let file = self.fields.as_deref().unwrap_or_default();
+        let damaged = |error: String| JobsError::Damaged(format!("stored fields: {error}"));
+        let prefix = file.get(..PREFIX_BYTES).unwrap_or_default();
+        let body = PREFIX_BYTES + header_length(prefix).map_err(damaged)?;
+        let cut = || damaged("cut short".to_owned());
+        let header =
+            Header::read(file.get(PREFIX_BYTES..body).ok_or_else(cut)?).map_err(damaged)?;
+        let points = header.points(patch);
+        if point.is_some_and(|point| point >= points) {
+            return Err(JobsError::NoSuchPoint { points });
+        }
+        let mut pieces = Vec::new();
+        for range in header.ranges(patch, point) {
+            let start = usize::try_from(range.start).unwrap_or(usize::MAX);
+            let end = usize::try_from(range.end).unwrap_or(usize::MAX);
+            let piece = file[body..].get(start..end).ok_or_else(cut)?;
+            pieces.extend_from_slice(piece);
+        }
+        header.decode(patch, point, &pieces).map_err(damaged)
+    }
 }
 
 /// The place where results are kept.
@@ -74,33 +112,26 @@ impl Results {
         Ok(folder.to_string())
     }
 
-    /// Reads a stored solution.
+    /// Reads a stored solution as JSON text.
     ///
     /// # Errors
     /// It cannot be read.
-    pub async fn solution(&self, stored: &StoredResult) -> Result<Solution, JobsError> {
-        let path = Path::from(stored.key.as_str()).join(SOLUTION);
-        let bytes = self.blobs.get(&path).await?.bytes().await?;
-        serde_json::from_slice(&bytes)
-            .map_err(|error| JobsError::Damaged(format!("{path}: {error}")))
+    pub async fn solution(&self, folder: &str) -> Result<Bytes, JobsError> {
+        let path = Path::from(folder).join(SOLUTION);
+        Ok(self.blobs.get(&path).await?.bytes().await?)
     }
 
     /// Reads the cells of one patch, with the values of one motion or of all of them, and nothing else.
     ///
     /// # Errors
-    /// There is no such patch or motion, or the fields cannot be read.
+    /// There is no such motion, or the fields cannot be read.
     pub async fn patch_fields(
         &self,
-        stored: &StoredResult,
+        folder: &str,
         patch: usize,
         point: Option<usize>,
     ) -> Result<PatchFields, JobsError> {
-        if patch >= stored.field_patches {
-            return Err(JobsError::NoSuchPatch {
-                patches: stored.field_patches,
-            });
-        }
-        let path = Path::from(stored.key.as_str()).join(FIELDS);
+        let path = Path::from(folder).join(FIELDS);
         let damaged = |error: String| JobsError::Damaged(format!("{path}: {error}"));
         let prefix = self.blobs.get_range(&path, 0..PREFIX_BYTES as u64).await?;
         let body = (PREFIX_BYTES + header_length(&prefix).map_err(damaged)?) as u64;
@@ -268,17 +299,5 @@ mod tests {
             Vec::<Uuid>::new()
         );
         results.remove(id, None).await.unwrap();
-    }
-
-    #[tokio::test]
-    async fn a_result_without_fields_has_no_patches() {
-        let folder = tempfile::tempdir().unwrap();
-        let results = Results::open(folder.path()).unwrap();
-        let stored = StoredResult {
-            key: "results/2026/01/none/1".to_owned(),
-            field_patches: 0,
-        };
-        let answer = results.patch_fields(&stored, 0, None).await;
-        assert!(matches!(answer, Err(JobsError::NoSuchPatch { patches: 0 })));
     }
 }

@@ -21,23 +21,23 @@ use crate::jobs::error::JobsError;
 use crate::jobs::job::{Failure, FailureKind, Job, State};
 use crate::jobs::results::Encoded;
 use crate::jobs::solver_thread::{Outcome, SolverThread, solve_guarded};
-use crate::jobs::store::{Claim, Ending, Renewal};
+use crate::jobs::store::{Claim, Ending, Placed, Renewal};
 use crate::jobs::watch::{Reason, Watch};
 use crate::jobs::{Shared, now_ms};
 
 /// How often an idle worker looks for jobs although nobody woke it.
 const POLL: Duration = Duration::from_secs(1);
 /// How long a solver that was told to stop may go on before its thread is left behind.
-const PATIENCE: Duration = Duration::from_secs(2);
+pub(super) const PATIENCE: Duration = Duration::from_secs(2);
 /// Tries to write the end of a job, with pauses that double from [`FIRST_PAUSE`].
-const WRITE_TRIES: u32 = 6;
-const FIRST_PAUSE: Duration = Duration::from_millis(50);
+pub(super) const WRITE_TRIES: u32 = 6;
+pub(super) const FIRST_PAUSE: Duration = Duration::from_millis(50);
 /// One worker with its solver thread.
 #[derive(Debug)]
 pub struct Worker {
-    shared: Arc<Shared>,
-    name: String,
-    thread: SolverThread,
+    pub(super) shared: Arc<Shared>,
+    pub(super) name: String,
+    pub(super) thread: SolverThread,
 }
 
 /// What became of one [`Worker::step`].
@@ -66,9 +66,9 @@ impl Worker {
     pub(super) async fn run(mut self) {
         let shared = self.shared.clone();
         while !shared.draining.is_cancelled() {
-            match self.step().await {
-                Ok(Step::Idle) => {}
-                Ok(_) => continue,
+            match self.group_step().await {
+                Ok(false) => {}
+                Ok(true) => continue,
                 Err(error) => tracing::error!(worker = self.name, %error, "worker step failed"),
             }
             tokio::select! {
@@ -92,7 +92,7 @@ impl Worker {
         self.attempt(&claim).instrument(span).await
     }
 
-    async fn attempt(&mut self, claim: &Claim) -> Result<Step, JobsError> {
+    pub(super) async fn attempt(&mut self, claim: &Claim) -> Result<Step, JobsError> {
         let start = Instant::now();
         tracing::info!(worker = self.name, "job started");
         let watch = Arc::new(Watch::default());
@@ -213,44 +213,22 @@ impl Worker {
         watch: &Watch,
         outcome: Outcome,
     ) -> Result<Step, JobsError> {
-        let ending = match outcome {
-            Outcome::Solved { .. } if watch.reason() == Some(Reason::Lost) => {
-                return Ok(Step::Lost(claim.id));
-            }
-            Outcome::Solved {
+        let ending = match judge(outcome, watch) {
+            Verdict::Lost => return Ok(Step::Lost(claim.id)),
+            Verdict::HandBack => return self.hand_back(claim).await,
+            Verdict::End(ending) => ending,
+            Verdict::Keep {
                 result,
                 warnings,
                 field_patches,
-            } => match self.store_result(claim, watch, result).await {
-                Ok(result_key) => Ending::Succeeded {
+            } => match self.place(claim, watch, result).await {
+                Ok(result) => Ending::Succeeded {
                     warnings,
-                    result_key,
+                    result,
                     field_patches,
                 },
-                Err(error) => {
-                    tracing::error!(%error, "result could not be stored");
-                    let detail = format!("the result could not be stored: {error}");
-                    Ending::Failed(Failure::new(FailureKind::Internal, detail))
-                }
+                Err(error) => not_stored(&error),
             },
-            Outcome::Unsolved(SolveError::Cancelled) | Outcome::Abandoned => match watch.reason() {
-                Some(Reason::Cancel) => Ending::Cancelled,
-                Some(Reason::Shutdown) => return self.hand_back(claim).await,
-                Some(Reason::Lost) => return Ok(Step::Lost(claim.id)),
-                None => Ending::Failed(Failure::new(
-                    FailureKind::Internal,
-                    "the solver stopped although nobody asked it to",
-                )),
-            },
-            Outcome::Unsolved(error) => Ending::Failed(
-                Failure::of_solve(&error)
-                    .unwrap_or_else(|| Failure::new(FailureKind::Internal, error.to_string())),
-            ),
-            Outcome::Refused(error) => Ending::Failed(Failure::new(
-                FailureKind::Internal,
-                format!("the stored case is no longer accepted: {error}"),
-            )),
-            Outcome::Broken(failure) => Ending::Failed(failure),
         };
         let Some(job) = self.finish(claim, &ending).await? else {
             return Ok(Step::Lost(claim.id));
@@ -262,12 +240,16 @@ impl Worker {
         Ok(Step::Ended(job.id, job.state))
     }
 
-    async fn store_result(
+    /// Puts a result where it is kept: a small one goes into the database with the end of its job.
+    pub(super) async fn place(
         &self,
         claim: &Claim,
         watch: &Watch,
         result: Encoded,
-    ) -> Result<String, JobsError> {
+    ) -> Result<Placed, JobsError> {
+        if result.bytes() <= self.shared.options.small_result_max_bytes {
+            return Ok(Placed::Table(result));
+        }
         // A slow disk shall not cost the lease of a long solve; should it be lost all the same, the end of the job is
         // fenced. After a short solve the lease is as good as new.
         if watch.elapsed() >= heartbeat(&self.shared) {
@@ -280,7 +262,8 @@ impl Worker {
                 tracing::warn!(%error, "lease could not be renewed");
             }
         }
-        self.shared.results.put(claim, result).await
+        let folder = self.shared.results.put(claim, result).await?;
+        Ok(Placed::Folder(folder))
     }
 
     /// Ends the job in the table; a database that fails for a moment does not cost the result.
@@ -299,7 +282,7 @@ impl Worker {
         self.shared.store.finish(claim, ending, now_ms()).await
     }
 
-    async fn hand_back(&self, claim: &Claim) -> Result<Step, JobsError> {
+    pub(super) async fn hand_back(&self, claim: &Claim) -> Result<Step, JobsError> {
         Ok(match self.shared.store.release(claim, now_ms()).await? {
             Some(state) if state.ended() => {
                 self.shared.announce(claim.id);
@@ -311,15 +294,76 @@ impl Worker {
     }
 
     /// Removes what earlier attempts stored before they were lost.
-    async fn remove_earlier(&self, id: Uuid, ending: &Ending) {
+    pub(super) async fn remove_earlier(&self, id: Uuid, ending: &Ending) {
         let keep = match ending {
-            Ending::Succeeded { result_key, .. } => Some(result_key.as_str()),
-            Ending::Failed(_) | Ending::Cancelled => None,
+            Ending::Succeeded {
+                result: Placed::Folder(folder),
+                ..
+            } => Some(folder.as_str()),
+            _ => None,
         };
         if let Err(error) = self.shared.results.remove(id, keep).await {
             tracing::warn!(%error, "results of an earlier attempt left behind");
         }
     }
+}
+
+/// What follows from the outcome of an attempt.
+pub(super) enum Verdict {
+    /// There is an answer to keep.
+    Keep {
+        result: Encoded,
+        warnings: Vec<String>,
+        field_patches: u32,
+    },
+    /// The job ends without one.
+    End(Ending),
+    /// The job goes back to the queue, its attempt uncounted.
+    HandBack,
+    /// The lease is gone.
+    Lost,
+}
+
+/// What follows from the outcome of an attempt.
+pub(super) fn judge(outcome: Outcome, watch: &Watch) -> Verdict {
+    let failed = |kind, detail: String| Verdict::End(Ending::Failed(Failure::new(kind, detail)));
+    match outcome {
+        Outcome::Solved { .. } if watch.reason() == Some(Reason::Lost) => Verdict::Lost,
+        Outcome::Solved {
+            result,
+            warnings,
+            field_patches,
+        } => Verdict::Keep {
+            result,
+            warnings,
+            field_patches,
+        },
+        Outcome::Unsolved(SolveError::Cancelled) | Outcome::Abandoned => match watch.reason() {
+            Some(Reason::Cancel) => Verdict::End(Ending::Cancelled),
+            Some(Reason::Shutdown) => Verdict::HandBack,
+            Some(Reason::Lost) => Verdict::Lost,
+            None => failed(
+                FailureKind::Internal,
+                "the solver stopped although nobody asked it to".to_owned(),
+            ),
+        },
+        Outcome::Unsolved(error) => match Failure::of_solve(&error) {
+            Some(failure) => Verdict::End(Ending::Failed(failure)),
+            None => failed(FailureKind::Internal, error.to_string()),
+        },
+        Outcome::Refused(error) => failed(
+            FailureKind::Internal,
+            format!("the stored case is no longer accepted: {error}"),
+        ),
+        Outcome::Broken(failure) => Verdict::End(Ending::Failed(failure)),
+    }
+}
+
+/// The end of a job whose result could not be stored.
+pub(super) fn not_stored(error: &JobsError) -> Ending {
+    tracing::error!(%error, "result could not be stored");
+    let detail = format!("the result could not be stored: {error}");
+    Ending::Failed(Failure::new(FailureKind::Internal, detail))
 }
 
 /// The lease as the worker knows it.
@@ -346,14 +390,14 @@ impl Lease {
 }
 
 /// An entry in the list of running attempts, as long as it lives.
-struct Registered {
+pub(super) struct Registered {
     shared: Arc<Shared>,
     id: Uuid,
     watch: Arc<Watch>,
 }
 
 impl Registered {
-    fn new(shared: &Arc<Shared>, id: Uuid, watch: &Arc<Watch>) -> Registered {
+    pub(super) fn new(shared: &Arc<Shared>, id: Uuid, watch: &Arc<Watch>) -> Registered {
         shared.running().insert(id, watch.clone());
         Registered {
             shared: shared.clone(),
@@ -381,6 +425,6 @@ pub(super) fn heartbeat(shared: &Shared) -> Duration {
     (shared.options.lease / 3).max(Duration::from_millis(1))
 }
 
-fn lease_ms(shared: &Shared) -> i64 {
+pub(super) fn lease_ms(shared: &Shared) -> i64 {
     i64::try_from(shared.options.lease.as_millis()).unwrap_or(i64::MAX)
 }

@@ -38,7 +38,8 @@ async fn succeeded(service: &Service) -> BTreeMap<String, Value> {
 /// The folders below `results` that hold a solution, one entry per job and attempt.
 fn stored_solutions(folder: &Path) -> Vec<String> {
     let mut found = Vec::new();
-    for entry in std::fs::read_dir(folder).unwrap() {
+    // There is no folder as long as every result is small.
+    for entry in std::fs::read_dir(folder).into_iter().flatten() {
         let path = entry.unwrap().path();
         if path.is_dir() {
             found.extend(stored_solutions(&path));
@@ -103,13 +104,11 @@ async fn every_acknowledged_job_succeeds_once_although_the_process_is_killed_twi
         assert_eq!(result["total"].as_array().unwrap().len(), MOTIONS as usize);
         assert!(result["total"][0]["force_x_n"].as_f64().unwrap() != 0.0);
     }
-    let mut stored = stored_solutions(&folder.path().join("results"));
-    stored.sort_unstable();
-    assert_eq!(
-        stored,
-        ids.into_iter().collect::<Vec<_>>(),
-        "one result per job"
-    );
+    // Results that are not small lie in folders, and no attempt that died leaves one behind.
+    let stored = stored_solutions(&folder.path().join("results"));
+    let distinct: BTreeSet<_> = stored.iter().cloned().collect();
+    assert_eq!(stored.len(), distinct.len(), "one result per job");
+    assert!(distinct.is_subset(&ids));
 }
 
 #[tokio::test]

@@ -169,7 +169,8 @@ async fn tour_uses_existing_examples_and_routes() {
             .split(['"', '\'', ' ', '?'])
             .next()
             .expect("a path")
-            .replace("$JOB", "/v1/jobs/{id}");
+            .replace("$JOB", "/v1/jobs/{id}")
+            .replace("$BATCH", "/v1/batches/{id}");
         assert!(
             known.contains_key(&path),
             "{line}: the contract has no {path}"

@@ -1,6 +1,7 @@
 //! Does the service behave?
 
 mod api;
+mod batches;
 mod cli;
 mod contract;
 mod crash;

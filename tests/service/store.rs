@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use bytes::Bytes;
 use railhead::jobs::store::list::Filter;
 use railhead::jobs::store::sqlite::SqliteStore;
-use railhead::jobs::store::{Claim, Deleted, Ending, Enqueued, NewJob, Renewal};
+use railhead::jobs::store::{Claim, Deleted, Ending, Enqueued, NewJob, Placed, Renewal};
 use railhead::jobs::{Failure, FailureKind, Job, State};
 use tempfile::TempDir;
 use uuid::Uuid;
@@ -51,6 +51,8 @@ pub fn new_job() -> NewJob {
         labels: BTreeMap::new(),
         method: "auto".to_owned(),
         body: Bytes::from_static(b"{}"),
+        outputs: "[]".to_owned(),
+        cost_us: 1000,
         idempotency: None,
     }
 }
@@ -72,7 +74,7 @@ fn keyed(key: &str, digest: u8) -> NewJob {
 pub fn success() -> Ending {
     Ending::Succeeded {
         warnings: vec!["mind the gap".to_owned()],
-        result_key: "results/1".to_owned(),
+        result: Placed::Folder("results/1".to_owned()),
         field_patches: 2,
     }
 }

@@ -6,7 +6,7 @@ use bytes::Bytes;
 use proptest::prelude::*;
 use railhead::jobs::State;
 use railhead::jobs::store::sqlite::SqliteStore;
-use railhead::jobs::store::{Claim, Deleted, Ending, NewJob, Renewal};
+use railhead::jobs::store::{Claim, Deleted, Ending, NewJob, Placed, Renewal};
 use uuid::Uuid;
 
 const LEASE: i64 = 10;
@@ -96,6 +96,8 @@ impl Pair {
             labels: BTreeMap::new(),
             method: "auto".to_owned(),
             body: Bytes::from_static(b"{}"),
+            outputs: "[]".to_owned(),
+            cost_us: 1000,
             idempotency: None,
         };
         self.store.enqueue(&new).await.unwrap();
@@ -174,7 +176,7 @@ impl Pair {
         let ending = if well {
             Ending::Succeeded {
                 warnings: Vec::new(),
-                result_key: "k".to_owned(),
+                result: Placed::Folder("k".to_owned()),
                 field_patches: 0,
             }
         } else {

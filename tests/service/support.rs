@@ -2,6 +2,7 @@
 
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, mpsc};
@@ -181,6 +182,16 @@ impl Drop for Service {
         // It may have ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
+    }
+}
+
+/// Ticks until it is told to stop.
+pub fn tick_forever(monitor: &dyn Monitor) -> SolveError {
+    loop {
+        if let ControlFlow::Break(stop) = monitor.tick(0.5) {
+            return stop.into();
+        }
+        std::thread::yield_now();
     }
 }
 

@@ -1,6 +1,5 @@
 //! Do workers solve what is queued, and survive what they solve?
 
-use std::ops::ControlFlow;
 use std::sync::{Mutex, mpsc};
 use std::time::Duration;
 
@@ -14,24 +13,24 @@ use railhead::jobs::{FailureKind, JobsError, Options, State};
 use serde_json::json;
 use tokio::sync::mpsc::unbounded_channel;
 
-use crate::support::{case, jobs_with, open};
-
-/// Ticks until it is told to stop.
-fn tick_until_stopped(monitor: &dyn Monitor) -> SolveError {
-    loop {
-        if let ControlFlow::Break(stop) = monitor.tick(0.5) {
-            return stop.into();
-        }
-        std::thread::yield_now();
-    }
-}
+use crate::support::{case, jobs_with, open, tick_forever};
 
 #[tokio::test]
 async fn a_solved_job_keeps_its_answer_and_its_remarks() {
+    // Once in the database, once in a folder.
+    for small_result_max_bytes in [1 << 20, 0] {
+        keeps_its_answer(small_result_max_bytes).await;
+    }
+}
+
+async fn keeps_its_answer(small_result_max_bytes: usize) {
     let folder = tempfile::tempdir().unwrap();
     let (answer, answers) = mpsc::channel();
-    let jobs = jobs_with(
-        folder.path(),
+    let jobs = open(
+        Options {
+            small_result_max_bytes,
+            ..Options::new(folder.path())
+        },
         move |problem: &Problem, monitor: &dyn Monitor| {
             let solved = solve(problem, monitor)?;
             answer.send(solved.clone()).unwrap();
@@ -74,6 +73,8 @@ async fn a_solved_job_keeps_its_answer_and_its_remarks() {
         jobs.point_fields(id, 0, 1).await,
         Err(JobsError::NoSuchPoint { points: 1 })
     ));
+    let in_folder = files_below(&folder.path().join("results")) > 0;
+    assert_eq!(in_folder, small_result_max_bytes == 0);
     let submitted =
         serde_json::from_slice::<serde_json::Value>(&jobs.case(id).await.unwrap()).unwrap();
     assert_eq!(submitted, remarkable);
@@ -152,7 +153,7 @@ async fn a_running_job_stops_when_it_is_cancelled() {
     let (started, mut has_started) = unbounded_channel();
     let jobs = jobs_with(folder.path(), move |_: &Problem, monitor: &dyn Monitor| {
         started.send(()).unwrap();
-        Err(tick_until_stopped(monitor))
+        Err(tick_forever(monitor))
     })
     .await;
     let id = jobs.submit(case("long"), None).await.unwrap().id;
@@ -377,7 +378,11 @@ async fn waiting_ends_with_the_time_allowed_and_for_unknown_jobs_at_once() {
 #[tokio::test]
 async fn results_without_a_job_are_swept_at_the_start() {
     let folder = tempfile::tempdir().unwrap();
-    let jobs = jobs_with(folder.path(), solve).await;
+    let options = Options {
+        small_result_max_bytes: 0,
+        ..Options::new(folder.path())
+    };
+    let jobs = open(options, solve).await;
     let kept = jobs.submit(case("kept"), None).await.unwrap().id;
     jobs.worker("w").unwrap().step().await.unwrap();
     let kept_file = only_solution(&folder.path().join("results"));

@@ -17,9 +17,6 @@ const POLE_MESH: MeshSize = MeshSize {
     strips: 5,
     cells: 5,
 };
-/// The next level has this many times the cells: twice where the target is near, else four times.
-const NEAR: f64 = 1.8;
-
 /// The answer for one motion on the finest level it needed.
 #[derive(Debug, Clone)]
 pub struct Point {
@@ -72,15 +69,16 @@ pub fn solve(
         }
         (None, Resolution::Mesh(_)) => {}
         (None, Resolution::Target(target)) => {
-            let mut cells = CELLS_FIRST;
+            let mut half_octaves = 0;
             while let Some(error) = point.error().filter(|e| *e > target) {
-                cells *= if error <= NEAR * target { 2 } else { 4 };
-                if cells > CELLS_MAX {
+                half_octaves += steps(error / target);
+                let cells = f64::from(CELLS_FIRST) * 2.0_f64.powf(0.5 * f64::from(half_octaves));
+                if cells > f64::from(CELLS_MAX) {
                     break;
                 }
                 let spinning = problem.motions[index].spin_per_mm != 0.0;
                 let regime = estimate::regime(ladder.get(point.level), &point.tangential, spinning);
-                let mut size = ladder.size(cells, regime);
+                let mut size = ladder.size(cells.round() as u32, regime);
                 let before = ladder.get(point.level).size.strips;
                 if size.strips == before {
                     // Levels with the same strips say nothing about the strips.
@@ -94,6 +92,13 @@ pub fn solve(
         }
     }
     Ok(point)
+}
+
+/// By how many half octaves the number of cells should grow when the error is so many times the target: errors fall
+/// about as 1/N, and steps of less than two or more than four times pay less. Coarse steps let the motions of a sweep
+/// share their levels.
+fn steps(excess: f64) -> i32 {
+    ((2.0 * (1.1 * excess).log2()).ceil() as i32).clamp(2, 4)
 }
 
 /// Solves motion `index` on the level of one size, from the point of a coarser one if there is one.

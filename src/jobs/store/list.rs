@@ -9,6 +9,8 @@ use crate::jobs::job::{Job, State};
 pub struct Filter {
     /// Only jobs in this state.
     pub state: Option<State>,
+    /// Only jobs of this batch.
+    pub batch: Option<Uuid>,
     /// Only jobs that carry this label with this value.
     pub label: Option<(String, String)>,
     /// Only jobs submitted at or after this time (epoch milliseconds).
@@ -64,6 +66,7 @@ impl Filter {
             self.label.as_ref().map(|(_, value)| value.clone()),
             self.created_after.map(|time| time.to_string()),
             self.created_before.map(|time| time.to_string()),
+            self.batch.map(|batch| batch.to_string()),
         ];
         for part in parts {
             // Length first, so that neighbouring parts cannot run into each other.

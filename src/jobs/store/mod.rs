@@ -13,6 +13,7 @@ use bytes::Bytes;
 use uuid::Uuid;
 
 use crate::jobs::job::{Failure, Job, State};
+use crate::jobs::results::Encoded;
 
 /// A job about to be queued.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,8 +30,40 @@ pub struct NewJob {
     pub method: String,
     /// The case as submitted, as JSON text.
     pub body: Bytes,
-    /// The client's idempotency key with the digest of the case.
+    /// The outputs the case asks for, as the JSON list of their names.
+    pub outputs: String,
+    /// Expected solve time in µs; small jobs are claimed in groups.
+    pub cost_us: u32,
+    /// The client's idempotency key with the digest of the case; not used inside a batch.
     pub idempotency: Option<(String, [u8; 32])>,
+}
+
+/// A batch about to be filled.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NewBatch {
+    /// UUIDv7.
+    pub id: Uuid,
+    /// Time of submission.
+    pub created_at: i64,
+    /// Number of jobs it will have.
+    pub count: u32,
+    /// Number of cases that were refused.
+    pub rejected: u32,
+    /// The client's idempotency key with the digest of all cases.
+    pub idempotency: Option<(String, [u8; 32])>,
+}
+
+/// What became of an attempt to begin a batch.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Begun {
+    /// The batch can be filled.
+    Created,
+    /// The idempotency key already stands for this batch, with the same cases.
+    Existing(Uuid),
+    /// The idempotency key stands for a batch that is being filled at this moment.
+    Unfinished,
+    /// The idempotency key already stands for other cases.
+    Conflict,
 }
 
 /// What became of an attempt to queue a job.
@@ -76,8 +109,8 @@ pub enum Ending {
     Succeeded {
         /// Remarks of the solution.
         warnings: Vec<String>,
-        /// Folder of the stored result.
-        result_key: String,
+        /// Where the result is kept.
+        result: Placed,
         /// Patches with stored fields.
         field_patches: u32,
     },
@@ -87,11 +120,22 @@ pub enum Ending {
     Cancelled,
 }
 
+/// Where a result is kept once its job has ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Placed {
+    /// In this folder, where it already lies.
+    Folder(String),
+    /// In the database, written together with the end of the job: a small one.
+    Table(Encoded),
+}
+
 /// Where a result lies.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StoredResult {
-    /// Folder of the stored result.
-    pub key: String,
+    /// The job.
+    pub job: Uuid,
+    /// Folder of the stored result; `None` if it lies in the database.
+    pub folder: Option<String>,
     /// Patches with stored fields; 0 if there is no fields object.
     pub field_patches: usize,
 }

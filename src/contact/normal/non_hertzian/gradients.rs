@@ -184,16 +184,16 @@ impl Work {
     /// displacement is up to date (no pressure had to be cut either).
     fn advance(&mut self, p: &mut [f64], step: f64) -> (bool, bool) {
         let (mut follow, mut fresh) = (true, true);
-        for k in 0..p.len() {
-            if p[k] > 0.0 {
-                p[k] -= step * self.t[k];
-                if p[k] <= 0.0 {
-                    (p[k], fresh) = (0.0, false);
+        for (k, p) in p.iter_mut().enumerate() {
+            if *p > 0.0 {
+                *p -= step * self.t[k];
+                if *p <= 0.0 {
+                    (*p, fresh) = (0.0, false);
                 }
             }
             // Outside, and what has just left the contact although the bodies overlap there.
-            if p[k] == 0.0 && self.g[k] < 0.0 {
-                p[k] = -step * self.g[k];
+            if *p == 0.0 && self.g[k] < 0.0 {
+                *p = -step * self.g[k];
                 (follow, fresh) = (false, false);
             }
         }

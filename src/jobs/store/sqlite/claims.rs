@@ -5,51 +5,23 @@ use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
 use crate::jobs::job::{Failure, Job, State};
+use crate::jobs::results::Encoded;
 use crate::jobs::store::sqlite::SqliteStore;
-use crate::jobs::store::sqlite::rows::{
-    job_columns, read_count, read_id, read_job, read_state, to_json,
-};
-use crate::jobs::store::{Claim, Ending, Renewal};
-
-const CLAIM: &str = "UPDATE jobs SET state = 'running', attempt = attempt + 1, lease_number = lease_number + 1, \
-     lease_until = $1, worker = $2, started_at = $3, progress = 0, version = version + 1 \
-     WHERE id = (SELECT id FROM jobs WHERE state = 'queued' ORDER BY id LIMIT 1) \
-     RETURNING id, attempt, lease_number, method";
+use crate::jobs::store::sqlite::rows::{job_columns, read_id, read_job, read_state, to_json};
+use crate::jobs::store::{Claim, Ending, Placed, Renewal};
 
 const REAP: &str = "UPDATE jobs SET \
-     state = CASE WHEN cancel_requested = 1 THEN 'cancelled' WHEN attempt >= $1 THEN 'failed' ELSE 'queued' END, \
-     failure = CASE WHEN cancel_requested = 0 AND attempt >= $1 THEN $2 ELSE NULL END, \
-     ended_at = CASE WHEN cancel_requested = 1 OR attempt >= $1 THEN $3 ELSE NULL END, \
-     started_at = CASE WHEN cancel_requested = 1 OR attempt >= $1 THEN started_at ELSE NULL END, \
+     state = CASE WHEN cancel_requested = 1 THEN 'cancelled' \
+         WHEN group_size = 1 AND attempt >= $1 THEN 'failed' ELSE 'queued' END, \
+     failure = CASE WHEN cancel_requested = 0 AND group_size = 1 AND attempt >= $1 THEN $2 ELSE NULL END, \
+     ended_at = CASE WHEN cancel_requested = 1 OR (group_size = 1 AND attempt >= $1) THEN $3 ELSE NULL END, \
+     started_at = CASE WHEN cancel_requested = 1 OR (group_size = 1 AND attempt >= $1) THEN started_at ELSE NULL END, \
+     attempt = CASE WHEN group_size > 1 THEN attempt - 1 ELSE attempt END, \
+     alone = CASE WHEN group_size > 1 THEN 1 ELSE alone END, \
      progress = 0, lease_until = NULL, worker = NULL, version = version + 1 \
      WHERE state = 'running' AND lease_until <= $4 RETURNING id, state";
 
 impl SqliteStore {
-    /// Claims the oldest queued job for `lease_ms` milliseconds.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub async fn claim(
-        &self,
-        worker: &str,
-        now: i64,
-        lease_ms: i64,
-    ) -> Result<Option<Claim>, JobsError> {
-        let row = sqlx::query(CLAIM)
-            .bind(now.saturating_add(lease_ms))
-            .bind(worker)
-            .bind(now)
-            .fetch_optional(&self.writer)
-            .await?;
-        let Some(row) = row else { return Ok(None) };
-        Ok(Some(Claim {
-            id: read_id(&row)?,
-            attempt: row.try_get("attempt")?,
-            lease_number: read_count(&row, "lease_number")?,
-            method: row.try_get("method")?,
-        }))
-    }
-
     /// Extends a lease and notes the progress.
     ///
     /// # Errors
@@ -90,27 +62,8 @@ impl SqliteStore {
         ending: &Ending,
         now: i64,
     ) -> Result<Option<Job>, JobsError> {
-        let (state, warnings, failure, key, patches) = match ending {
-            Ending::Succeeded {
-                warnings,
-                result_key,
-                field_patches,
-            } => (
-                State::Succeeded,
-                to_json(warnings)?,
-                None,
-                Some(result_key),
-                *field_patches,
-            ),
-            Ending::Failed(failure) => (
-                State::Failed,
-                "[]".to_owned(),
-                Some(to_json(failure)?),
-                None,
-                0,
-            ),
-            Ending::Cancelled => (State::Cancelled, "[]".to_owned(), None, None, 0),
-        };
+        let end = EndRow::of(ending)?;
+        let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         let row = sqlx::query(concat!(
             "UPDATE jobs SET state = $1, ended_at = $2, warnings = $3, failure = $4, result_key = $5, \
              field_patches = $6, progress = CASE WHEN $1 = 'succeeded' THEN 1.0 ELSE progress END, \
@@ -118,17 +71,27 @@ impl SqliteStore {
              WHERE id = $7 AND lease_number = $8 AND state = 'running' RETURNING ",
             job_columns!()
         ))
-        .bind(state.name())
+        .bind(end.state.name())
         .bind(now)
-        .bind(warnings)
-        .bind(failure)
-        .bind(key)
-        .bind(patches)
+        .bind(end.warnings)
+        .bind(end.failure)
+        .bind(end.folder)
+        .bind(end.field_patches)
         .bind(claim.id.to_string())
         .bind(fence(claim))
-        .fetch_optional(&self.writer)
+        .fetch_optional(&mut *transaction)
         .await?;
-        row.as_ref().map(read_job).transpose()
+        let Some(row) = row else { return Ok(None) };
+        if let Some(result) = end.inside {
+            sqlx::query("INSERT INTO results (job_id, solution, fields) VALUES ($1, $2, $3)")
+                .bind(claim.id.to_string())
+                .bind(result.solution.as_ref())
+                .bind(result.fields.as_deref())
+                .execute(&mut *transaction)
+                .await?;
+        }
+        transaction.commit().await?;
+        read_job(&row).map(Some)
     }
 
     /// Hands a running job back to the queue without counting the attempt; a job whose cancellation was asked for
@@ -176,14 +139,59 @@ impl SqliteStore {
     }
 }
 
+/// The end of a job in the form the database takes.
+pub(super) struct EndRow<'a> {
+    pub(super) state: State,
+    pub(super) warnings: String,
+    pub(super) failure: Option<String>,
+    pub(super) folder: Option<&'a str>,
+    pub(super) field_patches: u32,
+    pub(super) inside: Option<&'a Encoded>,
+}
+
+impl EndRow<'_> {
+    pub(super) fn of(ending: &Ending) -> Result<EndRow<'_>, JobsError> {
+        let mut row = EndRow {
+            state: State::Cancelled,
+            warnings: "[]".to_owned(),
+            failure: None,
+            folder: None,
+            field_patches: 0,
+            inside: None,
+        };
+        match ending {
+            Ending::Succeeded {
+                warnings,
+                result,
+                field_patches,
+            } => {
+                row.state = State::Succeeded;
+                row.warnings = to_json(warnings)?;
+                row.field_patches = *field_patches;
+                match result {
+                    Placed::Folder(folder) => row.folder = Some(folder),
+                    Placed::Table(result) => row.inside = Some(result),
+                }
+            }
+            Ending::Failed(failure) => {
+                row.state = State::Failed;
+                row.failure = Some(to_json(failure)?);
+            }
+            Ending::Cancelled => {}
+        }
+        Ok(row)
+    }
+}
+
 /// The lease number in the form the database takes.
-fn fence(claim: &Claim) -> i64 {
+pub(super) fn fence(claim: &Claim) -> i64 {
     i64::try_from(claim.lease_number).unwrap_or(i64::MAX)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::jobs::store::sqlite::groups::PEEK;
     use crate::jobs::store::sqlite::lists::tests::plan;
 
     #[tokio::test]
@@ -192,7 +200,7 @@ mod tests {
         let store = SqliteStore::open(&folder.path().join("jobs.db"))
             .await
             .unwrap();
-        for statement in [CLAIM, REAP] {
+        for statement in [PEEK, REAP] {
             let steps = plan(&store, statement).await;
             assert!(
                 steps

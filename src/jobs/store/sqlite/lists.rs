@@ -73,8 +73,16 @@ fn page_query(filter: &Filter, after: Option<Uuid>, limit: u32) -> QueryBuilder<
         and(&mut query, "key = ", key.clone());
         and(&mut query, "value = ", value.clone());
     }
+    if let Some(batch) = filter.batch {
+        and(&mut query, "batch_id = ", batch.to_string());
+    }
     if let Some(state) = filter.state {
-        and(&mut query, "state = ", state.name().to_owned());
+        // Within a batch the index of the batch is walked, not that of the state: a bare expression keeps it out.
+        let column = match filter.batch {
+            Some(_) => "state || '' = ",
+            None => "state = ",
+        };
+        and(&mut query, column, state.name().to_owned());
     }
     if let Some(first) = filter.id_from() {
         and(&mut query, &format!("{id} >= "), first.to_string());
@@ -111,6 +119,25 @@ pub(super) mod tests {
     }
 
     #[tokio::test]
+    async fn the_list_of_a_batch_walks_its_index() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = SqliteStore::open(&folder.path().join("jobs.db"))
+            .await
+            .unwrap();
+        for (state, after) in [(None, None), (Some(State::Queued), Some(Uuid::now_v7()))] {
+            let filter = Filter {
+                state,
+                batch: Some(Uuid::now_v7()),
+                ..Filter::default()
+            };
+            let query = page_query(&filter, after, 50);
+            let steps = plan(&store, query.sql().as_str()).await;
+            assert!(steps[0].contains("jobs_by_batch (batch_id=?"), "{steps:?}");
+            assert_eq!(steps.len(), 1, "{steps:?}");
+        }
+    }
+
+    #[tokio::test]
     async fn every_form_of_the_list_walks_an_index_without_sorting() {
         let folder = tempfile::tempdir().unwrap();
         let store = SqliteStore::open(&folder.path().join("jobs.db"))
@@ -123,6 +150,7 @@ pub(super) mod tests {
                     for after in [None, Some(Uuid::now_v7())] {
                         let filter = Filter {
                             state,
+                            batch: None,
                             label: label.clone(),
                             created_after: window,
                             created_before: window.map(|time| time + 5),

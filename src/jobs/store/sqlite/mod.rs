@@ -7,7 +7,9 @@
 //!
 //! Here: opening, and what a client asks for. [`claims`] holds what workers ask for, [`lists`] the lists.
 
+pub mod batches;
 pub mod claims;
+pub mod groups;
 pub mod lists;
 mod rows;
 
@@ -24,6 +26,7 @@ use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
 use crate::jobs::job::Job;
+use crate::jobs::results::Encoded;
 use crate::jobs::store::sqlite::rows::{job_columns, read_job, to_json};
 use crate::jobs::store::{Deleted, Enqueued, NewJob, StoredResult};
 
@@ -88,8 +91,8 @@ impl SqliteStore {
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         let id = new.id.to_string();
         let row = sqlx::query(concat!(
-            "INSERT INTO jobs (id, state, name, labels, method, created_at) \
-             VALUES ($1, 'queued', $2, $3, $4, $5) RETURNING ",
+            "INSERT INTO jobs (id, state, name, labels, method, created_at, cost_us, outputs) \
+             VALUES ($1, 'queued', $2, $3, $4, $5, $6, $7) RETURNING ",
             job_columns!()
         ))
         .bind(&id)
@@ -97,6 +100,8 @@ impl SqliteStore {
         .bind(to_json(&new.labels)?)
         .bind(&new.method)
         .bind(new.created_at)
+        .bind(new.cost_us)
+        .bind(&new.outputs)
         .fetch_one(&mut *transaction)
         .await?;
         if let Some((key, digest)) = &new.idempotency {
@@ -245,6 +250,24 @@ impl SqliteStore {
         Ok(Some((Bytes::from(body), row.try_get("cancel_requested")?)))
     }
 
+    /// The result of a job that lies in the database: its solution and its fields.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn small_result(&self, id: Uuid) -> Result<Option<Encoded>, JobsError> {
+        let row = sqlx::query("SELECT solution, fields FROM results WHERE job_id = $1")
+            .bind(id.to_string())
+            .fetch_optional(&self.readers)
+            .await?;
+        let Some(row) = row else { return Ok(None) };
+        let solution: Vec<u8> = row.try_get("solution")?;
+        let fields: Option<Vec<u8>> = row.try_get("fields")?;
+        Ok(Some(Encoded {
+            solution: solution.into(),
+            fields: fields.map(Into::into),
+        }))
+    }
+
     /// A job with the place of its result, if it has one.
     ///
     /// # Errors
@@ -253,16 +276,19 @@ impl SqliteStore {
         let row = sqlx::query(concat!(
             "SELECT ",
             job_columns!(),
-            ", result_key, field_patches FROM jobs WHERE id = $1"
+            ", result_key, field_patches, EXISTS (SELECT 1 FROM results WHERE job_id = id) AS inside \
+             FROM jobs WHERE id = $1"
         ))
         .bind(id.to_string())
         .fetch_optional(&self.readers)
         .await?;
         let Some(row) = row else { return Ok(None) };
         let patches: u32 = row.try_get("field_patches")?;
-        let key: Option<String> = row.try_get("result_key")?;
-        let stored = key.map(|key| StoredResult {
-            key,
+        let folder: Option<String> = row.try_get("result_key")?;
+        let inside: bool = row.try_get("inside")?;
+        let stored = (inside || folder.is_some()).then_some(StoredResult {
+            job: id,
+            folder,
             field_patches: patches as usize,
         });
         Ok(Some((read_job(&row)?, stored)))
@@ -271,11 +297,17 @@ impl SqliteStore {
 
 /// The forms the job table has had; a new one is added at the end, an old one is never edited.
 fn migrations() -> Migrator {
-    Migrator::with_migrations(vec![Migration::new(
-        1,
-        "jobs".into(),
-        MigrationType::Simple,
-        include_str!("schema.sql").into_sql_str(),
-        false,
-    )])
+    let form = |number, name: &'static str, text: &'static str| {
+        Migration::new(
+            number,
+            name.into(),
+            MigrationType::Simple,
+            text.into_sql_str(),
+            false,
+        )
+    };
+    Migrator::with_migrations(vec![
+        form(1, "jobs", include_str!("schema.sql")),
+        form(2, "batches", include_str!("batches.sql")),
+    ])
 }

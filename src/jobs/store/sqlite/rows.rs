@@ -12,7 +12,7 @@ use crate::jobs::job::{Job, State};
 /// The columns a [`Job`] is read from.
 macro_rules! job_columns {
     () => {
-        "id, state, name, labels, created_at, started_at, ended_at, attempt, progress, warnings, failure, version"
+        "id, state, name, labels, batch_id, created_at, started_at, ended_at, attempt, progress, warnings, failure, version"
     };
 }
 pub(super) use job_columns;
@@ -20,11 +20,17 @@ pub(super) use job_columns;
 /// Reads a row that has the columns of `job_columns`.
 pub(super) fn read_job(row: &SqliteRow) -> Result<Job, JobsError> {
     let failure: Option<String> = row.try_get("failure")?;
+    let batch: Option<String> = row.try_get("batch_id")?;
     Ok(Job {
         id: read_id(row)?,
         state: read_state(row)?,
         name: row.try_get("name")?,
         labels: from_json(row.try_get("labels")?)?,
+        batch_id: batch
+            .as_deref()
+            .map(Uuid::try_parse)
+            .transpose()
+            .map_err(|error| JobsError::Damaged(format!("batch id: {error}")))?,
         created_at: row.try_get("created_at")?,
         started_at: row.try_get("started_at")?,
         ended_at: row.try_get("ended_at")?,

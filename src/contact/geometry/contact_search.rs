@@ -1,0 +1,270 @@
+//! Finds where a wheel touches its rail, and the gap of every patch in the patch's own frame.
+//!
+//! The rail is straight along x, so that the wheel meets it where its normal has no part along x: the wheel is
+//! replaced by the curve of those points, and the search is one in the plane across. Patches are the intervals in which the
+//! undeformed bodies overlap; the frame of a patch lies at the mean of its overlap, weighted with its square over the
+//! area (power 5/2 on a line), with the mean inclination of the rail. In that frame the gap is taken along the normal, exactly: the
+//! wheel as surface of revolution, the rail as cylinder.
+
+use crate::contact::geometry::local_gap::LocalGap;
+use crate::contact::geometry::wheel_rail::WheelRail;
+
+/// Spacing of the search across and along the curves, in mm.
+const STEP: f64 = 0.01;
+const CURVE_STEP: f64 = 0.02;
+/// The window of a gap is larger than the overlap by this part and this length.
+const MARGIN: f64 = 0.15;
+const MARGIN_MM: f64 = 0.1;
+/// Overlaps nearer to each other than this, in mm, are one patch.
+const TOGETHER: f64 = 0.3;
+
+/// Wheel and rail over each other, line by line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Search<'g> {
+    geometry: &'g WheelRail,
+    lines: Vec<Line>,
+    /// Height of the wheel's centre in mm at which the bodies just touch.
+    pub touch: f64,
+}
+
+/// One line along x: its y, the upper edge of the rail, and the clearance above first touch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Line {
+    y: f64,
+    clearance: f64,
+    rail: f64,
+    wheel: f64,
+}
+
+/// The frame of a patch in track axes: z of the frame is the normal out of the rail.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// Origin on the rail's surface, `[x, y, z]` in mm.
+    pub origin: [f64; 3],
+    /// Turn about x from the track's axes, in rad.
+    pub angle: f64,
+    /// Parameter of the origin on the rail's curve.
+    pub rail: f64,
+    /// Parameter of the opposite point on the wheel's curve.
+    pub wheel: f64,
+}
+
+impl Frame {
+    /// Unit vectors in track axes: tangent (y of the frame) and normal (z of the frame), as `[y, z]`.
+    #[must_use]
+    pub fn axes(&self) -> [[f64; 2]; 2] {
+        let (sin, cos) = self.angle.sin_cos();
+        [[cos, sin], [-sin, cos]]
+    }
+
+    /// Coordinates across and along the normal of a point of the rail's curve.
+    pub(super) fn across(&self, geometry: &WheelRail, rail: f64) -> [f64; 2] {
+        let [y, z] = geometry.rail_at(rail).at;
+        let from = [y - self.origin[1], z - self.origin[2]];
+        self.axes()
+            .map(|axis| axis[0] * from[0] + axis[1] * from[1])
+    }
+}
+
+impl<'g> Search<'g> {
+    /// Lays the wheel over the rail and finds the height of first touch.
+    ///
+    /// # Errors
+    /// A sentence, if no part of the wheel lies above the rail.
+    pub fn new(geometry: &'g WheelRail) -> Result<Search<'g>, String> {
+        let [rail, wheel] = geometry.parameters(CURVE_STEP);
+        let rail: Vec<_> = rail
+            .into_iter()
+            .map(|s| {
+                let [y, z] = geometry.rail_at(s).at;
+                Some([y, z, s])
+            })
+            .collect();
+        let wheel: Vec<_> = wheel
+            .into_iter()
+            .map(|s| geometry.lowest(s).map(|[_, y, z]| [y, -z, s]))
+            .collect();
+        let (rail, wheel) = (envelope(&rail), envelope(&wheel));
+        let first = rail.first.max(wheel.first);
+        let last =
+            (rail.first + rail.points.len() as i64).min(wheel.first + wheel.points.len() as i64);
+        let mut lines = Vec::new();
+        for k in first..last {
+            let (below, above) = (
+                rail.points[(k - rail.first) as usize],
+                wheel.points[(k - wheel.first) as usize],
+            );
+            if let (Some([z, rail]), Some([depth, wheel])) = (below, above) {
+                lines.push(Line {
+                    y: k as f64 * STEP,
+                    clearance: -depth - z,
+                    rail,
+                    wheel,
+                });
+            }
+        }
+        let least = lines
+            .iter()
+            .map(|line| line.clearance)
+            .fold(f64::INFINITY, f64::min);
+        if lines.len() < 3 {
+            return Err(
+                "no part of the wheel lies above the rail; check gauge, flange-back distance and position, lateral shift".to_owned(),
+            );
+        }
+        for line in &mut lines {
+            line.clearance -= least;
+        }
+        Ok(Search {
+            geometry,
+            lines,
+            touch: -least,
+        })
+    }
+
+    /// The frames of the patches when the wheel is lowered by `lowering` mm below first touch, from smaller to larger y.
+    ///
+    /// # Errors
+    /// A sentence, if an overlap reaches the end of a profile.
+    pub fn frames(&self, lowering: f64) -> Result<Vec<Frame>, String> {
+        self.overlaps(lowering)?
+            .into_iter()
+            .map(|lines| Ok(self.frame(lines, lowering)))
+            .collect()
+    }
+
+    /// The gaps of the patches at the same height, each in its own frame.
+    ///
+    /// # Errors
+    /// A sentence, if an overlap reaches the end of a profile.
+    pub fn gaps(&self, lowering: f64) -> Result<Vec<LocalGap>, String> {
+        self.overlaps(lowering)?
+            .into_iter()
+            .map(|lines| self.gap(lines, lowering))
+            .collect()
+    }
+
+    fn overlaps(&self, lowering: f64) -> Result<Vec<&[Line]>, String> {
+        let inside = |line: &Line| line.clearance < lowering;
+        let apart = |a: &Line, b: &Line| b.y - a.y > TOGETHER;
+        let places: Vec<usize> = (0..self.lines.len())
+            .filter(|k| inside(&self.lines[*k]))
+            .collect();
+        let intervals = places.chunk_by(|a, b| !apart(&self.lines[*a], &self.lines[*b]));
+        let mut found = Vec::new();
+        for interval in intervals {
+            let (first, last) = (interval[0], interval[interval.len() - 1]);
+            let ends = |k: usize, next: Option<&Line>| {
+                next.is_none_or(|next| (next.y - self.lines[k].y).abs() > 1.5 * STEP)
+            };
+            let before = first.checked_sub(1).map(|k| &self.lines[k]);
+            if ends(first, before) || ends(last, self.lines.get(last + 1)) {
+                let line = self.lines[if ends(first, before) { first } else { last }];
+                let [rail, wheel] = [
+                    self.geometry.on_rail(line.rail),
+                    self.geometry.on_wheel(line.wheel),
+                ];
+                return Err(format!(
+                    "the contact reaches the end of a profile, at y = {:.2} mm on the rail and {:.2} mm on the wheel; the true contact is \
+                     cut off, longer profiles are needed",
+                    rail[0], wheel[0]
+                ));
+            }
+            found.push(&self.lines[first..=last]);
+        }
+        Ok(found)
+    }
+
+    fn frame(&self, lines: &[Line], lowering: f64) -> Frame {
+        let (mut weight, mut y, mut angle) = (0.0, 0.0, 0.0);
+        for line in lines {
+            let own = (lowering - line.clearance).max(0.0).powf(2.5);
+            weight += own;
+            y += own * line.y;
+            angle += own * self.inclination(line.rail);
+        }
+        let y = y / weight;
+        let k = lines
+            .partition_point(|line| line.y < y)
+            .clamp(1, lines.len() - 1);
+        let t = ((y - lines[k - 1].y) / (lines[k].y - lines[k - 1].y)).clamp(0.0, 1.0);
+        let between = |of: fn(&Line) -> f64| of(&lines[k - 1]) * (1.0 - t) + of(&lines[k]) * t;
+        let (rail, wheel) = (between(|line| line.rail), between(|line| line.wheel));
+        let [y, z] = self.geometry.rail_at(rail).at;
+        let x = self.geometry.lowest(wheel).map_or(0.0, |point| point[0]);
+        Frame {
+            origin: [x, y, z],
+            angle: angle / weight,
+            rail,
+            wheel,
+        }
+    }
+
+    /// Turn about x that lays the track's y along the rail's surface.
+    fn inclination(&self, rail: f64) -> f64 {
+        let [y, z] = self.geometry.rail_at(rail).tangent();
+        (z / y).atan()
+    }
+
+    fn gap(&self, lines: &[Line], lowering: f64) -> Result<LocalGap, String> {
+        let frame = self.frame(lines, lowering);
+        let mut across = [f64::INFINITY, f64::NEG_INFINITY];
+        let mut along = [0.0_f64; 2];
+        for line in lines {
+            let v = frame.across(self.geometry, line.rail)[0];
+            across = [across[0].min(v), across[1].max(v)];
+            let overlap = (lowering - line.clearance).max(0.0);
+            let half = (2.0 * self.geometry.meridian(line.wheel).radius * overlap).sqrt();
+            let middle = self
+                .geometry
+                .lowest(line.wheel)
+                .map_or(0.0, |point| point[0] - frame.origin[0]);
+            along = [along[0].min(middle - half), along[1].max(middle + half)];
+        }
+        let widen = |[low, high]: [f64; 2]| {
+            let margin = MARGIN * (high - low) + MARGIN_MM;
+            [low - margin, high + margin]
+        };
+        LocalGap::new(
+            self.geometry,
+            frame,
+            self.touch - lowering,
+            [widen(along), widen(across)],
+        )
+    }
+}
+
+/// Upper edge of a curve on the lines `k STEP`: height and parameter.
+struct Envelope {
+    first: i64,
+    points: Vec<Option<[f64; 2]>>,
+}
+
+/// `curve` lists `[y, height, parameter]`; lines over a part without points have none.
+fn envelope(curve: &[Option<[f64; 3]>]) -> Envelope {
+    let y = || curve.iter().flatten().map(|point| point[0] / STEP);
+    let first = y().fold(f64::INFINITY, f64::min).ceil() as i64;
+    let last = y().fold(f64::NEG_INFINITY, f64::max).floor() as i64;
+    let mut points: Vec<Option<[f64; 2]>> =
+        vec![None; usize::try_from(last - first + 1).unwrap_or(0)];
+    for pair in curve.windows(2) {
+        let [Some(from), Some(to)] = pair else {
+            continue;
+        };
+        let (low, high) = (from[0].min(to[0]) / STEP, from[0].max(to[0]) / STEP);
+        for k in low.ceil() as i64..=high.floor() as i64 {
+            let span = to[0] - from[0];
+            let t = if span == 0.0 {
+                0.0
+            } else {
+                (k as f64 * STEP - from[0]) / span
+            };
+            let at = [1, 2].map(|part| from[part] + t * (to[part] - from[part]));
+            let place = &mut points[(k - first) as usize];
+            if place.is_none_or(|highest| at[0] > highest[0]) {
+                *place = Some(at);
+            }
+        }
+    }
+    Envelope { first, points }
+}

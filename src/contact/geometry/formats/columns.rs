@@ -1,0 +1,25 @@
+//! Two-column text or CSV: y and z in mm, one point per line.
+
+use crate::contact::geometry::formats::{Contents, numbers, unreadable};
+
+/// Lines that start with `#`, `!`, `%` or `"` are remarks; one line of titles may stand before the first point.
+pub(super) fn read(text: &str) -> Result<Contents, String> {
+    let mut contents = Contents::default();
+    let mut title_allowed = true;
+    for (k, line) in text.lines().enumerate() {
+        let line = line.trim().trim_start_matches('\u{feff}');
+        if line.is_empty() || line.starts_with(['#', '!', '%', '"']) {
+            continue;
+        }
+        match numbers(line).as_deref() {
+            Some([y, z]) => contents.points.push([*y, *z]),
+            None if title_allowed && line.starts_with(|c: char| c.is_alphabetic()) => {}
+            _ => return Err(unreadable(k, line, "a pair of finite numbers y and z")),
+        }
+        title_allowed = false;
+    }
+    if contents.points.is_empty() {
+        return Err("no points found".to_owned());
+    }
+    Ok(contents)
+}

@@ -1,0 +1,269 @@
+//! The gap of one patch in its own frame: the wheel as surface of revolution over the rail as cylinder.
+
+use crate::contact::geometry::contact_search::Frame;
+use crate::contact::geometry::wheel_rail::WheelRail;
+
+/// Samples of a gap along and across.
+const COLUMNS: usize = 65;
+const ROWS: usize = 161;
+/// Spacing along the rail's curve, in mm.
+const CURVE_STEP: f64 = 0.1;
+/// The rail belongs to a patch as far as its tangent keeps this much of the frame's direction.
+const TANGENT_MIN: f64 = 0.1;
+
+/// The gap of one patch at one height of the wheel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LocalGap {
+    /// Frame in which the gap is given.
+    pub frame: Frame,
+    /// Coordinates along x in mm, from the frame's origin.
+    pub x: Vec<f64>,
+    /// Coordinates across in mm.
+    pub y: Vec<f64>,
+    /// Distance of the surfaces along the frame's normal in mm, negative where they overlap; `[j][i]` at `(x[i], y[j])`.
+    pub gap: Vec<Vec<f64>>,
+}
+
+impl LocalGap {
+    /// The gap over the window `[[x_min, x_max], [y_min, y_max]]` in mm of a frame, with the wheel's centre at the height
+    /// `centre`.
+    ///
+    /// # Errors
+    /// A sentence, if the rail bends away from the plane of the frame within the window.
+    pub(super) fn new(
+        geometry: &WheelRail,
+        frame: Frame,
+        centre: f64,
+        window: [[f64; 2]; 2],
+    ) -> Result<LocalGap, String> {
+        let rail = RailInFrame::new(geometry, &frame);
+        let [x, y] = [(window[0], COLUMNS), (window[1], ROWS)].map(|([low, high], count)| {
+            // Measured from the middle, so that a symmetric window has symmetric coordinates.
+            let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+            let at = |k: usize| (2.0 * k as f64 - (count - 1) as f64) / (count - 1) as f64;
+            (0..count)
+                .map(|k| middle + half * at(k))
+                .collect::<Vec<f64>>()
+        });
+        let y: Vec<f64> = y.into_iter().filter(|v| rail.reaches(*v)).collect();
+        let heights: Vec<f64> = y.iter().map(|v| rail.height(*v)).collect();
+        if y.len() < ROWS / 2 {
+            return Err(format!(
+                "the patch at y = {:.2} mm on the rail bends too much for a plane of contact",
+                geometry.on_rail(frame.rail)[0]
+            ));
+        }
+        let wheel = WheelInFrame {
+            geometry,
+            frame: &frame,
+            centre,
+        }
+        .heights(&x, &y);
+        let gap = wheel
+            .into_iter()
+            .zip(&heights)
+            .map(|(row, height)| row.into_iter().map(|wheel| wheel - height).collect())
+            .collect();
+        Ok(LocalGap { frame, x, y, gap })
+    }
+}
+
+/// Indices from the one after the middle to the last, and from the one before it to the first.
+fn outward(middle: usize, count: usize) -> (Vec<usize>, Vec<usize>) {
+    ((middle + 1..count).collect(), (0..middle).rev().collect())
+}
+
+/// The rail's curve over the plane of a frame, as far as it is a function there.
+struct RailInFrame<'g> {
+    geometry: &'g WheelRail,
+    frame: &'g Frame,
+    /// `[v, parameter]` by increasing v.
+    samples: Vec<[f64; 2]>,
+}
+
+impl<'g> RailInFrame<'g> {
+    fn new(geometry: &'g WheelRail, frame: &'g Frame) -> Self {
+        let mut rail = RailInFrame {
+            geometry,
+            frame,
+            samples: Vec::new(),
+        };
+        let parameters = geometry.parameters(CURVE_STEP)[0].clone();
+        let middle = parameters
+            .partition_point(|s| *s < frame.rail)
+            .min(parameters.len() - 1);
+        let [tangent, _] = frame.axes();
+        let sign = geometry.placement.side.sign();
+        let along = |s: f64| {
+            let place = geometry.rail_at(s).tangent();
+            sign * (place[0] * tangent[0] + place[1] * tangent[1])
+        };
+        let keeps = |k: &usize| along(parameters[*k]) > TANGENT_MIN;
+        let (after, before) = outward(middle, parameters.len());
+        let before = before
+            .into_iter()
+            .take_while(keeps)
+            .collect::<Vec<_>>()
+            .into_iter()
+            .rev();
+        let chosen = before
+            .chain([middle])
+            .chain(after.into_iter().take_while(keeps));
+        rail.samples = chosen
+            .map(|k| [rail.local(parameters[k])[0], parameters[k]])
+            .collect();
+        if sign < 0.0 {
+            rail.samples.reverse();
+        }
+        rail
+    }
+
+    /// Coordinates `[v, w]` in the frame of a point of the curve.
+    fn local(&self, s: f64) -> [f64; 2] {
+        self.frame.across(self.geometry, s)
+    }
+
+    fn reaches(&self, v: f64) -> bool {
+        self.samples.len() > 1
+            && self.samples[0][0] <= v
+            && v <= self.samples[self.samples.len() - 1][0]
+    }
+
+    /// Height over the plane at v, by bracketed secant steps along the curve.
+    fn height(&self, v: f64) -> f64 {
+        let k = self
+            .samples
+            .partition_point(|sample| sample[0] < v)
+            .clamp(1, self.samples.len() - 1);
+        let [mut low, mut high] = [self.samples[k - 1], self.samples[k]];
+        let mut at = [0.0; 2];
+        for _ in 0..30 {
+            let t = ((v - low[0]) / (high[0] - low[0])).clamp(0.0, 1.0);
+            let s = low[1] + t * (high[1] - low[1]);
+            at = self.local(s);
+            if (at[0] - v).abs() < 1e-11 {
+                break;
+            }
+            if at[0] < v {
+                low = [at[0], s];
+            } else {
+                high = [at[0], s];
+            }
+        }
+        at[1]
+    }
+}
+
+/// The wheel's surface over the plane of a frame.
+struct WheelInFrame<'g> {
+    geometry: &'g WheelRail,
+    frame: &'g Frame,
+    /// Height of the wheel's centre in the track.
+    centre: f64,
+}
+
+#[derive(Clone, Copy)]
+struct Guess {
+    height: f64,
+    wheel: f64,
+}
+
+impl WheelInFrame<'_> {
+    /// Height of the wheel's surface over the plane of the frame, outward from the middle.
+    fn heights(&self, x: &[f64], y: &[f64]) -> Vec<Vec<f64>> {
+        let nearest = |axis: &[f64]| axis.partition_point(|at| *at < 0.0).min(axis.len() - 1);
+        let middle = [nearest(x), nearest(y)];
+        // With an odd number of columns over a symmetric window the middle one is x = 0, and both halves are alike.
+        let mut rows = vec![vec![f64::NAN; x.len()]; y.len()];
+        let mut fill = |j: usize, start: Guess| -> Guess {
+            let first = self.height(x[middle[0]], y[j], start);
+            rows[j][middle[0]] = first.height;
+            for columns in [outward(middle[0], x.len()).0, outward(middle[0], x.len()).1] {
+                let mut guess = first;
+                for i in columns {
+                    guess = self.height(x[i], y[j], guess);
+                    rows[j][i] = guess.height;
+                }
+            }
+            first
+        };
+        let start = fill(
+            middle[1],
+            Guess {
+                height: 0.0,
+                wheel: self.frame.wheel,
+            },
+        );
+        let (up, down) = outward(middle[1], y.len());
+        for order in [up, down] {
+            let mut guess = start;
+            for j in order {
+                guess = fill(j, guess);
+            }
+        }
+        rows
+    }
+
+    /// Where the normal through (u, v) meets the wheel, by Newton's method in the height and the parameter of the
+    /// wheel's curve; where there is no such point, a surface that opens quickly.
+    fn height(&self, u: f64, v: f64, start: Guess) -> Guess {
+        const STEP_MAX: f64 = 1.0;
+        let [tangent, normal] = self.frame.axes();
+        let axle = self.geometry.axle();
+        let shift = self.geometry.placement.lateral_shift;
+        let base = [
+            self.frame.origin[0] + u,
+            self.frame.origin[1] + v * tangent[0] - shift,
+            self.frame.origin[2] + v * tangent[1] - self.centre,
+        ];
+        let normal = [0.0, normal[0], normal[1]];
+        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let rise_along = dot(normal, axle);
+        let mut guess = start;
+        for _ in 0..30 {
+            let point = [0, 1, 2].map(|k| base[k] + guess.height * normal[k]);
+            let along = dot(point, axle);
+            let radial = [0, 1, 2].map(|k| point[k] - along * axle[k]);
+            let radius = dot(radial, radial).sqrt();
+            let rise_radius = dot(normal, radial) / radius;
+            let circle = self.geometry.meridian(guess.wheel);
+            let (miss_along, miss_radius) = (along - circle.along, radius - circle.radius);
+            let determinant = -rise_along * circle.radius_slope + circle.along_slope * rise_radius;
+            let height = (-miss_radius * circle.along_slope + miss_along * circle.radius_slope)
+                / determinant;
+            let wheel = (miss_along * rise_radius - miss_radius * rise_along) / determinant;
+            guess.height += height.clamp(-STEP_MAX, STEP_MAX);
+            guess.wheel += wheel.clamp(-STEP_MAX, STEP_MAX);
+            if height.abs() + wheel.abs() < 1e-11 {
+                return guess;
+            }
+        }
+        Guess {
+            height: start.height + 1.0,
+            wheel: start.wheel,
+        }
+    }
+}
+
+impl WheelRail {
+    /// Overlap in mm of the undeformed bodies along the normal at the origin of a frame, with the wheel's centre at the
+    /// height `centre`; negative where there is a gap.
+    #[must_use]
+    pub fn overlap(&self, frame: &Frame, centre: f64) -> f64 {
+        let surface = WheelInFrame {
+            geometry: self,
+            frame,
+            centre,
+        };
+        -surface
+            .height(
+                0.0,
+                0.0,
+                Guess {
+                    height: 0.0,
+                    wheel: frame.wheel,
+                },
+            )
+            .height
+    }
+}

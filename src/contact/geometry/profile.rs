@@ -1,0 +1,328 @@
+//! One cross-section of a rail or a wheel: checked points and the smooth curve through them.
+//!
+//! Input follows the habit of the field: y positive to the field side, z positive down, mm. From here on z is positive
+//! up. The curve runs from the track centre to the field side, with the rail below and the wheel above it.
+
+use crate::contact::geometry::smoothing::Spline;
+
+/// Length of the whole curve in mm that a profile may have; anything else is in another unit.
+pub const ARC_LENGTH: [f64; 2] = [5.0, 500.0];
+/// Points of one profile.
+pub const POINTS_MIN: usize = 8;
+/// Most points of one profile.
+pub const POINTS_MAX: usize = 20_000;
+/// Points nearer to each other than this are one, in mm.
+const NEAR: f64 = 1e-3;
+/// Cosine of the turn from which on a point runs back against its neighbours.
+const BACK: f64 = -0.2;
+/// Part of the points that may run back.
+const ZIGZAG_SHARE_MAX: f64 = 0.05;
+
+/// Which body a profile belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Body {
+    /// The lower body.
+    Rail,
+    /// The upper body.
+    Wheel,
+}
+
+/// What is said about a profile beside its points.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Reading {
+    /// The y of the points is positive to the track centre; for a wheel without a statement the flange tells.
+    pub mirror_y: Option<bool>,
+    /// The z of the points is positive up; without a statement the shape tells.
+    pub mirror_z: Option<bool>,
+    /// Cut wavelength of the smoothing in mm; 0 for none.
+    pub smoothing: f64,
+}
+
+/// A cross-section as a curve, twice continuously differentiable in its chord length.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Profile {
+    y: Spline,
+    z: Spline,
+    /// What was found and changed on the way.
+    pub warnings: Vec<String>,
+}
+
+/// The curve at one place: y to the field side, z up, in mm; derivatives to the parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// Position `[y, z]`.
+    pub at: [f64; 2],
+    /// First derivative, of length about 1.
+    pub slope: [f64; 2],
+    /// Second derivative.
+    pub bend: [f64; 2],
+}
+
+impl Place {
+    /// Unit tangent, from the track centre to the field side along the curve.
+    #[must_use]
+    pub fn tangent(&self) -> [f64; 2] {
+        let length = self.slope[0].hypot(self.slope[1]);
+        self.slope.map(|part| part / length)
+    }
+
+    /// Curvature in 1/mm, positive where the curve bends upward.
+    #[must_use]
+    pub fn curvature(&self) -> f64 {
+        let [y, z] = self.slope;
+        (y * self.bend[1] - z * self.bend[0]) / y.hypot(z).powi(3)
+    }
+}
+
+impl Profile {
+    /// The curve through points `[y, z]` in mm, y to the field side and z down unless `reading` says otherwise, in
+    /// either order.
+    ///
+    /// Points nearer than 1 µm are merged, single points that run back are dropped; both leave a remark.
+    ///
+    /// # Errors
+    /// A sentence: too few or too many points, numbers that are not finite, a total arc length outside 5 to 500 mm, loops, more than 5 %
+    /// of the points running back, or a shape that does not tell what is up and was not stated.
+    pub fn new(body: Body, points: &[[f64; 2]], reading: Reading) -> Result<Profile, String> {
+        let mut warnings = Vec::new();
+        let mut points = checked(points)?;
+        let length = arc_length(&points);
+        let [shortest, longest] = ARC_LENGTH;
+        if !(shortest..=longest).contains(&length) {
+            return Err(format!(
+                "the arc length of the points is {length:.4} mm; {shortest} to {longest} mm are allowed (is another unit than mm \
+                 used?)"
+            ));
+        }
+        orient(body, &mut points, reading, &mut warnings)?;
+        straighten(&mut points, &mut warnings)?;
+        let given = points.len();
+        points.dedup_by(|after, before| distance(*after, *before) < NEAR);
+        if points.len() < given {
+            warnings.push(format!(
+                "{} points nearer than {NEAR} mm to another one were merged",
+                given - points.len()
+            ));
+        }
+        if points.len() < POINTS_MIN {
+            return Err(format!(
+                "{} different points given; at least {POINTS_MIN} are needed",
+                points.len()
+            ));
+        }
+        if let Some([first, second]) = crossing(&points) {
+            return Err(format!(
+                "the profile runs through itself near [{:.3}, {:.3}] and [{:.3}, {:.3}]; loops are refused",
+                first[0], -first[1], second[0], -second[1]
+            ));
+        }
+        let mut knots = vec![0.0];
+        for pair in points.windows(2) {
+            knots.push(knots[knots.len() - 1] + distance(pair[0], pair[1]));
+        }
+        let part = |k: usize| {
+            let values: Vec<f64> = points.iter().map(|point| point[k]).collect();
+            Spline::new(&knots, &values, reading.smoothing)
+        };
+        Ok(Profile {
+            y: part(0),
+            z: part(1),
+            warnings,
+        })
+    }
+
+    /// First and last parameter, in mm along the chords of the points.
+    #[must_use]
+    pub fn range(&self) -> [f64; 2] {
+        self.y.range()
+    }
+
+    /// The curve at a parameter; beyond the ends the tangent there.
+    #[must_use]
+    pub fn at(&self, s: f64) -> Place {
+        let (y, z) = (self.y.at(s), self.z.at(s));
+        Place {
+            at: [y.value, z.value],
+            slope: [y.slope, z.slope],
+            bend: [y.bend, z.bend],
+        }
+    }
+
+    /// The curve turned by an angle in rad from y to z about its origin.
+    #[must_use]
+    pub fn turned(&self, angle: f64) -> Profile {
+        let (sin, cos) = angle.sin_cos();
+        let knots = self.y.knots();
+        let at: Vec<[f64; 2]> = knots.iter().map(|s| self.at(*s).at).collect();
+        let part = |f: &dyn Fn(&[f64; 2]) -> f64| {
+            Spline::new(knots, &at.iter().map(f).collect::<Vec<_>>(), 0.0)
+        };
+        Profile {
+            y: part(&|p| cos * p[0] - sin * p[1]),
+            z: part(&|p| sin * p[0] + cos * p[1]),
+            warnings: self.warnings.clone(),
+        }
+    }
+
+    /// Parameters at most `step` apart over the whole curve, ends included.
+    #[must_use]
+    pub fn parameters(&self, step: f64) -> Vec<f64> {
+        let [first, last] = self.range();
+        let count = ((last - first) / step).ceil().max(1.0);
+        (0..=count as usize)
+            .map(|k| first + (last - first) * k as f64 / count)
+            .collect()
+    }
+}
+
+fn checked(points: &[[f64; 2]]) -> Result<Vec<[f64; 2]>, String> {
+    if !(POINTS_MIN..=POINTS_MAX).contains(&points.len()) {
+        return Err(format!(
+            "{} points given; {POINTS_MIN} to {POINTS_MAX} are allowed",
+            points.len()
+        ));
+    }
+    match points
+        .iter()
+        .position(|point| !point.iter().all(|part| part.is_finite()))
+    {
+        Some(k) => Err(format!("point {k} is not finite")),
+        None => Ok(points.to_vec()),
+    }
+}
+
+fn distance(from: [f64; 2], to: [f64; 2]) -> f64 {
+    (to[0] - from[0]).hypot(to[1] - from[1])
+}
+
+fn arc_length(points: &[[f64; 2]]) -> f64 {
+    points
+        .windows(2)
+        .map(|pair| distance(pair[0], pair[1]))
+        .sum()
+}
+
+/// Brings the points to y toward the field side, z up, and increasing y from the first to the last.
+fn orient(
+    body: Body,
+    points: &mut [[f64; 2]],
+    reading: Reading,
+    warnings: &mut Vec<String>,
+) -> Result<(), String> {
+    let up = match reading.mirror_z {
+        Some(up) => up,
+        None => {
+            let up = points_up(body, points).ok_or_else(|| {
+                "the shape does not tell whether z is positive up or down; state mirror_z"
+                    .to_owned()
+            })?;
+            if up {
+                warnings.push("z was found to be positive up and has been mirrored".to_owned());
+            }
+            up
+        }
+    };
+    if !up {
+        points.iter_mut().for_each(|point| point[1] = -point[1]);
+    }
+    let mirrored = match (reading.mirror_y, body) {
+        (Some(mirrored), _) => mirrored,
+        (None, Body::Rail) => false,
+        (None, Body::Wheel) => {
+            let mirrored = flange(points)[0] > middle(points);
+            if mirrored {
+                warnings.push(
+                    "the flange was found at positive y, so that y has been mirrored".to_owned(),
+                );
+            }
+            mirrored
+        }
+    };
+    if mirrored {
+        points.iter_mut().for_each(|point| point[0] = -point[0]);
+    }
+    if points[0][0] > points[points.len() - 1][0] {
+        points.reverse();
+    }
+    Ok(())
+}
+
+fn middle(points: &[[f64; 2]]) -> f64 {
+    let y = || points.iter().map(|point| point[0]);
+    0.5 * (y().fold(f64::INFINITY, f64::min) + y().fold(f64::NEG_INFINITY, f64::max))
+}
+
+/// The lowest point, z up.
+fn flange(points: &[[f64; 2]]) -> [f64; 2] {
+    points
+        .iter()
+        .copied()
+        .fold([0.0, f64::INFINITY], |low, point| {
+            if point[1] < low[1] { point } else { low }
+        })
+}
+
+/// Is z of these points positive up? A rail falls off toward its sides, a wheel's flange stands out downward.
+fn points_up(body: Body, points: &[[f64; 2]]) -> Option<bool> {
+    let z: Vec<f64> = points.iter().map(|point| point[1]).collect();
+    let mut sorted = z.clone();
+    sorted.sort_by(f64::total_cmp);
+    let (low, median, high) = (sorted[0], sorted[z.len() / 2], sorted[z.len() - 1]);
+    let departure = match body {
+        Body::Rail => {
+            let ends = 0.5 * (z[0] + z[z.len() - 1]);
+            0.5 * (low + high) - ends
+        }
+        Body::Wheel => 2.0 * median - low - high,
+    };
+    (departure.abs() > 0.02 * (high - low)).then_some(departure > 0.0)
+}
+
+/// Drops points that run back between their neighbours, as stitched measurements have them.
+fn straighten(points: &mut Vec<[f64; 2]>, warnings: &mut Vec<String>) -> Result<(), String> {
+    let given = points.len();
+    let allowed = (ZIGZAG_SHARE_MAX * given as f64).ceil() as usize;
+    loop {
+        let back = points.windows(3).position(|at| {
+            let (first, second) = (step(at[0], at[1]), step(at[1], at[2]));
+            let lengths = first[0].hypot(first[1]) * second[0].hypot(second[1]);
+            first[0] * second[0] + first[1] * second[1] < BACK * lengths
+        });
+        let Some(k) = back else { break };
+        points.remove(k + 1);
+        if given - points.len() > allowed {
+            return Err(format!(
+                "more than {allowed} of {given} points run back against their neighbours; are they in order along the profile?"
+            ));
+        }
+    }
+    if points.len() < given {
+        warnings.push(format!(
+            "{} points that ran back (zig-zag) were dropped",
+            given - points.len()
+        ));
+    }
+    Ok(())
+}
+
+fn step(from: [f64; 2], to: [f64; 2]) -> [f64; 2] {
+    [to[0] - from[0], to[1] - from[1]]
+}
+
+/// Two chords that cross, by their first points.
+fn crossing(points: &[[f64; 2]]) -> Option<[[f64; 2]; 2]> {
+    let cross = |a: [f64; 2], b: [f64; 2]| a[0] * b[1] - a[1] * b[0];
+    let side = |p: [f64; 2], q: [f64; 2], r: [f64; 2]| cross(step(p, q), step(p, r)) > 0.0;
+    for j in 2..points.len() - 1 {
+        let (c, d) = (points[j], points[j + 1]);
+        let (low, high) = (c[0].min(d[0]), c[0].max(d[0]));
+        for i in 0..j - 1 {
+            let (a, b) = (points[i], points[i + 1]);
+            let apart = a[0].max(b[0]) < low || a[0].min(b[0]) > high;
+            if !apart && side(a, b, c) != side(a, b, d) && side(c, d, a) != side(c, d, b) {
+                return Some([a, c]);
+            }
+        }
+    }
+    None
+}

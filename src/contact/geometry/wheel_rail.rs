@@ -1,0 +1,229 @@
+//! A wheel placed on a rail: cross-sections in track axes, the wheel as a surface of revolution about its axle.
+//!
+//! Track axes: x along rolling, y to the left, z up; y = 0 in the middle of the track, z = 0 at the top of the rail.
+//! The wheelset is turned by the roll about x first, then by the yaw about z, both about its centre, so that the axle
+//! is `e = (−sin ψ cos φ, cos ψ cos φ, sin φ)`. The point `(y, z)` of the wheel's profile (z up) runs on a circle of
+//! radius `r − z` at the distance `d/2 − p + y` from the centre along the axle, with the flange-back distance d and the
+//! flange-back position p. Conventions of the Manchester contact benchmark (Shackleton and Iwnicki 2008).
+
+use crate::contact::geometry::profile::{Place, Profile};
+
+/// Left or right rail, seen along rolling.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// y of the track is positive there.
+    Left,
+    /// y of the track is negative there.
+    Right,
+}
+
+impl Side {
+    /// Sign of the track's y on this side.
+    #[must_use]
+    pub fn sign(self) -> f64 {
+        match self {
+            Side::Left => 1.0,
+            Side::Right => -1.0,
+        }
+    }
+}
+
+/// How wheelset and rail lie to each other; lengths in mm, angles in rad.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Placement {
+    /// Which wheel and rail.
+    pub side: Side,
+    /// Radius of the wheel where z of its profile is 0.
+    pub rolling_radius: f64,
+    /// Distance of the rails' gauge faces.
+    pub gauge: f64,
+    /// Depth below the top of the rail at which the gauge is measured.
+    pub gauge_height: f64,
+    /// Turn of the rail about its profile's origin, positive with its top toward the track centre.
+    pub cant: f64,
+    /// Distance of the backs of the two flanges.
+    pub flange_back_distance: f64,
+    /// y of the flange's back in the wheel's profile.
+    pub flange_back_position: f64,
+    /// Shift of the wheelset to the left.
+    pub lateral_shift: f64,
+    /// Yaw of the wheelset, positive from x to y.
+    pub yaw: f64,
+    /// Roll of the wheelset, positive from y to z.
+    pub roll: f64,
+}
+
+/// A wheel and a rail in place, except for the height of the wheel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WheelRail {
+    /// How they lie.
+    pub placement: Placement,
+    rail_given: Profile,
+    rail: Profile,
+    wheel: Profile,
+    /// Origin of the rail's profile: `y` to the field side from the middle of the track, `z`.
+    rail_origin: [f64; 2],
+    axle: [f64; 3],
+    /// Unit vectors at right angles to the axle: nearly forward, and nearly down (without a part along x).
+    forward: [f64; 3],
+    down: [f64; 3],
+}
+
+/// A point of the wheel's meridian: position along the axle and radius, with their derivatives to the profile's parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Meridian {
+    /// Distance from the centre along the axle.
+    pub along: f64,
+    /// Its derivative.
+    pub along_slope: f64,
+    /// Radius.
+    pub radius: f64,
+    /// Its derivative.
+    pub radius_slope: f64,
+}
+
+impl WheelRail {
+    /// Places the rail by its gauge point and its top, the wheel by the wheelset.
+    ///
+    /// # Errors
+    /// A sentence, if the wheel's profile reaches its axle or is all beyond it.
+    pub fn new(rail: Profile, wheel: Profile, placement: Placement) -> Result<WheelRail, String> {
+        let lowest = wheel
+            .parameters(0.2)
+            .into_iter()
+            .map(|s| wheel.at(s).at[1])
+            .fold(f64::NEG_INFINITY, f64::max);
+        if lowest >= 0.9 * placement.rolling_radius {
+            return Err(format!(
+                "the wheel's profile reaches {lowest:.1} mm toward the axle of a wheel of {} mm radius",
+                placement.rolling_radius
+            ));
+        }
+        let canted = rail.turned(placement.cant);
+        let places: Vec<[f64; 2]> = canted
+            .parameters(0.05)
+            .into_iter()
+            .map(|s| canted.at(s).at)
+            .collect();
+        let top = places
+            .iter()
+            .map(|at| at[1])
+            .fold(f64::NEG_INFINITY, f64::max);
+        let gauge_point = places
+            .iter()
+            .filter(|at| at[1] >= top - placement.gauge_height)
+            .map(|at| at[0])
+            .fold(f64::INFINITY, f64::min);
+        let (yaw, roll) = (placement.yaw, placement.roll);
+        let axle = [-yaw.sin() * roll.cos(), yaw.cos() * roll.cos(), roll.sin()];
+        let across = axle[1].hypot(axle[2]);
+        Ok(WheelRail {
+            placement,
+            rail_given: rail,
+            rail: canted,
+            wheel,
+            rail_origin: [0.5 * placement.gauge - gauge_point, -top],
+            axle,
+            forward: [
+                across,
+                -axle[0] * axle[1] / across,
+                -axle[0] * axle[2] / across,
+            ],
+            down: [0.0, axle[2] / across, -axle[1] / across],
+        })
+    }
+
+    /// Unit vector along the axle, to the left.
+    #[must_use]
+    pub fn axle(&self) -> [f64; 3] {
+        self.axle
+    }
+
+    /// First and last parameter of the rail's and of the wheel's curve.
+    #[must_use]
+    pub fn ranges(&self) -> [[f64; 2]; 2] {
+        [self.rail.range(), self.wheel.range()]
+    }
+
+    /// Parameters at most `step` apart along the rail and the wheel.
+    #[must_use]
+    pub fn parameters(&self, step: f64) -> [Vec<f64>; 2] {
+        [self.rail.parameters(step), self.wheel.parameters(step)]
+    }
+
+    /// The rail's curve in track axes `[y, z]`, with derivatives to the parameter.
+    #[must_use]
+    pub fn rail_at(&self, s: f64) -> Place {
+        let sign = self.placement.side.sign();
+        let place = self.rail.at(s);
+        let turn = |[y, z]: [f64; 2]| [sign * y, z];
+        Place {
+            at: turn([
+                place.at[0] + self.rail_origin[0],
+                place.at[1] + self.rail_origin[1],
+            ]),
+            slope: turn(place.slope),
+            bend: turn(place.bend),
+        }
+    }
+
+    /// The wheel's meridian at a parameter of its profile.
+    #[must_use]
+    pub fn meridian(&self, s: f64) -> Meridian {
+        let sign = self.placement.side.sign();
+        let place = self.wheel.at(s);
+        let base = 0.5 * self.placement.flange_back_distance - self.placement.flange_back_position;
+        Meridian {
+            along: sign * (base + place.at[0]),
+            along_slope: sign * place.slope[0],
+            radius: self.placement.rolling_radius - place.at[1],
+            radius_slope: -place.slope[1],
+        }
+    }
+
+    /// The point of a wheel circle where the surface's normal has no part along x, relative to the wheel's centre but
+    /// shifted sideways with it: where the circle meets a rail that is straight along x. None where the yaw hides it.
+    #[must_use]
+    pub fn lowest(&self, s: f64) -> Option<[f64; 3]> {
+        let circle = self.meridian(s);
+        let across = self.axle[1].hypot(self.axle[2]);
+        let sin = circle.radius_slope * self.axle[0] / (circle.along_slope * across);
+        if sin.is_nan() || sin.abs() >= 1.0 {
+            return None;
+        }
+        let cos = (1.0 - sin * sin).sqrt();
+        let mut point = [0, 1, 2].map(|k| {
+            circle.along * self.axle[k]
+                + circle.radius * (cos * self.down[k] + sin * self.forward[k])
+        });
+        point[1] += self.placement.lateral_shift;
+        Some(point)
+    }
+
+    /// Position on the rail's profile as it was given (before cant): y to the field side, z down.
+    #[must_use]
+    pub fn on_rail(&self, s: f64) -> [f64; 2] {
+        let [y, z] = self.rail_given.at(s).at;
+        [y, -z]
+    }
+
+    /// Position on the wheel's profile: y to the field side, z down.
+    #[must_use]
+    pub fn on_wheel(&self, s: f64) -> [f64; 2] {
+        let [y, z] = self.wheel.at(s).at;
+        [y, -z]
+    }
+
+    /// Remarks on the two profiles.
+    #[must_use]
+    pub fn warnings(&self) -> Vec<String> {
+        let named = |name: &str, profile: &Profile| -> Vec<String> {
+            profile
+                .warnings
+                .iter()
+                .map(|warning| format!("{name}: {warning}"))
+                .collect()
+        };
+        [named("rail", &self.rail_given), named("wheel", &self.wheel)].concat()
+    }
+}

@@ -1,0 +1,371 @@
+//! `/v1/batches`: many cases in one request, followed and cancelled as one.
+
+use std::collections::BTreeMap;
+
+use axum::Json;
+use axum::body::Body;
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, StatusCode, Uri, header};
+use axum::response::{IntoResponse, Response};
+use futures_util::StreamExt;
+use serde::Serialize;
+use tokio::time::timeout;
+use utoipa::ToSchema;
+
+use crate::contact::case::Case;
+use crate::http::HttpOptions;
+use crate::http::body::{essence, read_strict};
+use crate::http::elements::{Element, Layout, Splitter};
+use crate::http::error::{ApiError, Kind};
+use crate::http::job::{BatchId, rfc3339};
+use crate::http::jobs::idempotency_key;
+use crate::http::problem::Fault;
+use crate::http::problems::problems;
+use crate::http::query::Query;
+use crate::jobs::Jobs;
+use crate::jobs::batch::{Batch, Draft};
+use crate::jobs::job::State as JobState;
+
+/// Cases are checked in portions of about this many bytes.
+const PORTION_BYTES: usize = 256 << 10;
+
+/// A batch that was accepted.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct BatchReceipt {
+    /// Identifier of the batch.
+    #[schema(value_type = String, format = "uuid")]
+    id: String,
+    /// Number of jobs made.
+    count: u32,
+    /// Number of faulty cases that were left out; 0 unless the request said `accept=valid`.
+    rejected: u32,
+    /// The faults of the cases that were left out, those of the first 1000.
+    errors: Vec<Fault>,
+    /// Where to go from here.
+    links: BTreeMap<String, String>,
+}
+
+/// A batch: how far it is.
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Batch)]
+pub struct BatchAnswer {
+    /// Identifier of the batch.
+    #[schema(value_type = String, format = "uuid")]
+    id: String,
+    /// Time of submission.
+    #[schema(format = "date-time", example = "2026-01-31T09:30:00.000Z")]
+    created_at: String,
+    /// Number of jobs made.
+    count: u32,
+    /// Number of faulty cases that were left out.
+    rejected: u32,
+    /// Number of jobs in each state.
+    states: BatchStates,
+    /// Share of the jobs that have ended.
+    #[schema(minimum = 0.0, maximum = 1.0)]
+    progress: f64,
+    /// Every job has ended.
+    ended: bool,
+    /// Where to go from here.
+    links: BTreeMap<String, String>,
+}
+
+/// Number of jobs in each state.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct BatchStates {
+    queued: u64,
+    running: u64,
+    succeeded: u64,
+    failed: u64,
+    cancelled: u64,
+}
+
+impl From<Batch> for BatchAnswer {
+    fn from(batch: Batch) -> Self {
+        let (ended, all) = batch.ended();
+        #[expect(clippy::cast_precision_loss, reason = "far fewer jobs than 2^53")]
+        let progress = if all == 0 {
+            1.0
+        } else {
+            ended as f64 / all as f64
+        };
+        BatchAnswer {
+            id: batch.id.to_string(),
+            created_at: rfc3339(batch.created_at),
+            count: batch.count,
+            rejected: batch.rejected,
+            states: BatchStates {
+                queued: batch.in_state(JobState::Queued),
+                running: batch.in_state(JobState::Running),
+                succeeded: batch.in_state(JobState::Succeeded),
+                failed: batch.in_state(JobState::Failed),
+                cancelled: batch.in_state(JobState::Cancelled),
+            },
+            progress,
+            ended: ended == all,
+            links: links(&batch),
+        }
+    }
+}
+
+fn links(batch: &Batch) -> BTreeMap<String, String> {
+    let own = format!("/v1/batches/{}", batch.id);
+    BTreeMap::from([
+        ("results".to_owned(), format!("{own}/results")),
+        ("cancel".to_owned(), format!("{own}/cancel")),
+        ("jobs".to_owned(), format!("/v1/jobs?batch={}", batch.id)),
+        ("self".to_owned(), own),
+    ])
+}
+
+problems! {
+    /// What `POST /v1/batches` can fail with.
+    BatchProblems: MalformedJson, UnreadableBody, BadQuery, BadHeader, BodyTimeout, BodyTooLarge, UnsupportedMediaType,
+    FaultyBatch, IdempotencyConflict, QueueFull, Draining
+}
+
+/// Submits many cases as one batch of jobs.
+///
+/// The body is a JSON array of cases or one case per line (`application/x-ndjson`); it is read as it arrives. All jobs of
+/// a batch answered with `202` are stored durably. Without `accept=valid` one faulty case refuses the whole batch (`422`), and
+/// nothing is stored; every fault names its case, and its line in NDJSON. A JSON array that is not JSON is `400`; a line that is not JSON is a faulty case.
+#[utoipa::path(
+    post,
+    path = "/v1/batches",
+    tag = "batches",
+    operation_id = "submit_batch",
+    params(
+        ("accept" = Option<String>, Query, description = "`all` (when left out): one faulty case refuses the batch; `valid`: faulty cases are left out and reported", example = "valid"),
+        ("Idempotency-Key" = Option<String>, Header, description = "1 to 255 visible ASCII characters. Repeating a request with the same key and the same cases answers the first batch instead of making another")
+    ),
+    request_body(content(
+        (Vec<Case> = "application/json"),
+        (String = "application/x-ndjson")
+    ), description = "Cases, at most 200 000, each of at most 8 MiB and together at most 1 GiB"),
+    responses(
+        (status = 202, description = "The jobs are stored and will be solved", body = BatchReceipt, headers(
+            ("Location" = String, description = "Path of the batch")
+        )),
+        BatchProblems
+    )
+)]
+pub async fn submit(
+    State(jobs): State<Jobs>,
+    State(options): State<HttpOptions>,
+    request: Request,
+) -> Result<Response, ApiError> {
+    let key = idempotency_key(request.headers())?;
+    let layout = layout(request.headers())?;
+    let valid_only = accept_valid(request.uri())?;
+    let draft = read_draft(&jobs, options, layout, request).await?;
+    if draft.cases == draft.rejected || (draft.rejected > 0 && !valid_only) {
+        return Err(refusal(&draft));
+    }
+    let errors = faults(&draft);
+    let batch = jobs.submit_batch(draft, key).await?;
+    let location = [(header::LOCATION, format!("/v1/batches/{}", batch.id))];
+    let receipt = BatchReceipt {
+        id: batch.id.to_string(),
+        count: batch.count,
+        rejected: batch.rejected,
+        errors,
+        links: links(&batch),
+    };
+    Ok((StatusCode::ACCEPTED, location, Json(receipt)).into_response())
+}
+
+fn accept_valid(uri: &Uri) -> Result<bool, ApiError> {
+    let mut query = Query::read(uri, &["accept"]);
+    let valid = query.take("accept", "`all` or `valid`", |text| match text {
+        "all" => Some(false),
+        "valid" => Some(true),
+        _ => None,
+    });
+    query.finish()?;
+    Ok(valid.unwrap_or(false))
+}
+
+fn layout(headers: &HeaderMap) -> Result<Layout, ApiError> {
+    match essence(headers).as_str() {
+        "application/json" => Ok(Layout::Array),
+        "application/x-ndjson" | "application/ndjson" | "application/jsonl" => Ok(Layout::Lines),
+        other => Err(ApiError::new(
+            Kind::UnsupportedMediaType,
+            format!(
+                "the content type is `{other}`; send an array with `application/json` or one case per line with `application/x-ndjson`"
+            ),
+        )),
+    }
+}
+
+/// Reads and checks the body as it arrives.
+async fn read_draft(
+    jobs: &Jobs,
+    options: HttpOptions,
+    layout: Layout,
+    request: Request<Body>,
+) -> Result<Draft, ApiError> {
+    let too_large = || {
+        ApiError::new(
+            Kind::BodyTooLarge,
+            format!(
+                "the body is larger than the {} bytes that are allowed for one batch",
+                options.batch_max_bytes
+            ),
+        )
+    };
+    let declared = request.headers().get(header::CONTENT_LENGTH);
+    let declared = declared.and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
+    if declared.is_some_and(|length| length > options.batch_max_bytes) {
+        return Err(too_large());
+    }
+    let mut draft = jobs.draft()?;
+    let mut splitter = Splitter::new(layout, options.body_max_bytes);
+    let mut pieces = request.into_body().into_data_stream();
+    let mut portion = Vec::new();
+    let (mut total, mut held) = (0_u64, 0);
+    loop {
+        let piece = timeout(options.body_timeout, pieces.next()).await;
+        let piece = piece.map_err(|_| {
+            ApiError::new(
+                Kind::BodyTimeout,
+                format!(
+                    "nothing of the body arrived for {} s",
+                    options.body_timeout.as_secs_f64()
+                ),
+            )
+        })?;
+        let Some(piece) = piece else { break };
+        let piece =
+            piece.map_err(|error| ApiError::new(Kind::UnreadableBody, error.to_string()))?;
+        total += piece.len() as u64;
+        if total > options.batch_max_bytes {
+            return Err(too_large());
+        }
+        held += piece.len();
+        splitter.feed(&piece, &mut portion)?;
+        if held >= PORTION_BYTES {
+            held = 0;
+            draft = check(jobs, draft, layout, std::mem::take(&mut portion)).await?;
+            require_count(&draft, options)?;
+        }
+    }
+    splitter.end(&mut portion)?;
+    draft = check(jobs, draft, layout, portion).await?;
+    require_count(&draft, options)?;
+    Ok(draft)
+}
+
+fn require_count(draft: &Draft, options: HttpOptions) -> Result<(), ApiError> {
+    if draft.cases <= options.batch_max_cases {
+        return Ok(());
+    }
+    Err(ApiError::new(
+        Kind::BodyTooLarge,
+        format!(
+            "the batch has more than the {} cases that are allowed",
+            options.batch_max_cases
+        ),
+    ))
+}
+
+/// Checks some cases off the threads that answer requests.
+async fn check(
+    jobs: &Jobs,
+    mut draft: Draft,
+    layout: Layout,
+    portion: Vec<Element>,
+) -> Result<Draft, ApiError> {
+    let jobs = jobs.clone();
+    let checked = tokio::task::spawn_blocking(move || {
+        for element in portion {
+            let case = read_strict(&element.text);
+            let case = match (case, layout) {
+                (Err(error), Layout::Array) => {
+                    return Err(ApiError::malformed_element(draft.cases, &error));
+                }
+                (case, _) => case.map_err(|error| format!("the line is not JSON: {error}")),
+            };
+            draft.add(&jobs, element.line, &element.text, case)?;
+        }
+        Ok(draft)
+    });
+    checked.await.map_err(|error| ApiError::internal(&error))?
+}
+
+/// Why a batch is not taken.
+fn refusal(draft: &Draft) -> ApiError {
+    if draft.cases == 0 {
+        return ApiError::new(Kind::FaultyBatch, "the batch has no case");
+    }
+    let kept = draft.faulty.len();
+    let more = match draft.rejected as usize - kept {
+        0 => String::new(),
+        _ => format!("; the faults of the first {kept} of them are listed"),
+    };
+    ApiError::faulty_batch(
+        format!(
+            "{} of {} cases have faults, so nothing was stored{more}",
+            draft.rejected, draft.cases
+        ),
+        faults(draft),
+    )
+}
+
+fn faults(draft: &Draft) -> Vec<Fault> {
+    let cases = draft.faulty.iter();
+    let faults = cases.flat_map(|case| {
+        case.faults.iter().map(|fault| Fault {
+            pointer: Some(format!("/{}{}", case.index, fault.pointer)),
+            parameter: None,
+            header: None,
+            line: case.line,
+            detail: fault.detail.clone(),
+        })
+    });
+    faults.collect()
+}
+
+problems! {
+    /// What looking at a batch can fail with.
+    LookBatchProblems: BatchNotFound
+}
+
+/// Looks at a batch.
+#[utoipa::path(
+    get,
+    path = "/v1/batches/{id}",
+    tag = "batches",
+    operation_id = "get_batch",
+    params(("id" = String, Path, description = "Id of the batch", format = "uuid")),
+    responses((status = 200, description = "The batch", body = BatchAnswer), LookBatchProblems)
+)]
+pub async fn look(
+    State(jobs): State<Jobs>,
+    BatchId(id): BatchId,
+) -> Result<Json<BatchAnswer>, ApiError> {
+    Ok(Json(jobs.batch(id).await?.into()))
+}
+
+/// Stops all jobs of a batch that have not ended. Those that have ended stay as they are.
+#[utoipa::path(
+    post,
+    path = "/v1/batches/{id}/cancel",
+    tag = "batches",
+    operation_id = "cancel_batch",
+    params(("id" = String, Path, description = "Id of the batch", format = "uuid")),
+    responses(
+        (status = 200, description = "Every job has ended", body = BatchAnswer),
+        (status = 202, description = "The running jobs will stop shortly", body = BatchAnswer),
+        LookBatchProblems
+    )
+)]
+pub async fn cancel(State(jobs): State<Jobs>, BatchId(id): BatchId) -> Result<Response, ApiError> {
+    let batch: BatchAnswer = jobs.cancel_batch(id).await?.into();
+    let status = if batch.ended {
+        StatusCode::OK
+    } else {
+        StatusCode::ACCEPTED
+    };
+    Ok((status, Json(batch)).into_response())
+}

@@ -1,0 +1,266 @@
+//! Small jobs in groups: claimed together, solved one after the other on the worker's thread, ended together.
+//!
+//! A small job is solved faster than a transaction is written, so one transaction serves many. The promises stay: each
+//! job has its own fence, its own watch and its own end. A group that dies goes back to the queue uncounted and its
+//! jobs are then taken one at a time, so that only a job that dies alone counts an attempt.
+
+use std::collections::HashSet;
+use std::pin::pin;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+use tokio::sync::oneshot;
+use tokio::time::{MissedTickBehavior, interval, sleep};
+use tracing::Instrument;
+use uuid::Uuid;
+
+use crate::jobs::error::JobsError;
+use crate::jobs::now_ms;
+use crate::jobs::solver_thread::{Outcome, SolverThread, solve_guarded};
+use crate::jobs::store::sqlite::groups::GroupBounds;
+use crate::jobs::store::{Claim, Ending};
+use crate::jobs::watch::{Reason, Watch};
+use crate::jobs::worker::{
+    FIRST_PAUSE, PATIENCE, Registered, Verdict, WRITE_TRIES, Worker, heartbeat, judge, lease_ms,
+    not_stored,
+};
+
+/// Largest sum of expected solve times in a group, in µs.
+const GROUP_COST_US: u64 = 200_000;
+/// A group that takes longer hands back what it has not begun.
+const GROUP_TIME: Duration = Duration::from_millis(400);
+
+/// One job of a group.
+struct Member {
+    claim: Claim,
+    watch: Arc<Watch>,
+    body: Bytes,
+    _registered: Registered,
+}
+
+impl Worker {
+    /// Claims a job or a group of small ones and sees them to their end; `false` if nothing was queued.
+    ///
+    /// # Errors
+    /// The database failed; claimed jobs are then taken back when their lease runs out.
+    pub(super) async fn group_step(&mut self) -> Result<bool, JobsError> {
+        let options = &self.shared.options;
+        let bounds = GroupBounds {
+            jobs: options.group_max.max(1),
+            cost_us: GROUP_COST_US,
+            workers: options.workers,
+        };
+        let lease = lease_ms(&self.shared);
+        let mut claims = self
+            .shared
+            .store
+            .claim_group(&self.name, now_ms(), lease, bounds)
+            .await?;
+        match claims.len() {
+            0 => return Ok(false),
+            1 => {
+                let claim = claims.remove(0);
+                let span = tracing::info_span!("job", job = %claim.id, attempt = claim.attempt, method = claim.method);
+                self.attempt(&claim).instrument(span).await?;
+            }
+            _ => self.attempt_group(claims).await?,
+        }
+        Ok(true)
+    }
+
+    async fn attempt_group(&mut self, claims: Vec<Claim>) -> Result<(), JobsError> {
+        let start = Instant::now();
+        let registered: Vec<_> = claims
+            .into_iter()
+            .map(|claim| {
+                let watch = Arc::new(Watch::default());
+                let registered = Registered::new(&self.shared, claim.id, &watch);
+                (claim, watch, registered)
+            })
+            .collect();
+        // Read after registering: a cancellation is either seen here or finds the watch.
+        let ids: Vec<_> = registered.iter().map(|(claim, ..)| claim.id).collect();
+        let mut cases = self.shared.store.cases(&ids).await?;
+        let members = registered
+            .into_iter()
+            .filter_map(|(claim, watch, registered)| {
+                let (body, cancel_requested) = cases.remove(&claim.id)?;
+                if cancel_requested {
+                    watch.stop(Reason::Cancel);
+                }
+                Some(Member {
+                    claim,
+                    watch,
+                    body,
+                    _registered: registered,
+                })
+            });
+        let members: Vec<Member> = members.collect();
+        let outcomes = self.solve_group(&members).await?;
+        let solved = outcomes.len();
+        let ended = self.record_group(&members, outcomes).await?;
+        tracing::info!(
+            worker = self.name,
+            jobs = members.len(),
+            solved,
+            ended,
+            seconds = start.elapsed().as_secs_f64(),
+            "group ended"
+        );
+        Ok(())
+    }
+
+    /// Has the cases solved on the solver thread and keeps the leases meanwhile. Returns the outcomes of the first
+    /// jobs; the others were not begun.
+    async fn solve_group(&mut self, members: &[Member]) -> Result<Vec<Outcome>, JobsError> {
+        let (reply, outcomes) = oneshot::channel();
+        let begun = Arc::new(AtomicUsize::new(0));
+        let task = {
+            let (shared, begun) = (self.shared.clone(), begun.clone());
+            let work: Vec<_> = members
+                .iter()
+                .map(|member| (member.watch.clone(), member.body.clone()))
+                .collect();
+            Box::new(move || {
+                let start = Instant::now();
+                let mut outcomes = Vec::with_capacity(work.len());
+                for (watch, body) in work {
+                    if start.elapsed() > GROUP_TIME || shared.stopping.is_cancelled() {
+                        break;
+                    }
+                    begun.fetch_add(1, Ordering::AcqRel);
+                    outcomes.push(solve_guarded(&shared, &watch, &body));
+                }
+                // An abandoned group has nobody listening.
+                let _ = reply.send(outcomes);
+            })
+        };
+        if !self.thread.give(task) {
+            self.thread = SolverThread::start(&self.name)?;
+            return Ok(Vec::new());
+        }
+        let mut outcomes = pin!(outcomes);
+        let mut beat = interval(heartbeat(&self.shared));
+        beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut until = now_ms().saturating_add(lease_ms(&self.shared));
+        let mut seen = 0;
+        let mut told = false;
+        let mut patience = pin!(sleep(Duration::ZERO));
+        loop {
+            let mut lost = false;
+            tokio::select! {
+                biased;
+                outcomes = &mut outcomes => return Ok(outcomes.unwrap_or_default()),
+                _ = beat.tick() => {
+                    let ticks = begun.load(Ordering::Acquire) as u64
+                        + members.iter().map(|member| member.watch.ticks()).sum::<u64>();
+                    if ticks != seen {
+                        seen = ticks;
+                        self.renew_group(members, &mut until).await;
+                    }
+                    lost = now_ms() >= until;
+                }
+                () = self.shared.stopping.cancelled(), if !told => {}
+                () = &mut patience, if told => {
+                    tracing::warn!("the solver does not stop; its thread is left behind");
+                    self.thread = SolverThread::start(&self.name)?;
+                    return Ok(Vec::new());
+                }
+            }
+            let stopping = self.shared.stopping.is_cancelled();
+            if (stopping || lost) && !told {
+                let reason = if lost { Reason::Lost } else { Reason::Shutdown };
+                for member in members {
+                    member.watch.stop(reason);
+                }
+                told = true;
+                patience.set(sleep(PATIENCE));
+            }
+        }
+    }
+
+    async fn renew_group(&self, members: &[Member], until: &mut i64) {
+        let claims: Vec<_> = members.iter().map(|member| member.claim.clone()).collect();
+        let (now, lease) = (now_ms(), lease_ms(&self.shared));
+        match self.shared.store.renew_group(&claims, now, lease).await {
+            Ok(held) => {
+                *until = now.saturating_add(lease);
+                for member in members {
+                    match held.get(&member.claim.id) {
+                        Some(true) => member.watch.stop(Reason::Cancel),
+                        Some(false) => {}
+                        None => member.watch.stop(Reason::Lost),
+                    }
+                }
+            }
+            Err(error) => tracing::warn!(%error, "leases could not be renewed"),
+        }
+    }
+
+    /// Writes down what became of a group; returns how many jobs ended.
+    async fn record_group(
+        &self,
+        members: &[Member],
+        outcomes: Vec<Outcome>,
+    ) -> Result<usize, JobsError> {
+        let mut ends = Vec::with_capacity(outcomes.len());
+        let mut back: Vec<&Member> = members[outcomes.len()..]
+            .iter()
+            .filter(|member| member.watch.reason() != Some(Reason::Lost))
+            .collect();
+        for (member, outcome) in members.iter().zip(outcomes) {
+            let ending = match judge(outcome, &member.watch) {
+                Verdict::Lost => continue,
+                Verdict::HandBack => {
+                    back.push(member);
+                    continue;
+                }
+                Verdict::End(ending) => ending,
+                Verdict::Keep {
+                    result,
+                    warnings,
+                    field_patches,
+                } => match self.place(&member.claim, &member.watch, result).await {
+                    Ok(result) => Ending::Succeeded {
+                        warnings,
+                        result,
+                        field_patches,
+                    },
+                    Err(error) => not_stored(&error),
+                },
+            };
+            ends.push((member.claim.clone(), ending));
+        }
+        let ended = self.finish_group(&ends).await?;
+        for (claim, ending) in &ends {
+            if ended.contains(&claim.id) {
+                if claim.lease_number > 1 {
+                    self.remove_earlier(claim.id, ending).await;
+                }
+                self.shared.announce(claim.id);
+            }
+        }
+        for member in back {
+            self.hand_back(&member.claim).await?;
+        }
+        Ok(ended.len())
+    }
+
+    /// Ends the jobs in the table; a database that fails for a moment does not cost the results.
+    async fn finish_group(&self, ends: &[(Claim, Ending)]) -> Result<HashSet<Uuid>, JobsError> {
+        let mut pause = FIRST_PAUSE;
+        for _ in 1..WRITE_TRIES {
+            match self.shared.store.finish_group(ends, now_ms()).await {
+                Err(JobsError::Database(error)) => {
+                    tracing::warn!(%error, "ends of a group could not be written yet");
+                }
+                written => return written,
+            }
+            sleep(pause).await;
+            pause *= 2;
+        }
+        self.shared.store.finish_group(ends, now_ms()).await
+    }
+}

@@ -1,0 +1,119 @@
+//! Checked cases of a batch on their way to the job table: a nameless file, so that a batch of any size needs little
+//! memory and leaves nothing behind, however the process ends.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, BufWriter, Read, Result, Seek, SeekFrom, Write};
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+/// What the job table needs to know of a case besides its text.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Card {
+    pub(super) index: u32,
+    pub(super) name: Option<String>,
+    pub(super) labels: BTreeMap<String, String>,
+    pub(super) method: String,
+    pub(super) outputs: String,
+    pub(super) cost_us: u32,
+}
+
+/// Cards and cases, first in, first out.
+#[derive(Debug)]
+pub(super) struct Spool(BufWriter<File>);
+
+impl Spool {
+    /// Makes an empty spool in a folder.
+    pub(super) fn new(folder: &Path) -> Result<Spool> {
+        let path = folder.join(format!("spool-{}", uuid::Uuid::now_v7()));
+        let file = File::options()
+            .read(true)
+            .write(true)
+            .create_new(true)
+            .open(&path)?;
+        std::fs::remove_file(&path)?;
+        Ok(Spool(BufWriter::with_capacity(1 << 18, file)))
+    }
+
+    /// Appends a case.
+    pub(super) fn push(&mut self, card: &Card, case: &[u8]) -> Result<()> {
+        for part in [serde_json::to_vec(card)?.as_slice(), case] {
+            self.0.write_all(&(part.len() as u64).to_le_bytes())?;
+            self.0.write_all(part)?;
+        }
+        Ok(())
+    }
+
+    /// Ends the writing and reads from the beginning.
+    pub(super) fn into_reader(self) -> Result<SpoolReader> {
+        let mut file = self.0.into_inner()?;
+        file.seek(SeekFrom::Start(0))?;
+        Ok(SpoolReader(BufReader::with_capacity(1 << 18, file)))
+    }
+}
+
+/// A spool being emptied.
+#[derive(Debug)]
+pub(super) struct SpoolReader(BufReader<File>);
+
+impl SpoolReader {
+    /// The next cases: at most `jobs`, and no further one once `bytes` are reached.
+    pub(super) fn take(&mut self, jobs: usize, bytes: usize) -> Result<Vec<(Card, Vec<u8>)>> {
+        let mut taken = Vec::new();
+        let mut size = 0;
+        while taken.len() < jobs && size < bytes {
+            let Some(card) = self.part()? else { break };
+            let case = self.part()?.unwrap_or_default();
+            size += case.len();
+            taken.push((serde_json::from_slice(&card)?, case));
+        }
+        Ok(taken)
+    }
+
+    fn part(&mut self) -> Result<Option<Vec<u8>>> {
+        let mut length = [0; 8];
+        match self.0.read_exact(&mut length) {
+            Err(error) if error.kind() == std::io::ErrorKind::UnexpectedEof => return Ok(None),
+            read => read?,
+        }
+        let mut part = vec![0; usize::try_from(u64::from_le_bytes(length)).unwrap_or(0)];
+        self.0.read_exact(&mut part)?;
+        Ok(Some(part))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_goes_in_comes_out_in_order_and_no_file_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut spool = Spool::new(folder.path()).unwrap();
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+        let card = |index| Card {
+            index,
+            name: Some("a\nb".to_owned()),
+            labels: BTreeMap::new(),
+            method: "auto".to_owned(),
+            outputs: "[]".to_owned(),
+            cost_us: 7,
+        };
+        for index in 0..5 {
+            spool
+                .push(&card(index), &vec![b'x'; index as usize])
+                .unwrap();
+        }
+        let mut reader = spool.into_reader().unwrap();
+        let first = reader.take(2, usize::MAX).unwrap();
+        let second = reader.take(9, 3).unwrap();
+        let rest = reader.take(9, usize::MAX).unwrap();
+        assert_eq!([first.len(), second.len(), rest.len()], [2, 2, 1]);
+        let all = [first, second, rest].concat();
+        for (index, (read, case)) in (0..).zip(all) {
+            assert_eq!((read, case.len()), (card(index), index as usize));
+        }
+        assert!(reader.take(1, 1).unwrap().is_empty());
+    }
+}

@@ -1,0 +1,248 @@
+//! Batches in the embedded job table: filled piece by piece, acknowledged once they are complete.
+//!
+//! The jobs of a batch may be claimed while it is being filled. A batch that a dead process left incomplete was never
+//! acknowledged and is removed with its jobs.
+
+use std::collections::BTreeMap;
+
+use sqlx::{QueryBuilder, Row, Sqlite};
+use uuid::Uuid;
+
+use crate::jobs::batch::{Batch, Line};
+use crate::jobs::error::JobsError;
+use crate::jobs::job::State;
+use crate::jobs::store::sqlite::SqliteStore;
+use crate::jobs::store::sqlite::rows::{
+    job_columns, read_count, read_id, read_job, read_state, to_json,
+};
+use crate::jobs::store::{Begun, NewBatch, NewJob};
+
+/// Jobs in one statement; with 10 values each far below the bound of SQLite.
+const ROWS_PER_STATEMENT: usize = 250;
+
+impl SqliteStore {
+    /// Begins a batch, or finds the one its idempotency key stands for.
+    ///
+    /// # Errors
+    /// The database failed; nothing was stored.
+    pub async fn begin_batch(&self, new: &NewBatch) -> Result<Begun, JobsError> {
+        let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
+        if let Some((key, digest)) = &new.idempotency {
+            let row = sqlx::query(
+                "SELECT digest, id, complete FROM batch_keys JOIN batches ON batches.id = batch_keys.batch_id WHERE key = $1",
+            )
+            .bind(key)
+            .fetch_optional(&mut *transaction)
+            .await?;
+            if let Some(row) = row {
+                let stored: Vec<u8> = row.try_get("digest")?;
+                return Ok(if stored != digest {
+                    Begun::Conflict
+                } else if row.try_get("complete")? {
+                    Begun::Existing(read_id(&row)?)
+                } else {
+                    Begun::Unfinished
+                });
+            }
+        }
+        sqlx::query(
+            "INSERT INTO batches (id, created_at, count, rejected) VALUES ($1, $2, $3, $4)",
+        )
+        .bind(new.id.to_string())
+        .bind(new.created_at)
+        .bind(new.count)
+        .bind(new.rejected)
+        .execute(&mut *transaction)
+        .await?;
+        if let Some((key, digest)) = &new.idempotency {
+            sqlx::query("INSERT INTO batch_keys (key, digest, batch_id) VALUES ($1, $2, $3)")
+                .bind(key)
+                .bind(digest.as_slice())
+                .bind(new.id.to_string())
+                .execute(&mut *transaction)
+                .await?;
+        }
+        transaction.commit().await?;
+        Ok(Begun::Created)
+    }
+
+    /// Queues jobs of a batch with their places in it, all or none.
+    ///
+    /// # Errors
+    /// The database failed; nothing was stored.
+    pub async fn enqueue_many(&self, batch: Uuid, jobs: &[(u32, NewJob)]) -> Result<(), JobsError> {
+        let batch = batch.to_string();
+        let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
+        for some in jobs.chunks(ROWS_PER_STATEMENT) {
+            let labels = some
+                .iter()
+                .map(|(_, job)| to_json(&job.labels))
+                .collect::<Result<Vec<_>, _>>()?;
+            let mut rows = QueryBuilder::<Sqlite>::new(
+                "INSERT INTO jobs (id, state, name, labels, method, created_at, batch_id, batch_index, cost_us, outputs) ",
+            );
+            rows.push_values(
+                some.iter().zip(labels),
+                |mut row, ((index, job), labels)| {
+                    row.push_bind(job.id.to_string())
+                        .push("'queued'")
+                        .push_bind(&job.name)
+                        .push_bind(labels)
+                        .push_bind(&job.method)
+                        .push_bind(job.created_at)
+                        .push_bind(&batch)
+                        .push_bind(*index)
+                        .push_bind(job.cost_us)
+                        .push_bind(&job.outputs);
+                },
+            );
+            rows.build().execute(&mut *transaction).await?;
+            let mut cases = QueryBuilder::<Sqlite>::new("INSERT INTO cases (job_id, body) ");
+            cases.push_values(some, |mut row, (_, job)| {
+                row.push_bind(job.id.to_string())
+                    .push_bind(job.body.as_ref());
+            });
+            cases.build().execute(&mut *transaction).await?;
+            let labels: Vec<_> = some
+                .iter()
+                .flat_map(|(_, job)| job.labels.iter().map(|label| (job.id, label)))
+                .collect();
+            for some in labels.chunks(ROWS_PER_STATEMENT) {
+                let mut rows =
+                    QueryBuilder::<Sqlite>::new("INSERT INTO job_labels (key, value, job_id) ");
+                rows.push_values(some, |mut row, (id, (key, value))| {
+                    row.push_bind(*key)
+                        .push_bind(*value)
+                        .push_bind(id.to_string());
+                });
+                rows.build().execute(&mut *transaction).await?;
+            }
+        }
+        transaction.commit().await?;
+        Ok(())
+    }
+
+    /// Marks a batch as complete. Durable once it returns.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn complete_batch(&self, id: Uuid) -> Result<(), JobsError> {
+        sqlx::query("UPDATE batches SET complete = 1 WHERE id = $1")
+            .bind(id.to_string())
+            .execute(&self.writer)
+            .await?;
+        Ok(())
+    }
+
+    /// Removes a batch that could not be completed, with its jobs.
+    ///
+    /// # Errors
+    /// The database failed; the next start will try again.
+    pub async fn drop_batch(&self, id: Uuid) -> Result<(), JobsError> {
+        sqlx::query("DELETE FROM batches WHERE id = $1 AND complete = 0")
+            .bind(id.to_string())
+            .execute(&self.writer)
+            .await?;
+        Ok(())
+    }
+
+    /// Removes every incomplete batch with its jobs; returns how many there were.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn drop_incomplete_batches(&self) -> Result<u64, JobsError> {
+        let gone = sqlx::query("DELETE FROM batches WHERE complete = 0")
+            .execute(&self.writer)
+            .await?;
+        Ok(gone.rows_affected())
+    }
+
+    /// Looks at a complete batch.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn batch(&self, id: Uuid) -> Result<Option<Batch>, JobsError> {
+        let row = sqlx::query(
+            "SELECT id, created_at, count, rejected FROM batches WHERE id = $1 AND complete = 1",
+        )
+        .bind(id.to_string())
+        .fetch_optional(&self.readers)
+        .await?;
+        let Some(row) = row else { return Ok(None) };
+        let rows = sqlx::query(
+            "SELECT state, COUNT(*) AS jobs FROM jobs WHERE batch_id = $1 GROUP BY state",
+        )
+        .bind(id.to_string())
+        .fetch_all(&self.readers)
+        .await?;
+        let mut states: BTreeMap<State, u64> =
+            State::ALL.into_iter().map(|state| (state, 0)).collect();
+        for row in &rows {
+            states.insert(read_state(row)?, read_count(row, "jobs")?);
+        }
+        Ok(Some(Batch {
+            id,
+            created_at: row.try_get("created_at")?,
+            count: row.try_get("count")?,
+            rejected: row.try_get("rejected")?,
+            states,
+        }))
+    }
+
+    /// Cancels the queued jobs of a batch and asks the workers of the running ones to stop; returns both with their
+    /// states.
+    ///
+    /// # Errors
+    /// The database failed; nothing changed.
+    pub async fn cancel_batch(&self, id: Uuid, now: i64) -> Result<Vec<(Uuid, State)>, JobsError> {
+        let rows = sqlx::query(
+            "UPDATE jobs SET state = CASE WHEN state = 'queued' THEN 'cancelled' ELSE state END, \
+             ended_at = CASE WHEN state = 'queued' THEN $1 ELSE NULL END, \
+             cancel_requested = 1, version = version + 1 \
+             WHERE batch_id = $2 AND cancel_requested = 0 AND state IN ('queued', 'running') RETURNING id, state",
+        )
+        .bind(now)
+        .bind(id.to_string())
+        .fetch_all(&self.writer)
+        .await?;
+        rows.iter()
+            .map(|row| Ok((read_id(row)?, read_state(row)?)))
+            .collect()
+    }
+
+    /// The next jobs of a batch in the order they were sent, with the solutions that lie in the database.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn batch_lines(
+        &self,
+        id: Uuid,
+        after: Option<Uuid>,
+        limit: u32,
+    ) -> Result<Vec<Line>, JobsError> {
+        let rows = sqlx::query(concat!(
+            "SELECT ",
+            job_columns!(),
+            ", batch_index, outputs, result_key, field_patches, solution FROM jobs \
+             LEFT JOIN results ON results.job_id = jobs.id \
+             WHERE batch_id = $1 AND id > $2 ORDER BY id LIMIT $3"
+        ))
+        .bind(id.to_string())
+        .bind(after.map_or_else(String::new, |id| id.to_string()))
+        .bind(limit)
+        .fetch_all(&self.readers)
+        .await?;
+        rows.iter()
+            .map(|row| {
+                let solution: Option<Vec<u8>> = row.try_get("solution")?;
+                Ok(Line {
+                    index: row.try_get("batch_index")?,
+                    job: read_job(row)?,
+                    outputs: row.try_get("outputs")?,
+                    folder: row.try_get("result_key")?,
+                    solution: solution.map(Into::into),
+                })
+            })
+            .collect()
+    }
+}

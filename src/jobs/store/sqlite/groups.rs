@@ -1,0 +1,238 @@
+//! Claims and ends of small jobs in groups: one transaction, and so one write to the disk, for all of them.
+
+use std::collections::{HashMap, HashSet};
+
+use bytes::Bytes;
+use sqlx::sqlite::SqliteRow;
+use sqlx::{QueryBuilder, Row, Sqlite};
+use uuid::Uuid;
+
+use crate::jobs::error::JobsError;
+use crate::jobs::store::sqlite::SqliteStore;
+use crate::jobs::store::sqlite::claims::{EndRow, fence};
+use crate::jobs::store::sqlite::rows::{read_count, read_id};
+use crate::jobs::store::{Claim, Ending};
+
+/// The oldest queued jobs.
+pub(super) const PEEK: &str =
+    "SELECT id, alone, cost_us FROM jobs WHERE state = 'queued' ORDER BY id LIMIT $1";
+
+/// How large a group may be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GroupBounds {
+    /// Most jobs.
+    pub jobs: usize,
+    /// Largest sum of the expected solve times in µs.
+    pub cost_us: u64,
+    /// Workers among which the queue is shared.
+    pub workers: usize,
+}
+
+impl SqliteStore {
+    /// Claims the oldest queued job for `lease_ms` milliseconds.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn claim(
+        &self,
+        worker: &str,
+        now: i64,
+        lease_ms: i64,
+    ) -> Result<Option<Claim>, JobsError> {
+        let one = GroupBounds {
+            jobs: 1,
+            cost_us: 0,
+            workers: 1,
+        };
+        Ok(self.claim_group(worker, now, lease_ms, one).await?.pop())
+    }
+
+    /// Claims the oldest queued job together with those behind it that are as small, oldest first. A job whose group
+    /// died comes alone.
+    ///
+    /// # Errors
+    /// The database failed; nothing changed.
+    pub async fn claim_group(
+        &self,
+        worker: &str,
+        now: i64,
+        lease_ms: i64,
+        bounds: GroupBounds,
+    ) -> Result<Vec<Claim>, JobsError> {
+        let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
+        let look = bounds.jobs.saturating_mul(bounds.workers.max(1));
+        let queued = sqlx::query(PEEK)
+            .bind(i64::try_from(look).unwrap_or(i64::MAX))
+            .fetch_all(&mut *transaction)
+            .await?;
+        let ids = choose(&queued, bounds)?;
+        if ids.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut update = QueryBuilder::<Sqlite>::new(
+            "UPDATE jobs SET state = 'running', attempt = attempt + 1, lease_number = lease_number + 1, lease_until = ",
+        );
+        update.push_bind(now.saturating_add(lease_ms));
+        update.push(", worker = ").push_bind(worker);
+        update.push(", started_at = ").push_bind(now);
+        update.push(", group_size = ");
+        update.push_bind(i64::try_from(ids.len()).unwrap_or(i64::MAX));
+        update.push(", progress = 0, version = version + 1 WHERE id IN (");
+        push_list(&mut update, &ids);
+        update.push(") RETURNING id, attempt, lease_number, method");
+        let rows = update.build().fetch_all(&mut *transaction).await?;
+        transaction.commit().await?;
+        let mut claims = rows
+            .iter()
+            .map(|row| {
+                Ok(Claim {
+                    id: read_id(row)?,
+                    attempt: row.try_get("attempt")?,
+                    lease_number: read_count(row, "lease_number")?,
+                    method: row.try_get("method")?,
+                })
+            })
+            .collect::<Result<Vec<_>, JobsError>>()?;
+        claims.sort_unstable_by_key(|claim| claim.id);
+        Ok(claims)
+    }
+
+    /// The cases of jobs, and whether their cancellation was asked for.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn cases(&self, ids: &[Uuid]) -> Result<HashMap<Uuid, (Bytes, bool)>, JobsError> {
+        let mut query = QueryBuilder::<Sqlite>::new(
+            "SELECT id, body, cancel_requested FROM cases JOIN jobs ON jobs.id = cases.job_id WHERE job_id IN (",
+        );
+        push_list(&mut query, ids);
+        query.push(")");
+        let rows = query.build().fetch_all(&self.readers).await?;
+        rows.iter()
+            .map(|row| {
+                let body: Vec<u8> = row.try_get("body")?;
+                let case = (Bytes::from(body), row.try_get("cancel_requested")?);
+                Ok((read_id(row)?, case))
+            })
+            .collect()
+    }
+
+    /// Extends the leases of a group. Returns the jobs still held, with whether their cancellation was asked for.
+    ///
+    /// # Errors
+    /// The database failed; the leases stand as they were.
+    pub async fn renew_group(
+        &self,
+        claims: &[Claim],
+        now: i64,
+        lease_ms: i64,
+    ) -> Result<HashMap<Uuid, bool>, JobsError> {
+        let mut query = QueryBuilder::<Sqlite>::new("WITH held (id, lease_number) AS (");
+        query.push_values(claims, |mut row, claim| {
+            row.push_bind(claim.id.to_string()).push_bind(fence(claim));
+        });
+        query.push(") UPDATE jobs SET lease_until = ");
+        query.push_bind(now.saturating_add(lease_ms));
+        query.push(
+            " FROM held WHERE jobs.id = held.id AND jobs.lease_number = held.lease_number \
+             AND jobs.state = 'running' RETURNING id, cancel_requested",
+        );
+        let rows = query.build().fetch_all(&self.writer).await?;
+        rows.iter()
+            .map(|row| Ok((read_id(row)?, row.try_get("cancel_requested")?)))
+            .collect()
+    }
+
+    /// Ends jobs, all in one transaction. Returns those that ended; the others' leases were lost and nothing of them
+    /// changed.
+    ///
+    /// # Errors
+    /// The database failed; nothing changed.
+    pub async fn finish_group(
+        &self,
+        ends: &[(Claim, Ending)],
+        now: i64,
+    ) -> Result<HashSet<Uuid>, JobsError> {
+        if ends.is_empty() {
+            return Ok(HashSet::new());
+        }
+        let rows = ends
+            .iter()
+            .map(|(claim, ending)| Ok((claim, EndRow::of(ending)?)))
+            .collect::<Result<Vec<_>, JobsError>>()?;
+        let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
+        let mut update = QueryBuilder::<Sqlite>::new(
+            "WITH done (id, lease_number, state, warnings, failure, folder, patches) AS (",
+        );
+        update.push_values(&rows, |mut row, (claim, end)| {
+            row.push_bind(claim.id.to_string())
+                .push_bind(fence(claim))
+                .push_bind(end.state.name())
+                .push_bind(&end.warnings)
+                .push_bind(&end.failure)
+                .push_bind(end.folder)
+                .push_bind(end.field_patches);
+        });
+        update.push(") UPDATE jobs SET state = done.state, ended_at = ");
+        update.push_bind(now);
+        update.push(
+            ", warnings = done.warnings, failure = done.failure, result_key = done.folder, \
+             field_patches = done.patches, \
+             progress = CASE WHEN done.state = 'succeeded' THEN 1.0 ELSE progress END, \
+             lease_until = NULL, worker = NULL, version = version + 1 \
+             FROM done WHERE jobs.id = done.id AND jobs.lease_number = done.lease_number \
+             AND jobs.state = 'running' RETURNING id",
+        );
+        let ended = update.build().fetch_all(&mut *transaction).await?;
+        let ended = ended
+            .iter()
+            .map(read_id)
+            .collect::<Result<HashSet<_>, _>>()?;
+        let inside: Vec<_> = rows
+            .iter()
+            .filter(|(claim, _)| ended.contains(&claim.id))
+            .filter_map(|(claim, end)| Some((claim.id, end.inside?)))
+            .collect();
+        if !inside.is_empty() {
+            let mut insert =
+                QueryBuilder::<Sqlite>::new("INSERT INTO results (job_id, solution, fields) ");
+            insert.push_values(inside, |mut row, (id, result)| {
+                row.push_bind(id.to_string())
+                    .push_bind(result.solution.as_ref())
+                    .push_bind(result.fields.as_deref());
+            });
+            insert.build().execute(&mut *transaction).await?;
+        }
+        transaction.commit().await?;
+        Ok(ended)
+    }
+}
+
+/// The ids of the next group among the oldest queued jobs.
+fn choose(queued: &[SqliteRow], bounds: GroupBounds) -> Result<Vec<Uuid>, JobsError> {
+    let share = queued
+        .len()
+        .div_ceil(bounds.workers.max(1))
+        .min(bounds.jobs);
+    let mut ids = Vec::with_capacity(share);
+    let mut cost_us = 0;
+    for row in &queued[..share] {
+        let alone: bool = row.try_get("alone")?;
+        cost_us += read_count(row, "cost_us")?;
+        if !ids.is_empty() && (alone || cost_us > bounds.cost_us) {
+            break;
+        }
+        ids.push(read_id(row)?);
+        if alone {
+            break;
+        }
+    }
+    Ok(ids)
+}
+
+fn push_list(query: &mut QueryBuilder<Sqlite>, ids: &[Uuid]) {
+    let mut list = query.separated(", ");
+    for id in ids {
+        list.push_bind(id.to_string());
+    }
+}

@@ -1,0 +1,253 @@
+//! Do wheel and rail touch where they should?
+
+use railhead::contact::geometry::contact_search::Search;
+use railhead::contact::geometry::formats::{self, Format};
+use railhead::contact::geometry::local_gap::LocalGap;
+use railhead::contact::geometry::profile::{Body, Profile, Reading};
+use railhead::contact::geometry::wheel_rail::{Placement, Side, WheelRail};
+
+use crate::profile_reference_files::reference_file;
+use crate::profile_shapes::{rail_60e1, s1002};
+
+/// The Manchester contact benchmark: right side, wheelset in the middle.
+pub fn placement() -> Placement {
+    Placement {
+        side: Side::Right,
+        rolling_radius: 460.0,
+        gauge: 1435.0,
+        gauge_height: 14.0,
+        cant: 0.025,
+        flange_back_distance: 1360.0,
+        flange_back_position: -70.0,
+        lateral_shift: 0.0,
+        yaw: 0.0,
+        roll: 0.0,
+    }
+}
+
+const AS_GIVEN: Reading = Reading {
+    mirror_y: Some(false),
+    mirror_z: Some(false),
+    smoothing: 0.0,
+};
+
+fn generated() -> [Profile; 2] {
+    [(Body::Rail, rail_60e1()), (Body::Wheel, s1002())]
+        .map(|(body, points)| Profile::new(body, &points, AS_GIVEN).unwrap())
+}
+
+/// Roll with which both wheels of a symmetric wheelset touch symmetric rails at the same height.
+fn roll(profiles: &[Profile; 2], placement: Placement) -> f64 {
+    let difference = |roll: f64| {
+        let touch = |side| {
+            let placement = Placement {
+                side,
+                roll,
+                ..placement
+            };
+            let geometry =
+                WheelRail::new(profiles[0].clone(), profiles[1].clone(), placement).unwrap();
+            Search::new(&geometry).unwrap().touch
+        };
+        touch(Side::Left) - touch(Side::Right)
+    };
+    let (mut low, mut high) = (0.0, -1e-4);
+    let (mut from, mut to) = (difference(low), difference(high));
+    for _ in 0..25 {
+        if to == from || to.abs() < 1e-7 {
+            break;
+        }
+        let next = high - to * (high - low) / (to - from);
+        (low, from) = (high, to);
+        (high, to) = (next, difference(next));
+    }
+    high
+}
+
+/// Shift to the right in mm, yaw in mrad, track's y of the patch on the right rail from the origin of the benchmark's rail, and about the
+/// normal approach at 10 kN: CONTACT's answers for case.
+const MANCHESTER: [[f64; 4]; 12] = [
+    [0.0, 0.0, -8.66, 0.016],
+    [0.5, 1.2, -16.03, 0.019],
+    [1.0, 2.4, -18.54, 0.022],
+    [2.0, 4.8, -19.62, 0.023],
+    [3.0, 7.2, -20.56, 0.023],
+    [4.0, 9.6, -21.79, 0.022],
+    [5.0, 12.0, -33.45, 0.0275],
+    [5.5, 13.2, -34.42, 0.028],
+    [6.0, 14.4, -35.40, 0.0275],
+    [6.5, 15.6, -42.04, 0.036],
+    [8.0, 19.2, -40.70, 0.035],
+    [10.0, 24.0, -39.44, 0.034],
+];
+/// Track's y of the origin of the benchmark's rail, which is given with its cant.
+const RAIL_ORIGIN: f64 = 760.5326;
+
+/// Track's y of the mean overlap of all patches, weighted with its square over the area; CONTACT has one such point for patches that lie
+/// near each other.
+fn centre_of_overlap(gaps: &[LocalGap]) -> f64 {
+    let (mut weight, mut sum) = (0.0, 0.0);
+    for gap in gaps {
+        let cell = (gap.x[1] - gap.x[0]) * (gap.y[1] - gap.y[0]);
+        let [tangent, _] = gap.frame.axes();
+        for (v, row) in gap.y.iter().zip(&gap.gap) {
+            let own: f64 = row.iter().map(|h| h.min(0.0).powi(2) * cell).sum();
+            weight += own;
+            sum += own * (gap.frame.origin[1] + v * tangent[0]);
+        }
+    }
+    sum / weight
+}
+
+fn manchester(profiles: &[Profile; 2], cant: f64) -> Vec<(f64, f64, f64)> {
+    let mut found = Vec::new();
+    for [shift, yaw, place, approach] in MANCHESTER {
+        let unrolled = Placement {
+            lateral_shift: -shift,
+            yaw: -yaw * 1e-3,
+            cant,
+            ..placement()
+        };
+        let placement = Placement {
+            roll: roll(profiles, unrolled),
+            ..unrolled
+        };
+        let geometry = WheelRail::new(profiles[0].clone(), profiles[1].clone(), placement).unwrap();
+        let search = Search::new(&geometry).unwrap();
+        let touching = search.frames(1e-3).unwrap()[0];
+        let lowering = approach / touching.angle.cos();
+        let gaps = search.gaps(lowering).unwrap();
+        found.push((shift, place, -centre_of_overlap(&gaps) - RAIL_ORIGIN));
+    }
+    found
+}
+
+#[test]
+fn patches_of_the_manchester_benchmark_lie_where_they_should() {
+    let mut sets = vec![(generated(), 0.025)];
+    let file = |name: &str, body| {
+        let contents = formats::read(Format::Simpack, &reference_file(name)?).unwrap();
+        Some(Profile::new(body, &contents.points, AS_GIVEN).unwrap())
+    };
+    if let (Some(rail), Some(wheel)) = (
+        file("profiles/MBench_UIC60_v3.prr", Body::Rail),
+        file("profiles/MBench_S1002_v3.prw", Body::Wheel),
+    ) {
+        sets.push(([rail, wheel], 0.0));
+    }
+    for (profiles, cant) in sets {
+        for (shift, place, found) in manchester(&profiles, cant) {
+            assert!(
+                (found - place).abs() < 0.3,
+                "shift {shift}: {found} against {place}"
+            );
+        }
+    }
+}
+
+#[test]
+fn left_and_right_are_mirror_images() {
+    let profiles = generated();
+    let right = Placement {
+        lateral_shift: -3.0,
+        yaw: -0.007,
+        roll: -2e-4,
+        ..placement()
+    };
+    let left = Placement {
+        side: Side::Left,
+        lateral_shift: 3.0,
+        yaw: 0.007,
+        roll: 2e-4,
+        ..placement()
+    };
+    let [left, right] = [left, right].map(|placement| {
+        WheelRail::new(profiles[0].clone(), profiles[1].clone(), placement).unwrap()
+    });
+    let [left, right] =
+        [&left, &right].map(|geometry| Search::new(geometry).unwrap().gaps(0.03).unwrap());
+    assert_eq!((left.len(), right.len()), (1, 1));
+    let (left, right) = (&left[0], &right[0]);
+    assert!((left.frame.origin[1] + right.frame.origin[1]).abs() < 1e-9);
+    assert!((left.frame.angle + right.frame.angle).abs() < 1e-9);
+    let rows = left.gap.len();
+    assert_eq!(rows, right.gap.len());
+    for (j, row) in left.gap.iter().enumerate() {
+        for (i, h) in row.iter().enumerate() {
+            assert!((h - right.gap[rows - 1 - j][i]).abs() < 1e-9);
+        }
+    }
+}
+
+/// A cone on a cylinder: rail of radius 300 mm, wheel coned 1:20.
+fn cone_on_arc() -> [Profile; 2] {
+    let arc = (-30..=30)
+        .map(f64::from)
+        .map(|y| [y, 300.0 - (9e4 - y * y).sqrt()]);
+    let cone = (-60..=60).map(f64::from).map(|y| [y, -0.05 * y]);
+    let rail = Profile::new(Body::Rail, &arc.collect::<Vec<_>>(), AS_GIVEN).unwrap();
+    [
+        rail,
+        Profile::new(Body::Wheel, &cone.collect::<Vec<_>>(), AS_GIVEN).unwrap(),
+    ]
+}
+
+#[test]
+fn the_gap_of_a_cone_on_an_arc_has_the_closed_form() {
+    let profiles = cone_on_arc();
+    let geometry = WheelRail::new(
+        profiles[0].clone(),
+        profiles[1].clone(),
+        Placement {
+            cant: 0.0,
+            ..placement()
+        },
+    )
+    .unwrap();
+    let lowering = 0.05;
+    let gaps = Search::new(&geometry).unwrap().gaps(lowering).unwrap();
+    assert_eq!(gaps.len(), 1);
+    let (gap, angle) = (&gaps[0], 0.05_f64.atan());
+    assert!(
+        (gap.frame.angle + angle).abs() < 1e-5,
+        "{}",
+        gap.frame.angle
+    );
+    let [y, _] = geometry.on_rail(gap.frame.rail);
+    assert!((y + 300.0 * angle.sin()).abs() < 0.02, "{y}");
+    let [along, _] = geometry.on_wheel(gap.frame.wheel);
+    // The radius of curvature of a cone at right angles to its generator.
+    let rolling = (460.0 - 0.05 * along) / angle.cos();
+    for (v, row) in gap.y.iter().zip(&gap.gap) {
+        for (x, h) in gap.x.iter().zip(row) {
+            let expected = 0.5 * x * x / rolling + 0.5 * v * v / 300.0 - lowering * angle.cos();
+            assert!(
+                (h - expected).abs() < 2e-4,
+                "{x} {v}: {h} against {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_larger_clearance_of_the_wheel_makes_the_overlap_smaller_by_as_much() {
+    let profiles = generated();
+    let geometry = WheelRail::new(
+        profiles[0].clone(),
+        profiles[1].clone(),
+        Placement {
+            lateral_shift: -6.0,
+            ..placement()
+        },
+    )
+    .unwrap();
+    let search = Search::new(&geometry).unwrap();
+    let frame = search.frames(0.02).unwrap()[0];
+    let [low, high] =
+        [0.02, 0.03].map(|lowering| geometry.overlap(&frame, search.touch - lowering));
+    let expected = 0.01 * frame.angle.cos();
+    assert!(
+        (high - low - expected).abs() < 1e-4,
+        "{low} {high} {expected}"
+    );
+}

@@ -1,0 +1,98 @@
+//! Do the frames and creepages of wheel and rail agree with CONTACT's? Needs the reference files beside the checkout.
+
+use railhead::contact::geometry::contact_search::Search;
+use railhead::contact::geometry::formats::{self, Format};
+use railhead::contact::geometry::profile::{Body, Profile, Reading};
+use railhead::contact::geometry::wheel_rail::{Placement, WheelRail};
+use railhead::contact::geometry::wheelset::{WheelsetMotion, creepages};
+use serde_json::Value;
+
+use crate::profile_geometry::placement;
+use crate::profile_reference_files::reference_file;
+
+fn profile(name: &str, body: Body) -> Option<Profile> {
+    let contents = formats::read(Format::Simpack, &reference_file(name)?).unwrap();
+    let reading = Reading {
+        mirror_y: contents.mirror_y,
+        mirror_z: contents.mirror_z,
+        smoothing: 0.0,
+    };
+    Some(Profile::new(body, &contents.points, reading).unwrap())
+}
+
+fn list(value: &Value) -> Vec<f64> {
+    value
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|v| v.as_f64().unwrap())
+        .collect()
+}
+
+/// There body 1 is the rail and z points down: turned by half a turn about x, y, yaw and lateral creepage change sign or keep it as below.
+/// The roll is not stored; it follows from the place of the contact in the track and on the wheel.
+#[test]
+fn frames_and_creepages_agree_with_contact() {
+    let (Some(rail), Some(wheel), Some(text)) = (
+        profile("profiles/MBench_UIC60_v3.prr", Body::Rail),
+        profile("profiles/MBench_S1002_v3.prw", Body::Wheel),
+        reference_file("profile_module1.json"),
+    ) else {
+        return;
+    };
+    let records: Vec<Value> = serde_json::from_str(&text).unwrap();
+    let mut compared = 0;
+    for record in &records {
+        let (input, patch) = (&record["input"], &record["patches"][0]);
+        let number = |name: &str| input[name].as_f64();
+        let (Some(yaw), Some(pitch), Some(shift)) = (
+            number("yaw_rad"),
+            number("vpitch_rad_per_s"),
+            number("y_ws_mm"),
+        ) else {
+            continue;
+        };
+        let on_track = list(&patch["contact_ref_track_xyz_delta_and_rail_yz"]);
+        let on_wheel = list(&patch["contact_ref_wheel"]);
+        let converged = |name: &str| patch["converged"][name]["value"].as_f64().unwrap();
+        let along = (750.0 + on_wheel[1]) * yaw.cos() + on_wheel[0] * yaw.sin();
+        let roll = -(on_track[1] - shift - along) / (460.0 + on_wheel[2]);
+        let geometry = WheelRail::new(
+            rail.clone(),
+            wheel.clone(),
+            Placement {
+                cant: 0.0,
+                lateral_shift: -shift,
+                yaw: -yaw,
+                roll,
+                ..placement()
+            },
+        )
+        .unwrap();
+        let search = Search::new(&geometry).unwrap();
+        let lowering = converged("approach_mm") / on_track[3].cos();
+        let frames = search.frames(lowering).unwrap();
+        assert_eq!(frames.len(), 1, "{}", record["id"]);
+        let frame = frames[0];
+        let motion = WheelsetMotion {
+            speed: 2000.0,
+            angular_velocity: -pitch,
+            lateral_velocity: 0.0,
+            yaw_rate: 0.0,
+            roll_rate: 0.0,
+        };
+        let [x, y, spin] = creepages(&geometry, &frame, search.touch - lowering, &motion);
+        // CONTACT takes the radius at the deepest overlap, this is the one at the origin of the patch.
+        assert!(
+            (-frame.origin[1] - on_track[1]).abs() < 0.15,
+            "{}",
+            record["id"]
+        );
+        assert!((frame.angle - on_track[3]).abs() < 2.5e-3);
+        assert!((x + converged("xi")).abs() < 5e-5);
+        assert!((y - converged("eta")).abs() < 1e-6);
+        assert!((spin - converged("phi")).abs() < 6e-6);
+        compared += 1;
+    }
+    assert_eq!(compared, 6);
+}

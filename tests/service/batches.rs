@@ -1,0 +1,433 @@
+//! Batches: taken whole or not at all, solved in groups, read in order.
+
+use std::time::Duration;
+
+use railhead::contact::solve;
+use railhead::jobs::Options;
+use reqwest::Method;
+use serde_json::{Value, json};
+
+use crate::errors::assert_problem;
+use crate::server::{Answer, Server, Setup};
+use crate::support::{Service, case, endless_case, open, pause, tick_forever};
+
+fn lines(cases: &[Value]) -> String {
+    let lines: Vec<String> = cases.iter().map(Value::to_string).collect();
+    lines.join("\n")
+}
+
+fn small(name: &str) -> Value {
+    let mut case = case(name);
+    case["solver"] = json!({ "method": "boundary_element", "mesh": { "strips": 2, "cells": 2 } });
+    case["outputs"] = json!(["resultants"]);
+    case
+}
+
+async fn send(server: &Server, query: &str, content: &str, body: String) -> Answer {
+    server
+        .send(Method::POST, &format!("/v1/batches{query}"), |request| {
+            request.header("content-type", content).body(body)
+        })
+        .await
+}
+
+async fn results(server: &Server, batch: &Value, query: &str) -> Vec<Value> {
+    let path = batch["links"]["results"].as_str().expect("a link");
+    let answer = server.get(&format!("{path}{query}")).await;
+    assert_eq!(answer.status, 200);
+    assert_eq!(answer.header("content-type"), Some("application/x-ndjson"));
+    let lines = answer.text.lines();
+    lines
+        .map(|line| serde_json::from_str(line).expect("a line of JSON"))
+        .collect()
+}
+
+#[tokio::test]
+async fn results_come_in_input_order_with_one_line_per_case() {
+    let server = Server::start().await;
+    let cases: Vec<Value> = (0..150).map(|i| small(&format!("case {i}"))).collect();
+    for (content, body) in [
+        ("application/json", Value::from(cases.clone()).to_string()),
+        ("application/x-ndjson", lines(&cases)),
+    ] {
+        let batch = send(&server, "", content, body).await;
+        assert_eq!((batch.status, &batch.json["count"]), (202, &json!(150)));
+        assert_eq!(
+            batch.header("location"),
+            batch.json["links"]["self"].as_str()
+        );
+        let lines = results(&server, &batch.json, "?wait=60").await;
+        assert_eq!(lines.len(), 150);
+        for (index, line) in lines.iter().enumerate() {
+            assert_eq!(line["index"], index);
+            assert_eq!(line["name"], format!("case {index}"));
+            assert_eq!(line["state"], "succeeded", "{line}");
+        }
+        let path = batch.json["links"]["self"].as_str().expect("a link");
+        let now = server.get(path).await.json;
+        assert_eq!(now["states"]["succeeded"], 150);
+        assert_eq!(
+            (&now["progress"], &now["ended"]),
+            (&json!(1.0), &json!(true))
+        );
+        // A line says what the job itself says.
+        let id = lines[77]["id"].as_str().expect("an id");
+        let alone = server.get(&format!("/v1/jobs/{id}/result")).await.json;
+        assert_eq!(lines[77]["result"], alone);
+        let job = server.get(&format!("/v1/jobs/{id}")).await.json;
+        assert_eq!(job["batch_id"], batch.json["id"]);
+        assert_eq!(job["attempt"], 1);
+    }
+}
+
+#[tokio::test]
+async fn one_faulty_case_refuses_the_batch_and_names_its_line() {
+    let server = Server::idle().await;
+    let mut faulty = small("faulty");
+    faulty["friction"]["coefficient"] = json!(-1);
+    let body = format!("{}\n\n{faulty}\n{{\"a\":\n{}\n", small("1"), small("2"));
+    let answer = send(&server, "", "application/x-ndjson", body.clone()).await;
+    assert_problem(&answer, 422, "faulty-batch", "2 of 4 cases");
+    let errors = answer.json["errors"].as_array().expect("errors");
+    assert_eq!(errors[0]["pointer"], "/1/friction/coefficient");
+    assert_eq!(
+        (&errors[0]["line"], &errors[1]["line"]),
+        (&json!(3), &json!(4))
+    );
+    assert_eq!(errors[1]["pointer"], "/2");
+    let jobs = server.get("/v1/jobs").await.json;
+    assert_eq!(jobs["jobs"], json!([]), "nothing was stored");
+
+    let answer = send(&server, "?accept=valid", "application/x-ndjson", body).await;
+    assert_eq!((answer.status, &answer.json["count"]), (202, &json!(2)));
+    assert_eq!(answer.json["rejected"], 2);
+    assert_eq!(
+        answer.json["errors"].as_array().map(Vec::len),
+        Some(errors.len())
+    );
+    let lines = results(&server, &answer.json, "").await;
+    let places: Vec<_> = lines
+        .iter()
+        .map(|line| (&line["index"], &line["state"]))
+        .collect();
+    let queued = json!("queued");
+    assert_eq!(places, [(&json!(0), &queued), (&json!(3), &queued)]);
+}
+
+#[tokio::test]
+async fn bodies_that_are_no_batch_are_refused() {
+    let server = Server::idle().await;
+    for (content, body, status, kind) in [
+        ("application/json", "[", 400, "malformed-json"),
+        ("application/json", "[{\"a\":NaN}]", 400, "malformed-json"),
+        ("application/json", "", 400, "malformed-json"),
+        ("application/json", "{}", 422, "faulty-batch"),
+        ("application/json", "[]", 422, "faulty-batch"),
+        ("application/x-ndjson", "\n \n", 422, "faulty-batch"),
+        ("text/csv", "a,b", 415, "unsupported-media-type"),
+    ] {
+        let answer = send(&server, "?accept=valid", content, body.to_owned()).await;
+        assert_problem(&answer, status, kind, "");
+    }
+    let answer = send(&server, "?accept=some", "application/json", "[]".to_owned()).await;
+    assert_problem(&answer, 400, "bad-query", "accept");
+    for path in ["", "/results"] {
+        let unknown = "/v1/batches/0196f0a0-0000-7000-8000-000000000000";
+        let answer = server.get(&format!("{unknown}{path}")).await;
+        assert_problem(&answer, 404, "batch-not-found", "");
+    }
+}
+
+#[tokio::test]
+async fn a_batch_is_bounded_by_case_by_bytes_and_by_count() {
+    let mut setup = Setup::new();
+    setup.http.body_max_bytes = 1000;
+    setup.http.batch_max_bytes = 4000;
+    setup.http.batch_max_cases = 3;
+    setup.options.queue_max = 4;
+    setup.working = false;
+    let server = setup.start().await;
+    let three = lines(&vec![small("x"); 3]);
+    assert!(three.len() < 2000);
+    let ndjson = "application/x-ndjson";
+    let answer = send(&server, "", ndjson, three.clone()).await;
+    assert_eq!(answer.status, 202, "{}", answer.text);
+    for (body, word) in [
+        (lines(&vec![small("x"); 4]), "3 cases"),
+        (small(&"n".repeat(900)).to_string(), "line 1 is larger"),
+        ("\n".repeat(4001), "one batch"),
+    ] {
+        let answer = send(&server, "", ndjson, body).await;
+        assert_problem(&answer, 413, "body-too-large", word);
+    }
+    let answer = send(&server, "", ndjson, three).await;
+    assert_problem(&answer, 503, "queue-full", "nothing was stored");
+    let jobs = server.get("/v1/jobs").await.json;
+    assert_eq!(jobs["jobs"].as_array().map(Vec::len), Some(3));
+}
+
+#[tokio::test]
+async fn the_same_key_gives_the_same_batch() {
+    let server = Server::idle().await;
+    let keyed = async |name: &str| {
+        let body = Value::from(vec![small(name), small("b")]).to_string();
+        server
+            .send(Method::POST, "/v1/batches", |request| {
+                request
+                    .header("content-type", "application/json")
+                    .header("idempotency-key", "k1")
+                    .body(body)
+            })
+            .await
+    };
+    let (first, again, other) = (keyed("a").await, keyed("a").await, keyed("c").await);
+    assert_eq!((first.status, again.status), (202, 202));
+    assert_eq!(first.json, again.json);
+    assert_problem(&other, 422, "idempotency-conflict", "");
+    let jobs = server.get("/v1/jobs").await.json;
+    assert_eq!(jobs["jobs"].as_array().map(Vec::len), Some(2));
+}
+
+#[tokio::test]
+async fn cancelling_a_batch_ends_its_queued_jobs_and_no_other() {
+    let server = Server::idle().await;
+    let alone = server
+        .send(Method::POST, "/v1/jobs", |request| {
+            request.json(&small("alone"))
+        })
+        .await
+        .json;
+    let body = lines(&vec![small("x"); 5]);
+    let batch = send(&server, "", "application/x-ndjson", body).await.json;
+    let path = batch["links"]["cancel"].as_str().expect("a link");
+    let answer = server.send(Method::POST, path, |request| request).await;
+    assert_eq!(
+        (answer.status, &answer.json["states"]["cancelled"]),
+        (200, &json!(5))
+    );
+    let lines = results(&server, &batch, "?wait=10").await;
+    assert!(lines.iter().all(|line| line["state"] == "cancelled"));
+    let other = server
+        .get(alone["links"]["self"].as_str().expect("a link"))
+        .await
+        .json;
+    assert_eq!(other["state"], "queued");
+    let listed = server
+        .get(batch["links"]["jobs"].as_str().expect("a link"))
+        .await
+        .json;
+    assert_eq!(listed["jobs"].as_array().map(Vec::len), Some(5));
+}
+
+#[tokio::test]
+async fn results_as_csv_have_a_header_and_a_line_per_motion() {
+    let server = Server::start().await;
+    let mut sweep = small("two, motions");
+    let motion = sweep["motion"].clone();
+    sweep["motion"] = json!([motion, motion]);
+    let batch = send(
+        &server,
+        "",
+        "application/json",
+        json!([small("one"), sweep]).to_string(),
+    )
+    .await;
+    let path = batch.json["links"]["results"].as_str().expect("a link");
+    let answer = server.get(&format!("{path}?wait=60&format=csv")).await;
+    let rows: Vec<&str> = answer.text.lines().collect();
+    assert_eq!(rows.len(), 4, "{}", answer.text);
+    assert!(rows[0].starts_with("index,id,name,state,point,"));
+    assert!(
+        rows[3].contains("\"two, motions\",succeeded,1,0.001,"),
+        "{}",
+        rows[3]
+    );
+    let by_accept = server
+        .send(Method::GET, path, |request| {
+            request.header("accept", "text/csv")
+        })
+        .await;
+    assert_eq!(by_accept.text, answer.text);
+}
+
+#[tokio::test]
+async fn a_panic_in_a_group_fails_that_job_only() {
+    let setup = Setup::new().solving(|problem, monitor| {
+        assert!(problem.name.as_deref() != Some("bad"), "boom");
+        solve(problem, monitor)
+    });
+    let server = setup.start().await;
+    let cases = ["a", "bad", "c"].map(small);
+    let batch = send(&server, "", "application/x-ndjson", lines(&cases)).await;
+    let lines = results(&server, &batch.json, "?wait=60").await;
+    let states: Vec<_> = lines.iter().map(|line| line["state"].as_str()).collect();
+    assert_eq!(
+        states,
+        [Some("succeeded"), Some("failed"), Some("succeeded")]
+    );
+    assert_eq!(lines[1]["error"]["type"], "/problems/solver-panic");
+}
+
+#[tokio::test]
+async fn a_running_group_stops_when_its_batch_is_cancelled() {
+    let server = Setup::new()
+        .solving(|_, monitor| Err(tick_forever(monitor)))
+        .start()
+        .await;
+    let batch = send(
+        &server,
+        "",
+        "application/x-ndjson",
+        lines(&vec![small("x"); 3]),
+    )
+    .await;
+    let path = batch.json["links"]["self"].as_str().expect("a link");
+    while server.get(path).await.json["states"]["running"] == 0 {
+        pause().await;
+    }
+    let cancel = batch.json["links"]["cancel"].as_str().expect("a link");
+    server.send(Method::POST, cancel, |request| request).await;
+    let lines = results(&server, &batch.json, "?wait=60").await;
+    assert!(
+        lines.iter().all(|line| line["state"] == "cancelled"),
+        "{lines:?}"
+    );
+}
+
+#[tokio::test]
+async fn a_batch_outlives_two_kills_and_every_case_is_answered_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &["--workers", "2"]);
+    let count = 1500;
+    let cases: Vec<Value> = (0..count).map(|i| case(&format!("{i}"))).collect();
+    let answer = service
+        .request(Method::POST, "/v1/batches")
+        .header("content-type", "application/x-ndjson")
+        .body(lines(&cases))
+        .send()
+        .await
+        .unwrap();
+    assert_eq!(answer.status(), 202);
+    let batch: Value = answer.json().await.unwrap();
+    let path = batch["links"]["self"].as_str().unwrap().to_owned();
+    let mut service = service;
+    for kill in 1..=2 {
+        while service.get(&path).await["states"]["succeeded"]
+            .as_u64()
+            .unwrap()
+            < kill * 100
+        {
+            pause().await;
+        }
+        service.kill();
+        service = Service::start(folder.path(), &["--workers", "2"]);
+    }
+    let text = service
+        .request(Method::GET, &format!("{path}/results?wait=120"))
+        .send()
+        .await
+        .unwrap()
+        .text()
+        .await
+        .unwrap();
+    let lines: Vec<Value> = text
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    assert_eq!(lines.len(), count);
+    for (index, line) in lines.iter().enumerate() {
+        assert_eq!(
+            (&line["index"], &line["state"]),
+            (&json!(index), &json!("succeeded"))
+        );
+        assert_eq!(line["name"], index.to_string());
+    }
+}
+
+#[tokio::test]
+async fn jobs_of_a_group_that_died_are_retried_alone_and_uncounted() {
+    use railhead::jobs::store::sqlite::SqliteStore;
+    use railhead::jobs::store::sqlite::groups::GroupBounds;
+    let folder = tempfile::tempdir().unwrap();
+    let store = SqliteStore::open(&folder.path().join("jobs.db"))
+        .await
+        .unwrap();
+    for _ in 0..3 {
+        store.enqueue(&crate::store::new_job()).await.unwrap();
+    }
+    let bounds = GroupBounds {
+        jobs: 8,
+        cost_us: 1_000_000,
+        workers: 1,
+    };
+    let group = store.claim_group("w", 0, 10, bounds).await.unwrap();
+    assert_eq!(group.len(), 3);
+    assert_eq!(store.reap(10, 10, 1).await.unwrap().len(), 3);
+    let ends: Vec<_> = group
+        .iter()
+        .map(|claim| (claim.clone(), crate::store::success()))
+        .collect();
+    assert!(
+        store.finish_group(&ends, 11).await.unwrap().is_empty(),
+        "fenced"
+    );
+    for claim in &group {
+        let alone = store.claim_group("w", 20, 10, bounds).await.unwrap();
+        assert_eq!(alone.len(), 1);
+        assert_eq!((alone[0].id, alone[0].attempt), (claim.id, 1));
+        assert_eq!(alone[0].lease_number, 2);
+    }
+    // Alone, the one attempt that is allowed counts.
+    let ended = store.reap(30, 30, 1).await.unwrap();
+    assert!(
+        ended.iter().all(|(_, state)| state.name() == "failed"),
+        "{ended:?}"
+    );
+}
+
+#[tokio::test]
+async fn an_incomplete_batch_is_gone_after_a_restart() {
+    use railhead::jobs::store::NewBatch;
+    use railhead::jobs::store::sqlite::SqliteStore;
+    let folder = tempfile::tempdir().unwrap();
+    let store = SqliteStore::open(&folder.path().join("jobs.db"))
+        .await
+        .unwrap();
+    let new = NewBatch {
+        id: uuid::Uuid::now_v7(),
+        created_at: 0,
+        count: 2,
+        rejected: 0,
+        idempotency: Some(("k".to_owned(), [1; 32])),
+    };
+    store.begin_batch(&new).await.unwrap();
+    let job = crate::store::new_job();
+    let id = job.id;
+    store.enqueue_many(new.id, &[(0, job)]).await.unwrap();
+    store.close().await;
+    let jobs = open(Options::new(folder.path()), solve).await;
+    assert!(jobs.get(id).await.is_err());
+    assert!(jobs.batch(new.id).await.is_err());
+    jobs.shutdown(Duration::ZERO).await;
+}
+
+#[tokio::test]
+async fn a_group_is_handed_back_when_the_service_stops() {
+    let folder = tempfile::tempdir().unwrap();
+    let jobs = open(Options::new(folder.path()), |_, monitor| {
+        Err(tick_forever(monitor))
+    })
+    .await;
+    jobs.start().unwrap();
+    let mut ids = Vec::new();
+    for case in [endless_case("long"), small("a"), small("b")] {
+        ids.push(jobs.submit(case, None).await.unwrap().id);
+    }
+    jobs.shutdown(Duration::from_millis(20)).await;
+    let jobs = open(Options::new(folder.path()), solve).await;
+    for id in ids {
+        let job = jobs.get(id).await.unwrap();
+        assert_eq!((job.state.name(), job.attempt), ("queued", 0));
+    }
+    jobs.shutdown(Duration::ZERO).await;
+}
