@@ -2,6 +2,8 @@
 
 use std::f64::consts::PI;
 
+use serde_json::Value;
+
 use crate::gap_samples::GapReference;
 use crate::reference::{Converged, assert_none, solve};
 
@@ -11,9 +13,9 @@ const AREA: f64 = 0.02;
 const PRESSURE_MAX: f64 = 0.02;
 const RESULTANT: f64 = 0.01;
 
-/// Every quantity of the default answer that is off by more than is allowed.
-fn failures(case: &GapReference) -> Vec<String> {
-    let (solution, _) = solve(&case.case());
+/// Every quantity of the answer to a question that is off by more than is allowed.
+fn failures(case: &GapReference, question: &Value) -> Vec<String> {
+    let (solution, _) = solve(question);
     let area: f64 = solution.patches.iter().map(|patch| patch.area_mm2).sum();
     let peaks = solution.patches.iter().map(|patch| patch.pressure_max_mpa);
     let approach = solution.patches[0].approach_mm.expect("an approach");
@@ -72,7 +74,10 @@ fn failures(case: &GapReference) -> Vec<String> {
 
 fn assert_class(cases: &[GapReference], count: usize) {
     assert_eq!(cases.len(), count);
-    let failures: Vec<String> = cases.iter().flat_map(failures).collect();
+    let failures: Vec<String> = cases
+        .iter()
+        .flat_map(|case| failures(case, &case.case()))
+        .collect();
     assert_none("too far from the converged value", &failures);
 }
 
@@ -108,4 +113,22 @@ fn an_approach_gives_back_the_load_it_came_from() {
             case.id
         );
     }
+}
+
+#[test]
+fn the_examples_are_reference_cases_sampled_as_a_measurement_is() {
+    let mut all = Vec::new();
+    for (file, id) in [
+        ("uic60-crown.case.json", "rad_uic_y8_80kN"),
+        ("area-132re-crown.case.json", "rad_area_y15_60kN"),
+        ("two-patches.case.json", "two_offset"),
+    ] {
+        let path = format!("{}/api/examples/{file}", env!("CARGO_MANIFEST_DIR"));
+        let text = std::fs::read_to_string(path).expect("an example");
+        let question: Value = serde_json::from_str(&text).expect("JSON");
+        let cases = GapReference::profiles();
+        let case = cases.iter().find(|case| case.id == id).expect("a case");
+        all.extend(failures(case, &question));
+    }
+    assert_none("too far from the converged value", &all);
 }

@@ -131,7 +131,7 @@ fn distance_inside(sample: &Sample, solution: &Solution, fields: &Fields) -> f64
     let mut cells = Vec::new();
     for (solution, fields) in solution.patches.iter().zip(&fields.patches) {
         let pressure = fields.pressure_mpa.as_ref().expect("pressures");
-        for k in 0..fields.x_mm.len() {
+        for (k, pressure) in pressure.iter().enumerate() {
             let [x, y] = [fields.x_mm[k], fields.y_mm[k]];
             let [dx, dy] = [fields.dx_mm[k], fields.dy_mm[k]];
             let cell = Rectangle {
@@ -144,8 +144,8 @@ fn distance_inside(sample: &Sample, solution: &Solution, fields: &Fields) -> f64
                 x,
                 y,
                 cell,
-                pressure[k],
-                pressure[k] > 0.6 * solution.pressure_max_mpa,
+                *pressure,
+                *pressure > 0.6 * solution.pressure_max_mpa,
             ));
         }
     }
@@ -170,7 +170,7 @@ fn distance_inside(sample: &Sample, solution: &Solution, fields: &Fields) -> f64
 /// How a random gap ended.
 enum Outcome {
     /// A contact, with the distance of [`distance_inside`].
-    Solved(Solution, f64),
+    Solved(Box<Solution>, f64),
     Refused(String),
 }
 
@@ -186,7 +186,7 @@ fn solve(sample: &Sample) -> Result<Outcome, String> {
     match contact::solve(&problem, &Unwatched) {
         Ok((solution, fields)) => {
             let distance = distance_inside(sample, &solution, &fields);
-            Ok(Outcome::Solved(solution, distance))
+            Ok(Outcome::Solved(Box::new(solution), distance))
         }
         Err(SolveError::NormalProblem { reason }) => Ok(Outcome::Refused(reason)),
         Err(error) => Err(format!("{}: {error}", sample.name)),
