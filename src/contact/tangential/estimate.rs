@@ -10,7 +10,7 @@ use crate::contact::tangential::level::Level;
 use crate::contact::tangential::liu_hsu::spin_pole::vortex_centre;
 
 /// Factor on the difference of the two rules on a mesh that was chosen without knowing the tractions.
-const RULES_UNKNOWING: f64 = 2.75;
+const RULES_UNKNOWING: f64 = 2.5;
 /// The same on a mesh made for them.
 const RULES_ALONE: f64 = 1.4;
 /// The same where a coarser level of the same kind has its say.
