@@ -15,8 +15,13 @@ const CURVE_STEP: f64 = 0.02;
 /// The window of a gap is larger than the overlap by this part and this length.
 const MARGIN: f64 = 0.15;
 const MARGIN_MM: f64 = 0.1;
-/// Overlaps nearer to each other than this, in mm, are one patch.
-const TOGETHER: f64 = 0.3;
+/// Overlaps nearer to each other than this along the rail, in mm, whose facing ends differ less in inclination, in rad, share
+/// one gap: there they influence each other. (CONTACT keeps apart what is 8 mm or 30° from each other.)
+const TOGETHER: f64 = 4.0;
+const TOGETHER_ANGLE: f64 = 0.5;
+
+/// No wheel is lowered farther than this, in mm.
+const LOWERING_MAX: f64 = 16.0;
 
 /// Wheel and rail over each other, line by line.
 #[derive(Debug, Clone, PartialEq)]
@@ -144,9 +149,49 @@ impl<'g> Search<'g> {
             .collect()
     }
 
+    /// About how far below first touch the wheel comes to rest under a vertical force, given in mm² as the force divided by
+    /// the contact modulus.
+    ///
+    /// Every patch is taken for a circle of the area that half the lowering makes overlap, pressed by a sphere, as if
+    /// horizontal: `N = 4/3 E* √(A/π) δ`, exact for paraboloids.
+    #[must_use]
+    pub fn estimated_lowering(&self, force: f64) -> f64 {
+        let (mut low, mut high) = (0.0_f64, 1e-3);
+        while self.estimated_force(high) < force && high < LOWERING_MAX {
+            (low, high) = (high, 2.0 * high);
+        }
+        for _ in 0..30 {
+            let middle = 0.5 * (low + high);
+            if self.estimated_force(middle) < force {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        0.5 * (low + high)
+    }
+
+    fn estimated_force(&self, lowering: f64) -> f64 {
+        let inside = |line: &Line| line.clearance < 0.5 * lowering;
+        let runs = self.lines.chunk_by(|a, b| inside(a) == inside(b));
+        let length = |line: &Line| {
+            let radius = self.geometry.placement.rolling_radius;
+            2.0 * (2.0 * radius * (0.5 * lowering - line.clearance)).sqrt()
+        };
+        let carried = |run: &[Line]| {
+            let area: f64 = run.iter().map(|line| length(line) * STEP).sum();
+            4.0 / 3.0 * (area / std::f64::consts::PI).sqrt() * lowering
+        };
+        runs.filter(|run| inside(&run[0])).map(carried).sum()
+    }
+
     fn overlaps(&self, lowering: f64) -> Result<Vec<&[Line]>, String> {
         let inside = |line: &Line| line.clearance < lowering;
-        let apart = |a: &Line, b: &Line| b.y - a.y > TOGETHER;
+        let apart = |a: &Line, b: &Line| {
+            b.y - a.y > 1.5 * STEP
+                && ((b.rail - a.rail).abs() > TOGETHER
+                    || (self.inclination(b.rail) - self.inclination(a.rail)).abs() > TOGETHER_ANGLE)
+        };
         let places: Vec<usize> = (0..self.lines.len())
             .filter(|k| inside(&self.lines[*k]))
             .collect();
@@ -170,7 +215,8 @@ impl<'g> Search<'g> {
                     rail[0], wheel[0]
                 ));
             }
-            found.push(&self.lines[first..=last]);
+            // With the line on either side that no longer overlaps.
+            found.push(&self.lines[first - 1..=last + 1]);
         }
         Ok(found)
     }

@@ -46,7 +46,7 @@ impl LocalGap {
                 .collect::<Vec<f64>>()
         });
         let y: Vec<f64> = y.into_iter().filter(|v| rail.reaches(*v)).collect();
-        let heights: Vec<f64> = y.iter().map(|v| rail.height(*v)).collect();
+        let heights: Vec<f64> = y.iter().map(|v| rail.height(*v)[0]).collect();
         if y.len() < ROWS / 2 {
             return Err(format!(
                 "the patch at y = {:.2} mm on the rail bends too much for a plane of contact",
@@ -129,18 +129,19 @@ impl<'g> RailInFrame<'g> {
             && v <= self.samples[self.samples.len() - 1][0]
     }
 
-    /// Height over the plane at v, by bracketed secant steps along the curve.
-    fn height(&self, v: f64) -> f64 {
+    /// Height over the plane at v, and the parameter there, by bracketed secant steps along the curve.
+    fn height(&self, v: f64) -> [f64; 2] {
         let k = self
             .samples
             .partition_point(|sample| sample[0] < v)
             .clamp(1, self.samples.len() - 1);
         let [mut low, mut high] = [self.samples[k - 1], self.samples[k]];
-        let mut at = [0.0; 2];
+        let mut found = [0.0; 2];
         for _ in 0..30 {
             let t = ((v - low[0]) / (high[0] - low[0])).clamp(0.0, 1.0);
             let s = low[1] + t * (high[1] - low[1]);
-            at = self.local(s);
+            let at = self.local(s);
+            found = [at[1], s];
             if (at[0] - v).abs() < 1e-11 {
                 break;
             }
@@ -150,7 +151,7 @@ impl<'g> RailInFrame<'g> {
                 high = [at[0], s];
             }
         }
-        at[1]
+        found
     }
 }
 
@@ -246,6 +247,34 @@ impl WheelInFrame<'_> {
 }
 
 impl WheelRail {
+    /// A frame of the same directions with its origin on the rail's surface over the point `by` of the plane, `[x, y]` in
+    /// mm, with the wheel's centre at the height `centre`.
+    #[must_use]
+    pub fn moved(&self, frame: &Frame, by: [f64; 2], centre: f64) -> Frame {
+        let [u, v] = by;
+        let [tangent, normal] = frame.axes();
+        let [height, rail] = RailInFrame::new(self, frame).height(v);
+        let surface = WheelInFrame {
+            geometry: self,
+            frame,
+            centre,
+        };
+        let start = Guess {
+            height: 0.0,
+            wheel: frame.wheel,
+        };
+        Frame {
+            origin: [
+                frame.origin[0] + u,
+                frame.origin[1] + v * tangent[0] + height * normal[0],
+                frame.origin[2] + v * tangent[1] + height * normal[1],
+            ],
+            angle: frame.angle,
+            rail,
+            wheel: surface.height(u, v, start).wheel,
+        }
+    }
+
     /// Overlap in mm of the undeformed bodies along the normal at the origin of a frame, with the wheel's centre at the
     /// height `centre`; negative where there is a gap.
     #[must_use]
