@@ -15,9 +15,9 @@ const CURVE_STEP: f64 = 0.02;
 /// The window of a gap is larger than the overlap by this part and this length.
 const MARGIN: f64 = 0.15;
 const MARGIN_MM: f64 = 0.1;
-/// Overlaps nearer to each other than this along the rail, in mm, whose facing ends differ less in inclination, in rad, share
-/// one gap: there they influence each other. (CONTACT keeps apart what is 8 mm or 30° from each other.)
-const TOGETHER: f64 = 4.0;
+/// Overlaps nearer to each other than this along the rail, in mm, whose mean inclinations differ less, in rad, share one gap:
+/// there they influence each other. (CONTACT keeps apart what is 8 mm or 30° from each other.)
+const TOGETHER: f64 = 8.0;
 const TOGETHER_ANGLE: f64 = 0.5;
 
 /// No wheel is lowered farther than this, in mm.
@@ -185,40 +185,57 @@ impl<'g> Search<'g> {
         runs.filter(|run| inside(&run[0])).map(carried).sum()
     }
 
+    /// Lines of every patch, with the line on either side that no longer overlaps.
     fn overlaps(&self, lowering: f64) -> Result<Vec<&[Line]>, String> {
-        let inside = |line: &Line| line.clearance < lowering;
-        let apart = |a: &Line, b: &Line| {
-            b.y - a.y > 1.5 * STEP
-                && ((b.rail - a.rail).abs() > TOGETHER
-                    || (self.inclination(b.rail) - self.inclination(a.rail)).abs() > TOGETHER_ANGLE)
-        };
-        let places: Vec<usize> = (0..self.lines.len())
-            .filter(|k| inside(&self.lines[*k]))
-            .collect();
-        let intervals = places.chunk_by(|a, b| !apart(&self.lines[*a], &self.lines[*b]));
-        let mut found = Vec::new();
-        for interval in intervals {
-            let (first, last) = (interval[0], interval[interval.len() - 1]);
-            let ends = |k: usize, next: Option<&Line>| {
-                next.is_none_or(|next| (next.y - self.lines[k].y).abs() > 1.5 * STEP)
-            };
-            let before = first.checked_sub(1).map(|k| &self.lines[k]);
-            if ends(first, before) || ends(last, self.lines.get(last + 1)) {
-                let line = self.lines[if ends(first, before) { first } else { last }];
-                let [rail, wheel] = [
-                    self.geometry.on_rail(line.rail),
-                    self.geometry.on_wheel(line.wheel),
-                ];
-                return Err(format!(
-                    "the contact reaches the end of a profile, at y = {:.2} mm on the rail and {:.2} mm on the wheel; the true contact is \
-                     cut off, longer profiles are needed",
-                    rail[0], wheel[0]
-                ));
+        let inside = |k: &usize| self.lines[*k].clearance < lowering;
+        let places: Vec<usize> = (0..self.lines.len()).filter(inside).collect();
+        let mut found: Vec<[usize; 2]> = Vec::new();
+        for run in places.chunk_by(|a, b| self.adjoin(*a, *b)) {
+            let (first, last) = (run[0], run[run.len() - 1]);
+            if first == 0 || !self.adjoin(first - 1, first) {
+                return Err(self.cut_off(first));
             }
-            // With the line on either side that no longer overlaps.
-            found.push(&self.lines[first - 1..=last + 1]);
+            if !self.adjoin(last, last + 1) {
+                return Err(self.cut_off(last));
+            }
+            match found.last_mut() {
+                Some(before) if self.share_a_gap(*before, [first, last], lowering) => {
+                    before[1] = last;
+                }
+                _ => found.push([first, last]),
+            }
         }
-        Ok(found)
+        Ok(found.into_iter().map(|ends| self.around(ends)).collect())
+    }
+
+    /// Are the lines at these places, one after the other, neighbours in space?
+    fn adjoin(&self, k: usize, next: usize) -> bool {
+        next == k + 1
+            && next < self.lines.len()
+            && self.lines[next].y - self.lines[k].y < 1.5 * STEP
+    }
+
+    fn around(&self, [first, last]: [usize; 2]) -> &[Line] {
+        &self.lines[first - 1..=last + 1]
+    }
+
+    fn share_a_gap(&self, one: [usize; 2], other: [usize; 2], lowering: f64) -> bool {
+        let apart = self.lines[other[0]].rail - self.lines[one[1]].rail;
+        let angle = |ends| self.frame(self.around(ends), lowering).angle;
+        apart.abs() <= TOGETHER && (angle(one) - angle(other)).abs() <= TOGETHER_ANGLE
+    }
+
+    fn cut_off(&self, line: usize) -> String {
+        let line = self.lines[line];
+        let [rail, wheel] = [
+            self.geometry.on_rail(line.rail),
+            self.geometry.on_wheel(line.wheel),
+        ];
+        format!(
+            "the contact reaches the end of a profile, at y = {:.2} mm on the rail and {:.2} mm on the wheel; the true contact is \
+             cut off, longer profiles are needed",
+            rail[0], wheel[0]
+        )
     }
 
     fn frame(&self, lines: &[Line], lowering: f64) -> Frame {

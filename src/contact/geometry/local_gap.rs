@@ -4,7 +4,7 @@ use crate::contact::geometry::contact_search::Frame;
 use crate::contact::geometry::wheel_rail::WheelRail;
 
 /// Samples of a gap along and across.
-const COLUMNS: usize = 65;
+const COLUMNS: usize = 33;
 const ROWS: usize = 161;
 /// Spacing along the rail's curve, in mm.
 const CURVE_STEP: f64 = 0.1;
@@ -169,6 +169,16 @@ struct Guess {
     wheel: f64,
 }
 
+impl Guess {
+    /// The next of a row that continues in a straight line from `before` over this one.
+    fn beyond(self, before: Guess) -> Guess {
+        Guess {
+            height: 2.0 * self.height - before.height,
+            wheel: 2.0 * self.wheel - before.wheel,
+        }
+    }
+}
+
 impl WheelInFrame<'_> {
     /// Height of the wheel's surface over the plane of the frame, outward from the middle.
     fn heights(&self, x: &[f64], y: &[f64]) -> Vec<Vec<f64>> {
@@ -180,10 +190,12 @@ impl WheelInFrame<'_> {
             let first = self.height(x[middle[0]], y[j], start);
             rows[j][middle[0]] = first.height;
             for columns in [outward(middle[0], x.len()).0, outward(middle[0], x.len()).1] {
-                let mut guess = first;
+                let (mut before, mut guess) = (first, first);
                 for i in columns {
-                    guess = self.height(x[i], y[j], guess);
-                    rows[j][i] = guess.height;
+                    let found = self.height(x[i], y[j], guess);
+                    rows[j][i] = found.height;
+                    // The surface goes on as it came.
+                    (before, guess) = (found, found.beyond(before));
                 }
             }
             first
@@ -197,9 +209,10 @@ impl WheelInFrame<'_> {
         );
         let (up, down) = outward(middle[1], y.len());
         for order in [up, down] {
-            let mut guess = start;
+            let (mut before, mut guess) = (start, start);
             for j in order {
-                guess = fill(j, guess);
+                let found = fill(j, guess);
+                (before, guess) = (found, found.beyond(before));
             }
         }
         rows
@@ -209,6 +222,7 @@ impl WheelInFrame<'_> {
     /// wheel's curve; where there is no such point, a surface that opens quickly.
     fn height(&self, u: f64, v: f64, start: Guess) -> Guess {
         const STEP_MAX: f64 = 1.0;
+        const STEP_LAST: f64 = 1e-6;
         let [tangent, normal] = self.frame.axes();
         let axle = self.geometry.axle();
         let shift = self.geometry.placement.lateral_shift;
@@ -235,7 +249,8 @@ impl WheelInFrame<'_> {
             let wheel = (miss_along * rise_radius - miss_radius * rise_along) / determinant;
             guess.height += height.clamp(-STEP_MAX, STEP_MAX);
             guess.wheel += wheel.clamp(-STEP_MAX, STEP_MAX);
-            if height.abs() + wheel.abs() < 1e-11 {
+            // The error falls with the square of the step.
+            if height.abs() + wheel.abs() < STEP_LAST {
                 return guess;
             }
         }

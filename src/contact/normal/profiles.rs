@@ -17,8 +17,9 @@ use crate::contact::normal::prescribed::PressureField;
 
 /// Heights looked at before giving up.
 const HEIGHTS_MAX: u32 = 40;
-/// The force found may differ from the one wanted by this part; pressures are then scaled to carry just that.
-const FORCE_TOLERANCE: f64 = 3e-4;
+/// The force found may differ from the one wanted by this part; pressures and approaches are then corrected to first order.
+/// What is left are two thirds of this part in the pressures, a third in the semi-axes.
+const FORCE_TOLERANCE: f64 = 1e-3;
 /// A bracket narrower than this part of the lowering holds a jump of the force, where patches merge.
 const BRACKET_MIN: f64 = 1e-5;
 /// So close to a lowering that cannot be solved, relative to it, the search ends.
@@ -53,6 +54,8 @@ pub struct ProfileContact {
 pub struct PressedWheel {
     /// How far the wheel is below first touch, in mm.
     pub lowering: f64,
+    /// The force that is prescribed, in N, as it came out at the last height, and its derivative by the lowering.
+    found: [f64; 2],
     /// Height of the wheel's centre over the top of the rail, in mm.
     pub centre: f64,
     /// Heights looked at.
@@ -91,7 +94,26 @@ impl PressedGap {
     }
 }
 
+/// How a wheel should come to rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wanted {
+    /// Of a vertical force the normal forces carry the part `1 / (1 + friction_share)`.
+    pub friction_share: f64,
+    /// The force may be missed by this part; 0 for as little as matters.
+    pub tolerance: f64,
+}
+
 impl PressedWheel {
+    /// Forces times a factor near 1, and the wheel lower by so much in mm.
+    fn correct(&mut self, factor: f64, lower: f64) {
+        self.lowering += lower;
+        self.centre -= lower;
+        for gap in &mut self.patches {
+            let approach = lower * gap.frame.angle.cos();
+            gap.field = gap.field.clone().corrected(factor, approach);
+        }
+    }
+
     /// Vertical part of the normal forces in N.
     #[must_use]
     pub fn vertical_force(&self) -> f64 {
@@ -101,54 +123,57 @@ impl PressedWheel {
 }
 
 impl ProfileContact {
-    /// Brings the wheel to rest. Of a vertical force the normal forces carry the part `1 / (1 + friction_share)`; `start` is
-    /// a lowering to begin with.
+    /// Brings the wheel to rest, from an earlier rest under a similar load if there is one.
     ///
     /// # Errors
     /// A reason why there is no answer; or the monitor stopped the work.
     pub fn press(
         &self,
         search: &Search,
-        friction_share: f64,
-        start: Option<f64>,
+        wanted: Wanted,
+        before: Option<&PressedWheel>,
         monitor: &dyn Monitor,
     ) -> Result<PressedWheel, Failure> {
         let target = match self.loading {
-            Loading::Vertical(force) => force / (1.0 + friction_share),
+            Loading::Vertical(force) => force / (1.0 + wanted.friction_share),
             Loading::Normal(force) => force,
             Loading::Lowering(lowering) => return self.lowered(search, lowering, monitor),
         };
         let mut bracket = Bracket::default();
-        let mut lowering = start
-            .unwrap_or_else(|| search.estimated_lowering(target / self.contact_modulus));
+        let mut lowering = match before {
+            Some(before) => bracket.next(before.lowering, before.found[0], target, before.found[1]),
+            None => search.estimated_lowering(target / self.contact_modulus),
+        };
         for heights in 1..=HEIGHTS_MAX {
             let mut found = match self.lowered(search, lowering, monitor) {
                 Ok(found) => found,
                 Err(Failure::NoAnswer(reason)) => {
-                    // Too deep, perhaps; what carries the load may lie higher.
+                    // Too deep, perhaps; the load may be carried higher up.
                     lowering = bracket.refuse(lowering, reason)?;
                     continue;
                 }
                 Err(stopped) => return Err(stopped),
             };
-            let carried = self.carried(&found);
-            let slope = self.slope(&found, carried);
+            let [carried, slope] = found.found;
             let next = bracket.next(lowering, carried, target, slope);
-            let settled = (carried / target - 1.0).abs() <= FORCE_TOLERANCE;
-            if !settled && let Some(reason) = bracket.closed_on_refusal(lowering) {
+            found.found[1] = bracket.slope.unwrap_or(slope);
+            found.heights = heights;
+            if (carried / target - 1.0).abs() <= wanted.tolerance.max(FORCE_TOLERANCE) {
+                // A coarse rest is not corrected: it is a place to go on from.
+                if wanted.tolerance <= FORCE_TOLERANCE {
+                    found.correct(target / carried, (target - carried) / found.found[1]);
+                }
+                return Ok(found);
+            }
+            if let Some(reason) = bracket.closed_on_refusal(lowering) {
                 return Err(Failure::NoAnswer(reason));
             }
-            if settled || bracket.width() < BRACKET_MIN * lowering {
-                if !settled {
-                    found.warnings.push(format!(
-                        "the force jumps at this height of the wheel, where patches merge; pressures were scaled by {:.4}",
-                        target / carried
-                    ));
-                }
-                found.heights = heights;
-                for gap in &mut found.patches {
-                    gap.field = gap.field.clone().scaled(target / carried);
-                }
+            if bracket.width() < BRACKET_MIN * lowering {
+                found.warnings.push(format!(
+                    "the force jumps at this height of the wheel, where patches merge; pressures were scaled by {:.4}",
+                    target / carried
+                ));
+                found.correct(target / carried, 0.0);
                 return Ok(found);
             }
             lowering = next;
@@ -178,13 +203,17 @@ impl ProfileContact {
                 "wheel and rail do not overlap at this height of the wheel".to_owned(),
             ));
         }
-        Ok(PressedWheel {
+        let mut wheel = PressedWheel {
             lowering,
+            found: [0.0; 2],
             centre,
             heights: 1,
             patches,
             warnings: Vec::new(),
-        })
+        };
+        let carried = self.carried(&wheel);
+        wheel.found = [carried, self.slope(&wheel, carried)];
+        Ok(wheel)
     }
 
     /// One gap under the overlap it has; approaches count from the first touch of its patch along the normal.
@@ -243,7 +272,11 @@ impl ProfileContact {
 
 /// Deepest overlap of a gap in mm.
 fn depth(gap: &LocalGap) -> f64 {
-    -gap.gap.iter().flatten().copied().fold(f64::INFINITY, f64::min)
+    -gap.gap
+        .iter()
+        .flatten()
+        .copied()
+        .fold(f64::INFINITY, f64::min)
 }
 
 /// What is known of the height sought.
@@ -257,6 +290,8 @@ struct Bracket {
     refused: Option<String>,
     /// The height before, with the power 2/3 of its force.
     before: Option<[f64; 2]>,
+    /// Derivative of the force by the lowering between the last two heights, where it can be trusted.
+    slope: Option<f64>,
 }
 
 impl Bracket {
@@ -278,8 +313,10 @@ impl Bracket {
         let secant = self
             .before
             .map(|[at, value]| (here - value) / (lowering - at))
-            .filter(|secant| (0.5..2.0).contains(&(secant / estimate)));
+            // Between heights that are nearly the same the difference is that of their grids.
+            .filter(|secant| (0.7..1.5).contains(&(secant / estimate)));
         self.before = Some([lowering, here]);
+        self.slope = secant.map(|secant| secant / POWER * carried / here);
         let next = lowering + (wanted - here) / secant.unwrap_or(estimate);
         let next = next.clamp(0.25 * lowering, 4.0 * lowering);
         self.within(next)

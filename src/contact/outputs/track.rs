@@ -127,7 +127,9 @@ impl Part {
 fn load_centre(parts: &[Part]) -> [f64; 2] {
     let force: f64 = parts.iter().map(|part| part.normal_force).sum();
     [0, 1].map(|k| {
-        let weighted = parts.iter().map(|part| part.normal_force * part.frame.origin[k]);
+        let weighted = parts
+            .iter()
+            .map(|part| part.normal_force * part.frame.origin[k]);
         weighted.sum::<f64>() / force
     })
 }

@@ -125,11 +125,7 @@ pub(super) fn read_load(case: &mut Object) -> Option<Load> {
         return None;
     }
     let mut block = case.child("load")?;
-    let names = if of_profiles {
-        &LOADS[..]
-    } else {
-        &LOADS[1..]
-    };
+    let names = if of_profiles { &LOADS[..] } else { &LOADS[1..] };
     block.only(names, &LOADS[..1]);
     if !of_profiles && let Some(value) = block.value(LOADS[0]) {
         let value = shown(value);
@@ -162,7 +158,10 @@ pub(super) fn read_load(case: &mut Object) -> Option<Load> {
         [first, second, ..] => {
             block.fault(
                 second,
-                format!("given together with {first}; exactly one of {} is allowed", names.join(", ")),
+                format!(
+                    "given together with {first}; exactly one of {} is allowed",
+                    names.join(", ")
+                ),
             );
             return None;
         }

@@ -102,7 +102,10 @@ fn wheelset(block: &mut Object) -> Option<Wheelset> {
         [true, true] => {
             block.fault(
                 SPINS[1],
-                format!("given together with {}; exactly one of the two is allowed", SPINS[0]),
+                format!(
+                    "given together with {}; exactly one of the two is allowed",
+                    SPINS[0]
+                ),
             );
             return None;
         }

@@ -1,4 +1,4 @@
-//! The load centre of a pressure, and the same pressure moved or scaled.
+//! The load centre of a pressure, and the same pressure moved or corrected.
 
 use crate::contact::normal::prescribed::PressureField;
 
@@ -42,13 +42,14 @@ impl PressureField {
         self
     }
 
-    /// The same region with all pressures times a factor near 1.
+    /// The same region with all pressures times a factor near 1, and the approaches larger by so much in mm.
     #[must_use]
-    pub fn scaled(mut self, factor: f64) -> PressureField {
+    pub fn corrected(mut self, factor: f64, approach: f64) -> PressureField {
         self.pressure_max *= factor;
         for shape in &mut self.shapes {
             shape.patch.normal_force *= factor;
             shape.patch.pressure_max *= factor;
+            shape.patch.approach = shape.patch.approach.map(|before| before + approach);
         }
         self
     }
@@ -84,20 +85,28 @@ mod tests {
         assert_eq!(patches.len(), 2);
         let centres = [0, 1].map(|k| field.load_centre(Some(k)));
         for (centre, y) in centres.iter().zip([-5.0, 4.0]) {
-            assert!((centre[0] - 0.3).abs() < 5e-3 && (centre[1] - y).abs() < 5e-3, "{centre:?}");
+            assert!(
+                (centre[0] - 0.3).abs() < 5e-3 && (centre[1] - y).abs() < 5e-3,
+                "{centre:?}"
+            );
         }
         let all = field.load_centre(None);
         let force = patches[0].normal_force + patches[1].normal_force;
-        let mean = (patches[0].normal_force * centres[0][1] + patches[1].normal_force * centres[1][1]) / force;
+        let mean = (patches[0].normal_force * centres[0][1]
+            + patches[1].normal_force * centres[1][1])
+            / force;
         assert!((all[1] - mean).abs() < 1e-9, "{all:?} {mean}");
     }
 
     #[test]
-    fn moving_and_scaling_change_coordinates_and_forces_only() {
+    fn moving_and_correcting_change_coordinates_and_forces_only() {
         let field = two_bumps();
-        let moved = field.clone().from_origin([0.3, -5.0]).scaled(1.01);
+        let moved = field.clone().from_origin([0.3, -5.0]).corrected(1.01, 0.0);
         let centre = moved.load_centre(Some(0));
-        assert!(centre[0].abs() < 5e-3 && centre[1].abs() < 5e-3, "{centre:?}");
+        assert!(
+            centre[0].abs() < 5e-3 && centre[1].abs() < 5e-3,
+            "{centre:?}"
+        );
         for (before, after) in field.patches().iter().zip(moved.patches()) {
             assert!((after.normal_force / before.normal_force - 1.01).abs() < 1e-12);
             assert!((after.extent[0] - before.extent[0] + 0.3).abs() < 1e-12);
