@@ -31,6 +31,7 @@ mod profile_laws;
 mod profile_manchester;
 mod profile_reference;
 mod profile_reference_files;
+mod profile_robustness;
 mod profile_shapes;
 mod profile_solutions;
 mod reference;

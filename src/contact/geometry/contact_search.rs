@@ -2,43 +2,41 @@
 //!
 //! The rail is straight along x, so that the wheel meets it where its normal has no part along x: the wheel is
 //! replaced by the curve of those points, and the search is one in the plane across. Patches are the intervals in which the
-//! undeformed bodies overlap; the frame of a patch lies at the mean of its overlap, weighted with its square over the
+//! undeformed bodies overlap (see `overlaps.rs`); the frame of a patch lies at the mean of its overlap, weighted with its square over the
 //! area (power 5/2 on a line), with the mean inclination of the rail. In that frame the gap is taken along the normal, exactly: the
 //! wheel as surface of revolution, the rail as cylinder.
 
 use crate::contact::geometry::local_gap::LocalGap;
+use crate::contact::geometry::overlaps::Overlap;
 use crate::contact::geometry::wheel_rail::WheelRail;
 
 /// Spacing of the search across and along the curves, in mm.
-const STEP: f64 = 0.01;
+pub(super) const STEP: f64 = 0.01;
 const CURVE_STEP: f64 = 0.02;
 /// The window of a gap is larger than the overlap by this part and this length.
 const MARGIN: f64 = 0.15;
 const MARGIN_MM: f64 = 0.1;
-/// Overlaps nearer to each other than this along the rail, in mm, whose mean inclinations differ less, in rad, share one gap:
-/// there they influence each other. (CONTACT keeps apart what is 8 mm or 30° from each other.)
-const TOGETHER: f64 = 8.0;
-const TOGETHER_ANGLE: f64 = 0.5;
-
+/// Slope with which surfaces are bent apart beyond a cut.
+const APART: f64 = 0.5;
 /// No wheel is lowered farther than this, in mm.
 const LOWERING_MAX: f64 = 16.0;
 
 /// Wheel and rail over each other, line by line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Search<'g> {
-    geometry: &'g WheelRail,
-    lines: Vec<Line>,
+    pub(super) geometry: &'g WheelRail,
+    pub(super) lines: Vec<Line>,
     /// Height of the wheel's centre in mm at which the bodies just touch.
     pub touch: f64,
 }
 
 /// One line along x: its y, the upper edge of the rail, and the clearance above first touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Line {
-    y: f64,
-    clearance: f64,
-    rail: f64,
-    wheel: f64,
+pub(super) struct Line {
+    pub(super) y: f64,
+    pub(super) clearance: f64,
+    pub(super) rail: f64,
+    pub(super) wheel: f64,
 }
 
 /// The frame of a patch in track axes: z of the frame is the normal out of the rail.
@@ -134,7 +132,7 @@ impl<'g> Search<'g> {
     pub fn frames(&self, lowering: f64) -> Result<Vec<Frame>, String> {
         self.overlaps(lowering)?
             .into_iter()
-            .map(|lines| Ok(self.frame(lines, lowering)))
+            .map(|overlap| Ok(self.frame(self.around(overlap.ends), lowering)))
             .collect()
     }
 
@@ -145,7 +143,7 @@ impl<'g> Search<'g> {
     pub fn gaps(&self, lowering: f64) -> Result<Vec<LocalGap>, String> {
         self.overlaps(lowering)?
             .into_iter()
-            .map(|lines| self.gap(lines, lowering))
+            .map(|overlap| self.gap(overlap, lowering))
             .collect()
     }
 
@@ -185,60 +183,7 @@ impl<'g> Search<'g> {
         runs.filter(|run| inside(&run[0])).map(carried).sum()
     }
 
-    /// Lines of every patch, with the line on either side that no longer overlaps.
-    fn overlaps(&self, lowering: f64) -> Result<Vec<&[Line]>, String> {
-        let inside = |k: &usize| self.lines[*k].clearance < lowering;
-        let places: Vec<usize> = (0..self.lines.len()).filter(inside).collect();
-        let mut found: Vec<[usize; 2]> = Vec::new();
-        for run in places.chunk_by(|a, b| self.adjoin(*a, *b)) {
-            let (first, last) = (run[0], run[run.len() - 1]);
-            if first == 0 || !self.adjoin(first - 1, first) {
-                return Err(self.cut_off(first));
-            }
-            if !self.adjoin(last, last + 1) {
-                return Err(self.cut_off(last));
-            }
-            match found.last_mut() {
-                Some(before) if self.share_a_gap(*before, [first, last], lowering) => {
-                    before[1] = last;
-                }
-                _ => found.push([first, last]),
-            }
-        }
-        Ok(found.into_iter().map(|ends| self.around(ends)).collect())
-    }
-
-    /// Are the lines at these places, one after the other, neighbours in space?
-    fn adjoin(&self, k: usize, next: usize) -> bool {
-        next == k + 1
-            && next < self.lines.len()
-            && self.lines[next].y - self.lines[k].y < 1.5 * STEP
-    }
-
-    fn around(&self, [first, last]: [usize; 2]) -> &[Line] {
-        &self.lines[first - 1..=last + 1]
-    }
-
-    fn share_a_gap(&self, one: [usize; 2], other: [usize; 2], lowering: f64) -> bool {
-        let apart = self.lines[other[0]].rail - self.lines[one[1]].rail;
-        let angle = |ends| self.frame(self.around(ends), lowering).angle;
-        apart.abs() <= TOGETHER && (angle(one) - angle(other)).abs() <= TOGETHER_ANGLE
-    }
-
-    fn cut_off(&self, line: usize) -> String {
-        let line = self.lines[line];
-        let [rail, wheel] = [
-            self.geometry.on_rail(line.rail),
-            self.geometry.on_wheel(line.wheel),
-        ];
-        format!(
-            "the contact reaches the end of a profile, at y = {:.2} mm on the rail and {:.2} mm on the wheel; the true contact is \
-             cut off, longer profiles are needed",
-            rail[0], wheel[0]
-        )
-    }
-
-    fn frame(&self, lines: &[Line], lowering: f64) -> Frame {
+    pub(super) fn frame(&self, lines: &[Line], lowering: f64) -> Frame {
         let (mut weight, mut y, mut angle) = (0.0, 0.0, 0.0);
         for line in lines {
             let own = (lowering - line.clearance).max(0.0).powf(2.5);
@@ -264,12 +209,13 @@ impl<'g> Search<'g> {
     }
 
     /// Turn about x that lays the track's y along the rail's surface.
-    fn inclination(&self, rail: f64) -> f64 {
+    pub(super) fn inclination(&self, rail: f64) -> f64 {
         let [y, z] = self.geometry.rail_at(rail).tangent();
         (z / y).atan()
     }
 
-    fn gap(&self, lines: &[Line], lowering: f64) -> Result<LocalGap, String> {
+    fn gap(&self, overlap: Overlap, lowering: f64) -> Result<LocalGap, String> {
+        let lines = self.around(overlap.ends);
         let frame = self.frame(lines, lowering);
         let mut across = [f64::INFINITY, f64::NEG_INFINITY];
         let mut along = [0.0_f64; 2];
@@ -288,12 +234,23 @@ impl<'g> Search<'g> {
             let margin = MARGIN * (high - low) + MARGIN_MM;
             [low - margin, high + margin]
         };
-        LocalGap::new(
+        let mut gap = LocalGap::new(
             self.geometry,
             frame,
             self.touch - lowering,
             [widen(along), widen(across)],
-        )
+        )?;
+        // Beyond a cut lies another patch, which keeps the surfaces apart between the two.
+        let ends = self
+            .thin_ends(overlap, lowering)
+            .map(|line| gap.frame.across(self.geometry, line.rail)[0]);
+        for (v, row) in gap.y.iter().zip(&mut gap.gap) {
+            let below = if overlap.cut[0] { ends[0] - v } else { 0.0 };
+            let above = if overlap.cut[1] { v - ends[1] } else { 0.0 };
+            let beyond = below.max(above).max(0.0);
+            row.iter_mut().for_each(|height| *height += APART * beyond);
+        }
+        Ok(gap)
     }
 }
 

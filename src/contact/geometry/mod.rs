@@ -3,6 +3,7 @@
 pub mod contact_search;
 pub mod formats;
 pub mod local_gap;
+mod overlaps;
 pub mod profile;
 pub mod smoothing;
 pub mod wheel_rail;

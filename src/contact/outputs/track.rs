@@ -8,6 +8,8 @@ use crate::contact::solution::{
     ErrorEstimate, Fields, NormalReport, Origin, Position, Solution, Total,
 };
 
+/// A patch over which the rail turns by more than this, in rad, is remarked on.
+const TURN_USUAL_MAX: f64 = 0.35;
 /// Axes, origins and signs in words.
 const FRAME: &str = "every patch in its own axes: x along rolling (leading edge at larger x), y to the left in the plane of \
                      contact, z out of the rail, origin at its load centre; total in track axes: x along rolling, y to the left, \
@@ -56,6 +58,15 @@ pub fn merge(
         for (k, patch) in solution.patches.iter_mut().enumerate() {
             let place = geometry.moved(&gap.frame, gap.field.load_centre(Some(k)), wheel.centre);
             patch.position = Some(position(geometry, &place, &gap.frame));
+            let [.., y_min, y_max] = patch.extent_mm;
+            let turn = turn(geometry, gap, wheel.centre, [y_min, y_max]);
+            if turn > TURN_USUAL_MAX {
+                warnings.push(format!(
+                    "patch {}: the rail turns by {turn:.2} rad over the contact, which a plane of contact and half-spaces describe \
+                     roughly",
+                    before + k
+                ));
+            }
         }
         match &mut whole {
             None => whole = Some((solution, fields)),
@@ -83,6 +94,16 @@ pub fn merge(
         ..solution
     };
     (solution, fields)
+}
+
+/// By how much the rail's inclination changes over a patch, in rad.
+fn turn(geometry: &WheelRail, gap: &PressedGap, centre: f64, across: [f64; 2]) -> f64 {
+    let [low, high] = across.map(|y| {
+        let rail = geometry.moved(&gap.frame, [0.0, y], centre).rail;
+        let [y, z] = geometry.rail_at(rail).tangent();
+        (z / y).atan()
+    });
+    (high - low).abs()
 }
 
 /// A part of the contact in track axes.

@@ -231,6 +231,9 @@ impl Parts {
                     .as_ref()
                     .map_or_else(|| vec![1.0], |(region, _)| region.segments_per_strip()),
                 motions: motions.as_ref().map_or(1, Vec::len),
+                normal_seconds: region
+                    .as_ref()
+                    .map_or(0.0, |(region, _)| cost::normal_seconds(region)),
             };
             faults.extend(size.faults(limits));
         }
