@@ -5,7 +5,8 @@ use crate::contact::answer;
 use crate::contact::case::{Motion, Output};
 use crate::contact::error::SolveError;
 use crate::contact::geometry::contact_search::Search;
-use crate::contact::geometry::wheelset::creepages;
+use crate::contact::geometry::wheel_rail::WheelRail;
+use crate::contact::geometry::wheelset::{WheelsetMotion, creepages};
 use crate::contact::monitor::{Monitor, Watch};
 use crate::contact::normal::Region;
 use crate::contact::normal::profiles::{Loading, PressedGap, PressedWheel, ProfileContact, Wanted};
@@ -136,20 +137,33 @@ impl Rest {
                 .with_time(if k == 0 { self.seconds } else { 0.0 });
             let motions = match &problem.wheelset {
                 None => problem.motions.clone(),
-                Some(wheelset) => {
-                    let [creepage_x, creepage_y, spin_per_mm] =
-                        creepages(&contact.geometry, &gap.frame, self.wheel.centre, wheelset);
-                    vec![Motion {
-                        creepage_x,
-                        creepage_y,
-                        spin_per_mm,
-                    }]
-                }
+                Some(wheelset) => vec![self.motion(gap, &contact.geometry, wheelset)],
             };
             let region = Region::Grid(gap.field.clone());
             let part = problem.of_part(region, motions, normal)?;
             answers.push(answer(&part, &watch)?);
         }
         Ok(answers)
+    }
+
+    /// Creepages and spin about the origin of a gap: those at its patches, weighted with their forces. Between patches
+    /// that share a gap the surfaces do not touch, so that the origin itself says nothing.
+    fn motion(&self, gap: &PressedGap, geometry: &WheelRail, wheelset: &WheelsetMotion) -> Motion {
+        let force = gap.normal_force();
+        let mut motion = Motion {
+            creepage_x: 0.0,
+            creepage_y: 0.0,
+            spin_per_mm: 0.0,
+        };
+        for (k, patch) in gap.field.patches().iter().enumerate() {
+            let [x, y] = gap.field.load_centre(Some(k));
+            let place = geometry.moved(&gap.frame, [x, y], self.wheel.centre);
+            let [along, across, spin] = creepages(geometry, &place, self.wheel.centre, wheelset);
+            let share = patch.normal_force / force;
+            motion.creepage_x += share * (along + spin * y);
+            motion.creepage_y += share * (across - spin * x);
+            motion.spin_per_mm += share * spin;
+        }
+        motion
     }
 }

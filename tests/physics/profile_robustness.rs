@@ -22,7 +22,7 @@ fn random_wheelsets_are_balanced_or_refused_with_a_reason() {
             "lateral_shift_mm": random.between(-9.0, 9.0),
             "yaw_rad": random.between(-0.03, 0.03),
             "roll_rad": random.between(-1e-3, 1e-3),
-            "cant_rad": [0.0, 0.025, 0.05][k % 3],
+            "cant_rad": 0.025 * f64::from(u32::try_from(k % 3).expect("small")),
         });
         let mut case = put(&generated(), "contact", members);
         let force = random.decades(1e2, 1.5e5);
