@@ -16,6 +16,9 @@ const CURVE_STEP: f64 = 0.02;
 /// The window of a gap is larger than the overlap by this part and this length.
 const MARGIN: f64 = 0.15;
 const MARGIN_MM: f64 = 0.1;
+/// A window that is too short along x is made longer by this factor, so many times.
+const WIDENING: f64 = 1.5;
+const WIDENINGS_MAX: usize = 5;
 /// Slope with which surfaces are bent apart beyond a cut.
 const APART: f64 = 0.5;
 /// No wheel is lowered farther than this, in mm.
@@ -240,6 +243,15 @@ impl<'g> Search<'g> {
             self.touch - lowering,
             [widen(along), widen(across)],
         )?;
+        // With yaw a hollow flange root follows the rail farther than a circle would.
+        for _ in 0..WIDENINGS_MAX {
+            if !gap.overlaps_at_ends() {
+                break;
+            }
+            along = along.map(|end| WIDENING * end);
+            let window = [widen(along), widen(across)];
+            gap = LocalGap::new(self.geometry, frame, self.touch - lowering, window)?;
+        }
         // Beyond a cut lies another patch, which keeps the surfaces apart between the two.
         let ends = self
             .thin_ends(overlap, lowering)

@@ -66,6 +66,12 @@ impl LocalGap {
             .collect();
         Ok(LocalGap { frame, x, y, gap })
     }
+
+    /// Do the bodies still overlap at the first or the last x?
+    pub(super) fn overlaps_at_ends(&self) -> bool {
+        let last = self.x.len() - 1;
+        self.gap.iter().any(|row| row[0] < 0.0 || row[last] < 0.0)
+    }
 }
 
 /// Indices from the one after the middle to the last, and from the one before it to the first.
