@@ -18,6 +18,8 @@ use crate::contact::solution::{Fields, Solution};
 const BALANCE: f64 = 5e-4;
 /// Rounds of the balance; each leaves about a tenth of the difference before, on steep flanges a third.
 const ROUNDS_MAX: u32 = 8;
+/// Part of its normal forces' vertical part that a wheel carries at least; on a steep flange friction may take away all of it.
+const CARRIED_MIN: f64 = 0.1;
 /// Allowed error of the resultants in the first round, relative to μN.
 const TARGET_FIRST: f64 = 0.05;
 /// By which part the first rest may miss the force: friction's share hardly depends on it.
@@ -79,6 +81,9 @@ pub(super) fn solve(
     let mut share = friction_share(&at_rest.wheel, &answers);
     for _ in 0..ROUNDS_MAX {
         let counted = share;
+        if 1.0 + counted < CARRIED_MIN {
+            break;
+        }
         at_rest = at_rest.again(rest(exactly(counted), Some(&at_rest.wheel))?);
         let answers = at_rest.answers(problem, contact, monitor)?;
         share = friction_share(&at_rest.wheel, &answers);
