@@ -35,7 +35,7 @@ pub fn head() -> utoipa::openapi::OpenApi {
 }
 
 /// Cases that the document shows: name, summary, text.
-const EXAMPLES: [(&str, &str, &str); 7] = [
+const EXAMPLES: [(&str, &str, &str); 9] = [
     (
         "hertz-steel",
         "A wheel on a rail by its radii, with both creepages and spin",
@@ -60,6 +60,16 @@ const EXAMPLES: [(&str, &str, &str); 7] = [
         "two-patches",
         "A gap on a grid with two contact patches",
         include_str!("../../api/examples/two-patches.case.json"),
+    ),
+    (
+        "wheel-rail",
+        "A wheel on a rail by their cross-sections, under a vertical force, with the motion of the wheelset",
+        include_str!("../../api/examples/wheel-rail.case.json"),
+    ),
+    (
+        "wheel-rail-flange",
+        "A wheel on a rail by their cross-sections, touching at the gauge corner and at the flange",
+        include_str!("../../api/examples/wheel-rail-flange.case.json"),
     ),
     (
         "pressure-grid",
