@@ -6,6 +6,7 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
 use crate::http::error::{ApiError, Kind};
+use crate::http::query::Query;
 
 /// Refuses requests whose `Accept` excludes `application/json`.
 pub async fn require_json(request: Request, next: Next) -> Response {
@@ -23,10 +24,16 @@ pub async fn require_json(request: Request, next: Next) -> Response {
 /// A form in which something can be answered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
+    /// `application/json`.
+    Json,
     /// `application/x-ndjson`: one JSON value per line.
     Ndjson,
     /// `text/csv`.
     Csv,
+    /// NumPy's archive of arrays.
+    Npz,
+    /// Legacy VTK, binary.
+    Vtk,
 }
 
 impl Format {
@@ -34,8 +41,11 @@ impl Format {
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
+            Format::Json => "json",
             Format::Ndjson => "ndjson",
             Format::Csv => "csv",
+            Format::Npz => "npz",
+            Format::Vtk => "vtk",
         }
     }
 
@@ -43,16 +53,24 @@ impl Format {
     #[must_use]
     pub fn media_type(self) -> &'static str {
         match self {
+            Format::Json => "application/json",
             Format::Ndjson => "application/x-ndjson",
             Format::Csv => "text/csv; charset=utf-8",
+            Format::Npz => "application/x-npz",
+            Format::Vtk => "application/x-vtk",
         }
     }
+}
 
-    /// The format of that name, if it is offered.
-    #[must_use]
-    pub fn named(name: &str, offered: &[Format]) -> Option<Format> {
-        offered.iter().copied().find(|format| format.name() == name)
-    }
+/// Takes the parameter `format` from a query.
+pub fn named_format(query: &mut Query, offered: &[Format]) -> Option<Format> {
+    let names: Vec<String> = offered
+        .iter()
+        .map(|format| format!("`{}`", format.name()))
+        .collect();
+    query.take("format", &names.join(", "), |text| {
+        offered.iter().copied().find(|format| format.name() == text)
+    })
 }
 
 /// The format to answer in: the one that was named, else the one that `Accept` likes best, the first one offered among

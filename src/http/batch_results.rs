@@ -13,7 +13,7 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use crate::contact::solution::Solution;
-use crate::http::accept::{Format, choose};
+use crate::http::accept::{Format, choose, named_format};
 use crate::http::error::ApiError;
 use crate::http::job::BatchId;
 use crate::http::problem::Problem;
@@ -84,9 +84,7 @@ pub async fn results(
         whole(text, 0, WAIT_MAX_SECONDS)
     });
     let offered = [Format::Ndjson, Format::Csv];
-    let named = query.take("format", "`ndjson` or `csv`", |text| {
-        Format::named(text, &offered)
-    });
+    let named = named_format(&mut query, &offered);
     query.finish()?;
     let format = choose(&headers, named, &offered)?;
     // Unknown batches are answered before the stream begins.

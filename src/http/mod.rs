@@ -7,9 +7,11 @@ mod batch_results;
 mod batches;
 mod body;
 mod cases;
+mod cells;
 mod elements;
 mod error;
 mod fields;
+mod formats;
 mod health;
 mod job;
 mod jobs;
@@ -18,6 +20,7 @@ mod openapi;
 mod problem;
 mod problems;
 mod query;
+mod resultants;
 mod results;
 mod trace;
 mod zones;
@@ -104,17 +107,18 @@ fn resources() -> OpenApiRouter<Shared> {
         .routes(routes!(batches::look))
         .routes(routes!(batches::cancel))
         .routes(routes!(results::result))
-        .routes(routes!(results::resultants))
-        .routes(routes!(zones::zones))
-        .routes(routes!(fields::tractions))
-        .routes(routes!(fields::pressure))
-        .routes(routes!(fields::slip))
         .routes(routes!(cases::check))
         .routes(routes!(methods::methods))
         .routes(routes!(problems::list))
         .routes(routes!(problems::explain))
         .route_layer(from_fn(accept::require_json));
-    v1.routes(routes!(batch_results::results))
+    // These choose among several forms themselves.
+    v1.routes(routes!(resultants::resultants))
+        .routes(routes!(zones::zones))
+        .routes(routes!(fields::tractions))
+        .routes(routes!(fields::pressure))
+        .routes(routes!(fields::slip))
+        .routes(routes!(batch_results::results))
         .routes(routes!(health::alive))
         .routes(routes!(health::ready))
         .routes(routes!(openapi::contract))

@@ -41,6 +41,8 @@ pub struct Setup {
 pub struct Answer {
     pub status: u16,
     pub headers: HeaderMap,
+    pub bytes: Vec<u8>,
+    /// The body as text; what is not UTF-8 is replaced.
     pub text: String,
     pub json: Value,
 }
@@ -121,11 +123,13 @@ impl Server {
         let response = shape(request).send().await.expect("an answer");
         let status = response.status().as_u16();
         let headers = response.headers().clone();
-        let text = response.text().await.expect("a body");
+        let bytes = response.bytes().await.expect("a body").to_vec();
+        let text = String::from_utf8_lossy(&bytes).into_owned();
         let answer = Answer {
             status,
             json: serde_json::from_str(&text).unwrap_or(Value::Null),
             headers,
+            bytes,
             text,
         };
         assert_documented(
