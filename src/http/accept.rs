@@ -34,6 +34,12 @@ pub enum Format {
     Npz,
     /// Legacy VTK, binary.
     Vtk,
+    /// A picture as SVG.
+    Svg,
+    /// A picture as PNG.
+    Png,
+    /// Server-sent events.
+    Events,
 }
 
 impl Format {
@@ -46,6 +52,9 @@ impl Format {
             Format::Csv => "csv",
             Format::Npz => "npz",
             Format::Vtk => "vtk",
+            Format::Svg => "svg",
+            Format::Png => "png",
+            Format::Events => "events",
         }
     }
 
@@ -58,6 +67,9 @@ impl Format {
             Format::Csv => "text/csv; charset=utf-8",
             Format::Npz => "application/x-npz",
             Format::Vtk => "application/x-vtk",
+            Format::Svg => "image/svg+xml",
+            Format::Png => "image/png",
+            Format::Events => "text/event-stream",
         }
     }
 }

@@ -14,6 +14,7 @@ use uuid::Uuid;
 
 use crate::contact::solution::Solution;
 use crate::http::accept::{Format, choose, named_format};
+use crate::http::coding::AsItComes;
 use crate::http::error::ApiError;
 use crate::http::job::BatchId;
 use crate::http::problem::Problem;
@@ -103,7 +104,15 @@ pub async fn results(
         head,
     };
     let body = Body::from_stream(try_unfold(place, next_piece));
-    Ok(([(header::CONTENT_TYPE, format.media_type())], body).into_response())
+    let headers = [
+        (header::CONTENT_TYPE, format.media_type()),
+        (header::VARY, "Accept"),
+    ];
+    let mut response = (headers, body).into_response();
+    if wait.is_some() {
+        response.extensions_mut().insert(AsItComes);
+    }
+    Ok(response)
 }
 
 /// Where a stream of results stands.

@@ -14,6 +14,7 @@ use crate::http::cells::{Cells, GriddedField, gridded, per_cell};
 use crate::http::error::ApiError;
 use crate::http::formats::{File, Table, csv, npz, vtk};
 use crate::http::job::JobId;
+use crate::http::plot::{WIDTH_DEFAULT, Wish, picture};
 use crate::http::problems::problems;
 use crate::http::query::{Query, whole};
 use crate::http::results::{INDEX, index, name_of, not_asked};
@@ -24,7 +25,14 @@ use crate::jobs::error::JobsError;
 const GRID_AXIS_MAX: u32 = 1000;
 
 /// The forms that a field comes in.
-const FORMATS: [Format; 4] = [Format::Json, Format::Csv, Format::Npz, Format::Vtk];
+const FORMATS: [Format; 6] = [
+    Format::Json,
+    Format::Csv,
+    Format::Npz,
+    Format::Vtk,
+    Format::Svg,
+    Format::Png,
+];
 
 /// A field of one patch for one motion.
 #[derive(Debug, Serialize, ToSchema)]
@@ -67,7 +75,7 @@ pub struct FieldQuery {
     /// `NXxNY`: resample on a regular grid over the bounding box of the patch, 2 to 1000 samples along each axis
     #[param(example = "60x40")]
     grid: Option<String>,
-    /// `json`, `csv`, `npz` or `vtk`; overrides `Accept`
+    /// `json`, `csv`, `npz`, `vtk`, or `svg` and `png` for a picture; overrides `Accept`
     #[param(example = "csv")]
     format: Option<String>,
 }
@@ -108,6 +116,37 @@ impl Selection {
             format: choose(headers, named, &FORMATS)?,
         })
     }
+
+    /// The picture of an output, if a picture is what was asked for.
+    ///
+    /// # Errors
+    /// `bad-query` if there is a `grid`, else as [`picture`].
+    pub async fn picture(
+        &self,
+        jobs: &Jobs,
+        id: Uuid,
+        shown: Output,
+    ) -> Result<Option<Response>, ApiError> {
+        if !matches!(self.format, Format::Svg | Format::Png) {
+            return Ok(None);
+        }
+        if self.grid.is_some() {
+            return Err(ApiError::bad_parameter(
+                "grid",
+                "a picture shows the cells themselves; leave `grid` out",
+            ));
+        }
+        let wish = Wish {
+            shown,
+            patch: self.patch,
+            point: self.point,
+            width: WIDTH_DEFAULT,
+        };
+        let mut response = picture(jobs, id, wish, self.format).await?;
+        let vary = HeaderValue::from_static("Accept");
+        response.headers_mut().insert(header::VARY, vary);
+        Ok(Some(response))
+    }
 }
 
 fn grid_size(text: &str) -> Option<(usize, usize)> {
@@ -134,7 +173,9 @@ problems! {
         (Field = "application/json"),
         (String = "text/csv"),
         (File = "application/x-npz"),
-        (File = "application/x-vtk")
+        (File = "application/x-vtk"),
+        (String = "image/svg+xml"),
+        (File = "image/png")
     )), FieldProblems)
 )]
 pub async fn tractions(
@@ -159,7 +200,9 @@ pub async fn tractions(
         (Field = "application/json"),
         (String = "text/csv"),
         (File = "application/x-npz"),
-        (File = "application/x-vtk")
+        (File = "application/x-vtk"),
+        (String = "image/svg+xml"),
+        (File = "image/png")
     )), FieldProblems)
 )]
 pub async fn pressure(
@@ -184,7 +227,9 @@ pub async fn pressure(
         (Field = "application/json"),
         (String = "text/csv"),
         (File = "application/x-npz"),
-        (File = "application/x-vtk")
+        (File = "application/x-vtk"),
+        (String = "image/svg+xml"),
+        (File = "image/png")
     )), FieldProblems)
 )]
 pub async fn slip(
@@ -204,6 +249,9 @@ async fn answer(
     output: Output,
 ) -> Result<Response, ApiError> {
     let selection = Selection::read(uri, headers)?;
+    if let Some(picture) = selection.picture(jobs, id, output).await? {
+        return Ok(picture);
+    }
     let (patch, point) = (selection.patch, selection.point);
     let (fields, values) = stored(jobs, id, patch, point, output).await?;
     write_as(selection, name_of(output), move || match selection.grid {

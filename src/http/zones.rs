@@ -83,7 +83,9 @@ pub struct Outlines {
         (Zones = "application/json"),
         (String = "text/csv"),
         (File = "application/x-npz"),
-        (File = "application/x-vtk")
+        (File = "application/x-vtk"),
+        (String = "image/svg+xml"),
+        (File = "image/png")
     )), FieldProblems)
 )]
 pub async fn zones(
@@ -93,6 +95,9 @@ pub async fn zones(
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let selection = Selection::read(&uri, &headers)?;
+    if let Some(picture) = selection.picture(&jobs, id, Output::Zones).await? {
+        return Ok(picture);
+    }
     let solution = jobs.solution(id).await?;
     require_index("patch", Some(selection.patch), solution.patches.len())?;
     let points = &solution.patches[selection.patch].points;

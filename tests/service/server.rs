@@ -1,5 +1,6 @@
 //! A service in this process, on a port of its own with a data folder of its own, and a client for it.
 
+use std::io::Read;
 use std::net::SocketAddr;
 use std::path::Path;
 use std::sync::Arc;
@@ -127,7 +128,7 @@ impl Server {
         let text = String::from_utf8_lossy(&bytes).into_owned();
         let answer = Answer {
             status,
-            json: serde_json::from_str(&text).unwrap_or(Value::Null),
+            json: serde_json::from_slice(&unpacked(&headers, &bytes)).unwrap_or(Value::Null),
             headers,
             bytes,
             text,
@@ -174,6 +175,22 @@ impl Server {
 impl Answer {
     pub fn header(&self, name: &str) -> Option<&str> {
         self.headers.get(name).and_then(|value| value.to_str().ok())
+    }
+}
+
+/// A body as it was before it was packed.
+pub fn unpacked(headers: &HeaderMap, bytes: &[u8]) -> Vec<u8> {
+    let coding = headers.get("content-encoding");
+    match coding.map(|coding| coding.to_str().expect("a coding")) {
+        Some("zstd") => zstd::decode_all(bytes).expect("zstd"),
+        Some("gzip") => {
+            let mut out = Vec::new();
+            let mut reader = flate2::read::GzDecoder::new(bytes);
+            reader.read_to_end(&mut out).expect("gzip");
+            out
+        }
+        Some(other) => panic!("{other} was not asked for"),
+        None => bytes.to_vec(),
     }
 }
 
