@@ -1,15 +1,23 @@
 //! Content negotiation: JSON unless a resource offers more.
 
-use axum::extract::Request;
-use axum::http::{HeaderMap, header};
+use axum::extract::{Query as Pairs, Request};
+use axum::http::{HeaderMap, Uri, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
 use crate::http::error::{ApiError, Kind};
 use crate::http::query::Query;
 
-/// Refuses requests whose `Accept` excludes `application/json`.
+/// Refuses requests that want something else than JSON, by `format` or because `Accept` excludes `application/json`.
 pub async fn require_json(request: Request, next: Next) -> Response {
+    let named = named(request.uri());
+    if let Some(other) = named.as_deref().filter(|name| *name != Format::Json.name()) {
+        let detail = format!("`format` is `{other}`; this resource answers `json` only");
+        return ApiError::new(Kind::NotAcceptable, detail).into_response();
+    }
+    if named.is_some() {
+        return next.run(request).await;
+    }
     if accepts_json(request.headers()) {
         return next.run(request).await;
     }
@@ -119,6 +127,13 @@ pub fn choose(
         );
         ApiError::new(Kind::NotAcceptable, detail)
     })
+}
+
+/// What `format` is in a query that is not read otherwise.
+fn named(uri: &Uri) -> Option<String> {
+    let Pairs(pairs) = Pairs::<Vec<(String, String)>>::try_from_uri(uri).ok()?;
+    let format = pairs.into_iter().find(|(name, _)| name == "format");
+    format.map(|(_, value)| value)
 }
 
 /// Does `Accept` allow `application/json`?
