@@ -13,7 +13,8 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use crate::contact::solution::Solution;
-use crate::http::accept::{Format, choose};
+use crate::http::accept::{Format, choose, named_format};
+use crate::http::coding::AsItComes;
 use crate::http::error::ApiError;
 use crate::http::job::BatchId;
 use crate::http::problem::Problem;
@@ -84,9 +85,7 @@ pub async fn results(
         whole(text, 0, WAIT_MAX_SECONDS)
     });
     let offered = [Format::Ndjson, Format::Csv];
-    let named = query.take("format", "`ndjson` or `csv`", |text| {
-        Format::named(text, &offered)
-    });
+    let named = named_format(&mut query, &offered);
     query.finish()?;
     let format = choose(&headers, named, &offered)?;
     // Unknown batches are answered before the stream begins.
@@ -105,7 +104,15 @@ pub async fn results(
         head,
     };
     let body = Body::from_stream(try_unfold(place, next_piece));
-    Ok(([(header::CONTENT_TYPE, format.media_type())], body).into_response())
+    let headers = [
+        (header::CONTENT_TYPE, format.media_type()),
+        (header::VARY, "Accept"),
+    ];
+    let mut response = (headers, body).into_response();
+    if wait.is_some() {
+        response.extensions_mut().insert(AsItComes);
+    }
+    Ok(response)
 }
 
 /// Where a stream of results stands.

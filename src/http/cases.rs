@@ -39,7 +39,7 @@ pub struct Estimate {
 
 problems! {
     /// What `POST /v1/cases/check` can fail with.
-    CheckProblems: MalformedJson, UnreadableBody, BodyTimeout, BodyTooLarge, UnsupportedMediaType, FaultyCase
+    CheckProblems: MalformedJson, UnreadableBody, BodyTimeout, BodyTooLarge, UnsupportedMediaType, UnsupportedEncoding, FaultyCase
 }
 
 /// Checks a case and estimates its cost, without making a job.

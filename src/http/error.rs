@@ -56,16 +56,19 @@ kinds! {
     BatchNotFound 404 "batch-not-found" "There is no such batch" "No batch has this id; it was never made here, or it was deleted."
     OutputNotAsked 404 "output-not-asked" "This output was not asked for" "The case did not ask for this output, so it was not computed; submit the case again with the output named in `outputs`."
     MethodNotAllowed 405 "method-not-allowed" "This method is not allowed here" "The resource exists, but not for this HTTP method; the header `Allow` lists those it has."
-    NotAcceptable 406 "not-acceptable" "This form cannot be answered" "The header `Accept` excludes every form in which this resource can be answered; the detail names them. Most answer `application/json` only."
+    NotAcceptable 406 "not-acceptable" "This form cannot be answered" "The header `Accept` excludes every form in which this resource can be answered, or `format` names another; the detail names them. Most answer `application/json` only."
     BodyTimeout 408 "body-timeout" "The body came too slowly" "The whole body did not arrive within the allowed time."
     ResultNotReady 409 "result-not-ready" "The job has not ended" "The job is queued or running, so there is no result yet; ask again after `Retry-After` seconds, or submit with `Prefer: wait=N`."
     JobFailed 409 "job-failed" "The job failed" "The job ended without a result; the member `error` of the job says why."
     JobCancelled 409 "job-cancelled" "The job was cancelled" "The job was cancelled before it had a result."
     JobNotEnded 409 "job-not-ended" "The job has not ended" "Only an ended job can be deleted; cancel it first."
+    BatchNotEnded 409 "batch-not-ended" "The batch has not ended" "Only a batch of which every job has ended can be deleted; cancel it first."
     BodyTooLarge 413 "body-too-large" "The body is too large" "The body exceeds the size that this service accepts for one case, or for a batch; or a batch has too many cases."
     UnsupportedMediaType 415 "unsupported-media-type" "The body is not declared as JSON" "A case is sent with `Content-Type: application/json`, a batch also with `application/x-ndjson`."
+    UnsupportedEncoding 415 "unsupported-encoding" "The body is packed in a way that is not understood" "A body may be sent with `Content-Encoding: gzip` or `zstd`, one of them, or as it is; `Accept-Encoding` of the answer names them."
     FaultyCase 422 "faulty-case" "The case has faults" "The body is JSON but not a case that can be solved; `errors` names every fault by its JSON pointer, with the value given and what is allowed."
     FaultyBatch 422 "faulty-batch" "The batch has faults" "The body holds no cases, or some of them have faults: `errors` names every fault by a JSON pointer that begins with the place of its case (counted from 0), and by its line in NDJSON. Nothing was stored; with `?accept=valid` the good cases are taken."
+    FaultyTable 422 "faulty-table" "The header of the table has faults" "The first line of a table names its columns by JSON pointers such as `/load/normal_force_n` or by short names; the detail names the column and what is allowed."
     IdempotencyConflict 422 "idempotency-conflict" "The idempotency key belongs to another case" "The `Idempotency-Key` was used before with a different body; use a new key for a new case."
     Internal 500 "internal" "The service failed" "Something went wrong inside the service; its log has the reason under the request id in the header `x-request-id`."
     QueueFull 503 "queue-full" "The queue is full" "The service holds as many unfinished jobs as it may; nothing was stored, try again after `Retry-After` seconds."
@@ -225,6 +228,12 @@ impl From<JobsError> for ApiError {
             JobsError::NotEnded(_) => ApiError::new(
                 Kind::JobNotEnded,
                 "the job is queued or running; cancel it first, then delete it",
+            ),
+            JobsError::BatchNotEnded(jobs) => ApiError::new(
+                Kind::BatchNotEnded,
+                format!(
+                    "{jobs} jobs of the batch are queued or running; cancel it first, then delete it"
+                ),
             ),
             JobsError::NoSuchPatch { patches } => ApiError::no_such_index("patch", patches),
             JobsError::NoSuchPoint { points } => ApiError::no_such_index("point", points),

@@ -85,6 +85,7 @@ impl JobAnswer {
 fn links(job: &Job) -> BTreeMap<String, String> {
     let own = format!("/v1/jobs/{}", job.id);
     let mut links = BTreeMap::from([("case".to_owned(), format!("{own}/case"))]);
+    links.insert("events".to_owned(), format!("{own}/events"));
     if job.state == JobState::Succeeded {
         links.insert("result".to_owned(), format!("{own}/result"));
     }

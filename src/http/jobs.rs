@@ -44,7 +44,7 @@ pub struct JobPage {
 
 problems! {
     /// What `POST /v1/jobs` can fail with.
-    SubmitProblems: MalformedJson, UnreadableBody, BadHeader, BodyTimeout, BodyTooLarge, UnsupportedMediaType, FaultyCase,
+    SubmitProblems: MalformedJson, UnreadableBody, BadHeader, BodyTimeout, BodyTooLarge, UnsupportedMediaType, UnsupportedEncoding, FaultyCase,
     IdempotencyConflict, QueueFull, Draining
 }
 

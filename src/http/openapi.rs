@@ -7,6 +7,10 @@ use axum::response::{IntoResponse, Response};
 use utoipa::OpenApi;
 use utoipa::openapi::RefOr;
 use utoipa::openapi::example::ExampleBuilder;
+use utoipa::openapi::path::{ParameterBuilder, ParameterIn};
+use utoipa::openapi::schema::Type;
+use utoipa::openapi::{HeaderBuilder, ObjectBuilder, Required, ResponseBuilder};
+use utoipa_axum::router::OpenApiRouter;
 
 use crate::http::problem::Problem;
 use crate::http::resources;
@@ -32,6 +36,38 @@ struct Head;
 /// The part of the document that no route carries.
 pub fn head() -> utoipa::openapi::OpenApi {
     Head::openapi()
+}
+
+/// Documents that every `GET` of these routes answers conditional requests.
+pub fn conditional<S: Clone + Send + Sync + 'static>(
+    mut routes: OpenApiRouter<S>,
+) -> OpenApiRouter<S> {
+    let text = || Some(ObjectBuilder::new().schema_type(Type::String).build());
+    for item in routes.get_openapi_mut().paths.paths.values_mut() {
+        let Some(operation) = &mut item.get else {
+            continue;
+        };
+        let given = ParameterBuilder::new()
+            .name("If-None-Match")
+            .parameter_in(ParameterIn::Header)
+            .required(Required::False)
+            .description(Some("Tags of answers that the client has"))
+            .schema(text());
+        operation
+            .parameters
+            .get_or_insert_default()
+            .push(given.build().into());
+        let responses = &mut operation.responses.responses;
+        if let Some(RefOr::T(found)) = responses.get_mut("200") {
+            let tag = HeaderBuilder::new()
+                .schema(text())
+                .description(Some("Digest of the answer, for `If-None-Match`"));
+            found.headers.insert("ETag".to_owned(), tag.build().into());
+        }
+        let unchanged = ResponseBuilder::new().description("The client has this answer already");
+        responses.insert("304".to_owned(), unchanged.build().into());
+    }
+    routes
 }
 
 /// Cases that the document shows: name, summary, text.

@@ -22,6 +22,8 @@ const CHUNK_JOBS: usize = 1000;
 const CHUNK_BYTES: usize = 4 << 20;
 /// Faulty cases whose faults are kept; further ones are only counted.
 const FAULTY_KEPT: usize = 1000;
+/// Jobs removed in one transaction.
+const DELETED_AT_ONCE: u32 = 500;
 /// Pause between two looks at a batch that another request is filling.
 const FILLING_PAUSE: Duration = Duration::from_millis(50);
 /// Pause between two looks at a job that a reader of results waits for.
@@ -276,6 +278,34 @@ impl Jobs {
             }
         }
         self.batch(id).await
+    }
+
+    /// Removes a batch of which every job has ended, with its jobs, their cases and their results. The jobs go in portions, so that
+    /// other writers are not held up; if the process dies meanwhile, the rest is still there and can be removed again.
+    ///
+    /// # Errors
+    /// [`JobsError::BatchNotEnded`], [`JobsError::BatchNotFound`], or a failed database.
+    pub async fn delete_batch(&self, id: Uuid) -> Result<(), JobsError> {
+        let (ended, all) = self.batch(id).await?.ended();
+        if ended < all {
+            return Err(JobsError::BatchNotEnded(all - ended));
+        }
+        loop {
+            let gone = self.shared.store.delete_ended(id, DELETED_AT_ONCE).await?;
+            if gone.is_empty() {
+                break;
+            }
+            for (job, folder) in gone {
+                if folder.is_some()
+                    && let Err(error) = self.shared.results.remove(job, None).await
+                {
+                    tracing::warn!(%job, %error, "results of a deleted job left behind until the next start");
+                }
+            }
+        }
+        self.shared.store.delete_empty_batch(id).await?;
+        tracing::info!(batch = %id, jobs = all, "batch deleted");
+        Ok(())
     }
 
     /// The next jobs of a batch after the job `after`, in the order they were sent, at most `limit`. With `until`, only

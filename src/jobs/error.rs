@@ -31,6 +31,9 @@ pub enum JobsError {
     /// The job must end first.
     #[error("the job is {}; only an ended job can be deleted, cancel it first", .0.name())]
     NotEnded(State),
+    /// This many jobs of the batch must end first.
+    #[error("{0} jobs of the batch have not ended; cancel it first")]
+    BatchNotEnded(u64),
     /// There is no result yet.
     #[error("the job is {}; its result is not there yet", .0.name())]
     NotReady(State),

@@ -10,6 +10,7 @@ pub mod batch;
 pub mod error;
 mod fetch;
 pub mod fields;
+mod follow;
 mod group;
 mod housekeeping;
 mod idempotency;

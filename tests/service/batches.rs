@@ -16,14 +16,16 @@ fn lines(cases: &[Value]) -> String {
     lines.join("\n")
 }
 
-fn small(name: &str) -> Value {
+/// A case that is solved in no time.
+pub fn small(name: &str) -> Value {
     let mut case = case(name);
     case["solver"] = json!({ "method": "boundary_element", "mesh": { "strips": 2, "cells": 2 } });
     case["outputs"] = json!(["resultants"]);
     case
 }
 
-async fn send(server: &Server, query: &str, content: &str, body: String) -> Answer {
+/// Sends the body of a batch.
+pub async fn send(server: &Server, query: &str, content: &str, body: String) -> Answer {
     server
         .send(Method::POST, &format!("/v1/batches{query}"), |request| {
             request.header("content-type", content).body(body)
@@ -31,7 +33,8 @@ async fn send(server: &Server, query: &str, content: &str, body: String) -> Answ
         .await
 }
 
-async fn results(server: &Server, batch: &Value, query: &str) -> Vec<Value> {
+/// The lines of the results of a batch.
+pub async fn results(server: &Server, batch: &Value, query: &str) -> Vec<Value> {
     let path = batch["links"]["results"].as_str().expect("a link");
     let answer = server.get(&format!("{path}{query}")).await;
     assert_eq!(answer.status, 200);
@@ -124,7 +127,7 @@ async fn bodies_that_are_no_batch_are_refused() {
         ("application/json", "{}", 422, "faulty-batch"),
         ("application/json", "[]", 422, "faulty-batch"),
         ("application/x-ndjson", "\n \n", 422, "faulty-batch"),
-        ("text/csv", "a,b", 415, "unsupported-media-type"),
+        ("text/plain", "a,b", 415, "unsupported-media-type"),
     ] {
         let answer = send(&server, "?accept=valid", content, body.to_owned()).await;
         assert_problem(&answer, status, kind, "");

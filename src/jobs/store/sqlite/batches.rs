@@ -210,6 +210,42 @@ impl SqliteStore {
             .collect()
     }
 
+    /// Removes up to `limit` ended jobs of a batch; returns them with the folders of their results.
+    ///
+    /// # Errors
+    /// The database failed; nothing changed.
+    pub async fn delete_ended(
+        &self,
+        id: Uuid,
+        limit: u32,
+    ) -> Result<Vec<(Uuid, Option<String>)>, JobsError> {
+        let rows = sqlx::query(
+            "DELETE FROM jobs WHERE id IN (SELECT id FROM jobs WHERE batch_id = $1 AND \
+             state IN ('succeeded', 'failed', 'cancelled') ORDER BY id LIMIT $2) RETURNING id, result_key",
+        )
+        .bind(id.to_string())
+        .bind(limit)
+        .fetch_all(&self.writer)
+        .await?;
+        rows.iter()
+            .map(|row| Ok((read_id(row)?, row.try_get("result_key")?)))
+            .collect()
+    }
+
+    /// Removes a complete batch that has no job left; says whether it did.
+    ///
+    /// # Errors
+    /// The database failed; nothing changed.
+    pub async fn delete_empty_batch(&self, id: Uuid) -> Result<bool, JobsError> {
+        let gone = sqlx::query(
+            "DELETE FROM batches WHERE id = $1 AND complete = 1 AND NOT EXISTS (SELECT 1 FROM jobs WHERE batch_id = $1)",
+        )
+        .bind(id.to_string())
+        .execute(&self.writer)
+        .await?;
+        Ok(gone.rows_affected() > 0)
+    }
+
     /// The next jobs of a batch in the order they were sent, with the solutions that lie in the database.
     ///
     /// # Errors
