@@ -14,6 +14,7 @@ mod health;
 mod job;
 mod jobs;
 mod methods;
+mod metrics;
 mod openapi;
 mod problem;
 mod problems;
@@ -27,7 +28,7 @@ use std::time::Duration;
 use axum::Router;
 use axum::extract::{DefaultBodyLimit, FromRef};
 use axum::http::Uri;
-use axum::middleware::from_fn;
+use axum::middleware::{from_fn, from_fn_with_state};
 use axum::response::Redirect;
 use axum::routing::get;
 use tower_http::catch_panic::CatchPanicLayer;
@@ -69,11 +70,13 @@ impl Default for HttpOptions {
 struct Shared {
     jobs: Jobs,
     options: HttpOptions,
+    metrics: metrics::Metrics,
 }
 
 /// The whole API, ready to be served.
 pub fn router(jobs: Jobs, options: HttpOptions) -> Router {
     let (resources, _) = resources().split_for_parts();
+    let metrics = metrics::Metrics::new(&jobs);
     let contract = SwaggerUi::new("/docs").config(
         // The validator badge would ask a server on the internet.
         Config::from("/openapi.json")
@@ -88,9 +91,14 @@ pub fn router(jobs: Jobs, options: HttpOptions) -> Router {
         .layer(DefaultBodyLimit::max(options.body_max_bytes))
         .layer(CatchPanicLayer::custom(trace::answer_panic))
         .layer(from_fn(error::name_instance))
+        .layer(from_fn_with_state(metrics.clone(), metrics::count))
         .layer(trace::span_layer())
         .layer(from_fn(trace::carry_request_id))
-        .with_state(Shared { jobs, options })
+        .with_state(Shared {
+            jobs,
+            options,
+            metrics,
+        })
 }
 
 /// Every documented route, in the order of the contract.
@@ -117,6 +125,7 @@ fn resources() -> OpenApiRouter<Shared> {
     v1.routes(routes!(batch_results::results))
         .routes(routes!(health::alive))
         .routes(routes!(health::ready))
+        .routes(routes!(metrics::metrics))
         .routes(routes!(openapi::contract))
 }
 

@@ -270,6 +270,7 @@ impl Jobs {
         self.batch(id).await?;
         for (job, state) in self.shared.store.cancel_batch(id, now_ms()).await? {
             if state.ended() {
+                self.shared.metrics.ended(state, 1);
                 self.shared.announce(job);
             } else if let Some(watch) = self.shared.running().get(&job) {
                 watch.stop(Reason::Cancel);

@@ -236,6 +236,7 @@ impl Worker {
         let ended = self.finish_group(&ends).await?;
         for (claim, ending) in &ends {
             if ended.contains(&claim.id) {
+                self.shared.metrics.ending(ending);
                 if claim.lease_number > 1 {
                     self.remove_earlier(claim.id, ending).await;
                 }

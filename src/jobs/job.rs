@@ -90,6 +90,31 @@ pub enum FailureKind {
     Internal,
 }
 
+impl FailureKind {
+    /// Every kind there is.
+    pub const ALL: [FailureKind; 6] = [
+        FailureKind::NotConverged,
+        FailureKind::Unsolvable,
+        FailureKind::OutOfTime,
+        FailureKind::Panic,
+        FailureKind::WorkerLost,
+        FailureKind::Internal,
+    ];
+
+    /// The word for this kind in the database and the metrics.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            FailureKind::NotConverged => "not_converged",
+            FailureKind::Unsolvable => "unsolvable",
+            FailureKind::OutOfTime => "out_of_time",
+            FailureKind::Panic => "panic",
+            FailureKind::WorkerLost => "worker_lost",
+            FailureKind::Internal => "internal",
+        }
+    }
+}
+
 impl State {
     /// Every state, in the order a job meets them.
     pub const ALL: [State; 5] = [
@@ -190,6 +215,9 @@ mod tests {
             assert_eq!(serde_json::to_value(state).unwrap(), state.name());
         }
         assert_eq!(State::from_name("canceled"), None);
+        for kind in FailureKind::ALL {
+            assert_eq!(serde_json::to_value(kind).unwrap(), kind.name());
+        }
     }
 
     #[test]

@@ -12,6 +12,7 @@ use tokio_util::task::TaskTracker;
 
 use crate::contact::problem::Limits;
 use crate::jobs::error::JobsError;
+use crate::jobs::metrics::Metrics;
 use crate::jobs::recipe::Recipe;
 use crate::jobs::results::Results;
 use crate::jobs::store::sqlite::SqliteStore;
@@ -101,6 +102,7 @@ impl Jobs {
                 draining: CancellationToken::new(),
                 stopping: CancellationToken::new(),
                 tasks: TaskTracker::new(),
+                metrics: Metrics::new(),
                 queued_at_most: tokio::sync::Mutex::new(queued),
                 lock: Mutex::new(Some(lock)),
             }),

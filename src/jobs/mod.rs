@@ -15,6 +15,7 @@ mod housekeeping;
 mod idempotency;
 pub mod job;
 pub mod lifecycle;
+mod metrics;
 pub mod recipe;
 pub mod results;
 mod solver_thread;
@@ -42,6 +43,7 @@ use crate::contact::problem::Problem;
 pub use crate::jobs::error::JobsError;
 pub use crate::jobs::job::{Failure, FailureKind, Job, State};
 pub use crate::jobs::lifecycle::Options;
+use crate::jobs::metrics::Metrics;
 use crate::jobs::recipe::Recipe;
 use crate::jobs::results::Results;
 pub use crate::jobs::store::list::{Filter, Page};
@@ -79,6 +81,7 @@ struct Shared {
     /// Set when the grace period is over: running jobs are handed back.
     stopping: CancellationToken,
     tasks: TaskTracker,
+    metrics: Metrics,
     /// Upper bound of the number of queued jobs, recounted when it reaches the limit.
     queued_at_most: tokio::sync::Mutex<u64>,
     /// Held as long as this process uses the data folder.
@@ -200,13 +203,17 @@ impl Jobs {
     /// # Errors
     /// [`JobsError::NotFound`], or a failed database.
     pub async fn cancel(&self, id: Uuid) -> Result<Job, JobsError> {
+        let now = now_ms();
         let job = self
             .shared
             .store
-            .cancel(id, now_ms())
+            .cancel(id, now)
             .await?
             .ok_or(JobsError::NotFound)?;
         if job.state.ended() {
+            if job.state == State::Cancelled && job.ended_at == Some(now) {
+                self.shared.metrics.ended(State::Cancelled, 1);
+            }
             self.shared.announce(id);
         } else if let Some(watch) = self.shared.running().get(&id) {
             // A worker that registers later reads the wish from the table.

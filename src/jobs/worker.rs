@@ -236,6 +236,7 @@ impl Worker {
         if claim.lease_number > 1 {
             self.remove_earlier(claim.id, &ending).await;
         }
+        self.shared.metrics.ending(&ending);
         self.shared.announce(claim.id);
         Ok(Step::Ended(job.id, job.state))
     }
@@ -262,8 +263,9 @@ impl Worker {
                 tracing::warn!(%error, "lease could not be renewed");
             }
         }
+        let bytes = result.bytes() as u64;
         let folder = self.shared.results.put(claim, result).await?;
-        Ok(Placed::Folder(folder))
+        Ok(Placed::Folder(folder, bytes))
     }
 
     /// Ends the job in the table; a database that fails for a moment does not cost the result.
@@ -285,6 +287,7 @@ impl Worker {
     pub(super) async fn hand_back(&self, claim: &Claim) -> Result<Step, JobsError> {
         Ok(match self.shared.store.release(claim, now_ms()).await? {
             Some(state) if state.ended() => {
+                self.shared.metrics.ended(state, 1);
                 self.shared.announce(claim.id);
                 Step::Ended(claim.id, state)
             }
@@ -297,7 +300,7 @@ impl Worker {
     pub(super) async fn remove_earlier(&self, id: Uuid, ending: &Ending) {
         let keep = match ending {
             Ending::Succeeded {
-                result: Placed::Folder(folder),
+                result: Placed::Folder(folder, _),
                 ..
             } => Some(folder.as_str()),
             _ => None,

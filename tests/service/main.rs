@@ -7,6 +7,7 @@ mod contract;
 mod crash;
 mod documents;
 mod errors;
+mod metrics;
 mod requests;
 mod results;
 mod schema;

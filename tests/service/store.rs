@@ -74,7 +74,7 @@ fn keyed(key: &str, digest: u8) -> NewJob {
 pub fn success() -> Ending {
     Ending::Succeeded {
         warnings: vec!["mind the gap".to_owned()],
-        result: Placed::Folder("results/1".to_owned()),
+        result: Placed::Folder("results/1".to_owned(), 10),
         field_patches: 2,
     }
 }

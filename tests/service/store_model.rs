@@ -176,7 +176,7 @@ impl Pair {
         let ending = if well {
             Ending::Succeeded {
                 warnings: Vec::new(),
-                result: Placed::Folder("k".to_owned()),
+                result: Placed::Folder("k".to_owned(), 1),
                 field_patches: 0,
             }
         } else {

@@ -123,8 +123,8 @@ pub enum Ending {
 /// Where a result is kept once its job has ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Placed {
-    /// In this folder, where it already lies.
-    Folder(String),
+    /// In this folder, where it already lies, with its size in bytes.
+    Folder(String, u64),
     /// In the database, written together with the end of the job: a small one.
     Table(Encoded),
 }

@@ -162,7 +162,7 @@ impl SqliteStore {
             .collect::<Result<Vec<_>, JobsError>>()?;
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         let mut update = QueryBuilder::<Sqlite>::new(
-            "WITH done (id, lease_number, state, warnings, failure, folder, patches) AS (",
+            "WITH done (id, lease_number, state, warnings, failure, folder, bytes, patches) AS (",
         );
         update.push_values(&rows, |mut row, (claim, end)| {
             row.push_bind(claim.id.to_string())
@@ -171,13 +171,14 @@ impl SqliteStore {
                 .push_bind(&end.warnings)
                 .push_bind(&end.failure)
                 .push_bind(end.folder)
+                .push_bind(end.result_bytes)
                 .push_bind(end.field_patches);
         });
         update.push(") UPDATE jobs SET state = done.state, ended_at = ");
         update.push_bind(now);
         update.push(
             ", warnings = done.warnings, failure = done.failure, result_key = done.folder, \
-             field_patches = done.patches, \
+             result_bytes = done.bytes, field_patches = done.patches, \
              progress = CASE WHEN done.state = 'succeeded' THEN 1.0 ELSE progress END, \
              lease_until = NULL, worker = NULL, version = version + 1 \
              FROM done WHERE jobs.id = done.id AND jobs.lease_number = done.lease_number \

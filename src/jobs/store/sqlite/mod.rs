@@ -9,11 +9,12 @@
 
 pub mod batches;
 pub mod claims;
+pub mod figures;
 pub mod groups;
 pub mod lists;
 mod rows;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use bytes::Bytes;
@@ -36,6 +37,7 @@ const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 /// The embedded job table.
 #[derive(Debug, Clone)]
 pub struct SqliteStore {
+    file: PathBuf,
     writer: SqlitePool,
     readers: SqlitePool,
 }
@@ -63,7 +65,11 @@ impl SqliteStore {
         let writer = pool(1).connect_with(options.clone()).await?;
         migrations().run(&writer).await?;
         let readers = pool(READERS).connect_with(options.read_only(true)).await?;
-        Ok(SqliteStore { writer, readers })
+        Ok(SqliteStore {
+            file: file.to_owned(),
+            writer,
+            readers,
+        })
     }
 
     /// Closes every connection; the write-ahead log is folded into the database.
@@ -309,5 +315,6 @@ fn migrations() -> Migrator {
     Migrator::with_migrations(vec![
         form(1, "jobs", include_str!("schema.sql")),
         form(2, "batches", include_str!("batches.sql")),
+        form(3, "result bytes", include_str!("result_bytes.sql")),
     ])
 }
