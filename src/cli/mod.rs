@@ -71,6 +71,10 @@ pub struct ServeArgs {
     #[arg(long, env = "RAILHEAD_QUEUE_MAX", default_value_t = 300_000, value_name = "N",
           value_parser = clap::value_parser!(u64).range(1..))]
     pub queue_max: u64,
+    /// Answer a case that is identical to one solved before with that result, without solving it again.
+    #[arg(long, env = "RAILHEAD_CACHE", default_value_t = true, value_name = "BOOL",
+          action = clap::ArgAction::Set)]
+    pub cache: bool,
     /// Seconds a running job may go on after the service was told to stop; then it goes back to the queue.
     #[arg(
         long,

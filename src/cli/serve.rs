@@ -46,6 +46,7 @@ async fn serve(args: &ServeArgs) -> anyhow::Result<()> {
         limits: args.case.limits(),
         attempts_max: args.attempts_max,
         queue_max: args.queue_max,
+        cache: args.cache,
         ..Options::new(&args.data_dir)
     })
     .await?;

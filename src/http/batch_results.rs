@@ -176,6 +176,8 @@ fn write_ndjson(lines: &[Line]) -> Result<Vec<u8>, JobsError> {
                 JobsError::Damaged(format!("solution of job {} is no object", job.id))
             })?;
             out.extend_from_slice(open);
+            out.extend_from_slice(b",\"cached\":");
+            write_json(&mut out, &job.cached)?;
             out.extend_from_slice(b",\"links\":");
             write_json(&mut out, &JobResult::links(job.id, &outputs(line)))?;
             out.extend_from_slice(b"}}");

@@ -18,7 +18,7 @@ use crate::http::body::{essence, read_strict};
 use crate::http::elements::{Element, Layout, Splitter};
 use crate::http::error::{ApiError, Kind};
 use crate::http::job::{BatchId, rfc3339};
-use crate::http::jobs::idempotency_key;
+use crate::http::jobs::{idempotency_key, wants_fresh};
 use crate::http::problem::Fault;
 use crate::http::problems::problems;
 use crate::http::query::Query;
@@ -136,7 +136,8 @@ problems! {
     operation_id = "submit_batch",
     params(
         ("accept" = Option<String>, Query, description = "`all` (when left out): one faulty case refuses the batch; `valid`: faulty cases are left out and reported", example = "valid"),
-        ("Idempotency-Key" = Option<String>, Header, description = "1 to 255 visible ASCII characters. Repeating a request with the same key and the same cases answers the first batch instead of making another")
+        ("Idempotency-Key" = Option<String>, Header, description = "1 to 255 visible ASCII characters. Repeating a request with the same key and the same cases answers the first batch instead of making another"),
+        ("Cache-Control" = Option<String>, Header, description = "`no-cache`: solve all cases, also those that are identical to cases solved before", example = "no-cache")
     ),
     request_body(content(
         (Vec<Case> = "application/json"),
@@ -157,7 +158,9 @@ pub async fn submit(
     let key = idempotency_key(request.headers())?;
     let layout = layout(request.headers())?;
     let valid_only = accept_valid(request.uri())?;
-    let draft = read_draft(&jobs, options, layout, request).await?;
+    let fresh = wants_fresh(request.headers());
+    let mut draft = read_draft(&jobs, options, layout, request).await?;
+    draft.fresh = fresh;
     if draft.cases == draft.rejected || (draft.rejected > 0 && !valid_only) {
         return Err(refusal(&draft));
     }

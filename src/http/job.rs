@@ -40,6 +40,8 @@ pub struct JobAnswer {
     ended_at: Option<String>,
     /// Attempts made, the current one included.
     attempt: u32,
+    /// The result was computed for an identical case before, so nothing was solved.
+    cached: bool,
     /// Rough progress.
     #[schema(minimum = 0.0, maximum = 1.0)]
     progress: f64,
@@ -73,6 +75,7 @@ impl JobAnswer {
             started_at: job.started_at.map(rfc3339),
             ended_at: job.ended_at.map(rfc3339),
             attempt: job.attempt,
+            cached: job.cached,
             progress: job.progress,
             warnings: job.warnings,
             error,

@@ -51,7 +51,8 @@ problems! {
 /// Submits one case as a job.
 ///
 /// A job answered with `202` or `200` is stored durably. With `Prefer: wait=N` the answer is the ended job (`200`) if it
-/// ends within N seconds, including its result if it succeeded and its `error` if it failed.
+/// ends within N seconds, including its result if it succeeded and its `error` if it failed. A case that is identical to one
+/// solved before (`name` and `labels` aside) succeeds at once with that result, marked `cached`.
 #[utoipa::path(
     post,
     path = "/v1/jobs",
@@ -59,7 +60,8 @@ problems! {
     operation_id = "submit_job",
     params(
         ("Prefer" = Option<String>, Header, description = "`wait=N`: answer when the job has ended, at most N seconds (60 at most) later (RFC 7240)", example = "wait=10"),
-        ("Idempotency-Key" = Option<String>, Header, description = "1 to 255 visible ASCII characters. Repeating a request with the same key and the same case answers the first job instead of making another")
+        ("Idempotency-Key" = Option<String>, Header, description = "1 to 255 visible ASCII characters. Repeating a request with the same key and the same case answers the first job instead of making another"),
+        ("Cache-Control" = Option<String>, Header, description = "`no-cache`: solve the case even if an identical one was solved before", example = "no-cache")
     ),
     request_body(content = Case, description = "One case", content_type = "application/json"),
     responses(
@@ -82,7 +84,11 @@ pub async fn submit(
 ) -> Result<Response, ApiError> {
     let key = idempotency_key(&headers)?;
     let wait = preferred_wait(&headers);
-    let mut job = jobs.submit(case, key).await?;
+    let mut job = if wants_fresh(&headers) {
+        jobs.submit_fresh(case, key).await?
+    } else {
+        jobs.submit(case, key).await?
+    };
     let location = format!("/v1/jobs/{}", job.id);
     let mut result = None;
     if let Some(seconds) = wait {
@@ -136,6 +142,17 @@ fn preferred_wait(headers: &HeaderMap) -> Option<u32> {
             .then(|| digits.parse().unwrap_or(WAIT_MAX_SECONDS))
     });
     waits.next().map(|seconds| seconds.min(WAIT_MAX_SECONDS))
+}
+
+/// Does the client refuse results of earlier identical cases?
+#[must_use]
+pub fn wants_fresh(headers: &HeaderMap) -> bool {
+    let values = headers.get_all(header::CACHE_CONTROL);
+    let mut directives = values
+        .iter()
+        .filter_map(|value| value.to_str().ok())
+        .flat_map(|value| value.split(','));
+    directives.any(|directive| directive.trim().eq_ignore_ascii_case("no-cache"))
 }
 
 /// The idempotency key of a request, if it has one.

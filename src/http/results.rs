@@ -22,6 +22,8 @@ use crate::jobs::Jobs;
 pub struct JobResult {
     #[serde(flatten)]
     solution: Solution,
+    /// The result was computed for an identical case before; `seconds` are those of that solve.
+    cached: bool,
     /// The job, and every part of the result that the case asked for.
     links: BTreeMap<String, String>,
 }
@@ -101,7 +103,12 @@ pub async fn result_of(jobs: &Jobs, id: Uuid) -> Result<JobResult, ApiError> {
     let outputs = outputs_asked(jobs, id).await?;
     let outputs: Vec<&str> = outputs.into_iter().map(name_of).collect();
     let links = JobResult::links(id, &outputs);
-    Ok(JobResult { solution, links })
+    let cached = jobs.get(id).await?.cached;
+    Ok(JobResult {
+        solution,
+        cached,
+        links,
+    })
 }
 
 impl JobResult {

@@ -96,6 +96,8 @@ pub struct Draft {
     pub rejected: u32,
     /// The first faulty ones.
     pub faulty: Vec<FaultyCase>,
+    /// Cases are solved even if identical ones were solved before.
+    pub fresh: bool,
 }
 
 impl Draft {
@@ -132,6 +134,7 @@ impl Draft {
                     method: problem.method.name().to_owned(),
                     outputs: outputs_text(&problem.outputs),
                     cost_us: cost_us(&problem),
+                    digest: problem.digest,
                     name: problem.name,
                     labels: problem.labels,
                 };
@@ -170,6 +173,7 @@ impl Jobs {
             cases: 0,
             rejected: 0,
             faulty: Vec::new(),
+            fresh: false,
         })
     }
 
@@ -206,7 +210,7 @@ impl Jobs {
         // A client that hangs up must not leave a batch half filled, so the filling goes on without it.
         let jobs = self.clone();
         let filled = tokio::spawn(async move {
-            let filled = jobs.fill(&new, draft.spool).await;
+            let filled = jobs.fill(&new, draft.spool, draft.fresh).await;
             if filled.is_err()
                 && let Err(error) = jobs.shared.store.drop_batch(new.id).await
             {
@@ -220,7 +224,7 @@ impl Jobs {
         self.batch(id).await
     }
 
-    async fn fill(&self, new: &NewBatch, spool: Spool) -> Result<(), JobsError> {
+    async fn fill(&self, new: &NewBatch, spool: Spool, fresh: bool) -> Result<(), JobsError> {
         self.admit(u64::from(new.count)).await?;
         let mut reader = spool
             .into_reader()
@@ -238,11 +242,16 @@ impl Jobs {
             if cases.is_empty() {
                 break;
             }
-            let some: Vec<_> = cases
+            let mut some: Vec<_> = cases
                 .into_iter()
-                .map(|(card, case)| (card.index, new_job(card, case)))
+                .map(|(card, case)| (card.index, self.new_job(card, case)))
                 .collect();
-            self.shared.store.enqueue_many(new.id, &some).await?;
+            if !fresh {
+                self.find_sources(some.iter_mut().map(|(_, job)| job))
+                    .await?;
+            }
+            let ended = self.shared.store.enqueue_many(new.id, &some).await?;
+            self.ended_cached(&ended);
             for _ in 0..self.shared.options.workers {
                 self.shared.wake.notify_one();
             }
@@ -332,25 +341,27 @@ impl Jobs {
         }
     }
 
+    fn new_job(&self, card: Card, case: Vec<u8>) -> NewJob {
+        let id = Uuid::now_v7();
+        NewJob {
+            id,
+            created_at: created_at(id),
+            name: card.name,
+            labels: card.labels,
+            method: card.method,
+            outputs: card.outputs,
+            cost_us: card.cost_us,
+            body: Bytes::from(case),
+            reuse_key: self.reuse_key(&card.digest),
+            source: None,
+            idempotency: None,
+        }
+    }
+
     fn spool_failed(&self, source: std::io::Error) -> JobsError {
         JobsError::DataDir {
             path: self.shared.options.data_dir.clone(),
             source,
         }
-    }
-}
-
-fn new_job(card: Card, case: Vec<u8>) -> NewJob {
-    let id = Uuid::now_v7();
-    NewJob {
-        id,
-        created_at: created_at(id),
-        name: card.name,
-        labels: card.labels,
-        method: card.method,
-        outputs: card.outputs,
-        cost_us: card.cost_us,
-        body: Bytes::from(case),
-        idempotency: None,
     }
 }

@@ -35,6 +35,8 @@ pub struct Job {
     pub warnings: Vec<String>,
     /// Why there is no answer; present exactly when the state is `failed`.
     pub failure: Option<Failure>,
+    /// The result was computed for an identical case before, not for this job.
+    pub cached: bool,
     /// Grows with every change that a client can see.
     pub version: u64,
 }

@@ -41,11 +41,13 @@ pub struct Options {
     pub group_max: usize,
     /// Results up to this size in bytes are kept in the database, larger ones in folders.
     pub small_result_max_bytes: usize,
+    /// Identical cases get the result of the first one that was solved.
+    pub cache: bool,
 }
 
 impl Options {
     /// The defaults for a data folder: one worker, a lease of 30 s, 5 attempts, 300 000 queued jobs,
-    /// groups of 64, results up to 32 KiB in the database.
+    /// groups of 64, results up to 32 KiB in the database, results used again.
     #[must_use]
     pub fn new(data_dir: impl Into<PathBuf>) -> Options {
         Options {
@@ -57,6 +59,7 @@ impl Options {
             queue_max: 300_000,
             group_max: 64,
             small_result_max_bytes: 32 << 10,
+            cache: true,
         }
     }
 }

@@ -49,6 +49,8 @@ pub(super) struct Metrics {
     iterations: Family<MethodLabel, Histogram>,
     ended: Family<StateLabel, Counter>,
     failures: Family<ReasonLabel, Counter>,
+    cache_hits: Counter,
+    cache_misses: Counter,
 }
 
 impl Metrics {
@@ -62,6 +64,8 @@ impl Metrics {
             iterations: Family::new_with_constructor(|| Histogram::new(ITERATIONS)),
             ended: Family::default(),
             failures: Family::default(),
+            cache_hits: Counter::default(),
+            cache_misses: Counter::default(),
         };
         // A series that appears only with its first event hides that event from a rate.
         for state in State::ALL.into_iter().filter(|state| state.ended()) {
@@ -111,6 +115,12 @@ impl Metrics {
         self.ended.get_or_create(&state_label(state)).inc_by(jobs);
     }
 
+    /// Earlier results were looked for.
+    pub(super) fn looked_up(&self, hits: u64, misses: u64) {
+        self.cache_hits.inc_by(hits);
+        self.cache_misses.inc_by(misses);
+    }
+
     fn register(&self, registry: &mut Registry) {
         registry.register(
             "build",
@@ -147,6 +157,16 @@ impl Metrics {
             "jobs_ended",
             "Jobs that ended, by state",
             self.ended.clone(),
+        );
+        registry.register(
+            "cache_hits",
+            "Cases answered with the result of an identical earlier one",
+            self.cache_hits.clone(),
+        );
+        registry.register(
+            "cache_misses",
+            "Cases for which an earlier result was looked for in vain",
+            self.cache_misses.clone(),
         );
         registry.register(
             "job_failures",

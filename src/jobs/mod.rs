@@ -18,6 +18,7 @@ pub mod lifecycle;
 mod metrics;
 pub mod recipe;
 pub mod results;
+mod reuse;
 mod solver_thread;
 mod spool;
 pub mod store;
@@ -97,7 +98,8 @@ impl Jobs {
         (self.shared.recipe.check)(case, &self.shared.options.limits)
     }
 
-    /// Checks a case and queues it. Once this returns the job survives the death of the process.
+    /// Checks a case and queues it. Once this returns the job survives the death of the process. If an identical case
+    /// was solved before, the job has already succeeded, with that result.
     ///
     /// With an idempotency key the same case gives the same job again, however often it is submitted, for as long as
     /// that job exists.
@@ -109,6 +111,27 @@ impl Jobs {
         &self,
         case: Value,
         idempotency_key: Option<String>,
+    ) -> Result<Job, JobsError> {
+        self.submit_case(case, idempotency_key, false).await
+    }
+
+    /// As [`Jobs::submit`], but the case is solved even if an identical one was solved before.
+    ///
+    /// # Errors
+    /// As [`Jobs::submit`].
+    pub async fn submit_fresh(
+        &self,
+        case: Value,
+        idempotency_key: Option<String>,
+    ) -> Result<Job, JobsError> {
+        self.submit_case(case, idempotency_key, true).await
+    }
+
+    async fn submit_case(
+        &self,
+        case: Value,
+        idempotency_key: Option<String>,
+        fresh: bool,
     ) -> Result<Job, JobsError> {
         if self.shared.draining.is_cancelled() {
             return Err(JobsError::Draining);
@@ -130,7 +153,7 @@ impl Jobs {
         let problem = problem?;
         let (outputs, cost_us) = (problem.outputs.clone(), cost_us(&problem));
         let id = Uuid::now_v7();
-        let new = NewJob {
+        let mut new = NewJob {
             id,
             created_at: created_at(id),
             name: problem.name,
@@ -138,11 +161,23 @@ impl Jobs {
             method: problem.method.name().to_owned(),
             outputs: outputs_text(&outputs),
             cost_us,
+            reuse_key: self.reuse_key(&problem.digest),
+            source: None,
             body: Bytes::from(body.map_err(|error| JobsError::Damaged(error.to_string()))?),
             idempotency,
         };
-        self.admit(1).await?;
+        if !fresh {
+            self.find_sources(std::iter::once(&mut new)).await?;
+        }
+        if new.source.is_none() {
+            self.admit(1).await?;
+        }
         let job = replayed(self.shared.store.enqueue(&new).await?)?;
+        if job.id == id && job.cached {
+            self.ended_cached(&[id]);
+            tracing::info!(job = %id, method = new.method, "job answered from an earlier result");
+            return Ok(job);
+        }
         self.shared.wake.notify_one();
         tracing::info!(job = %job.id, method = new.method, "job queued");
         Ok(job)
@@ -230,8 +265,10 @@ impl Jobs {
         match self.shared.store.delete(id).await? {
             Deleted::NotEnded(state) => Err(JobsError::NotEnded(state)),
             Deleted::NotFound => Err(JobsError::NotFound),
-            Deleted::Done => {
-                if let Err(error) = self.shared.results.remove(id, None).await {
+            Deleted::Done { orphan } => {
+                if let Some(orphan) = orphan
+                    && let Err(error) = self.shared.results.remove(orphan, None).await
+                {
                     tracing::warn!(job = %id, %error, "results of a deleted job left behind until the next start");
                 }
                 Ok(())

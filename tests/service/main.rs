@@ -2,6 +2,7 @@
 
 mod api;
 mod batches;
+mod cache;
 mod cli;
 mod contract;
 mod crash;

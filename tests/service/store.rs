@@ -53,6 +53,8 @@ pub fn new_job() -> NewJob {
         body: Bytes::from_static(b"{}"),
         outputs: "[]".to_owned(),
         cost_us: 1000,
+        reuse_key: None,
+        source: None,
         idempotency: None,
     }
 }
@@ -398,7 +400,10 @@ async fn only_an_ended_job_can_be_deleted_and_all_that_hung_on_it_goes() {
         table.store.existing(&[Uuid::now_v7(), id]).await.unwrap(),
         [id]
     );
-    assert_eq!(table.store.delete(id).await.unwrap(), Deleted::Done);
+    assert_eq!(
+        table.store.delete(id).await.unwrap(),
+        Deleted::Done { orphan: Some(id) }
+    );
     assert_eq!(table.store.delete(id).await.unwrap(), Deleted::NotFound);
 
     assert_eq!(table.store.case(id).await.unwrap(), None);

@@ -98,6 +98,8 @@ impl Pair {
             body: Bytes::from_static(b"{}"),
             outputs: "[]".to_owned(),
             cost_us: 1000,
+            reuse_key: None,
+            source: None,
             idempotency: None,
         };
         self.store.enqueue(&new).await.unwrap();
@@ -223,11 +225,11 @@ impl Pair {
     async fn delete(&mut self, id: Uuid) {
         let expected = match self.rows.get(&id) {
             None => Deleted::NotFound,
-            Some(row) if row.state.ended() => Deleted::Done,
+            Some(row) if row.state.ended() => Deleted::Done { orphan: Some(id) },
             Some(row) => Deleted::NotEnded(row.state),
         };
         assert_eq!(self.store.delete(id).await.unwrap(), expected);
-        if expected == Deleted::Done {
+        if expected == (Deleted::Done { orphan: Some(id) }) {
             self.rows.remove(&id);
         }
     }

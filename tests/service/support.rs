@@ -40,7 +40,7 @@ where
     open(Options::new(data_dir), solve).await
 }
 
-/// Jobs with options of one's own, solved by the given function.
+/// Jobs with options of one's own, solved by the given function, each anew.
 pub async fn open<F>(options: Options, solve: F) -> Jobs
 where
     F: Fn(&Problem, &dyn Monitor) -> Result<(Solution, Fields), SolveError> + Send + Sync + 'static,
@@ -48,6 +48,10 @@ where
     let recipe = Recipe {
         solve: Arc::new(solve),
         ..Recipe::contact()
+    };
+    let options = Options {
+        cache: false,
+        ..options
     };
     Jobs::open_with(options, recipe).await.unwrap()
 }

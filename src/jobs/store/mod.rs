@@ -15,6 +15,9 @@ use uuid::Uuid;
 use crate::jobs::job::{Failure, Job, State};
 use crate::jobs::results::Encoded;
 
+/// Equal for cases of one tenant that have the same answer.
+pub type ReuseKey = [u8; 16];
+
 /// A job about to be queued.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NewJob {
@@ -34,6 +37,10 @@ pub struct NewJob {
     pub outputs: String,
     /// Expected solve time in µs; small jobs are claimed in groups.
     pub cost_us: u32,
+    /// What tells later identical cases that this job's result is theirs too.
+    pub reuse_key: Option<ReuseKey>,
+    /// A succeeded job whose result this one gets, instead of being queued.
+    pub source: Option<Uuid>,
     /// The client's idempotency key with the digest of the case; not used inside a batch.
     pub idempotency: Option<(String, [u8; 32])>,
 }
@@ -69,7 +76,7 @@ pub enum Begun {
 /// What became of an attempt to queue a job.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Enqueued {
-    /// The job is queued.
+    /// The job is queued, or has ended with the result of its source.
     Created(Job),
     /// The idempotency key already stands for this job, with the same case.
     Existing(Job),
@@ -144,7 +151,10 @@ pub struct StoredResult {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Deleted {
     /// The row and all that hung on it are gone.
-    Done,
+    Done {
+        /// The job whose stored results nobody needs any more.
+        orphan: Option<Uuid>,
+    },
     /// It has not ended.
     NotEnded(State),
     /// There was none.

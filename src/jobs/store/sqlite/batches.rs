@@ -12,12 +12,13 @@ use crate::jobs::batch::{Batch, Line};
 use crate::jobs::error::JobsError;
 use crate::jobs::job::State;
 use crate::jobs::store::sqlite::SqliteStore;
+use crate::jobs::store::sqlite::reuse::end_with_sources;
 use crate::jobs::store::sqlite::rows::{
     job_columns, read_count, read_id, read_job, read_state, to_json,
 };
-use crate::jobs::store::{Begun, NewBatch, NewJob};
+use crate::jobs::store::{Begun, NewBatch, NewJob, ReuseKey};
 
-/// Jobs in one statement; with 10 values each far below the bound of SQLite.
+/// Jobs in one statement; with 11 values each far below the bound of SQLite.
 const ROWS_PER_STATEMENT: usize = 250;
 
 impl SqliteStore {
@@ -66,11 +67,17 @@ impl SqliteStore {
         Ok(Begun::Created)
     }
 
-    /// Queues jobs of a batch with their places in it, all or none.
+    /// Queues jobs of a batch with their places in it, all or none. Returns those that ended at once with the result of
+    /// their source.
     ///
     /// # Errors
     /// The database failed; nothing was stored.
-    pub async fn enqueue_many(&self, batch: Uuid, jobs: &[(u32, NewJob)]) -> Result<(), JobsError> {
+    pub async fn enqueue_many(
+        &self,
+        batch: Uuid,
+        jobs: &[(u32, NewJob)],
+    ) -> Result<Vec<Uuid>, JobsError> {
+        let mut ended = Vec::new();
         let batch = batch.to_string();
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         for some in jobs.chunks(ROWS_PER_STATEMENT) {
@@ -79,7 +86,7 @@ impl SqliteStore {
                 .map(|(_, job)| to_json(&job.labels))
                 .collect::<Result<Vec<_>, _>>()?;
             let mut rows = QueryBuilder::<Sqlite>::new(
-                "INSERT INTO jobs (id, state, name, labels, method, created_at, batch_id, batch_index, cost_us, outputs) ",
+                "INSERT INTO jobs (id, state, name, labels, method, created_at, batch_id, batch_index, cost_us, outputs, reuse_key) ",
             );
             rows.push_values(
                 some.iter().zip(labels),
@@ -93,7 +100,8 @@ impl SqliteStore {
                         .push_bind(&batch)
                         .push_bind(*index)
                         .push_bind(job.cost_us)
-                        .push_bind(&job.outputs);
+                        .push_bind(&job.outputs)
+                        .push_bind(job.reuse_key.as_ref().map(ReuseKey::as_slice));
                 },
             );
             rows.build().execute(&mut *transaction).await?;
@@ -117,9 +125,11 @@ impl SqliteStore {
                 });
                 rows.build().execute(&mut *transaction).await?;
             }
+            let jobs = some.iter().map(|(_, job)| job);
+            ended.extend(end_with_sources(&mut transaction, jobs).await?);
         }
         transaction.commit().await?;
-        Ok(())
+        Ok(ended)
     }
 
     /// Marks a batch as complete. Durable once it returns.

@@ -36,7 +36,7 @@ impl SqliteStore {
         Ok(Page { jobs, next_cursor })
     }
 
-    /// Which of these jobs exist.
+    /// Which of these jobs exist, or have a folder that a result of another job lies in.
     ///
     /// # Errors
     /// The database failed.
@@ -48,7 +48,9 @@ impl SqliteStore {
         }
         query.push(")");
         let rows = query.build().fetch_all(&self.readers).await?;
-        rows.iter().map(read_id).collect()
+        let mut existing = rows.iter().map(read_id).collect::<Result<Vec<_>, _>>()?;
+        existing.extend(self.lenders(ids).await?);
+        Ok(existing)
     }
 }
 

@@ -12,6 +12,7 @@ pub mod claims;
 pub mod figures;
 pub mod groups;
 pub mod lists;
+pub mod reuse;
 mod rows;
 
 use std::path::{Path, PathBuf};
@@ -28,9 +29,11 @@ use uuid::Uuid;
 use crate::jobs::error::JobsError;
 use crate::jobs::job::Job;
 use crate::jobs::results::Encoded;
+use crate::jobs::store::sqlite::reuse::end_with_sources;
 use crate::jobs::store::sqlite::rows::{job_columns, read_job, to_json};
-use crate::jobs::store::{Deleted, Enqueued, NewJob, StoredResult};
+use crate::jobs::store::{Deleted, Enqueued, NewJob, ReuseKey, StoredResult};
 
+const GET: &str = concat!("SELECT ", job_columns!(), " FROM jobs WHERE id = $1");
 const READERS: u32 = 4;
 const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 
@@ -96,9 +99,9 @@ impl SqliteStore {
     pub async fn enqueue(&self, new: &NewJob) -> Result<Enqueued, JobsError> {
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         let id = new.id.to_string();
-        let row = sqlx::query(concat!(
-            "INSERT INTO jobs (id, state, name, labels, method, created_at, cost_us, outputs) \
-             VALUES ($1, 'queued', $2, $3, $4, $5, $6, $7) RETURNING ",
+        let mut row = sqlx::query(concat!(
+            "INSERT INTO jobs (id, state, name, labels, method, created_at, cost_us, outputs, reuse_key) \
+             VALUES ($1, 'queued', $2, $3, $4, $5, $6, $7, $8) RETURNING ",
             job_columns!()
         ))
         .bind(&id)
@@ -108,6 +111,7 @@ impl SqliteStore {
         .bind(new.created_at)
         .bind(new.cost_us)
         .bind(&new.outputs)
+        .bind(new.reuse_key.as_ref().map(ReuseKey::as_slice))
         .fetch_one(&mut *transaction)
         .await?;
         if let Some((key, digest)) = &new.idempotency {
@@ -137,6 +141,15 @@ impl SqliteStore {
                 .bind(value)
                 .bind(&id)
                 .execute(&mut *transaction)
+                .await?;
+        }
+        if !end_with_sources(&mut transaction, std::iter::once(new))
+            .await?
+            .is_empty()
+        {
+            row = sqlx::query(GET)
+                .bind(&id)
+                .fetch_one(&mut *transaction)
                 .await?;
         }
         transaction.commit().await?;
@@ -211,15 +224,27 @@ impl SqliteStore {
     /// # Errors
     /// The database failed; nothing changed.
     pub async fn delete(&self, id: Uuid) -> Result<Deleted, JobsError> {
+        let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         let gone = sqlx::query(
-            "DELETE FROM jobs WHERE id = $1 AND state IN ('succeeded', 'failed', 'cancelled')",
+            "DELETE FROM jobs WHERE id = $1 AND state IN ('succeeded', 'failed', 'cancelled') RETURNING result_owner",
         )
         .bind(id.to_string())
-        .execute(&self.writer)
+        .fetch_optional(&mut *transaction)
         .await?;
-        if gone.rows_affected() > 0 {
-            return Ok(Deleted::Done);
+        if let Some(row) = gone {
+            let owner: Option<String> = row.try_get("result_owner")?;
+            let owner = owner.unwrap_or_else(|| id.to_string());
+            let needed: bool = sqlx::query_scalar(
+                "SELECT EXISTS (SELECT 1 FROM jobs WHERE id = $1) OR EXISTS (SELECT 1 FROM jobs WHERE result_owner = $1)",
+            )
+            .bind(&owner)
+            .fetch_one(&mut *transaction)
+            .await?;
+            transaction.commit().await?;
+            let orphan = Uuid::try_parse(&owner).ok().filter(|_| !needed);
+            return Ok(Deleted::Done { orphan });
         }
+        drop(transaction);
         let job = self.get(id).await?;
         Ok(job.map_or(Deleted::NotFound, |job| Deleted::NotEnded(job.state)))
     }
@@ -229,14 +254,10 @@ impl SqliteStore {
     /// # Errors
     /// The database failed.
     pub async fn get(&self, id: Uuid) -> Result<Option<Job>, JobsError> {
-        let row = sqlx::query(concat!(
-            "SELECT ",
-            job_columns!(),
-            " FROM jobs WHERE id = $1"
-        ))
-        .bind(id.to_string())
-        .fetch_optional(&self.readers)
-        .await?;
+        let row = sqlx::query(GET)
+            .bind(id.to_string())
+            .fetch_optional(&self.readers)
+            .await?;
         row.as_ref().map(read_job).transpose()
     }
 
@@ -316,5 +337,6 @@ fn migrations() -> Migrator {
         form(1, "jobs", include_str!("schema.sql")),
         form(2, "batches", include_str!("batches.sql")),
         form(3, "result bytes", include_str!("result_bytes.sql")),
+        form(4, "reuse", include_str!("reuse.sql")),
     ])
 }

@@ -12,7 +12,7 @@ use crate::jobs::job::{Job, State};
 /// The columns a [`Job`] is read from.
 macro_rules! job_columns {
     () => {
-        "id, state, name, labels, batch_id, created_at, started_at, ended_at, attempt, progress, warnings, failure, version"
+        "id, state, name, labels, batch_id, created_at, started_at, ended_at, attempt, progress, warnings, failure, cached, version"
     };
 }
 pub(super) use job_columns;
@@ -38,6 +38,7 @@ pub(super) fn read_job(row: &SqliteRow) -> Result<Job, JobsError> {
         progress: row.try_get("progress")?,
         warnings: from_json(row.try_get("warnings")?)?,
         failure: failure.as_deref().map(from_json).transpose()?,
+        cached: row.try_get("cached")?,
         version: read_count(row, "version")?,
     })
 }
