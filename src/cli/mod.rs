@@ -1,6 +1,7 @@
 //! What can be started, and with which settings? Every command, flag and environment variable.
 
 mod healthcheck;
+mod keys;
 mod serve;
 mod solve;
 
@@ -33,6 +34,8 @@ enum Command {
     ///
     /// Exit code 0: solved; 1: no answer; 2: the case is faulty.
     Solve(SolveArgs),
+    /// Make, list and revoke API keys; also while the service runs.
+    Keys(KeysArgs),
     /// Ask a running service whether it is ready; exit code 0 if it is, 1 if not.
     Healthcheck(HealthcheckArgs),
     /// Print the contract of the HTTP API (OpenAPI 3.1, JSON).
@@ -83,8 +86,117 @@ pub struct ServeArgs {
         value_name = "SECONDS"
     )]
     pub shutdown_grace_s: u32,
+    /// Queued jobs of one tenant beyond which its new ones are turned away.
+    #[arg(long, env = "RAILHEAD_TENANT_QUEUE_MAX", default_value_t = 250_000, value_name = "N",
+          value_parser = clap::value_parser!(u64).range(1..))]
+    pub tenant_queue_max: u64,
+    /// Whether requests without an API key are answered. Without keys and without anonymous use the service does not
+    /// start.
+    #[arg(
+        long,
+        env = "RAILHEAD_ANONYMOUS",
+        value_enum,
+        default_value = "loopback"
+    )]
+    pub anonymous: Anonymous,
+    /// Requests per second of one API key, twice as many at once; 0: any number. Requests without a key are not counted.
+    #[arg(
+        long,
+        env = "RAILHEAD_RATE_LIMIT",
+        default_value_t = 200,
+        value_name = "N"
+    )]
+    pub rate_limit: u32,
+    /// Origins of web pages that may read answers, such as `https://dashboard.example`, separated by commas.
+    #[arg(long, env = "RAILHEAD_CORS_ORIGIN", value_delimiter = ',', value_name = "ORIGIN", value_parser = origin)]
+    pub cors_origin: Vec<String>,
     #[command(flatten)]
     pub log: LogArgs,
+}
+
+/// When requests without an API key are answered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Anonymous {
+    /// While the service listens on a loopback address.
+    Loopback,
+    /// On every address: whoever reaches the port may use the service.
+    Always,
+    /// Not at all.
+    Never,
+}
+
+/// Settings of `keys`.
+#[derive(Debug, Clone, Args)]
+pub struct KeysArgs {
+    #[command(subcommand)]
+    pub action: KeysAction,
+}
+
+/// What can be done with API keys.
+#[derive(Debug, Clone, Subcommand)]
+pub enum KeysAction {
+    /// Make a key and print it, this one time.
+    Create {
+        /// Whose jobs the key opens; keys of the tenant `operator` may also read `/metrics`.
+        #[arg(long, value_name = "TENANT")]
+        tenant: String,
+        /// What the key is for.
+        #[arg(long, value_name = "TEXT")]
+        name: Option<String>,
+        /// Data folder of the service.
+        #[arg(
+            long,
+            env = "RAILHEAD_DATA_DIR",
+            default_value = "./railhead-data",
+            value_name = "FOLDER"
+        )]
+        data_dir: PathBuf,
+    },
+    /// List all keys without their secrets.
+    List {
+        /// Data folder of the service.
+        #[arg(
+            long,
+            env = "RAILHEAD_DATA_DIR",
+            default_value = "./railhead-data",
+            value_name = "FOLDER"
+        )]
+        data_dir: PathBuf,
+    },
+    /// Revoke a key; a running service refuses it within two seconds.
+    Revoke {
+        /// Id of the key, as `list` shows it.
+        #[arg(value_name = "ID")]
+        id: String,
+        /// Data folder of the service.
+        #[arg(
+            long,
+            env = "RAILHEAD_DATA_DIR",
+            default_value = "./railhead-data",
+            value_name = "FOLDER"
+        )]
+        data_dir: PathBuf,
+    },
+}
+
+/// Reads an origin: scheme and authority, nothing else.
+fn origin(text: &str) -> Result<String, String> {
+    let rest = text
+        .strip_prefix("https://")
+        .or_else(|| text.strip_prefix("http://"));
+    let plain = |rest: &str| {
+        !rest.is_empty()
+            && rest
+                .bytes()
+                .all(|byte| byte.is_ascii_graphic() && !b"/*?#@".contains(&byte))
+    };
+    if rest.is_some_and(plain) {
+        return Ok(text.to_owned());
+    }
+    Err(
+        "an origin is `http://` or `https://` and a host, perhaps with a port, and no path"
+            .to_owned(),
+    )
 }
 
 /// Settings of `solve`.
@@ -164,6 +276,7 @@ pub fn run() -> ExitCode {
     let done = match Cli::parse().command {
         Command::Serve(args) => serve::run(&args),
         Command::Solve(args) => solve::run(&args),
+        Command::Keys(args) => keys::run(&args),
         Command::Healthcheck(args) => healthcheck::run(&args.url),
         Command::Openapi => print(&http::openapi_json()),
     };

@@ -3,7 +3,6 @@
 use std::time::Duration;
 
 use axum::body::{Body, Bytes};
-use axum::extract::State;
 use axum::http::{HeaderMap, Uri, header};
 use axum::response::{IntoResponse, Response};
 use futures_util::stream::try_unfold;
@@ -14,6 +13,7 @@ use uuid::Uuid;
 
 use crate::contact::solution::Solution;
 use crate::http::accept::{Format, choose};
+use crate::http::access::Caller;
 use crate::http::error::ApiError;
 use crate::http::job::BatchId;
 use crate::http::problem::Problem;
@@ -74,7 +74,7 @@ problems! {
     responses((status = 200, description = "One line per job", content((BatchLine = "application/x-ndjson"), (String = "text/csv"))), BatchResultProblems)
 )]
 pub async fn results(
-    State(jobs): State<Jobs>,
+    Caller(jobs): Caller,
     BatchId(id): BatchId,
     uri: Uri,
     headers: HeaderMap,

@@ -14,6 +14,7 @@ use utoipa::ToSchema;
 
 use crate::contact::case::Case;
 use crate::http::HttpOptions;
+use crate::http::access::Caller;
 use crate::http::body::{essence, read_strict};
 use crate::http::elements::{Element, Layout, Splitter};
 use crate::http::error::{ApiError, Kind};
@@ -121,7 +122,7 @@ fn links(batch: &Batch) -> BTreeMap<String, String> {
 problems! {
     /// What `POST /v1/batches` can fail with.
     BatchProblems: MalformedJson, UnreadableBody, BadQuery, BadHeader, BodyTimeout, BodyTooLarge, UnsupportedMediaType,
-    FaultyBatch, IdempotencyConflict, QueueFull, Draining
+    FaultyBatch, IdempotencyConflict, QuotaExceeded, QueueFull, Draining
 }
 
 /// Submits many cases as one batch of jobs.
@@ -151,7 +152,7 @@ problems! {
     )
 )]
 pub async fn submit(
-    State(jobs): State<Jobs>,
+    Caller(jobs): Caller,
     State(options): State<HttpOptions>,
     request: Request,
 ) -> Result<Response, ApiError> {
@@ -344,7 +345,7 @@ problems! {
     responses((status = 200, description = "The batch", body = BatchAnswer), LookBatchProblems)
 )]
 pub async fn look(
-    State(jobs): State<Jobs>,
+    Caller(jobs): Caller,
     BatchId(id): BatchId,
 ) -> Result<Json<BatchAnswer>, ApiError> {
     Ok(Json(jobs.batch(id).await?.into()))
@@ -363,7 +364,7 @@ pub async fn look(
         LookBatchProblems
     )
 )]
-pub async fn cancel(State(jobs): State<Jobs>, BatchId(id): BatchId) -> Result<Response, ApiError> {
+pub async fn cancel(Caller(jobs): Caller, BatchId(id): BatchId) -> Result<Response, ApiError> {
     let batch: BatchAnswer = jobs.cancel_batch(id).await?.into();
     let status = if batch.ended {
         StatusCode::OK

@@ -51,6 +51,8 @@ kinds! {
     BadQuery 400 "bad-query" "The query is not understood" "A query parameter is unknown, repeated or has a value that is not allowed; `errors` names every such parameter."
     BadHeader 400 "bad-header" "A header is not understood" "A request header has a value that is not allowed; `errors` names it."
     UnreadableBody 400 "unreadable-body" "The body could not be read" "The connection ended or broke before the whole body had arrived."
+    Unauthorized 401 "unauthorized" "A key is needed" "The service is asked with `Authorization: Bearer` and an API key; there was none, or it is unknown or revoked. Keys come from the operator of the service."
+    Forbidden 403 "forbidden" "This key may not do that" "The key is good, but belongs to a tenant that has no business here."
     UnknownRoute 404 "unknown-route" "There is nothing at this address" "The path names no resource of this service; `/openapi.json` lists all of them."
     JobNotFound 404 "job-not-found" "There is no such job" "No job has this id; it was never made here, or it was deleted."
     BatchNotFound 404 "batch-not-found" "There is no such batch" "No batch has this id; it was never made here, or it was deleted."
@@ -66,6 +68,8 @@ kinds! {
     UnsupportedMediaType 415 "unsupported-media-type" "The body is not declared as JSON" "A case is sent with `Content-Type: application/json`, a batch also with `application/x-ndjson`."
     FaultyCase 422 "faulty-case" "The case has faults" "The body is JSON but not a case that can be solved; `errors` names every fault by its JSON pointer, with the value given and what is allowed."
     FaultyBatch 422 "faulty-batch" "The batch has faults" "The body holds no cases, or some of them have faults: `errors` names every fault by a JSON pointer that begins with the place of its case (counted from 0), and by its line in NDJSON. Nothing was stored; with `?accept=valid` the good cases are taken."
+    TooManyRequests 429 "too-many-requests" "Too many requests" "The key sends more requests per second than it may; try again after `Retry-After` seconds."
+    QuotaExceeded 429 "quota-exceeded" "Too many jobs are waiting" "The tenant has as many queued jobs as it may; nothing was stored, try again after `Retry-After` seconds."
     IdempotencyConflict 422 "idempotency-conflict" "The idempotency key belongs to another case" "The `Idempotency-Key` was used before with a different body; use a new key for a new case."
     Internal 500 "internal" "The service failed" "Something went wrong inside the service; its log has the reason under the request id in the header `x-request-id`."
     QueueFull 503 "queue-full" "The queue is full" "The service holds as many unfinished jobs as it may; nothing was stored, try again after `Retry-After` seconds."
@@ -84,7 +88,12 @@ impl Kind {
     pub fn passes(self) -> bool {
         matches!(
             self,
-            Kind::ResultNotReady | Kind::QueueFull | Kind::Draining | Kind::NotReady
+            Kind::ResultNotReady
+                | Kind::TooManyRequests
+                | Kind::QuotaExceeded
+                | Kind::QueueFull
+                | Kind::Draining
+                | Kind::NotReady
         )
     }
 }
@@ -104,6 +113,13 @@ impl ApiError {
             problem: Box::new(Problem::new(kind, detail)),
             retry_after: kind.passes().then_some(RETRY_SECONDS),
         }
+    }
+
+    /// The same, with the seconds after which to try again.
+    #[must_use]
+    pub fn after(mut self, seconds: u32) -> Self {
+        self.retry_after = Some(seconds);
+        self
     }
 
     /// A failure of the service itself: the reason goes to the log, not to the client.
@@ -236,6 +252,12 @@ impl From<JobsError> for ApiError {
                 Kind::QueueFull,
                 format!("{queue_max} jobs are waiting, which is the limit; nothing was stored"),
             ),
+            JobsError::QuotaExceeded { queue_max } => ApiError::new(
+                Kind::QuotaExceeded,
+                format!(
+                    "{queue_max} jobs of this tenant are waiting, which is its limit; nothing was stored"
+                ),
+            ),
             JobsError::BadCursor => ApiError::bad_parameter(
                 "cursor",
                 "`cursor` is not one that this service gave out for the same filters; start again without it",
@@ -274,6 +296,12 @@ impl IntoResponse for ApiError {
             response
                 .headers_mut()
                 .insert(header::RETRY_AFTER, HeaderValue::from(seconds));
+        }
+        if self.problem.status == 401 {
+            let scheme = HeaderValue::from_static("Bearer realm=\"railhead\"");
+            response
+                .headers_mut()
+                .insert(header::WWW_AUTHENTICATE, scheme);
         }
         // The handler does not know the path it answers for; `name_instance` writes the problem again with it.
         response.extensions_mut().insert(self.problem);

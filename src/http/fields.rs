@@ -1,6 +1,5 @@
 //! `/v1/jobs/{id}/tractions`, `/pressure` and `/slip`: values per cell, or on a regular grid.
 
-use axum::extract::State;
 use axum::http::{Uri, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
@@ -11,6 +10,7 @@ use crate::contact::case::Output;
 use crate::contact::outputs::resample::resample;
 use crate::contact::solution::{PatchFields, PointFields};
 use crate::contact::zones::Zone;
+use crate::http::access::Caller;
 use crate::http::error::ApiError;
 use crate::http::job::JobId;
 use crate::http::problems::problems;
@@ -165,7 +165,7 @@ problems! {
     responses((status = 200, description = "Tractions on the lower body, in MPa", body = Field), FieldProblems)
 )]
 pub async fn tractions(
-    State(jobs): State<Jobs>,
+    Caller(jobs): Caller,
     JobId(id): JobId,
     uri: Uri,
 ) -> Result<Response, ApiError> {
@@ -187,7 +187,7 @@ pub async fn tractions(
     responses((status = 200, description = "Pressure in MPa", body = Field), FieldProblems)
 )]
 pub async fn pressure(
-    State(jobs): State<Jobs>,
+    Caller(jobs): Caller,
     JobId(id): JobId,
     uri: Uri,
 ) -> Result<Response, ApiError> {
@@ -208,11 +208,7 @@ pub async fn pressure(
     ),
     responses((status = 200, description = "Relative slip, dimensionless", body = Field), FieldProblems)
 )]
-pub async fn slip(
-    State(jobs): State<Jobs>,
-    JobId(id): JobId,
-    uri: Uri,
-) -> Result<Response, ApiError> {
+pub async fn slip(Caller(jobs): Caller, JobId(id): JobId, uri: Uri) -> Result<Response, ApiError> {
     answer(&jobs, id, &uri, Output::Slip).await
 }
 

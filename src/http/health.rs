@@ -5,9 +5,9 @@ use axum::extract::State;
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use crate::http::access::Unscoped;
 use crate::http::error::{ApiError, Kind};
 use crate::http::problems::problems;
-use crate::jobs::Jobs;
 use crate::jobs::error::JobsError;
 
 /// A healthy answer.
@@ -55,7 +55,7 @@ problems! {
     operation_id = "readyz",
     responses((status = 200, description = "The service takes jobs", body = Health), ReadyProblems)
 )]
-pub async fn ready(State(jobs): State<Jobs>) -> Result<Json<Health>, ApiError> {
+pub async fn ready(State(Unscoped(jobs)): State<Unscoped>) -> Result<Json<Health>, ApiError> {
     match jobs.ready().await {
         Ok(()) => Ok(Health::new("ready")),
         Err(JobsError::Draining) => Err(JobsError::Draining.into()),

@@ -3,7 +3,6 @@
 use std::time::Duration;
 
 use axum::Json;
-use axum::extract::State;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
@@ -11,6 +10,7 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use crate::contact::case::Case;
+use crate::http::access::Caller;
 use crate::http::body::JsonBody;
 use crate::http::error::ApiError;
 use crate::http::job::{JobAnswer, JobId};
@@ -18,7 +18,7 @@ use crate::http::problems::problems;
 use crate::http::query::{Query, whole};
 use crate::http::results::result_of;
 use crate::jobs::job::State as JobState;
-use crate::jobs::{Filter, Jobs, PAGE_MAX};
+use crate::jobs::{Filter, PAGE_MAX};
 
 /// Longest time that `Prefer: wait` holds a request, in s.
 pub const WAIT_MAX_SECONDS: u32 = 60;
@@ -45,7 +45,7 @@ pub struct JobPage {
 problems! {
     /// What `POST /v1/jobs` can fail with.
     SubmitProblems: MalformedJson, UnreadableBody, BadHeader, BodyTimeout, BodyTooLarge, UnsupportedMediaType, FaultyCase,
-    IdempotencyConflict, QueueFull, Draining
+    IdempotencyConflict, QuotaExceeded, QueueFull, Draining
 }
 
 /// Submits one case as a job.
@@ -78,7 +78,7 @@ problems! {
     )
 )]
 pub async fn submit(
-    State(jobs): State<Jobs>,
+    Caller(jobs): Caller,
     headers: HeaderMap,
     JsonBody(case): JsonBody,
 ) -> Result<Response, ApiError> {
@@ -198,7 +198,7 @@ problems! {
     ),
     responses((status = 200, description = "A page of jobs", body = JobPage), ListProblems)
 )]
-pub async fn list(State(jobs): State<Jobs>, uri: Uri) -> Result<Json<JobPage>, ApiError> {
+pub async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Json<JobPage>, ApiError> {
     let mut query = Query::read(
         &uri,
         &[
@@ -272,7 +272,7 @@ problems! {
     params(("id" = String, Path, description = "Id of the job", format = "uuid")),
     responses((status = 200, description = "The job", body = JobAnswer), LookProblems)
 )]
-pub async fn look(State(jobs): State<Jobs>, JobId(id): JobId) -> Result<Json<JobAnswer>, ApiError> {
+pub async fn look(Caller(jobs): Caller, JobId(id): JobId) -> Result<Json<JobAnswer>, ApiError> {
     Ok(Json(JobAnswer::new(jobs.get(id).await?, None)))
 }
 
@@ -285,7 +285,7 @@ pub async fn look(State(jobs): State<Jobs>, JobId(id): JobId) -> Result<Json<Job
     params(("id" = String, Path, description = "Id of the job", format = "uuid")),
     responses((status = 200, description = "The case", body = Case), LookProblems)
 )]
-pub async fn case(State(jobs): State<Jobs>, JobId(id): JobId) -> Result<Response, ApiError> {
+pub async fn case(Caller(jobs): Caller, JobId(id): JobId) -> Result<Response, ApiError> {
     let text = jobs.case(id).await?;
     Ok(([(header::CONTENT_TYPE, "application/json")], text).into_response())
 }
@@ -303,7 +303,7 @@ pub async fn case(State(jobs): State<Jobs>, JobId(id): JobId) -> Result<Response
         LookProblems
     )
 )]
-pub async fn cancel(State(jobs): State<Jobs>, JobId(id): JobId) -> Result<Response, ApiError> {
+pub async fn cancel(Caller(jobs): Caller, JobId(id): JobId) -> Result<Response, ApiError> {
     let job = jobs.cancel(id).await?;
     let status = if job.state.ended() {
         StatusCode::OK
@@ -327,7 +327,7 @@ problems! {
     params(("id" = String, Path, description = "Id of the job", format = "uuid")),
     responses((status = 204, description = "The job is gone"), DeleteProblems)
 )]
-pub async fn delete(State(jobs): State<Jobs>, JobId(id): JobId) -> Result<StatusCode, ApiError> {
+pub async fn delete(Caller(jobs): Caller, JobId(id): JobId) -> Result<StatusCode, ApiError> {
     jobs.delete(id).await?;
     Ok(StatusCode::NO_CONTENT)
 }

@@ -14,6 +14,7 @@ use prometheus_client::metrics::family::Family;
 use prometheus_client::metrics::histogram::Histogram;
 use prometheus_client::registry::Registry;
 
+use crate::http::access::Operator;
 use crate::http::error::ApiError;
 use crate::http::problems::problems;
 use crate::jobs::Jobs;
@@ -118,7 +119,7 @@ fn known(method: &Method) -> &'static str {
 
 problems! {
     /// What `GET /metrics` can fail with.
-    MetricsProblems:
+    MetricsProblems: Unauthorized, Forbidden, TooManyRequests
 }
 
 /// What the service counts, as OpenMetrics text.
@@ -132,7 +133,7 @@ problems! {
     responses((status = 200, description = "The figures", body = String, content_type = "application/openmetrics-text"), MetricsProblems)
 )]
 pub async fn metrics(
-    State(jobs): State<Jobs>,
+    Operator(jobs): Operator,
     State(metrics): State<Metrics>,
 ) -> Result<Response, ApiError> {
     jobs.refresh_metrics().await?;

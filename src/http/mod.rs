@@ -3,6 +3,7 @@
 //! Handlers translate: they read a request, call [`Jobs`] and answer. Nothing is computed here.
 
 mod accept;
+mod access;
 mod batch_results;
 mod batches;
 mod body;
@@ -10,6 +11,7 @@ mod cases;
 mod elements;
 mod error;
 mod fields;
+mod headers;
 mod health;
 mod job;
 mod jobs;
@@ -36,9 +38,11 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
+use crate::http::access::{Access, Unscoped};
 use crate::http::error::{ApiError, Kind};
 use crate::jobs::Jobs;
 
+pub use crate::http::headers::allow_origins;
 pub use crate::http::openapi::openapi_json;
 
 /// What one request may cost.
@@ -52,6 +56,10 @@ pub struct HttpOptions {
     pub batch_max_bytes: u64,
     /// Most cases of a batch.
     pub batch_max_cases: u32,
+    /// Requests without a key are answered, as those of a tenant of their own.
+    pub anonymous: bool,
+    /// Requests per second of one key; 0 for any number.
+    pub requests_per_second: u32,
 }
 
 impl Default for HttpOptions {
@@ -61,6 +69,8 @@ impl Default for HttpOptions {
             body_timeout: Duration::from_secs(60),
             batch_max_bytes: 1 << 30,
             batch_max_cases: 200_000,
+            anonymous: true,
+            requests_per_second: 0,
         }
     }
 }
@@ -68,7 +78,8 @@ impl Default for HttpOptions {
 /// What every handler can reach.
 #[derive(Clone, FromRef)]
 struct Shared {
-    jobs: Jobs,
+    unscoped: Unscoped,
+    access: Access,
     options: HttpOptions,
     metrics: metrics::Metrics,
 }
@@ -83,7 +94,8 @@ pub fn router(jobs: Jobs, options: HttpOptions) -> Router {
             .validator_url("none")
             .try_it_out_enabled(true),
     );
-    resources
+    let access = Access::new(&jobs, options);
+    let router = resources
         .merge(contract)
         .route("/", get(|| async { Redirect::temporary("/docs/") }))
         .fallback(|uri: Uri| async move { error::unknown_route(uri.path()) })
@@ -95,10 +107,12 @@ pub fn router(jobs: Jobs, options: HttpOptions) -> Router {
         .layer(trace::span_layer())
         .layer(from_fn(trace::carry_request_id))
         .with_state(Shared {
-            jobs,
+            unscoped: Unscoped(jobs),
+            access,
             options,
             metrics,
-        })
+        });
+    headers::secure(router)
 }
 
 /// Every documented route, in the order of the contract.

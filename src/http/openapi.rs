@@ -7,8 +7,10 @@ use axum::response::{IntoResponse, Response};
 use utoipa::OpenApi;
 use utoipa::openapi::RefOr;
 use utoipa::openapi::example::ExampleBuilder;
+use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement, SecurityScheme};
 
 use crate::http::problem::Problem;
+use crate::http::problems::describe_access;
 use crate::http::resources;
 
 #[derive(OpenApi)]
@@ -78,6 +80,7 @@ static DOCUMENT: LazyLock<String> = LazyLock::new(|| {
     for path in ["/v1/jobs", "/v1/cases/check"] {
         add_examples(&mut document, path);
     }
+    require_keys(&mut document);
     let text = document.to_pretty_json();
     // Only a map with keys that are not strings cannot be written; the document has none.
     text.map(|text| text + "\n").unwrap_or_default()
@@ -87,6 +90,35 @@ static DOCUMENT: LazyLock<String> = LazyLock::new(|| {
 #[must_use]
 pub fn openapi_json() -> String {
     DOCUMENT.clone()
+}
+
+/// Says of every operation on what belongs to a tenant that it may need a key.
+fn require_keys(document: &mut utoipa::openapi::OpenApi) {
+    let scheme = HttpBuilder::new()
+        .scheme(HttpAuthScheme::Bearer)
+        .description(Some(
+            "An API key; not needed where the service lets anybody in, as it does on loopback",
+        ))
+        .build();
+    let components = document.components.get_or_insert_default();
+    components.add_security_scheme("key", SecurityScheme::Http(scheme));
+    for item in document.paths.paths.values_mut() {
+        let operations = [&mut item.get, &mut item.post, &mut item.delete];
+        for operation in operations.into_iter().filter_map(Option::as_mut) {
+            let tags = operation.tags.as_deref().unwrap_or_default();
+            let open = tags.iter().any(|tag| tag == "service");
+            let metrics = operation.operation_id.as_deref() == Some("get_metrics");
+            let methods = operation.operation_id.as_deref() == Some("list_methods");
+            if (open && !metrics) || methods {
+                continue;
+            }
+            operation.security = Some(vec![
+                SecurityRequirement::new("key", Vec::<String>::new()),
+                SecurityRequirement::default(),
+            ]);
+            describe_access(&mut operation.responses.responses);
+        }
+    }
 }
 
 fn add_examples(document: &mut utoipa::openapi::OpenApi, path: &str) {

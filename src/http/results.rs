@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use axum::Json;
-use axum::extract::State;
 use axum::http::Uri;
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -11,6 +10,7 @@ use uuid::Uuid;
 
 use crate::contact::case::{Motion, Output};
 use crate::contact::solution::{ErrorEstimate, Origin, Solution, Total};
+use crate::http::access::Caller;
 use crate::http::error::{ApiError, Kind};
 use crate::http::job::JobId;
 use crate::http::problems::problems;
@@ -87,10 +87,7 @@ problems! {
     params(("id" = String, Path, description = "Id of the job", format = "uuid")),
     responses((status = 200, description = "The result", body = JobResult), ResultProblems)
 )]
-pub async fn result(
-    State(jobs): State<Jobs>,
-    JobId(id): JobId,
-) -> Result<Json<JobResult>, ApiError> {
+pub async fn result(Caller(jobs): Caller, JobId(id): JobId) -> Result<Json<JobResult>, ApiError> {
     result_of(&jobs, id).await.map(Json)
 }
 
@@ -144,7 +141,7 @@ problems! {
     responses((status = 200, description = "Forces and moments on the lower body", body = Resultants), PartProblems)
 )]
 pub async fn resultants(
-    State(jobs): State<Jobs>,
+    Caller(jobs): Caller,
     JobId(id): JobId,
     uri: Uri,
 ) -> Result<Json<Resultants>, ApiError> {

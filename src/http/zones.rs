@@ -1,6 +1,5 @@
 //! `/v1/jobs/{id}/zones`: where the patch sticks and where it slips.
 
-use axum::extract::State;
 use axum::http::Uri;
 use axum::response::Response;
 use serde::Serialize;
@@ -11,11 +10,11 @@ use crate::contact::outputs::outline::{outlines, patch_outline};
 use crate::contact::outputs::resample::resample_zone;
 use crate::contact::solution::PatchFields;
 use crate::contact::zones::Zone;
+use crate::http::access::Caller;
 use crate::http::error::ApiError;
 use crate::http::fields::{Cells, FieldProblems, GriddedField, Selection, per_cell, write_json};
 use crate::http::job::JobId;
 use crate::http::results::{not_asked, require_index};
-use crate::jobs::Jobs;
 
 /// Stick and slip zones of one patch for one motion.
 #[derive(Debug, Serialize, ToSchema)]
@@ -74,11 +73,7 @@ pub struct Outlines {
     ),
     responses((status = 200, description = "Areas, outlines and the zone of every cell, or zones on a regular grid", body = Zones), FieldProblems)
 )]
-pub async fn zones(
-    State(jobs): State<Jobs>,
-    JobId(id): JobId,
-    uri: Uri,
-) -> Result<Response, ApiError> {
+pub async fn zones(Caller(jobs): Caller, JobId(id): JobId, uri: Uri) -> Result<Response, ApiError> {
     let selection = Selection::read(&uri)?;
     let solution = jobs.solution(id).await?;
     require_index("patch", Some(selection.patch), solution.patches.len())?;

@@ -32,6 +32,8 @@ const LOOK_PAUSE: Duration = Duration::from_millis(10);
 pub struct Batch {
     /// UUIDv7.
     pub id: Uuid,
+    /// Whose it is.
+    pub tenant: String,
     /// Time of submission, epoch milliseconds.
     pub created_at: i64,
     /// Number of jobs it was made of.
@@ -191,6 +193,7 @@ impl Jobs {
         let digest = *draft.digest.finalize().as_bytes();
         let new = NewBatch {
             id,
+            tenant: self.tenant.clone(),
             created_at: created_at(id),
             count: draft.cases - draft.rejected,
             rejected: draft.rejected,
@@ -267,7 +270,9 @@ impl Jobs {
     /// [`JobsError::BatchNotFound`], or a failed database.
     pub async fn batch(&self, id: Uuid) -> Result<Batch, JobsError> {
         let batch = self.shared.store.batch(id).await?;
-        batch.ok_or(JobsError::BatchNotFound)
+        batch
+            .filter(|batch| *batch.tenant == *self.tenant)
+            .ok_or(JobsError::BatchNotFound)
     }
 
     /// Cancels every job of a batch that has not ended: queued ones end at once, running ones at the next tick of
@@ -306,6 +311,7 @@ impl Jobs {
             // Subscribe first, then look: what ends in between is announced.
             let mut ended = self.shared.ended.subscribe();
             let mut lines = self.shared.store.batch_lines(id, after, limit).await?;
+            lines.retain(|line| *line.job.tenant == *self.tenant);
             let waiting = Instant::now() < until && !self.shared.draining.is_cancelled();
             if waiting {
                 let done = lines
@@ -345,6 +351,7 @@ impl Jobs {
         let id = Uuid::now_v7();
         NewJob {
             id,
+            tenant: self.tenant.clone(),
             created_at: created_at(id),
             name: card.name,
             labels: card.labels,

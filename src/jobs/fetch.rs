@@ -15,6 +15,7 @@ impl Jobs {
     /// # Errors
     /// [`JobsError::NotFound`], or a failed database.
     pub async fn case(&self, id: Uuid) -> Result<Bytes, JobsError> {
+        self.get(id).await?;
         let (body, _) = self
             .shared
             .store
@@ -90,6 +91,7 @@ impl Jobs {
             .store
             .result(id)
             .await?
+            .filter(|(job, _)| *job.tenant == *self.tenant)
             .ok_or(JobsError::NotFound)?;
         match stored {
             Some(stored) => Ok(stored),

@@ -13,6 +13,8 @@ use crate::contact::error::SolveError;
 pub struct Job {
     /// UUIDv7; sorts by time of submission.
     pub id: Uuid,
+    /// Whose it is.
+    pub tenant: String,
     /// Where it stands.
     pub state: State,
     /// Free text of the client.

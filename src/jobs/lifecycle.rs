@@ -12,12 +12,13 @@ use tokio_util::task::TaskTracker;
 
 use crate::contact::problem::Limits;
 use crate::jobs::error::JobsError;
+use crate::jobs::keys::ANONYMOUS;
 use crate::jobs::metrics::Metrics;
 use crate::jobs::recipe::Recipe;
 use crate::jobs::results::Results;
 use crate::jobs::store::sqlite::SqliteStore;
 use crate::jobs::worker::Worker;
-use crate::jobs::{Jobs, Shared, housekeeping, now_ms};
+use crate::jobs::{Admitted, Jobs, Shared, housekeeping, now_ms};
 
 /// How long a shutdown waits for workers that were told to stop, beyond their own patience.
 const STOPPED_WITHIN: Duration = Duration::from_secs(10);
@@ -37,6 +38,8 @@ pub struct Options {
     pub attempts_max: u32,
     /// Bound of queued jobs.
     pub queue_max: u64,
+    /// Bound of queued jobs of one tenant.
+    pub tenant_queue_max: u64,
     /// Most jobs a worker claims together, if they are small; 1 means no groups.
     pub group_max: usize,
     /// Results up to this size in bytes are kept in the database, larger ones in folders.
@@ -46,7 +49,8 @@ pub struct Options {
 }
 
 impl Options {
-    /// The defaults for a data folder: one worker, a lease of 30 s, 5 attempts, 300 000 queued jobs,
+    /// The defaults for a data folder: one worker, a lease of 30 s, 5 attempts, 300 000 queued jobs of which
+    /// 250 000 of one tenant,
     /// groups of 64, results up to 32 KiB in the database, results used again.
     #[must_use]
     pub fn new(data_dir: impl Into<PathBuf>) -> Options {
@@ -57,6 +61,7 @@ impl Options {
             lease: Duration::from_secs(30),
             attempts_max: 5,
             queue_max: 300_000,
+            tenant_queue_max: 250_000,
             group_max: 64,
             small_result_max_bytes: 32 << 10,
             cache: true,
@@ -94,6 +99,7 @@ impl Jobs {
         let queued = store.queued(options.queue_max).await?;
         let (ended, _) = broadcast::channel(1024);
         Ok(Jobs {
+            tenant: ANONYMOUS.into(),
             shared: Arc::new(Shared {
                 options,
                 recipe,
@@ -106,7 +112,11 @@ impl Jobs {
                 stopping: CancellationToken::new(),
                 tasks: TaskTracker::new(),
                 metrics: Metrics::new(),
-                queued_at_most: tokio::sync::Mutex::new(queued),
+                trusted: Mutex::default(),
+                queued_at_most: tokio::sync::Mutex::new(Admitted {
+                    all: queued,
+                    ..Admitted::default()
+                }),
                 lock: Mutex::new(Some(lock)),
             }),
         })

@@ -14,6 +14,7 @@ mod group;
 mod housekeeping;
 mod idempotency;
 pub mod job;
+pub mod keys;
 pub mod lifecycle;
 mod metrics;
 pub mod recipe;
@@ -43,6 +44,7 @@ use crate::contact::error::CaseError;
 use crate::contact::problem::Problem;
 pub use crate::jobs::error::JobsError;
 pub use crate::jobs::job::{Failure, FailureKind, Job, State};
+use crate::jobs::keys::Trusted;
 pub use crate::jobs::lifecycle::Options;
 use crate::jobs::metrics::Metrics;
 use crate::jobs::recipe::Recipe;
@@ -62,6 +64,8 @@ const READY_WITHIN: Duration = Duration::from_secs(2);
 #[derive(Debug, Clone)]
 pub struct Jobs {
     shared: Arc<Shared>,
+    /// Whose jobs this handle makes and sees.
+    tenant: Arc<str>,
 }
 
 /// What every handle and every worker shares.
@@ -83,10 +87,19 @@ struct Shared {
     stopping: CancellationToken,
     tasks: TaskTracker,
     metrics: Metrics,
-    /// Upper bound of the number of queued jobs, recounted when it reaches the limit.
-    queued_at_most: tokio::sync::Mutex<u64>,
+    /// Keys found good a moment ago.
+    trusted: Mutex<Trusted>,
+    /// Upper bounds of the number of queued jobs, recounted when they reach their limits.
+    queued_at_most: tokio::sync::Mutex<Admitted>,
     /// Held as long as this process uses the data folder.
     lock: Mutex<Option<File>>,
+}
+
+/// Upper bounds of the number of queued jobs.
+#[derive(Debug, Default)]
+struct Admitted {
+    all: u64,
+    of_tenants: HashMap<Arc<str>, u64>,
 }
 
 impl Jobs {
@@ -146,7 +159,7 @@ impl Jobs {
             .await
             .map_err(|error| JobsError::Damaged(error.to_string()))?;
         if let Some((key, digest)) = &idempotency
-            && let Some(enqueued) = self.shared.store.by_key(key, digest).await?
+            && let Some(enqueued) = self.shared.store.by_key(&self.tenant, key, digest).await?
         {
             return replayed(enqueued);
         }
@@ -155,6 +168,7 @@ impl Jobs {
         let id = Uuid::now_v7();
         let mut new = NewJob {
             id,
+            tenant: self.tenant.clone(),
             created_at: created_at(id),
             name: problem.name,
             labels: problem.labels,
@@ -188,7 +202,10 @@ impl Jobs {
     /// # Errors
     /// [`JobsError::NotFound`], or a failed database.
     pub async fn get(&self, id: Uuid) -> Result<Job, JobsError> {
-        self.shared.store.get(id).await?.ok_or(JobsError::NotFound)
+        let job = self.shared.store.get(id).await?;
+        // What belongs to another tenant is answered like what does not exist.
+        job.filter(|job| *job.tenant == *self.tenant)
+            .ok_or(JobsError::NotFound)
     }
 
     /// Waits until a job has ended, but not longer than `at_most`, and returns it as it then is. Returns at once when
@@ -228,7 +245,7 @@ impl Jobs {
     ) -> Result<Page, JobsError> {
         self.shared
             .store
-            .list(filter, cursor, limit.clamp(1, PAGE_MAX))
+            .list(&self.tenant, filter, cursor, limit.clamp(1, PAGE_MAX))
             .await
     }
 
@@ -238,6 +255,7 @@ impl Jobs {
     /// # Errors
     /// [`JobsError::NotFound`], or a failed database.
     pub async fn cancel(&self, id: Uuid) -> Result<Job, JobsError> {
+        self.get(id).await?;
         let now = now_ms();
         let job = self
             .shared
@@ -262,6 +280,7 @@ impl Jobs {
     /// # Errors
     /// [`JobsError::NotEnded`], [`JobsError::NotFound`], or a failed database.
     pub async fn delete(&self, id: Uuid) -> Result<(), JobsError> {
+        self.get(id).await?;
         match self.shared.store.delete(id).await? {
             Deleted::NotEnded(state) => Err(JobsError::NotEnded(state)),
             Deleted::NotFound => Err(JobsError::NotFound),
@@ -292,15 +311,29 @@ impl Jobs {
     /// Takes places in the queue. The bound is exact: the figure kept here is never below the true one, and the queue
     /// is counted before anybody is turned away.
     async fn admit(&self, jobs: u64) -> Result<(), JobsError> {
-        let queue_max = self.shared.options.queue_max;
+        let (store, options) = (&self.shared.store, &self.shared.options);
         let mut at_most = self.shared.queued_at_most.lock().await;
-        if *at_most + jobs > queue_max {
-            *at_most = self.shared.store.queued(queue_max).await?;
+        let queue_max = options.tenant_queue_max;
+        // Nothing is known yet of a tenant that comes for the first time: it is counted.
+        let known = at_most.of_tenants.get(&self.tenant).copied();
+        let mut of_tenant = known.unwrap_or(queue_max);
+        if of_tenant + jobs > queue_max {
+            of_tenant = store.queued_of(&self.tenant, queue_max).await?;
         }
-        if *at_most + jobs > queue_max {
+        if of_tenant + jobs > queue_max {
+            return Err(JobsError::QuotaExceeded { queue_max });
+        }
+        let queue_max = options.queue_max;
+        if at_most.all + jobs > queue_max {
+            at_most.all = store.queued(queue_max).await?;
+        }
+        if at_most.all + jobs > queue_max {
             return Err(JobsError::QueueFull { queue_max });
         }
-        *at_most += jobs;
+        at_most.all += jobs;
+        at_most
+            .of_tenants
+            .insert(self.tenant.clone(), of_tenant + jobs);
         Ok(())
     }
 }

@@ -398,6 +398,7 @@ async fn an_incomplete_batch_is_gone_after_a_restart() {
         .unwrap();
     let new = NewBatch {
         id: uuid::Uuid::now_v7(),
+        tenant: "anonymous".into(),
         created_at: 0,
         count: 2,
         rejected: 0,

@@ -351,6 +351,7 @@ async fn every_kind_of_problem_explains_itself() {
     // Every kind is provoked by a test here or in `requests`; `internal` by a unit test of the panic handler, and `not-ready`
     // needs a job table that stops answering.
     let here = concat!(
+        include_str!("access.rs"),
         include_str!("batches.rs"),
         include_str!("errors.rs"),
         include_str!("requests.rs")

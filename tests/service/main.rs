@@ -1,5 +1,6 @@
 //! Does the service behave?
 
+mod access;
 mod api;
 mod batches;
 mod cache;

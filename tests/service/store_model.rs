@@ -90,6 +90,7 @@ impl Pair {
     async fn enqueue(&mut self) {
         let id = Uuid::now_v7();
         let new = NewJob {
+            tenant: "anonymous".into(),
             id,
             created_at: 0,
             name: None,

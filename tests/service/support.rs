@@ -68,7 +68,8 @@ impl Service {
     /// Starts `railhead serve` on a data folder and returns when it listens.
     pub fn start(data_dir: &Path, flags: &[&str]) -> Service {
         let mut child = railhead()
-            .args(["serve", "--listen", "127.0.0.1:0", "--log-format", "json"])
+            .args(["serve", "--log-format", "json"])
+            .env("RAILHEAD_LISTEN", "127.0.0.1:0")
             .arg("--data-dir")
             .arg(data_dir)
             .args(flags)
@@ -155,6 +156,12 @@ impl Service {
         log.iter()
             .filter(|event| event["message"] == message)
             .count()
+    }
+
+    /// Everything logged so far, as JSON text.
+    pub fn log_text(&self) -> String {
+        let log = self.log.lock().unwrap();
+        log.iter().map(|event| format!("{event}\n")).collect()
     }
 
     /// Ends it with SIGKILL.

@@ -8,6 +8,7 @@ pub mod list;
 pub mod sqlite;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use bytes::Bytes;
 use uuid::Uuid;
@@ -23,6 +24,8 @@ pub type ReuseKey = [u8; 16];
 pub struct NewJob {
     /// UUIDv7.
     pub id: Uuid,
+    /// Whose it is.
+    pub tenant: Arc<str>,
     /// Time of submission.
     pub created_at: i64,
     /// Free text of the client.
@@ -50,6 +53,8 @@ pub struct NewJob {
 pub struct NewBatch {
     /// UUIDv7.
     pub id: Uuid,
+    /// Whose it is.
+    pub tenant: Arc<str>,
     /// Time of submission.
     pub created_at: i64,
     /// Number of jobs it will have.

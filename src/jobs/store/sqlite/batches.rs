@@ -18,7 +18,7 @@ use crate::jobs::store::sqlite::rows::{
 };
 use crate::jobs::store::{Begun, NewBatch, NewJob, ReuseKey};
 
-/// Jobs in one statement; with 11 values each far below the bound of SQLite.
+/// Jobs in one statement; with 12 values each far below the bound of SQLite.
 const ROWS_PER_STATEMENT: usize = 250;
 
 impl SqliteStore {
@@ -30,8 +30,10 @@ impl SqliteStore {
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         if let Some((key, digest)) = &new.idempotency {
             let row = sqlx::query(
-                "SELECT digest, id, complete FROM batch_keys JOIN batches ON batches.id = batch_keys.batch_id WHERE key = $1",
+                "SELECT digest, id, complete FROM batch_keys JOIN batches ON batches.id = batch_keys.batch_id \
+                 WHERE of_tenant = $1 AND key = $2",
             )
+            .bind(&*new.tenant)
             .bind(key)
             .fetch_optional(&mut *transaction)
             .await?;
@@ -47,21 +49,25 @@ impl SqliteStore {
             }
         }
         sqlx::query(
-            "INSERT INTO batches (id, created_at, count, rejected) VALUES ($1, $2, $3, $4)",
+            "INSERT INTO batches (id, tenant, created_at, count, rejected) VALUES ($1, $2, $3, $4, $5)",
         )
         .bind(new.id.to_string())
+        .bind(&*new.tenant)
         .bind(new.created_at)
         .bind(new.count)
         .bind(new.rejected)
         .execute(&mut *transaction)
         .await?;
         if let Some((key, digest)) = &new.idempotency {
-            sqlx::query("INSERT INTO batch_keys (key, digest, batch_id) VALUES ($1, $2, $3)")
-                .bind(key)
-                .bind(digest.as_slice())
-                .bind(new.id.to_string())
-                .execute(&mut *transaction)
-                .await?;
+            sqlx::query(
+                "INSERT INTO batch_keys (of_tenant, key, digest, batch_id) VALUES ($1, $2, $3, $4)",
+            )
+            .bind(&*new.tenant)
+            .bind(key)
+            .bind(digest.as_slice())
+            .bind(new.id.to_string())
+            .execute(&mut *transaction)
+            .await?;
         }
         transaction.commit().await?;
         Ok(Begun::Created)
@@ -86,7 +92,7 @@ impl SqliteStore {
                 .map(|(_, job)| to_json(&job.labels))
                 .collect::<Result<Vec<_>, _>>()?;
             let mut rows = QueryBuilder::<Sqlite>::new(
-                "INSERT INTO jobs (id, state, name, labels, method, created_at, batch_id, batch_index, cost_us, outputs, reuse_key) ",
+                "INSERT INTO jobs (id, state, name, labels, method, created_at, batch_id, batch_index, cost_us, outputs, reuse_key, tenant) ",
             );
             rows.push_values(
                 some.iter().zip(labels),
@@ -101,7 +107,8 @@ impl SqliteStore {
                         .push_bind(*index)
                         .push_bind(job.cost_us)
                         .push_bind(&job.outputs)
-                        .push_bind(job.reuse_key.as_ref().map(ReuseKey::as_slice));
+                        .push_bind(job.reuse_key.as_ref().map(ReuseKey::as_slice))
+                        .push_bind(&*job.tenant);
                 },
             );
             rows.build().execute(&mut *transaction).await?;
@@ -113,15 +120,17 @@ impl SqliteStore {
             cases.build().execute(&mut *transaction).await?;
             let labels: Vec<_> = some
                 .iter()
-                .flat_map(|(_, job)| job.labels.iter().map(|label| (job.id, label)))
+                .flat_map(|(_, job)| job.labels.iter().map(move |label| (job, label)))
                 .collect();
             for some in labels.chunks(ROWS_PER_STATEMENT) {
-                let mut rows =
-                    QueryBuilder::<Sqlite>::new("INSERT INTO job_labels (key, value, job_id) ");
-                rows.push_values(some, |mut row, (id, (key, value))| {
-                    row.push_bind(*key)
+                let mut rows = QueryBuilder::<Sqlite>::new(
+                    "INSERT INTO job_labels (of_tenant, key, value, job_id) ",
+                );
+                rows.push_values(some, |mut row, (job, (key, value))| {
+                    row.push_bind(&*job.tenant)
+                        .push_bind(*key)
                         .push_bind(*value)
-                        .push_bind(id.to_string());
+                        .push_bind(job.id.to_string());
                 });
                 rows.build().execute(&mut *transaction).await?;
             }
@@ -173,7 +182,7 @@ impl SqliteStore {
     /// The database failed.
     pub async fn batch(&self, id: Uuid) -> Result<Option<Batch>, JobsError> {
         let row = sqlx::query(
-            "SELECT id, created_at, count, rejected FROM batches WHERE id = $1 AND complete = 1",
+            "SELECT id, tenant, created_at, count, rejected FROM batches WHERE id = $1 AND complete = 1",
         )
         .bind(id.to_string())
         .fetch_optional(&self.readers)
@@ -192,6 +201,7 @@ impl SqliteStore {
         }
         Ok(Some(Batch {
             id,
+            tenant: row.try_get("tenant")?,
             created_at: row.try_get("created_at")?,
             count: row.try_get("count")?,
             rejected: row.try_get("rejected")?,

@@ -197,7 +197,7 @@ pub(super) fn fence(claim: &Claim) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::jobs::store::sqlite::groups::PEEK;
+    use crate::jobs::store::sqlite::groups::{NEXT_TENANT, PEEK};
     use crate::jobs::store::sqlite::lists::tests::plan;
 
     #[tokio::test]
@@ -206,12 +206,12 @@ mod tests {
         let store = SqliteStore::open(&folder.path().join("jobs.db"))
             .await
             .unwrap();
-        for statement in [PEEK, REAP] {
+        for statement in [NEXT_TENANT, PEEK, REAP] {
             let steps = plan(&store, statement).await;
             assert!(
                 steps
                     .iter()
-                    .any(|step| step.contains("jobs_by_state (state=?)")),
+                    .any(|step| step.contains("jobs_by_state (state=?")),
                 "{steps:?}"
             );
             assert!(

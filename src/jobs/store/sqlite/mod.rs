@@ -11,11 +11,13 @@ pub mod batches;
 pub mod claims;
 pub mod figures;
 pub mod groups;
+pub mod keys;
 pub mod lists;
 pub mod reuse;
 mod rows;
 
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use bytes::Bytes;
@@ -41,6 +43,8 @@ const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 #[derive(Debug, Clone)]
 pub struct SqliteStore {
     file: PathBuf,
+    /// The tenant whose job was claimed last.
+    served: Arc<Mutex<String>>,
     writer: SqlitePool,
     readers: SqlitePool,
 }
@@ -70,6 +74,7 @@ impl SqliteStore {
         let readers = pool(READERS).connect_with(options.read_only(true)).await?;
         Ok(SqliteStore {
             file: file.to_owned(),
+            served: Arc::default(),
             writer,
             readers,
         })
@@ -100,8 +105,8 @@ impl SqliteStore {
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         let id = new.id.to_string();
         let mut row = sqlx::query(concat!(
-            "INSERT INTO jobs (id, state, name, labels, method, created_at, cost_us, outputs, reuse_key) \
-             VALUES ($1, 'queued', $2, $3, $4, $5, $6, $7, $8) RETURNING ",
+            "INSERT INTO jobs (id, state, name, labels, method, created_at, cost_us, outputs, reuse_key, tenant) \
+             VALUES ($1, 'queued', $2, $3, $4, $5, $6, $7, $8, $9) RETURNING ",
             job_columns!()
         ))
         .bind(&id)
@@ -112,12 +117,15 @@ impl SqliteStore {
         .bind(new.cost_us)
         .bind(&new.outputs)
         .bind(new.reuse_key.as_ref().map(ReuseKey::as_slice))
+        .bind(&*new.tenant)
         .fetch_one(&mut *transaction)
         .await?;
         if let Some((key, digest)) = &new.idempotency {
             let inserted = sqlx::query(
-                "INSERT INTO idempotency_keys (key, digest, job_id) VALUES ($1, $2, $3) ON CONFLICT (key) DO NOTHING",
+                "INSERT INTO idempotency_keys (of_tenant, key, digest, job_id) VALUES ($1, $2, $3, $4) \
+                 ON CONFLICT (of_tenant, key) DO NOTHING",
             )
+            .bind(&*new.tenant)
             .bind(key)
             .bind(digest.as_slice())
             .bind(&id)
@@ -125,7 +133,7 @@ impl SqliteStore {
             .await?;
             if inserted.rows_affected() == 0 {
                 transaction.rollback().await?;
-                let found = self.by_key(key, digest).await?;
+                let found = self.by_key(&new.tenant, key, digest).await?;
                 // The job of the key was deleted in between; the client's next try will find the key free.
                 return found.ok_or(JobsError::IdempotencyConflict);
             }
@@ -136,12 +144,15 @@ impl SqliteStore {
             .execute(&mut *transaction)
             .await?;
         for (key, value) in &new.labels {
-            sqlx::query("INSERT INTO job_labels (key, value, job_id) VALUES ($1, $2, $3)")
-                .bind(key)
-                .bind(value)
-                .bind(&id)
-                .execute(&mut *transaction)
-                .await?;
+            sqlx::query(
+                "INSERT INTO job_labels (of_tenant, key, value, job_id) VALUES ($1, $2, $3, $4)",
+            )
+            .bind(&*new.tenant)
+            .bind(key)
+            .bind(value)
+            .bind(&id)
+            .execute(&mut *transaction)
+            .await?;
         }
         if !end_with_sources(&mut transaction, std::iter::once(new))
             .await?
@@ -156,20 +167,22 @@ impl SqliteStore {
         Ok(Enqueued::Created(read_job(&row)?))
     }
 
-    /// What an idempotency key stands for, if it was used.
+    /// What an idempotency key of a tenant stands for, if it was used.
     ///
     /// # Errors
     /// The database failed.
     pub async fn by_key(
         &self,
+        tenant: &str,
         key: &str,
         digest: &[u8; 32],
     ) -> Result<Option<Enqueued>, JobsError> {
         let row = sqlx::query(concat!(
             "SELECT ",
             job_columns!(),
-            ", digest FROM idempotency_keys JOIN jobs ON jobs.id = idempotency_keys.job_id WHERE key = $1"
+            ", digest FROM idempotency_keys JOIN jobs ON jobs.id = idempotency_keys.job_id WHERE of_tenant = $1 AND key = $2"
         ))
+        .bind(tenant)
         .bind(key)
         .fetch_optional(&self.readers)
         .await?;
@@ -190,6 +203,21 @@ impl SqliteStore {
         let count: i64 = sqlx::query_scalar(
             "SELECT COUNT(*) FROM (SELECT 1 FROM jobs WHERE state = 'queued' LIMIT $1) AS waiting",
         )
+        .bind(i64::try_from(at_most).unwrap_or(i64::MAX))
+        .fetch_one(&self.readers)
+        .await?;
+        Ok(u64::try_from(count).unwrap_or(0))
+    }
+
+    /// Number of queued jobs of a tenant, counted no further than `at_most`.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn queued_of(&self, tenant: &str, at_most: u64) -> Result<u64, JobsError> {
+        let count: i64 = sqlx::query_scalar(
+            "SELECT COUNT(*) FROM (SELECT 1 FROM jobs WHERE state = 'queued' AND tenant = $1 LIMIT $2) AS waiting",
+        )
+        .bind(tenant)
         .bind(i64::try_from(at_most).unwrap_or(i64::MAX))
         .fetch_one(&self.readers)
         .await?;
@@ -338,5 +366,6 @@ fn migrations() -> Migrator {
         form(2, "batches", include_str!("batches.sql")),
         form(3, "result bytes", include_str!("result_bytes.sql")),
         form(4, "reuse", include_str!("reuse.sql")),
+        form(5, "tenants", include_str!("tenants.sql")),
     ])
 }

@@ -12,7 +12,7 @@ use crate::jobs::job::{Job, State};
 /// The columns a [`Job`] is read from.
 macro_rules! job_columns {
     () => {
-        "id, state, name, labels, batch_id, created_at, started_at, ended_at, attempt, progress, warnings, failure, cached, version"
+        "id, tenant, state, name, labels, batch_id, created_at, started_at, ended_at, attempt, progress, warnings, failure, cached, version"
     };
 }
 pub(super) use job_columns;
@@ -23,6 +23,7 @@ pub(super) fn read_job(row: &SqliteRow) -> Result<Job, JobsError> {
     let batch: Option<String> = row.try_get("batch_id")?;
     Ok(Job {
         id: read_id(row)?,
+        tenant: row.try_get("tenant")?,
         state: read_state(row)?,
         name: row.try_get("name")?,
         labels: from_json(row.try_get("labels")?)?,
