@@ -78,6 +78,9 @@ pub struct ServeArgs {
     #[arg(long, env = "RAILHEAD_CACHE", default_value_t = true, value_name = "BOOL",
           action = clap::ArgAction::Set)]
     pub cache: bool,
+    /// How long ended jobs and their results are kept, such as `30d` or `12h`; `forever`: until they are deleted.
+    #[arg(long, env = "RAILHEAD_RETENTION", default_value = "forever", value_name = "TIME", value_parser = retention)]
+    pub retention: Retention,
     /// Seconds a running job may go on after the service was told to stop; then it goes back to the queue.
     #[arg(
         long,
@@ -112,6 +115,29 @@ pub struct ServeArgs {
     pub cors_origin: Vec<String>,
     #[command(flatten)]
     pub log: LogArgs,
+}
+
+/// How long ended jobs are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Retention(pub Option<Duration>);
+
+/// Reads a time such as `30d`, `1w` or `90m`, or `forever`.
+fn retention(text: &str) -> Result<Retention, String> {
+    if text == "forever" {
+        return Ok(Retention(None));
+    }
+    let wrong = "allowed are `forever` or a time of at least 1 s such as `12h`, `30d`, `8w`";
+    let span: jiff::Span = text.parse().map_err(|_| wrong.to_owned())?;
+    let seconds = span
+        .total((
+            jiff::Unit::Second,
+            jiff::SpanRelativeTo::days_are_24_hours(),
+        ))
+        .map_err(|_| wrong.to_owned())?;
+    match Duration::try_from_secs_f64(seconds) {
+        Ok(time) if time >= Duration::from_secs(1) => Ok(Retention(Some(time))),
+        _ => Err(wrong.to_owned()),
+    }
 }
 
 /// When requests without an API key are answered.
@@ -328,6 +354,18 @@ mod tests {
                 arg.get_env().and_then(|name| name.to_str()),
                 Some(variable.as_str())
             );
+        }
+    }
+
+    #[test]
+    fn a_retention_is_a_time_with_its_unit_or_forever() {
+        let days = |days: u64| Ok(Retention(Some(Duration::from_secs(days * 24 * 3600))));
+        assert_eq!(retention("forever"), Ok(Retention(None)));
+        assert_eq!(retention("30d"), days(30));
+        assert_eq!(retention("2w"), days(14));
+        assert_eq!(retention("24h"), days(1));
+        for wrong in ["", "30", "0s", "-1d", "1 month", "soon"] {
+            assert!(retention(wrong).is_err(), "{wrong:?}");
         }
     }
 

@@ -47,6 +47,7 @@ async fn serve(args: &ServeArgs) -> anyhow::Result<()> {
         attempts_max: args.attempts_max,
         queue_max: args.queue_max,
         cache: args.cache,
+        retention: args.retention.0,
         tenant_queue_max: args.tenant_queue_max,
         ..Options::new(&args.data_dir)
     })

@@ -64,6 +64,7 @@ kinds! {
     JobFailed 409 "job-failed" "The job failed" "The job ended without a result; the member `error` of the job says why."
     JobCancelled 409 "job-cancelled" "The job was cancelled" "The job was cancelled before it had a result."
     JobNotEnded 409 "job-not-ended" "The job has not ended" "Only an ended job can be deleted; cancel it first."
+    Expired 410 "expired" "This has expired" "The job or batch was here, but ended longer ago than this service keeps ended jobs (`expires_at` of a job says until when); it was removed with its results. Its id is remembered for 30 days."
     BodyTooLarge 413 "body-too-large" "The body is too large" "The body exceeds the size that this service accepts for one case, or for a batch; or a batch has too many cases."
     UnsupportedMediaType 415 "unsupported-media-type" "The body is not declared as JSON" "A case is sent with `Content-Type: application/json`, a batch also with `application/x-ndjson`."
     FaultyCase 422 "faulty-case" "The case has faults" "The body is JSON but not a case that can be solved; `errors` names every fault by its JSON pointer, with the value given and what is allowed."
@@ -232,6 +233,10 @@ impl From<JobsError> for ApiError {
         match error {
             JobsError::Case(faults) => faults.into(),
             JobsError::NotFound => ApiError::new(Kind::JobNotFound, "no job has this id"),
+            JobsError::Expired => ApiError::new(
+                Kind::Expired,
+                "ended longer ago than this service keeps ended jobs, so it was removed",
+            ),
             JobsError::BatchNotFound => ApiError::new(Kind::BatchNotFound, "no batch has this id"),
             JobsError::NotReady(state) => ApiError::new(
                 Kind::ResultNotReady,

@@ -9,8 +9,9 @@ use utoipa::openapi::RefOr;
 use utoipa::openapi::example::ExampleBuilder;
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement, SecurityScheme};
 
+use crate::http::error::Kind;
 use crate::http::problem::Problem;
-use crate::http::problems::describe_access;
+use crate::http::problems::describe_also;
 use crate::http::resources;
 
 #[derive(OpenApi)]
@@ -92,7 +93,7 @@ pub fn openapi_json() -> String {
     DOCUMENT.clone()
 }
 
-/// Says of every operation on what belongs to a tenant that it may need a key.
+/// Says of every operation on what belongs to a tenant that it may need a key, and that jobs and batches may expire.
 fn require_keys(document: &mut utoipa::openapi::OpenApi) {
     let scheme = HttpBuilder::new()
         .scheme(HttpAuthScheme::Bearer)
@@ -102,7 +103,7 @@ fn require_keys(document: &mut utoipa::openapi::OpenApi) {
         .build();
     let components = document.components.get_or_insert_default();
     components.add_security_scheme("key", SecurityScheme::Http(scheme));
-    for item in document.paths.paths.values_mut() {
+    for (path, item) in &mut document.paths.paths {
         let operations = [&mut item.get, &mut item.post, &mut item.delete];
         for operation in operations.into_iter().filter_map(Option::as_mut) {
             let tags = operation.tags.as_deref().unwrap_or_default();
@@ -116,7 +117,11 @@ fn require_keys(document: &mut utoipa::openapi::OpenApi) {
                 SecurityRequirement::new("key", Vec::<String>::new()),
                 SecurityRequirement::default(),
             ]);
-            describe_access(&mut operation.responses.responses);
+            let mut kinds = vec![Kind::Unauthorized, Kind::TooManyRequests];
+            if path.contains("{id}") {
+                kinds.push(Kind::Expired);
+            }
+            describe_also(&mut operation.responses.responses, &kinds);
         }
     }
 }

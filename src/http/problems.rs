@@ -108,11 +108,11 @@ pub async fn explain(Path(name): Path<String>) -> Result<Json<ProblemKind>, ApiE
     })
 }
 
-/// Adds the problems that access control can answer to the responses of an operation.
-pub fn describe_access(responses: &mut BTreeMap<String, RefOr<Response>>) {
-    for kind in [Kind::Unauthorized, Kind::TooManyRequests] {
+/// Adds problems that many operations can answer to the responses of one.
+pub fn describe_also(responses: &mut BTreeMap<String, RefOr<Response>>, kinds: &[Kind]) {
+    for kind in kinds {
         let status = kind.status().to_string();
-        let mut described = describe(&[kind]);
+        let mut described = describe(&[*kind]);
         match (responses.get_mut(&status), described.remove(&status)) {
             (Some(RefOr::T(known)), Some(_)) => {
                 let line = format!("`{}`: {}", kind.slug(), kind.meaning());

@@ -14,7 +14,7 @@ use crate::jobs::job::{Job, State};
 use crate::jobs::spool::{Card, Spool};
 use crate::jobs::store::{Begun, NewBatch, NewJob};
 use crate::jobs::watch::Reason;
-use crate::jobs::{Jobs, LOOK_AGAIN, cost_us, created_at, idempotency, now_ms, outputs_text};
+use crate::jobs::{Jobs, LOOK_AGAIN, cost_us, created_at, idempotency, outputs_text};
 
 /// Jobs queued in one transaction.
 const CHUNK_JOBS: usize = 1000;
@@ -270,9 +270,10 @@ impl Jobs {
     /// [`JobsError::BatchNotFound`], or a failed database.
     pub async fn batch(&self, id: Uuid) -> Result<Batch, JobsError> {
         let batch = self.shared.store.batch(id).await?;
-        batch
-            .filter(|batch| *batch.tenant == *self.tenant)
-            .ok_or(JobsError::BatchNotFound)
+        match batch.filter(|batch| *batch.tenant == *self.tenant) {
+            Some(batch) => Ok(batch),
+            None => Err(self.missing(id, JobsError::BatchNotFound).await),
+        }
     }
 
     /// Cancels every job of a batch that has not ended: queued ones end at once, running ones at the next tick of
@@ -282,7 +283,12 @@ impl Jobs {
     /// [`JobsError::BatchNotFound`], or a failed database.
     pub async fn cancel_batch(&self, id: Uuid) -> Result<Batch, JobsError> {
         self.batch(id).await?;
-        for (job, state) in self.shared.store.cancel_batch(id, now_ms()).await? {
+        for (job, state) in self
+            .shared
+            .store
+            .cancel_batch(id, self.shared.now_ms())
+            .await?
+        {
             if state.ended() {
                 self.shared.metrics.ended(state, 1);
                 self.shared.announce(job);

@@ -34,6 +34,9 @@ pub enum JobsError {
     /// There is no such job.
     #[error("there is no such job")]
     NotFound,
+    /// There was such a job or batch, but its time is over.
+    #[error("its time is over, it has been removed")]
+    Expired,
     /// There is no such batch.
     #[error("there is no such batch")]
     BatchNotFound,

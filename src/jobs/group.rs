@@ -17,7 +17,6 @@ use tracing::Instrument;
 use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
-use crate::jobs::now_ms;
 use crate::jobs::solver_thread::{Outcome, SolverThread, solve_guarded};
 use crate::jobs::store::sqlite::groups::GroupBounds;
 use crate::jobs::store::{Claim, Ending};
@@ -56,7 +55,7 @@ impl Worker {
         let mut claims = self
             .shared
             .store
-            .claim_group(&self.name, now_ms(), lease, bounds)
+            .claim_group(&self.name, self.shared.now_ms(), lease, bounds)
             .await?;
         match claims.len() {
             0 => return Ok(false),
@@ -144,7 +143,7 @@ impl Worker {
         let mut outcomes = pin!(outcomes);
         let mut beat = interval(heartbeat(&self.shared));
         beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        let mut until = now_ms().saturating_add(lease_ms(&self.shared));
+        let mut until = self.shared.now_ms().saturating_add(lease_ms(&self.shared));
         let mut seen = 0;
         let mut told = false;
         let mut patience = pin!(sleep(Duration::ZERO));
@@ -160,7 +159,7 @@ impl Worker {
                         seen = ticks;
                         self.renew_group(members, &mut until).await;
                     }
-                    lost = now_ms() >= until;
+                    lost = self.shared.now_ms() >= until;
                 }
                 () = self.shared.stopping.cancelled(), if !told => {}
                 () = &mut patience, if told => {
@@ -183,7 +182,7 @@ impl Worker {
 
     async fn renew_group(&self, members: &[Member], until: &mut i64) {
         let claims: Vec<_> = members.iter().map(|member| member.claim.clone()).collect();
-        let (now, lease) = (now_ms(), lease_ms(&self.shared));
+        let (now, lease) = (self.shared.now_ms(), lease_ms(&self.shared));
         match self.shared.store.renew_group(&claims, now, lease).await {
             Ok(held) => {
                 *until = now.saturating_add(lease);
@@ -253,7 +252,12 @@ impl Worker {
     async fn finish_group(&self, ends: &[(Claim, Ending)]) -> Result<HashSet<Uuid>, JobsError> {
         let mut pause = FIRST_PAUSE;
         for _ in 1..WRITE_TRIES {
-            match self.shared.store.finish_group(ends, now_ms()).await {
+            match self
+                .shared
+                .store
+                .finish_group(ends, self.shared.now_ms())
+                .await
+            {
                 Err(JobsError::Database(error)) => {
                     tracing::warn!(%error, "ends of a group could not be written yet");
                 }
@@ -262,6 +266,9 @@ impl Worker {
             sleep(pause).await;
             pause *= 2;
         }
-        self.shared.store.finish_group(ends, now_ms()).await
+        self.shared
+            .store
+            .finish_group(ends, self.shared.now_ms())
+            .await
     }
 }

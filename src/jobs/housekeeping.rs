@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
+use crate::jobs::Shared;
 use crate::jobs::error::JobsError;
 use crate::jobs::job::{FailureKind, State};
 use crate::jobs::worker::heartbeat;
-use crate::jobs::{Shared, now_ms};
 
 /// Jobs looked up in one statement by the sweep.
 const SWEEP_CHUNK: usize = 500;
@@ -19,7 +19,7 @@ pub(super) async fn reap_expired(shared: Arc<Shared>) {
         .await
         .is_some()
     {
-        let now = now_ms();
+        let now = shared.now_ms();
         match shared
             .store
             .reap(now, now, shared.options.attempts_max)

@@ -4,9 +4,10 @@ use std::path::Path;
 use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
+use crate::jobs::Jobs;
+use crate::jobs::clock::Clock;
 use crate::jobs::error::JobsError;
 use crate::jobs::store::sqlite::SqliteStore;
-use crate::jobs::{Jobs, now_ms};
 
 /// The tenant of requests without a key.
 pub const ANONYMOUS: &str = "anonymous";
@@ -86,7 +87,7 @@ impl Keyring {
             hash: blake3::hash(text.as_bytes()),
             tenant: tenant.into(),
             name,
-            created_at: now_ms(),
+            created_at: Clock::system().now_ms(),
             revoked_at: None,
         };
         self.store.add_key(&key).await?;
@@ -106,7 +107,7 @@ impl Keyring {
     /// # Errors
     /// The database failed.
     pub async fn revoke(&self, id: &str) -> Result<Option<Key>, JobsError> {
-        self.store.revoke_key(id, now_ms()).await
+        self.store.revoke_key(id, Clock::system().now_ms()).await
     }
 
     /// Closes the data folder.

@@ -11,6 +11,7 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
 use crate::contact::problem::Limits;
+use crate::jobs::clock::Clock;
 use crate::jobs::error::JobsError;
 use crate::jobs::keys::ANONYMOUS;
 use crate::jobs::metrics::Metrics;
@@ -18,7 +19,7 @@ use crate::jobs::recipe::Recipe;
 use crate::jobs::results::Results;
 use crate::jobs::store::sqlite::SqliteStore;
 use crate::jobs::worker::Worker;
-use crate::jobs::{Admitted, Jobs, Shared, housekeeping, now_ms};
+use crate::jobs::{Admitted, Jobs, Shared, housekeeping, retention};
 
 /// How long a shutdown waits for workers that were told to stop, beyond their own patience.
 const STOPPED_WITHIN: Duration = Duration::from_secs(10);
@@ -46,12 +47,17 @@ pub struct Options {
     pub small_result_max_bytes: usize,
     /// Identical cases get the result of the first one that was solved.
     pub cache: bool,
+    /// How long ended jobs are kept; `None`: until they are deleted.
+    pub retention: Option<Duration>,
+    /// What leases, ends and expiries are measured with.
+    pub clock: Clock,
 }
 
 impl Options {
     /// The defaults for a data folder: one worker, a lease of 30 s, 5 attempts, 300 000 queued jobs of which
     /// 250 000 of one tenant,
-    /// groups of 64, results up to 32 KiB in the database, results used again.
+    /// groups of 64, results up to 32 KiB in the database, results used again,
+    /// ended jobs kept for ever, the system's clock.
     #[must_use]
     pub fn new(data_dir: impl Into<PathBuf>) -> Options {
         Options {
@@ -65,6 +71,8 @@ impl Options {
             group_max: 64,
             small_result_max_bytes: 32 << 10,
             cache: true,
+            retention: None,
+            clock: Clock::system(),
         }
     }
 }
@@ -92,7 +100,9 @@ impl Jobs {
         if incomplete > 0 {
             tracing::info!(incomplete, "batches that were never acknowledged removed");
         }
-        let taken_back = store.reap(i64::MAX, now_ms(), options.attempts_max).await?;
+        let taken_back = store
+            .reap(i64::MAX, options.clock.now_ms(), options.attempts_max)
+            .await?;
         for (id, state) in taken_back {
             tracing::info!(job = %id, state = state.name(), "job of a dead process taken back");
         }
@@ -122,7 +132,8 @@ impl Jobs {
         })
     }
 
-    /// Starts the workers, the reaper of expired leases and the sweep of orphaned results.
+    /// Starts the workers, the reaper of expired leases and the sweeps of orphaned results and of
+    /// expired jobs.
     ///
     /// # Errors
     /// A solver thread could not be started.
@@ -137,6 +148,9 @@ impl Jobs {
         self.shared
             .tasks
             .spawn(housekeeping::sweep_orphans(self.shared.clone()));
+        self.shared
+            .tasks
+            .spawn(retention::sweep(self.shared.clone()));
         Ok(())
     }
 

@@ -11,10 +11,10 @@ use prometheus_client::registry::Registry;
 
 use crate::contact::case::Method;
 use crate::contact::solution::Solution;
+use crate::jobs::Jobs;
 use crate::jobs::error::JobsError;
 use crate::jobs::job::{FailureKind, State};
 use crate::jobs::store::Ending;
-use crate::jobs::{Jobs, now_ms};
 
 /// Upper bounds of solve times in s.
 const SOLVE_SECONDS: [f64; 14] = [
@@ -195,7 +195,7 @@ impl Jobs {
         }
         let age_ms = figures
             .oldest_queued_at
-            .map_or(0, |created| (now_ms() - created).max(0));
+            .map_or(0, |created| (self.shared.now_ms() - created).max(0));
         #[expect(clippy::cast_precision_loss, reason = "an age is far below 2^53 ms")]
         metrics.oldest_queued_seconds.set(age_ms as f64 / 1000.0);
         let bytes = |bytes: u64| i64::try_from(bytes).unwrap_or(i64::MAX);

@@ -7,6 +7,7 @@
 //! which go back to the queue when the data folder is opened again.
 
 pub mod batch;
+pub mod clock;
 pub mod error;
 mod fetch;
 pub mod fields;
@@ -19,6 +20,7 @@ pub mod lifecycle;
 mod metrics;
 pub mod recipe;
 pub mod results;
+pub mod retention;
 mod reuse;
 mod solver_thread;
 mod spool;
@@ -161,7 +163,7 @@ impl Jobs {
         if let Some((key, digest)) = &idempotency
             && let Some(enqueued) = self.shared.store.by_key(&self.tenant, key, digest).await?
         {
-            return replayed(enqueued);
+            return replayed(enqueued).map(|job| self.dated(job));
         }
         let problem = problem?;
         let (outputs, cost_us) = (problem.outputs.clone(), cost_us(&problem));
@@ -190,22 +192,24 @@ impl Jobs {
         if job.id == id && job.cached {
             self.ended_cached(&[id]);
             tracing::info!(job = %id, method = new.method, "job answered from an earlier result");
-            return Ok(job);
+            return Ok(self.dated(job));
         }
         self.shared.wake.notify_one();
         tracing::info!(job = %job.id, method = new.method, "job queued");
-        Ok(job)
+        Ok(self.dated(job))
     }
 
     /// Looks at a job.
     ///
     /// # Errors
-    /// [`JobsError::NotFound`], or a failed database.
+    /// [`JobsError::NotFound`], [`JobsError::Expired`], or a failed database.
     pub async fn get(&self, id: Uuid) -> Result<Job, JobsError> {
         let job = self.shared.store.get(id).await?;
         // What belongs to another tenant is answered like what does not exist.
-        job.filter(|job| *job.tenant == *self.tenant)
-            .ok_or(JobsError::NotFound)
+        match job.filter(|job| *job.tenant == *self.tenant) {
+            Some(job) => self.unexpired(job),
+            None => Err(self.missing(id, JobsError::NotFound).await),
+        }
     }
 
     /// Waits until a job has ended, but not longer than `at_most`, and returns it as it then is. Returns at once when
@@ -243,10 +247,13 @@ impl Jobs {
         cursor: Option<&str>,
         limit: u32,
     ) -> Result<Page, JobsError> {
-        self.shared
-            .store
+        let store = &self.shared.store;
+        let mut page = store
             .list(&self.tenant, filter, cursor, limit.clamp(1, PAGE_MAX))
-            .await
+            .await?;
+        let jobs = page.jobs.into_iter();
+        page.jobs = jobs.filter_map(|job| self.unexpired(job).ok()).collect();
+        Ok(page)
     }
 
     /// Cancels a job: a queued one ends at once, a running one at the next tick of its solver, an ended one stays as
@@ -256,7 +263,7 @@ impl Jobs {
     /// [`JobsError::NotFound`], or a failed database.
     pub async fn cancel(&self, id: Uuid) -> Result<Job, JobsError> {
         self.get(id).await?;
-        let now = now_ms();
+        let now = self.shared.now_ms();
         let job = self
             .shared
             .store
@@ -272,7 +279,7 @@ impl Jobs {
             // A worker that registers later reads the wish from the table.
             watch.stop(Reason::Cancel);
         }
-        Ok(job)
+        Ok(self.dated(job))
     }
 
     /// Removes an ended job with its case and results.
@@ -339,6 +346,11 @@ impl Jobs {
 }
 
 impl Shared {
+    /// The present, epoch milliseconds.
+    fn now_ms(&self) -> i64 {
+        self.options.clock.now_ms()
+    }
+
     /// The attempts of this process.
     fn running(&self) -> std::sync::MutexGuard<'_, HashMap<Uuid, Arc<Watch>>> {
         self.running.lock().unwrap_or_else(PoisonError::into_inner)
@@ -380,8 +392,4 @@ fn cost_us(problem: &Problem) -> u32 {
 /// The time of submission is the one inside the id, so that order by id is order by time.
 fn created_at(id: Uuid) -> i64 {
     i64::try_from(id.as_u128() >> 80).unwrap_or(0)
-}
-
-fn now_ms() -> i64 {
-    jiff::Timestamp::now().as_millisecond()
 }

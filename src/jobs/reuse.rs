@@ -34,9 +34,10 @@ impl Jobs {
             return Ok(());
         }
         let sources = self.shared.store.sources(&keys).await?;
-        let mut hits = 0;
+        let (mut hits, now) = (0, self.shared.now_ms());
         for job in jobs {
-            job.source = job.reuse_key.and_then(|key| sources.get(&key).copied());
+            let source = job.reuse_key.and_then(|key| sources.get(&key));
+            job.source = source.map(|source| (*source, now));
             hits += u64::from(job.source.is_some());
         }
         self.shared

@@ -17,13 +17,13 @@ use uuid::Uuid;
 
 use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
+use crate::jobs::Shared;
 use crate::jobs::error::JobsError;
 use crate::jobs::job::{Failure, FailureKind, Job, State};
 use crate::jobs::results::Encoded;
 use crate::jobs::solver_thread::{Outcome, SolverThread, solve_guarded};
 use crate::jobs::store::{Claim, Ending, Placed, Renewal};
 use crate::jobs::watch::{Reason, Watch};
-use crate::jobs::{Shared, now_ms};
 
 /// How often an idle worker looks for jobs although nobody woke it.
 const POLL: Duration = Duration::from_secs(1);
@@ -85,7 +85,12 @@ impl Worker {
     /// The database failed; a claimed job is then taken back when its lease runs out.
     pub async fn step(&mut self) -> Result<Step, JobsError> {
         let lease = lease_ms(&self.shared);
-        let Some(claim) = self.shared.store.claim(&self.name, now_ms(), lease).await? else {
+        let Some(claim) = self
+            .shared
+            .store
+            .claim(&self.name, self.shared.now_ms(), lease)
+            .await?
+        else {
             return Ok(Step::Idle);
         };
         let span = tracing::info_span!("job", job = %claim.id, attempt = claim.attempt, method = claim.method);
@@ -181,12 +186,12 @@ impl Worker {
     async fn beat(&self, claim: &Claim, watch: &Watch, held: &mut Lease) {
         let ticks = watch.ticks();
         if ticks == held.ticks {
-            if now_ms() >= held.until {
+            if self.shared.now_ms() >= held.until {
                 held.lose(watch);
             }
             return;
         }
-        let now = now_ms();
+        let now = self.shared.now_ms();
         let lease = lease_ms(&self.shared);
         match self
             .shared
@@ -255,10 +260,10 @@ impl Worker {
         // fenced. After a short solve the lease is as good as new.
         if watch.elapsed() >= heartbeat(&self.shared) {
             let lease = lease_ms(&self.shared);
-            let renewal = self
-                .shared
-                .store
-                .renew(claim, watch.progress(), now_ms(), lease);
+            let renewal =
+                self.shared
+                    .store
+                    .renew(claim, watch.progress(), self.shared.now_ms(), lease);
             if let Err(error) = renewal.await {
                 tracing::warn!(%error, "lease could not be renewed");
             }
@@ -272,7 +277,12 @@ impl Worker {
     async fn finish(&self, claim: &Claim, ending: &Ending) -> Result<Option<Job>, JobsError> {
         let mut pause = FIRST_PAUSE;
         for _ in 1..WRITE_TRIES {
-            match self.shared.store.finish(claim, ending, now_ms()).await {
+            match self
+                .shared
+                .store
+                .finish(claim, ending, self.shared.now_ms())
+                .await
+            {
                 Err(JobsError::Database(error)) => {
                     tracing::warn!(%error, "end of the job could not be written yet")
                 }
@@ -281,19 +291,29 @@ impl Worker {
             sleep(pause).await;
             pause *= 2;
         }
-        self.shared.store.finish(claim, ending, now_ms()).await
+        self.shared
+            .store
+            .finish(claim, ending, self.shared.now_ms())
+            .await
     }
 
     pub(super) async fn hand_back(&self, claim: &Claim) -> Result<Step, JobsError> {
-        Ok(match self.shared.store.release(claim, now_ms()).await? {
-            Some(state) if state.ended() => {
-                self.shared.metrics.ended(state, 1);
-                self.shared.announce(claim.id);
-                Step::Ended(claim.id, state)
-            }
-            Some(_) => Step::HandedBack(claim.id),
-            None => Step::Lost(claim.id),
-        })
+        Ok(
+            match self
+                .shared
+                .store
+                .release(claim, self.shared.now_ms())
+                .await?
+            {
+                Some(state) if state.ended() => {
+                    self.shared.metrics.ended(state, 1);
+                    self.shared.announce(claim.id);
+                    Step::Ended(claim.id, state)
+                }
+                Some(_) => Step::HandedBack(claim.id),
+                None => Step::Lost(claim.id),
+            },
+        )
     }
 
     /// Removes what earlier attempts stored before they were lost.
@@ -380,7 +400,7 @@ impl Lease {
     fn new(shared: &Shared) -> Lease {
         Lease {
             ticks: 0,
-            until: now_ms().saturating_add(lease_ms(shared)),
+            until: shared.now_ms().saturating_add(lease_ms(shared)),
             lost: false,
         }
     }

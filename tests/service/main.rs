@@ -12,6 +12,7 @@ mod errors;
 mod metrics;
 mod requests;
 mod results;
+mod retention;
 mod schema;
 mod server;
 mod shutdown;

@@ -42,8 +42,8 @@ pub struct NewJob {
     pub cost_us: u32,
     /// What tells later identical cases that this job's result is theirs too.
     pub reuse_key: Option<ReuseKey>,
-    /// A succeeded job whose result this one gets, instead of being queued.
-    pub source: Option<Uuid>,
+    /// A succeeded job whose result this one gets, instead of being queued, and the time at which it ends so.
+    pub source: Option<(Uuid, i64)>,
     /// The client's idempotency key with the digest of the case; not used inside a batch.
     pub idempotency: Option<(String, [u8; 32])>,
 }

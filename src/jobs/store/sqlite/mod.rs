@@ -9,6 +9,7 @@
 
 pub mod batches;
 pub mod claims;
+pub mod expiry;
 pub mod figures;
 pub mod groups;
 pub mod keys;
@@ -23,7 +24,8 @@ use std::time::Duration;
 use bytes::Bytes;
 use sqlx::migrate::{Migration, MigrationType, Migrator};
 use sqlx::sqlite::{
-    SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous,
+    SqliteAutoVacuum, SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions,
+    SqliteSynchronous,
 };
 use sqlx::{Row, SqlSafeStr};
 use uuid::Uuid;
@@ -36,6 +38,8 @@ use crate::jobs::store::sqlite::rows::{job_columns, read_job, to_json};
 use crate::jobs::store::{Deleted, Enqueued, NewJob, ReuseKey, StoredResult};
 
 const GET: &str = concat!("SELECT ", job_columns!(), " FROM jobs WHERE id = $1");
+/// The write-ahead log is cut to this size when it was larger for a while.
+const LOG_BYTES: &str = "67108864";
 const READERS: u32 = 4;
 const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 
@@ -60,6 +64,7 @@ impl SqliteStore {
             .create_if_missing(true)
             .journal_mode(SqliteJournalMode::Wal)
             .synchronous(SqliteSynchronous::Full)
+            .pragma("journal_size_limit", LOG_BYTES)
             .busy_timeout(BUSY_TIMEOUT)
             .foreign_keys(true);
         let pool = |connections: u32| {
@@ -69,8 +74,10 @@ impl SqliteStore {
                 .max_lifetime(None)
                 .test_before_acquire(false)
         };
-        let writer = pool(1).connect_with(options.clone()).await?;
+        let writing = options.clone().auto_vacuum(SqliteAutoVacuum::Incremental);
+        let writer = pool(1).connect_with(writing).await?;
         migrations().run(&writer).await?;
+        allow_shrinking(&writer).await?;
         let readers = pool(READERS).connect_with(options.read_only(true)).await?;
         Ok(SqliteStore {
             file: file.to_owned(),
@@ -350,8 +357,26 @@ impl SqliteStore {
     }
 }
 
+/// Free pages can be given back only by a database that was made for it; one of an earlier version is rewritten once.
+async fn allow_shrinking(writer: &SqlitePool) -> Result<(), JobsError> {
+    let mode: i64 = sqlx::query_scalar("PRAGMA auto_vacuum")
+        .fetch_one(writer)
+        .await?;
+    if mode == 0 {
+        tracing::info!("the job table is rewritten once, so that it can shrink");
+        sqlx::raw_sql("PRAGMA auto_vacuum = INCREMENTAL; VACUUM")
+            .execute(writer)
+            .await?;
+    }
+    Ok(())
+}
+
 /// The forms the job table has had; a new one is added at the end, an old one is never edited.
 fn migrations() -> Migrator {
+    Migrator::with_migrations(forms())
+}
+
+fn forms() -> Vec<Migration> {
     let form = |number, name: &'static str, text: &'static str| {
         Migration::new(
             number,
@@ -361,11 +386,70 @@ fn migrations() -> Migrator {
             false,
         )
     };
-    Migrator::with_migrations(vec![
+    vec![
         form(1, "jobs", include_str!("schema.sql")),
         form(2, "batches", include_str!("batches.sql")),
         form(3, "result bytes", include_str!("result_bytes.sql")),
         form(4, "reuse", include_str!("reuse.sql")),
         form(5, "tenants", include_str!("tenants.sql")),
-    ])
+        form(6, "tombstones", include_str!("tombstones.sql")),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::jobs::store::list::Filter;
+
+    #[tokio::test]
+    async fn a_table_of_the_first_version_is_brought_forward_with_its_jobs() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("jobs.db");
+        let options = SqliteConnectOptions::new()
+            .filename(&file)
+            .create_if_missing(true)
+            .journal_mode(SqliteJournalMode::Wal);
+        let old = SqlitePoolOptions::new()
+            .connect_with(options)
+            .await
+            .unwrap();
+        let first = forms().into_iter().take(2).collect();
+        Migrator::with_migrations(first).run(&old).await.unwrap();
+        let id = Uuid::now_v7();
+        let filled = format!(
+            "INSERT INTO jobs (id, state, labels, method, created_at) VALUES ('{id}', 'succeeded', '{{\"line\":\"A12\"}}', 'auto', 5);
+             INSERT INTO cases (job_id, body) VALUES ('{id}', x'7b7d');
+             INSERT INTO job_labels (key, value, job_id) VALUES ('line', 'A12', '{id}');
+             INSERT INTO idempotency_keys (key, digest, job_id) VALUES ('k', zeroblob(32), '{id}');
+             INSERT INTO results (job_id, solution) VALUES ('{id}', x'7b7d');"
+        );
+        sqlx::raw_sql(sqlx::AssertSqlSafe(filled))
+            .execute(&old)
+            .await
+            .unwrap();
+        old.close().await;
+
+        let store = SqliteStore::open(&file).await.unwrap();
+        let job = store.get(id).await.unwrap().unwrap();
+        assert_eq!((&*job.tenant, job.cached), ("anonymous", false));
+        let label = Filter {
+            label: Some(("line".to_owned(), "A12".to_owned())),
+            ..Filter::default()
+        };
+        let page = store.list("anonymous", &label, None, 10).await.unwrap();
+        assert_eq!(page.jobs, [job]);
+        let by_key = store.by_key("anonymous", "k", &[0; 32]).await.unwrap();
+        assert!(matches!(by_key, Some(Enqueued::Existing(job)) if job.id == id));
+        assert!(store.small_result(id).await.unwrap().is_some());
+        let mode: i64 = sqlx::query_scalar("PRAGMA auto_vacuum")
+            .fetch_one(&store.writer)
+            .await
+            .unwrap();
+        assert_eq!(mode, 2, "it can shrink");
+        store.delete(id).await.unwrap();
+        assert_eq!(
+            store.by_key("anonymous", "k", &[0; 32]).await.unwrap(),
+            None
+        );
+    }
 }

@@ -69,9 +69,7 @@ pub(super) async fn end_with_sources(
     connection: &mut SqliteConnection,
     jobs: impl Iterator<Item = &NewJob>,
 ) -> Result<Vec<Uuid>, JobsError> {
-    let pairs: Vec<_> = jobs
-        .filter_map(|job| Some((job.id, job.created_at, job.source?)))
-        .collect();
+    let pairs: Vec<_> = jobs.filter_map(|job| Some((job.id, job.source?))).collect();
     if pairs.is_empty() {
         return Ok(Vec::new());
     }
@@ -94,9 +92,9 @@ pub(super) async fn end_with_sources(
     ended.iter().map(read_id).collect()
 }
 
-fn with_pairs(pairs: &[(Uuid, i64, Uuid)]) -> QueryBuilder<Sqlite> {
+fn with_pairs(pairs: &[(Uuid, (Uuid, i64))]) -> QueryBuilder<Sqlite> {
     let mut query = QueryBuilder::new("WITH pairs (job, at, source) AS (");
-    query.push_values(pairs, |mut row, (job, at, source)| {
+    query.push_values(pairs, |mut row, (job, (source, at))| {
         row.push_bind(job.to_string())
             .push_bind(*at)
             .push_bind(source.to_string());

@@ -35,6 +35,7 @@ pub(super) fn read_job(row: &SqliteRow) -> Result<Job, JobsError> {
         created_at: row.try_get("created_at")?,
         started_at: row.try_get("started_at")?,
         ended_at: row.try_get("ended_at")?,
+        expires_at: None,
         attempt: row.try_get("attempt")?,
         progress: row.try_get("progress")?,
         warnings: from_json(row.try_get("warnings")?)?,
