@@ -36,6 +36,10 @@ fn main() {
         "| method | cells × strips | solved | error: median | 90 % | largest | µs | LU | slowest case, LU |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
+    targets(&cases, lu);
+    if std::env::var_os("TARGETS_ONLY").is_some() {
+        return;
+    }
     for (cells, strips) in [
         (8, 8),
         (12, 12),
@@ -67,6 +71,74 @@ fn main() {
             lu,
         );
     }
+}
+
+/// What a target costs and whether it is met.
+fn targets(cases: &[Value], lu: f64) {
+    println!(
+        "| target | met | covered | certified | estimate / error | error: median | 90 % | largest | LU: median | 90 % | largest | iterations | products | cells |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|");
+    for target in [0.02, 0.005, 0.001] {
+        let (mut met, mut covered, mut certified) = (0, 0, 0);
+        let (mut ratios, mut errors, mut seconds) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut iterations, mut products, mut cells) = (0, 0, 0);
+        for case in cases {
+            let solver = json!({ "target_error": target });
+            let problem =
+                check(&question(case, &solver), &Limits::default()).expect("a valid case");
+            let (solution, _) = solve(&problem, &Unwatched).expect("a solution");
+            seconds.push(median(
+                (0..REPEATS)
+                    .map(|_| seconds_of(|| solve(&problem, &Unwatched)).0)
+                    .collect(),
+            ));
+            let total = &solution.total[0];
+            let force =
+                case["friction"].as_f64().unwrap() * case["normal_force_n"].as_f64().unwrap();
+            let estimate = total.error_estimate.expect("an estimate").force_x_n / force;
+            let error = error(total, case);
+            let uncertainty = ["force_x", "force_y", "moment_z"]
+                .iter()
+                .map(|name| case[*name]["unc"].as_f64().unwrap())
+                .fold(0.0, f64::max);
+            let point = &solution.patches[0].points[0].solver;
+            met += i32::from(error <= target + uncertainty);
+            covered += i32::from(estimate >= error - uncertainty);
+            certified += i32::from(estimate <= target);
+            if std::env::var_os("DETAILS").is_some() {
+                println!(
+                    "{} {target} est {estimate:.5} err {error:.5} unc {uncertainty:.5} {}x{} it {} prod {} LU {:.2}",
+                    case["id"],
+                    point.mesh.cells,
+                    point.mesh.strips,
+                    point.iterations,
+                    point.products,
+                    seconds.last().unwrap() / lu
+                );
+            }
+            ratios.push(estimate / error);
+            errors.push(error);
+            iterations += point.iterations;
+            products += point.products;
+            cells += point.mesh.cells * point.mesh.strips;
+        }
+        let n = cases.len() as u32;
+        println!(
+            "| {target} | {met} | {covered} | {certified} | {:.1} | {:.4} | {:.4} | {:.4} | {:.3} | {:.3} | {:.3} | {:.1} | {:.1} | {:.0} |",
+            median(ratios),
+            median(errors.clone()),
+            quantile(errors.clone(), 0.9),
+            quantile(errors, 1.0),
+            median(seconds.clone()) / lu,
+            quantile(seconds.clone(), 0.9) / lu,
+            quantile(seconds, 1.0) / lu,
+            f64::from(iterations) / f64::from(n),
+            f64::from(products) / f64::from(n),
+            f64::from(cells) / f64::from(n),
+        );
+    }
+    println!();
 }
 
 /// The stored reference cases of all classes.

@@ -54,10 +54,102 @@ impl Grading {
         Grading { edges, nodes }
     }
 
+    /// Cells that gather at both ends and about `pole`: their density is `(1 − β)/2 + β/(π√(1 − ξ²)) + g L(ξ − pole)`.
+    #[must_use]
+    pub fn about(pole: f64, cells: usize) -> Grading {
+        let gathering = Gathering {
+            pole,
+            at_ends: GATHERED_AT_ENDS,
+        };
+        let mut shares = (0..=2 * cells).map(|k| 0.5 * k as f64 / cells as f64);
+        let mut edges = Vec::with_capacity(cells + 1);
+        let mut nodes = Vec::with_capacity(cells);
+        let mut last = -1.0;
+        while let Some(share) = shares.next() {
+            last = gathering.place(share, last);
+            edges.push(last);
+            if let Some(share) = shares.next() {
+                last = gathering.place(share, last);
+                nodes.push(last);
+            }
+        }
+        if pole == 0.0 {
+            symmetrise(&mut edges);
+            symmetrise(&mut nodes);
+        }
+        Grading { edges, nodes }
+    }
+
     /// Number of cells.
     #[must_use]
     pub fn cells(&self) -> usize {
         self.nodes.len()
+    }
+}
+
+/// Share β of the cells' density that is graded toward the ends where cells gather about a pole.
+const GATHERED_AT_ENDS: f64 = 0.75;
+/// Weight g and half width d of the Lorentz bump `L(t) = 1/(πd(1 + t²/d²))` at the pole. Any weight from 0.08 to 0.25 and
+/// any half width from 0.05 to 0.15 serve.
+const BUMP: (f64, f64) = (0.15, 0.1);
+
+/// A density of cells or strips over −1 … 1 with a bump at the pole.
+#[derive(Debug, Clone, Copy)]
+struct Gathering {
+    pole: f64,
+    at_ends: f64,
+}
+
+impl Gathering {
+    fn density(self, t: f64) -> f64 {
+        let (weight, width) = BUMP;
+        let ends = if self.at_ends > 0.0 {
+            self.at_ends / (PI * (1.0 - t * t).max(1e-12).sqrt())
+        } else {
+            0.0
+        };
+        let bump = weight / (PI * width * (1.0 + ((t - self.pole) / width).powi(2)));
+        0.5 * (1.0 - self.at_ends) + ends + bump
+    }
+
+    fn cumulated(self, t: f64) -> f64 {
+        let (weight, width) = BUMP;
+        let bump = |t: f64| weight / PI * ((t - self.pole) / width).atan();
+        let ends = if self.at_ends > 0.0 {
+            self.at_ends * (0.5 + t.asin() / PI)
+        } else {
+            0.0
+        };
+        0.5 * (1.0 - self.at_ends) * (t + 1.0) + ends + bump(t) - bump(-1.0)
+    }
+
+    /// Where a share of the density lies to the left; `from` is a place left of it.
+    fn place(self, share: f64, from: f64) -> f64 {
+        if share <= 0.0 {
+            return -1.0;
+        }
+        if share >= 1.0 {
+            return 1.0;
+        }
+        let goal = share * self.cumulated(1.0);
+        let (mut low, mut high) = (from, 1.0);
+        let mut t = from + (goal - self.cumulated(from)) / self.density(from).min(2.0);
+        for _ in 0..60 {
+            if t <= low || t >= high {
+                t = 0.5 * (low + high);
+            }
+            let excess = self.cumulated(t) - goal;
+            if excess.abs() < 1e-14 {
+                break;
+            }
+            if excess > 0.0 {
+                high = t;
+            } else {
+                low = t;
+            }
+            t -= excess / self.density(t);
+        }
+        t
     }
 }
 
@@ -93,6 +185,8 @@ pub struct Mesh {
     pub right: Vec<f64>,
     /// Node of each cell, in mm: where displacement is observed and traction counted.
     pub node: Vec<f64>,
+    /// y of each segment where its rigid slip is taken, in mm: the mid-line of the strip unless something better is known.
+    pub arm: Vec<f64>,
 }
 
 impl Mesh {
@@ -105,6 +199,7 @@ impl Mesh {
             left: Vec::with_capacity(chords.len() * n),
             right: Vec::with_capacity(chords.len() * n),
             node: Vec::with_capacity(chords.len() * n),
+            arm: chords.iter().map(|chord| chord.y).collect(),
         };
         for chord in chords {
             let start = mesh.node.len();
@@ -144,12 +239,13 @@ impl Mesh {
         areas
     }
 
-    /// y of every cell.
+    /// y of every cell's traction.
     #[must_use]
     pub fn rows(&self) -> Vec<f64> {
         self.segments
             .iter()
-            .flat_map(|s| s.cells.clone().map(|_| s.chord.y))
+            .zip(&self.arm)
+            .flat_map(|(s, y)| s.cells.clone().map(|_| *y))
             .collect()
     }
 
@@ -172,6 +268,7 @@ impl Mesh {
             left: along(&self.left),
             right: along(&self.right),
             node: along(&self.node),
+            arm: self.arm.iter().map(|y| (y - origin[1]) * factor).collect(),
         }
     }
 
@@ -214,9 +311,58 @@ pub fn equal_strips(low: f64, high: f64, count: usize) -> Vec<(f64, f64)> {
         .collect()
 }
 
+/// `count` strips between `low` and `high` as `(y, dy)`, narrower about `pole`, a place between −1 and 1.
+#[must_use]
+pub fn strips_about(pole: f64, low: f64, high: f64, count: usize) -> Vec<(f64, f64)> {
+    let gathering = Gathering { pole, at_ends: 0.0 };
+    let mut edges = vec![-1.0];
+    for k in 1..=count {
+        let last = edges[k - 1];
+        edges.push(gathering.place(k as f64 / count as f64, last));
+    }
+    if pole == 0.0 {
+        symmetrise(&mut edges);
+    }
+    let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+    edges
+        .windows(2)
+        .map(|e| (middle + 0.5 * half * (e[0] + e[1]), half * (e[1] - e[0])))
+        .collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn cells_about_a_pole_follow_their_density() {
+        for pole in [0.0, 0.37, -0.95] {
+            let gathering = Gathering {
+                pole,
+                at_ends: GATHERED_AT_ENDS,
+            };
+            let grading = Grading::about(pole, 12);
+            let total = gathering.cumulated(1.0);
+            for (k, edge) in grading.edges.iter().enumerate() {
+                assert!((gathering.cumulated(*edge) / total - k as f64 / 12.0).abs() < 1e-12);
+            }
+            for (k, node) in grading.nodes.iter().enumerate() {
+                assert!(
+                    (gathering.cumulated(*node) / total - (k as f64 + 0.5) / 12.0).abs() < 1e-12
+                );
+            }
+            // The density is the slope of its sum.
+            for t in [-0.8, 0.1, 0.6] {
+                let slope = (gathering.cumulated(t + 1e-6) - gathering.cumulated(t - 1e-6)) / 2e-6;
+                assert!((slope / gathering.density(t) - 1.0).abs() < 1e-6);
+            }
+            let strips = strips_about(pole, 2.0, 6.0, 9);
+            let width: f64 = strips.iter().map(|(_, dy)| dy).sum();
+            assert!((width - 4.0).abs() < 1e-12);
+            let narrowest = strips.iter().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+            assert!((narrowest.0 - (4.0 + 2.0 * pole)).abs() <= narrowest.1);
+        }
+    }
 
     fn circle(strips: usize) -> Vec<Chord> {
         equal_strips(-1.0, 1.0, strips)

@@ -23,7 +23,7 @@ use crate::contact::monitor::{Monitor, Watch};
 use crate::contact::outputs::assemble::{assemble, wants_fields};
 use crate::contact::problem::{Limits, Problem};
 use crate::contact::solution::{Fields, Solution};
-use crate::contact::tangential::ladder::Ladder;
+use crate::contact::tangential::ladder::{Ladder, Plan, Regime};
 use crate::contact::tangential::point::{self, Point};
 
 /// Reads and checks a case.
@@ -64,7 +64,8 @@ pub fn solve(problem: &Problem, monitor: &dyn Monitor) -> Result<(Solution, Fiel
     Ok(assemble(problem, &ladder, &points))
 }
 
-/// Brings every point to the finest level that any of them needed: the fields of a patch share their cells.
+/// Brings every point to one level as fine as the finest that any of them needed, gathered about none of their poles: the
+/// fields of a patch share their cells.
 fn on_one_level(
     problem: &Problem,
     ladder: &mut Ladder,
@@ -75,12 +76,19 @@ fn on_one_level(
     let Some(finest) = points.iter().max_by_key(|p| cells(p)).map(|p| p.level) else {
         return Ok(points);
     };
-    let size = ladder.get(finest).size;
+    let size = ladder.get(finest).plan.size;
+    let plan = Plan {
+        size,
+        regime: Regime::Sticking,
+    };
+    if points.iter().all(|point| point.level == finest) {
+        return Ok(points);
+    }
     let lift = |(index, point): (usize, Point)| {
-        if point.level == finest {
+        if ladder.get(point.level).plan == plan {
             return Ok(point);
         }
-        point::climb(problem, ladder, index, size, Some(point), monitor)
+        point::climb(problem, ladder, index, plan, Some(point), monitor)
     };
     points.into_iter().enumerate().map(lift).collect()
 }

@@ -19,6 +19,8 @@ pub struct Fitted {
     pub chord: Chord,
     /// The region's own chord on the mid-line of the strip.
     pub line: Chord,
+    /// y of the centre of the strip's load; the mid-line where a strip has several chords.
+    pub load_y: f64,
 }
 
 impl Fitted {
@@ -56,11 +58,12 @@ pub fn chords(region: &Region, patch: usize, strips: &[(f64, f64)]) -> Vec<Fitte
     let width: f64 = strips.iter().map(|(_, dy)| dy).sum();
     let share = 0.5 / (1.0 + 0.5 * (longest / width).powi(2));
     let fit = |line: &Chord| {
-        let mean = if alone(line) {
-            mean_length(region, patch, line)
+        let strip = if alone(line) {
+            Strip::of(region, patch, line)
         } else {
             None
         };
+        let mean = strip.map(|strip| strip.length);
         let length = line.right - line.left;
         let half = 0.5 * ((1.0 - share) * length + share * mean.unwrap_or(length));
         let middle = 0.5 * (line.left + line.right);
@@ -71,23 +74,46 @@ pub fn chords(region: &Region, patch: usize, strips: &[(f64, f64)]) -> Vec<Fitte
                 ..*line
             },
             line: *line,
+            load_y: strip.map_or(line.y, |strip| strip.load_y),
         }
     };
     lines.iter().map(fit).collect()
 }
 
-/// Mean length of the chords over a strip; nothing if there is more than one on any of its lines.
-fn mean_length(region: &Region, patch: usize, line: &Chord) -> Option<f64> {
-    let mut mean = 0.0;
-    for (place, weight) in GAUSS {
-        let across = region.chords(patch, &[(line.y + 0.5 * line.dy * place, line.dy)]);
-        match across.as_slice() {
-            [] => {}
-            [chord] => mean += 0.5 * weight * (chord.right - chord.left),
-            _ => return None,
+/// What a strip holds between its two sides.
+#[derive(Debug, Clone, Copy)]
+struct Strip {
+    /// Mean length of the chords.
+    length: f64,
+    /// y of the centre of the load.
+    load_y: f64,
+}
+
+impl Strip {
+    /// The strip about a line; nothing if there is more than one chord on any of its lines.
+    fn of(region: &Region, patch: usize, line: &Chord) -> Option<Strip> {
+        let (mut length, mut load, mut moment) = (0.0, 0.0, 0.0);
+        for (place, weight) in GAUSS {
+            let y = line.y + 0.5 * line.dy * place;
+            match region.chords(patch, &[(y, line.dy)]).as_slice() {
+                [] => {}
+                [chord] => {
+                    let long = 0.5 * weight * (chord.right - chord.left);
+                    let share = long * region.mean_pressure(chord, chord.left, chord.right);
+                    length += long;
+                    load += share;
+                    moment += share * (y - line.y);
+                }
+                _ => return None,
+            }
         }
+        let load_y = if load > 0.0 {
+            line.y + moment / load
+        } else {
+            line.y
+        };
+        Some(Strip { length, load_y })
     }
-    Some(mean)
 }
 
 #[cfg(test)]

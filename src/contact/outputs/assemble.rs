@@ -144,8 +144,8 @@ fn point_solution(
         solver: SolverReport {
             method: point.method,
             mesh: MeshReport {
-                strips: level.size.strips,
-                cells: level.size.cells,
+                strips: level.plan.size.strips,
+                cells: level.plan.size.cells,
             },
             iterations: point.work.iterations,
             products: point.work.products,

@@ -59,14 +59,14 @@ impl<'a> Equations<'a> {
             row_count: 0,
             y: Vec::with_capacity(count),
         };
-        for segment in &mesh.segments[..count] {
+        for (segment, y) in mesh.segments[..count].iter().zip(&mesh.arm) {
             let stencil = Stencil::new(rule, mesh, segment);
             let rows = stencil.cells() + 2;
             equations.rows.push(row..row + rows);
             row += rows;
             equations.stencils.push(stencil);
             equations.cells.push(segment.cells.clone());
-            equations.y.push(segment.chord.y);
+            equations.y.push(*y);
         }
         equations.row_count = row;
         equations

@@ -1,5 +1,6 @@
 //! How wrong are the resultants? From two rules, two levels, and the cell that holds the spin pole.
 
+use crate::contact::mesh::Segment;
 use crate::contact::normal::Patch;
 use crate::contact::outputs::resultants::Resultants;
 use crate::contact::problem::Problem;
@@ -8,47 +9,61 @@ use crate::contact::tangential::ladder::Regime;
 use crate::contact::tangential::level::Level;
 use crate::contact::tangential::liu_hsu::spin_pole::vortex_centre;
 
-/// Factor on the difference of the two rules where there is only one level.
-const RULES_ALONE: f64 = 2.5;
-/// Factor on both indicators where there are two levels; with it their larger one covered the error in 97 % of 62 Hertz
-/// contacts at the meshes of this ladder.
-const SAFETY: f64 = 1.25;
+/// Factor on the difference of the two rules on a mesh that was chosen without knowing the tractions.
+const RULES_UNKNOWING: f64 = 3.0;
+/// The same on a mesh made for them.
+const RULES_ALONE: f64 = 1.5;
+/// The same where a coarser level of the same kind has its say.
+const RULES_BESIDE: f64 = 0.75;
+/// Factor on the step of the extrapolation.
+const LEVELS: f64 = 1.5;
+/// Factor on the step where nothing is extrapolated.
+const LEVELS_ALONE: f64 = 1.25;
 /// Error of sampling the vortex of the tractions by one cell, over p h² / N.
 const POLE: f64 = 0.45;
 /// Relative error where everything slips along the rigid slip.
 const RIGID: f64 = 1e-6;
 /// Stick below this share of the cells' area counts as none.
-const STICK_NEGLIGIBLE: f64 = 0.08;
+const STICK_NEGLIGIBLE: f64 = 0.12;
+/// With less stick than this on the first level, a pole in a sticking cell may as well be in a slipping one.
+const STICK_UNCERTAIN: f64 = 0.2;
 /// A pole this far out, relative to the half axes of the box around the patches, is outside.
 const POLE_INSIDE: f64 = 0.9;
+/// Cells gather no farther out than here.
+const POLE_OUTMOST: f64 = 0.95;
 
 /// Relative errors of every patch, then of the sum over them; nothing where there is no second opinion.
 pub type Errors = Vec<Option<f64>>;
 
-/// What two levels say about each other.
+/// What else is known besides the two rules on one mesh.
 #[derive(Debug, Clone, Copy)]
-pub struct Finer<'a> {
-    /// Resultants of the coarser level.
-    pub coarser: &'a [Resultants],
-    /// Cells of the finer level over those of the coarser.
-    pub cells_ratio: f64,
-    /// The meshes differ in kind, not only in size.
-    pub other_kind: bool,
+pub enum Opinion<'a> {
+    /// Nothing.
+    Alone,
+    /// The resultants of a coarser level of the same kind, and the share of the change that is left to go: 1 over (ratio
+    /// of cells − 1).
+    Coarser(&'a [Resultants], f64),
 }
 
-/// Estimates the errors of `found`, the resultants of `answer` on `level`, relative to μN (moment: μN√(A/π)).
+/// Estimates the errors of resultants, relative to μN (moment: μN√(A/π)): the largest component for all three, since
+/// single ones cross zero.
 ///
-/// `max(1.25 |trapezoid − mirror|, 1.25 |change| / (ratio of cells − 1), pole)`, the largest component for all three
-/// resultants, since single ones cross zero; on the first level `max(2.5 |trapezoid − mirror|, pole)`. The pole's term is
-/// `0.45 p h² / N` with the pressure p and longer side h of the cell that holds the centre of the traction vortex, if it
-/// slips: sampling the vortex at nodes makes an error of that size which two rules on one mesh share.
+/// `found` are the resultants of `answer` on `level`, not extrapolated. The estimate is
+/// - `1.5 |trapezoid − mirror|` on a mesh made for the regime, three times the difference on one that was not;
+/// - `max(1.5 s |change|, 0.75 |trapezoid − mirror|)` for resultants extrapolated by the share s of the change from a coarser
+///   level of the same kind;
+/// - never less than the tolerance of the solve, nor, unless extrapolated on cells that gather about the pole, than
+///   `0.45 p h² / N` with the pressure p and longer side h of the cell that holds the centre of the traction vortex:
+///   sampling the vortex at nodes makes an error of that size which two rules on one mesh share.
 #[must_use]
 pub fn errors(
     problem: &Problem,
     level: &Level,
     answer: &Tangential,
     found: &[Resultants],
-    finer: Option<Finer>,
+    opinion: Opinion,
+    spinning: bool,
+    tolerance: f64,
 ) -> Errors {
     let patches = problem.region.patches();
     let all = |value| vec![value; patches.len() + 1];
@@ -68,67 +83,82 @@ pub fn errors(
             .collect();
         distances(problem, &patches, found, &second)
     });
-    let of_levels = finer.map(|finer| {
-        let change = distances(problem, &patches, found, finer.coarser);
-        let extrapolated = |d: f64| d / (finer.cells_ratio - 1.0);
-        change
-            .into_iter()
-            .map(|d| {
-                if finer.other_kind {
-                    d.min(extrapolated(d))
-                } else {
-                    extrapolated(d)
-                }
-            })
-            .collect()
-    });
-    let rules_factor = if of_levels.is_some() {
-        SAFETY
-    } else {
-        RULES_ALONE
+    let of_levels = match opinion {
+        Opinion::Alone => None,
+        Opinion::Coarser(coarser, share) => {
+            let mut change = distances(problem, &patches, found, coarser);
+            change.iter_mut().for_each(|d| *d *= share);
+            Some(change)
+        }
     };
-    let pole = pole_error(problem, level, answer);
-    let scaled = |values: &Vec<f64>, factor: f64, k: usize| factor * values[k];
+    let rules_factor = match (&of_levels, level.plan.regime) {
+        (Some(_), _) => RULES_BESIDE,
+        (None, Regime::Unknown) => RULES_UNKNOWING,
+        (None, _) => RULES_ALONE,
+    };
+    let gathered = level.plan.pole().is_some();
+    let pole = if !spinning || gathered && of_levels.is_some() {
+        0.0
+    } else {
+        pole_error(problem, level, answer)
+    };
     (0..=patches.len())
         .map(|k| match (&of_rules, &of_levels) {
-            (Some(rules), Some(levels)) => {
-                Some(scaled(rules, rules_factor, k).max(scaled(levels, SAFETY, k)))
-            }
-            (Some(rules), None) => Some(scaled(rules, rules_factor, k)),
+            (Some(rules), Some(levels)) => Some((rules_factor * rules[k]).max(LEVELS * levels[k])),
+            (Some(rules), None) => Some(rules_factor * rules[k]),
             // The dense method has one rule; the change between its levels is all there is.
-            (None, Some(levels)) => Some(scaled(levels, SAFETY, k)),
+            (None, Some(levels)) => Some(LEVELS_ALONE * levels[k]),
             (None, None) => None,
         })
-        .map(|error| error.map(|e| e.max(pole)))
+        .map(|error| error.map(|e| e.max(pole).max(tolerance)))
         .collect()
 }
 
 /// Which mesh the next level should have, seen from this one.
 #[must_use]
 pub fn regime(level: &Level, answer: &Tangential, spinning: bool) -> Regime {
+    if !spinning || stick_share(level, answer) >= STICK_NEGLIGIBLE {
+        return Regime::Sticking;
+    }
+    pole(level, answer)
+        .and_then(|at| place_inside(level, at))
+        .map_or(Regime::Sticking, Regime::Spinning)
+}
+
+/// Share of the cells' area that sticks.
+fn stick_share(level: &Level, answer: &Tangential) -> f64 {
     let (mut stick, mut total) = (0.0, 0.0);
     for (slips, area) in answer.slips.iter().zip(&level.area) {
         total += area;
         stick += if *slips { 0.0 } else { *area };
     }
-    let inside = spinning && stick < STICK_NEGLIGIBLE * total && {
-        pole(level, answer).is_some_and(|[x, y]| {
-            let extent = |values: &[f64]| values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-            let a = extent(&level.normalised.node);
-            let b = level
-                .normalised
-                .segments
-                .iter()
-                .map(|s| s.chord.y.abs() + 0.5 * s.chord.dy)
-                .fold(0.0, f64::max);
-            (x / a).hypot(y / b) < POLE_INSIDE
-        })
+    stick / total
+}
+
+/// A point inside the box about the patches as a place along the nearest chord and across, each from −1 to 1.
+fn place_inside(level: &Level, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+    let mesh = &level.normalised;
+    let side = |sign: f64| {
+        let sides = mesh
+            .segments
+            .iter()
+            .map(|s| sign * s.chord.y + 0.5 * s.chord.dy);
+        sign * sides.fold(f64::NEG_INFINITY, f64::max)
     };
-    if inside {
-        Regime::Spinning
-    } else {
-        Regime::Sticking
+    let (bottom, top) = (side(-1.0), side(1.0));
+    let across = (2.0 * y - bottom - top) / (top - bottom);
+    let reach = mesh.node.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    if (x / reach).hypot(across) >= POLE_INSIDE {
+        return None;
     }
+    let distance = |s: &Segment| (s.chord.y - y).abs();
+    let nearest = mesh
+        .segments
+        .iter()
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+    let (left, right) = (nearest.chord.left, nearest.chord.right);
+    let along = (2.0 * x - left - right) / (right - left);
+    Some([along.clamp(-POLE_OUTMOST, POLE_OUTMOST), across])
 }
 
 /// Centre of the traction vortex, in the level's dimensionless coordinates.
@@ -146,7 +176,8 @@ fn pole(level: &Level, answer: &Tangential) -> Option<[f64; 2]> {
     vortex_centre(&t, &level.normalised.node, &rows, &weight)
 }
 
-/// Error of sampling the vortex, relative to the whole load; 0 where no slipping cell holds its centre.
+/// Error of sampling the vortex, relative to the whole load; 0 where the cell that holds the centre surely
+/// sticks.
 fn pole_error(problem: &Problem, level: &Level, answer: &Tangential) -> f64 {
     let Some([x, y]) = pole(level, answer) else {
         return 0.0;
@@ -157,12 +188,15 @@ fn pole_error(problem: &Problem, level: &Level, answer: &Tangential) -> f64 {
         .iter()
         .map(|p| p.normal_force)
         .sum();
+    let uncertain =
+        level.plan.regime == Regime::Unknown && stick_share(level, answer) < STICK_UNCERTAIN;
     for (segment, here) in level.mesh.segments.iter().zip(&level.normalised.segments) {
         if (here.chord.y - y).abs() > 0.5 * here.chord.dy {
             continue;
         }
         for i in segment.cells.clone() {
-            if level.normalised.left[i] <= x && x <= level.normalised.right[i] && answer.slips[i] {
+            let holds = level.normalised.left[i] <= x && x <= level.normalised.right[i];
+            if holds && (answer.slips[i] || uncertain) {
                 let longer = (level.mesh.right[i] - level.mesh.left[i]).max(segment.chord.dy);
                 return POLE * level.pressure[i] * longer * longer / load;
             }

@@ -24,10 +24,11 @@ pub fn rigid_answer(level: &Level, motion: &Motion) -> Option<Tangential> {
     let cells = level.mesh.cells();
     let mut slip = [vec![0.0; cells], vec![0.0; cells]];
     let mut smallest = f64::INFINITY;
-    for segment in &level.normalised.segments {
+    let normalised = &level.normalised;
+    for (segment, y) in normalised.segments.iter().zip(&normalised.arm) {
         for i in segment.cells.clone() {
-            slip[0][i] = motion.creepage_x - motion.spin_per_mm * segment.chord.y;
-            slip[1][i] = motion.creepage_y + motion.spin_per_mm * level.normalised.node[i];
+            slip[0][i] = motion.creepage_x - motion.spin_per_mm * y;
+            slip[1][i] = motion.creepage_y + motion.spin_per_mm * normalised.node[i];
             smallest = smallest.min(slip[0][i].hypot(slip[1][i]));
         }
     }

@@ -13,26 +13,68 @@ pub const CELLS_MAX: u32 = 2048;
 /// Fewest strips, and cells in one, that the rules are good for.
 const SIDE_MIN: f64 = 4.0;
 
+/// Places of poles are rounded to multiples of this.
+const POLE_GRID: f64 = 0.05;
+
 /// What the tractions of a motion look like, as far as the mesh should know.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Regime {
     /// Nothing is known yet.
     Unknown,
     /// A stick zone of some size.
     Sticking,
-    /// Hardly any stick, and tractions that turn about a point in the patch.
-    Spinning,
+    /// Hardly any stick, and tractions that turn about a place in the patch: along its chord and across the patch,
+    /// each from −1 to 1.
+    Spinning([f64; 2]),
 }
 
 impl Regime {
-    /// Cells along a strip divided by strips, for a patch of half-length a and half-width b. The exponents lie on flat
-    /// optima over 62 Hertz contacts with a/b from 0.2 to 5.
+    /// Cells along a strip divided by strips, for a patch of half-length a and half-width b. Factors and exponents lie on
+    /// flat optima over 62 Hertz contacts with a/b from 0.2 to 5.
     fn shape(self, a_over_b: f64) -> f64 {
         match self {
             Regime::Unknown => 1.25 * a_over_b.powf(0.45),
             Regime::Sticking => 1.3 * a_over_b.powf(0.3),
-            Regime::Spinning => 1.2 * a_over_b.powf(0.6),
+            Regime::Spinning(_) => 0.85 * a_over_b.powf(0.4),
         }
+    }
+}
+
+/// What a level is made from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plan {
+    /// Strips and cells.
+    pub size: MeshSize,
+    /// What it was made for.
+    pub regime: Regime,
+}
+
+impl Plan {
+    /// Where cells and strips gather, if anywhere.
+    #[must_use]
+    pub fn pole(&self) -> Option<[f64; 2]> {
+        match self.regime {
+            Regime::Spinning(pole) => Some(pole),
+            Regime::Unknown | Regime::Sticking => None,
+        }
+    }
+
+    /// Do the meshes of two plans differ in size only, so that the change between them tells what is left?
+    #[must_use]
+    pub fn is_like(&self, other: &Plan) -> bool {
+        match (self.regime, other.regime) {
+            (Regime::Sticking, Regime::Sticking) | (Regime::Spinning(_), Regime::Spinning(_)) => {
+                self.size.strips != other.size.strips
+            }
+            _ => false,
+        }
+    }
+}
+
+impl From<MeshSize> for Plan {
+    fn from(size: MeshSize) -> Self {
+        let regime = Regime::Unknown;
+        Plan { size, regime }
     }
 }
 
@@ -76,9 +118,24 @@ impl<'a> Ladder<'a> {
         }
     }
 
-    /// The size with about so many cells over all patches, an even number of strips.
+    /// The plan with about so many cells over all patches, an even number of strips, and a pole where the tractions turn
+    /// about one. Poles lie on a grid, so that motions that differ little share their levels.
     #[must_use]
-    pub fn size(&self, cells: u32, regime: Regime) -> MeshSize {
+    pub fn plan(&self, cells: u32, regime: Regime) -> Plan {
+        let regime = match regime {
+            Regime::Spinning(pole) if self.patches == 1.0 => {
+                Regime::Spinning(pole.map(|p| (p / POLE_GRID).round() * POLE_GRID))
+            }
+            Regime::Spinning(_) => Regime::Sticking,
+            Regime::Unknown | Regime::Sticking => regime,
+        };
+        Plan {
+            size: self.size(cells, regime),
+            regime,
+        }
+    }
+
+    fn size(&self, cells: u32, regime: Regime) -> MeshSize {
         let cells = f64::from(cells) / self.patches;
         let shape = regime.shape(self.a_over_b);
         let strips =
@@ -90,15 +147,15 @@ impl<'a> Ladder<'a> {
         }
     }
 
-    /// The number of the level of this size; it is made if it is not there.
+    /// The number of the level of this plan; it is made if it is not there.
     ///
     /// # Errors
     /// If no strip meets a patch.
-    pub fn level(&mut self, size: MeshSize) -> Result<usize, SolveError> {
-        if let Some(found) = self.levels.iter().position(|level| level.size == size) {
+    pub fn level(&mut self, plan: Plan) -> Result<usize, SolveError> {
+        if let Some(found) = self.levels.iter().position(|level| level.plan == plan) {
             return Ok(found);
         }
-        self.levels.push(Level::new(self.problem, size)?);
+        self.levels.push(Level::new(self.problem, plan)?);
         Ok(self.levels.len() - 1)
     }
 

@@ -3,14 +3,15 @@
 use std::cell::OnceCell;
 use std::f64::consts::PI;
 
-use crate::contact::case::{MeshSize, Motion};
+use crate::contact::case::Motion;
 use crate::contact::error::SolveError;
 use crate::contact::influence::strips::{Differences, Parity, Precision};
-use crate::contact::mesh::{Chord, Grading, Mesh, equal_strips};
+use crate::contact::mesh::{Chord, Grading, Mesh, equal_strips, strips_about};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::Region;
 use crate::contact::normal::fitted::{self, Fitted};
 use crate::contact::problem::{Elasticity, Problem, Resolution};
+use crate::contact::tangential::ladder::Plan;
 
 /// Targets from here on are met with a matrix in single precision.
 const SINGLE_PRECISION_FROM: f64 = 5e-4;
@@ -54,8 +55,8 @@ impl Scale {
 /// A mesh with its pressures, and the influence once somebody needs it.
 #[derive(Debug)]
 pub struct Level {
-    /// Strips and cells asked for.
-    pub size: MeshSize,
+    /// What it was made from.
+    pub plan: Plan,
     /// The mesh in mm.
     pub mesh: Mesh,
     /// Pressure of every cell in MPa; the cells of a patch carry its normal force exactly.
@@ -75,11 +76,14 @@ pub struct Level {
 }
 
 impl Level {
-    /// Meshes every patch of the problem's region with equal strips and cosine-graded cells.
+    /// Meshes every patch of the problem's region: equal strips and cosine-graded cells, or both gathered about the
+    /// plan's pole.
     ///
     /// # Errors
     /// [`SolveError::Unmeshable`] if no strip meets a patch.
-    pub fn new(problem: &Problem, size: MeshSize) -> Result<Level, SolveError> {
+    pub fn new(problem: &Problem, plan: impl Into<Plan>) -> Result<Level, SolveError> {
+        let plan: Plan = plan.into();
+        let size = plan.size;
         let (region, friction) = (&problem.region, problem.friction);
         let Elasticity {
             shear_modulus,
@@ -89,7 +93,11 @@ impl Level {
         let patches = region.patches();
         let mut fitted: Vec<Fitted> = Vec::new();
         for (k, patch) in patches.iter().enumerate() {
-            let strips = equal_strips(patch.extent[2], patch.extent[3], size.strips as usize);
+            let [low, high] = [patch.extent[2], patch.extent[3]];
+            let strips = match plan.pole() {
+                Some([_, y]) => strips_about(y, low, high, size.strips as usize),
+                None => equal_strips(low, high, size.strips as usize),
+            };
             let chords = fitted::chords(region, k, &strips);
             if chords.is_empty() {
                 return Err(SolveError::Unmeshable {
@@ -100,7 +108,12 @@ impl Level {
             fitted.extend(chords);
         }
         let chords: Vec<Chord> = fitted.iter().map(|f| f.chord).collect();
-        let mesh = Mesh::new(&chords, &Grading::cosine(size.cells as usize));
+        let grading = match plan.pole() {
+            Some([x, _]) => Grading::about(x, size.cells as usize),
+            None => Grading::cosine(size.cells as usize),
+        };
+        let mut mesh = Mesh::new(&chords, &grading);
+        mesh.arm = fitted.iter().map(|f| f.load_y).collect();
         let area = mesh.areas();
         let pressure = cell_pressures(region, &fitted, &mesh, &area);
         let mirror = mesh
@@ -118,7 +131,7 @@ impl Level {
         let bound = pressure.iter().map(|p| p / largest).collect();
         let influence = OnceCell::new();
         Ok(Level {
-            size,
+            plan,
             mesh,
             pressure,
             area,

@@ -5,8 +5,8 @@ use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
 use crate::contact::outputs::resultants::Resultants;
 use crate::contact::problem::{Problem, Resolution};
-use crate::contact::tangential::estimate::{self, Errors, Finer};
-use crate::contact::tangential::ladder::{CELLS_FIRST, CELLS_MAX, Ladder, Regime};
+use crate::contact::tangential::estimate::{self, Errors, Opinion};
+use crate::contact::tangential::ladder::{CELLS_FIRST, CELLS_MAX, Ladder, Plan, Regime};
 use crate::contact::tangential::level::Level;
 use crate::contact::tangential::{
     Failure, Tangential, Work, boundary_element, full_slip, liu_hsu, nested,
@@ -17,6 +17,11 @@ const POLE_MESH: MeshSize = MeshSize {
     strips: 5,
     cells: 5,
 };
+/// Levels of nearly the same size say nothing about each other.
+const RATIO_MIN: f64 = 1.3;
+/// Error of extrapolated resultants over that of the same without, as far as the climb counts on it.
+const EXTRAPOLATED: f64 = 0.6;
+
 /// The answer for one motion on the finest level it needed.
 #[derive(Debug, Clone)]
 pub struct Point {
@@ -24,8 +29,10 @@ pub struct Point {
     pub tangential: Tangential,
     /// The number of that level in the ladder.
     pub level: usize,
-    /// Resultants of every patch about the origin of the case.
+    /// Resultants of every patch about the origin of the case: the best known.
     pub resultants: Vec<Resultants>,
+    /// The same as the tractions give them, without extrapolation.
+    pub summed: Vec<Resultants>,
     /// Estimated errors, see [`estimate::errors`].
     pub errors: Errors,
     /// Work over all levels.
@@ -57,48 +64,57 @@ pub fn solve(
 ) -> Result<Point, SolveError> {
     let sizes = Ladder::fixed_sizes(problem);
     let first = match &sizes {
-        Some(sizes) => sizes[0],
-        None => ladder.size(CELLS_FIRST, Regime::Unknown),
+        Some(sizes) => sizes[0].into(),
+        None => ladder.plan(CELLS_FIRST, Regime::Unknown),
     };
     let mut point = climb(problem, ladder, index, first, None, monitor)?;
     match (sizes, problem.resolution) {
         (Some(sizes), _) => {
             for size in &sizes[1..] {
-                point = climb(problem, ladder, index, *size, Some(point), monitor)?;
+                point = climb(problem, ladder, index, (*size).into(), Some(point), monitor)?;
             }
         }
         (None, Resolution::Mesh(_)) => {}
         (None, Resolution::Target(target)) => {
+            let spinning = problem.motions[index].spin_per_mm != 0.0;
             let mut half_octaves = 0;
             while let Some(error) = point.error().filter(|e| *e > target) {
-                half_octaves += steps(error / target);
+                half_octaves = if half_octaves == 0 {
+                    first_steps(target)
+                } else {
+                    half_octaves + steps(error / target)
+                };
                 let cells = f64::from(CELLS_FIRST) * 2.0_f64.powf(0.5 * f64::from(half_octaves));
                 if cells > f64::from(CELLS_MAX) {
                     break;
                 }
-                let spinning = problem.motions[index].spin_per_mm != 0.0;
                 let regime = estimate::regime(ladder.get(point.level), &point.tangential, spinning);
-                let mut size = ladder.size(cells.round() as u32, regime);
-                let before = ladder.get(point.level).size.strips;
-                if size.strips == before {
+                let mut plan = ladder.plan(cells.round() as u32, regime);
+                let before = ladder.get(point.level).plan.size.strips;
+                if plan.size.strips == before {
                     // Levels with the same strips say nothing about the strips.
-                    size = MeshSize {
+                    plan.size = MeshSize {
                         strips: before + 2,
-                        cells: (size.cells * before).div_ceil(before + 2),
+                        cells: (plan.size.cells * before).div_ceil(before + 2),
                     };
                 }
-                point = climb(problem, ladder, index, size, Some(point), monitor)?;
+                point = climb(problem, ladder, index, plan, Some(point), monitor)?;
             }
         }
     }
     Ok(point)
 }
 
+/// By how many half octaves the second level has more cells than the first: what most cases need.
+fn first_steps(target: f64) -> i32 {
+    ((0.04 / target).log2().round() as i32).clamp(1, 4)
+}
+
 /// By how many half octaves the number of cells should grow when the error is so many times the target: errors fall
-/// about as 1/N, and steps of less than two or more than four times pay less. Coarse steps let the motions of a sweep
-/// share their levels.
+/// about as 1/N and the next level can be extrapolated; steps of less than two or more than four times pay less. Coarse
+/// steps let the motions of a sweep share their levels.
 fn steps(excess: f64) -> i32 {
-    ((2.0 * (1.1 * excess).log2()).ceil() as i32).clamp(2, 4)
+    ((2.0 * (EXTRAPOLATED * excess).log2()).ceil() as i32).clamp(2, 4)
 }
 
 /// Solves motion `index` on the level of one size, from the point of a coarser one if there is one.
@@ -109,12 +125,12 @@ pub fn climb(
     problem: &Problem,
     ladder: &mut Ladder,
     index: usize,
-    size: MeshSize,
+    plan: Plan,
     coarser: Option<Point>,
     monitor: &dyn Monitor,
 ) -> Result<Point, SolveError> {
     let began = monitor.elapsed();
-    let number = ladder.level(size)?;
+    let number = ladder.level(plan)?;
     let level = ladder.get(number);
     let below = coarser
         .as_ref()
@@ -122,21 +138,38 @@ pub fn climb(
     let tangential = solve_level(problem, level, &problem.motions[index], below, monitor)
         .map_err(|f| named(f, problem, index))?;
     let patches = problem.region.patches().len();
-    let resultants: Vec<Resultants> = (0..patches)
+    let summed: Vec<Resultants> = (0..patches)
         .map(|p| Resultants::of_patch(level, &tangential.traction, p))
         .collect();
-    let finer = coarser.as_ref().map(|point| Finer {
-        coarser: &point.resultants,
-        cells_ratio: level.mesh.cells() as f64 / ladder.get(point.level).mesh.cells() as f64,
-        other_kind: estimate::regime(
-            level,
-            &tangential,
-            problem.motions[index].spin_per_mm != 0.0,
-        ) == Regime::Spinning,
+    let coarser_like = coarser.as_ref().filter(|point| {
+        let below = ladder.get(point.level);
+        let alike = problem.method == Method::LiuHsu || level.plan.is_like(&below.plan);
+        alike && level.mesh.cells() as f64 > RATIO_MIN * below.mesh.cells() as f64
     });
-    // Levels of nearly the same size say nothing about each other.
-    let finer = finer.filter(|f| f.cells_ratio > 1.3);
-    let errors = estimate::errors(problem, level, &tangential, &resultants, finer);
+    let share = coarser_like.map_or(0.0, |point| {
+        let below = ladder.get(point.level).mesh.cells() as f64;
+        below / (level.mesh.cells() as f64 - below)
+    });
+    let opinion = match coarser_like {
+        Some(point) => Opinion::Coarser(&point.summed, share),
+        None => Opinion::Alone,
+    };
+    let errors = estimate::errors(
+        problem,
+        level,
+        &tangential,
+        &summed,
+        opinion,
+        problem.motions[index].spin_per_mm != 0.0,
+        tolerance(problem),
+    );
+    let resultants = match coarser_like {
+        // The rules of the fast solver share one order of convergence; the dense method has no such record.
+        Some(point) if problem.method != Method::LiuHsu => {
+            extrapolated(problem, &summed, point, share)
+        }
+        _ => summed.clone(),
+    };
     let mut work = coarser.as_ref().map_or(Work::default(), |point| point.work);
     work.add(tangential.work);
     let seconds =
@@ -145,11 +178,28 @@ pub fn climb(
         tangential,
         level: number,
         resultants,
+        summed,
         errors,
         work,
         method: method_used(problem),
         seconds,
     })
+}
+
+/// The resultants of every patch where the climb leads to.
+fn extrapolated(
+    problem: &Problem,
+    summed: &[Resultants],
+    coarser: &Point,
+    share: f64,
+) -> Vec<Resultants> {
+    let patches = problem.region.patches();
+    let pairs = summed.iter().zip(&coarser.summed).zip(&patches);
+    pairs
+        .map(|((fine, coarse), patch)| {
+            fine.beyond(*coarse, share, problem.friction * patch.normal_force)
+        })
+        .collect()
 }
 
 /// `auto` is the fast solver today.
