@@ -1,5 +1,6 @@
 //! What can be started, and with which settings? Every command, flag and environment variable.
 
+mod config;
 mod healthcheck;
 mod keys;
 mod serve;
@@ -11,7 +12,7 @@ use std::process::ExitCode;
 use std::thread::available_parallelism;
 use std::time::Duration;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::contact::problem::Limits;
 use crate::http;
@@ -36,6 +37,8 @@ enum Command {
     Solve(SolveArgs),
     /// Make, list and revoke API keys; also while the service runs.
     Keys(KeysArgs),
+    /// Print the settings that `serve` would run with and where each comes from, as JSON; takes the flags of `serve`.
+    Config(ServeArgs),
     /// Ask a running service whether it is ready; exit code 0 if it is, 1 if not.
     Healthcheck(HealthcheckArgs),
     /// Print the contract of the HTTP API (OpenAPI 3.1, JSON).
@@ -299,9 +302,19 @@ impl CaseArgs {
 /// Reads the command line, does what it says, and returns the exit code.
 #[must_use]
 pub fn run() -> ExitCode {
-    let done = match Cli::parse().command {
+    let mut command = Cli::command();
+    let given = command.get_matches_mut();
+    let cli = Cli::from_arg_matches(&given).unwrap_or_else(|error| error.exit());
+    let done = match cli.command {
         Command::Serve(args) => serve::run(&args),
         Command::Solve(args) => solve::run(&args),
+        Command::Config(args) => match (
+            command.find_subcommand("config"),
+            given.subcommand_matches("config"),
+        ) {
+            (Some(command), Some(given)) => print(&config::describe(command, given, &args)),
+            _ => unreachable!("the subcommand was read from these"),
+        },
         Command::Keys(args) => keys::run(&args),
         Command::Healthcheck(args) => healthcheck::run(&args.url),
         Command::Openapi => print(&http::openapi_json()),
@@ -331,8 +344,6 @@ fn complain(text: &str) {
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-
     use super::*;
 
     #[test]

@@ -194,3 +194,44 @@ fn settings_come_from_the_environment_too_and_flags_win() {
     );
     running.kill();
 }
+
+#[test]
+fn config_tells_every_setting_and_where_it_comes_from() {
+    let out = railhead()
+        .args([
+            "config",
+            "--queue-max",
+            "7",
+            "--cors-origin",
+            "http://a,http://b",
+        ])
+        .env("RAILHEAD_RETENTION", "30d")
+        .output()
+        .unwrap();
+    assert!(out.status.success(), "{out:?}");
+    let told: Value = serde_json::from_slice(&out.stdout).unwrap();
+    for (setting, value, source) in [
+        ("queue-max", json!(7), "flag"),
+        ("retention", json!("30d"), "environment"),
+        ("listen", json!("127.0.0.1:8080"), "default"),
+        ("cache", json!(true), "default"),
+        ("cors-origin", json!(["http://a", "http://b"]), "flag"),
+    ] {
+        assert_eq!(told[setting]["value"], value, "{setting}");
+        assert_eq!(told[setting]["source"], source, "{setting}");
+    }
+    assert!(told["workers"]["value"].as_u64() >= Some(1));
+    // Every flag of `serve` is there under its name.
+    let help = railhead().args(["serve", "--help"]).output().unwrap();
+    let help = String::from_utf8(help.stdout).unwrap();
+    let flags = help
+        .lines()
+        .filter_map(|line| line.trim().strip_prefix("--"));
+    let flags: Vec<&str> = flags
+        .map(|flag| flag.split([' ', '=']).next().unwrap_or_default())
+        .collect();
+    assert!(flags.len() > 10, "{help}");
+    for flag in flags {
+        assert!(told[flag]["variable"].is_string(), "{flag}");
+    }
+}
