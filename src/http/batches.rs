@@ -122,7 +122,7 @@ fn links(batch: &Batch) -> BTreeMap<String, String> {
 problems! {
     /// What `POST /v1/batches` can fail with.
     BatchProblems: MalformedJson, UnreadableBody, BadQuery, BadHeader, BodyTimeout, BodyTooLarge, UnsupportedMediaType,
-    FaultyBatch, IdempotencyConflict, QuotaExceeded, QueueFull, Draining
+    FaultyBatch, IdempotencyConflict, QuotaExceeded, QueueFull, Draining, StorageFull, StorageUnwritable
 }
 
 /// Submits many cases as one batch of jobs.

@@ -7,6 +7,7 @@ use axum::response::{IntoResponse, Response};
 
 use crate::contact::error::CaseError;
 use crate::http::problem::{Fault, Problem};
+use crate::jobs::Trouble;
 use crate::jobs::error::JobsError;
 use crate::jobs::job::{Job, State};
 
@@ -15,6 +16,8 @@ pub const PROBLEM_JSON: &str = "application/problem+json";
 
 /// Seconds after which a refused client may try again.
 const RETRY_SECONDS: u32 = 1;
+/// The same where somebody has to make room first.
+const DISK_RETRY_SECONDS: u32 = 10;
 
 /// Declares the kinds of problems once: name, status, slug, title, meaning.
 macro_rules! kinds {
@@ -74,6 +77,8 @@ kinds! {
     IdempotencyConflict 422 "idempotency-conflict" "The idempotency key belongs to another case" "The `Idempotency-Key` was used before with a different body; use a new key for a new case."
     Internal 500 "internal" "The service failed" "Something went wrong inside the service; its log has the reason under the request id in the header `x-request-id`."
     QueueFull 503 "queue-full" "The queue is full" "The service holds as many unfinished jobs as it may; nothing was stored, try again after `Retry-After` seconds."
+    StorageUnwritable 503 "storage-unwritable" "The disk cannot be written" "The disk of the service is read-only or fails, or its job table is locked by another process; nothing was stored, jobs already accepted are kept. Try again after `Retry-After` seconds."
+    StorageFull 507 "storage-full" "The disk is full" "The disk of the service has no room for another job; nothing was stored, jobs already accepted are kept. Try again after `Retry-After` seconds."
     Draining 503 "draining" "The service is shutting down" "The service takes no new jobs because it is shutting down; jobs already accepted are kept. Try again after `Retry-After` seconds."
     NotReady 503 "not-ready" "The service is not ready" "The job store cannot be reached at the moment."
     NotConverged 422 "not-converged" "The solver did not converge" "Only inside a job: the iteration ended without meeting its tolerance; `residual` and `iterations` belong to the best iterate, `detail` says what to try."
@@ -93,6 +98,8 @@ impl Kind {
                 | Kind::TooManyRequests
                 | Kind::QuotaExceeded
                 | Kind::QueueFull
+                | Kind::StorageUnwritable
+                | Kind::StorageFull
                 | Kind::Draining
                 | Kind::NotReady
         )
@@ -271,9 +278,25 @@ impl From<JobsError> for ApiError {
                 Kind::Draining,
                 "the service is shutting down and takes no new jobs",
             ),
-            other => ApiError::internal(&other),
+            other => match other.trouble() {
+                Some(trouble) => troubled(trouble, &other),
+                None => ApiError::internal(&other),
+            },
         }
     }
+}
+
+/// The disk takes nothing; the log has the system's own words.
+fn troubled(trouble: Trouble, reason: &JobsError) -> ApiError {
+    tracing::warn!(%reason, "a request failed for want of a disk");
+    let (kind, what) = match trouble {
+        Trouble::Full => (Kind::StorageFull, "the disk of the service is full"),
+        Trouble::Unwritable => (
+            Kind::StorageUnwritable,
+            "the disk of the service cannot be written at the moment",
+        ),
+    };
+    ApiError::new(kind, what).after(DISK_RETRY_SECONDS)
 }
 
 /// Why an ended job has no result.

@@ -44,7 +44,7 @@ pub async fn alive() -> Json<Health> {
 
 problems! {
     /// What `GET /readyz` can fail with.
-    ReadyProblems: NotReady, Draining
+    ReadyProblems: NotReady, Draining, StorageFull, StorageUnwritable
 }
 
 /// Can the service take jobs? Asks the job store.
@@ -58,7 +58,9 @@ problems! {
 pub async fn ready(State(Unscoped(jobs)): State<Unscoped>) -> Result<Json<Health>, ApiError> {
     match jobs.ready().await {
         Ok(()) => Ok(Health::new("ready")),
-        Err(JobsError::Draining) => Err(JobsError::Draining.into()),
+        Err(reason) if matches!(reason, JobsError::Draining) || reason.trouble().is_some() => {
+            Err(reason.into())
+        }
         Err(reason) => {
             tracing::warn!(%reason, "the job store does not answer");
             Err(ApiError::new(

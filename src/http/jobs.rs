@@ -45,7 +45,7 @@ pub struct JobPage {
 problems! {
     /// What `POST /v1/jobs` can fail with.
     SubmitProblems: MalformedJson, UnreadableBody, BadHeader, BodyTimeout, BodyTooLarge, UnsupportedMediaType, FaultyCase,
-    IdempotencyConflict, QuotaExceeded, QueueFull, Draining
+    IdempotencyConflict, QuotaExceeded, QueueFull, Draining, StorageFull, StorageUnwritable
 }
 
 /// Submits one case as a job.

@@ -121,6 +121,8 @@ fn require_keys(document: &mut utoipa::openapi::OpenApi) {
             if path.contains("{id}") {
                 kinds.push(Kind::Expired);
             }
+            // A locked or failing disk can meet every request.
+            kinds.extend([Kind::StorageUnwritable, Kind::StorageFull]);
             describe_also(&mut operation.responses.responses, &kinds);
         }
     }

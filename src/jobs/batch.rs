@@ -203,7 +203,7 @@ impl Jobs {
             if self.shared.draining.is_cancelled() {
                 return Err(JobsError::Draining);
             }
-            match self.shared.store.begin_batch(&new).await? {
+            match self.noted(self.shared.store.begin_batch(&new).await)? {
                 Begun::Created => break,
                 Begun::Existing(id) => return self.batch(id).await,
                 Begun::Conflict => return Err(JobsError::IdempotencyConflict),
@@ -221,9 +221,10 @@ impl Jobs {
             }
             filled
         });
-        filled
+        let filled = filled
             .await
-            .map_err(|error| JobsError::Damaged(error.to_string()))??;
+            .map_err(|error| JobsError::Damaged(error.to_string()))?;
+        self.noted(filled)?;
         self.batch(id).await
     }
 

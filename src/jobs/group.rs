@@ -22,8 +22,7 @@ use crate::jobs::store::sqlite::groups::GroupBounds;
 use crate::jobs::store::{Claim, Ending};
 use crate::jobs::watch::{Reason, Watch};
 use crate::jobs::worker::{
-    FIRST_PAUSE, PATIENCE, Registered, Verdict, WRITE_TRIES, Worker, heartbeat, judge, lease_ms,
-    not_stored,
+    PATIENCE, Registered, Verdict, Worker, heartbeat, judge, lease_ms, not_stored,
 };
 
 /// Largest sum of expected solve times in a group, in µs.
@@ -227,6 +226,10 @@ impl Worker {
                         result,
                         field_patches,
                     },
+                    Err(error) if error.trouble().is_some() => {
+                        back.push(member);
+                        continue;
+                    }
                     Err(error) => not_stored(&error),
                 },
             };
@@ -248,27 +251,11 @@ impl Worker {
         Ok(ended.len())
     }
 
-    /// Ends the jobs in the table; a database that fails for a moment does not cost the results.
+    /// Ends the jobs in the table; a database that fails for a while does not cost the results.
     async fn finish_group(&self, ends: &[(Claim, Ending)]) -> Result<HashSet<Uuid>, JobsError> {
-        let mut pause = FIRST_PAUSE;
-        for _ in 1..WRITE_TRIES {
-            match self
-                .shared
-                .store
-                .finish_group(ends, self.shared.now_ms())
-                .await
-            {
-                Err(JobsError::Database(error)) => {
-                    tracing::warn!(%error, "ends of a group could not be written yet");
-                }
-                written => return written,
-            }
-            sleep(pause).await;
-            pause *= 2;
-        }
-        self.shared
-            .store
-            .finish_group(ends, self.shared.now_ms())
+        let shared = &self.shared;
+        shared
+            .write_patiently(|| shared.store.finish_group(ends, shared.now_ms()))
             .await
     }
 }

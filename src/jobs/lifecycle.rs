@@ -2,6 +2,7 @@
 
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -122,6 +123,7 @@ impl Jobs {
                 stopping: CancellationToken::new(),
                 tasks: TaskTracker::new(),
                 metrics: Metrics::new(),
+                storage_failing: AtomicBool::new(false),
                 trusted: Mutex::default(),
                 queued_at_most: tokio::sync::Mutex::new(Admitted {
                     all: queued,

@@ -49,6 +49,7 @@ pub(super) struct Metrics {
     iterations: Family<MethodLabel, Histogram>,
     ended: Family<StateLabel, Counter>,
     failures: Family<ReasonLabel, Counter>,
+    storage_failing: Gauge,
     cache_hits: Counter,
     cache_misses: Counter,
 }
@@ -64,6 +65,7 @@ impl Metrics {
             iterations: Family::new_with_constructor(|| Histogram::new(ITERATIONS)),
             ended: Family::default(),
             failures: Family::default(),
+            storage_failing: Gauge::default(),
             cache_hits: Counter::default(),
             cache_misses: Counter::default(),
         };
@@ -121,6 +123,11 @@ impl Metrics {
         self.cache_misses.inc_by(misses);
     }
 
+    /// The disk takes data, or does not.
+    pub(super) fn storage_failing(&self, failing: bool) {
+        self.storage_failing.set(i64::from(failing));
+    }
+
     fn register(&self, registry: &mut Registry) {
         registry.register(
             "build",
@@ -142,6 +149,11 @@ impl Metrics {
             "result_bytes",
             "Size of the results kept outside the job table",
             self.result_bytes.clone(),
+        );
+        registry.register(
+            "storage_failing",
+            "1 while the disk is full or cannot be written",
+            self.storage_failing.clone(),
         );
         registry.register(
             "solve_seconds",

@@ -24,12 +24,14 @@ pub mod retention;
 mod reuse;
 mod solver_thread;
 mod spool;
+mod storage;
 pub mod store;
 pub mod watch;
 pub mod worker;
 
 use std::collections::HashMap;
 use std::fs::File;
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -51,6 +53,7 @@ pub use crate::jobs::lifecycle::Options;
 use crate::jobs::metrics::Metrics;
 use crate::jobs::recipe::Recipe;
 use crate::jobs::results::Results;
+pub use crate::jobs::storage::Trouble;
 pub use crate::jobs::store::list::{Filter, Page};
 use crate::jobs::store::sqlite::SqliteStore;
 use crate::jobs::store::{Deleted, Enqueued, NewJob};
@@ -89,6 +92,8 @@ struct Shared {
     stopping: CancellationToken,
     tasks: TaskTracker,
     metrics: Metrics,
+    /// The last write failed because of the disk.
+    storage_failing: AtomicBool,
     /// Keys found good a moment ago.
     trusted: Mutex<Trusted>,
     /// Upper bounds of the number of queued jobs, recounted when they reach their limits.
@@ -188,7 +193,7 @@ impl Jobs {
         if new.source.is_none() {
             self.admit(1).await?;
         }
-        let job = replayed(self.shared.store.enqueue(&new).await?)?;
+        let job = replayed(self.noted(self.shared.store.enqueue(&new).await)?)?;
         if job.id == id && job.cached {
             self.ended_cached(&[id]);
             tracing::info!(job = %id, method = new.method, "job answered from an earlier result");
@@ -302,7 +307,7 @@ impl Jobs {
         }
     }
 
-    /// Can this service take requests? A round trip to the database.
+    /// Can this service take requests? A round trip to the database, which must also take data.
     ///
     /// # Errors
     /// [`JobsError::Draining`], or a database that fails or does not answer in time.
@@ -312,7 +317,8 @@ impl Jobs {
         }
         timeout(READY_WITHIN, self.shared.store.ping())
             .await
-            .unwrap_or(Err(JobsError::Database(sqlx::Error::PoolTimedOut)))
+            .unwrap_or(Err(JobsError::Database(sqlx::Error::PoolTimedOut)))?;
+        self.shared.require_storage().await
     }
 
     /// Takes places in the queue. The bound is exact: the figure kept here is never below the true one, and the queue

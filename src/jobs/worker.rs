@@ -29,9 +29,6 @@ use crate::jobs::watch::{Reason, Watch};
 const POLL: Duration = Duration::from_secs(1);
 /// How long a solver that was told to stop may go on before its thread is left behind.
 pub(super) const PATIENCE: Duration = Duration::from_secs(2);
-/// Tries to write the end of a job, with pauses that double from [`FIRST_PAUSE`].
-pub(super) const WRITE_TRIES: u32 = 6;
-pub(super) const FIRST_PAUSE: Duration = Duration::from_millis(50);
 /// One worker with its solver thread.
 #[derive(Debug)]
 pub struct Worker {
@@ -232,6 +229,8 @@ impl Worker {
                     result,
                     field_patches,
                 },
+                // The service stops while the disk takes nothing.
+                Err(error) if error.trouble().is_some() => return self.hand_back(claim).await,
                 Err(error) => not_stored(&error),
             },
         };
@@ -269,31 +268,18 @@ impl Worker {
             }
         }
         let bytes = result.bytes() as u64;
-        let folder = self.shared.results.put(claim, result).await?;
+        let shared = &self.shared;
+        let folder = shared
+            .write_patiently(|| shared.results.put(claim, result.clone()))
+            .await?;
         Ok(Placed::Folder(folder, bytes))
     }
 
-    /// Ends the job in the table; a database that fails for a moment does not cost the result.
+    /// Ends the job in the table; a database that fails for a while does not cost the result.
     async fn finish(&self, claim: &Claim, ending: &Ending) -> Result<Option<Job>, JobsError> {
-        let mut pause = FIRST_PAUSE;
-        for _ in 1..WRITE_TRIES {
-            match self
-                .shared
-                .store
-                .finish(claim, ending, self.shared.now_ms())
-                .await
-            {
-                Err(JobsError::Database(error)) => {
-                    tracing::warn!(%error, "end of the job could not be written yet")
-                }
-                written => return written,
-            }
-            sleep(pause).await;
-            pause *= 2;
-        }
-        self.shared
-            .store
-            .finish(claim, ending, self.shared.now_ms())
+        let shared = &self.shared;
+        shared
+            .write_patiently(|| shared.store.finish(claim, ending, shared.now_ms()))
             .await
     }
 

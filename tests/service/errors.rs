@@ -355,7 +355,8 @@ async fn every_kind_of_problem_explains_itself() {
         include_str!("batches.rs"),
         include_str!("errors.rs"),
         include_str!("requests.rs"),
-        include_str!("retention.rs")
+        include_str!("retention.rs"),
+        include_str!("storage.rs")
     );
     let untested: Vec<&String> = seen
         .iter()

@@ -16,6 +16,7 @@ mod retention;
 mod schema;
 mod server;
 mod shutdown;
+mod storage;
 mod store;
 mod store_lists;
 mod store_model;

@@ -67,7 +67,21 @@ pub struct Service {
 impl Service {
     /// Starts `railhead serve` on a data folder and returns when it listens.
     pub fn start(data_dir: &Path, flags: &[&str]) -> Service {
-        let mut child = railhead()
+        let mut program = railhead();
+        Service::spawn(&mut program, data_dir, flags)
+    }
+
+    /// The same, by a program that is given the real one and its flags.
+    pub fn start_by(program: &mut Command, data_dir: &Path, flags: &[&str]) -> Service {
+        for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("RAILHEAD_")) {
+            program.env_remove(name);
+        }
+        program.arg(env!("CARGO_BIN_EXE_railhead"));
+        Service::spawn(program, data_dir, flags)
+    }
+
+    fn spawn(program: &mut Command, data_dir: &Path, flags: &[&str]) -> Service {
+        let mut child = program
             .args(["serve", "--log-format", "json"])
             .env("RAILHEAD_LISTEN", "127.0.0.1:0")
             .arg("--data-dir")
@@ -109,6 +123,11 @@ impl Service {
     /// The address it listens on.
     pub fn address(&self) -> SocketAddr {
         self.address
+    }
+
+    /// The id of its process.
+    pub fn id(&self) -> u32 {
+        self.child.id()
     }
 
     /// A request to this service.

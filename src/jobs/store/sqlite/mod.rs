@@ -27,7 +27,7 @@ use sqlx::sqlite::{
     SqliteAutoVacuum, SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions,
     SqliteSynchronous,
 };
-use sqlx::{Row, SqlSafeStr};
+use sqlx::{Connection, Row, SqlSafeStr, SqliteConnection};
 use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
@@ -75,7 +75,10 @@ impl SqliteStore {
                 .test_before_acquire(false)
         };
         let writing = options.clone().auto_vacuum(SqliteAutoVacuum::Incremental);
-        let writer = pool(1).connect_with(writing).await?;
+        let writer = pool(1)
+            .before_acquire(|connection, _| Box::pin(is_free(connection)))
+            .connect_with(writing)
+            .await?;
         migrations().run(&writer).await?;
         allow_shrinking(&writer).await?;
         let readers = pool(READERS).connect_with(options.read_only(true)).await?;
@@ -100,6 +103,17 @@ impl SqliteStore {
     pub async fn ping(&self) -> Result<(), JobsError> {
         sqlx::query("SELECT 1 FROM jobs LIMIT 1")
             .fetch_optional(&self.readers)
+            .await?;
+        Ok(())
+    }
+
+    /// Writes a page that is as it was.
+    ///
+    /// # Errors
+    /// The database cannot be written.
+    pub async fn touch(&self) -> Result<(), JobsError> {
+        sqlx::query("PRAGMA user_version = 1")
+            .execute(&self.writer)
             .await?;
         Ok(())
     }
@@ -355,6 +369,15 @@ impl SqliteStore {
         });
         Ok(Some((read_job(&row)?, stored)))
     }
+}
+
+/// A transaction that a full disk broke can leave its connection inside it for ever; such a connection is replaced.
+async fn is_free(connection: &mut SqliteConnection) -> sqlx::Result<bool> {
+    if connection.is_in_transaction() {
+        // A rollback may be on its way; it is done after a round trip.
+        connection.ping().await?;
+    }
+    Ok(!connection.is_in_transaction())
 }
 
 /// Free pages can be given back only by a database that was made for it; one of an earlier version is rewritten once.
