@@ -1,60 +1,129 @@
-//! A natural logarithm that the compiler can turn into SIMD code.
+//! The two widths of numbers in which influence is computed, with a natural logarithm that the compiler can turn into
+//! SIMD code.
 
-/// `ln x` for normal, positive `x`.
-///
-/// `x = 2^e m` with `m` in `√½ … √2`, then `ln m = 2 artanh s`, `s = (m − 1)/(m + 1)`, by its series in `s²` up to
-/// `s²¹`. Error at most 4 units in the last place of `max(|ln x|, |ln m|)`. Zero, subnormal, negative and non-finite
-/// arguments give meaningless finite or non-finite values, never a panic: callers keep them out.
-#[inline(always)]
-#[must_use]
-pub fn ln(x: f64) -> f64 {
-    const SQRT_HALF_BITS: u64 = 0x3fe6_a09e_667f_3bcd;
-    const BIAS: u64 = 1024;
-    // Shifted so that the exponent field is never negative: SSE2 and AVX2 have no arithmetic 64-bit shift.
-    let shifted = x
-        .to_bits()
-        .wrapping_sub(SQRT_HALF_BITS)
-        .wrapping_add(BIAS << 52);
-    let exponent_bits = shifted >> 52;
-    let mantissa = f64::from_bits(
-        x.to_bits()
-            .wrapping_sub(exponent_bits.wrapping_sub(BIAS) << 52),
-    );
-    // 2^52 + k has k in its lowest bits: an integer to float conversion without a conversion instruction.
-    let exponent =
-        f64::from_bits(exponent_bits | 0x4330_0000_0000_0000) - (4_503_599_627_370_496.0 + 1024.0);
-    let s = (mantissa - 1.0) / (mantissa + 1.0);
-    let z = s * s;
-    let mut series = 2.0 / 21.0;
-    for coefficient in [
-        2.0 / 19.0,
-        2.0 / 17.0,
-        2.0 / 15.0,
-        2.0 / 13.0,
-        2.0 / 11.0,
-        2.0 / 9.0,
-        2.0 / 7.0,
-        0.4,
-        2.0 / 3.0,
-    ] {
-        series = series * z + coefficient;
-    }
-    exponent * std::f64::consts::LN_2 + (s * z * series + 2.0 * s)
+use std::ops::{Add, Mul, Neg, Sub};
+
+/// A floating-point number of the kernels.
+pub trait Number:
+    Copy
+    + PartialOrd
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + std::ops::Div<Output = Self>
+    + Neg<Output = Self>
+    + 'static
+{
+    /// 0.
+    const ZERO: Self;
+    /// Far below every length, far above the smallest normal number.
+    const TINY: Self;
+    /// The nearest number of this width.
+    fn of(value: f64) -> Self;
+    /// Square root.
+    fn sqrt(self) -> Self;
+    /// Magnitude.
+    fn abs(self) -> Self;
+    /// Natural logarithm of a normal, positive number; see the implementations for their errors.
+    fn ln(self) -> Self;
 }
+
+/// `ln x` with `x = 2^e m`, `m` in `√½ … √2` and `ln m = 2 artanh s`, `s = (m − 1)/(m + 1)`, by its series in `s²`.
+/// Zero, subnormal, negative and non-finite arguments give meaningless finite or non-finite values, never a panic:
+/// callers keep them out. The products and sums are fused: one rounding, alike on every machine.
+macro_rules! number {
+    (
+        $float:ty, $bits:ty, tiny $tiny:expr, sqrt_half $sqrt_half:expr, mantissa $mantissa:expr, bias $bias:expr,
+        magic $magic:expr, $magic_value:expr, series $series:expr, $error:literal
+    ) => {
+        impl Number for $float {
+            const ZERO: Self = 0.0;
+            const TINY: Self = $tiny;
+
+            #[inline(always)]
+            fn of(value: f64) -> Self {
+                value as $float
+            }
+
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                <$float>::sqrt(self)
+            }
+
+            #[inline(always)]
+            fn abs(self) -> Self {
+                <$float>::abs(self)
+            }
+
+            #[doc = $error]
+            #[inline(always)]
+            fn ln(self) -> Self {
+                // Shifted so that the exponent field is never negative: SSE2 and AVX2 have no arithmetic 64-bit shift.
+                let shifted = self
+                    .to_bits()
+                    .wrapping_sub($sqrt_half)
+                    .wrapping_add($bias << $mantissa);
+                let exponent_bits = shifted >> $mantissa;
+                let mantissa = <$float>::from_bits(
+                    self.to_bits()
+                        .wrapping_sub(exponent_bits.wrapping_sub($bias) << $mantissa),
+                );
+                // 2^mantissa + k has k in its lowest bits: an integer to float conversion without an instruction for it.
+                let exponent =
+                    <$float>::from_bits(exponent_bits | $magic) - ($magic_value + $bias as $float);
+                let s = (mantissa - 1.0) / (mantissa + 1.0);
+                let z = s * s;
+                let mut series: $float = 0.0;
+                for coefficient in $series {
+                    series = series.mul_add(z, coefficient);
+                }
+                exponent.mul_add(
+                    std::f64::consts::LN_2 as $float,
+                    (s * z).mul_add(series, 2.0 * s),
+                )
+            }
+        }
+    };
+}
+
+number!(
+    f64, u64, tiny 1e-290, sqrt_half 0x3fe6_a09e_667f_3bcd, mantissa 52, bias 1024_u64,
+    magic 0x4330_0000_0000_0000, 4_503_599_627_370_496.0,
+    series [
+        2.0 / 21.0, 2.0 / 19.0, 2.0 / 17.0, 2.0 / 15.0, 2.0 / 13.0, 2.0 / 11.0, 2.0 / 9.0, 2.0 / 7.0, 0.4, 2.0 / 3.0,
+    ],
+    "Error at most 4 units in the last place of `max(|ln x|, |ln m|)`."
+);
+number!(
+    f32, u32, tiny 1e-30, sqrt_half 0x3f35_04f3, mantissa 23, bias 128_u32,
+    magic 0x4b00_0000, 8_388_608.0,
+    series [2.0 / 9.0, 2.0 / 7.0, 0.4, 2.0 / 3.0],
+    "Error at most 2 units in the last place of `max(|ln x|, |ln m|)`."
+);
 
 #[cfg(test)]
 mod tests {
-    use super::ln;
+    use super::Number;
 
     #[test]
     fn it_agrees_with_the_standard_library_over_the_whole_range() {
         let mut x: f64 = 1e-300;
         while x < 1e300 {
             let expected = x.ln();
+            let found = Number::ln(x);
             assert!(
-                (ln(x) - expected).abs() <= 5e-16 * expected.abs().max(0.5),
-                "{x}: {} {expected}",
-                ln(x)
+                (found - expected).abs() <= 5e-16 * expected.abs().max(0.5),
+                "{x}: {found} {expected}"
+            );
+            x *= 1.0173;
+        }
+        let mut x: f32 = 1e-35;
+        while x < 1e35 {
+            let expected = f64::from(x).ln();
+            let found = f64::from(Number::ln(x));
+            assert!(
+                (found - expected).abs() <= 2e-7 * expected.abs().max(0.5),
+                "{x}: {found} {expected}"
             );
             x *= 1.0173;
         }
@@ -62,11 +131,13 @@ mod tests {
 
     #[test]
     fn it_is_exact_at_one_and_smooth_around_it() {
-        assert_eq!(ln(1.0), 0.0);
+        assert_eq!(Number::ln(1.0_f64), 0.0);
+        assert_eq!(Number::ln(1.0_f32), 0.0);
         for k in 1..40 {
             let h = 0.5_f64.powi(k);
+            let found = Number::ln(1.0 + h);
             assert!(
-                (ln(1.0 + h) - h.ln_1p()).abs() <= 4e-16 * h.max(f64::EPSILON),
+                (found - h.ln_1p()).abs() <= 4e-16 * h.max(f64::EPSILON),
                 "{h}"
             );
         }

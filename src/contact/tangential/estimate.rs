@@ -10,13 +10,13 @@ use crate::contact::tangential::level::Level;
 use crate::contact::tangential::liu_hsu::spin_pole::vortex_centre;
 
 /// Factor on the difference of the two rules on a mesh that was chosen without knowing the tractions.
-const RULES_UNKNOWING: f64 = 3.0;
+const RULES_UNKNOWING: f64 = 2.5;
 /// The same on a mesh made for them.
-const RULES_ALONE: f64 = 1.5;
+const RULES_ALONE: f64 = 1.4;
 /// The same where a coarser level of the same kind has its say.
-const RULES_BESIDE: f64 = 0.75;
+const RULES_BESIDE: f64 = 0.5;
 /// Factor on the step of the extrapolation.
-const LEVELS: f64 = 1.5;
+const LEVELS: f64 = 1.25;
 /// Factor on the step where nothing is extrapolated.
 const LEVELS_ALONE: f64 = 1.25;
 /// Error of sampling the vortex of the tractions by one cell, over p h² / N.

@@ -113,7 +113,10 @@ impl Level {
             None => Grading::cosine(size.cells as usize),
         };
         let mut mesh = Mesh::new(&chords, &grading);
-        mesh.arm = fitted.iter().map(|f| f.load_y).collect();
+        if plan.pole().is_some() {
+            // Where all slips, tractions turn with the slip at the load's centre; sticking strips go with their mid-lines.
+            mesh.arm = fitted.iter().map(|f| f.load_y).collect();
+        }
         let area = mesh.areas();
         let pressure = cell_pressures(region, &fitted, &mesh, &area);
         let mirror = mesh

@@ -1,35 +1,39 @@
 //! Rows of the operator between strips: corner sums of the closed forms over all cell edges, differenced.
 
-use pulp::NullaryFnOnce;
+use std::ops::ControlFlow;
 
-use crate::contact::influence::logarithm::ln;
+use pulp::{Arch, NullaryFnOnce};
+
+use crate::contact::influence::logarithm::Number;
+use crate::contact::influence::strips::observation_points;
 use crate::contact::mesh::Mesh;
+use crate::contact::monitor::{Monitor, Stop};
 
 /// All cell edges of a mesh, as seen from the mid-line of one strip.
-pub(super) struct Edges {
+pub(super) struct Edges<T> {
     /// x of every edge, segment by segment.
-    x: Vec<f64>,
+    x: Vec<T>,
     /// Distance in y from the strip's smaller-y side, and its logarithm (0 for distance 0).
-    q1: Vec<f64>,
-    q2: Vec<f64>,
-    ln_q1: Vec<f64>,
-    ln_q2: Vec<f64>,
+    q1: Vec<T>,
+    q2: Vec<T>,
+    ln_q1: Vec<T>,
+    ln_q2: Vec<T>,
     /// Per edge, at the point in work and at the one before: the three corner sums over the two y.
-    now: [Vec<f64>; 3],
-    before: [Vec<f64>; 3],
+    now: [Vec<T>; 3],
+    before: [Vec<T>; 3],
     /// One row over all cells: xx, xy, yy.
-    row: [Vec<f64>; 3],
+    row: [Vec<T>; 3],
 }
 
-impl Edges {
-    pub(super) fn new(mesh: &Mesh) -> Edges {
-        let mut x = Vec::with_capacity(mesh.cells() + mesh.segments.len());
+impl<T: Number> Edges<T> {
+    pub(super) fn new(mesh: &Mesh) -> Edges<T> {
+        let mut x: Vec<T> = Vec::with_capacity(mesh.cells() + mesh.segments.len());
         for segment in &mesh.segments {
-            x.extend_from_slice(&mesh.left[segment.cells.clone()]);
-            x.push(mesh.right[segment.cells.end - 1]);
+            x.extend(mesh.left[segment.cells.clone()].iter().map(|x| T::of(*x)));
+            x.push(T::of(mesh.right[segment.cells.end - 1]));
         }
-        let edges = || vec![0.0; x.len()];
-        let cells = || vec![0.0; mesh.cells()];
+        let edges = || vec![T::ZERO; x.len()];
+        let cells = || vec![T::ZERO; mesh.cells()];
         Edges {
             q1: edges(),
             q2: edges(),
@@ -54,7 +58,7 @@ impl Edges {
                 (&mut self.ln_q1, ln_or_zero(middle + half)),
                 (&mut self.ln_q2, ln_or_zero(middle - half)),
             ] {
-                values[start..end].fill(value);
+                values[start..end].fill(T::of(value));
             }
             start = end;
         }
@@ -64,7 +68,7 @@ impl Edges {
     /// less that at `q2`. The differences of `asinh` are logarithms of one ratio, so nothing cancels for small strips.
     #[inline(always)]
     fn corner_sums(&mut self, x: f64) {
-        const TINY: f64 = 1e-290;
+        let x = T::of(x);
         let n = self.x.len();
         let (xe, q1s, q2s) = (&self.x[..n], &self.q1[..n], &self.q2[..n]);
         let (ln_q1s, ln_q2s) = (&self.ln_q1[..n], &self.ln_q2[..n]);
@@ -76,22 +80,22 @@ impl Edges {
             let distance = p.abs();
             let pp = p * p;
             let (r1, r2) = ((pp + q1 * q1).sqrt(), (pp + q2 * q2).sqrt());
-            let along1 = q1 * (ln(distance + r1 + TINY) - ln_q1s[e]);
-            let along2 = q2 * (ln(distance + r2 + TINY) - ln_q2s[e]);
-            out_a[e] = if p < 0.0 {
+            let along1 = q1 * ((distance + r1 + T::TINY).ln() - ln_q1s[e]);
+            let along2 = q2 * ((distance + r2 + T::TINY).ln() - ln_q2s[e]);
+            out_a[e] = if p < T::ZERO {
                 along2 - along1
             } else {
                 along1 - along2
             };
             let (g1, g2) = (q1.abs() + r1, q2.abs() + r2);
-            let (above, below) = if q2 >= 0.0 {
+            let (above, below) = if q2 >= T::ZERO {
                 (g1, g2)
-            } else if q1 <= 0.0 {
+            } else if q1 <= T::ZERO {
                 (g2, g1)
             } else {
                 (g1 * g2, pp)
             };
-            out_b[e] = p * ln((above + TINY) / (below + TINY));
+            out_b[e] = p * ((above + T::TINY) / (below + T::TINY)).ln();
             out_r[e] = r1 - r2;
         }
     }
@@ -100,6 +104,8 @@ impl Edges {
     #[inline(always)]
     fn row(&mut self, mesh: &Mesh, nu: f64) {
         use std::f64::consts::FRAC_1_PI;
+        let (one, other) = (T::of(FRAC_1_PI), T::of(FRAC_1_PI * (1.0 - nu)));
+        let cross = T::of(-FRAC_1_PI * nu);
         let mut edge = 0;
         for segment in &mesh.segments {
             let cells = segment.cells.clone();
@@ -120,27 +126,67 @@ impl Edges {
             );
             for i in 0..n {
                 let (a, b) = (a(i), b(i));
-                xx[i] = FRAC_1_PI * (a + (1.0 - nu) * b);
-                xy[i] = -FRAC_1_PI * nu * r(i);
-                yy[i] = FRAC_1_PI * (b + (1.0 - nu) * a);
+                xx[i] = one * a + other * b;
+                xy[i] = cross * r(i);
+                yy[i] = one * b + other * a;
             }
             edge += n + 1;
         }
     }
 }
 
+/// A matrix to compute.
+pub(super) struct Assembly<'a> {
+    pub(super) mesh: &'a Mesh,
+    pub(super) nu: f64,
+    pub(super) folded: bool,
+    /// Length of a block of a row.
+    pub(super) stride: usize,
+    pub(super) row_length: usize,
+    /// First row of each stored segment, and one more.
+    pub(super) first_row: &'a [usize],
+}
+
+impl Assembly<'_> {
+    /// All rows, one after the other.
+    pub(super) fn rows<T: Number>(&self, monitor: &dyn Monitor) -> Result<Vec<T>, Stop> {
+        let rows = self.first_row[self.first_row.len() - 1];
+        let mut matrix = vec![T::ZERO; rows * self.row_length];
+        let mut edges = Edges::new(self.mesh);
+        let arch = Arch::new();
+        let places = self.first_row.windows(2);
+        for (place, segment) in places.zip(&self.mesh.segments) {
+            if let ControlFlow::Break(stop) = monitor.tick(0.0) {
+                return Err(stop);
+            }
+            let points = observation_points(self.mesh, segment);
+            edges.look_from(self.mesh, segment.chord.y);
+            arch.dispatch(SegmentRows {
+                edges: &mut edges,
+                points: &points,
+                mesh: self.mesh,
+                nu: self.nu,
+                folded: self.folded,
+                stride: self.stride,
+                target: &mut matrix[place[0] * self.row_length..place[1] * self.row_length],
+            });
+        }
+        Ok(matrix)
+    }
+}
+
 /// Computes all rows of one segment.
-pub(super) struct SegmentRows<'a> {
-    pub(super) edges: &'a mut Edges,
+pub(super) struct SegmentRows<'a, T> {
+    pub(super) edges: &'a mut Edges<T>,
     pub(super) points: &'a [f64],
     pub(super) mesh: &'a Mesh,
     pub(super) nu: f64,
     pub(super) folded: bool,
     pub(super) stride: usize,
-    pub(super) target: &'a mut [f64],
+    pub(super) target: &'a mut [T],
 }
 
-impl NullaryFnOnce for SegmentRows<'_> {
+impl<T: Number> NullaryFnOnce for SegmentRows<'_, T> {
     type Output = ();
 
     #[inline(always)]
@@ -175,7 +221,7 @@ impl NullaryFnOnce for SegmentRows<'_> {
 
 /// Adds and subtracts the value of the mirrored cell for the first half of the segments.
 #[inline(always)]
-fn fold(mesh: &Mesh, values: &[f64], plus: &mut [f64], minus: &mut [f64]) {
+fn fold<T: Number>(mesh: &Mesh, values: &[T], plus: &mut [T], minus: &mut [T]) {
     let m = mesh.segments.len();
     for (here, there) in mesh.segments[..m / 2]
         .iter()

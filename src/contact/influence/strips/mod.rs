@@ -10,11 +10,9 @@
 mod assembly;
 mod product;
 
-use std::ops::ControlFlow;
-
 use pulp::Arch;
 
-use crate::contact::influence::strips::assembly::{Edges, SegmentRows};
+use crate::contact::influence::strips::assembly::Assembly;
 use crate::contact::influence::strips::product::{Matrix, Product};
 use crate::contact::mesh::{Mesh, Segment};
 use crate::contact::monitor::{Monitor, Stop};
@@ -31,7 +29,7 @@ pub enum Parity {
     Lateral,
 }
 
-/// Width of the stored numbers. Rows are always computed in double precision.
+/// Width of the numbers of the matrix, in its computation and its products.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Precision {
     /// Four bytes: half the memory and twice the speed; forces move by less than 1e-5 of μN.
@@ -129,31 +127,18 @@ impl Differences {
             first_cell.push(segment.cells.end);
         }
         let blocks = if folded { 6 } else { 3 };
-        let rows = first_row[stored];
-        let mut matrix = Matrix::new(precision, rows * blocks * stride);
-        let mut segment_rows = Vec::new();
-        let mut edges = Edges::new(mesh);
-        let arch = Arch::new();
-        for (j, segment) in mesh.segments[..stored].iter().enumerate() {
-            if let ControlFlow::Break(stop) = monitor.tick(0.0) {
-                return Err(stop);
-            }
-            let place = first_row[j] * blocks * stride..first_row[j + 1] * blocks * stride;
-            segment_rows.clear();
-            segment_rows.resize(place.len(), 0.0);
-            let points = observation_points(mesh, segment);
-            edges.look_from(mesh, segment.chord.y);
-            arch.dispatch(SegmentRows {
-                edges: &mut edges,
-                points: &points,
-                mesh,
-                nu,
-                folded,
-                stride,
-                target: &mut segment_rows,
-            });
-            matrix.store(place.start, &segment_rows);
-        }
+        let assembly = Assembly {
+            mesh,
+            nu,
+            folded,
+            stride,
+            row_length: blocks * stride,
+            first_row: &first_row,
+        };
+        let matrix = match precision {
+            Precision::Single => Matrix::Single(assembly.rows(monitor)?),
+            Precision::Double => Matrix::Double(assembly.rows(monitor)?),
+        };
         let layout = if folded { Layout::Folded } else { Layout::Full };
         Ok(Differences {
             layout,

@@ -2,8 +2,6 @@
 
 use pulp::{Simd, WithSimd};
 
-use crate::contact::influence::strips::Precision;
-
 /// The stored numbers.
 #[derive(Debug, Clone)]
 pub(super) enum Matrix {
@@ -12,24 +10,6 @@ pub(super) enum Matrix {
 }
 
 impl Matrix {
-    pub(super) fn new(precision: Precision, length: usize) -> Matrix {
-        match precision {
-            Precision::Single => Matrix::Single(vec![0.0; length]),
-            Precision::Double => Matrix::Double(vec![0.0; length]),
-        }
-    }
-
-    pub(super) fn store(&mut self, start: usize, values: &[f64]) {
-        match self {
-            Matrix::Single(matrix) => {
-                for (to, from) in matrix[start..].iter_mut().zip(values) {
-                    *to = *from as f32;
-                }
-            }
-            Matrix::Double(matrix) => matrix[start..start + values.len()].copy_from_slice(values),
-        }
-    }
-
     pub(super) fn at(&self, place: usize) -> f64 {
         match self {
             Matrix::Single(matrix) => f64::from(matrix[place]),

@@ -1,5 +1,7 @@
 //! The bulk operator against the closed forms, point by point, and against itself folded.
 
+use std::ops::ControlFlow;
+
 use super::*;
 use crate::contact::influence::coefficients::{Rectangle, rectangle};
 use crate::contact::mesh::{Chord, Grading, equal_strips};
@@ -150,14 +152,14 @@ fn a_folded_matrix_gives_the_same_products_as_the_full_one() {
 }
 
 #[test]
-fn single_precision_keeps_six_digits() {
+fn single_precision_keeps_five_digits() {
     for folded in [false, true] {
         let mesh = ellipse(1.5, 1.0, 6, 8);
         let double = Differences::new(&mesh, 0.3, folded, Precision::Double, &Unwatched).unwrap();
         let single = Differences::new(&mesh, 0.3, folded, Precision::Single, &Unwatched).unwrap();
         let (expected_x, expected_y) = applied(&double, &mesh);
         let (ux, uy) = applied(&single, &mesh);
-        assert!(largest_gap(&ux, &expected_x) < 1e-6 && largest_gap(&uy, &expected_y) < 1e-6);
+        assert!(largest_gap(&ux, &expected_x) < 1e-5 && largest_gap(&uy, &expected_y) < 1e-5);
         assert!(ux != expected_x, "it is another matrix");
     }
 }
