@@ -1,5 +1,6 @@
 //! What can be started, and with which settings? Every command, flag and environment variable.
 
+mod backup;
 mod config;
 mod healthcheck;
 mod keys;
@@ -37,6 +38,8 @@ enum Command {
     Solve(SolveArgs),
     /// Make, list and revoke API keys; also while the service runs.
     Keys(KeysArgs),
+    /// Copy the data folder, also while the service runs; a service can be started on the copy.
+    Backup(BackupArgs),
     /// Print the settings that `serve` would run with and where each comes from, as JSON; takes the flags of `serve`.
     Config(ServeArgs),
     /// Ask a running service whether it is ready; exit code 0 if it is, 1 if not.
@@ -152,6 +155,22 @@ pub enum Anonymous {
     Always,
     /// Not at all.
     Never,
+}
+
+/// Settings of `backup`.
+#[derive(Debug, Clone, Args)]
+pub struct BackupArgs {
+    /// Folder to make; it must not be there yet.
+    #[arg(long, value_name = "FOLDER")]
+    pub to: PathBuf,
+    /// Data folder of the service.
+    #[arg(
+        long,
+        env = "RAILHEAD_DATA_DIR",
+        default_value = "./railhead-data",
+        value_name = "FOLDER"
+    )]
+    pub data_dir: PathBuf,
 }
 
 /// Settings of `keys`.
@@ -315,6 +334,7 @@ pub fn run() -> ExitCode {
             (Some(command), Some(given)) => print(&config::describe(command, given, &args)),
             _ => unreachable!("the subcommand was read from these"),
         },
+        Command::Backup(args) => backup::run(&args),
         Command::Keys(args) => keys::run(&args),
         Command::Healthcheck(args) => healthcheck::run(&args.url),
         Command::Openapi => print(&http::openapi_json()),

@@ -6,6 +6,7 @@
 //! and stops all this. A process that dies leaves `running` rows,
 //! which go back to the queue when the data folder is opened again.
 
+pub mod backup;
 pub mod batch;
 pub mod clock;
 pub mod error;

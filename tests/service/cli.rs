@@ -6,7 +6,7 @@ use std::process::{Output, Stdio};
 
 use serde_json::{Value, json};
 
-use crate::support::{Service, case, railhead};
+use crate::support::{Service, case, endless_case, railhead};
 
 fn example(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -234,4 +234,47 @@ fn config_tells_every_setting_and_where_it_comes_from() {
     for flag in flags {
         assert!(told[flag]["variable"].is_string(), "{flag}");
     }
+}
+
+#[tokio::test]
+async fn a_backup_of_a_working_service_can_be_started() {
+    let folder = tempfile::tempdir().unwrap();
+    let (data_dir, copy) = (folder.path().join("data"), folder.path().join("copy"));
+    let service = Service::start(&data_dir, &["--cache", "false"]);
+    // Some results lie in the table, some are too large for it.
+    let mut large = case("large");
+    large["solver"]["mesh"] = json!({ "strips": 40, "cells": 40 });
+    let mut results = Vec::new();
+    for case in [case("small"), large] {
+        let id = service.submit(&case).await;
+        service.until(&id, "succeeded").await;
+        let path = format!("/v1/jobs/{id}");
+        let result = service.get(&format!("{path}/result")).await;
+        let fields = service.get(&format!("{path}/tractions")).await;
+        results.push((path, result, fields));
+    }
+    let endless = service.submit(&endless_case("runs meanwhile")).await;
+    service.until(&endless, "running").await;
+    let backup = || {
+        let mut command = railhead();
+        let command = command.arg("backup").arg("--to").arg(&copy);
+        command.arg("--data-dir").arg(&data_dir).output().unwrap()
+    };
+    let made = backup();
+    assert!(made.status.success(), "{made:?}");
+    let again = backup();
+    assert_eq!(
+        again.status.code(),
+        Some(1),
+        "nothing is overwritten: {again:?}"
+    );
+    service.kill();
+    std::fs::remove_dir_all(&data_dir).unwrap();
+
+    let service = Service::start(&copy, &[]);
+    for (path, result, fields) in results {
+        assert_eq!(service.get(&format!("{path}/result")).await, result);
+        assert_eq!(service.get(&format!("{path}/tractions")).await, fields);
+    }
+    service.until(&endless, "running").await;
 }

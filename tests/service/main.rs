@@ -9,6 +9,7 @@ mod contract;
 mod crash;
 mod documents;
 mod errors;
+mod keys;
 mod metrics;
 mod requests;
 mod results;
