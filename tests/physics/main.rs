@@ -33,4 +33,5 @@ mod reference_hertz;
 mod regions;
 mod robustness;
 mod skips;
+mod sweeps;
 mod targets;

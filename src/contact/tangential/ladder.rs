@@ -5,6 +5,7 @@ use crate::contact::case::{MeshSize, Method};
 use crate::contact::error::SolveError;
 use crate::contact::problem::{Problem, Resolution};
 use crate::contact::tangential::level::Level;
+use crate::contact::tangential::trail::Trail;
 
 /// Cells of the first level.
 pub const CELLS_FIRST: u32 = 64;
@@ -13,6 +14,8 @@ pub const CELLS_MAX: u32 = 2048;
 /// Fewest strips, and cells in one, that the rules are good for.
 const SIDE_MIN: f64 = 4.0;
 
+/// A mesh serves as long as the pole is this near to where the cells gather: within the bump of their density.
+const POLE_MOVED: f64 = 0.15;
 /// Places of poles are rounded to multiples of this.
 const POLE_GRID: f64 = 0.05;
 
@@ -59,6 +62,18 @@ impl Plan {
         }
     }
 
+    /// Does the mesh serve a regime that was found on it?
+    #[must_use]
+    pub fn serves(&self, found: Regime) -> bool {
+        match (self.regime, found) {
+            (Regime::Sticking, Regime::Sticking) => true,
+            (Regime::Spinning(made), Regime::Spinning(found)) => {
+                (made[0] - found[0]).hypot(made[1] - found[1]) < POLE_MOVED
+            }
+            _ => false,
+        }
+    }
+
     /// Do the meshes of two plans differ in size only, so that the change between them tells what is left?
     #[must_use]
     pub fn is_like(&self, other: &Plan) -> bool {
@@ -83,6 +98,10 @@ impl From<MeshSize> for Plan {
 pub struct Ladder<'a> {
     problem: &'a Problem,
     levels: Vec<Level>,
+    /// What the motions solved so far left on the levels.
+    pub trail: Trail,
+    /// The levels that the last motion climbed.
+    pub path: Vec<usize>,
     /// Length over width of the patch that carries most.
     a_over_b: f64,
     patches: f64,
@@ -102,6 +121,8 @@ impl<'a> Ladder<'a> {
         Ladder {
             problem,
             levels: Vec::new(),
+            trail: Trail::default(),
+            path: Vec::new(),
             a_over_b,
             patches: patches.len() as f64,
         }

@@ -11,6 +11,7 @@ use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::Region;
 use crate::contact::normal::fitted::{self, Fitted};
 use crate::contact::problem::{Elasticity, Problem, Resolution};
+use crate::contact::tangential::boundary_element::strip_blocks::SharedBlocks;
 use crate::contact::tangential::ladder::Plan;
 
 /// Targets from here on are met with a matrix in single precision.
@@ -69,6 +70,8 @@ pub struct Level {
     pub normalised: Mesh,
     /// Friction bound of every cell, dimensionless.
     pub bound: Vec<f64>,
+    /// What the fast solver prepares for all motions.
+    pub own_blocks: SharedBlocks,
     poisson_ratio: f64,
     precision: Precision,
     mirrored: bool,
@@ -141,6 +144,7 @@ impl Level {
             scale,
             normalised,
             bound,
+            own_blocks: SharedBlocks::default(),
             poisson_ratio,
             precision: precision(problem),
             mirrored: mirror.is_some(),

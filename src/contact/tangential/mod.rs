@@ -10,6 +10,7 @@ pub mod liu_hsu;
 pub mod nested;
 pub mod point;
 pub mod rules;
+pub mod trail;
 
 use crate::contact::monitor::Stop;
 

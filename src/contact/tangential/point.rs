@@ -8,6 +8,7 @@ use crate::contact::problem::{Problem, Resolution};
 use crate::contact::tangential::estimate::{self, Errors, Opinion};
 use crate::contact::tangential::ladder::{CELLS_FIRST, CELLS_MAX, Ladder, Plan, Regime};
 use crate::contact::tangential::level::Level;
+use crate::contact::tangential::trail::Start;
 use crate::contact::tangential::{
     Failure, Tangential, Work, boundary_element, full_slip, liu_hsu, nested,
 };
@@ -63,44 +64,98 @@ pub fn solve(
     monitor: &dyn Monitor,
 ) -> Result<Point, SolveError> {
     let sizes = Ladder::fixed_sizes(problem);
-    let first = match &sizes {
-        Some(sizes) => sizes[0].into(),
-        None => ladder.plan(CELLS_FIRST, Regime::Unknown),
-    };
-    let mut point = climb(problem, ladder, index, first, None, monitor)?;
+    let last_path = std::mem::take(&mut ladder.path);
     match (sizes, problem.resolution) {
         (Some(sizes), _) => {
+            let mut point = climb(problem, ladder, index, sizes[0].into(), None, monitor)?;
             for size in &sizes[1..] {
                 point = climb(problem, ladder, index, (*size).into(), Some(point), monitor)?;
             }
+            Ok(point)
         }
-        (None, Resolution::Mesh(_)) => {}
+        (None, Resolution::Mesh(size)) => climb(problem, ladder, index, size.into(), None, monitor),
         (None, Resolution::Target(target)) => {
-            let spinning = problem.motions[index].spin_per_mm != 0.0;
-            let mut half_octaves = 0;
-            while let Some(error) = point.error().filter(|e| *e > target) {
-                half_octaves = if half_octaves == 0 {
-                    first_steps(target)
-                } else {
-                    half_octaves + steps(error / target)
-                };
-                let cells = f64::from(CELLS_FIRST) * 2.0_f64.powf(0.5 * f64::from(half_octaves));
-                if cells > f64::from(CELLS_MAX) {
-                    break;
+            let again = again(problem, ladder, index, &last_path, monitor)?;
+            let (begun, half_octaves) = match again {
+                Some(point) => (point, first_steps(target)),
+                None => {
+                    let first = ladder.plan(CELLS_FIRST, Regime::Unknown);
+                    let point = climb(problem, ladder, index, first, None, monitor)?;
+                    (point, 0)
                 }
-                let regime = estimate::regime(ladder.get(point.level), &point.tangential, spinning);
-                let mut plan = ladder.plan(cells.round() as u32, regime);
-                let before = ladder.get(point.level).plan.size.strips;
-                if plan.size.strips == before {
-                    // Levels with the same strips say nothing about the strips.
-                    plan.size = MeshSize {
-                        strips: before + 2,
-                        cells: (plan.size.cells * before).div_ceil(before + 2),
-                    };
-                }
-                point = climb(problem, ladder, index, plan, Some(point), monitor)?;
-            }
+            };
+            ascend(problem, ladder, index, begun, half_octaves, target, monitor)
         }
+    }
+}
+
+/// Begins a motion of a sweep on the level where the last motion had its first mesh made for its regime, if that serves
+/// this one too.
+fn again(
+    problem: &Problem,
+    ladder: &mut Ladder,
+    index: usize,
+    last_path: &[usize],
+    monitor: &dyn Monitor,
+) -> Result<Option<Point>, SolveError> {
+    let fitted = |number: &&usize| ladder.get(**number).plan.regime != Regime::Unknown;
+    let Some(&number) = last_path.iter().find(fitted) else {
+        return Ok(None);
+    };
+    let level = ladder.get(number);
+    let motion = level.scale.motion(&problem.motions[index]);
+    if ladder.trail.start(number, level, &motion).is_none() {
+        return Ok(None);
+    }
+    let plan = level.plan;
+    let point = climb(problem, ladder, index, plan, None, monitor)?;
+    let found = regime_of(problem, ladder, index, &point);
+    if plan.serves(found) {
+        return Ok(Some(point));
+    }
+    // The tractions are a good start for a mesh that does.
+    ladder.path.clear();
+    let cells = ladder.get(number).mesh.cells() as u32;
+    let plan = ladder.plan(cells, found);
+    climb(problem, ladder, index, plan, Some(point), monitor).map(Some)
+}
+
+fn regime_of(problem: &Problem, ladder: &Ladder, index: usize, point: &Point) -> Regime {
+    let spinning = problem.motions[index].spin_per_mm != 0.0;
+    estimate::regime(ladder.get(point.level), &point.tangential, spinning)
+}
+
+/// Climbs from a point on a level until the estimate meets the target or the levels end.
+fn ascend(
+    problem: &Problem,
+    ladder: &mut Ladder,
+    index: usize,
+    mut point: Point,
+    mut half_octaves: i32,
+    target: f64,
+    monitor: &dyn Monitor,
+) -> Result<Point, SolveError> {
+    while let Some(error) = point.error().filter(|e| *e > target) {
+        half_octaves = if half_octaves == 0 {
+            first_steps(target)
+        } else {
+            half_octaves + steps(error / target)
+        };
+        let cells = f64::from(CELLS_FIRST) * 2.0_f64.powf(0.5 * f64::from(half_octaves));
+        if cells > f64::from(CELLS_MAX) {
+            break;
+        }
+        let regime = regime_of(problem, ladder, index, &point);
+        let mut plan = ladder.plan(cells.round() as u32, regime);
+        let before = ladder.get(point.level).plan.size.strips;
+        if plan.size.strips == before {
+            // Levels with the same strips say nothing about the strips.
+            plan.size = MeshSize {
+                strips: before + 2,
+                cells: (plan.size.cells * before).div_ceil(before + 2),
+            };
+        }
+        point = climb(problem, ladder, index, plan, Some(point), monitor)?;
     }
     Ok(point)
 }
@@ -135,7 +190,10 @@ pub fn climb(
     let below = coarser
         .as_ref()
         .map(|point| (ladder.get(point.level), &point.tangential));
-    let tangential = solve_level(problem, level, &problem.motions[index], below, monitor)
+    let motion = level.scale.motion(&problem.motions[index]);
+    let warm = ladder.trail.start(number, level, &motion);
+    let start = warm.or_else(|| below.map(|(coarse, answer)| nested_start(coarse, answer, level)));
+    let tangential = solve_level(problem, level, &problem.motions[index], start, monitor)
         .map_err(|f| named(f, problem, index))?;
     let patches = problem.region.patches().len();
     let summed: Vec<Resultants> = (0..patches)
@@ -170,6 +228,8 @@ pub fn climb(
         }
         _ => summed.clone(),
     };
+    ladder.trail.leave(number, motion, &tangential);
+    ladder.path.push(number);
     let mut work = coarser.as_ref().map_or(Work::default(), |point| point.work);
     work.add(tangential.work);
     let seconds =
@@ -213,7 +273,7 @@ fn method_used(problem: &Problem) -> Method {
 /// Residual to reach: far below the target, since every iteration below it is for nothing.
 fn tolerance(problem: &Problem) -> f64 {
     match problem.resolution {
-        Resolution::Target(target) => (0.02 * target).clamp(boundary_element::TOLERANCE, 1e-4),
+        Resolution::Target(target) => (0.04 * target).clamp(boundary_element::TOLERANCE, 4e-4),
         Resolution::Mesh(_) => boundary_element::TOLERANCE,
     }
 }
@@ -236,11 +296,35 @@ fn named(failure: Failure, problem: &Problem, point: usize) -> SolveError {
     }
 }
 
+/// Tractions of a coarser level on a finer one; relative to the friction bound they vary less than as they are.
+fn nested_start(coarse: &Level, answer: &Tangential, level: &Level) -> Start {
+    let relative = |values: &[f64]| -> Vec<f64> {
+        values
+            .iter()
+            .zip(&coarse.bound)
+            .map(|(t, g)| if *g > 0.0 { t / g } else { 0.0 })
+            .collect()
+    };
+    let second = answer.second.as_ref().unwrap_or(&answer.traction);
+    let mirror = [0, 1].map(|k| {
+        let mut values = nested::interpolate(&coarse.mesh, &relative(&second[k]), &level.mesh);
+        values
+            .iter_mut()
+            .zip(&level.bound)
+            .for_each(|(t, g)| *t *= g);
+        values
+    });
+    Start {
+        mirror,
+        trapezoid: None,
+    }
+}
+
 fn solve_level(
     problem: &Problem,
     level: &Level,
     motion: &Motion,
-    coarser: Option<(&Level, &Tangential)>,
+    start: Option<Start>,
     monitor: &dyn Monitor,
 ) -> Result<Tangential, Failure> {
     if problem.friction == 0.0 {
@@ -257,24 +341,5 @@ fn solve_level(
         );
     }
     let motion = level.scale.motion(motion);
-    let start = coarser.map(|(coarse, answer)| {
-        // Tractions relative to the friction bound vary less than tractions do.
-        let relative = |values: &[f64]| -> Vec<f64> {
-            values
-                .iter()
-                .zip(&coarse.bound)
-                .map(|(t, g)| if *g > 0.0 { t / g } else { 0.0 })
-                .collect()
-        };
-        let second = answer.second.as_ref().unwrap_or(&answer.traction);
-        [0, 1].map(|k| {
-            let mut values = nested::interpolate(&coarse.mesh, &relative(&second[k]), &level.mesh);
-            values
-                .iter_mut()
-                .zip(&level.bound)
-                .for_each(|(t, g)| *t *= g);
-            values
-        })
-    });
     boundary_element::solve(level, &motion, start.as_ref(), tolerance(problem), monitor)
 }

@@ -13,16 +13,18 @@ use crate::contact::case::Motion;
 use crate::contact::influence::strips::{Differences, Parity};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::tangential::boundary_element::newton::{Convergence, FrictionLaw, Newton};
+use crate::contact::tangential::boundary_element::strip_blocks::OwnBlocks;
 use crate::contact::tangential::equations::Equations;
 use crate::contact::tangential::full_slip;
 use crate::contact::tangential::level::Level;
 use crate::contact::tangential::rules::Rule;
+use crate::contact::tangential::trail::Start;
 use crate::contact::tangential::{Failure, Tangential, Work, obey_coulomb};
 
 /// Residual of the friction law that ends a solve on an explicit mesh, relative to the traction scale of the case.
 pub const TOLERANCE: f64 = 1e-6;
 
-/// Solves one motion (dimensionless, about the level's origin) on one level, starting from tractions per cell.
+/// Solves one motion (dimensionless, about the level's origin) on one level, from a start or from zero tractions.
 ///
 /// # Errors
 /// [`Failure::NotConverged`] if no start leads to a solution of the three-point rule; [`Failure::Stopped`] if the
@@ -30,7 +32,7 @@ pub const TOLERANCE: f64 = 1e-6;
 pub fn solve(
     level: &Level,
     motion: &Motion,
-    start: Option<&[Vec<f64>; 2]>,
+    start: Option<&Start>,
     tolerance: f64,
     monitor: &dyn Monitor,
 ) -> Result<Tangential, Failure> {
@@ -46,14 +48,16 @@ pub fn solve(
     } else if level.is_mirrored() {
         skipped.push("mirror symmetry of the patch: half the influence".to_owned());
     }
-    let mut t = solve.start(start);
+    let mut t = solve.start(start.map(|start| &start.mirror));
     let mirror = solve.mirror(&mut t, start.is_some())?;
     if mirror.by_fixed_point {
         skipped.push("everything slips: fixed point instead of Newton".to_owned());
     }
     let by_mirror = solve.expand(&t);
     let mut warnings = Vec::new();
-    let (slips, second) = match solve.trapezoid(&mut t)? {
+    let warm = start.and_then(|start| start.trapezoid.as_ref());
+    let warm = warm.map(|warm| solve.start(Some(warm)));
+    let (slips, second) = match solve.trapezoid(&mut t, warm)? {
         Some(slips) => (slips, Some(by_mirror)),
         None => {
             warnings.push(
@@ -128,6 +132,15 @@ impl<'a> Solve<'a> {
         Equations::new(rule, &self.level.normalised, self.influence, self.parity)
     }
 
+    /// A solver that shares its own blocks with the other motions of the level.
+    fn newton<'e>(&self, equations: &'e Equations<'e>) -> Newton<'e> {
+        let own = self
+            .level
+            .own_blocks
+            .get(equations.rule, self.parity, || OwnBlocks::new(equations));
+        Newton::with_blocks(equations, own)
+    }
+
     /// The start brought onto the unknowns, or zero tractions.
     fn start(&self, start: Option<&[Vec<f64>; 2]>) -> Vec<f64> {
         let padded = self.influence.padded(self.parity);
@@ -178,7 +191,7 @@ impl<'a> Solve<'a> {
     fn mirror(&mut self, t: &mut [f64], started: bool) -> Result<MirrorAnswer, Failure> {
         let equations = self.equations(Rule::Mirror);
         let rigid = equations.rigid(self.motion);
-        let mut newton = Newton::new(&equations);
+        let mut newton = self.newton(&equations);
         let (mut report, by_fixed_point) = self.rule(&mut newton, &rigid, t, true)?;
         if !report.converged && started {
             t.fill(0.0);
@@ -219,22 +232,38 @@ impl<'a> Solve<'a> {
     fn upwind(&mut self, t: &mut [f64]) -> Result<bool, Stop> {
         let equations = self.equations(Rule::Upwind);
         let rigid = equations.rigid(self.motion);
-        let mut newton = Newton::new(&equations);
+        let mut newton = self.newton(&equations);
         Ok(self.rule(&mut newton, &rigid, t, false)?.0.converged)
     }
 
-    /// The trapezoid rule from the three-point solution in `t`, else from the upwind solution; returns which cells
-    /// slip. If neither start leads to a solution `t` is as it was.
-    fn trapezoid(&mut self, t: &mut [f64]) -> Result<Option<Vec<bool>>, Stop> {
+    /// The trapezoid rule from a start of its own if there is one, else from the three-point solution in `t`, else from the
+    /// upwind solution; returns which cells slip. If no start leads to a solution `t` is as it was.
+    fn trapezoid(
+        &mut self,
+        t: &mut [f64],
+        warm: Option<Vec<f64>>,
+    ) -> Result<Option<Vec<bool>>, Stop> {
         let equations = self.equations(Rule::Trapezoid);
         let rigid = equations.rigid(self.motion);
-        let mut newton = Newton::new(&equations);
-        let mut found = t.to_vec();
+        let mut newton = self.newton(&equations);
         let residual = self.work.residual;
-        if !self
-            .rule(&mut newton, &rigid, &mut found, true)?
-            .0
-            .converged
+        let mut converged = false;
+        let mut found = t.to_vec();
+        if let Some(warm) = warm {
+            found.copy_from_slice(&warm);
+            converged = self
+                .rule(&mut newton, &rigid, &mut found, true)?
+                .0
+                .converged;
+            if !converged {
+                found.copy_from_slice(t);
+            }
+        }
+        if !converged
+            && !self
+                .rule(&mut newton, &rigid, &mut found, true)?
+                .0
+                .converged
         {
             found.fill(0.0);
             self.upwind(&mut found)?;

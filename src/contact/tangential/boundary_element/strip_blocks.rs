@@ -1,12 +1,17 @@
 //! The preconditioner: every segment's own block of the Newton matrix, factored on its own.
 
+use std::cell::RefCell;
+use std::rc::Rc;
+
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::lu::partial_pivoting::factor;
 use faer::{MatMut, Par};
 use pulp::{Arch, NullaryFnOnce};
 
+use crate::contact::influence::strips::Parity;
 use crate::contact::tangential::boundary_element::newton::Linearisation;
 use crate::contact::tangential::equations::Equations;
+use crate::contact::tangential::rules::Rule;
 
 /// Own blocks of the operator, fixed for a rule and mesh.
 #[derive(Debug)]
@@ -37,6 +42,30 @@ impl OwnBlocks {
             }
         }
         diagonal
+    }
+}
+
+/// The own blocks of a level, made once for each rule and parity.
+#[derive(Debug, Default)]
+pub struct SharedBlocks {
+    made: RefCell<Vec<(Rule, Option<Parity>, Rc<OwnBlocks>)>>,
+}
+
+impl SharedBlocks {
+    /// The blocks of a rule and parity; `make` is called if they are not there.
+    pub fn get(
+        &self,
+        rule: Rule,
+        parity: Option<Parity>,
+        make: impl FnOnce() -> OwnBlocks,
+    ) -> Rc<OwnBlocks> {
+        let mut made = self.made.borrow_mut();
+        if let Some((_, _, blocks)) = made.iter().find(|m| (m.0, m.1) == (rule, parity)) {
+            return Rc::clone(blocks);
+        }
+        let blocks = Rc::new(make());
+        made.push((rule, parity, Rc::clone(&blocks)));
+        blocks
     }
 }
 
