@@ -3,7 +3,6 @@
 use std::time::Duration;
 
 use axum::body::{Body, Bytes};
-use axum::extract::State;
 use axum::http::{HeaderMap, Uri, header};
 use axum::response::{IntoResponse, Response};
 use futures_util::stream::try_unfold;
@@ -14,6 +13,7 @@ use uuid::Uuid;
 
 use crate::contact::solution::Solution;
 use crate::http::accept::{Format, choose, named_format};
+use crate::http::access::Caller;
 use crate::http::coding::AsItComes;
 use crate::http::error::ApiError;
 use crate::http::job::BatchId;
@@ -75,7 +75,7 @@ problems! {
     responses((status = 200, description = "One line per job", content((BatchLine = "application/x-ndjson"), (String = "text/csv"))), BatchResultProblems)
 )]
 pub async fn results(
-    State(jobs): State<Jobs>,
+    Caller(jobs): Caller,
     BatchId(id): BatchId,
     uri: Uri,
     headers: HeaderMap,
@@ -183,6 +183,8 @@ fn write_ndjson(lines: &[Line]) -> Result<Vec<u8>, JobsError> {
                 JobsError::Damaged(format!("solution of job {} is no object", job.id))
             })?;
             out.extend_from_slice(open);
+            out.extend_from_slice(b",\"cached\":");
+            write_json(&mut out, &job.cached)?;
             out.extend_from_slice(b",\"links\":");
             write_json(&mut out, &JobResult::links(job.id, &outputs(line)))?;
             out.extend_from_slice(b"}}");

@@ -12,14 +12,14 @@ use uuid::Uuid;
 
 use crate::contact::case::Case;
 use crate::http::HttpOptions;
+use crate::http::access::Caller;
 use crate::http::batch_body::{form, read_draft};
 use crate::http::error::{ApiError, Kind};
 use crate::http::job::{BatchId, rfc3339};
-use crate::http::jobs::idempotency_key;
+use crate::http::jobs::{idempotency_key, wants_fresh};
 use crate::http::problem::Fault;
 use crate::http::problems::problems;
 use crate::http::query::Query;
-use crate::jobs::Jobs;
 use crate::jobs::batch::{Batch, Draft};
 use crate::jobs::job::State as JobState;
 
@@ -116,7 +116,7 @@ fn links(batch: &Batch) -> BTreeMap<String, String> {
 problems! {
     /// What `POST /v1/batches` can fail with.
     BatchProblems: MalformedJson, UnreadableBody, BadQuery, BadHeader, BodyTimeout, BodyTooLarge, UnsupportedMediaType, UnsupportedEncoding,
-    FaultyBatch, FaultyTable, JobNotFound, IdempotencyConflict, QueueFull, Draining
+    FaultyBatch, FaultyTable, JobNotFound, IdempotencyConflict, QuotaExceeded, QueueFull, Draining, StorageFull, StorageUnwritable
 }
 
 /// Submits many cases as one batch of jobs.
@@ -133,7 +133,8 @@ problems! {
     params(
         ("accept" = Option<String>, Query, description = "`all` (when left out): one faulty case refuses the batch; `valid`: faulty cases are left out and reported", example = "valid"),
         ("template" = Option<String>, Query, description = "With `text/csv`, and needed there: the job whose case is the template", format = "uuid"),
-        ("Idempotency-Key" = Option<String>, Header, description = "1 to 255 visible ASCII characters. Repeating a request with the same key and the same cases answers the first batch instead of making another")
+        ("Idempotency-Key" = Option<String>, Header, description = "1 to 255 visible ASCII characters. Repeating a request with the same key and the same cases answers the first batch instead of making another"),
+        ("Cache-Control" = Option<String>, Header, description = "`no-cache`: solve all cases, also those that are identical to cases solved before", example = "no-cache")
     ),
     request_body(content(
         (Vec<Case> = "application/json"),
@@ -148,14 +149,16 @@ problems! {
     )
 )]
 pub async fn submit(
-    State(jobs): State<Jobs>,
+    Caller(jobs): Caller,
     State(options): State<HttpOptions>,
     request: Request,
 ) -> Result<Response, ApiError> {
     let key = idempotency_key(request.headers())?;
     let (valid_only, template) = wishes(request.uri())?;
     let form = form(&jobs, request.headers(), template).await?;
-    let draft = read_draft(&jobs, options, form, request).await?;
+    let fresh = wants_fresh(request.headers());
+    let mut draft = read_draft(&jobs, options, form, request).await?;
+    draft.fresh = fresh;
     if draft.cases == draft.rejected || (draft.rejected > 0 && !valid_only) {
         return Err(refusal(&draft));
     }
@@ -235,7 +238,7 @@ problems! {
     responses((status = 200, description = "The batch", body = BatchAnswer), LookBatchProblems)
 )]
 pub async fn look(
-    State(jobs): State<Jobs>,
+    Caller(jobs): Caller,
     BatchId(id): BatchId,
 ) -> Result<Json<BatchAnswer>, ApiError> {
     Ok(Json(jobs.batch(id).await?.into()))
@@ -254,7 +257,7 @@ pub async fn look(
         LookBatchProblems
     )
 )]
-pub async fn cancel(State(jobs): State<Jobs>, BatchId(id): BatchId) -> Result<Response, ApiError> {
+pub async fn cancel(Caller(jobs): Caller, BatchId(id): BatchId) -> Result<Response, ApiError> {
     let batch: BatchAnswer = jobs.cancel_batch(id).await?.into();
     let status = if batch.ended {
         StatusCode::OK
@@ -278,10 +281,7 @@ problems! {
     params(("id" = String, Path, description = "Id of the batch", format = "uuid")),
     responses((status = 204, description = "The batch is gone"), DeleteBatchProblems)
 )]
-pub async fn delete(
-    State(jobs): State<Jobs>,
-    BatchId(id): BatchId,
-) -> Result<StatusCode, ApiError> {
+pub async fn delete(Caller(jobs): Caller, BatchId(id): BatchId) -> Result<StatusCode, ApiError> {
     jobs.delete_batch(id).await?;
     Ok(StatusCode::NO_CONTENT)
 }

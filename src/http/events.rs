@@ -6,7 +6,6 @@
 use std::convert::Infallible;
 use std::time::Duration;
 
-use axum::extract::State;
 use axum::http::{HeaderMap, HeaderName, StatusCode};
 use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
@@ -17,6 +16,7 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use crate::http::accept::{Format, choose};
+use crate::http::access::Caller;
 use crate::http::batches::{BatchAnswer, LookBatchProblems};
 use crate::http::error::ApiError;
 use crate::http::job::{BatchId, JobId};
@@ -75,7 +75,7 @@ impl JobEvent {
     )
 )]
 pub async fn job(
-    State(jobs): State<Jobs>,
+    Caller(jobs): Caller,
     JobId(id): JobId,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
@@ -123,7 +123,7 @@ async fn next_of_job(
     )
 )]
 pub async fn batch(
-    State(jobs): State<Jobs>,
+    Caller(jobs): Caller,
     BatchId(id): BatchId,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {

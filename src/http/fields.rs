@@ -1,6 +1,5 @@
 //! `/v1/jobs/{id}/tractions`, `/pressure` and `/slip`: values per cell, or on a regular grid.
 
-use axum::extract::State;
 use axum::http::{HeaderMap, HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
@@ -10,6 +9,7 @@ use uuid::Uuid;
 use crate::contact::case::Output;
 use crate::contact::solution::{PatchFields, PointFields};
 use crate::http::accept::{Format, choose, named_format};
+use crate::http::access::Caller;
 use crate::http::cells::{Cells, GriddedField, gridded, per_cell};
 use crate::http::error::ApiError;
 use crate::http::formats::{File, Table, csv, npz, vtk};
@@ -179,7 +179,7 @@ problems! {
     )), FieldProblems)
 )]
 pub async fn tractions(
-    State(jobs): State<Jobs>,
+    Caller(jobs): Caller,
     JobId(id): JobId,
     uri: Uri,
     headers: HeaderMap,
@@ -206,7 +206,7 @@ pub async fn tractions(
     )), FieldProblems)
 )]
 pub async fn pressure(
-    State(jobs): State<Jobs>,
+    Caller(jobs): Caller,
     JobId(id): JobId,
     uri: Uri,
     headers: HeaderMap,
@@ -233,7 +233,7 @@ pub async fn pressure(
     )), FieldProblems)
 )]
 pub async fn slip(
-    State(jobs): State<Jobs>,
+    Caller(jobs): Caller,
     JobId(id): JobId,
     uri: Uri,
     headers: HeaderMap,

@@ -3,6 +3,7 @@
 //! Handlers translate: they read a request, call [`Jobs`] and answer. Nothing is computed here.
 
 mod accept;
+mod access;
 mod batch_body;
 mod batch_results;
 mod batches;
@@ -16,10 +17,12 @@ mod error;
 mod events;
 mod fields;
 mod formats;
+mod headers;
 mod health;
 mod job;
 mod jobs;
 mod methods;
+mod metrics;
 mod openapi;
 mod picture;
 mod plot;
@@ -46,9 +49,11 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
+use crate::http::access::{Access, Unscoped};
 use crate::http::error::{ApiError, Kind};
 use crate::jobs::Jobs;
 
+pub use crate::http::headers::allow_origins;
 pub use crate::http::openapi::openapi_json;
 
 /// What one request may cost.
@@ -62,6 +67,10 @@ pub struct HttpOptions {
     pub batch_max_bytes: u64,
     /// Most cases of a batch.
     pub batch_max_cases: u32,
+    /// Requests without a key are answered, as those of a tenant of their own.
+    pub anonymous: bool,
+    /// Requests per second of one key; 0 for any number.
+    pub requests_per_second: u32,
 }
 
 impl Default for HttpOptions {
@@ -71,6 +80,8 @@ impl Default for HttpOptions {
             body_timeout: Duration::from_secs(60),
             batch_max_bytes: 1 << 30,
             batch_max_cases: 200_000,
+            anonymous: true,
+            requests_per_second: 0,
         }
     }
 }
@@ -78,20 +89,24 @@ impl Default for HttpOptions {
 /// What every handler can reach.
 #[derive(Clone, FromRef)]
 struct Shared {
-    jobs: Jobs,
+    unscoped: Unscoped,
+    access: Access,
     options: HttpOptions,
+    metrics: metrics::Metrics,
 }
 
 /// The whole API, ready to be served.
 pub fn router(jobs: Jobs, options: HttpOptions) -> Router {
     let (resources, _) = resources().split_for_parts();
+    let metrics = metrics::Metrics::new(&jobs);
     let contract = SwaggerUi::new("/docs").config(
         // The validator badge would ask a server on the internet.
         Config::from("/openapi.json")
             .validator_url("none")
             .try_it_out_enabled(true),
     );
-    resources
+    let access = Access::new(&jobs, options);
+    let router = resources
         .merge(contract)
         .route("/", get(|| async { Redirect::temporary("/docs/") }))
         .fallback(|uri: Uri| async move { error::unknown_route(uri.path()) })
@@ -103,9 +118,16 @@ pub fn router(jobs: Jobs, options: HttpOptions) -> Router {
         .layer(from_fn(error::name_instance))
         .layer(coding::packing())
         .layer(from_fn(caching::complete))
+        .layer(from_fn_with_state(metrics.clone(), metrics::count))
         .layer(trace::span_layer())
         .layer(from_fn(trace::carry_request_id))
-        .with_state(Shared { jobs, options })
+        .with_state(Shared {
+            unscoped: Unscoped(jobs),
+            access,
+            options,
+            metrics,
+        });
+    headers::secure(router)
 }
 
 /// Every documented route, in the order of the contract.
@@ -152,6 +174,7 @@ fn resources() -> OpenApiRouter<Shared> {
         .routes(routes!(events::batch))
         .routes(routes!(health::alive))
         .routes(routes!(health::ready))
+        .routes(routes!(metrics::metrics))
         .merge(contract)
 }
 

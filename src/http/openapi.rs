@@ -9,10 +9,13 @@ use utoipa::openapi::RefOr;
 use utoipa::openapi::example::ExampleBuilder;
 use utoipa::openapi::path::{ParameterBuilder, ParameterIn};
 use utoipa::openapi::schema::Type;
+use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement, SecurityScheme};
 use utoipa::openapi::{HeaderBuilder, ObjectBuilder, Required, ResponseBuilder};
 use utoipa_axum::router::OpenApiRouter;
 
+use crate::http::error::Kind;
 use crate::http::problem::Problem;
+use crate::http::problems::describe_also;
 use crate::http::resources;
 
 #[derive(OpenApi)]
@@ -124,6 +127,7 @@ static DOCUMENT: LazyLock<String> = LazyLock::new(|| {
     for path in ["/v1/jobs", "/v1/cases/check"] {
         add_examples(&mut document, path);
     }
+    require_keys(&mut document);
     let text = document.to_pretty_json();
     // Only a map with keys that are not strings cannot be written; the document has none.
     text.map(|text| text + "\n").unwrap_or_default()
@@ -133,6 +137,41 @@ static DOCUMENT: LazyLock<String> = LazyLock::new(|| {
 #[must_use]
 pub fn openapi_json() -> String {
     DOCUMENT.clone()
+}
+
+/// Says of every operation on what belongs to a tenant that it may need a key, and that jobs and batches may expire.
+fn require_keys(document: &mut utoipa::openapi::OpenApi) {
+    let scheme = HttpBuilder::new()
+        .scheme(HttpAuthScheme::Bearer)
+        .description(Some(
+            "An API key; not needed where the service lets anybody in, as it does on loopback",
+        ))
+        .build();
+    let components = document.components.get_or_insert_default();
+    components.add_security_scheme("key", SecurityScheme::Http(scheme));
+    for (path, item) in &mut document.paths.paths {
+        let operations = [&mut item.get, &mut item.post, &mut item.delete];
+        for operation in operations.into_iter().filter_map(Option::as_mut) {
+            let tags = operation.tags.as_deref().unwrap_or_default();
+            let open = tags.iter().any(|tag| tag == "service");
+            let metrics = operation.operation_id.as_deref() == Some("get_metrics");
+            let methods = operation.operation_id.as_deref() == Some("list_methods");
+            if (open && !metrics) || methods {
+                continue;
+            }
+            operation.security = Some(vec![
+                SecurityRequirement::new("key", Vec::<String>::new()),
+                SecurityRequirement::default(),
+            ]);
+            let mut kinds = vec![Kind::Unauthorized, Kind::TooManyRequests];
+            if path.contains("{id}") {
+                kinds.push(Kind::Expired);
+            }
+            // A locked or failing disk can meet every request.
+            kinds.extend([Kind::StorageUnwritable, Kind::StorageFull]);
+            describe_also(&mut operation.responses.responses, &kinds);
+        }
+    }
 }
 
 fn add_examples(document: &mut utoipa::openapi::OpenApi, path: &str) {

@@ -1,6 +1,5 @@
 //! `/v1/jobs/{id}/plot.svg` and `/plot.png`: a picture of one patch for one motion.
 
-use axum::extract::State;
 use axum::http::{HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
 use utoipa::IntoParams;
@@ -9,6 +8,7 @@ use uuid::Uuid;
 use crate::contact::case::Output;
 use crate::contact::solution::PointSolution;
 use crate::http::accept::Format;
+use crate::http::access::Caller;
 use crate::http::error::ApiError;
 use crate::http::fields::{FieldProblems, stored};
 use crate::http::formats::File;
@@ -98,11 +98,7 @@ impl Wish {
     params(("id" = String, Path, description = "Id of the job", format = "uuid"), PlotQuery),
     responses((status = 200, description = "The picture", content((String = "image/svg+xml"))), FieldProblems)
 )]
-pub async fn svg(
-    State(jobs): State<Jobs>,
-    JobId(id): JobId,
-    uri: Uri,
-) -> Result<Response, ApiError> {
+pub async fn svg(Caller(jobs): Caller, JobId(id): JobId, uri: Uri) -> Result<Response, ApiError> {
     picture(&jobs, id, Wish::read(&uri)?, Format::Svg).await
 }
 
@@ -115,11 +111,7 @@ pub async fn svg(
     params(("id" = String, Path, description = "Id of the job", format = "uuid"), PlotQuery),
     responses((status = 200, description = "The picture", content((File = "image/png"))), FieldProblems)
 )]
-pub async fn png(
-    State(jobs): State<Jobs>,
-    JobId(id): JobId,
-    uri: Uri,
-) -> Result<Response, ApiError> {
+pub async fn png(Caller(jobs): Caller, JobId(id): JobId, uri: Uri) -> Result<Response, ApiError> {
     picture(&jobs, id, Wish::read(&uri)?, Format::Png).await
 }
 

@@ -1,6 +1,5 @@
 //! `/v1/jobs/{id}/resultants`: forces and moments, per patch and in sum, as JSON or as a table.
 
-use axum::extract::State;
 use axum::http::{HeaderMap, Uri, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
@@ -9,13 +8,13 @@ use utoipa::ToSchema;
 use crate::contact::case::Motion;
 use crate::contact::solution::{ErrorEstimate, Origin, Solution, Total};
 use crate::http::accept::{Format, choose, named_format};
+use crate::http::access::Caller;
 use crate::http::error::ApiError;
 use crate::http::formats::csv::number;
 use crate::http::job::JobId;
 use crate::http::problems::problems;
 use crate::http::query::Query;
 use crate::http::results::{INDEX, index, require_index};
-use crate::jobs::Jobs;
 
 /// Forces and moments.
 #[derive(Debug, Serialize, ToSchema)]
@@ -82,7 +81,7 @@ problems! {
     responses((status = 200, description = "Forces and moments on the lower body. CSV: one line per patch and motion, then one per motion with `total` as its patch", content((Resultants = "application/json"), (String = "text/csv"))), PartProblems)
 )]
 pub async fn resultants(
-    State(jobs): State<Jobs>,
+    Caller(jobs): Caller,
     JobId(id): JobId,
     uri: Uri,
     headers: HeaderMap,
@@ -222,6 +221,7 @@ fn write_csv(resultants: &Resultants, sums: &[Sum]) -> Result<Vec<u8>, csv::Erro
             let total = Total {
                 force_x_n: point.force_x_n,
                 force_y_n: point.force_y_n,
+                force_z_n: None,
                 moment_z_n_mm: point.moment_z_n_mm,
                 error_estimate: point.error_estimate,
             };

@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 
 use axum::Json;
-use axum::extract::State;
 use serde::Serialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
 use crate::contact::case::Output;
 use crate::contact::solution::Solution;
+use crate::http::access::Caller;
 use crate::http::error::{ApiError, Kind};
 use crate::http::job::JobId;
 use crate::http::problems::problems;
@@ -21,6 +21,8 @@ use crate::jobs::Jobs;
 pub struct JobResult {
     #[serde(flatten)]
     solution: Solution,
+    /// The result was computed for an identical case before; `seconds` are those of that solve.
+    cached: bool,
     /// The job, and every part of the result that the case asked for.
     links: BTreeMap<String, String>,
 }
@@ -39,10 +41,7 @@ problems! {
     params(("id" = String, Path, description = "Id of the job", format = "uuid")),
     responses((status = 200, description = "The result", body = JobResult), ResultProblems)
 )]
-pub async fn result(
-    State(jobs): State<Jobs>,
-    JobId(id): JobId,
-) -> Result<Json<JobResult>, ApiError> {
+pub async fn result(Caller(jobs): Caller, JobId(id): JobId) -> Result<Json<JobResult>, ApiError> {
     result_of(&jobs, id).await.map(Json)
 }
 
@@ -55,7 +54,12 @@ pub async fn result_of(jobs: &Jobs, id: Uuid) -> Result<JobResult, ApiError> {
     let outputs = outputs_asked(jobs, id).await?;
     let outputs: Vec<&str> = outputs.into_iter().map(name_of).collect();
     let links = JobResult::links(id, &outputs);
-    Ok(JobResult { solution, links })
+    let cached = jobs.get(id).await?.cached;
+    Ok(JobResult {
+        solution,
+        cached,
+        links,
+    })
 }
 
 impl JobResult {

@@ -1,6 +1,5 @@
 //! `/v1/jobs/{id}/zones`: where the patch sticks and where it slips.
 
-use axum::extract::State;
 use axum::http::{HeaderMap, Uri};
 use axum::response::Response;
 use serde::Serialize;
@@ -9,13 +8,13 @@ use utoipa::ToSchema;
 use crate::contact::case::Output;
 use crate::contact::outputs::outline::{outlines, patch_outline};
 use crate::contact::zones::Zone;
+use crate::http::access::Caller;
 use crate::http::cells::{Cells, GriddedField, gridded, per_cell};
 use crate::http::error::ApiError;
 use crate::http::fields::{FieldProblems, FieldQuery, Selection, stored, write_as};
 use crate::http::formats::{File, Table};
 use crate::http::job::JobId;
 use crate::http::results::{not_asked, require_index};
-use crate::jobs::Jobs;
 
 /// Stick and slip zones of one patch for one motion.
 #[derive(Debug, Serialize, ToSchema)]
@@ -89,7 +88,7 @@ pub struct Outlines {
     )), FieldProblems)
 )]
 pub async fn zones(
-    State(jobs): State<Jobs>,
+    Caller(jobs): Caller,
     JobId(id): JobId,
     uri: Uri,
     headers: HeaderMap,

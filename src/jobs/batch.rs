@@ -14,7 +14,7 @@ use crate::jobs::job::{Job, State};
 use crate::jobs::spool::{Card, Spool};
 use crate::jobs::store::{Begun, NewBatch, NewJob};
 use crate::jobs::watch::Reason;
-use crate::jobs::{Jobs, LOOK_AGAIN, cost_us, created_at, idempotency, now_ms, outputs_text};
+use crate::jobs::{Jobs, LOOK_AGAIN, cost_us, created_at, idempotency, outputs_text};
 
 /// Jobs queued in one transaction.
 const CHUNK_JOBS: usize = 1000;
@@ -34,6 +34,8 @@ const LOOK_PAUSE: Duration = Duration::from_millis(10);
 pub struct Batch {
     /// UUIDv7.
     pub id: Uuid,
+    /// Whose it is.
+    pub tenant: String,
     /// Time of submission, epoch milliseconds.
     pub created_at: i64,
     /// Number of jobs it was made of.
@@ -98,6 +100,8 @@ pub struct Draft {
     pub rejected: u32,
     /// The first faulty ones.
     pub faulty: Vec<FaultyCase>,
+    /// Cases are solved even if identical ones were solved before.
+    pub fresh: bool,
 }
 
 impl Draft {
@@ -134,6 +138,7 @@ impl Draft {
                     method: problem.method.name().to_owned(),
                     outputs: outputs_text(&problem.outputs),
                     cost_us: cost_us(&problem),
+                    digest: problem.digest,
                     name: problem.name,
                     labels: problem.labels,
                 };
@@ -172,6 +177,7 @@ impl Jobs {
             cases: 0,
             rejected: 0,
             faulty: Vec::new(),
+            fresh: false,
         })
     }
 
@@ -189,6 +195,7 @@ impl Jobs {
         let digest = *draft.digest.finalize().as_bytes();
         let new = NewBatch {
             id,
+            tenant: self.tenant.clone(),
             created_at: created_at(id),
             count: draft.cases - draft.rejected,
             rejected: draft.rejected,
@@ -198,7 +205,7 @@ impl Jobs {
             if self.shared.draining.is_cancelled() {
                 return Err(JobsError::Draining);
             }
-            match self.shared.store.begin_batch(&new).await? {
+            match self.noted(self.shared.store.begin_batch(&new).await)? {
                 Begun::Created => break,
                 Begun::Existing(id) => return self.batch(id).await,
                 Begun::Conflict => return Err(JobsError::IdempotencyConflict),
@@ -208,7 +215,7 @@ impl Jobs {
         // A client that hangs up must not leave a batch half filled, so the filling goes on without it.
         let jobs = self.clone();
         let filled = tokio::spawn(async move {
-            let filled = jobs.fill(&new, draft.spool).await;
+            let filled = jobs.fill(&new, draft.spool, draft.fresh).await;
             if filled.is_err()
                 && let Err(error) = jobs.shared.store.drop_batch(new.id).await
             {
@@ -216,13 +223,14 @@ impl Jobs {
             }
             filled
         });
-        filled
+        let filled = filled
             .await
-            .map_err(|error| JobsError::Damaged(error.to_string()))??;
+            .map_err(|error| JobsError::Damaged(error.to_string()))?;
+        self.noted(filled)?;
         self.batch(id).await
     }
 
-    async fn fill(&self, new: &NewBatch, spool: Spool) -> Result<(), JobsError> {
+    async fn fill(&self, new: &NewBatch, spool: Spool, fresh: bool) -> Result<(), JobsError> {
         self.admit(u64::from(new.count)).await?;
         let mut reader = spool
             .into_reader()
@@ -240,11 +248,16 @@ impl Jobs {
             if cases.is_empty() {
                 break;
             }
-            let some: Vec<_> = cases
+            let mut some: Vec<_> = cases
                 .into_iter()
-                .map(|(card, case)| (card.index, new_job(card, case)))
+                .map(|(card, case)| (card.index, self.new_job(card, case)))
                 .collect();
-            self.shared.store.enqueue_many(new.id, &some).await?;
+            if !fresh {
+                self.find_sources(some.iter_mut().map(|(_, job)| job))
+                    .await?;
+            }
+            let ended = self.shared.store.enqueue_many(new.id, &some).await?;
+            self.ended_cached(&ended);
             for _ in 0..self.shared.options.workers {
                 self.shared.wake.notify_one();
             }
@@ -260,7 +273,10 @@ impl Jobs {
     /// [`JobsError::BatchNotFound`], or a failed database.
     pub async fn batch(&self, id: Uuid) -> Result<Batch, JobsError> {
         let batch = self.shared.store.batch(id).await?;
-        batch.ok_or(JobsError::BatchNotFound)
+        match batch.filter(|batch| *batch.tenant == *self.tenant) {
+            Some(batch) => Ok(batch),
+            None => Err(self.missing(id, JobsError::BatchNotFound).await),
+        }
     }
 
     /// Cancels every job of a batch that has not ended: queued ones end at once, running ones at the next tick of
@@ -270,8 +286,14 @@ impl Jobs {
     /// [`JobsError::BatchNotFound`], or a failed database.
     pub async fn cancel_batch(&self, id: Uuid) -> Result<Batch, JobsError> {
         self.batch(id).await?;
-        for (job, state) in self.shared.store.cancel_batch(id, now_ms()).await? {
+        for (job, state) in self
+            .shared
+            .store
+            .cancel_batch(id, self.shared.now_ms())
+            .await?
+        {
             if state.ended() {
+                self.shared.metrics.ended(state, 1);
                 self.shared.announce(job);
             } else if let Some(watch) = self.shared.running().get(&job) {
                 watch.stop(Reason::Cancel);
@@ -326,6 +348,7 @@ impl Jobs {
             // Subscribe first, then look: what ends in between is announced.
             let mut ended = self.shared.ended.subscribe();
             let mut lines = self.shared.store.batch_lines(id, after, limit).await?;
+            lines.retain(|line| *line.job.tenant == *self.tenant);
             let waiting = Instant::now() < until && !self.shared.draining.is_cancelled();
             if waiting {
                 let done = lines
@@ -361,25 +384,28 @@ impl Jobs {
         }
     }
 
+    fn new_job(&self, card: Card, case: Vec<u8>) -> NewJob {
+        let id = Uuid::now_v7();
+        NewJob {
+            id,
+            tenant: self.tenant.clone(),
+            created_at: created_at(id),
+            name: card.name,
+            labels: card.labels,
+            method: card.method,
+            outputs: card.outputs,
+            cost_us: card.cost_us,
+            body: Bytes::from(case),
+            reuse_key: self.reuse_key(&card.digest),
+            source: None,
+            idempotency: None,
+        }
+    }
+
     fn spool_failed(&self, source: std::io::Error) -> JobsError {
         JobsError::DataDir {
             path: self.shared.options.data_dir.clone(),
             source,
         }
-    }
-}
-
-fn new_job(card: Card, case: Vec<u8>) -> NewJob {
-    let id = Uuid::now_v7();
-    NewJob {
-        id,
-        created_at: created_at(id),
-        name: card.name,
-        labels: card.labels,
-        method: card.method,
-        outputs: card.outputs,
-        cost_us: card.cost_us,
-        body: Bytes::from(case),
-        idempotency: None,
     }
 }

@@ -353,10 +353,13 @@ async fn every_kind_of_problem_explains_itself() {
     let here = concat!(
         include_str!("batch_deletion.rs"),
         include_str!("batch_tables.rs"),
+        include_str!("access.rs"),
         include_str!("batches.rs"),
         include_str!("caching.rs"),
         include_str!("errors.rs"),
-        include_str!("requests.rs")
+        include_str!("requests.rs"),
+        include_str!("retention.rs"),
+        include_str!("storage.rs")
     );
     let untested: Vec<&String> = seen
         .iter()

@@ -224,9 +224,7 @@ pub fn climb(
     let resultants = match coarser_like {
         // The rules of the fast solver share one order of convergence; the dense method has no such record.
         // With tractions asked for, resultants stay what the tractions add up to.
-        Some(point)
-            if problem.method != Method::LiuHsu && !problem.wants(Output::Tractions) =>
-        {
+        Some(point) if problem.method != Method::LiuHsu && !problem.wants(Output::Tractions) => {
             extrapolated(problem, &summed, point, share)
         }
         _ => summed.clone(),
