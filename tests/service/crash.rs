@@ -10,7 +10,7 @@ use crate::support::{Service, long_case, pause};
 
 const JOBS: usize = 50;
 /// Motions per job: enough to be met while running.
-const MOTIONS: u32 = 8;
+const MOTIONS: u32 = 60;
 
 async fn count(service: &Service, state: &str) -> usize {
     let list = service

@@ -21,6 +21,8 @@ pub struct Fitted {
     pub line: Chord,
     /// y of the centre of the strip's load; the mid-line where a strip has several chords.
     pub load_y: f64,
+    /// Load of the strip over its width in N/mm; nothing where a strip has several chords.
+    pub load: Option<f64>,
 }
 
 impl Fitted {
@@ -75,6 +77,7 @@ pub fn chords(region: &Region, patch: usize, strips: &[(f64, f64)]) -> Vec<Fitte
             },
             line: *line,
             load_y: strip.map_or(line.y, |strip| strip.load_y),
+            load: strip.map(|strip| strip.load).filter(|load| *load > 0.0),
         }
     };
     lines.iter().map(fit).collect()
@@ -87,6 +90,8 @@ struct Strip {
     length: f64,
     /// y of the centre of the load.
     load_y: f64,
+    /// Load over width.
+    load: f64,
 }
 
 impl Strip {
@@ -112,7 +117,11 @@ impl Strip {
         } else {
             line.y
         };
-        Some(Strip { length, load_y })
+        Some(Strip {
+            length,
+            load_y,
+            load,
+        })
     }
 }
 

@@ -56,6 +56,12 @@ pub struct Patch {
 }
 
 impl Region {
+    /// Is it Hertz's ellipse, in closed form?
+    #[must_use]
+    pub fn is_ellipse(&self) -> bool {
+        matches!(self, Region::Ellipse(_))
+    }
+
     /// Hertz's ellipse for `radii` or `ellipse`, with the contact modulus `E*` in MPa.
     ///
     /// # Errors

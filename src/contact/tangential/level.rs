@@ -230,27 +230,40 @@ fn precision(problem: &Problem) -> Precision {
     }
 }
 
-/// Mean pressures of the cells, scaled patch by patch so that the cells carry the patch's normal force.
+/// Mean pressures of the cells, scaled so that the cells carry the load of their strip where the region is not Hertz's
+/// ellipse (its line loads are smooth enough), then the patch's normal force.
 fn cell_pressures(region: &Region, fitted: &[Fitted], mesh: &Mesh, area: &[f64]) -> Vec<f64> {
     let patches = region.patches();
     let mut load = vec![0.0; patches.len()];
     let mut pressure = vec![0.0; mesh.cells()];
     for (segment, fitted) in mesh.segments.iter().zip(fitted) {
+        let mut carried = 0.0;
         for i in segment.cells.clone() {
             pressure[i] = fitted.mean_pressure(region, mesh.left[i], mesh.right[i]);
-            load[segment.chord.patch] += pressure[i] * area[i];
+            carried += pressure[i] * area[i];
         }
+        if let Some(strip) = fitted.load
+            && !region.is_ellipse()
+            && carried > 0.0
+        {
+            let strip = strip * segment.chord.dy;
+            scale(&mut pressure[segment.cells.clone()], strip / carried);
+            carried = strip;
+        }
+        load[segment.chord.patch] += carried;
     }
     for segment in &mesh.segments {
         let patch = segment.chord.patch;
         if load[patch] > 0.0 {
             let factor = patches[patch].normal_force / load[patch];
-            pressure[segment.cells.clone()]
-                .iter_mut()
-                .for_each(|p| *p *= factor);
+            scale(&mut pressure[segment.cells.clone()], factor);
         }
     }
     pressure
+}
+
+fn scale(values: &mut [f64], factor: f64) {
+    values.iter_mut().for_each(|value| *value *= factor);
 }
 
 /// Are the pressures mirror images to 1e-9 of the largest?
