@@ -60,12 +60,8 @@ pub fn chords(region: &Region, patch: usize, strips: &[(f64, f64)]) -> Vec<Fitte
     let width: f64 = strips.iter().map(|(_, dy)| dy).sum();
     let share = 0.5 / (1.0 + 0.5 * (longest / width).powi(2));
     let fit = |line: &Chord| {
-        let strip = if alone(line) {
-            Strip::of(region, patch, line)
-        } else {
-            None
-        };
-        let mean = strip.map(|strip| strip.length);
+        let strip = alone(line).then(|| Strip::of(region, patch, line));
+        let mean = strip.and_then(|strip| strip.length);
         let length = line.right - line.left;
         let half = 0.5 * ((1.0 - share) * length + share * mean.unwrap_or(length));
         let middle = 0.5 * (line.left + line.right);
@@ -86,8 +82,8 @@ pub fn chords(region: &Region, patch: usize, strips: &[(f64, f64)]) -> Vec<Fitte
 /// What a strip holds between its two sides.
 #[derive(Debug, Clone, Copy)]
 struct Strip {
-    /// Mean length of the chords.
-    length: f64,
+    /// Mean length of the chords; nothing if there is more than one on any of its lines.
+    length: Option<f64>,
     /// y of the centre of the load.
     load_y: f64,
     /// Load over width.
@@ -95,21 +91,21 @@ struct Strip {
 }
 
 impl Strip {
-    /// The strip about a line; nothing if there is more than one chord on any of its lines.
-    fn of(region: &Region, patch: usize, line: &Chord) -> Option<Strip> {
-        let (mut length, mut load, mut moment) = (0.0, 0.0, 0.0);
+    /// The strip about a line.
+    fn of(region: &Region, patch: usize, line: &Chord) -> Strip {
+        let (mut length, mut load, mut moment) = (Some(0.0), 0.0, 0.0);
         for (place, weight) in GAUSS {
             let y = line.y + 0.5 * line.dy * place;
-            match region.chords(patch, &[(y, line.dy)]).as_slice() {
-                [] => {}
-                [chord] => {
-                    let long = 0.5 * weight * (chord.right - chord.left);
-                    let share = long * region.mean_pressure(chord, chord.left, chord.right);
-                    length += long;
-                    load += share;
-                    moment += share * (y - line.y);
-                }
-                _ => return None,
+            let across = region.chords(patch, &[(y, line.dy)]);
+            if across.len() > 1 {
+                length = None;
+            }
+            for chord in across {
+                let long = 0.5 * weight * (chord.right - chord.left);
+                let share = long * region.mean_pressure(&chord, chord.left, chord.right);
+                length = length.map(|sum: f64| sum + long);
+                load += share;
+                moment += share * (y - line.y);
             }
         }
         let load_y = if load > 0.0 {
@@ -117,11 +113,11 @@ impl Strip {
         } else {
             line.y
         };
-        Some(Strip {
+        Strip {
             length,
             load_y,
             load,
-        })
+        }
     }
 }
 
