@@ -63,6 +63,14 @@ fn main() {
         &cases,
         lu,
     );
+    for bound in ["elliptic", "parabolic"] {
+        row(
+            &format!("fastsim, {bound}"),
+            &json!({ "method": "fastsim", "traction_bound": bound, "target_error": 0.2 }),
+            &cases,
+            lu,
+        );
+    }
     for (cells, strips) in [(8, 8), (12, 12), (16, 16), (24, 12)] {
         row(
             "liu_hsu",

@@ -225,6 +225,9 @@ pub struct Solver {
     /// An explicit mesh instead of a target.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh: Option<MeshSize>,
+    /// How much traction `fastsim` lets friction carry where; `elliptic` when left out. For no other method.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub traction_bound: Option<TractionBound>,
     /// Give up after this many seconds of solving.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(exclusive_minimum = 0.0)]
@@ -242,6 +245,19 @@ pub enum Method {
     BoundaryElement,
     /// The method of Liu and Hsu: Newton–Raphson with two initial guesses.
     LiuHsu,
+    /// Kalker's simplified theory: a draft in microseconds.
+    Fastsim,
+}
+
+/// Where `fastsim` lets tractions slip.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TractionBound {
+    /// At μ times the pressure, for an ellipse Hertz's semi-ellipsoid.
+    #[default]
+    Elliptic,
+    /// At the square of the pressure, scaled to carry the same μN: for an ellipse Kalker's paraboloid, 4/3 as high in the middle.
+    Parabolic,
 }
 
 /// An explicit mesh: equal strips, cosine-graded cells along x, no clustering.

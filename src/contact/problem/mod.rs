@@ -13,7 +13,7 @@ use std::time::Duration;
 use serde::Serialize;
 
 use crate::contact::case::{
-    Case, Contact, Load, Material, MeshSize, Method, Motion, Motions, Output, Solver,
+    Case, Contact, Load, Material, MeshSize, Method, Motion, Motions, Output, Solver, TractionBound,
 };
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::normal::Region;
@@ -83,6 +83,8 @@ pub struct Problem {
     pub motions: Vec<Motion>,
     /// The method asked for.
     pub method: Method,
+    /// Where `fastsim` lets tractions slip.
+    pub traction_bound: TractionBound,
     /// Target or mesh.
     pub resolution: Resolution,
     /// Time allowed for the whole case.
@@ -147,6 +149,7 @@ impl Problem {
             region,
             motions,
             method: case.solver.method,
+            traction_bound: case.solver.traction_bound.unwrap_or_default(),
             resolution: resolution(&case.solver),
             time_limit: case.solver.time_limit_s.map(Duration::from_secs_f64),
             outputs: case.outputs.clone(),
@@ -279,6 +282,8 @@ struct Canonical<'a> {
     load: Option<&'a Load>,
     motions: &'a [Motion],
     method: Method,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    traction_bound: Option<TractionBound>,
     target_error: Option<f64>,
     mesh: Option<MeshSize>,
     time_limit_s: Option<f64>,
@@ -303,6 +308,11 @@ fn digest(case: &Case, elasticity: &Elasticity, motions: &[Motion]) -> String {
         load: case.load.as_ref(),
         motions,
         method: case.solver.method,
+        // What is left out means the same as the default.
+        traction_bound: case
+            .solver
+            .traction_bound
+            .filter(|bound| *bound != TractionBound::default()),
         target_error,
         mesh: case.solver.mesh,
         time_limit_s: case.solver.time_limit_s,

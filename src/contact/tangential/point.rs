@@ -10,7 +10,7 @@ use crate::contact::tangential::ladder::{CELLS_FIRST, CELLS_MAX, Ladder, Plan, R
 use crate::contact::tangential::level::Level;
 use crate::contact::tangential::trail::Start;
 use crate::contact::tangential::{
-    Failure, Tangential, Work, boundary_element, full_slip, liu_hsu, nested,
+    Failure, Tangential, Work, boundary_element, fastsim, full_slip, liu_hsu, nested,
 };
 
 /// The coarse mesh that gives the method of Liu and Hsu its spin pole: fewer than 30 cells, as they found.
@@ -267,6 +267,7 @@ fn method_used(problem: &Problem) -> Method {
     match problem.method {
         Method::Auto | Method::BoundaryElement => Method::BoundaryElement,
         Method::LiuHsu => Method::LiuHsu,
+        Method::Fastsim => Method::Fastsim,
     }
 }
 
@@ -341,5 +342,8 @@ fn solve_level(
         );
     }
     let motion = level.scale.motion(motion);
+    if problem.method == Method::Fastsim {
+        return Ok(fastsim::solve(problem, level, &motion));
+    }
     boundary_element::solve(level, &motion, start.as_ref(), tolerance(problem), monitor)
 }
