@@ -1,6 +1,9 @@
 //! What can be started, and with which settings? Every command, flag and environment variable.
 
+mod backup;
+mod config;
 mod healthcheck;
+mod keys;
 mod serve;
 mod solve;
 
@@ -10,7 +13,7 @@ use std::process::ExitCode;
 use std::thread::available_parallelism;
 use std::time::Duration;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::contact::problem::Limits;
 use crate::http;
@@ -33,6 +36,12 @@ enum Command {
     ///
     /// Exit code 0: solved; 1: no answer; 2: the case is faulty.
     Solve(SolveArgs),
+    /// Make, list and revoke API keys; also while the service runs.
+    Keys(KeysArgs),
+    /// Copy the data folder, also while the service runs; a service can be started on the copy.
+    Backup(BackupArgs),
+    /// Print the settings that `serve` would run with and where each comes from, as JSON; takes the flags of `serve`.
+    Config(ServeArgs),
     /// Ask a running service whether it is ready; exit code 0 if it is, 1 if not.
     Healthcheck(HealthcheckArgs),
     /// Print the contract of the HTTP API (OpenAPI 3.1, JSON).
@@ -71,6 +80,13 @@ pub struct ServeArgs {
     #[arg(long, env = "RAILHEAD_QUEUE_MAX", default_value_t = 300_000, value_name = "N",
           value_parser = clap::value_parser!(u64).range(1..))]
     pub queue_max: u64,
+    /// Answer a case that is identical to one solved before with that result, without solving it again.
+    #[arg(long, env = "RAILHEAD_CACHE", default_value_t = true, value_name = "BOOL",
+          action = clap::ArgAction::Set)]
+    pub cache: bool,
+    /// How long ended jobs and their results are kept, such as `30d` or `12h`; `forever`: until they are deleted.
+    #[arg(long, env = "RAILHEAD_RETENTION", default_value = "forever", value_name = "TIME", value_parser = retention)]
+    pub retention: Retention,
     /// Seconds a running job may go on after the service was told to stop; then it goes back to the queue.
     #[arg(
         long,
@@ -79,8 +95,156 @@ pub struct ServeArgs {
         value_name = "SECONDS"
     )]
     pub shutdown_grace_s: u32,
+    /// Queued jobs of one tenant beyond which its new ones are turned away.
+    #[arg(long, env = "RAILHEAD_TENANT_QUEUE_MAX", default_value_t = 250_000, value_name = "N",
+          value_parser = clap::value_parser!(u64).range(1..))]
+    pub tenant_queue_max: u64,
+    /// Whether requests without an API key are answered. Without keys and without anonymous use the service does not
+    /// start.
+    #[arg(
+        long,
+        env = "RAILHEAD_ANONYMOUS",
+        value_enum,
+        default_value = "loopback"
+    )]
+    pub anonymous: Anonymous,
+    /// Requests per second of one API key, twice as many at once; 0: any number. Requests without a key are not counted.
+    #[arg(
+        long,
+        env = "RAILHEAD_RATE_LIMIT",
+        default_value_t = 200,
+        value_name = "N"
+    )]
+    pub rate_limit: u32,
+    /// Origins of web pages that may read answers, such as `https://dashboard.example`, separated by commas.
+    #[arg(long, env = "RAILHEAD_CORS_ORIGIN", value_delimiter = ',', value_name = "ORIGIN", value_parser = origin)]
+    pub cors_origin: Vec<String>,
     #[command(flatten)]
     pub log: LogArgs,
+}
+
+/// How long ended jobs are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Retention(pub Option<Duration>);
+
+/// Reads a time such as `30d`, `1w` or `90m`, or `forever`.
+fn retention(text: &str) -> Result<Retention, String> {
+    if text == "forever" {
+        return Ok(Retention(None));
+    }
+    let wrong = "allowed are `forever` or a time of at least 1 s such as `12h`, `30d`, `8w`";
+    let span: jiff::Span = text.parse().map_err(|_| wrong.to_owned())?;
+    let seconds = span
+        .total((
+            jiff::Unit::Second,
+            jiff::SpanRelativeTo::days_are_24_hours(),
+        ))
+        .map_err(|_| wrong.to_owned())?;
+    match Duration::try_from_secs_f64(seconds) {
+        Ok(time) if time >= Duration::from_secs(1) => Ok(Retention(Some(time))),
+        _ => Err(wrong.to_owned()),
+    }
+}
+
+/// When requests without an API key are answered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Anonymous {
+    /// While the service listens on a loopback address.
+    Loopback,
+    /// On every address: whoever reaches the port may use the service.
+    Always,
+    /// Not at all.
+    Never,
+}
+
+/// Settings of `backup`.
+#[derive(Debug, Clone, Args)]
+pub struct BackupArgs {
+    /// Folder to make; it must not be there yet.
+    #[arg(long, value_name = "FOLDER")]
+    pub to: PathBuf,
+    /// Data folder of the service.
+    #[arg(
+        long,
+        env = "RAILHEAD_DATA_DIR",
+        default_value = "./railhead-data",
+        value_name = "FOLDER"
+    )]
+    pub data_dir: PathBuf,
+}
+
+/// Settings of `keys`.
+#[derive(Debug, Clone, Args)]
+pub struct KeysArgs {
+    #[command(subcommand)]
+    pub action: KeysAction,
+}
+
+/// What can be done with API keys.
+#[derive(Debug, Clone, Subcommand)]
+pub enum KeysAction {
+    /// Make a key and print it, this one time.
+    Create {
+        /// Whose jobs the key opens; keys of the tenant `operator` may also read `/metrics`.
+        #[arg(long, value_name = "TENANT")]
+        tenant: String,
+        /// What the key is for.
+        #[arg(long, value_name = "TEXT")]
+        name: Option<String>,
+        /// Data folder of the service.
+        #[arg(
+            long,
+            env = "RAILHEAD_DATA_DIR",
+            default_value = "./railhead-data",
+            value_name = "FOLDER"
+        )]
+        data_dir: PathBuf,
+    },
+    /// List all keys without their secrets.
+    List {
+        /// Data folder of the service.
+        #[arg(
+            long,
+            env = "RAILHEAD_DATA_DIR",
+            default_value = "./railhead-data",
+            value_name = "FOLDER"
+        )]
+        data_dir: PathBuf,
+    },
+    /// Revoke a key; a running service refuses it within two seconds.
+    Revoke {
+        /// Id of the key, as `list` shows it.
+        #[arg(value_name = "ID")]
+        id: String,
+        /// Data folder of the service.
+        #[arg(
+            long,
+            env = "RAILHEAD_DATA_DIR",
+            default_value = "./railhead-data",
+            value_name = "FOLDER"
+        )]
+        data_dir: PathBuf,
+    },
+}
+
+/// Reads an origin: scheme and authority, nothing else.
+fn origin(text: &str) -> Result<String, String> {
+    let rest = text
+        .strip_prefix("https://")
+        .or_else(|| text.strip_prefix("http://"));
+    let plain = |rest: &str| {
+        !rest.is_empty()
+            && rest
+                .bytes()
+                .all(|byte| byte.is_ascii_graphic() && !b"/*?#@".contains(&byte))
+    };
+    if rest.is_some_and(plain) {
+        return Ok(text.to_owned());
+    }
+    Err(
+        "an origin is `http://` or `https://` and a host, perhaps with a port, and no path"
+            .to_owned(),
+    )
 }
 
 /// Settings of `solve`.
@@ -157,9 +321,21 @@ impl CaseArgs {
 /// Reads the command line, does what it says, and returns the exit code.
 #[must_use]
 pub fn run() -> ExitCode {
-    let done = match Cli::parse().command {
+    let mut command = Cli::command();
+    let given = command.get_matches_mut();
+    let cli = Cli::from_arg_matches(&given).unwrap_or_else(|error| error.exit());
+    let done = match cli.command {
         Command::Serve(args) => serve::run(&args),
         Command::Solve(args) => solve::run(&args),
+        Command::Config(args) => match (
+            command.find_subcommand("config"),
+            given.subcommand_matches("config"),
+        ) {
+            (Some(command), Some(given)) => print(&config::describe(command, given, &args)),
+            _ => unreachable!("the subcommand was read from these"),
+        },
+        Command::Backup(args) => backup::run(&args),
+        Command::Keys(args) => keys::run(&args),
         Command::Healthcheck(args) => healthcheck::run(&args.url),
         Command::Openapi => print(&http::openapi_json()),
     };
@@ -188,8 +364,6 @@ fn complain(text: &str) {
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-
     use super::*;
 
     #[test]
@@ -211,6 +385,18 @@ mod tests {
                 arg.get_env().and_then(|name| name.to_str()),
                 Some(variable.as_str())
             );
+        }
+    }
+
+    #[test]
+    fn a_retention_is_a_time_with_its_unit_or_forever() {
+        let days = |days: u64| Ok(Retention(Some(Duration::from_secs(days * 24 * 3600))));
+        assert_eq!(retention("forever"), Ok(Retention(None)));
+        assert_eq!(retention("30d"), days(30));
+        assert_eq!(retention("2w"), days(14));
+        assert_eq!(retention("24h"), days(1));
+        for wrong in ["", "30", "0s", "-1d", "1 month", "soon"] {
+            assert!(retention(wrong).is_err(), "{wrong:?}");
         }
     }
 

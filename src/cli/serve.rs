@@ -10,13 +10,13 @@
 use std::process::ExitCode;
 use std::time::Duration;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use tokio::net::TcpListener;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::time::{Instant, timeout};
 use tokio_util::sync::CancellationToken;
 
-use crate::cli::ServeArgs;
+use crate::cli::{Anonymous, ServeArgs};
 use crate::http::{self, HttpOptions};
 use crate::jobs::{Jobs, Options};
 use crate::telemetry;
@@ -46,18 +46,45 @@ async fn serve(args: &ServeArgs) -> anyhow::Result<()> {
         limits: args.case.limits(),
         attempts_max: args.attempts_max,
         queue_max: args.queue_max,
+        cache: args.cache,
+        retention: args.retention.0,
+        tenant_queue_max: args.tenant_queue_max,
         ..Options::new(&args.data_dir)
     })
     .await?;
     let listener = TcpListener::bind(args.listen)
         .await
         .with_context(|| format!("cannot listen on {}", args.listen))?;
-    jobs.start()?;
     let address = listener.local_addr()?;
+    let anonymous = match args.anonymous {
+        Anonymous::Loopback => address.ip().is_loopback(),
+        Anonymous::Always => true,
+        Anonymous::Never => false,
+    };
+    if !anonymous && !jobs.any_key().await? {
+        jobs.shutdown(Duration::ZERO).await;
+        bail!(
+            "nobody could use a service on {address}: there is no API key, and requests without one are only answered \
+             on loopback; make a key with `railhead keys create --tenant NAME --data-dir {}`, or let everybody in who \
+             reaches the port with `--anonymous always`",
+            args.data_dir.display()
+        );
+    }
+    jobs.start()?;
     tracing::info!(%address, workers, data_dir = %args.data_dir.display(), "listening");
+    if anonymous && !address.ip().is_loopback() {
+        tracing::warn!(%address, "whoever reaches this address may use the service without a key");
+    }
 
     let stop = CancellationToken::new();
-    let router = http::router(jobs.clone(), HttpOptions::default());
+    let options = HttpOptions {
+        anonymous,
+        requests_per_second: args.rate_limit,
+        ..HttpOptions::default()
+    };
+    let origins = args.cors_origin.iter().map(|origin| origin.parse());
+    let origins = origins.collect::<Result<_, _>>().context("--cors-origin")?;
+    let router = http::allow_origins(http::router(jobs.clone(), options), origins);
     let server =
         axum::serve(listener, router).with_graceful_shutdown(stop.clone().cancelled_owned());
     let mut server = tokio::spawn(server.into_future());

@@ -8,6 +8,9 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::contact::geometry::formats::Format;
+use crate::contact::geometry::wheel_rail::Side;
+
 /// One contact case: two bodies, how they are pressed together and how they roll.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Case {
@@ -127,17 +130,87 @@ pub enum Contact {
         /// `pressure_mpa[j][i]` at `(x_mm[i], y_mm[j])`, not negative, 0 outside the contact.
         pressure_mpa: Vec<Vec<f64>>,
     },
+    /// A wheel on a rail, by their cross-sections. Every patch is found, and solved in a frame of its own.
+    Profiles {
+        /// Cross-section of the rail.
+        #[schema(inline = false)]
+        rail: Box<CrossSection>,
+        /// Cross-section of the wheel.
+        #[schema(inline = false)]
+        wheel: Box<CrossSection>,
+        /// Which wheel of the wheelset, seen along rolling.
+        side: Side,
+        /// Radius of the wheel where z of its cross-section is 0, in mm.
+        #[schema(exclusive_minimum = 0.0)]
+        rolling_radius_mm: f64,
+        /// Distance of the gauge faces of the two rails, in mm; 1435 when left out.
+        #[schema(required = false)]
+        gauge_mm: f64,
+        /// Depth below the top of the rail at which the gauge is measured, in mm; 14 when left out.
+        #[schema(required = false)]
+        gauge_height_mm: f64,
+        /// Turn of the rail about the origin of its cross-section, in rad, positive with its top toward the track centre; 0
+        /// when left out.
+        #[schema(required = false)]
+        cant_rad: f64,
+        /// Distance of the backs of the two flanges, in mm; 1360 when left out.
+        #[schema(required = false)]
+        flange_back_distance_mm: f64,
+        /// y of the back of the flange in the wheel's cross-section, in mm; -70 when left out.
+        #[schema(required = false)]
+        flange_back_position_mm: f64,
+        /// Shift of the wheelset to the left, in mm; 0 when left out.
+        #[schema(required = false)]
+        lateral_shift_mm: f64,
+        /// Yaw of the wheelset in rad, positive from x to y; 0 when left out.
+        #[schema(required = false)]
+        yaw_rad: f64,
+        /// Roll of the wheelset in rad, positive from y to z; 0 when left out.
+        #[schema(required = false)]
+        roll_rad: f64,
+    },
+}
+
+/// A cross-section of a rail or a wheel, as points or as the text of a file; exactly one of the two.
+///
+/// y is positive to the field side and z positive down unless `mirror_y` and `mirror_z`, the file or the shape itself say otherwise.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct CrossSection {
+    /// Points `[y, z]` in mm, in order along the cross-section.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub points_mm: Option<Vec<[f64; 2]>>,
+    /// Format of `text`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub format: Option<Format>,
+    /// What the file says; its text, never a path.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub text: Option<String>,
+    /// y of the points is positive to the track centre. Left out, the file tells; then a wheel's flange, and a rail is as
+    /// above.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mirror_y: Option<bool>,
+    /// z of the points is positive up. Left out, the file tells, then the shape.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mirror_z: Option<bool>,
+    /// Waves shorter than about this along the cross-section are smoothed away, in mm; 0 (none) when left out.
+    #[schema(required = false)]
+    pub smoothing_mm: f64,
 }
 
 /// How hard the bodies are pressed together; exactly one member is given.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct Load {
-    /// Normal force in N, more than 0.
+    /// Normal force in N, more than 0. For `profiles` the sum over all patches, each along its own normal.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(exclusive_minimum = 0.0)]
     pub normal_force_n: Option<f64>,
+    /// Vertical force of the wheel on the rail in N, more than 0; for `profiles` only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(exclusive_minimum = 0.0)]
+    pub vertical_force_n: Option<f64>,
     /// Approach of distant points in mm. For `radii` and `ellipse` it counts from first touch and is more than 0; for gaps it
-    /// counts from gap = 0 of the given data and is more than the least gap.
+    /// counts from gap = 0 of the given data and is more than the least gap; for `profiles` the wheel is lowered by it, vertically
+    /// from first touch.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub approach_mm: Option<f64>,
 }
@@ -169,6 +242,39 @@ pub enum Motions {
         /// What varies, and what stays.
         sweep: Sweep,
     },
+    /// The motion of the wheelset, from which every patch gets its own creepages; for `profiles` only.
+    Wheelset {
+        /// How the wheelset moves.
+        wheelset: Wheelset,
+    },
+}
+
+/// Motion of a wheelset. Exactly one of `angular_velocity_rad_per_s` and `free_rolling_radius_mm` is given.
+///
+/// With the speed V, the axle e, the angular velocity ω = Ω e + (roll rate, 0, yaw rate) and r from the wheelset's centre to the
+/// patch, the wheel's material moves with v = (V, lateral velocity, 0) + ω × r; the creepages of a patch with the tangent t and the
+/// normal n are v_x / V, v · t / V and the spin ω · n / V.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct Wheelset {
+    /// Speed V along x in mm/s, more than 0.
+    #[schema(exclusive_minimum = 0.0)]
+    pub speed_mm_per_s: f64,
+    /// Angular velocity Ω about the axle in rad/s, positive for rolling forward.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub angular_velocity_rad_per_s: Option<f64>,
+    /// Radius in mm at which the wheel would roll freely: Ω is the speed divided by it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(exclusive_minimum = 0.0)]
+    pub free_rolling_radius_mm: Option<f64>,
+    /// Velocity of the centre to the left in mm/s; 0 when left out.
+    #[schema(required = false)]
+    pub lateral_velocity_mm_per_s: f64,
+    /// Rate of the yaw in rad/s; 0 when left out.
+    #[schema(required = false)]
+    pub yaw_rate_rad_per_s: f64,
+    /// Rate of the roll in rad/s; 0 when left out.
+    #[schema(required = false)]
+    pub roll_rate_rad_per_s: f64,
 }
 
 /// Ranges of the motion's components. A component left out is 0.

@@ -11,6 +11,7 @@ pub mod monitor;
 pub mod normal;
 pub mod outputs;
 pub mod problem;
+mod profiles;
 mod read;
 pub mod solution;
 pub mod tangential;
@@ -20,6 +21,7 @@ use serde_json::Value;
 
 use crate::contact::error::{CaseError, SolveError};
 use crate::contact::monitor::{Monitor, Watch};
+use crate::contact::normal::Region;
 use crate::contact::outputs::assemble::{assemble, wants_fields};
 use crate::contact::problem::{Limits, Problem};
 use crate::contact::solution::{Fields, Solution};
@@ -40,22 +42,28 @@ pub fn check(case: &Value, limits: &Limits) -> Result<Problem, CaseError> {
 }
 
 /// Solves a checked case: region and pressure where they are not known yet, then every motion from a coarse mesh level
-/// up to the first that meets the target.
+/// up to the first that meets the target; of a wheel on a rail patch by patch.
 ///
 /// # Errors
 /// A named reason why there is no answer.
 pub fn solve(problem: &Problem, monitor: &dyn Monitor) -> Result<(Solution, Fields), SolveError> {
+    if let Region::Profiles(contact) = &problem.region {
+        return profiles::solve(problem, contact, monitor);
+    }
     let watch = Watch::new(monitor, problem.time_limit, problem.motions.len());
-    let problem = problem.pressed(&watch)?;
-    let problem = problem.as_ref();
+    answer(problem.pressed(&watch)?.as_ref(), &watch)
+}
+
+/// Solves every motion of a problem whose region and pressure are known.
+fn answer(problem: &Problem, watch: &Watch) -> Result<(Solution, Fields), SolveError> {
     let mut ladder = Ladder::new(problem);
     let mut points = Vec::with_capacity(problem.motions.len());
     for index in 0..problem.motions.len() {
-        points.push(point::solve(problem, &mut ladder, index, &watch)?);
+        points.push(point::solve(problem, &mut ladder, index, watch)?);
         watch.advance();
     }
     if wants_fields(problem) {
-        points = on_one_level(problem, &mut ladder, points, &watch)?;
+        points = on_one_level(problem, &mut ladder, points, watch)?;
     }
     if let (Some(first), Some(normal)) = (points.first_mut(), problem.normal) {
         // What all motions share is charged to the first.

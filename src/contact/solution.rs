@@ -21,6 +21,9 @@ pub struct Solution {
     /// How region and pressure were found; absent where they were known beforehand.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub normal: Option<NormalReport>,
+    /// How far the wheel is below the height of first touch, vertically, in mm; only for `profiles`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub wheel_lowering_mm: Option<f64>,
     /// The point that rigid slip and moments refer to, and where it is.
     pub origin: Origin,
     /// The frame in words.
@@ -86,8 +89,31 @@ pub struct PatchSolution {
     pub semi_axes_mm: Option<[f64; 2]>,
     /// Extent of the patch `[x_min, x_max, y_min, y_max]` in mm.
     pub extent_mm: [f64; 4],
+    /// Where the patch lies on wheel and rail; only for `profiles`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub position: Option<Position>,
     /// One entry per motion, in the order of the case.
     pub points: Vec<PointSolution>,
+}
+
+/// Place of a patch of wheel and rail, that of its load centre, and the frame of its coordinates.
+///
+/// Track axes: x along rolling, y to the left from the middle of the track, z up from the top of the rail.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Position {
+    /// The load centre in track axes, `[x, y, z]` in mm.
+    pub track_mm: [f64; 3],
+    /// The load centre on the rail's cross-section, `[y, z]` in mm, y to the field side and z down.
+    pub rail_mm: [f64; 2],
+    /// The same on the wheel's cross-section.
+    pub wheel_mm: [f64; 2],
+    /// Turn about x from the track's axes to those of the patch, in rad: its normal is `(0, −sin, cos)` of this angle.
+    pub contact_angle_rad: f64,
+    /// Radius of the wheel at the load centre in mm.
+    pub rolling_radius_mm: f64,
+    /// Origin of the coordinates of the patch in track axes, `[x, y, z]` in mm: the load centre of the patches that share
+    /// these coordinates because they lie near each other; usually the patch is alone.
+    pub origin_track_mm: [f64; 3],
 }
 
 /// The tangential answer of one patch for one motion.
@@ -185,13 +211,16 @@ pub struct MeshReport {
     pub cells: u32,
 }
 
-/// Sums over all patches for one motion.
+/// Sums over all patches for one motion; for `profiles` in track axes, normal forces included.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Total {
     /// Longitudinal force on the lower body in N.
     pub force_x_n: f64,
     /// Lateral force on the lower body in N.
     pub force_y_n: f64,
+    /// Vertical force on the lower body in N, z up, so that a wheel's load is negative; only for `profiles`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub force_z_n: Option<f64>,
     /// Moment about the origin on the lower body in N·mm.
     pub moment_z_n_mm: f64,
     /// Estimated absolute errors; null where there is nothing to estimate them from.

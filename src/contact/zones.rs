@@ -12,3 +12,14 @@ pub enum Zone {
     /// The friction bound is reached and the surfaces slip.
     Slip,
 }
+
+impl Zone {
+    /// The word for this zone in every text.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Zone::Stick => "stick",
+            Zone::Slip => "slip",
+        }
+    }
+}

@@ -1,14 +1,23 @@
 //! Content negotiation: JSON unless a resource offers more.
 
-use axum::extract::Request;
-use axum::http::{HeaderMap, header};
+use axum::extract::{Query as Pairs, Request};
+use axum::http::{HeaderMap, Uri, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
 use crate::http::error::{ApiError, Kind};
+use crate::http::query::Query;
 
-/// Refuses requests whose `Accept` excludes `application/json`.
+/// Refuses requests that want something else than JSON, by `format` or because `Accept` excludes `application/json`.
 pub async fn require_json(request: Request, next: Next) -> Response {
+    let named = named(request.uri());
+    if let Some(other) = named.as_deref().filter(|name| *name != Format::Json.name()) {
+        let detail = format!("`format` is `{other}`; this resource answers `json` only");
+        return ApiError::new(Kind::NotAcceptable, detail).into_response();
+    }
+    if named.is_some() {
+        return next.run(request).await;
+    }
     if accepts_json(request.headers()) {
         return next.run(request).await;
     }
@@ -23,10 +32,22 @@ pub async fn require_json(request: Request, next: Next) -> Response {
 /// A form in which something can be answered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
+    /// `application/json`.
+    Json,
     /// `application/x-ndjson`: one JSON value per line.
     Ndjson,
     /// `text/csv`.
     Csv,
+    /// NumPy's archive of arrays.
+    Npz,
+    /// Legacy VTK, binary.
+    Vtk,
+    /// A picture as SVG.
+    Svg,
+    /// A picture as PNG.
+    Png,
+    /// Server-sent events.
+    Events,
 }
 
 impl Format {
@@ -34,8 +55,14 @@ impl Format {
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
+            Format::Json => "json",
             Format::Ndjson => "ndjson",
             Format::Csv => "csv",
+            Format::Npz => "npz",
+            Format::Vtk => "vtk",
+            Format::Svg => "svg",
+            Format::Png => "png",
+            Format::Events => "events",
         }
     }
 
@@ -43,16 +70,27 @@ impl Format {
     #[must_use]
     pub fn media_type(self) -> &'static str {
         match self {
+            Format::Json => "application/json",
             Format::Ndjson => "application/x-ndjson",
             Format::Csv => "text/csv; charset=utf-8",
+            Format::Npz => "application/x-npz",
+            Format::Vtk => "application/x-vtk",
+            Format::Svg => "image/svg+xml",
+            Format::Png => "image/png",
+            Format::Events => "text/event-stream",
         }
     }
+}
 
-    /// The format of that name, if it is offered.
-    #[must_use]
-    pub fn named(name: &str, offered: &[Format]) -> Option<Format> {
-        offered.iter().copied().find(|format| format.name() == name)
-    }
+/// Takes the parameter `format` from a query.
+pub fn named_format(query: &mut Query, offered: &[Format]) -> Option<Format> {
+    let names: Vec<String> = offered
+        .iter()
+        .map(|format| format!("`{}`", format.name()))
+        .collect();
+    query.take("format", &names.join(", "), |text| {
+        offered.iter().copied().find(|format| format.name() == text)
+    })
 }
 
 /// The format to answer in: the one that was named, else the one that `Accept` likes best, the first one offered among
@@ -89,6 +127,13 @@ pub fn choose(
         );
         ApiError::new(Kind::NotAcceptable, detail)
     })
+}
+
+/// What `format` is in a query that is not read otherwise.
+fn named(uri: &Uri) -> Option<String> {
+    let Pairs(pairs) = Pairs::<Vec<(String, String)>>::try_from_uri(uri).ok()?;
+    let format = pairs.into_iter().find(|(name, _)| name == "format");
+    format.map(|(_, value)| value)
 }
 
 /// Does `Accept` allow `application/json`?

@@ -3,7 +3,6 @@
 use std::time::Duration;
 
 use axum::body::{Body, Bytes};
-use axum::extract::State;
 use axum::http::{HeaderMap, Uri, header};
 use axum::response::{IntoResponse, Response};
 use futures_util::stream::try_unfold;
@@ -13,7 +12,9 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use crate::contact::solution::Solution;
-use crate::http::accept::{Format, choose};
+use crate::http::accept::{Format, choose, named_format};
+use crate::http::access::Caller;
+use crate::http::coding::AsItComes;
 use crate::http::error::ApiError;
 use crate::http::job::BatchId;
 use crate::http::problem::Problem;
@@ -74,7 +75,7 @@ problems! {
     responses((status = 200, description = "One line per job", content((BatchLine = "application/x-ndjson"), (String = "text/csv"))), BatchResultProblems)
 )]
 pub async fn results(
-    State(jobs): State<Jobs>,
+    Caller(jobs): Caller,
     BatchId(id): BatchId,
     uri: Uri,
     headers: HeaderMap,
@@ -84,9 +85,7 @@ pub async fn results(
         whole(text, 0, WAIT_MAX_SECONDS)
     });
     let offered = [Format::Ndjson, Format::Csv];
-    let named = query.take("format", "`ndjson` or `csv`", |text| {
-        Format::named(text, &offered)
-    });
+    let named = named_format(&mut query, &offered);
     query.finish()?;
     let format = choose(&headers, named, &offered)?;
     // Unknown batches are answered before the stream begins.
@@ -105,7 +104,15 @@ pub async fn results(
         head,
     };
     let body = Body::from_stream(try_unfold(place, next_piece));
-    Ok(([(header::CONTENT_TYPE, format.media_type())], body).into_response())
+    let headers = [
+        (header::CONTENT_TYPE, format.media_type()),
+        (header::VARY, "Accept"),
+    ];
+    let mut response = (headers, body).into_response();
+    if wait.is_some() {
+        response.extensions_mut().insert(AsItComes);
+    }
+    Ok(response)
 }
 
 /// Where a stream of results stands.
@@ -176,6 +183,8 @@ fn write_ndjson(lines: &[Line]) -> Result<Vec<u8>, JobsError> {
                 JobsError::Damaged(format!("solution of job {} is no object", job.id))
             })?;
             out.extend_from_slice(open);
+            out.extend_from_slice(b",\"cached\":");
+            write_json(&mut out, &job.cached)?;
             out.extend_from_slice(b",\"links\":");
             write_json(&mut out, &JobResult::links(job.id, &outputs(line)))?;
             out.extend_from_slice(b"}}");

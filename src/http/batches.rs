@@ -3,31 +3,25 @@
 use std::collections::BTreeMap;
 
 use axum::Json;
-use axum::body::Body;
 use axum::extract::{Request, State};
-use axum::http::{HeaderMap, StatusCode, Uri, header};
+use axum::http::{StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
-use futures_util::StreamExt;
 use serde::Serialize;
-use tokio::time::timeout;
 use utoipa::ToSchema;
+use uuid::Uuid;
 
 use crate::contact::case::Case;
 use crate::http::HttpOptions;
-use crate::http::body::{essence, read_strict};
-use crate::http::elements::{Element, Layout, Splitter};
+use crate::http::access::Caller;
+use crate::http::batch_body::{form, read_draft};
 use crate::http::error::{ApiError, Kind};
 use crate::http::job::{BatchId, rfc3339};
-use crate::http::jobs::idempotency_key;
+use crate::http::jobs::{idempotency_key, wants_fresh};
 use crate::http::problem::Fault;
 use crate::http::problems::problems;
 use crate::http::query::Query;
-use crate::jobs::Jobs;
 use crate::jobs::batch::{Batch, Draft};
 use crate::jobs::job::State as JobState;
-
-/// Cases are checked in portions of about this many bytes.
-const PORTION_BYTES: usize = 256 << 10;
 
 /// A batch that was accepted.
 #[derive(Debug, Serialize, ToSchema)]
@@ -113,6 +107,7 @@ fn links(batch: &Batch) -> BTreeMap<String, String> {
     BTreeMap::from([
         ("results".to_owned(), format!("{own}/results")),
         ("cancel".to_owned(), format!("{own}/cancel")),
+        ("events".to_owned(), format!("{own}/events")),
         ("jobs".to_owned(), format!("/v1/jobs?batch={}", batch.id)),
         ("self".to_owned(), own),
     ])
@@ -120,15 +115,16 @@ fn links(batch: &Batch) -> BTreeMap<String, String> {
 
 problems! {
     /// What `POST /v1/batches` can fail with.
-    BatchProblems: MalformedJson, UnreadableBody, BadQuery, BadHeader, BodyTimeout, BodyTooLarge, UnsupportedMediaType,
-    FaultyBatch, IdempotencyConflict, QueueFull, Draining
+    BatchProblems: MalformedJson, UnreadableBody, BadQuery, BadHeader, BodyTimeout, BodyTooLarge, UnsupportedMediaType, UnsupportedEncoding,
+    FaultyBatch, FaultyTable, JobNotFound, IdempotencyConflict, QuotaExceeded, QueueFull, Draining, StorageFull, StorageUnwritable
 }
 
 /// Submits many cases as one batch of jobs.
 ///
-/// The body is a JSON array of cases or one case per line (`application/x-ndjson`); it is read as it arrives. All jobs of
+/// The body is a JSON array of cases, one case per line (`application/x-ndjson`), or a table (`text/csv`) whose lines fill the cells of
+/// a template case; it is read as it arrives. All jobs of
 /// a batch answered with `202` are stored durably. Without `accept=valid` one faulty case refuses the whole batch (`422`), and
-/// nothing is stored; every fault names its case, and its line in NDJSON. A JSON array that is not JSON is `400`; a line that is not JSON is a faulty case.
+/// nothing is stored; every fault names its case, and its line in NDJSON and CSV. A JSON array that is not JSON is `400`; a line that is not JSON is a faulty case.
 #[utoipa::path(
     post,
     path = "/v1/batches",
@@ -136,11 +132,14 @@ problems! {
     operation_id = "submit_batch",
     params(
         ("accept" = Option<String>, Query, description = "`all` (when left out): one faulty case refuses the batch; `valid`: faulty cases are left out and reported", example = "valid"),
-        ("Idempotency-Key" = Option<String>, Header, description = "1 to 255 visible ASCII characters. Repeating a request with the same key and the same cases answers the first batch instead of making another")
+        ("template" = Option<String>, Query, description = "With `text/csv`, and needed there: the job whose case is the template", format = "uuid"),
+        ("Idempotency-Key" = Option<String>, Header, description = "1 to 255 visible ASCII characters. Repeating a request with the same key and the same cases answers the first batch instead of making another"),
+        ("Cache-Control" = Option<String>, Header, description = "`no-cache`: solve all cases, also those that are identical to cases solved before", example = "no-cache")
     ),
     request_body(content(
         (Vec<Case> = "application/json"),
-        (String = "application/x-ndjson")
+        (String = "application/x-ndjson"),
+        (String = "text/csv")
     ), description = "Cases, at most 200 000, each of at most 8 MiB and together at most 1 GiB"),
     responses(
         (status = 202, description = "The jobs are stored and will be solved", body = BatchReceipt, headers(
@@ -150,14 +149,16 @@ problems! {
     )
 )]
 pub async fn submit(
-    State(jobs): State<Jobs>,
+    Caller(jobs): Caller,
     State(options): State<HttpOptions>,
     request: Request,
 ) -> Result<Response, ApiError> {
     let key = idempotency_key(request.headers())?;
-    let layout = layout(request.headers())?;
-    let valid_only = accept_valid(request.uri())?;
-    let draft = read_draft(&jobs, options, layout, request).await?;
+    let (valid_only, template) = wishes(request.uri())?;
+    let form = form(&jobs, request.headers(), template).await?;
+    let fresh = wants_fresh(request.headers());
+    let mut draft = read_draft(&jobs, options, form, request).await?;
+    draft.fresh = fresh;
     if draft.cases == draft.rejected || (draft.rejected > 0 && !valid_only) {
         return Err(refusal(&draft));
     }
@@ -174,123 +175,19 @@ pub async fn submit(
     Ok((StatusCode::ACCEPTED, location, Json(receipt)).into_response())
 }
 
-fn accept_valid(uri: &Uri) -> Result<bool, ApiError> {
-    let mut query = Query::read(uri, &["accept"]);
+/// Are good cases taken without the faulty ones, and which job is the template of a table?
+fn wishes(uri: &Uri) -> Result<(bool, Option<Uuid>), ApiError> {
+    let mut query = Query::read(uri, &["accept", "template"]);
     let valid = query.take("accept", "`all` or `valid`", |text| match text {
         "all" => Some(false),
         "valid" => Some(true),
         _ => None,
     });
-    query.finish()?;
-    Ok(valid.unwrap_or(false))
-}
-
-fn layout(headers: &HeaderMap) -> Result<Layout, ApiError> {
-    match essence(headers).as_str() {
-        "application/json" => Ok(Layout::Array),
-        "application/x-ndjson" | "application/ndjson" | "application/jsonl" => Ok(Layout::Lines),
-        other => Err(ApiError::new(
-            Kind::UnsupportedMediaType,
-            format!(
-                "the content type is `{other}`; send an array with `application/json` or one case per line with `application/x-ndjson`"
-            ),
-        )),
-    }
-}
-
-/// Reads and checks the body as it arrives.
-async fn read_draft(
-    jobs: &Jobs,
-    options: HttpOptions,
-    layout: Layout,
-    request: Request<Body>,
-) -> Result<Draft, ApiError> {
-    let too_large = || {
-        ApiError::new(
-            Kind::BodyTooLarge,
-            format!(
-                "the body is larger than the {} bytes that are allowed for one batch",
-                options.batch_max_bytes
-            ),
-        )
-    };
-    let declared = request.headers().get(header::CONTENT_LENGTH);
-    let declared = declared.and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
-    if declared.is_some_and(|length| length > options.batch_max_bytes) {
-        return Err(too_large());
-    }
-    let mut draft = jobs.draft()?;
-    let mut splitter = Splitter::new(layout, options.body_max_bytes);
-    let mut pieces = request.into_body().into_data_stream();
-    let mut portion = Vec::new();
-    let (mut total, mut held) = (0_u64, 0);
-    loop {
-        let piece = timeout(options.body_timeout, pieces.next()).await;
-        let piece = piece.map_err(|_| {
-            ApiError::new(
-                Kind::BodyTimeout,
-                format!(
-                    "nothing of the body arrived for {} s",
-                    options.body_timeout.as_secs_f64()
-                ),
-            )
-        })?;
-        let Some(piece) = piece else { break };
-        let piece =
-            piece.map_err(|error| ApiError::new(Kind::UnreadableBody, error.to_string()))?;
-        total += piece.len() as u64;
-        if total > options.batch_max_bytes {
-            return Err(too_large());
-        }
-        held += piece.len();
-        splitter.feed(&piece, &mut portion)?;
-        if held >= PORTION_BYTES {
-            held = 0;
-            draft = check(jobs, draft, layout, std::mem::take(&mut portion)).await?;
-            require_count(&draft, options)?;
-        }
-    }
-    splitter.end(&mut portion)?;
-    draft = check(jobs, draft, layout, portion).await?;
-    require_count(&draft, options)?;
-    Ok(draft)
-}
-
-fn require_count(draft: &Draft, options: HttpOptions) -> Result<(), ApiError> {
-    if draft.cases <= options.batch_max_cases {
-        return Ok(());
-    }
-    Err(ApiError::new(
-        Kind::BodyTooLarge,
-        format!(
-            "the batch has more than the {} cases that are allowed",
-            options.batch_max_cases
-        ),
-    ))
-}
-
-/// Checks some cases off the threads that answer requests.
-async fn check(
-    jobs: &Jobs,
-    mut draft: Draft,
-    layout: Layout,
-    portion: Vec<Element>,
-) -> Result<Draft, ApiError> {
-    let jobs = jobs.clone();
-    let checked = tokio::task::spawn_blocking(move || {
-        for element in portion {
-            let case = read_strict(&element.text);
-            let case = match (case, layout) {
-                (Err(error), Layout::Array) => {
-                    return Err(ApiError::malformed_element(draft.cases, &error));
-                }
-                (case, _) => case.map_err(|error| format!("the line is not JSON: {error}")),
-            };
-            draft.add(&jobs, element.line, &element.text, case)?;
-        }
-        Ok(draft)
+    let template = query.take("template", "the id of a job", |text| {
+        Uuid::try_parse(text).ok()
     });
-    checked.await.map_err(|error| ApiError::internal(&error))?
+    query.finish()?;
+    Ok((valid.unwrap_or(false), template))
 }
 
 /// Why a batch is not taken.
@@ -341,7 +238,7 @@ problems! {
     responses((status = 200, description = "The batch", body = BatchAnswer), LookBatchProblems)
 )]
 pub async fn look(
-    State(jobs): State<Jobs>,
+    Caller(jobs): Caller,
     BatchId(id): BatchId,
 ) -> Result<Json<BatchAnswer>, ApiError> {
     Ok(Json(jobs.batch(id).await?.into()))
@@ -360,7 +257,7 @@ pub async fn look(
         LookBatchProblems
     )
 )]
-pub async fn cancel(State(jobs): State<Jobs>, BatchId(id): BatchId) -> Result<Response, ApiError> {
+pub async fn cancel(Caller(jobs): Caller, BatchId(id): BatchId) -> Result<Response, ApiError> {
     let batch: BatchAnswer = jobs.cancel_batch(id).await?.into();
     let status = if batch.ended {
         StatusCode::OK
@@ -368,4 +265,23 @@ pub async fn cancel(State(jobs): State<Jobs>, BatchId(id): BatchId) -> Result<Re
         StatusCode::ACCEPTED
     };
     Ok((status, Json(batch)).into_response())
+}
+
+problems! {
+    /// What deleting a batch can fail with.
+    DeleteBatchProblems: BatchNotFound, BatchNotEnded
+}
+
+/// Removes a batch of which every job has ended, with its jobs, their cases and their results.
+#[utoipa::path(
+    delete,
+    path = "/v1/batches/{id}",
+    tag = "batches",
+    operation_id = "delete_batch",
+    params(("id" = String, Path, description = "Id of the batch", format = "uuid")),
+    responses((status = 204, description = "The batch is gone"), DeleteBatchProblems)
+)]
+pub async fn delete(Caller(jobs): Caller, BatchId(id): BatchId) -> Result<StatusCode, ApiError> {
+    jobs.delete_batch(id).await?;
+    Ok(StatusCode::NO_CONTENT)
 }

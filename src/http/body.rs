@@ -10,6 +10,7 @@ use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor}
 use serde_json::{Map, Number, Value};
 
 use crate::http::HttpOptions;
+use crate::http::coding::too_long;
 use crate::http::error::{ApiError, Kind};
 
 /// The JSON body of a request. What it means is for others to judge.
@@ -100,6 +101,7 @@ async fn read_whole<S: Send + Sync>(
         Ok(Err(rejection)) if rejection.status() == StatusCode::PAYLOAD_TOO_LARGE => {
             Err(too_large())
         }
+        Ok(Err(rejection)) if too_long(&rejection) => Err(too_large()),
         Ok(Err(rejection)) => Err(ApiError::new(Kind::UnreadableBody, rejection.body_text())),
         Err(_) => Err(ApiError::new(
             Kind::BodyTimeout,

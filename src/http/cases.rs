@@ -1,15 +1,14 @@
 //! `/v1/cases/check`: is this a case, and what would it cost? Makes no job.
 
 use axum::Json;
-use axum::extract::State;
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::contact::case::{Case, Method, Output};
+use crate::http::access::Caller;
 use crate::http::body::JsonBody;
 use crate::http::error::ApiError;
 use crate::http::problems::problems;
-use crate::jobs::Jobs;
 
 /// A case that can be solved, and its expected cost.
 #[derive(Debug, Serialize, ToSchema)]
@@ -39,7 +38,7 @@ pub struct Estimate {
 
 problems! {
     /// What `POST /v1/cases/check` can fail with.
-    CheckProblems: MalformedJson, UnreadableBody, BodyTimeout, BodyTooLarge, UnsupportedMediaType, FaultyCase
+    CheckProblems: MalformedJson, UnreadableBody, BodyTimeout, BodyTooLarge, UnsupportedMediaType, UnsupportedEncoding, FaultyCase
 }
 
 /// Checks a case and estimates its cost, without making a job.
@@ -52,7 +51,7 @@ problems! {
     responses((status = 200, description = "The case can be solved", body = CheckedCase), CheckProblems)
 )]
 pub async fn check(
-    State(jobs): State<Jobs>,
+    Caller(jobs): Caller,
     JsonBody(case): JsonBody,
 ) -> Result<Json<CheckedCase>, ApiError> {
     // A large grid takes long enough to check that it must not hold up other requests.

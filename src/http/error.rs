@@ -7,6 +7,7 @@ use axum::response::{IntoResponse, Response};
 
 use crate::contact::error::CaseError;
 use crate::http::problem::{Fault, Problem};
+use crate::jobs::Trouble;
 use crate::jobs::error::JobsError;
 use crate::jobs::job::{Job, State};
 
@@ -15,6 +16,8 @@ pub const PROBLEM_JSON: &str = "application/problem+json";
 
 /// Seconds after which a refused client may try again.
 const RETRY_SECONDS: u32 = 1;
+/// The same where somebody has to make room first.
+const DISK_RETRY_SECONDS: u32 = 10;
 
 /// Declares the kinds of problems once: name, status, slug, title, meaning.
 macro_rules! kinds {
@@ -51,24 +54,34 @@ kinds! {
     BadQuery 400 "bad-query" "The query is not understood" "A query parameter is unknown, repeated or has a value that is not allowed; `errors` names every such parameter."
     BadHeader 400 "bad-header" "A header is not understood" "A request header has a value that is not allowed; `errors` names it."
     UnreadableBody 400 "unreadable-body" "The body could not be read" "The connection ended or broke before the whole body had arrived."
+    Unauthorized 401 "unauthorized" "A key is needed" "The service is asked with `Authorization: Bearer` and an API key; there was none, or it is unknown or revoked. Keys come from the operator of the service."
+    Forbidden 403 "forbidden" "This key may not do that" "The key is good, but belongs to a tenant that has no business here."
     UnknownRoute 404 "unknown-route" "There is nothing at this address" "The path names no resource of this service; `/openapi.json` lists all of them."
     JobNotFound 404 "job-not-found" "There is no such job" "No job has this id; it was never made here, or it was deleted."
     BatchNotFound 404 "batch-not-found" "There is no such batch" "No batch has this id; it was never made here, or it was deleted."
     OutputNotAsked 404 "output-not-asked" "This output was not asked for" "The case did not ask for this output, so it was not computed; submit the case again with the output named in `outputs`."
     MethodNotAllowed 405 "method-not-allowed" "This method is not allowed here" "The resource exists, but not for this HTTP method; the header `Allow` lists those it has."
-    NotAcceptable 406 "not-acceptable" "This form cannot be answered" "The header `Accept` excludes every form in which this resource can be answered; the detail names them. Most answer `application/json` only."
+    NotAcceptable 406 "not-acceptable" "This form cannot be answered" "The header `Accept` excludes every form in which this resource can be answered, or `format` names another; the detail names them. Most answer `application/json` only."
     BodyTimeout 408 "body-timeout" "The body came too slowly" "The whole body did not arrive within the allowed time."
     ResultNotReady 409 "result-not-ready" "The job has not ended" "The job is queued or running, so there is no result yet; ask again after `Retry-After` seconds, or submit with `Prefer: wait=N`."
     JobFailed 409 "job-failed" "The job failed" "The job ended without a result; the member `error` of the job says why."
     JobCancelled 409 "job-cancelled" "The job was cancelled" "The job was cancelled before it had a result."
     JobNotEnded 409 "job-not-ended" "The job has not ended" "Only an ended job can be deleted; cancel it first."
+    BatchNotEnded 409 "batch-not-ended" "The batch has not ended" "Only a batch of which every job has ended can be deleted; cancel it first."
+    Expired 410 "expired" "This has expired" "The job or batch was here, but ended longer ago than this service keeps ended jobs (`expires_at` of a job says until when); it was removed with its results. Its id is remembered for 30 days."
     BodyTooLarge 413 "body-too-large" "The body is too large" "The body exceeds the size that this service accepts for one case, or for a batch; or a batch has too many cases."
     UnsupportedMediaType 415 "unsupported-media-type" "The body is not declared as JSON" "A case is sent with `Content-Type: application/json`, a batch also with `application/x-ndjson`."
+    UnsupportedEncoding 415 "unsupported-encoding" "The body is packed in a way that is not understood" "A body may be sent with `Content-Encoding: gzip` or `zstd`, one of them, or as it is; `Accept-Encoding` of the answer names them."
     FaultyCase 422 "faulty-case" "The case has faults" "The body is JSON but not a case that can be solved; `errors` names every fault by its JSON pointer, with the value given and what is allowed."
     FaultyBatch 422 "faulty-batch" "The batch has faults" "The body holds no cases, or some of them have faults: `errors` names every fault by a JSON pointer that begins with the place of its case (counted from 0), and by its line in NDJSON. Nothing was stored; with `?accept=valid` the good cases are taken."
+    FaultyTable 422 "faulty-table" "The header of the table has faults" "The first line of a table names its columns by JSON pointers such as `/load/normal_force_n` or by short names; the detail names the column and what is allowed."
+    TooManyRequests 429 "too-many-requests" "Too many requests" "The key sends more requests per second than it may; try again after `Retry-After` seconds."
+    QuotaExceeded 429 "quota-exceeded" "Too many jobs are waiting" "The tenant has as many queued jobs as it may; nothing was stored, try again after `Retry-After` seconds."
     IdempotencyConflict 422 "idempotency-conflict" "The idempotency key belongs to another case" "The `Idempotency-Key` was used before with a different body; use a new key for a new case."
     Internal 500 "internal" "The service failed" "Something went wrong inside the service; its log has the reason under the request id in the header `x-request-id`."
     QueueFull 503 "queue-full" "The queue is full" "The service holds as many unfinished jobs as it may; nothing was stored, try again after `Retry-After` seconds."
+    StorageUnwritable 503 "storage-unwritable" "The disk cannot be written" "The disk of the service is read-only or fails, or its job table is locked by another process; nothing was stored, jobs already accepted are kept. Try again after `Retry-After` seconds."
+    StorageFull 507 "storage-full" "The disk is full" "The disk of the service has no room for another job; nothing was stored, jobs already accepted are kept. Try again after `Retry-After` seconds."
     Draining 503 "draining" "The service is shutting down" "The service takes no new jobs because it is shutting down; jobs already accepted are kept. Try again after `Retry-After` seconds."
     NotReady 503 "not-ready" "The service is not ready" "The job store cannot be reached at the moment."
     NotConverged 422 "not-converged" "The solver did not converge" "Only inside a job: the iteration ended without meeting its tolerance; `residual` and `iterations` belong to the best iterate, `detail` says what to try."
@@ -84,7 +97,14 @@ impl Kind {
     pub fn passes(self) -> bool {
         matches!(
             self,
-            Kind::ResultNotReady | Kind::QueueFull | Kind::Draining | Kind::NotReady
+            Kind::ResultNotReady
+                | Kind::TooManyRequests
+                | Kind::QuotaExceeded
+                | Kind::QueueFull
+                | Kind::StorageUnwritable
+                | Kind::StorageFull
+                | Kind::Draining
+                | Kind::NotReady
         )
     }
 }
@@ -104,6 +124,13 @@ impl ApiError {
             problem: Box::new(Problem::new(kind, detail)),
             retry_after: kind.passes().then_some(RETRY_SECONDS),
         }
+    }
+
+    /// The same, with the seconds after which to try again.
+    #[must_use]
+    pub fn after(mut self, seconds: u32) -> Self {
+        self.retry_after = Some(seconds);
+        self
     }
 
     /// A failure of the service itself: the reason goes to the log, not to the client.
@@ -216,6 +243,10 @@ impl From<JobsError> for ApiError {
         match error {
             JobsError::Case(faults) => faults.into(),
             JobsError::NotFound => ApiError::new(Kind::JobNotFound, "no job has this id"),
+            JobsError::Expired => ApiError::new(
+                Kind::Expired,
+                "ended longer ago than this service keeps ended jobs, so it was removed",
+            ),
             JobsError::BatchNotFound => ApiError::new(Kind::BatchNotFound, "no batch has this id"),
             JobsError::NotReady(state) => ApiError::new(
                 Kind::ResultNotReady,
@@ -225,6 +256,12 @@ impl From<JobsError> for ApiError {
             JobsError::NotEnded(_) => ApiError::new(
                 Kind::JobNotEnded,
                 "the job is queued or running; cancel it first, then delete it",
+            ),
+            JobsError::BatchNotEnded(jobs) => ApiError::new(
+                Kind::BatchNotEnded,
+                format!(
+                    "{jobs} jobs of the batch are queued or running; cancel it first, then delete it"
+                ),
             ),
             JobsError::NoSuchPatch { patches } => ApiError::no_such_index("patch", patches),
             JobsError::NoSuchPoint { points } => ApiError::no_such_index("point", points),
@@ -236,6 +273,12 @@ impl From<JobsError> for ApiError {
                 Kind::QueueFull,
                 format!("{queue_max} jobs are waiting, which is the limit; nothing was stored"),
             ),
+            JobsError::QuotaExceeded { queue_max } => ApiError::new(
+                Kind::QuotaExceeded,
+                format!(
+                    "{queue_max} jobs of this tenant are waiting, which is its limit; nothing was stored"
+                ),
+            ),
             JobsError::BadCursor => ApiError::bad_parameter(
                 "cursor",
                 "`cursor` is not one that this service gave out for the same filters; start again without it",
@@ -244,9 +287,25 @@ impl From<JobsError> for ApiError {
                 Kind::Draining,
                 "the service is shutting down and takes no new jobs",
             ),
-            other => ApiError::internal(&other),
+            other => match other.trouble() {
+                Some(trouble) => troubled(trouble, &other),
+                None => ApiError::internal(&other),
+            },
         }
     }
+}
+
+/// The disk takes nothing; the log has the system's own words.
+fn troubled(trouble: Trouble, reason: &JobsError) -> ApiError {
+    tracing::warn!(%reason, "a request failed for want of a disk");
+    let (kind, what) = match trouble {
+        Trouble::Full => (Kind::StorageFull, "the disk of the service is full"),
+        Trouble::Unwritable => (
+            Kind::StorageUnwritable,
+            "the disk of the service cannot be written at the moment",
+        ),
+    };
+    ApiError::new(kind, what).after(DISK_RETRY_SECONDS)
 }
 
 /// Why an ended job has no result.
@@ -274,6 +333,12 @@ impl IntoResponse for ApiError {
             response
                 .headers_mut()
                 .insert(header::RETRY_AFTER, HeaderValue::from(seconds));
+        }
+        if self.problem.status == 401 {
+            let scheme = HeaderValue::from_static("Bearer realm=\"railhead\"");
+            response
+                .headers_mut()
+                .insert(header::WWW_AUTHENTICATE, scheme);
         }
         // The handler does not know the path it answers for; `name_instance` writes the problem again with it.
         response.extensions_mut().insert(self.problem);

@@ -5,9 +5,9 @@ use axum::extract::State;
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use crate::http::access::Unscoped;
 use crate::http::error::{ApiError, Kind};
 use crate::http::problems::problems;
-use crate::jobs::Jobs;
 use crate::jobs::error::JobsError;
 
 /// A healthy answer.
@@ -44,7 +44,7 @@ pub async fn alive() -> Json<Health> {
 
 problems! {
     /// What `GET /readyz` can fail with.
-    ReadyProblems: NotReady, Draining
+    ReadyProblems: NotReady, Draining, StorageFull, StorageUnwritable
 }
 
 /// Can the service take jobs? Asks the job store.
@@ -55,10 +55,12 @@ problems! {
     operation_id = "readyz",
     responses((status = 200, description = "The service takes jobs", body = Health), ReadyProblems)
 )]
-pub async fn ready(State(jobs): State<Jobs>) -> Result<Json<Health>, ApiError> {
+pub async fn ready(State(Unscoped(jobs)): State<Unscoped>) -> Result<Json<Health>, ApiError> {
     match jobs.ready().await {
         Ok(()) => Ok(Health::new("ready")),
-        Err(JobsError::Draining) => Err(JobsError::Draining.into()),
+        Err(reason) if matches!(reason, JobsError::Draining) || reason.trouble().is_some() => {
+            Err(reason.into())
+        }
         Err(reason) => {
             tracing::warn!(%reason, "the job store does not answer");
             Err(ApiError::new(

@@ -38,8 +38,13 @@ pub struct JobAnswer {
     /// End of the job; null before it.
     #[schema(format = "date-time")]
     ended_at: Option<String>,
+    /// When the job will be removed with its result; null before its end, and where ended jobs are kept for ever.
+    #[schema(format = "date-time")]
+    expires_at: Option<String>,
     /// Attempts made, the current one included.
     attempt: u32,
+    /// The result was computed for an identical case before, so nothing was solved.
+    cached: bool,
     /// Rough progress.
     #[schema(minimum = 0.0, maximum = 1.0)]
     progress: f64,
@@ -72,7 +77,9 @@ impl JobAnswer {
             created_at: rfc3339(job.created_at),
             started_at: job.started_at.map(rfc3339),
             ended_at: job.ended_at.map(rfc3339),
+            expires_at: job.expires_at.map(rfc3339),
             attempt: job.attempt,
+            cached: job.cached,
             progress: job.progress,
             warnings: job.warnings,
             error,
@@ -85,6 +92,7 @@ impl JobAnswer {
 fn links(job: &Job) -> BTreeMap<String, String> {
     let own = format!("/v1/jobs/{}", job.id);
     let mut links = BTreeMap::from([("case".to_owned(), format!("{own}/case"))]);
+    links.insert("events".to_owned(), format!("{own}/events"));
     if job.state == JobState::Succeeded {
         links.insert("result".to_owned(), format!("{own}/result"));
     }

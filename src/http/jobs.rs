@@ -3,7 +3,6 @@
 use std::time::Duration;
 
 use axum::Json;
-use axum::extract::State;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
@@ -11,6 +10,7 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use crate::contact::case::Case;
+use crate::http::access::Caller;
 use crate::http::body::JsonBody;
 use crate::http::error::ApiError;
 use crate::http::job::{JobAnswer, JobId};
@@ -18,7 +18,7 @@ use crate::http::problems::problems;
 use crate::http::query::{Query, whole};
 use crate::http::results::result_of;
 use crate::jobs::job::State as JobState;
-use crate::jobs::{Filter, Jobs, PAGE_MAX};
+use crate::jobs::{Filter, PAGE_MAX};
 
 /// Longest time that `Prefer: wait` holds a request, in s.
 pub const WAIT_MAX_SECONDS: u32 = 60;
@@ -44,14 +44,15 @@ pub struct JobPage {
 
 problems! {
     /// What `POST /v1/jobs` can fail with.
-    SubmitProblems: MalformedJson, UnreadableBody, BadHeader, BodyTimeout, BodyTooLarge, UnsupportedMediaType, FaultyCase,
-    IdempotencyConflict, QueueFull, Draining
+    SubmitProblems: MalformedJson, UnreadableBody, BadHeader, BodyTimeout, BodyTooLarge, UnsupportedMediaType, UnsupportedEncoding, FaultyCase,
+    IdempotencyConflict, QuotaExceeded, QueueFull, Draining, StorageFull, StorageUnwritable
 }
 
 /// Submits one case as a job.
 ///
 /// A job answered with `202` or `200` is stored durably. With `Prefer: wait=N` the answer is the ended job (`200`) if it
-/// ends within N seconds, including its result if it succeeded and its `error` if it failed.
+/// ends within N seconds, including its result if it succeeded and its `error` if it failed. A case that is identical to one
+/// solved before (`name` and `labels` aside) succeeds at once with that result, marked `cached`.
 #[utoipa::path(
     post,
     path = "/v1/jobs",
@@ -59,7 +60,8 @@ problems! {
     operation_id = "submit_job",
     params(
         ("Prefer" = Option<String>, Header, description = "`wait=N`: answer when the job has ended, at most N seconds (60 at most) later (RFC 7240)", example = "wait=10"),
-        ("Idempotency-Key" = Option<String>, Header, description = "1 to 255 visible ASCII characters. Repeating a request with the same key and the same case answers the first job instead of making another")
+        ("Idempotency-Key" = Option<String>, Header, description = "1 to 255 visible ASCII characters. Repeating a request with the same key and the same case answers the first job instead of making another"),
+        ("Cache-Control" = Option<String>, Header, description = "`no-cache`: solve the case even if an identical one was solved before", example = "no-cache")
     ),
     request_body(content = Case, description = "One case", content_type = "application/json"),
     responses(
@@ -76,13 +78,17 @@ problems! {
     )
 )]
 pub async fn submit(
-    State(jobs): State<Jobs>,
+    Caller(jobs): Caller,
     headers: HeaderMap,
     JsonBody(case): JsonBody,
 ) -> Result<Response, ApiError> {
     let key = idempotency_key(&headers)?;
     let wait = preferred_wait(&headers);
-    let mut job = jobs.submit(case, key).await?;
+    let mut job = if wants_fresh(&headers) {
+        jobs.submit_fresh(case, key).await?
+    } else {
+        jobs.submit(case, key).await?
+    };
     let location = format!("/v1/jobs/{}", job.id);
     let mut result = None;
     if let Some(seconds) = wait {
@@ -138,6 +144,17 @@ fn preferred_wait(headers: &HeaderMap) -> Option<u32> {
     waits.next().map(|seconds| seconds.min(WAIT_MAX_SECONDS))
 }
 
+/// Does the client refuse results of earlier identical cases?
+#[must_use]
+pub fn wants_fresh(headers: &HeaderMap) -> bool {
+    let values = headers.get_all(header::CACHE_CONTROL);
+    let mut directives = values
+        .iter()
+        .filter_map(|value| value.to_str().ok())
+        .flat_map(|value| value.split(','));
+    directives.any(|directive| directive.trim().eq_ignore_ascii_case("no-cache"))
+}
+
 /// The idempotency key of a request, if it has one.
 ///
 /// # Errors
@@ -181,7 +198,7 @@ problems! {
     ),
     responses((status = 200, description = "A page of jobs", body = JobPage), ListProblems)
 )]
-pub async fn list(State(jobs): State<Jobs>, uri: Uri) -> Result<Json<JobPage>, ApiError> {
+pub async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Json<JobPage>, ApiError> {
     let mut query = Query::read(
         &uri,
         &[
@@ -255,7 +272,7 @@ problems! {
     params(("id" = String, Path, description = "Id of the job", format = "uuid")),
     responses((status = 200, description = "The job", body = JobAnswer), LookProblems)
 )]
-pub async fn look(State(jobs): State<Jobs>, JobId(id): JobId) -> Result<Json<JobAnswer>, ApiError> {
+pub async fn look(Caller(jobs): Caller, JobId(id): JobId) -> Result<Json<JobAnswer>, ApiError> {
     Ok(Json(JobAnswer::new(jobs.get(id).await?, None)))
 }
 
@@ -268,7 +285,7 @@ pub async fn look(State(jobs): State<Jobs>, JobId(id): JobId) -> Result<Json<Job
     params(("id" = String, Path, description = "Id of the job", format = "uuid")),
     responses((status = 200, description = "The case", body = Case), LookProblems)
 )]
-pub async fn case(State(jobs): State<Jobs>, JobId(id): JobId) -> Result<Response, ApiError> {
+pub async fn case(Caller(jobs): Caller, JobId(id): JobId) -> Result<Response, ApiError> {
     let text = jobs.case(id).await?;
     Ok(([(header::CONTENT_TYPE, "application/json")], text).into_response())
 }
@@ -286,7 +303,7 @@ pub async fn case(State(jobs): State<Jobs>, JobId(id): JobId) -> Result<Response
         LookProblems
     )
 )]
-pub async fn cancel(State(jobs): State<Jobs>, JobId(id): JobId) -> Result<Response, ApiError> {
+pub async fn cancel(Caller(jobs): Caller, JobId(id): JobId) -> Result<Response, ApiError> {
     let job = jobs.cancel(id).await?;
     let status = if job.state.ended() {
         StatusCode::OK
@@ -310,7 +327,7 @@ problems! {
     params(("id" = String, Path, description = "Id of the job", format = "uuid")),
     responses((status = 204, description = "The job is gone"), DeleteProblems)
 )]
-pub async fn delete(State(jobs): State<Jobs>, JobId(id): JobId) -> Result<StatusCode, ApiError> {
+pub async fn delete(Caller(jobs): Caller, JobId(id): JobId) -> Result<StatusCode, ApiError> {
     jobs.delete(id).await?;
     Ok(StatusCode::NO_CONTENT)
 }

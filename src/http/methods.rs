@@ -171,6 +171,11 @@ fn contacts() -> Vec<ContactAbility> {
             summary: "Any gap on a grid: region and pressure are found, in one or several patches.",
         },
         ContactAbility {
+            name: "profiles",
+            needs_load: true,
+            summary: "A wheel on a rail by their cross-sections: every patch is found, with its place and its own frame.",
+        },
+        ContactAbility {
             name: "pressure_grid",
             needs_load: false,
             summary: "A given pressure on a grid; its positive part is the contact, in one or several patches.",

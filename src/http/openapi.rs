@@ -7,8 +7,15 @@ use axum::response::{IntoResponse, Response};
 use utoipa::OpenApi;
 use utoipa::openapi::RefOr;
 use utoipa::openapi::example::ExampleBuilder;
+use utoipa::openapi::path::{ParameterBuilder, ParameterIn};
+use utoipa::openapi::schema::Type;
+use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement, SecurityScheme};
+use utoipa::openapi::{HeaderBuilder, ObjectBuilder, Required, ResponseBuilder};
+use utoipa_axum::router::OpenApiRouter;
 
+use crate::http::error::Kind;
 use crate::http::problem::Problem;
+use crate::http::problems::describe_also;
 use crate::http::resources;
 
 #[derive(OpenApi)]
@@ -34,8 +41,40 @@ pub fn head() -> utoipa::openapi::OpenApi {
     Head::openapi()
 }
 
+/// Documents that every `GET` of these routes answers conditional requests.
+pub fn conditional<S: Clone + Send + Sync + 'static>(
+    mut routes: OpenApiRouter<S>,
+) -> OpenApiRouter<S> {
+    let text = || Some(ObjectBuilder::new().schema_type(Type::String).build());
+    for item in routes.get_openapi_mut().paths.paths.values_mut() {
+        let Some(operation) = &mut item.get else {
+            continue;
+        };
+        let given = ParameterBuilder::new()
+            .name("If-None-Match")
+            .parameter_in(ParameterIn::Header)
+            .required(Required::False)
+            .description(Some("Tags of answers that the client has"))
+            .schema(text());
+        operation
+            .parameters
+            .get_or_insert_default()
+            .push(given.build().into());
+        let responses = &mut operation.responses.responses;
+        if let Some(RefOr::T(found)) = responses.get_mut("200") {
+            let tag = HeaderBuilder::new()
+                .schema(text())
+                .description(Some("Digest of the answer, for `If-None-Match`"));
+            found.headers.insert("ETag".to_owned(), tag.build().into());
+        }
+        let unchanged = ResponseBuilder::new().description("The client has this answer already");
+        responses.insert("304".to_owned(), unchanged.build().into());
+    }
+    routes
+}
+
 /// Cases that the document shows: name, summary, text.
-const EXAMPLES: [(&str, &str, &str); 7] = [
+const EXAMPLES: [(&str, &str, &str); 9] = [
     (
         "hertz-steel",
         "A wheel on a rail by its radii, with both creepages and spin",
@@ -62,6 +101,16 @@ const EXAMPLES: [(&str, &str, &str); 7] = [
         include_str!("../../api/examples/two-patches.case.json"),
     ),
     (
+        "wheel-rail",
+        "A wheel on a rail by their cross-sections, under a vertical force, with the motion of the wheelset",
+        include_str!("../../api/examples/wheel-rail.case.json"),
+    ),
+    (
+        "wheel-rail-flange",
+        "A wheel on a rail by their cross-sections, touching at the gauge corner and at the flange",
+        include_str!("../../api/examples/wheel-rail-flange.case.json"),
+    ),
+    (
         "pressure-grid",
         "A given pressure over a patch of any shape",
         include_str!("../../api/examples/pressure-grid.case.json"),
@@ -78,6 +127,7 @@ static DOCUMENT: LazyLock<String> = LazyLock::new(|| {
     for path in ["/v1/jobs", "/v1/cases/check"] {
         add_examples(&mut document, path);
     }
+    require_keys(&mut document);
     let text = document.to_pretty_json();
     // Only a map with keys that are not strings cannot be written; the document has none.
     text.map(|text| text + "\n").unwrap_or_default()
@@ -87,6 +137,41 @@ static DOCUMENT: LazyLock<String> = LazyLock::new(|| {
 #[must_use]
 pub fn openapi_json() -> String {
     DOCUMENT.clone()
+}
+
+/// Says of every operation on what belongs to a tenant that it may need a key, and that jobs and batches may expire.
+fn require_keys(document: &mut utoipa::openapi::OpenApi) {
+    let scheme = HttpBuilder::new()
+        .scheme(HttpAuthScheme::Bearer)
+        .description(Some(
+            "An API key; not needed where the service lets anybody in, as it does on loopback",
+        ))
+        .build();
+    let components = document.components.get_or_insert_default();
+    components.add_security_scheme("key", SecurityScheme::Http(scheme));
+    for (path, item) in &mut document.paths.paths {
+        let operations = [&mut item.get, &mut item.post, &mut item.delete];
+        for operation in operations.into_iter().filter_map(Option::as_mut) {
+            let tags = operation.tags.as_deref().unwrap_or_default();
+            let open = tags.iter().any(|tag| tag == "service");
+            let metrics = operation.operation_id.as_deref() == Some("get_metrics");
+            let methods = operation.operation_id.as_deref() == Some("list_methods");
+            if (open && !metrics) || methods {
+                continue;
+            }
+            operation.security = Some(vec![
+                SecurityRequirement::new("key", Vec::<String>::new()),
+                SecurityRequirement::default(),
+            ]);
+            let mut kinds = vec![Kind::Unauthorized, Kind::TooManyRequests];
+            if path.contains("{id}") {
+                kinds.push(Kind::Expired);
+            }
+            // A locked or failing disk can meet every request.
+            kinds.extend([Kind::StorageUnwritable, Kind::StorageFull]);
+            describe_also(&mut operation.responses.responses, &kinds);
+        }
+    }
 }
 
 fn add_examples(document: &mut utoipa::openapi::OpenApi, path: &str) {

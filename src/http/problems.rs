@@ -108,6 +108,26 @@ pub async fn explain(Path(name): Path<String>) -> Result<Json<ProblemKind>, ApiE
     })
 }
 
+/// Adds problems that many operations can answer to the responses of one.
+pub fn describe_also(responses: &mut BTreeMap<String, RefOr<Response>>, kinds: &[Kind]) {
+    for kind in kinds {
+        let status = kind.status().to_string();
+        let mut described = describe(&[*kind]);
+        match (responses.get_mut(&status), described.remove(&status)) {
+            (Some(RefOr::T(known)), Some(_)) => {
+                let line = format!("`{}`: {}", kind.slug(), kind.meaning());
+                if !known.description.contains(&line) {
+                    known.description = format!("{line}\n\n{}", known.description);
+                }
+            }
+            (None, Some(new)) => {
+                responses.insert(status, new);
+            }
+            _ => {}
+        }
+    }
+}
+
 /// The responses of these kinds of problems and of those every route has, one per status code.
 #[must_use]
 pub fn describe(kinds: &[Kind]) -> BTreeMap<String, RefOr<Response>> {

@@ -1,20 +1,19 @@
-//! `/v1/jobs/{id}/result` and `/resultants`: everything small about the answer of a job.
+//! `/v1/jobs/{id}/result`: everything small about the answer of a job.
 
 use std::collections::BTreeMap;
 
 use axum::Json;
-use axum::extract::State;
-use axum::http::Uri;
 use serde::Serialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::contact::case::{Motion, Output};
-use crate::contact::solution::{ErrorEstimate, Origin, Solution, Total};
+use crate::contact::case::Output;
+use crate::contact::solution::Solution;
+use crate::http::access::Caller;
 use crate::http::error::{ApiError, Kind};
 use crate::http::job::JobId;
 use crate::http::problems::problems;
-use crate::http::query::{Query, whole};
+use crate::http::query::whole;
 use crate::jobs::Jobs;
 
 /// The result of a job: the solution without its fields, and where to get those.
@@ -22,53 +21,10 @@ use crate::jobs::Jobs;
 pub struct JobResult {
     #[serde(flatten)]
     solution: Solution,
+    /// The result was computed for an identical case before; `seconds` are those of that solve.
+    cached: bool,
     /// The job, and every part of the result that the case asked for.
     links: BTreeMap<String, String>,
-}
-
-/// Forces and moments.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct Resultants {
-    /// One entry per contact patch, or the one that was asked for.
-    patches: Vec<PatchResultants>,
-    /// One entry per motion, or the one that was asked for: plain sums over all patches.
-    total: Vec<Total>,
-    /// The point that moments refer to.
-    origin: Origin,
-}
-
-/// Forces and moments of one patch.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct PatchResultants {
-    /// Number of the patch, counted from 0.
-    patch: usize,
-    /// Normal force in N.
-    normal_force_n: f64,
-    /// One entry per motion, or the one that was asked for.
-    points: Vec<PointResultants>,
-}
-
-/// Forces and moment of one patch for one motion; on the lower body.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct PointResultants {
-    /// Number of the motion, counted from 0.
-    point: usize,
-    /// The motion.
-    motion: Motion,
-    /// Longitudinal force in N.
-    force_x_n: f64,
-    /// Lateral force in N.
-    force_y_n: f64,
-    /// Moment about the origin in N·mm.
-    moment_z_n_mm: f64,
-    /// Estimated absolute errors; null where there is nothing to estimate them from.
-    error_estimate: Option<ErrorEstimate>,
-    /// Dissipated power divided by rolling speed, in N.
-    friction_power_n: f64,
-    /// The same without the part of spin, as |ν_x F_x| + |ν_y F_y|, in N.
-    friction_power_without_spin_n: f64,
-    /// A prescribed force could not be reached.
-    saturated: bool,
 }
 
 problems! {
@@ -85,10 +41,7 @@ problems! {
     params(("id" = String, Path, description = "Id of the job", format = "uuid")),
     responses((status = 200, description = "The result", body = JobResult), ResultProblems)
 )]
-pub async fn result(
-    State(jobs): State<Jobs>,
-    JobId(id): JobId,
-) -> Result<Json<JobResult>, ApiError> {
+pub async fn result(Caller(jobs): Caller, JobId(id): JobId) -> Result<Json<JobResult>, ApiError> {
     result_of(&jobs, id).await.map(Json)
 }
 
@@ -101,7 +54,12 @@ pub async fn result_of(jobs: &Jobs, id: Uuid) -> Result<JobResult, ApiError> {
     let outputs = outputs_asked(jobs, id).await?;
     let outputs: Vec<&str> = outputs.into_iter().map(name_of).collect();
     let links = JobResult::links(id, &outputs);
-    Ok(JobResult { solution, links })
+    let cached = jobs.get(id).await?.cached;
+    Ok(JobResult {
+        solution,
+        cached,
+        links,
+    })
 }
 
 impl JobResult {
@@ -115,80 +73,6 @@ impl JobResult {
         }
         links.insert("job".to_owned(), own);
         links
-    }
-}
-
-problems! {
-    /// What parts of a result can fail with.
-    PartProblems: BadQuery, JobNotFound, ResultNotReady, JobFailed, JobCancelled
-}
-
-/// Forces and moments of a succeeded job. They are always computed, whatever the case asked for.
-#[utoipa::path(
-    get,
-    path = "/v1/jobs/{id}/resultants",
-    tag = "results",
-    operation_id = "get_resultants",
-    params(
-        ("id" = String, Path, description = "Id of the job", format = "uuid"),
-        ("point" = Option<u32>, Query, description = "Only this motion, counted from 0"),
-        ("patch" = Option<u32>, Query, description = "Only this patch, counted from 0; `total` stays the sum over all")
-    ),
-    responses((status = 200, description = "Forces and moments on the lower body", body = Resultants), PartProblems)
-)]
-pub async fn resultants(
-    State(jobs): State<Jobs>,
-    JobId(id): JobId,
-    uri: Uri,
-) -> Result<Json<Resultants>, ApiError> {
-    let mut query = Query::read(&uri, &["point", "patch"]);
-    let point = query.take("point", INDEX, index);
-    let patch = query.take("patch", INDEX, index);
-    query.finish()?;
-    let solution = jobs.solution(id).await?;
-    require_index("point", point, solution.total.len())?;
-    require_index("patch", patch, solution.patches.len())?;
-    Ok(Json(select(solution, point, patch)))
-}
-
-fn select(solution: Solution, point: Option<usize>, patch: Option<usize>) -> Resultants {
-    let chosen = |choice: Option<usize>, index: usize| choice.is_none_or(|choice| choice == index);
-    let patches = solution.patches.into_iter().enumerate();
-    let patches = patches
-        .filter(|(index, _)| chosen(patch, *index))
-        .map(|(number, patch)| {
-            let points = patch
-                .points
-                .into_iter()
-                .enumerate()
-                .filter(|(index, _)| chosen(point, *index));
-            PatchResultants {
-                patch: number,
-                normal_force_n: patch.normal_force_n,
-                points: points
-                    .map(|(number, point)| PointResultants {
-                        point: number,
-                        motion: point.motion,
-                        force_x_n: point.force_x_n,
-                        force_y_n: point.force_y_n,
-                        moment_z_n_mm: point.moment_z_n_mm,
-                        error_estimate: point.error_estimate,
-                        friction_power_n: point.friction_power_n,
-                        friction_power_without_spin_n: point.friction_power_without_spin_n,
-                        saturated: point.saturated,
-                    })
-                    .collect(),
-            }
-        });
-    let patches = patches.collect();
-    let total = solution.total.into_iter().enumerate();
-    Resultants {
-        patches,
-        total: total
-            .filter(|(index, _)| chosen(point, *index))
-            .map(|(_, total)| total)
-            .collect(),
-        origin: solution.origin,
     }
 }
 

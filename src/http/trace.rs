@@ -77,6 +77,8 @@ impl MakeSpan<Body> for RequestSpan {
             path = request.uri().path(),
             route = route.unwrap_or_default(),
             job = field::Empty,
+            tenant = field::Empty,
+            key = field::Empty,
         )
     }
 }

@@ -1,21 +1,20 @@
 //! `/v1/jobs/{id}/zones`: where the patch sticks and where it slips.
 
-use axum::extract::State;
-use axum::http::Uri;
+use axum::http::{HeaderMap, Uri};
 use axum::response::Response;
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::contact::case::Output;
 use crate::contact::outputs::outline::{outlines, patch_outline};
-use crate::contact::outputs::resample::resample_zone;
-use crate::contact::solution::PatchFields;
 use crate::contact::zones::Zone;
+use crate::http::access::Caller;
+use crate::http::cells::{Cells, GriddedField, gridded, per_cell};
 use crate::http::error::ApiError;
-use crate::http::fields::{Cells, FieldProblems, GriddedField, Selection, per_cell, write_json};
+use crate::http::fields::{FieldProblems, FieldQuery, Selection, stored, write_as};
+use crate::http::formats::{File, Table};
 use crate::http::job::JobId;
 use crate::http::results::{not_asked, require_index};
-use crate::jobs::Jobs;
 
 /// Stick and slip zones of one patch for one motion.
 #[derive(Debug, Serialize, ToSchema)]
@@ -25,6 +24,15 @@ pub enum Zones {
     PerCell(ZoneCells),
     /// With `grid`: the zone of the nearest cell, resampled.
     Gridded(GriddedField),
+}
+
+impl From<Zones> for Table {
+    fn from(zones: Zones) -> Self {
+        match zones {
+            Zones::PerCell(zones) => zones.cells.into(),
+            Zones::Gridded(field) => field.into(),
+        }
+    }
 }
 
 /// Areas, outlines and the zone of every cell.
@@ -68,18 +76,27 @@ pub struct Outlines {
     operation_id = "get_zones",
     params(
         ("id" = String, Path, description = "Id of the job", format = "uuid"),
-        ("point" = Option<u32>, Query, description = "The motion, counted from 0; 0 when left out"),
-        ("patch" = Option<u32>, Query, description = "The patch, counted from 0; 0 when left out"),
-        ("grid" = Option<String>, Query, description = "`NXxNY`: resample on a regular grid over the bounding box of the patch, 2 to 1000 samples along each axis", example = "60x40")
+        FieldQuery
     ),
-    responses((status = 200, description = "Areas, outlines and the zone of every cell, or zones on a regular grid", body = Zones), FieldProblems)
+    responses((status = 200, description = "Areas, outlines and the zone of every cell, or zones on a regular grid; only cells or grid in forms other than JSON", content(
+        (Zones = "application/json"),
+        (String = "text/csv"),
+        (File = "application/x-npz"),
+        (File = "application/x-vtk"),
+        (String = "image/svg+xml"),
+        (File = "image/png")
+    )), FieldProblems)
 )]
 pub async fn zones(
-    State(jobs): State<Jobs>,
+    Caller(jobs): Caller,
     JobId(id): JobId,
     uri: Uri,
+    headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    let selection = Selection::read(&uri)?;
+    let selection = Selection::read(&uri, &headers)?;
+    if let Some(picture) = selection.picture(&jobs, id, Output::Zones).await? {
+        return Ok(picture);
+    }
     let solution = jobs.solution(id).await?;
     require_index("patch", Some(selection.patch), solution.patches.len())?;
     let points = &solution.patches[selection.patch].points;
@@ -95,46 +112,28 @@ pub async fn zones(
     else {
         return not_asked(&jobs, id, Output::Zones).await;
     };
-    let mut fields = jobs
-        .point_fields(id, selection.patch, selection.point)
-        .await?;
-    let point = fields.points.pop().unwrap_or_default();
-    let Some(zone) = point.zone.clone() else {
-        return not_asked(&jobs, id, Output::Zones).await;
-    };
-    write_json(move || match selection.grid {
-        Some(grid) => Zones::Gridded(gridded(&fields, &zone, selection, grid)),
+    let (patch, point) = (selection.patch, selection.point);
+    let (fields, values) = stored(&jobs, id, patch, point, Output::Zones).await?;
+    write_as(selection, "zones", move || match selection.grid {
+        Some((nx, ny)) => Zones::Gridded(GriddedField {
+            patch,
+            point,
+            ..gridded(&fields, &values, Output::Zones, nx, ny)
+        }),
         None => Zones::PerCell(ZoneCells {
-            patch: selection.patch,
-            point: selection.point,
+            patch,
+            point,
             stick_area_mm2,
             slip_area_mm2,
             stick_cells,
             slip_cells,
             outlines: Outlines {
                 patch: patch_outline(&fields),
-                stick: outlines(&fields, Some(&zone), Some(Zone::Stick)),
-                slip: outlines(&fields, Some(&zone), Some(Zone::Slip)),
+                stick: outlines(&fields, values.zone.as_deref(), Some(Zone::Stick)),
+                slip: outlines(&fields, values.zone.as_deref(), Some(Zone::Slip)),
             },
-            cells: per_cell(fields, point, Output::Zones),
+            cells: per_cell(fields, values, Output::Zones),
         }),
     })
     .await
-}
-
-fn gridded(
-    fields: &PatchFields,
-    zone: &[Zone],
-    selection: Selection,
-    (nx, ny): (usize, usize),
-) -> GriddedField {
-    let grid = resample_zone(fields, zone, nx, ny);
-    GriddedField {
-        patch: selection.patch,
-        point: selection.point,
-        x_mm: grid.x_mm,
-        y_mm: grid.y_mm,
-        zone: Some(grid.values),
-        ..GriddedField::default()
-    }
 }

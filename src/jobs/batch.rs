@@ -14,7 +14,7 @@ use crate::jobs::job::{Job, State};
 use crate::jobs::spool::{Card, Spool};
 use crate::jobs::store::{Begun, NewBatch, NewJob};
 use crate::jobs::watch::Reason;
-use crate::jobs::{Jobs, LOOK_AGAIN, cost_us, created_at, idempotency, now_ms, outputs_text};
+use crate::jobs::{Jobs, LOOK_AGAIN, cost_us, created_at, idempotency, outputs_text};
 
 /// Jobs queued in one transaction.
 const CHUNK_JOBS: usize = 1000;
@@ -22,6 +22,8 @@ const CHUNK_JOBS: usize = 1000;
 const CHUNK_BYTES: usize = 4 << 20;
 /// Faulty cases whose faults are kept; further ones are only counted.
 const FAULTY_KEPT: usize = 1000;
+/// Jobs removed in one transaction.
+const DELETED_AT_ONCE: u32 = 500;
 /// Pause between two looks at a batch that another request is filling.
 const FILLING_PAUSE: Duration = Duration::from_millis(50);
 /// Pause between two looks at a job that a reader of results waits for.
@@ -32,6 +34,8 @@ const LOOK_PAUSE: Duration = Duration::from_millis(10);
 pub struct Batch {
     /// UUIDv7.
     pub id: Uuid,
+    /// Whose it is.
+    pub tenant: String,
     /// Time of submission, epoch milliseconds.
     pub created_at: i64,
     /// Number of jobs it was made of.
@@ -96,6 +100,8 @@ pub struct Draft {
     pub rejected: u32,
     /// The first faulty ones.
     pub faulty: Vec<FaultyCase>,
+    /// Cases are solved even if identical ones were solved before.
+    pub fresh: bool,
 }
 
 impl Draft {
@@ -132,6 +138,7 @@ impl Draft {
                     method: problem.method.name().to_owned(),
                     outputs: outputs_text(&problem.outputs),
                     cost_us: cost_us(&problem),
+                    digest: problem.digest,
                     name: problem.name,
                     labels: problem.labels,
                 };
@@ -170,6 +177,7 @@ impl Jobs {
             cases: 0,
             rejected: 0,
             faulty: Vec::new(),
+            fresh: false,
         })
     }
 
@@ -187,6 +195,7 @@ impl Jobs {
         let digest = *draft.digest.finalize().as_bytes();
         let new = NewBatch {
             id,
+            tenant: self.tenant.clone(),
             created_at: created_at(id),
             count: draft.cases - draft.rejected,
             rejected: draft.rejected,
@@ -196,7 +205,7 @@ impl Jobs {
             if self.shared.draining.is_cancelled() {
                 return Err(JobsError::Draining);
             }
-            match self.shared.store.begin_batch(&new).await? {
+            match self.noted(self.shared.store.begin_batch(&new).await)? {
                 Begun::Created => break,
                 Begun::Existing(id) => return self.batch(id).await,
                 Begun::Conflict => return Err(JobsError::IdempotencyConflict),
@@ -206,7 +215,7 @@ impl Jobs {
         // A client that hangs up must not leave a batch half filled, so the filling goes on without it.
         let jobs = self.clone();
         let filled = tokio::spawn(async move {
-            let filled = jobs.fill(&new, draft.spool).await;
+            let filled = jobs.fill(&new, draft.spool, draft.fresh).await;
             if filled.is_err()
                 && let Err(error) = jobs.shared.store.drop_batch(new.id).await
             {
@@ -214,13 +223,14 @@ impl Jobs {
             }
             filled
         });
-        filled
+        let filled = filled
             .await
-            .map_err(|error| JobsError::Damaged(error.to_string()))??;
+            .map_err(|error| JobsError::Damaged(error.to_string()))?;
+        self.noted(filled)?;
         self.batch(id).await
     }
 
-    async fn fill(&self, new: &NewBatch, spool: Spool) -> Result<(), JobsError> {
+    async fn fill(&self, new: &NewBatch, spool: Spool, fresh: bool) -> Result<(), JobsError> {
         self.admit(u64::from(new.count)).await?;
         let mut reader = spool
             .into_reader()
@@ -238,11 +248,16 @@ impl Jobs {
             if cases.is_empty() {
                 break;
             }
-            let some: Vec<_> = cases
+            let mut some: Vec<_> = cases
                 .into_iter()
-                .map(|(card, case)| (card.index, new_job(card, case)))
+                .map(|(card, case)| (card.index, self.new_job(card, case)))
                 .collect();
-            self.shared.store.enqueue_many(new.id, &some).await?;
+            if !fresh {
+                self.find_sources(some.iter_mut().map(|(_, job)| job))
+                    .await?;
+            }
+            let ended = self.shared.store.enqueue_many(new.id, &some).await?;
+            self.ended_cached(&ended);
             for _ in 0..self.shared.options.workers {
                 self.shared.wake.notify_one();
             }
@@ -258,7 +273,10 @@ impl Jobs {
     /// [`JobsError::BatchNotFound`], or a failed database.
     pub async fn batch(&self, id: Uuid) -> Result<Batch, JobsError> {
         let batch = self.shared.store.batch(id).await?;
-        batch.ok_or(JobsError::BatchNotFound)
+        match batch.filter(|batch| *batch.tenant == *self.tenant) {
+            Some(batch) => Ok(batch),
+            None => Err(self.missing(id, JobsError::BatchNotFound).await),
+        }
     }
 
     /// Cancels every job of a batch that has not ended: queued ones end at once, running ones at the next tick of
@@ -268,14 +286,48 @@ impl Jobs {
     /// [`JobsError::BatchNotFound`], or a failed database.
     pub async fn cancel_batch(&self, id: Uuid) -> Result<Batch, JobsError> {
         self.batch(id).await?;
-        for (job, state) in self.shared.store.cancel_batch(id, now_ms()).await? {
+        for (job, state) in self
+            .shared
+            .store
+            .cancel_batch(id, self.shared.now_ms())
+            .await?
+        {
             if state.ended() {
+                self.shared.metrics.ended(state, 1);
                 self.shared.announce(job);
             } else if let Some(watch) = self.shared.running().get(&job) {
                 watch.stop(Reason::Cancel);
             }
         }
         self.batch(id).await
+    }
+
+    /// Removes a batch of which every job has ended, with its jobs, their cases and their results. The jobs go in portions, so that
+    /// other writers are not held up; if the process dies meanwhile, the rest is still there and can be removed again.
+    ///
+    /// # Errors
+    /// [`JobsError::BatchNotEnded`], [`JobsError::BatchNotFound`], or a failed database.
+    pub async fn delete_batch(&self, id: Uuid) -> Result<(), JobsError> {
+        let (ended, all) = self.batch(id).await?.ended();
+        if ended < all {
+            return Err(JobsError::BatchNotEnded(all - ended));
+        }
+        loop {
+            let gone = self.shared.store.delete_ended(id, DELETED_AT_ONCE).await?;
+            if gone.is_empty() {
+                break;
+            }
+            for (job, folder) in gone {
+                if folder.is_some()
+                    && let Err(error) = self.shared.results.remove(job, None).await
+                {
+                    tracing::warn!(%job, %error, "results of a deleted job left behind until the next start");
+                }
+            }
+        }
+        self.shared.store.delete_empty_batch(id).await?;
+        tracing::info!(batch = %id, jobs = all, "batch deleted");
+        Ok(())
     }
 
     /// The next jobs of a batch after the job `after`, in the order they were sent, at most `limit`. With `until`, only
@@ -296,6 +348,7 @@ impl Jobs {
             // Subscribe first, then look: what ends in between is announced.
             let mut ended = self.shared.ended.subscribe();
             let mut lines = self.shared.store.batch_lines(id, after, limit).await?;
+            lines.retain(|line| *line.job.tenant == *self.tenant);
             let waiting = Instant::now() < until && !self.shared.draining.is_cancelled();
             if waiting {
                 let done = lines
@@ -331,25 +384,28 @@ impl Jobs {
         }
     }
 
+    fn new_job(&self, card: Card, case: Vec<u8>) -> NewJob {
+        let id = Uuid::now_v7();
+        NewJob {
+            id,
+            tenant: self.tenant.clone(),
+            created_at: created_at(id),
+            name: card.name,
+            labels: card.labels,
+            method: card.method,
+            outputs: card.outputs,
+            cost_us: card.cost_us,
+            body: Bytes::from(case),
+            reuse_key: self.reuse_key(&card.digest),
+            source: None,
+            idempotency: None,
+        }
+    }
+
     fn spool_failed(&self, source: std::io::Error) -> JobsError {
         JobsError::DataDir {
             path: self.shared.options.data_dir.clone(),
             source,
         }
-    }
-}
-
-fn new_job(card: Card, case: Vec<u8>) -> NewJob {
-    let id = Uuid::now_v7();
-    NewJob {
-        id,
-        created_at: created_at(id),
-        name: card.name,
-        labels: card.labels,
-        method: card.method,
-        outputs: card.outputs,
-        cost_us: card.cost_us,
-        body: Bytes::from(case),
-        idempotency: None,
     }
 }

@@ -19,18 +19,33 @@ pub enum JobsError {
         /// Bound of queued jobs.
         queue_max: u64,
     },
+    /// The tenant has as many queued jobs as it may; nothing was stored.
+    #[error("this tenant has {queue_max} queued jobs, which is its limit; try again later")]
+    QuotaExceeded {
+        /// Bound of queued jobs of one tenant.
+        queue_max: u64,
+    },
+    /// The name cannot be that of a tenant.
+    #[error("a tenant is named by 1 to 64 letters, digits, dots, dashes and underscores")]
+    BadTenant,
     /// The idempotency key was used before with another case.
     #[error("this idempotency key was used before with another case")]
     IdempotencyConflict,
     /// There is no such job.
     #[error("there is no such job")]
     NotFound,
+    /// There was such a job or batch, but its time is over.
+    #[error("its time is over, it has been removed")]
+    Expired,
     /// There is no such batch.
     #[error("there is no such batch")]
     BatchNotFound,
     /// The job must end first.
     #[error("the job is {}; only an ended job can be deleted, cancel it first", .0.name())]
     NotEnded(State),
+    /// This many jobs of the batch must end first.
+    #[error("{0} jobs of the batch have not ended; cancel it first")]
+    BatchNotEnded(u64),
     /// There is no result yet.
     #[error("the job is {}; its result is not there yet", .0.name())]
     NotReady(State),

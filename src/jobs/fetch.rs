@@ -15,6 +15,7 @@ impl Jobs {
     /// # Errors
     /// [`JobsError::NotFound`], or a failed database.
     pub async fn case(&self, id: Uuid) -> Result<Bytes, JobsError> {
+        self.get(id).await?;
         let (body, _) = self
             .shared
             .store
@@ -85,12 +86,11 @@ impl Jobs {
 
     /// Where the result of a job lies.
     async fn stored(&self, id: Uuid) -> Result<StoredResult, JobsError> {
-        let (job, stored) = self
-            .shared
-            .store
-            .result(id)
-            .await?
-            .ok_or(JobsError::NotFound)?;
+        let found = self.shared.store.result(id).await?;
+        let Some((job, stored)) = found.filter(|(job, _)| *job.tenant == *self.tenant) else {
+            return Err(self.missing(id, JobsError::NotFound).await);
+        };
+        let job = self.unexpired(job)?;
         match stored {
             Some(stored) => Ok(stored),
             None if job.state.ended() => Err(JobsError::NotSucceeded(Box::new(job))),

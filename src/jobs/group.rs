@@ -17,14 +17,12 @@ use tracing::Instrument;
 use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
-use crate::jobs::now_ms;
 use crate::jobs::solver_thread::{Outcome, SolverThread, solve_guarded};
 use crate::jobs::store::sqlite::groups::GroupBounds;
 use crate::jobs::store::{Claim, Ending};
 use crate::jobs::watch::{Reason, Watch};
 use crate::jobs::worker::{
-    FIRST_PAUSE, PATIENCE, Registered, Verdict, WRITE_TRIES, Worker, heartbeat, judge, lease_ms,
-    not_stored,
+    PATIENCE, Registered, Verdict, Worker, heartbeat, judge, lease_ms, not_stored,
 };
 
 /// Largest sum of expected solve times in a group, in µs.
@@ -56,7 +54,7 @@ impl Worker {
         let mut claims = self
             .shared
             .store
-            .claim_group(&self.name, now_ms(), lease, bounds)
+            .claim_group(&self.name, self.shared.now_ms(), lease, bounds)
             .await?;
         match claims.len() {
             0 => return Ok(false),
@@ -144,7 +142,7 @@ impl Worker {
         let mut outcomes = pin!(outcomes);
         let mut beat = interval(heartbeat(&self.shared));
         beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        let mut until = now_ms().saturating_add(lease_ms(&self.shared));
+        let mut until = self.shared.now_ms().saturating_add(lease_ms(&self.shared));
         let mut seen = 0;
         let mut told = false;
         let mut patience = pin!(sleep(Duration::ZERO));
@@ -160,7 +158,7 @@ impl Worker {
                         seen = ticks;
                         self.renew_group(members, &mut until).await;
                     }
-                    lost = now_ms() >= until;
+                    lost = self.shared.now_ms() >= until;
                 }
                 () = self.shared.stopping.cancelled(), if !told => {}
                 () = &mut patience, if told => {
@@ -183,7 +181,7 @@ impl Worker {
 
     async fn renew_group(&self, members: &[Member], until: &mut i64) {
         let claims: Vec<_> = members.iter().map(|member| member.claim.clone()).collect();
-        let (now, lease) = (now_ms(), lease_ms(&self.shared));
+        let (now, lease) = (self.shared.now_ms(), lease_ms(&self.shared));
         match self.shared.store.renew_group(&claims, now, lease).await {
             Ok(held) => {
                 *until = now.saturating_add(lease);
@@ -228,6 +226,10 @@ impl Worker {
                         result,
                         field_patches,
                     },
+                    Err(error) if error.trouble().is_some() => {
+                        back.push(member);
+                        continue;
+                    }
                     Err(error) => not_stored(&error),
                 },
             };
@@ -236,6 +238,7 @@ impl Worker {
         let ended = self.finish_group(&ends).await?;
         for (claim, ending) in &ends {
             if ended.contains(&claim.id) {
+                self.shared.metrics.ending(ending);
                 if claim.lease_number > 1 {
                     self.remove_earlier(claim.id, ending).await;
                 }
@@ -248,19 +251,11 @@ impl Worker {
         Ok(ended.len())
     }
 
-    /// Ends the jobs in the table; a database that fails for a moment does not cost the results.
+    /// Ends the jobs in the table; a database that fails for a while does not cost the results.
     async fn finish_group(&self, ends: &[(Claim, Ending)]) -> Result<HashSet<Uuid>, JobsError> {
-        let mut pause = FIRST_PAUSE;
-        for _ in 1..WRITE_TRIES {
-            match self.shared.store.finish_group(ends, now_ms()).await {
-                Err(JobsError::Database(error)) => {
-                    tracing::warn!(%error, "ends of a group could not be written yet");
-                }
-                written => return written,
-            }
-            sleep(pause).await;
-            pause *= 2;
-        }
-        self.shared.store.finish_group(ends, now_ms()).await
+        let shared = &self.shared;
+        shared
+            .write_patiently(|| shared.store.finish_group(ends, shared.now_ms()))
+            .await
     }
 }

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
+use crate::jobs::Shared;
 use crate::jobs::error::JobsError;
+use crate::jobs::job::{FailureKind, State};
 use crate::jobs::worker::heartbeat;
-use crate::jobs::{Shared, now_ms};
 
 /// Jobs looked up in one statement by the sweep.
 const SWEEP_CHUNK: usize = 500;
@@ -18,7 +19,7 @@ pub(super) async fn reap_expired(shared: Arc<Shared>) {
         .await
         .is_some()
     {
-        let now = now_ms();
+        let now = shared.now_ms();
         match shared
             .store
             .reap(now, now, shared.options.attempts_max)
@@ -28,6 +29,7 @@ pub(super) async fn reap_expired(shared: Arc<Shared>) {
                 for (id, state) in taken {
                     tracing::warn!(job = %id, state = state.name(), "lease ran out, job taken back");
                     if state.ended() {
+                        count_taken(&shared, state);
                         shared.announce(id);
                     } else {
                         shared.wake.notify_one();
@@ -36,6 +38,13 @@ pub(super) async fn reap_expired(shared: Arc<Shared>) {
             }
             Err(error) => tracing::warn!(%error, "expired leases could not be looked for"),
         }
+    }
+}
+
+fn count_taken(shared: &Shared, state: State) {
+    match state {
+        State::Failed => shared.metrics.failed(FailureKind::WorkerLost),
+        state => shared.metrics.ended(state, 1),
     }
 }
 

@@ -13,6 +13,8 @@ use crate::contact::error::SolveError;
 pub struct Job {
     /// UUIDv7; sorts by time of submission.
     pub id: Uuid,
+    /// Whose it is.
+    pub tenant: String,
     /// Where it stands.
     pub state: State,
     /// Free text of the client.
@@ -27,6 +29,8 @@ pub struct Job {
     pub started_at: Option<i64>,
     /// End of the job; absent before it.
     pub ended_at: Option<i64>,
+    /// When it will be removed with its result; absent before its end, and where ended jobs are kept for ever.
+    pub expires_at: Option<i64>,
     /// Attempts that count, from 1 once running; an attempt handed back by a graceful shutdown does not count.
     pub attempt: u32,
     /// 0 to 1, rough; written at most with each heartbeat.
@@ -35,6 +39,8 @@ pub struct Job {
     pub warnings: Vec<String>,
     /// Why there is no answer; present exactly when the state is `failed`.
     pub failure: Option<Failure>,
+    /// The result was computed for an identical case before, not for this job.
+    pub cached: bool,
     /// Grows with every change that a client can see.
     pub version: u64,
 }
@@ -88,6 +94,31 @@ pub enum FailureKind {
     WorkerLost,
     /// The service could not do its part, for example store the result.
     Internal,
+}
+
+impl FailureKind {
+    /// Every kind there is.
+    pub const ALL: [FailureKind; 6] = [
+        FailureKind::NotConverged,
+        FailureKind::Unsolvable,
+        FailureKind::OutOfTime,
+        FailureKind::Panic,
+        FailureKind::WorkerLost,
+        FailureKind::Internal,
+    ];
+
+    /// The word for this kind in the database and the metrics.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            FailureKind::NotConverged => "not_converged",
+            FailureKind::Unsolvable => "unsolvable",
+            FailureKind::OutOfTime => "out_of_time",
+            FailureKind::Panic => "panic",
+            FailureKind::WorkerLost => "worker_lost",
+            FailureKind::Internal => "internal",
+        }
+    }
 }
 
 impl State {
@@ -190,6 +221,9 @@ mod tests {
             assert_eq!(serde_json::to_value(state).unwrap(), state.name());
         }
         assert_eq!(State::from_name("canceled"), None);
+        for kind in FailureKind::ALL {
+            assert_eq!(serde_json::to_value(kind).unwrap(), kind.name());
+        }
     }
 
     #[test]

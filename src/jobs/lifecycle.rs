@@ -2,6 +2,7 @@
 
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -11,12 +12,15 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
 use crate::contact::problem::Limits;
+use crate::jobs::clock::Clock;
 use crate::jobs::error::JobsError;
+use crate::jobs::keys::ANONYMOUS;
+use crate::jobs::metrics::Metrics;
 use crate::jobs::recipe::Recipe;
 use crate::jobs::results::Results;
 use crate::jobs::store::sqlite::SqliteStore;
 use crate::jobs::worker::Worker;
-use crate::jobs::{Jobs, Shared, housekeeping, now_ms};
+use crate::jobs::{Admitted, Jobs, Shared, housekeeping, retention};
 
 /// How long a shutdown waits for workers that were told to stop, beyond their own patience.
 const STOPPED_WITHIN: Duration = Duration::from_secs(10);
@@ -36,15 +40,25 @@ pub struct Options {
     pub attempts_max: u32,
     /// Bound of queued jobs.
     pub queue_max: u64,
+    /// Bound of queued jobs of one tenant.
+    pub tenant_queue_max: u64,
     /// Most jobs a worker claims together, if they are small; 1 means no groups.
     pub group_max: usize,
     /// Results up to this size in bytes are kept in the database, larger ones in folders.
     pub small_result_max_bytes: usize,
+    /// Identical cases get the result of the first one that was solved.
+    pub cache: bool,
+    /// How long ended jobs are kept; `None`: until they are deleted.
+    pub retention: Option<Duration>,
+    /// What leases, ends and expiries are measured with.
+    pub clock: Clock,
 }
 
 impl Options {
-    /// The defaults for a data folder: one worker, a lease of 30 s, 5 attempts, 300 000 queued jobs,
-    /// groups of 64, results up to 32 KiB in the database.
+    /// The defaults for a data folder: one worker, a lease of 30 s, 5 attempts, 300 000 queued jobs of which
+    /// 250 000 of one tenant,
+    /// groups of 64, results up to 32 KiB in the database, results used again,
+    /// ended jobs kept for ever, the system's clock.
     #[must_use]
     pub fn new(data_dir: impl Into<PathBuf>) -> Options {
         Options {
@@ -54,8 +68,12 @@ impl Options {
             lease: Duration::from_secs(30),
             attempts_max: 5,
             queue_max: 300_000,
+            tenant_queue_max: 250_000,
             group_max: 64,
             small_result_max_bytes: 32 << 10,
+            cache: true,
+            retention: None,
+            clock: Clock::system(),
         }
     }
 }
@@ -83,13 +101,16 @@ impl Jobs {
         if incomplete > 0 {
             tracing::info!(incomplete, "batches that were never acknowledged removed");
         }
-        let taken_back = store.reap(i64::MAX, now_ms(), options.attempts_max).await?;
+        let taken_back = store
+            .reap(i64::MAX, options.clock.now_ms(), options.attempts_max)
+            .await?;
         for (id, state) in taken_back {
             tracing::info!(job = %id, state = state.name(), "job of a dead process taken back");
         }
         let queued = store.queued(options.queue_max).await?;
         let (ended, _) = broadcast::channel(1024);
         Ok(Jobs {
+            tenant: ANONYMOUS.into(),
             shared: Arc::new(Shared {
                 options,
                 recipe,
@@ -101,13 +122,20 @@ impl Jobs {
                 draining: CancellationToken::new(),
                 stopping: CancellationToken::new(),
                 tasks: TaskTracker::new(),
-                queued_at_most: tokio::sync::Mutex::new(queued),
+                metrics: Metrics::new(),
+                storage_failing: AtomicBool::new(false),
+                trusted: Mutex::default(),
+                queued_at_most: tokio::sync::Mutex::new(Admitted {
+                    all: queued,
+                    ..Admitted::default()
+                }),
                 lock: Mutex::new(Some(lock)),
             }),
         })
     }
 
-    /// Starts the workers, the reaper of expired leases and the sweep of orphaned results.
+    /// Starts the workers, the reaper of expired leases and the sweeps of orphaned results and of
+    /// expired jobs.
     ///
     /// # Errors
     /// A solver thread could not be started.
@@ -122,6 +150,9 @@ impl Jobs {
         self.shared
             .tasks
             .spawn(housekeeping::sweep_orphans(self.shared.clone()));
+        self.shared
+            .tasks
+            .spawn(retention::sweep(self.shared.clone()));
         Ok(())
     }
 

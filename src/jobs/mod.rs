@@ -6,25 +6,34 @@
 //! and stops all this. A process that dies leaves `running` rows,
 //! which go back to the queue when the data folder is opened again.
 
+pub mod backup;
 pub mod batch;
+pub mod clock;
 pub mod error;
 mod fetch;
 pub mod fields;
+mod follow;
 mod group;
 mod housekeeping;
 mod idempotency;
 pub mod job;
+pub mod keys;
 pub mod lifecycle;
+mod metrics;
 pub mod recipe;
 pub mod results;
+pub mod retention;
+mod reuse;
 mod solver_thread;
 mod spool;
+mod storage;
 pub mod store;
 pub mod watch;
 pub mod worker;
 
 use std::collections::HashMap;
 use std::fs::File;
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -41,9 +50,12 @@ use crate::contact::error::CaseError;
 use crate::contact::problem::Problem;
 pub use crate::jobs::error::JobsError;
 pub use crate::jobs::job::{Failure, FailureKind, Job, State};
+use crate::jobs::keys::Trusted;
 pub use crate::jobs::lifecycle::Options;
+use crate::jobs::metrics::Metrics;
 use crate::jobs::recipe::Recipe;
 use crate::jobs::results::Results;
+pub use crate::jobs::storage::Trouble;
 pub use crate::jobs::store::list::{Filter, Page};
 use crate::jobs::store::sqlite::SqliteStore;
 use crate::jobs::store::{Deleted, Enqueued, NewJob};
@@ -59,6 +71,8 @@ const READY_WITHIN: Duration = Duration::from_secs(2);
 #[derive(Debug, Clone)]
 pub struct Jobs {
     shared: Arc<Shared>,
+    /// Whose jobs this handle makes and sees.
+    tenant: Arc<str>,
 }
 
 /// What every handle and every worker shares.
@@ -79,10 +93,22 @@ struct Shared {
     /// Set when the grace period is over: running jobs are handed back.
     stopping: CancellationToken,
     tasks: TaskTracker,
-    /// Upper bound of the number of queued jobs, recounted when it reaches the limit.
-    queued_at_most: tokio::sync::Mutex<u64>,
+    metrics: Metrics,
+    /// The last write failed because of the disk.
+    storage_failing: AtomicBool,
+    /// Keys found good a moment ago.
+    trusted: Mutex<Trusted>,
+    /// Upper bounds of the number of queued jobs, recounted when they reach their limits.
+    queued_at_most: tokio::sync::Mutex<Admitted>,
     /// Held as long as this process uses the data folder.
     lock: Mutex<Option<File>>,
+}
+
+/// Upper bounds of the number of queued jobs.
+#[derive(Debug, Default)]
+struct Admitted {
+    all: u64,
+    of_tenants: HashMap<Arc<str>, u64>,
 }
 
 impl Jobs {
@@ -94,7 +120,8 @@ impl Jobs {
         (self.shared.recipe.check)(case, &self.shared.options.limits)
     }
 
-    /// Checks a case and queues it. Once this returns the job survives the death of the process.
+    /// Checks a case and queues it. Once this returns the job survives the death of the process. If an identical case
+    /// was solved before, the job has already succeeded, with that result.
     ///
     /// With an idempotency key the same case gives the same job again, however often it is submitted, for as long as
     /// that job exists.
@@ -106,6 +133,27 @@ impl Jobs {
         &self,
         case: Value,
         idempotency_key: Option<String>,
+    ) -> Result<Job, JobsError> {
+        self.submit_case(case, idempotency_key, false).await
+    }
+
+    /// As [`Jobs::submit`], but the case is solved even if an identical one was solved before.
+    ///
+    /// # Errors
+    /// As [`Jobs::submit`].
+    pub async fn submit_fresh(
+        &self,
+        case: Value,
+        idempotency_key: Option<String>,
+    ) -> Result<Job, JobsError> {
+        self.submit_case(case, idempotency_key, true).await
+    }
+
+    async fn submit_case(
+        &self,
+        case: Value,
+        idempotency_key: Option<String>,
+        fresh: bool,
     ) -> Result<Job, JobsError> {
         if self.shared.draining.is_cancelled() {
             return Err(JobsError::Draining);
@@ -120,37 +168,55 @@ impl Jobs {
             .await
             .map_err(|error| JobsError::Damaged(error.to_string()))?;
         if let Some((key, digest)) = &idempotency
-            && let Some(enqueued) = self.shared.store.by_key(key, digest).await?
+            && let Some(enqueued) = self.shared.store.by_key(&self.tenant, key, digest).await?
         {
-            return replayed(enqueued);
+            return replayed(enqueued).map(|job| self.dated(job));
         }
         let problem = problem?;
         let (outputs, cost_us) = (problem.outputs.clone(), cost_us(&problem));
         let id = Uuid::now_v7();
-        let new = NewJob {
+        let mut new = NewJob {
             id,
+            tenant: self.tenant.clone(),
             created_at: created_at(id),
             name: problem.name,
             labels: problem.labels,
             method: problem.method.name().to_owned(),
             outputs: outputs_text(&outputs),
             cost_us,
+            reuse_key: self.reuse_key(&problem.digest),
+            source: None,
             body: Bytes::from(body.map_err(|error| JobsError::Damaged(error.to_string()))?),
             idempotency,
         };
-        self.admit(1).await?;
-        let job = replayed(self.shared.store.enqueue(&new).await?)?;
+        if !fresh {
+            self.find_sources(std::iter::once(&mut new)).await?;
+        }
+        if new.source.is_none() {
+            self.admit(1).await?;
+        }
+        let job = replayed(self.noted(self.shared.store.enqueue(&new).await)?)?;
+        if job.id == id && job.cached {
+            self.ended_cached(&[id]);
+            tracing::info!(job = %id, method = new.method, "job answered from an earlier result");
+            return Ok(self.dated(job));
+        }
         self.shared.wake.notify_one();
         tracing::info!(job = %job.id, method = new.method, "job queued");
-        Ok(job)
+        Ok(self.dated(job))
     }
 
     /// Looks at a job.
     ///
     /// # Errors
-    /// [`JobsError::NotFound`], or a failed database.
+    /// [`JobsError::NotFound`], [`JobsError::Expired`], or a failed database.
     pub async fn get(&self, id: Uuid) -> Result<Job, JobsError> {
-        self.shared.store.get(id).await?.ok_or(JobsError::NotFound)
+        let job = self.shared.store.get(id).await?;
+        // What belongs to another tenant is answered like what does not exist.
+        match job.filter(|job| *job.tenant == *self.tenant) {
+            Some(job) => self.unexpired(job),
+            None => Err(self.missing(id, JobsError::NotFound).await),
+        }
     }
 
     /// Waits until a job has ended, but not longer than `at_most`, and returns it as it then is. Returns at once when
@@ -188,10 +254,13 @@ impl Jobs {
         cursor: Option<&str>,
         limit: u32,
     ) -> Result<Page, JobsError> {
-        self.shared
-            .store
-            .list(filter, cursor, limit.clamp(1, PAGE_MAX))
-            .await
+        let store = &self.shared.store;
+        let mut page = store
+            .list(&self.tenant, filter, cursor, limit.clamp(1, PAGE_MAX))
+            .await?;
+        let jobs = page.jobs.into_iter();
+        page.jobs = jobs.filter_map(|job| self.unexpired(job).ok()).collect();
+        Ok(page)
     }
 
     /// Cancels a job: a queued one ends at once, a running one at the next tick of its solver, an ended one stays as
@@ -200,19 +269,24 @@ impl Jobs {
     /// # Errors
     /// [`JobsError::NotFound`], or a failed database.
     pub async fn cancel(&self, id: Uuid) -> Result<Job, JobsError> {
+        self.get(id).await?;
+        let now = self.shared.now_ms();
         let job = self
             .shared
             .store
-            .cancel(id, now_ms())
+            .cancel(id, now)
             .await?
             .ok_or(JobsError::NotFound)?;
         if job.state.ended() {
+            if job.state == State::Cancelled && job.ended_at == Some(now) {
+                self.shared.metrics.ended(State::Cancelled, 1);
+            }
             self.shared.announce(id);
         } else if let Some(watch) = self.shared.running().get(&id) {
             // A worker that registers later reads the wish from the table.
             watch.stop(Reason::Cancel);
         }
-        Ok(job)
+        Ok(self.dated(job))
     }
 
     /// Removes an ended job with its case and results.
@@ -220,11 +294,14 @@ impl Jobs {
     /// # Errors
     /// [`JobsError::NotEnded`], [`JobsError::NotFound`], or a failed database.
     pub async fn delete(&self, id: Uuid) -> Result<(), JobsError> {
+        self.get(id).await?;
         match self.shared.store.delete(id).await? {
             Deleted::NotEnded(state) => Err(JobsError::NotEnded(state)),
             Deleted::NotFound => Err(JobsError::NotFound),
-            Deleted::Done => {
-                if let Err(error) = self.shared.results.remove(id, None).await {
+            Deleted::Done { orphan } => {
+                if let Some(orphan) = orphan
+                    && let Err(error) = self.shared.results.remove(orphan, None).await
+                {
                     tracing::warn!(job = %id, %error, "results of a deleted job left behind until the next start");
                 }
                 Ok(())
@@ -232,7 +309,7 @@ impl Jobs {
         }
     }
 
-    /// Can this service take requests? A round trip to the database.
+    /// Can this service take requests? A round trip to the database, which must also take data.
     ///
     /// # Errors
     /// [`JobsError::Draining`], or a database that fails or does not answer in time.
@@ -242,26 +319,46 @@ impl Jobs {
         }
         timeout(READY_WITHIN, self.shared.store.ping())
             .await
-            .unwrap_or(Err(JobsError::Database(sqlx::Error::PoolTimedOut)))
+            .unwrap_or(Err(JobsError::Database(sqlx::Error::PoolTimedOut)))?;
+        self.shared.require_storage().await
     }
 
     /// Takes places in the queue. The bound is exact: the figure kept here is never below the true one, and the queue
     /// is counted before anybody is turned away.
     async fn admit(&self, jobs: u64) -> Result<(), JobsError> {
-        let queue_max = self.shared.options.queue_max;
+        let (store, options) = (&self.shared.store, &self.shared.options);
         let mut at_most = self.shared.queued_at_most.lock().await;
-        if *at_most + jobs > queue_max {
-            *at_most = self.shared.store.queued(queue_max).await?;
+        let queue_max = options.tenant_queue_max;
+        // Nothing is known yet of a tenant that comes for the first time: it is counted.
+        let known = at_most.of_tenants.get(&self.tenant).copied();
+        let mut of_tenant = known.unwrap_or(queue_max);
+        if of_tenant + jobs > queue_max {
+            of_tenant = store.queued_of(&self.tenant, queue_max).await?;
         }
-        if *at_most + jobs > queue_max {
+        if of_tenant + jobs > queue_max {
+            return Err(JobsError::QuotaExceeded { queue_max });
+        }
+        let queue_max = options.queue_max;
+        if at_most.all + jobs > queue_max {
+            at_most.all = store.queued(queue_max).await?;
+        }
+        if at_most.all + jobs > queue_max {
             return Err(JobsError::QueueFull { queue_max });
         }
-        *at_most += jobs;
+        at_most.all += jobs;
+        at_most
+            .of_tenants
+            .insert(self.tenant.clone(), of_tenant + jobs);
         Ok(())
     }
 }
 
 impl Shared {
+    /// The present, epoch milliseconds.
+    fn now_ms(&self) -> i64 {
+        self.options.clock.now_ms()
+    }
+
     /// The attempts of this process.
     fn running(&self) -> std::sync::MutexGuard<'_, HashMap<Uuid, Arc<Watch>>> {
         self.running.lock().unwrap_or_else(PoisonError::into_inner)
@@ -303,8 +400,4 @@ fn cost_us(problem: &Problem) -> u32 {
 /// The time of submission is the one inside the id, so that order by id is order by time.
 fn created_at(id: Uuid) -> i64 {
     i64::try_from(id.as_u128() >> 80).unwrap_or(0)
-}
-
-fn now_ms() -> i64 {
-    jiff::Timestamp::now().as_millisecond()
 }

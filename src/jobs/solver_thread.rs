@@ -7,6 +7,7 @@ use std::sync::mpsc;
 use bytes::Bytes;
 
 use crate::contact::error::{CaseError, SolveError};
+use crate::contact::monitor::Monitor;
 use crate::jobs::Shared;
 use crate::jobs::error::JobsError;
 use crate::jobs::fields;
@@ -90,6 +91,8 @@ fn solve_case(shared: &Shared, watch: &Watch, body: &[u8]) -> Outcome {
         Ok(answer) => answer,
         Err(error) => return Outcome::Unsolved(error),
     };
+    let seconds = watch.elapsed().as_secs_f64();
+    shared.metrics.solved(problem.method, &solution, seconds);
     let field_patches = u32::try_from(fields.patches.len()).unwrap_or(u32::MAX);
     let packed = match field_patches {
         0 => Ok(None),

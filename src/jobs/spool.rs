@@ -17,6 +17,7 @@ pub(super) struct Card {
     pub(super) method: String,
     pub(super) outputs: String,
     pub(super) cost_us: u32,
+    pub(super) digest: String,
 }
 
 /// Cards and cases, first in, first out.
@@ -99,6 +100,7 @@ mod tests {
             method: "auto".to_owned(),
             outputs: "[]".to_owned(),
             cost_us: 7,
+            digest: "d".to_owned(),
         };
         for index in 0..5 {
             spool

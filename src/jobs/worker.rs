@@ -17,21 +17,18 @@ use uuid::Uuid;
 
 use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
+use crate::jobs::Shared;
 use crate::jobs::error::JobsError;
 use crate::jobs::job::{Failure, FailureKind, Job, State};
 use crate::jobs::results::Encoded;
 use crate::jobs::solver_thread::{Outcome, SolverThread, solve_guarded};
 use crate::jobs::store::{Claim, Ending, Placed, Renewal};
 use crate::jobs::watch::{Reason, Watch};
-use crate::jobs::{Shared, now_ms};
 
 /// How often an idle worker looks for jobs although nobody woke it.
 const POLL: Duration = Duration::from_secs(1);
 /// How long a solver that was told to stop may go on before its thread is left behind.
 pub(super) const PATIENCE: Duration = Duration::from_secs(2);
-/// Tries to write the end of a job, with pauses that double from [`FIRST_PAUSE`].
-pub(super) const WRITE_TRIES: u32 = 6;
-pub(super) const FIRST_PAUSE: Duration = Duration::from_millis(50);
 /// One worker with its solver thread.
 #[derive(Debug)]
 pub struct Worker {
@@ -85,7 +82,12 @@ impl Worker {
     /// The database failed; a claimed job is then taken back when its lease runs out.
     pub async fn step(&mut self) -> Result<Step, JobsError> {
         let lease = lease_ms(&self.shared);
-        let Some(claim) = self.shared.store.claim(&self.name, now_ms(), lease).await? else {
+        let Some(claim) = self
+            .shared
+            .store
+            .claim(&self.name, self.shared.now_ms(), lease)
+            .await?
+        else {
             return Ok(Step::Idle);
         };
         let span = tracing::info_span!("job", job = %claim.id, attempt = claim.attempt, method = claim.method);
@@ -181,12 +183,12 @@ impl Worker {
     async fn beat(&self, claim: &Claim, watch: &Watch, held: &mut Lease) {
         let ticks = watch.ticks();
         if ticks == held.ticks {
-            if now_ms() >= held.until {
+            if self.shared.now_ms() >= held.until {
                 held.lose(watch);
             }
             return;
         }
-        let now = now_ms();
+        let now = self.shared.now_ms();
         let lease = lease_ms(&self.shared);
         match self
             .shared
@@ -227,6 +229,8 @@ impl Worker {
                     result,
                     field_patches,
                 },
+                // The service stops while the disk takes nothing.
+                Err(error) if error.trouble().is_some() => return self.hand_back(claim).await,
                 Err(error) => not_stored(&error),
             },
         };
@@ -236,6 +240,7 @@ impl Worker {
         if claim.lease_number > 1 {
             self.remove_earlier(claim.id, &ending).await;
         }
+        self.shared.metrics.ending(&ending);
         self.shared.announce(claim.id);
         Ok(Step::Ended(job.id, job.state))
     }
@@ -254,50 +259,54 @@ impl Worker {
         // fenced. After a short solve the lease is as good as new.
         if watch.elapsed() >= heartbeat(&self.shared) {
             let lease = lease_ms(&self.shared);
-            let renewal = self
-                .shared
-                .store
-                .renew(claim, watch.progress(), now_ms(), lease);
+            let renewal =
+                self.shared
+                    .store
+                    .renew(claim, watch.progress(), self.shared.now_ms(), lease);
             if let Err(error) = renewal.await {
                 tracing::warn!(%error, "lease could not be renewed");
             }
         }
-        let folder = self.shared.results.put(claim, result).await?;
-        Ok(Placed::Folder(folder))
+        let bytes = result.bytes() as u64;
+        let shared = &self.shared;
+        let folder = shared
+            .write_patiently(|| shared.results.put(claim, result.clone()))
+            .await?;
+        Ok(Placed::Folder(folder, bytes))
     }
 
-    /// Ends the job in the table; a database that fails for a moment does not cost the result.
+    /// Ends the job in the table; a database that fails for a while does not cost the result.
     async fn finish(&self, claim: &Claim, ending: &Ending) -> Result<Option<Job>, JobsError> {
-        let mut pause = FIRST_PAUSE;
-        for _ in 1..WRITE_TRIES {
-            match self.shared.store.finish(claim, ending, now_ms()).await {
-                Err(JobsError::Database(error)) => {
-                    tracing::warn!(%error, "end of the job could not be written yet")
-                }
-                written => return written,
-            }
-            sleep(pause).await;
-            pause *= 2;
-        }
-        self.shared.store.finish(claim, ending, now_ms()).await
+        let shared = &self.shared;
+        shared
+            .write_patiently(|| shared.store.finish(claim, ending, shared.now_ms()))
+            .await
     }
 
     pub(super) async fn hand_back(&self, claim: &Claim) -> Result<Step, JobsError> {
-        Ok(match self.shared.store.release(claim, now_ms()).await? {
-            Some(state) if state.ended() => {
-                self.shared.announce(claim.id);
-                Step::Ended(claim.id, state)
-            }
-            Some(_) => Step::HandedBack(claim.id),
-            None => Step::Lost(claim.id),
-        })
+        Ok(
+            match self
+                .shared
+                .store
+                .release(claim, self.shared.now_ms())
+                .await?
+            {
+                Some(state) if state.ended() => {
+                    self.shared.metrics.ended(state, 1);
+                    self.shared.announce(claim.id);
+                    Step::Ended(claim.id, state)
+                }
+                Some(_) => Step::HandedBack(claim.id),
+                None => Step::Lost(claim.id),
+            },
+        )
     }
 
     /// Removes what earlier attempts stored before they were lost.
     pub(super) async fn remove_earlier(&self, id: Uuid, ending: &Ending) {
         let keep = match ending {
             Ending::Succeeded {
-                result: Placed::Folder(folder),
+                result: Placed::Folder(folder, _),
                 ..
             } => Some(folder.as_str()),
             _ => None,
@@ -377,7 +386,7 @@ impl Lease {
     fn new(shared: &Shared) -> Lease {
         Lease {
             ticks: 0,
-            until: now_ms().saturating_add(lease_ms(shared)),
+            until: shared.now_ms().saturating_add(lease_ms(shared)),
             lost: false,
         }
     }

@@ -184,12 +184,11 @@ fn contradictions_are_refused() {
 #[test]
 fn what_is_not_offered_yet_is_named_with_what_is() {
     assert_fault(
-        &good_with("/contact/type", json!("profiles")),
+        &good_with("/contact/type", json!("slices")),
         "/contact/type",
         &[
-            "profiles",
-            "not offered by this version",
-            "radii, ellipse, gap_profile, gap_grid, pressure_grid",
+            "slices",
+            "radii, ellipse, gap_profile, gap_grid, pressure_grid, profiles",
         ],
     );
     assert_fault(

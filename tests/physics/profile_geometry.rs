@@ -31,13 +31,13 @@ const AS_GIVEN: Reading = Reading {
     smoothing: 0.0,
 };
 
-fn generated() -> [Profile; 2] {
+pub fn generated() -> [Profile; 2] {
     [(Body::Rail, rail_60e1()), (Body::Wheel, s1002())]
         .map(|(body, points)| Profile::new(body, &points, AS_GIVEN).unwrap())
 }
 
 /// Roll with which both wheels of a symmetric wheelset touch symmetric rails at the same height.
-fn roll(profiles: &[Profile; 2], placement: Placement) -> f64 {
+pub fn roll(profiles: &[Profile; 2], placement: Placement) -> f64 {
     let difference = |roll: f64| {
         let touch = |side| {
             let placement = Placement {
@@ -66,7 +66,7 @@ fn roll(profiles: &[Profile; 2], placement: Placement) -> f64 {
 
 /// Shift to the right in mm, yaw in mrad, track's y of the patch on the right rail from the origin of the benchmark's rail, and about the
 /// normal approach at 10 kN: CONTACT's answers for case.
-const MANCHESTER: [[f64; 4]; 12] = [
+pub const MANCHESTER: [[f64; 4]; 12] = [
     [0.0, 0.0, -8.66, 0.016],
     [0.5, 1.2, -16.03, 0.019],
     [1.0, 2.4, -18.54, 0.022],
@@ -81,7 +81,7 @@ const MANCHESTER: [[f64; 4]; 12] = [
     [10.0, 24.0, -39.44, 0.034],
 ];
 /// Track's y of the origin of the benchmark's rail, which is given with its cant.
-const RAIL_ORIGIN: f64 = 760.5326;
+pub const RAIL_ORIGIN: f64 = 760.5326;
 
 /// Track's y of the mean overlap of all patches, weighted with its square over the area; CONTACT has one such point for patches that lie
 /// near each other.

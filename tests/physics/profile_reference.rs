@@ -82,14 +82,19 @@ fn frames_and_creepages_agree_with_contact() {
             roll_rate: 0.0,
         };
         let [x, y, spin] = creepages(&geometry, &frame, search.touch - lowering, &motion);
-        // CONTACT takes the radius at the deepest overlap, this is the one at the origin of the patch.
+        // CONTACT takes the radius at the deepest overlap, this is the one at the origin of the patch, up to 0.15 mm away.
         assert!(
             (-frame.origin[1] - on_track[1]).abs() < 0.15,
             "{}",
             record["id"]
         );
         assert!((frame.angle - on_track[3]).abs() < 2.5e-3);
-        assert!((x + converged("xi")).abs() < 5e-5);
+        let steep = 3e-4 * on_track[3].abs();
+        assert!(
+            (x + converged("xi")).abs() < 4e-5 + steep,
+            "{}",
+            record["id"]
+        );
         assert!((y - converged("eta")).abs() < 1e-6);
         assert!((spin - converged("phi")).abs() < 6e-6);
         compared += 1;

@@ -6,7 +6,7 @@ use std::process::{Output, Stdio};
 
 use serde_json::{Value, json};
 
-use crate::support::{Service, case, railhead};
+use crate::support::{Service, case, endless_case, railhead};
 
 fn example(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -193,4 +193,88 @@ fn settings_come_from_the_environment_too_and_flags_win() {
         complaints(&output)
     );
     running.kill();
+}
+
+#[test]
+fn config_tells_every_setting_and_where_it_comes_from() {
+    let out = railhead()
+        .args([
+            "config",
+            "--queue-max",
+            "7",
+            "--cors-origin",
+            "http://a,http://b",
+        ])
+        .env("RAILHEAD_RETENTION", "30d")
+        .output()
+        .unwrap();
+    assert!(out.status.success(), "{out:?}");
+    let told: Value = serde_json::from_slice(&out.stdout).unwrap();
+    for (setting, value, source) in [
+        ("queue-max", json!(7), "flag"),
+        ("retention", json!("30d"), "environment"),
+        ("listen", json!("127.0.0.1:8080"), "default"),
+        ("cache", json!(true), "default"),
+        ("cors-origin", json!(["http://a", "http://b"]), "flag"),
+    ] {
+        assert_eq!(told[setting]["value"], value, "{setting}");
+        assert_eq!(told[setting]["source"], source, "{setting}");
+    }
+    assert!(told["workers"]["value"].as_u64() >= Some(1));
+    // Every flag of `serve` is there under its name.
+    let help = railhead().args(["serve", "--help"]).output().unwrap();
+    let help = String::from_utf8(help.stdout).unwrap();
+    let flags = help
+        .lines()
+        .filter_map(|line| line.trim().strip_prefix("--"));
+    let flags: Vec<&str> = flags
+        .map(|flag| flag.split([' ', '=']).next().unwrap_or_default())
+        .collect();
+    assert!(flags.len() > 10, "{help}");
+    for flag in flags {
+        assert!(told[flag]["variable"].is_string(), "{flag}");
+    }
+}
+
+#[tokio::test]
+async fn a_backup_of_a_working_service_can_be_started() {
+    let folder = tempfile::tempdir().unwrap();
+    let (data_dir, copy) = (folder.path().join("data"), folder.path().join("copy"));
+    let service = Service::start(&data_dir, &["--cache", "false"]);
+    // Some results lie in the table, some are too large for it.
+    let mut large = case("large");
+    large["solver"]["mesh"] = json!({ "strips": 40, "cells": 40 });
+    let mut results = Vec::new();
+    for case in [case("small"), large] {
+        let id = service.submit(&case).await;
+        service.until(&id, "succeeded").await;
+        let path = format!("/v1/jobs/{id}");
+        let result = service.get(&format!("{path}/result")).await;
+        let fields = service.get(&format!("{path}/tractions")).await;
+        results.push((path, result, fields));
+    }
+    let endless = service.submit(&endless_case("runs meanwhile")).await;
+    service.until(&endless, "running").await;
+    let backup = || {
+        let mut command = railhead();
+        let command = command.arg("backup").arg("--to").arg(&copy);
+        command.arg("--data-dir").arg(&data_dir).output().unwrap()
+    };
+    let made = backup();
+    assert!(made.status.success(), "{made:?}");
+    let again = backup();
+    assert_eq!(
+        again.status.code(),
+        Some(1),
+        "nothing is overwritten: {again:?}"
+    );
+    service.kill();
+    std::fs::remove_dir_all(&data_dir).unwrap();
+
+    let service = Service::start(&copy, &[]);
+    for (path, result, fields) in results {
+        assert_eq!(service.get(&format!("{path}/result")).await, result);
+        assert_eq!(service.get(&format!("{path}/tractions")).await, fields);
+    }
+    service.until(&endless, "running").await;
 }

@@ -73,6 +73,7 @@ async fn methods_name_every_word_of_the_contract() {
             Some("ellipse") => "spin.case.json",
             Some("gap_profile") => "uic60-crown.case.json",
             Some("gap_grid") => "two-patches.case.json",
+            Some("profiles") => "wheel-rail.case.json",
             Some("pressure_grid") => "pressure-grid.case.json",
             other => panic!("{other:?} has no example"),
         };

@@ -348,12 +348,18 @@ async fn every_kind_of_problem_explains_itself() {
         assert!(seen.insert(path.to_owned()), "{path} is there twice");
         assert_eq!(&server.get(path).await.json, kind);
     }
-    // Every kind is provoked by a test here or in `requests`; `internal` by a unit test of the panic handler, and `not-ready`
+    // Every kind is provoked by a test here or in the files below; `internal` by a unit test of the panic handler, and `not-ready`
     // needs a job table that stops answering.
     let here = concat!(
+        include_str!("batch_deletion.rs"),
+        include_str!("batch_tables.rs"),
+        include_str!("access.rs"),
         include_str!("batches.rs"),
+        include_str!("caching.rs"),
         include_str!("errors.rs"),
-        include_str!("requests.rs")
+        include_str!("requests.rs"),
+        include_str!("retention.rs"),
+        include_str!("storage.rs")
     );
     let untested: Vec<&String> = seen
         .iter()

@@ -1,19 +1,34 @@
 //! Does the service behave?
 
+mod access;
 mod api;
+mod batch_deletion;
+mod batch_tables;
 mod batches;
+mod cache;
+mod caching;
 mod cli;
 mod contract;
 mod crash;
 mod documents;
 mod errors;
+mod events;
+mod formats;
+mod guides;
+mod keys;
+mod metrics;
+mod pictures;
+mod profiles;
 mod requests;
 mod results;
+mod retention;
 mod schema;
 mod server;
 mod shutdown;
+mod storage;
 mod store;
 mod store_lists;
 mod store_model;
 mod support;
+mod vtk;
 mod worker;

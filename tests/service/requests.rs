@@ -252,6 +252,12 @@ async fn answers_that_exclude_json_are_refused() {
             .await;
         assert_problem(&answer, 406, "not-acceptable", "text/csv");
     }
+    let named = server.get("/v1/methods?format=csv").await;
+    assert_problem(&named, 406, "not-acceptable", "`json` only");
+    let send = server.send(Method::GET, "/v1/methods?format=json", |request| {
+        request.header("accept", "text/csv")
+    });
+    assert_eq!(send.await.status, 200, "`format` overrides `Accept`");
     let browser = "text/html,application/xhtml+xml,*/*;q=0.8";
     assert_eq!(
         server

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use crate::server::{Server, example};
 
 /// The numbers of an array.
-fn numbers(value: &Value) -> Vec<f64> {
+pub fn numbers(value: &Value) -> Vec<f64> {
     let items = value
         .as_array()
         .unwrap_or_else(|| panic!("{value} is no array"));

@@ -1,5 +1,6 @@
 //! A service in this process, on a port of its own with a data folder of its own, and a client for it.
 
+use std::io::Read;
 use std::net::SocketAddr;
 use std::path::Path;
 use std::sync::Arc;
@@ -41,6 +42,8 @@ pub struct Setup {
 pub struct Answer {
     pub status: u16,
     pub headers: HeaderMap,
+    pub bytes: Vec<u8>,
+    /// The body as text; what is not UTF-8 is replaced.
     pub text: String,
     pub json: Value,
 }
@@ -121,11 +124,13 @@ impl Server {
         let response = shape(request).send().await.expect("an answer");
         let status = response.status().as_u16();
         let headers = response.headers().clone();
-        let text = response.text().await.expect("a body");
+        let bytes = response.bytes().await.expect("a body").to_vec();
+        let text = String::from_utf8_lossy(&bytes).into_owned();
         let answer = Answer {
             status,
-            json: serde_json::from_str(&text).unwrap_or(Value::Null),
+            json: serde_json::from_slice(&unpacked(&headers, &bytes)).unwrap_or(Value::Null),
             headers,
+            bytes,
             text,
         };
         assert_documented(
@@ -170,6 +175,22 @@ impl Server {
 impl Answer {
     pub fn header(&self, name: &str) -> Option<&str> {
         self.headers.get(name).and_then(|value| value.to_str().ok())
+    }
+}
+
+/// A body as it was before it was packed.
+pub fn unpacked(headers: &HeaderMap, bytes: &[u8]) -> Vec<u8> {
+    let coding = headers.get("content-encoding");
+    match coding.map(|coding| coding.to_str().expect("a coding")) {
+        Some("zstd") => zstd::decode_all(bytes).expect("zstd"),
+        Some("gzip") => {
+            let mut out = Vec::new();
+            let mut reader = flate2::read::GzDecoder::new(bytes);
+            reader.read_to_end(&mut out).expect("gzip");
+            out
+        }
+        Some(other) => panic!("{other} was not asked for"),
+        None => bytes.to_vec(),
     }
 }
 

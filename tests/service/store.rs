@@ -46,6 +46,7 @@ pub fn new_job() -> NewJob {
     let id = Uuid::now_v7();
     NewJob {
         id,
+        tenant: "anonymous".into(),
         created_at: i64::try_from(id.as_u128() >> 80).unwrap(),
         name: Some("a case".to_owned()),
         labels: BTreeMap::new(),
@@ -53,6 +54,8 @@ pub fn new_job() -> NewJob {
         body: Bytes::from_static(b"{}"),
         outputs: "[]".to_owned(),
         cost_us: 1000,
+        reuse_key: None,
+        source: None,
         idempotency: None,
     }
 }
@@ -74,7 +77,7 @@ fn keyed(key: &str, digest: u8) -> NewJob {
 pub fn success() -> Ending {
     Ending::Succeeded {
         warnings: vec!["mind the gap".to_owned()],
-        result: Placed::Folder("results/1".to_owned()),
+        result: Placed::Folder("results/1".to_owned(), 10),
         field_patches: 2,
     }
 }
@@ -366,10 +369,21 @@ async fn one_idempotency_key_makes_one_job() {
         Enqueued::Conflict
     );
     assert_eq!(
-        table.store.by_key("k", &[2; 32]).await.unwrap(),
+        table
+            .store
+            .by_key("anonymous", "k", &[2; 32])
+            .await
+            .unwrap(),
         Some(Enqueued::Conflict)
     );
-    assert_eq!(table.store.by_key("other", &[1; 32]).await.unwrap(), None);
+    assert_eq!(
+        table
+            .store
+            .by_key("anonymous", "other", &[1; 32])
+            .await
+            .unwrap(),
+        None
+    );
     assert!(matches!(
         table.store.enqueue(&keyed("other", 2)).await.unwrap(),
         Enqueued::Created(_)
@@ -398,16 +412,34 @@ async fn only_an_ended_job_can_be_deleted_and_all_that_hung_on_it_goes() {
         table.store.existing(&[Uuid::now_v7(), id]).await.unwrap(),
         [id]
     );
-    assert_eq!(table.store.delete(id).await.unwrap(), Deleted::Done);
+    assert_eq!(
+        table.store.delete(id).await.unwrap(),
+        Deleted::Done { orphan: Some(id) }
+    );
     assert_eq!(table.store.delete(id).await.unwrap(), Deleted::NotFound);
 
     assert_eq!(table.store.case(id).await.unwrap(), None);
-    assert_eq!(table.store.by_key("k", &[1; 32]).await.unwrap(), None);
+    assert_eq!(
+        table
+            .store
+            .by_key("anonymous", "k", &[1; 32])
+            .await
+            .unwrap(),
+        None
+    );
     let filter = Filter {
         label: Some(("line".to_owned(), "A12".to_owned())),
         ..Filter::default()
     };
-    assert_eq!(table.store.list(&filter, None, 10).await.unwrap().jobs, []);
+    assert_eq!(
+        table
+            .store
+            .list("anonymous", &filter, None, 10)
+            .await
+            .unwrap()
+            .jobs,
+        []
+    );
     assert!(table.store.existing(&[id]).await.unwrap().is_empty());
 }
 

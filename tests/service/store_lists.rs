@@ -20,7 +20,7 @@ async fn pages_neither_repeat_nor_skip_while_jobs_arrive() {
     loop {
         let page = table
             .store
-            .list(&filter, cursor.as_deref(), 10)
+            .list("anonymous", &filter, cursor.as_deref(), 10)
             .await
             .unwrap();
         seen.extend(page.jobs.iter().map(|job| job.id));
@@ -45,7 +45,7 @@ async fn a_full_last_page_has_no_next_one() {
     for (limit, more) in [(3, true), (4, false), (5, false)] {
         let page = table
             .store
-            .list(&Filter::default(), None, limit)
+            .list("anonymous", &Filter::default(), None, limit)
             .await
             .unwrap();
         assert_eq!(page.next_cursor.is_some(), more, "limit {limit}");
@@ -67,7 +67,11 @@ async fn filters_combine_and_windows_are_half_open() {
     }
     table.claim(0).await.unwrap();
     let ids = async |filter: &Filter| {
-        let page = table.store.list(filter, None, 100).await.unwrap();
+        let page = table
+            .store
+            .list("anonymous", filter, None, 100)
+            .await
+            .unwrap();
         page.jobs
             .iter()
             .map(|job| jobs.iter().position(|id| *id == job.id).unwrap())
@@ -98,7 +102,7 @@ async fn a_cursor_of_another_filter_is_refused() {
     }
     let cursor = table
         .store
-        .list(&Filter::default(), None, 1)
+        .list("anonymous", &Filter::default(), None, 1)
         .await
         .unwrap()
         .next_cursor
@@ -108,7 +112,7 @@ async fn a_cursor_of_another_filter_is_refused() {
         ..Filter::default()
     };
     for (filter, cursor) in [(&other, cursor.as_str()), (&Filter::default(), "nonsense")] {
-        let answer = table.store.list(filter, Some(cursor), 1).await;
+        let answer = table.store.list("anonymous", filter, Some(cursor), 1).await;
         assert!(matches!(answer, Err(JobsError::BadCursor)), "{answer:?}");
     }
 }

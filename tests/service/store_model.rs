@@ -90,6 +90,7 @@ impl Pair {
     async fn enqueue(&mut self) {
         let id = Uuid::now_v7();
         let new = NewJob {
+            tenant: "anonymous".into(),
             id,
             created_at: 0,
             name: None,
@@ -98,6 +99,8 @@ impl Pair {
             body: Bytes::from_static(b"{}"),
             outputs: "[]".to_owned(),
             cost_us: 1000,
+            reuse_key: None,
+            source: None,
             idempotency: None,
         };
         self.store.enqueue(&new).await.unwrap();
@@ -176,7 +179,7 @@ impl Pair {
         let ending = if well {
             Ending::Succeeded {
                 warnings: Vec::new(),
-                result: Placed::Folder("k".to_owned()),
+                result: Placed::Folder("k".to_owned(), 1),
                 field_patches: 0,
             }
         } else {
@@ -223,11 +226,11 @@ impl Pair {
     async fn delete(&mut self, id: Uuid) {
         let expected = match self.rows.get(&id) {
             None => Deleted::NotFound,
-            Some(row) if row.state.ended() => Deleted::Done,
+            Some(row) if row.state.ended() => Deleted::Done { orphan: Some(id) },
             Some(row) => Deleted::NotEnded(row.state),
         };
         assert_eq!(self.store.delete(id).await.unwrap(), expected);
-        if expected == Deleted::Done {
+        if expected == (Deleted::Done { orphan: Some(id) }) {
             self.rows.remove(&id);
         }
     }

@@ -40,7 +40,7 @@ where
     open(Options::new(data_dir), solve).await
 }
 
-/// Jobs with options of one's own, solved by the given function.
+/// Jobs with options of one's own, solved by the given function, each anew.
 pub async fn open<F>(options: Options, solve: F) -> Jobs
 where
     F: Fn(&Problem, &dyn Monitor) -> Result<(Solution, Fields), SolveError> + Send + Sync + 'static,
@@ -48,6 +48,10 @@ where
     let recipe = Recipe {
         solve: Arc::new(solve),
         ..Recipe::contact()
+    };
+    let options = Options {
+        cache: false,
+        ..options
     };
     Jobs::open_with(options, recipe).await.unwrap()
 }
@@ -63,8 +67,23 @@ pub struct Service {
 impl Service {
     /// Starts `railhead serve` on a data folder and returns when it listens.
     pub fn start(data_dir: &Path, flags: &[&str]) -> Service {
-        let mut child = railhead()
-            .args(["serve", "--listen", "127.0.0.1:0", "--log-format", "json"])
+        let mut program = railhead();
+        Service::spawn(&mut program, data_dir, flags)
+    }
+
+    /// The same, by a program that is given the real one and its flags.
+    pub fn start_by(program: &mut Command, data_dir: &Path, flags: &[&str]) -> Service {
+        for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("RAILHEAD_")) {
+            program.env_remove(name);
+        }
+        program.arg(env!("CARGO_BIN_EXE_railhead"));
+        Service::spawn(program, data_dir, flags)
+    }
+
+    fn spawn(program: &mut Command, data_dir: &Path, flags: &[&str]) -> Service {
+        let mut child = program
+            .args(["serve", "--log-format", "json"])
+            .env("RAILHEAD_LISTEN", "127.0.0.1:0")
             .arg("--data-dir")
             .arg(data_dir)
             .args(flags)
@@ -104,6 +123,11 @@ impl Service {
     /// The address it listens on.
     pub fn address(&self) -> SocketAddr {
         self.address
+    }
+
+    /// The id of its process.
+    pub fn id(&self) -> u32 {
+        self.child.id()
     }
 
     /// A request to this service.
@@ -151,6 +175,12 @@ impl Service {
         log.iter()
             .filter(|event| event["message"] == message)
             .count()
+    }
+
+    /// Everything logged so far, as JSON text.
+    pub fn log_text(&self) -> String {
+        let log = self.log.lock().unwrap();
+        log.iter().map(|event| format!("{event}\n")).collect()
     }
 
     /// Ends it with SIGKILL.

@@ -2,38 +2,44 @@
 //!
 //! The rail is straight along x, so that the wheel meets it where its normal has no part along x: the wheel is
 //! replaced by the curve of those points, and the search is one in the plane across. Patches are the intervals in which the
-//! undeformed bodies overlap; the frame of a patch lies at the mean of its overlap, weighted with its square over the
+//! undeformed bodies overlap (see `overlaps.rs`); the frame of a patch lies at the mean of its overlap, weighted with its square over the
 //! area (power 5/2 on a line), with the mean inclination of the rail. In that frame the gap is taken along the normal, exactly: the
 //! wheel as surface of revolution, the rail as cylinder.
 
 use crate::contact::geometry::local_gap::LocalGap;
+use crate::contact::geometry::overlaps::Overlap;
 use crate::contact::geometry::wheel_rail::WheelRail;
 
 /// Spacing of the search across and along the curves, in mm.
-const STEP: f64 = 0.01;
+pub(super) const STEP: f64 = 0.01;
 const CURVE_STEP: f64 = 0.02;
 /// The window of a gap is larger than the overlap by this part and this length.
 const MARGIN: f64 = 0.15;
 const MARGIN_MM: f64 = 0.1;
-/// Overlaps nearer to each other than this, in mm, are one patch.
-const TOGETHER: f64 = 0.3;
+/// A window that is too short along x is made longer by this factor, so many times.
+const WIDENING: f64 = 1.5;
+const WIDENINGS_MAX: usize = 5;
+/// Slope with which surfaces are bent apart beyond a cut.
+const APART: f64 = 0.5;
+/// No wheel is lowered farther than this, in mm.
+const LOWERING_MAX: f64 = 16.0;
 
 /// Wheel and rail over each other, line by line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Search<'g> {
-    geometry: &'g WheelRail,
-    lines: Vec<Line>,
+    pub(super) geometry: &'g WheelRail,
+    pub(super) lines: Vec<Line>,
     /// Height of the wheel's centre in mm at which the bodies just touch.
     pub touch: f64,
 }
 
 /// One line along x: its y, the upper edge of the rail, and the clearance above first touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Line {
-    y: f64,
-    clearance: f64,
-    rail: f64,
-    wheel: f64,
+pub(super) struct Line {
+    pub(super) y: f64,
+    pub(super) clearance: f64,
+    pub(super) rail: f64,
+    pub(super) wheel: f64,
 }
 
 /// The frame of a patch in track axes: z of the frame is the normal out of the rail.
@@ -129,7 +135,7 @@ impl<'g> Search<'g> {
     pub fn frames(&self, lowering: f64) -> Result<Vec<Frame>, String> {
         self.overlaps(lowering)?
             .into_iter()
-            .map(|lines| Ok(self.frame(lines, lowering)))
+            .map(|overlap| Ok(self.frame(self.around(overlap.ends), lowering)))
             .collect()
     }
 
@@ -140,42 +146,47 @@ impl<'g> Search<'g> {
     pub fn gaps(&self, lowering: f64) -> Result<Vec<LocalGap>, String> {
         self.overlaps(lowering)?
             .into_iter()
-            .map(|lines| self.gap(lines, lowering))
+            .map(|overlap| self.gap(overlap, lowering))
             .collect()
     }
 
-    fn overlaps(&self, lowering: f64) -> Result<Vec<&[Line]>, String> {
-        let inside = |line: &Line| line.clearance < lowering;
-        let apart = |a: &Line, b: &Line| b.y - a.y > TOGETHER;
-        let places: Vec<usize> = (0..self.lines.len())
-            .filter(|k| inside(&self.lines[*k]))
-            .collect();
-        let intervals = places.chunk_by(|a, b| !apart(&self.lines[*a], &self.lines[*b]));
-        let mut found = Vec::new();
-        for interval in intervals {
-            let (first, last) = (interval[0], interval[interval.len() - 1]);
-            let ends = |k: usize, next: Option<&Line>| {
-                next.is_none_or(|next| (next.y - self.lines[k].y).abs() > 1.5 * STEP)
-            };
-            let before = first.checked_sub(1).map(|k| &self.lines[k]);
-            if ends(first, before) || ends(last, self.lines.get(last + 1)) {
-                let line = self.lines[if ends(first, before) { first } else { last }];
-                let [rail, wheel] = [
-                    self.geometry.on_rail(line.rail),
-                    self.geometry.on_wheel(line.wheel),
-                ];
-                return Err(format!(
-                    "the contact reaches the end of a profile, at y = {:.2} mm on the rail and {:.2} mm on the wheel; the true contact is \
-                     cut off, longer profiles are needed",
-                    rail[0], wheel[0]
-                ));
-            }
-            found.push(&self.lines[first..=last]);
+    /// About how far below first touch the wheel comes to rest under a vertical force, given in mm² as the force divided by
+    /// the contact modulus.
+    ///
+    /// Every patch is taken for a circle of the area that half the lowering makes overlap, pressed by a sphere, as if
+    /// horizontal: `N = 4/3 E* √(A/π) δ`, exact for paraboloids.
+    #[must_use]
+    pub fn estimated_lowering(&self, force: f64) -> f64 {
+        let (mut low, mut high) = (0.0_f64, 1e-3);
+        while self.estimated_force(high) < force && high < LOWERING_MAX {
+            (low, high) = (high, 2.0 * high);
         }
-        Ok(found)
+        for _ in 0..30 {
+            let middle = 0.5 * (low + high);
+            if self.estimated_force(middle) < force {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        0.5 * (low + high)
     }
 
-    fn frame(&self, lines: &[Line], lowering: f64) -> Frame {
+    fn estimated_force(&self, lowering: f64) -> f64 {
+        let inside = |line: &Line| line.clearance < 0.5 * lowering;
+        let runs = self.lines.chunk_by(|a, b| inside(a) == inside(b));
+        let length = |line: &Line| {
+            let radius = self.geometry.placement.rolling_radius;
+            2.0 * (2.0 * radius * (0.5 * lowering - line.clearance)).sqrt()
+        };
+        let carried = |run: &[Line]| {
+            let area: f64 = run.iter().map(|line| length(line) * STEP).sum();
+            4.0 / 3.0 * (area / std::f64::consts::PI).sqrt() * lowering
+        };
+        runs.filter(|run| inside(&run[0])).map(carried).sum()
+    }
+
+    pub(super) fn frame(&self, lines: &[Line], lowering: f64) -> Frame {
         let (mut weight, mut y, mut angle) = (0.0, 0.0, 0.0);
         for line in lines {
             let own = (lowering - line.clearance).max(0.0).powf(2.5);
@@ -201,12 +212,13 @@ impl<'g> Search<'g> {
     }
 
     /// Turn about x that lays the track's y along the rail's surface.
-    fn inclination(&self, rail: f64) -> f64 {
+    pub(super) fn inclination(&self, rail: f64) -> f64 {
         let [y, z] = self.geometry.rail_at(rail).tangent();
         (z / y).atan()
     }
 
-    fn gap(&self, lines: &[Line], lowering: f64) -> Result<LocalGap, String> {
+    fn gap(&self, overlap: Overlap, lowering: f64) -> Result<LocalGap, String> {
+        let lines = self.around(overlap.ends);
         let frame = self.frame(lines, lowering);
         let mut across = [f64::INFINITY, f64::NEG_INFINITY];
         let mut along = [0.0_f64; 2];
@@ -225,12 +237,32 @@ impl<'g> Search<'g> {
             let margin = MARGIN * (high - low) + MARGIN_MM;
             [low - margin, high + margin]
         };
-        LocalGap::new(
+        let mut gap = LocalGap::new(
             self.geometry,
             frame,
             self.touch - lowering,
             [widen(along), widen(across)],
-        )
+        )?;
+        // With yaw a hollow flange root follows the rail farther than a circle would.
+        for _ in 0..WIDENINGS_MAX {
+            if !gap.overlaps_at_ends() {
+                break;
+            }
+            along = along.map(|end| WIDENING * end);
+            let window = [widen(along), widen(across)];
+            gap = LocalGap::new(self.geometry, frame, self.touch - lowering, window)?;
+        }
+        // Beyond a cut lies another patch, which keeps the surfaces apart between the two.
+        let ends = self
+            .thin_ends(overlap, lowering)
+            .map(|line| gap.frame.across(self.geometry, line.rail)[0]);
+        for (v, row) in gap.y.iter().zip(&mut gap.gap) {
+            let below = if overlap.cut[0] { ends[0] - v } else { 0.0 };
+            let above = if overlap.cut[1] { v - ends[1] } else { 0.0 };
+            let beyond = below.max(above).max(0.0);
+            row.iter_mut().for_each(|height| *height += APART * beyond);
+        }
+        Ok(gap)
     }
 }
 

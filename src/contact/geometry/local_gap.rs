@@ -4,7 +4,7 @@ use crate::contact::geometry::contact_search::Frame;
 use crate::contact::geometry::wheel_rail::WheelRail;
 
 /// Samples of a gap along and across.
-const COLUMNS: usize = 65;
+const COLUMNS: usize = 33;
 const ROWS: usize = 161;
 /// Spacing along the rail's curve, in mm.
 const CURVE_STEP: f64 = 0.1;
@@ -46,7 +46,7 @@ impl LocalGap {
                 .collect::<Vec<f64>>()
         });
         let y: Vec<f64> = y.into_iter().filter(|v| rail.reaches(*v)).collect();
-        let heights: Vec<f64> = y.iter().map(|v| rail.height(*v)).collect();
+        let heights: Vec<f64> = y.iter().map(|v| rail.height(*v)[0]).collect();
         if y.len() < ROWS / 2 {
             return Err(format!(
                 "the patch at y = {:.2} mm on the rail bends too much for a plane of contact",
@@ -65,6 +65,12 @@ impl LocalGap {
             .map(|(row, height)| row.into_iter().map(|wheel| wheel - height).collect())
             .collect();
         Ok(LocalGap { frame, x, y, gap })
+    }
+
+    /// Do the bodies still overlap at the first or the last x?
+    pub(super) fn overlaps_at_ends(&self) -> bool {
+        let last = self.x.len() - 1;
+        self.gap.iter().any(|row| row[0] < 0.0 || row[last] < 0.0)
     }
 }
 
@@ -129,18 +135,19 @@ impl<'g> RailInFrame<'g> {
             && v <= self.samples[self.samples.len() - 1][0]
     }
 
-    /// Height over the plane at v, by bracketed secant steps along the curve.
-    fn height(&self, v: f64) -> f64 {
+    /// Height over the plane at v, and the parameter there, by bracketed secant steps along the curve.
+    fn height(&self, v: f64) -> [f64; 2] {
         let k = self
             .samples
             .partition_point(|sample| sample[0] < v)
             .clamp(1, self.samples.len() - 1);
         let [mut low, mut high] = [self.samples[k - 1], self.samples[k]];
-        let mut at = [0.0; 2];
+        let mut found = [0.0; 2];
         for _ in 0..30 {
             let t = ((v - low[0]) / (high[0] - low[0])).clamp(0.0, 1.0);
             let s = low[1] + t * (high[1] - low[1]);
-            at = self.local(s);
+            let at = self.local(s);
+            found = [at[1], s];
             if (at[0] - v).abs() < 1e-11 {
                 break;
             }
@@ -150,7 +157,7 @@ impl<'g> RailInFrame<'g> {
                 high = [at[0], s];
             }
         }
-        at[1]
+        found
     }
 }
 
@@ -168,6 +175,16 @@ struct Guess {
     wheel: f64,
 }
 
+impl Guess {
+    /// The next of a row that continues in a straight line from `before` over this one.
+    fn beyond(self, before: Guess) -> Guess {
+        Guess {
+            height: 2.0 * self.height - before.height,
+            wheel: 2.0 * self.wheel - before.wheel,
+        }
+    }
+}
+
 impl WheelInFrame<'_> {
     /// Height of the wheel's surface over the plane of the frame, outward from the middle.
     fn heights(&self, x: &[f64], y: &[f64]) -> Vec<Vec<f64>> {
@@ -179,10 +196,12 @@ impl WheelInFrame<'_> {
             let first = self.height(x[middle[0]], y[j], start);
             rows[j][middle[0]] = first.height;
             for columns in [outward(middle[0], x.len()).0, outward(middle[0], x.len()).1] {
-                let mut guess = first;
+                let (mut before, mut guess) = (first, first);
                 for i in columns {
-                    guess = self.height(x[i], y[j], guess);
-                    rows[j][i] = guess.height;
+                    let found = self.height(x[i], y[j], guess);
+                    rows[j][i] = found.height;
+                    // The surface goes on as it came.
+                    (before, guess) = (found, found.beyond(before));
                 }
             }
             first
@@ -196,9 +215,10 @@ impl WheelInFrame<'_> {
         );
         let (up, down) = outward(middle[1], y.len());
         for order in [up, down] {
-            let mut guess = start;
+            let (mut before, mut guess) = (start, start);
             for j in order {
-                guess = fill(j, guess);
+                let found = fill(j, guess);
+                (before, guess) = (found, found.beyond(before));
             }
         }
         rows
@@ -208,6 +228,7 @@ impl WheelInFrame<'_> {
     /// wheel's curve; where there is no such point, a surface that opens quickly.
     fn height(&self, u: f64, v: f64, start: Guess) -> Guess {
         const STEP_MAX: f64 = 1.0;
+        const STEP_LAST: f64 = 1e-6;
         let [tangent, normal] = self.frame.axes();
         let axle = self.geometry.axle();
         let shift = self.geometry.placement.lateral_shift;
@@ -234,7 +255,8 @@ impl WheelInFrame<'_> {
             let wheel = (miss_along * rise_radius - miss_radius * rise_along) / determinant;
             guess.height += height.clamp(-STEP_MAX, STEP_MAX);
             guess.wheel += wheel.clamp(-STEP_MAX, STEP_MAX);
-            if height.abs() + wheel.abs() < 1e-11 {
+            // The error falls with the square of the step.
+            if height.abs() + wheel.abs() < STEP_LAST {
                 return guess;
             }
         }
@@ -246,6 +268,34 @@ impl WheelInFrame<'_> {
 }
 
 impl WheelRail {
+    /// A frame of the same directions with its origin on the rail's surface over the point `by` of the plane, `[x, y]` in
+    /// mm, with the wheel's centre at the height `centre`.
+    #[must_use]
+    pub fn moved(&self, frame: &Frame, by: [f64; 2], centre: f64) -> Frame {
+        let [u, v] = by;
+        let [tangent, normal] = frame.axes();
+        let [height, rail] = RailInFrame::new(self, frame).height(v);
+        let surface = WheelInFrame {
+            geometry: self,
+            frame,
+            centre,
+        };
+        let start = Guess {
+            height: 0.0,
+            wheel: frame.wheel,
+        };
+        Frame {
+            origin: [
+                frame.origin[0] + u,
+                frame.origin[1] + v * tangent[0] + height * normal[0],
+                frame.origin[2] + v * tangent[1] + height * normal[1],
+            ],
+            angle: frame.angle,
+            rail,
+            wheel: surface.height(u, v, start).wheel,
+        }
+    }
+
     /// Overlap in mm of the undeformed bodies along the normal at the origin of a frame, with the wheel's centre at the
     /// height `centre`; negative where there is a gap.
     #[must_use]

@@ -1,11 +1,9 @@
 //! Where do the bodies touch? Cross-sections of wheel and rail, their placement, and the gaps of their patches.
-//!
-//! Groundwork of the contact type `profiles`, which cases cannot ask for yet: the normal problem of these gaps is not
-//! connected.
 
 pub mod contact_search;
 pub mod formats;
 pub mod local_gap;
+mod overlaps;
 pub mod profile;
 pub mod smoothing;
 pub mod wheel_rail;

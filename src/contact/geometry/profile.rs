@@ -91,7 +91,7 @@ impl Profile {
         if !(shortest..=longest).contains(&length) {
             return Err(format!(
                 "the arc length of the points is {length:.4} mm; {shortest} to {longest} mm are allowed (is another unit than mm \
-                 used?)"
+                 used, or are the points not in order?)"
             ));
         }
         orient(body, &mut points, reading, &mut warnings)?;
@@ -140,7 +140,9 @@ impl Profile {
     /// The curve at a parameter; beyond the ends the tangent there.
     #[must_use]
     pub fn at(&self, s: f64) -> Place {
-        let (y, z) = (self.y.at(s), self.z.at(s));
+        // Both have the same knots.
+        let i = self.y.interval(s);
+        let (y, z) = (self.y.at_in(i, s), self.z.at_in(i, s));
         Place {
             at: [y.value, z.value],
             slope: [y.slope, z.slope],

@@ -97,6 +97,19 @@ impl Spline {
     /// Value and derivatives; beyond the ends the tangent there.
     #[must_use]
     pub fn at(&self, s: f64) -> Jet {
+        self.at_in(self.interval(s), s)
+    }
+
+    /// The interval of knots that a place lies in, or the nearest one.
+    #[must_use]
+    pub fn interval(&self, s: f64) -> usize {
+        let after = self.knots.partition_point(|knot| *knot <= s);
+        after.clamp(1, self.knots.len() - 1) - 1
+    }
+
+    /// [`Spline::at`] for a place whose [`Spline::interval`] is known.
+    #[must_use]
+    pub fn at_in(&self, i: usize, s: f64) -> Jet {
         let [first, last] = self.range();
         if s < first || s > last {
             let end = if s < first { first } else { last };
@@ -107,11 +120,6 @@ impl Spline {
                 bend: 0.0,
             };
         }
-        let i = self
-            .knots
-            .partition_point(|knot| *knot <= s)
-            .clamp(1, self.knots.len() - 1)
-            - 1;
         let step = self.knots[i + 1] - self.knots[i];
         let (b, a) = ((s - self.knots[i]) / step, (self.knots[i + 1] - s) / step);
         let (bend_a, bend_b) = (self.bends[i], self.bends[i + 1]);

@@ -6,10 +6,14 @@
 //! radius `r − z` at the distance `d/2 − p + y` from the centre along the axle, with the flange-back distance d and the
 //! flange-back position p. Conventions of the Manchester contact benchmark (Shackleton and Iwnicki 2008).
 
+use serde::Serialize;
+use utoipa::ToSchema;
+
 use crate::contact::geometry::profile::{Place, Profile};
 
 /// Left or right rail, seen along rolling.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum Side {
     /// y of the track is positive there.
     Left,
@@ -109,11 +113,7 @@ impl WheelRail {
             .iter()
             .map(|at| at[1])
             .fold(f64::NEG_INFINITY, f64::max);
-        let gauge_point = places
-            .iter()
-            .filter(|at| at[1] >= top - placement.gauge_height)
-            .map(|at| at[0])
-            .fold(f64::INFINITY, f64::min);
+        let gauge_point = nearest_above(&places, top - placement.gauge_height);
         let (yaw, roll) = (placement.yaw, placement.roll);
         let axle = [-yaw.sin() * roll.cos(), yaw.cos() * roll.cos(), roll.sin()];
         let across = axle[1].hypot(axle[2]);
@@ -226,4 +226,20 @@ impl WheelRail {
         };
         [named("rail", &self.rail_given), named("wheel", &self.wheel)].concat()
     }
+}
+
+/// Least y of a curve above a height, its crossings included.
+fn nearest_above(places: &[[f64; 2]], height: f64) -> f64 {
+    let above = places.iter().filter(|at| at[1] >= height);
+    let crossings = places.windows(2).filter_map(|pair| {
+        let [from, to] = [pair[0], pair[1]];
+        let t = (height - from[1]) / (to[1] - from[1]);
+        (0.0..1.0)
+            .contains(&t)
+            .then(|| from[0] + t * (to[0] - from[0]))
+    });
+    above
+        .map(|at| at[0])
+        .chain(crossings)
+        .fold(f64::INFINITY, f64::min)
 }

@@ -125,6 +125,7 @@ mod tests {
     fn circle() -> Region {
         let load = Load {
             normal_force_n: Some(2.0 * std::f64::consts::PI / 3.0),
+            vertical_force_n: None,
             approach_mm: None,
         };
         Region::hertz(

@@ -5,6 +5,9 @@ pub mod hertz;
 mod interpolation;
 pub mod non_hertzian;
 pub mod prescribed;
+pub mod profiles;
+
+use std::sync::Arc;
 
 use crate::contact::case::{Contact, Load};
 use crate::contact::error::Fault;
@@ -13,6 +16,7 @@ use crate::contact::normal::hertz::{Ellipse, Pressing};
 use crate::contact::normal::non_hertzian::GapContact;
 use crate::contact::normal::non_hertzian::gap::Gap;
 use crate::contact::normal::prescribed::PressureField;
+use crate::contact::normal::profiles::ProfileContact;
 
 /// Pressures in MPa, lengths in mm and ratios of semi-axes beyond which a patch is a mistake rather than a contact.
 const PRESSURE_MAX: f64 = 1e12;
@@ -30,6 +34,8 @@ pub enum Region {
     Grid(PressureField),
     /// A gap: region and pressure have to be found first, until then there are no patches.
     Gap(Box<GapContact>),
+    /// A wheel on a rail: patches have to be found first, each in a frame of its own, until then there are none.
+    Profiles(Arc<ProfileContact>),
 }
 
 /// What is known of one patch before anything is meshed.
@@ -64,10 +70,13 @@ impl Region {
             Contact::Ellipse { a_mm, b_mm } => {
                 Ellipse::of_semi_axes(a_mm, b_mm, pressing, contact_modulus)
             }
-            Contact::GapProfile { .. } | Contact::GapGrid { .. } | Contact::PressureGrid { .. } => {
+            Contact::GapProfile { .. }
+            | Contact::GapGrid { .. }
+            | Contact::PressureGrid { .. }
+            | Contact::Profiles { .. } => {
                 return Err(fault(
                     "/contact/type",
-                    "neither gaps nor pressures on a grid make an ellipse".to_owned(),
+                    "neither gaps nor profiles nor pressures on a grid make an ellipse".to_owned(),
                 ));
             }
         };
@@ -148,7 +157,7 @@ impl Region {
         match self {
             Region::Ellipse(_) => vec![1.0],
             Region::Grid(field) => field.segments_per_strip(),
-            Region::Gap(_) => vec![1.0],
+            Region::Gap(_) | Region::Profiles(_) => vec![1.0],
         }
     }
 
@@ -158,7 +167,7 @@ impl Region {
         match self {
             Region::Ellipse(ellipse) => vec![ellipse.patch()],
             Region::Grid(field) => field.patches(),
-            Region::Gap(_) => Vec::new(),
+            Region::Gap(_) | Region::Profiles(_) => Vec::new(),
         }
     }
 
@@ -171,7 +180,7 @@ impl Region {
         match self {
             Region::Ellipse(ellipse) => ellipse.chords(strips),
             Region::Grid(field) => field.chords(patch, strips),
-            Region::Gap(_) => Vec::new(),
+            Region::Gap(_) | Region::Profiles(_) => Vec::new(),
         }
     }
 
@@ -181,7 +190,7 @@ impl Region {
         match self {
             Region::Ellipse(ellipse) => ellipse.mean_pressure(chord, x0, x1),
             Region::Grid(field) => field.mean_pressure(chord, x0, x1),
-            Region::Gap(_) => 0.0,
+            Region::Gap(_) | Region::Profiles(_) => 0.0,
         }
     }
 }

@@ -34,12 +34,13 @@ pub fn assemble(problem: &Problem, ladder: &Ladder, points: &[Point]) -> (Soluti
             .collect(),
         warnings: warnings(problem, points),
         normal: problem.normal,
+        wheel_lowering_mm: None,
         origin: Origin {
             x_mm: 0.0,
             y_mm: 0.0,
             meaning: match problem.region {
                 Region::Ellipse(_) => "centre of the contact ellipse",
-                Region::Gap(_) | Region::Grid(_) => {
+                Region::Gap(_) | Region::Profiles(_) | Region::Grid(_) => {
                     "origin of the given coordinates, for all patches"
                 }
             }
@@ -89,6 +90,7 @@ fn patch_solution(
         pressure_max_mpa: patch.pressure_max,
         semi_axes_mm: patch.semi_axes,
         extent_mm: patch.extent,
+        position: None,
         points: points
             .iter()
             .zip(&problem.motions)
@@ -251,6 +253,7 @@ fn total(problem: &Problem, patches: &[Patch], point: &Point) -> Total {
     Total {
         force_x_n: sum.force_x,
         force_y_n: sum.force_y,
+        force_z_n: None,
         moment_z_n_mm: sum.moment_z,
         error_estimate: point
             .errors

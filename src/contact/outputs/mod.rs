@@ -8,3 +8,4 @@ pub mod outline;
 pub mod resample;
 pub mod resultants;
 mod segments;
+pub mod track;

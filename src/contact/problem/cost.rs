@@ -2,6 +2,7 @@
 
 use crate::contact::case::{MeshSize, Method};
 use crate::contact::error::Fault;
+use crate::contact::normal::Region;
 use crate::contact::problem::{Cost, Limits, Problem, Resolution};
 
 /// Cells of the finest mesh that a target may lead to, and of that of the dense method.
@@ -36,6 +37,17 @@ pub(super) struct Size {
     /// Segments per strip, for each patch.
     pub(super) segments: Vec<f64>,
     pub(super) motions: usize,
+    /// Time to find region and pressure, in s.
+    pub(super) normal_seconds: f64,
+}
+
+/// Time to find region and pressure, in s: that of a gap, or of the few heights of a wheel with a gap or two at each.
+pub(super) fn normal_seconds(region: &Region) -> f64 {
+    match region {
+        Region::Ellipse(_) | Region::Grid(_) => 0.0,
+        Region::Gap(_) => 0.005,
+        Region::Profiles(_) => 0.04,
+    }
 }
 
 impl Problem {
@@ -48,6 +60,7 @@ impl Problem {
             resolution: self.resolution,
             segments: self.region.segments_per_strip(),
             motions: self.motions.len(),
+            normal_seconds: normal_seconds(&self.region),
         }
         .cost()
     }
@@ -72,7 +85,7 @@ impl Size {
         };
         Cost {
             bytes: (bytes + fields) as u64,
-            seconds,
+            seconds: seconds + self.normal_seconds,
         }
     }
 

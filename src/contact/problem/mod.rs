@@ -6,6 +6,7 @@ mod cost;
 mod elasticity;
 mod motions;
 mod press;
+mod profiles;
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -13,9 +14,11 @@ use std::time::Duration;
 use serde::Serialize;
 
 use crate::contact::case::{
-    Case, Contact, Load, Material, MeshSize, Method, Motion, Motions, Output, Solver, TractionBound,
+    Case, Contact, Load, Material, MeshSize, Method, Motion, Motions, Output, Solver,
+    TractionBound, Wheelset,
 };
 use crate::contact::error::{CaseError, Fault};
+use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::normal::Region;
 use crate::contact::solution::NormalReport;
 use cost::Size;
@@ -81,6 +84,9 @@ pub struct Problem {
     pub region: Region,
     /// The motions, in the order of the case; never empty.
     pub motions: Vec<Motion>,
+    /// The motion of the wheelset that stands in place of the one motion above, which is then 0: the creepages of the patches
+    /// follow from it.
+    pub wheelset: Option<WheelsetMotion>,
     /// The method asked for.
     pub method: Method,
     /// Where `fastsim` lets tractions slip.
@@ -123,7 +129,10 @@ impl Problem {
             motion: Some(&case.motion),
             solver: Some(&case.solver),
         };
-        let (parts, faults) = Parts::check(given, limits);
+        let (parts, mut faults) = Parts::check(given, limits);
+        if faults.is_empty() && parts.region.is_none() {
+            faults.push(missing_load());
+        }
         let (true, Some(elasticity), Some((region, remarks)), Some(motions)) = (
             faults.is_empty(),
             parts.elasticity,
@@ -148,6 +157,7 @@ impl Problem {
             friction: case.friction.coefficient,
             region,
             motions,
+            wheelset: profiles::wheelset(&case.motion),
             method: case.solver.method,
             traction_bound: case.solver.traction_bound.unwrap_or_default(),
             resolution: resolution(&case.solver),
@@ -179,11 +189,14 @@ pub(super) struct Given<'a> {
 
 /// Faults of the parts of a case that can be checked although others are faulty.
 pub(super) fn faults_of(given: Given, limits: &Limits) -> Vec<Fault> {
-    // Without its load a region cannot be told; that is a fault already.
-    let carries_load = matches!(given.contact, Some(Contact::PressureGrid { .. }));
+    // Without its load a region cannot be told; that is a fault already. Profiles are looked at all the same.
+    let without_load = matches!(
+        given.contact,
+        Some(Contact::PressureGrid { .. } | Contact::Profiles { .. })
+    );
     let contact = given
         .contact
-        .filter(|_| carries_load || given.load.is_some());
+        .filter(|_| without_load || given.load.is_some());
     Parts::check(Given { contact, ..given }, limits).1
 }
 
@@ -201,7 +214,16 @@ impl Parts {
         let elasticity = given.material.map(Elasticity::combine);
         let elasticity = elasticity.and_then(|elasticity| keep(elasticity, &mut faults));
         let region = region(given.contact, given.load, elasticity.as_ref(), limits);
-        let region = region.and_then(|region| keep(region, &mut faults));
+        let region = match (region, given.contact) {
+            (None, Some(contact @ Contact::Profiles { .. })) => {
+                let modulus = elasticity.map(|elasticity| elasticity.contact_modulus());
+                profiles::region(contact, given.load, modulus).unwrap_or_else(|found| {
+                    faults.extend(found);
+                    None
+                })
+            }
+            (region, _) => region.and_then(|region| keep(region, &mut faults)),
+        };
         let motions = given.motion.map(|motion| motions::expand(motion, limits));
         let motions = motions.and_then(|motions| keep(motions, &mut faults));
         if let Some(solver) = given.solver {
@@ -213,6 +235,9 @@ impl Parts {
                     .as_ref()
                     .map_or_else(|| vec![1.0], |(region, _)| region.segments_per_strip()),
                 motions: motions.as_ref().map_or(1, Vec::len),
+                normal_seconds: region
+                    .as_ref()
+                    .map_or(0.0, |(region, _)| cost::normal_seconds(region)),
             };
             faults.extend(size.faults(limits));
         }
@@ -229,14 +254,14 @@ fn keep<T>(result: Result<T, Fault>, faults: &mut Vec<Fault>) -> Option<T> {
     result.map_err(|fault| faults.push(fault)).ok()
 }
 
-/// The region and its remarks, if all that it depends on is known.
+/// The region and its remarks, if all that it depends on is known; profiles are left to [`profiles::region`].
 fn region(
     contact: Option<&Contact>,
     load: Option<&Load>,
     elasticity: Option<&Elasticity>,
     limits: &Limits,
 ) -> Option<Result<(Region, Vec<String>), Fault>> {
-    let contact = contact?;
+    let contact = contact.filter(|contact| !matches!(contact, Contact::Profiles { .. }))?;
     if let Contact::PressureGrid {
         x_mm,
         y_mm,
@@ -251,10 +276,7 @@ fn region(
         ));
     }
     let Some(load) = load else {
-        return Some(Err(Fault {
-            pointer: "/load".to_owned(),
-            detail: "missing; exactly one of normal_force_n, approach_mm is needed".to_owned(),
-        }));
+        return Some(Err(missing_load()));
     };
     let modulus = elasticity?.contact_modulus();
     if let Contact::GapProfile { .. } | Contact::GapGrid { .. } = contact {
@@ -263,6 +285,13 @@ fn region(
     }
     let region = Region::hertz(contact, load, modulus);
     Some(region.map(|region| (region, Vec::new())))
+}
+
+fn missing_load() -> Fault {
+    Fault {
+        pointer: "/load".to_owned(),
+        detail: "missing; exactly one of normal_force_n, approach_mm is needed".to_owned(),
+    }
 }
 
 fn resolution(solver: &Solver) -> Resolution {
@@ -281,6 +310,8 @@ struct Canonical<'a> {
     contact: &'a Contact,
     load: Option<&'a Load>,
     motions: &'a [Motion],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    wheelset: Option<&'a Wheelset>,
     method: Method,
     #[serde(skip_serializing_if = "Option::is_none")]
     traction_bound: Option<TractionBound>,
@@ -307,6 +338,10 @@ fn digest(case: &Case, elasticity: &Elasticity, motions: &[Motion]) -> String {
         contact: &case.contact,
         load: case.load.as_ref(),
         motions,
+        wheelset: match &case.motion {
+            Motions::Wheelset { wheelset } => Some(wheelset),
+            _ => None,
+        },
         method: case.solver.method,
         // What is left out means the same as the default.
         traction_bound: case

@@ -4,6 +4,13 @@ use crate::contact::case::{Combine, Motion, Motions, Range, Sweep};
 use crate::contact::error::Fault;
 use crate::contact::problem::Limits;
 
+/// No creepage.
+const STILL: Motion = Motion {
+    creepage_x: 0.0,
+    creepage_y: 0.0,
+    spin_per_mm: 0.0,
+};
+
 /// The motions in order, never empty. In a grid the last named component varies fastest, in the fixed order
 /// `creepage_x`, `creepage_y`, `spin_per_mm`.
 ///
@@ -11,7 +18,7 @@ use crate::contact::problem::Limits;
 /// A fault at `/motion` if there are more than the limits allow.
 pub(super) fn expand(motions: &Motions, limits: &Limits) -> Result<Vec<Motion>, Fault> {
     let count = match motions {
-        Motions::One(_) => 1,
+        Motions::One(_) | Motions::Wheelset { .. } => 1,
         Motions::Many(list) => list.len() as u128,
         Motions::Sweep { sweep } => sweep_length(sweep),
     };
@@ -28,6 +35,8 @@ pub(super) fn expand(motions: &Motions, limits: &Limits) -> Result<Vec<Motion>, 
         Motions::One(motion) => vec![*motion],
         Motions::Many(list) => list.clone(),
         Motions::Sweep { sweep } => write_out(sweep),
+        // Every patch gets its own creepages when it is found.
+        Motions::Wheelset { .. } => vec![STILL],
     })
 }
 

@@ -1,11 +1,12 @@
-//! Finds region and pressure where a case gives a gap.
+//! Finds region and pressure where a case gives a gap, and asks on for one patch of many.
 
 use std::borrow::Cow;
 
+use crate::contact::case::Motion;
 use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::Region;
-use crate::contact::normal::non_hertzian::Failure;
+use crate::contact::normal::non_hertzian::{Failure, Report};
 use crate::contact::problem::Problem;
 use crate::contact::solution::NormalReport;
 
@@ -19,36 +20,75 @@ impl Problem {
             return Ok(Cow::Borrowed(self));
         };
         let began = monitor.elapsed();
-        let found = contact.solve(monitor).map_err(|failure| match failure {
-            Failure::Stopped(stop) => stop.into(),
-            Failure::NoAnswer(reason) => SolveError::NormalProblem { reason },
-        })?;
+        let found = contact.solve(monitor)?;
         let mut problem = self.clone();
         problem.region = Region::Grid(found.field);
         problem.warnings.extend(found.warnings);
-        problem.normal = Some(NormalReport {
-            cells: found
-                .report
-                .cells
-                .map(|n| u32::try_from(n).unwrap_or(u32::MAX)),
-            iterations: found.report.iterations,
-            residual: found.report.residual,
-            seconds: (monitor.elapsed() - began).as_secs_f64(),
-        });
-        // How many patches and segments there are is known only now.
-        let bytes = problem.cost().bytes;
+        let seconds = (monitor.elapsed() - began).as_secs_f64();
+        problem.normal = Some(found.report.with_time(seconds));
+        problem.fits()?;
+        Ok(Cow::Owned(problem))
+    }
+
+    /// The same question about a part of the contact whose region, pressure and motions are known; without remarks.
+    ///
+    /// # Errors
+    /// The part needs more memory than is allowed.
+    pub fn of_part(
+        &self,
+        region: Region,
+        motions: Vec<Motion>,
+        normal: NormalReport,
+    ) -> Result<Problem, SolveError> {
+        let part = Problem {
+            region,
+            motions,
+            wheelset: None,
+            warnings: Vec::new(),
+            normal: Some(normal),
+            ..self.clone()
+        };
+        part.fits().map(|()| part)
+    }
+
+    /// Does a solve stay within the memory allowed? How many patches and segments there are is known only when they are
+    /// found.
+    fn fits(&self) -> Result<(), SolveError> {
+        let bytes = self.cost().bytes;
         if bytes > self.memory_bytes {
             return Err(SolveError::NormalProblem {
                 reason: format!(
                     "the contact falls apart into {} patches with {:.1} segments per strip, which need about {} MiB; at \
                      most {} MiB are allowed for one case",
-                    problem.region.patches().len(),
-                    problem.region.segments_per_strip().iter().sum::<f64>(),
+                    self.region.patches().len(),
+                    self.region.segments_per_strip().iter().sum::<f64>(),
                     bytes >> 20,
                     self.memory_bytes >> 20
                 ),
             });
         }
-        Ok(Cow::Owned(problem))
+        Ok(())
+    }
+}
+
+impl From<Failure> for SolveError {
+    fn from(failure: Failure) -> Self {
+        match failure {
+            Failure::Stopped(stop) => stop.into(),
+            Failure::NoAnswer(reason) => SolveError::NormalProblem { reason },
+        }
+    }
+}
+
+impl Report {
+    /// The report as the client reads it, with the wall time in s.
+    #[must_use]
+    pub fn with_time(self, seconds: f64) -> NormalReport {
+        NormalReport {
+            cells: self.cells.map(|n| u32::try_from(n).unwrap_or(u32::MAX)),
+            iterations: self.iterations,
+            residual: self.residual,
+            seconds,
+        }
     }
 }

@@ -3,14 +3,17 @@
 use serde_json::Value;
 
 use crate::contact::case::{Contact, Load};
-use crate::contact::read::object::{Interval, Object};
+use crate::contact::read::object::{Interval, Object, shown};
+use crate::contact::read::profiles;
 use crate::contact::read::samples::{Quantity, axis, line, samples};
 
 const RADIUS: Interval = Interval::positive(1e9, "mm");
 const SEMI_AXIS: Interval = Interval::positive(1e6, "mm");
-const NORMAL_FORCE: Interval = Interval::positive(1e12, "N");
+const FORCE: Interval = Interval::positive(1e12, "N");
 const APPROACH: Interval = Interval::positive(1e6, "mm");
 const APPROACH_OF_GAP: Interval = Interval::closed(-1e6, 1e6, "mm");
+/// Members of a load; the first is for profiles only.
+const LOADS: [&str; 3] = ["vertical_force_n", "normal_force_n", "approach_mm"];
 const PRESSURE: Quantity = Quantity {
     member: "pressure_mpa",
     word: "pressure",
@@ -29,23 +32,24 @@ enum Kind {
     GapProfile,
     GapGrid,
     PressureGrid,
+    Profiles,
 }
 
-const KINDS: [(&str, Kind); 5] = [
+const KINDS: [(&str, Kind); 6] = [
     ("radii", Kind::Radii),
     ("ellipse", Kind::Ellipse),
     ("gap_profile", Kind::GapProfile),
     ("gap_grid", Kind::GapGrid),
     ("pressure_grid", Kind::PressureGrid),
+    ("profiles", Kind::Profiles),
 ];
-const KINDS_LATER: [&str; 1] = ["profiles"];
 
 /// Reads the required member `contact` of a case.
 pub(super) fn read(case: &mut Object) -> Option<Contact> {
     let mut block = case.child("contact")?;
     let words = KINDS.map(|(word, _)| word).join(", ");
     block.required("type", &format!("one of {words}"))?;
-    match block.word("type", &KINDS, &KINDS_LATER)? {
+    match block.word("type", &KINDS, &[])? {
         Kind::Radii => {
             block.only(&["type", "rolling_mm", "lateral_mm"], &[]);
             let rolling_mm = block.required_number("rolling_mm", RADIUS);
@@ -94,6 +98,7 @@ pub(super) fn read(case: &mut Object) -> Option<Contact> {
                 pressure_mpa: pressure_mpa?,
             })
         }
+        Kind::Profiles => profiles::read(&mut block),
     }
 }
 
@@ -115,33 +120,56 @@ pub(super) fn read_load(case: &mut Object) -> Option<Load> {
         return None;
     }
     let of_gap = matches!(kind, Some("gap_profile" | "gap_grid"));
-    if !case.has("load") && !of_gap && !matches!(kind, Some("radii" | "ellipse")) {
+    let of_profiles = kind == Some("profiles");
+    if !case.has("load") && !of_gap && !of_profiles && !matches!(kind, Some("radii" | "ellipse")) {
         return None;
     }
     let mut block = case.child("load")?;
-    block.only(&["normal_force_n", "approach_mm"], &[]);
-    let normal_force_n = block.number("normal_force_n", NORMAL_FORCE);
+    let names = if of_profiles { &LOADS[..] } else { &LOADS[1..] };
+    block.only(names, &LOADS[..1]);
+    if !of_profiles && let Some(value) = block.value(LOADS[0]) {
+        let value = shown(value);
+        block.fault(
+            LOADS[0],
+            format!("{value} given; a vertical force belongs to the contact type profiles, give a normal_force_n"),
+        );
+        return None;
+    }
+    let vertical_force_n = block.number("vertical_force_n", FORCE);
+    let normal_force_n = block.number("normal_force_n", FORCE);
     let approach_mm = block.number(
         "approach_mm",
         if of_gap { APPROACH_OF_GAP } else { APPROACH },
     );
-    match (block.has("normal_force_n"), block.has("approach_mm")) {
-        (false, false) => {
-            block.fault_here("empty; exactly one of normal_force_n, approach_mm is needed");
+    let given: Vec<&str> = names
+        .iter()
+        .copied()
+        .filter(|name| block.has(name))
+        .collect();
+    match given.as_slice() {
+        [] => {
+            block.fault_here(format!(
+                "empty; exactly one of {} is needed",
+                names.join(", ")
+            ));
             return None;
         }
-        (true, true) => {
+        [_] => {}
+        [first, second, ..] => {
             block.fault(
-                "approach_mm",
-                "given together with normal_force_n; exactly one of the two is allowed",
+                second,
+                format!(
+                    "given together with {first}; exactly one of {} is allowed",
+                    names.join(", ")
+                ),
             );
             return None;
         }
-        _ => {}
     }
-    normal_force_n.or(approach_mm)?;
+    vertical_force_n.or(normal_force_n).or(approach_mm)?;
     Some(Load {
         normal_force_n,
+        vertical_force_n,
         approach_mm,
     })
 }

@@ -7,6 +7,7 @@ mod contact;
 mod material;
 mod motion;
 mod object;
+mod profiles;
 mod samples;
 mod solver;
 

@@ -2,11 +2,15 @@
 
 use serde_json::Value;
 
-use crate::contact::case::{Combine, Motion, Motions, Range, Sweep};
+use crate::contact::case::{Combine, Motion, Motions, Range, Sweep, Wheelset};
 use crate::contact::read::object::{Faults, Interval, Object, join, shown};
 
 const CREEPAGE: Interval = Interval::closed(-1e6, 1e6, "");
 const SPIN: Interval = Interval::closed(-1e6, 1e6, "1/mm");
+const SPEED: Interval = Interval::positive(1e9, "mm/s");
+const VELOCITY: Interval = Interval::closed(-1e9, 1e9, "mm/s");
+const RATE: Interval = Interval::closed(-1e6, 1e6, "rad/s");
+const RADIUS: Interval = Interval::positive(1e9, "mm");
 const POINTS_MAX: u32 = 1_000_000;
 const COMPONENTS: [&str; 3] = ["creepage_x", "creepage_y", "spin_per_mm"];
 const FORCES: [&str; 2] = ["force_x_n", "force_y_n"];
@@ -15,6 +19,10 @@ const FORCES: [&str; 2] = ["force_x_n", "force_y_n"];
 pub(super) fn read(case: &mut Object) -> Option<Motions> {
     let what = "an object with at least one of creepage_x, creepage_y, spin_per_mm, an array of such objects, or {\"sweep\": …}";
     let value = case.required("motion", what)?;
+    let kind = case
+        .value("contact")
+        .and_then(|contact| contact.get("type"));
+    let of_profiles = kind.and_then(Value::as_str) == Some("profiles");
     let pointer = case.pointer_to("motion");
     let faults = case.faults();
     match value {
@@ -23,6 +31,19 @@ pub(super) fn read(case: &mut Object) -> Option<Motions> {
             block.only(&["sweep"], &[]);
             let sweep = sweep(&mut block.child("sweep")?)?;
             Some(Motions::Sweep { sweep })
+        }
+        Value::Object(members) if members.contains_key("wheelset") => {
+            let mut block = Object::open(value, pointer, faults)?;
+            block.only(&["wheelset"], &[]);
+            if !of_profiles {
+                block.fault(
+                    "wheelset",
+                    "given without profiles; the motion of a wheelset belongs to the contact type profiles, give creepages",
+                );
+                return None;
+            }
+            let wheelset = wheelset(&mut block.child("wheelset")?)?;
+            Some(Motions::Wheelset { wheelset })
         }
         Value::Object(_) => motion(value, pointer, faults).map(Motions::One),
         Value::Array(elements) if !elements.is_empty() => {
@@ -54,6 +75,58 @@ fn motion(value: &Value, pointer: String, faults: &mut Faults) -> Option<Motion>
         creepage_x: creepage_x?,
         creepage_y: creepage_y?,
         spin_per_mm: spin_per_mm?,
+    })
+}
+
+fn wheelset(block: &mut Object) -> Option<Wheelset> {
+    const SPINS: [&str; 2] = ["angular_velocity_rad_per_s", "free_rolling_radius_mm"];
+    const RATES: [(&str, Interval); 3] = [
+        ("lateral_velocity_mm_per_s", VELOCITY),
+        ("yaw_rate_rad_per_s", RATE),
+        ("roll_rate_rad_per_s", RATE),
+    ];
+    let names = ["speed_mm_per_s"].into_iter().chain(SPINS);
+    let names: Vec<&str> = names.chain(RATES.map(|(name, _)| name)).collect();
+    block.only(&names, &[]);
+    let speed_mm_per_s = block.required_number("speed_mm_per_s", SPEED);
+    let angular_velocity_rad_per_s = block.number(SPINS[0], RATE);
+    let free_rolling_radius_mm = block.number(SPINS[1], RADIUS);
+    let rates = RATES.map(|(name, allowed)| {
+        if block.has(name) {
+            block.number(name, allowed)
+        } else {
+            Some(0.0)
+        }
+    });
+    match SPINS.map(|name| block.has(name)) {
+        [true, true] => {
+            block.fault(
+                SPINS[1],
+                format!(
+                    "given together with {}; exactly one of the two is allowed",
+                    SPINS[0]
+                ),
+            );
+            return None;
+        }
+        [false, false] => {
+            block.fault(
+                SPINS[0],
+                format!("missing; {RATE} is needed here, or a {}", SPINS[1]),
+            );
+            return None;
+        }
+        _ => {}
+    }
+    angular_velocity_rad_per_s.or(free_rolling_radius_mm)?;
+    let [lateral, yaw, roll] = rates;
+    Some(Wheelset {
+        speed_mm_per_s: speed_mm_per_s?,
+        angular_velocity_rad_per_s,
+        free_rolling_radius_mm,
+        lateral_velocity_mm_per_s: lateral?,
+        yaw_rate_rad_per_s: yaw?,
+        roll_rate_rad_per_s: roll?,
     })
 }
 

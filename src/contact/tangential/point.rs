@@ -1,6 +1,6 @@
 //! One motion of a case, from the coarsest level to the finest, with an estimate of its error.
 
-use crate::contact::case::{MeshSize, Method, Motion};
+use crate::contact::case::{MeshSize, Method, Motion, Output};
 use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
 use crate::contact::outputs::resultants::Resultants;
@@ -223,7 +223,8 @@ pub fn climb(
     );
     let resultants = match coarser_like {
         // The rules of the fast solver share one order of convergence; the dense method has no such record.
-        Some(point) if problem.method != Method::LiuHsu => {
+        // With tractions asked for, resultants stay what the tractions add up to.
+        Some(point) if problem.method != Method::LiuHsu && !problem.wants(Output::Tractions) => {
             extrapolated(problem, &summed, point, share)
         }
         _ => summed.clone(),

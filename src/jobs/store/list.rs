@@ -79,7 +79,7 @@ impl Filter {
 }
 
 /// The smallest UUID whose leading 48 bits are the given time; times outside 48 bits are clamped.
-fn first_id_at(epoch_ms: i64) -> Uuid {
+pub(super) fn first_id_at(epoch_ms: i64) -> Uuid {
     let millis = u128::try_from(epoch_ms.clamp(0, (1 << 48) - 1)).unwrap_or(0);
     Uuid::from_u128(millis << 80)
 }

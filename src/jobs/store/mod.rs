@@ -8,6 +8,7 @@ pub mod list;
 pub mod sqlite;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use bytes::Bytes;
 use uuid::Uuid;
@@ -15,11 +16,16 @@ use uuid::Uuid;
 use crate::jobs::job::{Failure, Job, State};
 use crate::jobs::results::Encoded;
 
+/// Equal for cases of one tenant that have the same answer.
+pub type ReuseKey = [u8; 16];
+
 /// A job about to be queued.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NewJob {
     /// UUIDv7.
     pub id: Uuid,
+    /// Whose it is.
+    pub tenant: Arc<str>,
     /// Time of submission.
     pub created_at: i64,
     /// Free text of the client.
@@ -34,6 +40,10 @@ pub struct NewJob {
     pub outputs: String,
     /// Expected solve time in µs; small jobs are claimed in groups.
     pub cost_us: u32,
+    /// What tells later identical cases that this job's result is theirs too.
+    pub reuse_key: Option<ReuseKey>,
+    /// A succeeded job whose result this one gets, instead of being queued, and the time at which it ends so.
+    pub source: Option<(Uuid, i64)>,
     /// The client's idempotency key with the digest of the case; not used inside a batch.
     pub idempotency: Option<(String, [u8; 32])>,
 }
@@ -43,6 +53,8 @@ pub struct NewJob {
 pub struct NewBatch {
     /// UUIDv7.
     pub id: Uuid,
+    /// Whose it is.
+    pub tenant: Arc<str>,
     /// Time of submission.
     pub created_at: i64,
     /// Number of jobs it will have.
@@ -69,7 +81,7 @@ pub enum Begun {
 /// What became of an attempt to queue a job.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Enqueued {
-    /// The job is queued.
+    /// The job is queued, or has ended with the result of its source.
     Created(Job),
     /// The idempotency key already stands for this job, with the same case.
     Existing(Job),
@@ -123,8 +135,8 @@ pub enum Ending {
 /// Where a result is kept once its job has ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Placed {
-    /// In this folder, where it already lies.
-    Folder(String),
+    /// In this folder, where it already lies, with its size in bytes.
+    Folder(String, u64),
     /// In the database, written together with the end of the job: a small one.
     Table(Encoded),
 }
@@ -144,7 +156,10 @@ pub struct StoredResult {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Deleted {
     /// The row and all that hung on it are gone.
-    Done,
+    Done {
+        /// The job whose stored results nobody needs any more.
+        orphan: Option<Uuid>,
+    },
     /// It has not ended.
     NotEnded(State),
     /// There was none.

@@ -4,8 +4,12 @@ mod columns;
 mod miniprof;
 mod simpack;
 
+use serde::Serialize;
+use utoipa::ToSchema;
+
 /// A file format a client can name; each is a file of that name beside this one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum Format {
     /// Two columns y and z, separated by blanks, commas, semicolons or tabs.
     Columns,

@@ -9,6 +9,7 @@ mod components;
 mod computed;
 mod level_set;
 mod line;
+mod moments;
 mod shape;
 
 use crate::contact::mesh::Chord;

@@ -45,10 +45,13 @@ impl OwnBlocks {
     }
 }
 
+/// The own blocks of one rule and parity.
+type Made = (Rule, Option<Parity>, Rc<OwnBlocks>);
+
 /// The own blocks of a level, made once for each rule and parity.
 #[derive(Debug, Default)]
 pub struct SharedBlocks {
-    made: RefCell<Vec<(Rule, Option<Parity>, Rc<OwnBlocks>)>>,
+    made: RefCell<Vec<Made>>,
 }
 
 impl SharedBlocks {

@@ -12,12 +12,13 @@ use crate::jobs::batch::{Batch, Line};
 use crate::jobs::error::JobsError;
 use crate::jobs::job::State;
 use crate::jobs::store::sqlite::SqliteStore;
+use crate::jobs::store::sqlite::reuse::end_with_sources;
 use crate::jobs::store::sqlite::rows::{
     job_columns, read_count, read_id, read_job, read_state, to_json,
 };
-use crate::jobs::store::{Begun, NewBatch, NewJob};
+use crate::jobs::store::{Begun, NewBatch, NewJob, ReuseKey};
 
-/// Jobs in one statement; with 10 values each far below the bound of SQLite.
+/// Jobs in one statement; with 12 values each far below the bound of SQLite.
 const ROWS_PER_STATEMENT: usize = 250;
 
 impl SqliteStore {
@@ -29,8 +30,10 @@ impl SqliteStore {
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         if let Some((key, digest)) = &new.idempotency {
             let row = sqlx::query(
-                "SELECT digest, id, complete FROM batch_keys JOIN batches ON batches.id = batch_keys.batch_id WHERE key = $1",
+                "SELECT digest, id, complete FROM batch_keys JOIN batches ON batches.id = batch_keys.batch_id \
+                 WHERE of_tenant = $1 AND key = $2",
             )
+            .bind(&*new.tenant)
             .bind(key)
             .fetch_optional(&mut *transaction)
             .await?;
@@ -46,31 +49,41 @@ impl SqliteStore {
             }
         }
         sqlx::query(
-            "INSERT INTO batches (id, created_at, count, rejected) VALUES ($1, $2, $3, $4)",
+            "INSERT INTO batches (id, tenant, created_at, count, rejected) VALUES ($1, $2, $3, $4, $5)",
         )
         .bind(new.id.to_string())
+        .bind(&*new.tenant)
         .bind(new.created_at)
         .bind(new.count)
         .bind(new.rejected)
         .execute(&mut *transaction)
         .await?;
         if let Some((key, digest)) = &new.idempotency {
-            sqlx::query("INSERT INTO batch_keys (key, digest, batch_id) VALUES ($1, $2, $3)")
-                .bind(key)
-                .bind(digest.as_slice())
-                .bind(new.id.to_string())
-                .execute(&mut *transaction)
-                .await?;
+            sqlx::query(
+                "INSERT INTO batch_keys (of_tenant, key, digest, batch_id) VALUES ($1, $2, $3, $4)",
+            )
+            .bind(&*new.tenant)
+            .bind(key)
+            .bind(digest.as_slice())
+            .bind(new.id.to_string())
+            .execute(&mut *transaction)
+            .await?;
         }
         transaction.commit().await?;
         Ok(Begun::Created)
     }
 
-    /// Queues jobs of a batch with their places in it, all or none.
+    /// Queues jobs of a batch with their places in it, all or none. Returns those that ended at once with the result of
+    /// their source.
     ///
     /// # Errors
     /// The database failed; nothing was stored.
-    pub async fn enqueue_many(&self, batch: Uuid, jobs: &[(u32, NewJob)]) -> Result<(), JobsError> {
+    pub async fn enqueue_many(
+        &self,
+        batch: Uuid,
+        jobs: &[(u32, NewJob)],
+    ) -> Result<Vec<Uuid>, JobsError> {
+        let mut ended = Vec::new();
         let batch = batch.to_string();
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         for some in jobs.chunks(ROWS_PER_STATEMENT) {
@@ -79,7 +92,7 @@ impl SqliteStore {
                 .map(|(_, job)| to_json(&job.labels))
                 .collect::<Result<Vec<_>, _>>()?;
             let mut rows = QueryBuilder::<Sqlite>::new(
-                "INSERT INTO jobs (id, state, name, labels, method, created_at, batch_id, batch_index, cost_us, outputs) ",
+                "INSERT INTO jobs (id, state, name, labels, method, created_at, batch_id, batch_index, cost_us, outputs, reuse_key, tenant) ",
             );
             rows.push_values(
                 some.iter().zip(labels),
@@ -93,7 +106,9 @@ impl SqliteStore {
                         .push_bind(&batch)
                         .push_bind(*index)
                         .push_bind(job.cost_us)
-                        .push_bind(&job.outputs);
+                        .push_bind(&job.outputs)
+                        .push_bind(job.reuse_key.as_ref().map(ReuseKey::as_slice))
+                        .push_bind(&*job.tenant);
                 },
             );
             rows.build().execute(&mut *transaction).await?;
@@ -105,21 +120,25 @@ impl SqliteStore {
             cases.build().execute(&mut *transaction).await?;
             let labels: Vec<_> = some
                 .iter()
-                .flat_map(|(_, job)| job.labels.iter().map(|label| (job.id, label)))
+                .flat_map(|(_, job)| job.labels.iter().map(move |label| (job, label)))
                 .collect();
             for some in labels.chunks(ROWS_PER_STATEMENT) {
-                let mut rows =
-                    QueryBuilder::<Sqlite>::new("INSERT INTO job_labels (key, value, job_id) ");
-                rows.push_values(some, |mut row, (id, (key, value))| {
-                    row.push_bind(*key)
+                let mut rows = QueryBuilder::<Sqlite>::new(
+                    "INSERT INTO job_labels (of_tenant, key, value, job_id) ",
+                );
+                rows.push_values(some, |mut row, (job, (key, value))| {
+                    row.push_bind(&*job.tenant)
+                        .push_bind(*key)
                         .push_bind(*value)
-                        .push_bind(id.to_string());
+                        .push_bind(job.id.to_string());
                 });
                 rows.build().execute(&mut *transaction).await?;
             }
+            let jobs = some.iter().map(|(_, job)| job);
+            ended.extend(end_with_sources(&mut transaction, jobs).await?);
         }
         transaction.commit().await?;
-        Ok(())
+        Ok(ended)
     }
 
     /// Marks a batch as complete. Durable once it returns.
@@ -163,7 +182,7 @@ impl SqliteStore {
     /// The database failed.
     pub async fn batch(&self, id: Uuid) -> Result<Option<Batch>, JobsError> {
         let row = sqlx::query(
-            "SELECT id, created_at, count, rejected FROM batches WHERE id = $1 AND complete = 1",
+            "SELECT id, tenant, created_at, count, rejected FROM batches WHERE id = $1 AND complete = 1",
         )
         .bind(id.to_string())
         .fetch_optional(&self.readers)
@@ -182,6 +201,7 @@ impl SqliteStore {
         }
         Ok(Some(Batch {
             id,
+            tenant: row.try_get("tenant")?,
             created_at: row.try_get("created_at")?,
             count: row.try_get("count")?,
             rejected: row.try_get("rejected")?,
@@ -208,6 +228,42 @@ impl SqliteStore {
         rows.iter()
             .map(|row| Ok((read_id(row)?, read_state(row)?)))
             .collect()
+    }
+
+    /// Removes up to `limit` ended jobs of a batch; returns them with the folders of their results.
+    ///
+    /// # Errors
+    /// The database failed; nothing changed.
+    pub async fn delete_ended(
+        &self,
+        id: Uuid,
+        limit: u32,
+    ) -> Result<Vec<(Uuid, Option<String>)>, JobsError> {
+        let rows = sqlx::query(
+            "DELETE FROM jobs WHERE id IN (SELECT id FROM jobs WHERE batch_id = $1 AND \
+             state IN ('succeeded', 'failed', 'cancelled') ORDER BY id LIMIT $2) RETURNING id, result_key",
+        )
+        .bind(id.to_string())
+        .bind(limit)
+        .fetch_all(&self.writer)
+        .await?;
+        rows.iter()
+            .map(|row| Ok((read_id(row)?, row.try_get("result_key")?)))
+            .collect()
+    }
+
+    /// Removes a complete batch that has no job left; says whether it did.
+    ///
+    /// # Errors
+    /// The database failed; nothing changed.
+    pub async fn delete_empty_batch(&self, id: Uuid) -> Result<bool, JobsError> {
+        let gone = sqlx::query(
+            "DELETE FROM batches WHERE id = $1 AND complete = 1 AND NOT EXISTS (SELECT 1 FROM jobs WHERE batch_id = $1)",
+        )
+        .bind(id.to_string())
+        .execute(&self.writer)
+        .await?;
+        Ok(gone.rows_affected() > 0)
     }
 
     /// The next jobs of a batch in the order they were sent, with the solutions that lie in the database.

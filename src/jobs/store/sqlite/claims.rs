@@ -66,7 +66,7 @@ impl SqliteStore {
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         let row = sqlx::query(concat!(
             "UPDATE jobs SET state = $1, ended_at = $2, warnings = $3, failure = $4, result_key = $5, \
-             field_patches = $6, progress = CASE WHEN $1 = 'succeeded' THEN 1.0 ELSE progress END, \
+             result_bytes = $9, field_patches = $6, progress = CASE WHEN $1 = 'succeeded' THEN 1.0 ELSE progress END, \
              lease_until = NULL, worker = NULL, version = version + 1 \
              WHERE id = $7 AND lease_number = $8 AND state = 'running' RETURNING ",
             job_columns!()
@@ -79,6 +79,7 @@ impl SqliteStore {
         .bind(end.field_patches)
         .bind(claim.id.to_string())
         .bind(fence(claim))
+        .bind(end.result_bytes)
         .fetch_optional(&mut *transaction)
         .await?;
         let Some(row) = row else { return Ok(None) };
@@ -145,6 +146,7 @@ pub(super) struct EndRow<'a> {
     pub(super) warnings: String,
     pub(super) failure: Option<String>,
     pub(super) folder: Option<&'a str>,
+    pub(super) result_bytes: Option<i64>,
     pub(super) field_patches: u32,
     pub(super) inside: Option<&'a Encoded>,
 }
@@ -156,6 +158,7 @@ impl EndRow<'_> {
             warnings: "[]".to_owned(),
             failure: None,
             folder: None,
+            result_bytes: None,
             field_patches: 0,
             inside: None,
         };
@@ -169,7 +172,10 @@ impl EndRow<'_> {
                 row.warnings = to_json(warnings)?;
                 row.field_patches = *field_patches;
                 match result {
-                    Placed::Folder(folder) => row.folder = Some(folder),
+                    Placed::Folder(folder, bytes) => {
+                        row.folder = Some(folder);
+                        row.result_bytes = i64::try_from(*bytes).ok();
+                    }
                     Placed::Table(result) => row.inside = Some(result),
                 }
             }
@@ -191,7 +197,7 @@ pub(super) fn fence(claim: &Claim) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::jobs::store::sqlite::groups::PEEK;
+    use crate::jobs::store::sqlite::groups::{NEXT_TENANT, PEEK};
     use crate::jobs::store::sqlite::lists::tests::plan;
 
     #[tokio::test]
@@ -200,12 +206,12 @@ mod tests {
         let store = SqliteStore::open(&folder.path().join("jobs.db"))
             .await
             .unwrap();
-        for statement in [PEEK, REAP] {
+        for statement in [NEXT_TENANT, PEEK, REAP] {
             let steps = plan(&store, statement).await;
             assert!(
                 steps
                     .iter()
-                    .any(|step| step.contains("jobs_by_state (state=?)")),
+                    .any(|step| step.contains("jobs_by_state (state=?")),
                 "{steps:?}"
             );
             assert!(

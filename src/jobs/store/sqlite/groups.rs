@@ -1,6 +1,7 @@
 //! Claims and ends of small jobs in groups: one transaction, and so one write to the disk, for all of them.
 
 use std::collections::{HashMap, HashSet};
+use std::sync::PoisonError;
 
 use bytes::Bytes;
 use sqlx::sqlite::SqliteRow;
@@ -13,9 +14,11 @@ use crate::jobs::store::sqlite::claims::{EndRow, fence};
 use crate::jobs::store::sqlite::rows::{read_count, read_id};
 use crate::jobs::store::{Claim, Ending};
 
-/// The oldest queued jobs.
-pub(super) const PEEK: &str =
-    "SELECT id, alone, cost_us FROM jobs WHERE state = 'queued' ORDER BY id LIMIT $1";
+/// The tenant with queued jobs that comes next in the alphabet.
+pub(super) const NEXT_TENANT: &str =
+    "SELECT tenant FROM jobs WHERE state = 'queued' AND tenant > $1 ORDER BY tenant LIMIT 1";
+/// The oldest queued jobs of a tenant.
+pub(super) const PEEK: &str = "SELECT id, alone, cost_us FROM jobs WHERE state = 'queued' AND tenant = $1 ORDER BY id LIMIT $2";
 
 /// How large a group may be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,7 +32,7 @@ pub struct GroupBounds {
 }
 
 impl SqliteStore {
-    /// Claims the oldest queued job for `lease_ms` milliseconds.
+    /// Claims the oldest queued job of the tenant whose turn it is, for `lease_ms` milliseconds.
     ///
     /// # Errors
     /// The database failed.
@@ -47,8 +50,9 @@ impl SqliteStore {
         Ok(self.claim_group(worker, now, lease_ms, one).await?.pop())
     }
 
-    /// Claims the oldest queued job together with those behind it that are as small, oldest first. A job whose group
-    /// died comes alone.
+    /// Claims the oldest queued job of the tenant whose turn it is, together with those behind it that are as small,
+    /// oldest first. A job whose group died comes alone. Tenants take turns, so that a long queue of one holds up no
+    /// other.
     ///
     /// # Errors
     /// The database failed; nothing changed.
@@ -61,7 +65,22 @@ impl SqliteStore {
     ) -> Result<Vec<Claim>, JobsError> {
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         let look = bounds.jobs.saturating_mul(bounds.workers.max(1));
+        let served = self.served().clone();
+        let mut tenant = None;
+        // After the last tenant in the alphabet the first one has its turn again.
+        for after in [served.as_str(), ""] {
+            if tenant.is_none() {
+                tenant = sqlx::query_scalar::<_, String>(NEXT_TENANT)
+                    .bind(after)
+                    .fetch_optional(&mut *transaction)
+                    .await?;
+            }
+        }
+        let Some(tenant) = tenant else {
+            return Ok(Vec::new());
+        };
         let queued = sqlx::query(PEEK)
+            .bind(&tenant)
             .bind(i64::try_from(look).unwrap_or(i64::MAX))
             .fetch_all(&mut *transaction)
             .await?;
@@ -82,6 +101,7 @@ impl SqliteStore {
         update.push(") RETURNING id, attempt, lease_number, method");
         let rows = update.build().fetch_all(&mut *transaction).await?;
         transaction.commit().await?;
+        *self.served() = tenant;
         let mut claims = rows
             .iter()
             .map(|row| {
@@ -95,6 +115,10 @@ impl SqliteStore {
             .collect::<Result<Vec<_>, JobsError>>()?;
         claims.sort_unstable_by_key(|claim| claim.id);
         Ok(claims)
+    }
+
+    fn served(&self) -> std::sync::MutexGuard<'_, String> {
+        self.served.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The cases of jobs, and whether their cancellation was asked for.
@@ -162,7 +186,7 @@ impl SqliteStore {
             .collect::<Result<Vec<_>, JobsError>>()?;
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         let mut update = QueryBuilder::<Sqlite>::new(
-            "WITH done (id, lease_number, state, warnings, failure, folder, patches) AS (",
+            "WITH done (id, lease_number, state, warnings, failure, folder, bytes, patches) AS (",
         );
         update.push_values(&rows, |mut row, (claim, end)| {
             row.push_bind(claim.id.to_string())
@@ -171,13 +195,14 @@ impl SqliteStore {
                 .push_bind(&end.warnings)
                 .push_bind(&end.failure)
                 .push_bind(end.folder)
+                .push_bind(end.result_bytes)
                 .push_bind(end.field_patches);
         });
         update.push(") UPDATE jobs SET state = done.state, ended_at = ");
         update.push_bind(now);
         update.push(
             ", warnings = done.warnings, failure = done.failure, result_key = done.folder, \
-             field_patches = done.patches, \
+             result_bytes = done.bytes, field_patches = done.patches, \
              progress = CASE WHEN done.state = 'succeeded' THEN 1.0 ELSE progress END, \
              lease_until = NULL, worker = NULL, version = version + 1 \
              FROM done WHERE jobs.id = done.id AND jobs.lease_number = done.lease_number \

@@ -9,33 +9,47 @@
 
 pub mod batches;
 pub mod claims;
+pub mod expiry;
+pub mod figures;
+mod forms;
 pub mod groups;
+pub mod keys;
 pub mod lists;
+pub mod reuse;
 mod rows;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use bytes::Bytes;
-use sqlx::migrate::{Migration, MigrationType, Migrator};
 use sqlx::sqlite::{
-    SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous,
+    SqliteAutoVacuum, SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions,
+    SqliteSynchronous,
 };
-use sqlx::{Row, SqlSafeStr};
+use sqlx::{Connection, Row, SqliteConnection};
 use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
 use crate::jobs::job::Job;
 use crate::jobs::results::Encoded;
+use crate::jobs::store::sqlite::forms::{allow_shrinking, migrations};
+use crate::jobs::store::sqlite::reuse::end_with_sources;
 use crate::jobs::store::sqlite::rows::{job_columns, read_job, to_json};
-use crate::jobs::store::{Deleted, Enqueued, NewJob, StoredResult};
+use crate::jobs::store::{Deleted, Enqueued, NewJob, ReuseKey, StoredResult};
 
+const GET: &str = concat!("SELECT ", job_columns!(), " FROM jobs WHERE id = $1");
+/// The write-ahead log is cut to this size when it was larger for a while.
+const LOG_BYTES: &str = "67108864";
 const READERS: u32 = 4;
 const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// The embedded job table.
 #[derive(Debug, Clone)]
 pub struct SqliteStore {
+    file: PathBuf,
+    /// The tenant whose job was claimed last.
+    served: Arc<Mutex<String>>,
     writer: SqlitePool,
     readers: SqlitePool,
 }
@@ -51,6 +65,7 @@ impl SqliteStore {
             .create_if_missing(true)
             .journal_mode(SqliteJournalMode::Wal)
             .synchronous(SqliteSynchronous::Full)
+            .pragma("journal_size_limit", LOG_BYTES)
             .busy_timeout(BUSY_TIMEOUT)
             .foreign_keys(true);
         let pool = |connections: u32| {
@@ -60,10 +75,20 @@ impl SqliteStore {
                 .max_lifetime(None)
                 .test_before_acquire(false)
         };
-        let writer = pool(1).connect_with(options.clone()).await?;
+        let writing = options.clone().auto_vacuum(SqliteAutoVacuum::Incremental);
+        let writer = pool(1)
+            .before_acquire(|connection, _| Box::pin(is_free(connection)))
+            .connect_with(writing)
+            .await?;
         migrations().run(&writer).await?;
+        allow_shrinking(&writer).await?;
         let readers = pool(READERS).connect_with(options.read_only(true)).await?;
-        Ok(SqliteStore { writer, readers })
+        Ok(SqliteStore {
+            file: file.to_owned(),
+            served: Arc::default(),
+            writer,
+            readers,
+        })
     }
 
     /// Closes every connection; the write-ahead log is folded into the database.
@@ -83,6 +108,29 @@ impl SqliteStore {
         Ok(())
     }
 
+    /// Writes a copy of the database, as it is at one moment, to a new file.
+    ///
+    /// # Errors
+    /// The file is there already or cannot be written.
+    pub async fn copy_into(&self, file: &Path) -> Result<(), JobsError> {
+        sqlx::query("VACUUM INTO $1")
+            .bind(file.to_string_lossy().into_owned())
+            .execute(&self.writer)
+            .await?;
+        Ok(())
+    }
+
+    /// Writes a page that is as it was.
+    ///
+    /// # Errors
+    /// The database cannot be written.
+    pub async fn touch(&self) -> Result<(), JobsError> {
+        sqlx::query("PRAGMA user_version = 1")
+            .execute(&self.writer)
+            .await?;
+        Ok(())
+    }
+
     /// Queues a job, or finds the one its idempotency key already stands for. Durable once it returns.
     ///
     /// # Errors
@@ -90,9 +138,9 @@ impl SqliteStore {
     pub async fn enqueue(&self, new: &NewJob) -> Result<Enqueued, JobsError> {
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         let id = new.id.to_string();
-        let row = sqlx::query(concat!(
-            "INSERT INTO jobs (id, state, name, labels, method, created_at, cost_us, outputs) \
-             VALUES ($1, 'queued', $2, $3, $4, $5, $6, $7) RETURNING ",
+        let mut row = sqlx::query(concat!(
+            "INSERT INTO jobs (id, state, name, labels, method, created_at, cost_us, outputs, reuse_key, tenant) \
+             VALUES ($1, 'queued', $2, $3, $4, $5, $6, $7, $8, $9) RETURNING ",
             job_columns!()
         ))
         .bind(&id)
@@ -102,12 +150,16 @@ impl SqliteStore {
         .bind(new.created_at)
         .bind(new.cost_us)
         .bind(&new.outputs)
+        .bind(new.reuse_key.as_ref().map(ReuseKey::as_slice))
+        .bind(&*new.tenant)
         .fetch_one(&mut *transaction)
         .await?;
         if let Some((key, digest)) = &new.idempotency {
             let inserted = sqlx::query(
-                "INSERT INTO idempotency_keys (key, digest, job_id) VALUES ($1, $2, $3) ON CONFLICT (key) DO NOTHING",
+                "INSERT INTO idempotency_keys (of_tenant, key, digest, job_id) VALUES ($1, $2, $3, $4) \
+                 ON CONFLICT (of_tenant, key) DO NOTHING",
             )
+            .bind(&*new.tenant)
             .bind(key)
             .bind(digest.as_slice())
             .bind(&id)
@@ -115,7 +167,7 @@ impl SqliteStore {
             .await?;
             if inserted.rows_affected() == 0 {
                 transaction.rollback().await?;
-                let found = self.by_key(key, digest).await?;
+                let found = self.by_key(&new.tenant, key, digest).await?;
                 // The job of the key was deleted in between; the client's next try will find the key free.
                 return found.ok_or(JobsError::IdempotencyConflict);
             }
@@ -126,31 +178,45 @@ impl SqliteStore {
             .execute(&mut *transaction)
             .await?;
         for (key, value) in &new.labels {
-            sqlx::query("INSERT INTO job_labels (key, value, job_id) VALUES ($1, $2, $3)")
-                .bind(key)
-                .bind(value)
+            sqlx::query(
+                "INSERT INTO job_labels (of_tenant, key, value, job_id) VALUES ($1, $2, $3, $4)",
+            )
+            .bind(&*new.tenant)
+            .bind(key)
+            .bind(value)
+            .bind(&id)
+            .execute(&mut *transaction)
+            .await?;
+        }
+        if !end_with_sources(&mut transaction, std::iter::once(new))
+            .await?
+            .is_empty()
+        {
+            row = sqlx::query(GET)
                 .bind(&id)
-                .execute(&mut *transaction)
+                .fetch_one(&mut *transaction)
                 .await?;
         }
         transaction.commit().await?;
         Ok(Enqueued::Created(read_job(&row)?))
     }
 
-    /// What an idempotency key stands for, if it was used.
+    /// What an idempotency key of a tenant stands for, if it was used.
     ///
     /// # Errors
     /// The database failed.
     pub async fn by_key(
         &self,
+        tenant: &str,
         key: &str,
         digest: &[u8; 32],
     ) -> Result<Option<Enqueued>, JobsError> {
         let row = sqlx::query(concat!(
             "SELECT ",
             job_columns!(),
-            ", digest FROM idempotency_keys JOIN jobs ON jobs.id = idempotency_keys.job_id WHERE key = $1"
+            ", digest FROM idempotency_keys JOIN jobs ON jobs.id = idempotency_keys.job_id WHERE of_tenant = $1 AND key = $2"
         ))
+        .bind(tenant)
         .bind(key)
         .fetch_optional(&self.readers)
         .await?;
@@ -171,6 +237,21 @@ impl SqliteStore {
         let count: i64 = sqlx::query_scalar(
             "SELECT COUNT(*) FROM (SELECT 1 FROM jobs WHERE state = 'queued' LIMIT $1) AS waiting",
         )
+        .bind(i64::try_from(at_most).unwrap_or(i64::MAX))
+        .fetch_one(&self.readers)
+        .await?;
+        Ok(u64::try_from(count).unwrap_or(0))
+    }
+
+    /// Number of queued jobs of a tenant, counted no further than `at_most`.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn queued_of(&self, tenant: &str, at_most: u64) -> Result<u64, JobsError> {
+        let count: i64 = sqlx::query_scalar(
+            "SELECT COUNT(*) FROM (SELECT 1 FROM jobs WHERE state = 'queued' AND tenant = $1 LIMIT $2) AS waiting",
+        )
+        .bind(tenant)
         .bind(i64::try_from(at_most).unwrap_or(i64::MAX))
         .fetch_one(&self.readers)
         .await?;
@@ -205,15 +286,27 @@ impl SqliteStore {
     /// # Errors
     /// The database failed; nothing changed.
     pub async fn delete(&self, id: Uuid) -> Result<Deleted, JobsError> {
+        let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         let gone = sqlx::query(
-            "DELETE FROM jobs WHERE id = $1 AND state IN ('succeeded', 'failed', 'cancelled')",
+            "DELETE FROM jobs WHERE id = $1 AND state IN ('succeeded', 'failed', 'cancelled') RETURNING result_owner",
         )
         .bind(id.to_string())
-        .execute(&self.writer)
+        .fetch_optional(&mut *transaction)
         .await?;
-        if gone.rows_affected() > 0 {
-            return Ok(Deleted::Done);
+        if let Some(row) = gone {
+            let owner: Option<String> = row.try_get("result_owner")?;
+            let owner = owner.unwrap_or_else(|| id.to_string());
+            let needed: bool = sqlx::query_scalar(
+                "SELECT EXISTS (SELECT 1 FROM jobs WHERE id = $1) OR EXISTS (SELECT 1 FROM jobs WHERE result_owner = $1)",
+            )
+            .bind(&owner)
+            .fetch_one(&mut *transaction)
+            .await?;
+            transaction.commit().await?;
+            let orphan = Uuid::try_parse(&owner).ok().filter(|_| !needed);
+            return Ok(Deleted::Done { orphan });
         }
+        drop(transaction);
         let job = self.get(id).await?;
         Ok(job.map_or(Deleted::NotFound, |job| Deleted::NotEnded(job.state)))
     }
@@ -223,14 +316,10 @@ impl SqliteStore {
     /// # Errors
     /// The database failed.
     pub async fn get(&self, id: Uuid) -> Result<Option<Job>, JobsError> {
-        let row = sqlx::query(concat!(
-            "SELECT ",
-            job_columns!(),
-            " FROM jobs WHERE id = $1"
-        ))
-        .bind(id.to_string())
-        .fetch_optional(&self.readers)
-        .await?;
+        let row = sqlx::query(GET)
+            .bind(id.to_string())
+            .fetch_optional(&self.readers)
+            .await?;
         row.as_ref().map(read_job).transpose()
     }
 
@@ -295,19 +384,11 @@ impl SqliteStore {
     }
 }
 
-/// The forms the job table has had; a new one is added at the end, an old one is never edited.
-fn migrations() -> Migrator {
-    let form = |number, name: &'static str, text: &'static str| {
-        Migration::new(
-            number,
-            name.into(),
-            MigrationType::Simple,
-            text.into_sql_str(),
-            false,
-        )
-    };
-    Migrator::with_migrations(vec![
-        form(1, "jobs", include_str!("schema.sql")),
-        form(2, "batches", include_str!("batches.sql")),
-    ])
+/// A transaction that a full disk broke can leave its connection inside it for ever; such a connection is replaced.
+async fn is_free(connection: &mut SqliteConnection) -> sqlx::Result<bool> {
+    if connection.is_in_transaction() {
+        // A rollback may be on its way; it is done after a round trip.
+        connection.ping().await?;
+    }
+    Ok(!connection.is_in_transaction())
 }

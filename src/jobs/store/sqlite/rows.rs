@@ -12,7 +12,7 @@ use crate::jobs::job::{Job, State};
 /// The columns a [`Job`] is read from.
 macro_rules! job_columns {
     () => {
-        "id, state, name, labels, batch_id, created_at, started_at, ended_at, attempt, progress, warnings, failure, version"
+        "id, tenant, state, name, labels, batch_id, created_at, started_at, ended_at, attempt, progress, warnings, failure, cached, version"
     };
 }
 pub(super) use job_columns;
@@ -23,6 +23,7 @@ pub(super) fn read_job(row: &SqliteRow) -> Result<Job, JobsError> {
     let batch: Option<String> = row.try_get("batch_id")?;
     Ok(Job {
         id: read_id(row)?,
+        tenant: row.try_get("tenant")?,
         state: read_state(row)?,
         name: row.try_get("name")?,
         labels: from_json(row.try_get("labels")?)?,
@@ -34,10 +35,12 @@ pub(super) fn read_job(row: &SqliteRow) -> Result<Job, JobsError> {
         created_at: row.try_get("created_at")?,
         started_at: row.try_get("started_at")?,
         ended_at: row.try_get("ended_at")?,
+        expires_at: None,
         attempt: row.try_get("attempt")?,
         progress: row.try_get("progress")?,
         warnings: from_json(row.try_get("warnings")?)?,
         failure: failure.as_deref().map(from_json).transpose()?,
+        cached: row.try_get("cached")?,
         version: read_count(row, "version")?,
     })
 }

@@ -1,0 +1,52 @@
+//! Writes `docs/accuracy-and-speed.md` and its pictures: error against run time, the cost and honesty of targets, growth with
+//! the number of cells, and what skipping saves. One run, one thread.
+//!
+//! `cargo bench --bench report`. Times are of the thread, not of the wall, and in units of one 500 × 500 f64 LU (faer,
+//! factored in place) of the same run. Without the reference cases of `tests/data` nothing is written.
+
+#[path = "../machine.rs"]
+mod machine;
+
+mod gaps;
+mod meshes;
+mod plot;
+mod questions;
+mod savings;
+mod scaling;
+mod targets;
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use machine::lu_seconds;
+
+const HEAD: &str = "# Accuracy and speed
+
+Written by `cargo bench --bench report`; do not edit. Everything was measured in one run of one thread, on a machine that other
+processes may have used as well.
+
+**Error** of a case: the largest of the errors of F_x and F_y relative to μN and of M_z relative to μN√(A/π), against CONTACT's
+solutions extrapolated to infinitely many elements (`tests/data/README.md`; their own uncertainty is 0.0001 to 0.0014).
+**1 LU**: one 500 × 500 f64 LU factorisation of faer in place, the unit of machine speed: ";
+
+fn main() {
+    // Run by `cargo test --benches` as well, where there is nothing to measure.
+    if !std::env::args().any(|argument| argument == "--bench") {
+        return;
+    }
+    let lu = lu_seconds();
+    let mut text = HEAD.to_owned();
+    let _ = writeln!(text, "{:.2} ms here.\n", 1e3 * lu);
+    let cases = questions::hertz_cases();
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
+    let pictures = folder.join("accuracy-and-speed");
+    std::fs::create_dir_all(&pictures).expect("a folder for the pictures");
+    text.push_str(&targets::section(&cases, lu));
+    text.push_str(&meshes::section(&cases, lu, &pictures));
+    text.push_str(&gaps::section(lu));
+    text.push_str(&savings::section(lu));
+    text.push_str(&scaling::section(lu, &pictures));
+    let path = folder.join("accuracy-and-speed.md");
+    std::fs::write(&path, text).expect("the report can be written");
+    println!("{}", path.display());
+}

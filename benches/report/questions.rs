@@ -1,0 +1,82 @@
+//! The reference cases as questions, and the errors of their answers.
+
+use railhead::contact::monitor::Unwatched;
+use railhead::contact::problem::{Limits, Problem};
+use railhead::contact::solution::{Solution, Total};
+use railhead::contact::{check, solve};
+use serde_json::{Value, json};
+
+use crate::machine::{median, seconds_of};
+
+/// The reference classes of Hertz contacts with a friction limit.
+pub const CLASSES: [&str; 5] = [
+    "hertz_long",
+    "hertz_lat",
+    "hertz_spin",
+    "hertz_longspin",
+    "hertz_xyspin",
+];
+
+/// A stored list of reference data.
+pub fn stored(name: &str) -> Vec<Value> {
+    let path = format!("{}/tests/data/{name}.json", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(path).expect("reference data");
+    serde_json::from_str(&text).expect("reference data are JSON")
+}
+
+pub fn hertz_cases() -> Vec<Value> {
+    CLASSES.iter().flat_map(|class| stored(class)).collect()
+}
+
+/// A number of a stored case.
+pub fn number(case: &Value, name: &str) -> f64 {
+    case[name].as_f64().expect("a number")
+}
+
+/// A stored Hertz case as a problem.
+pub fn hertz(case: &Value, solver: &Value, outputs: &Value) -> Problem {
+    let question = json!({
+        "material": { "shear_modulus_mpa": case["shear_modulus_mpa"], "poisson_ratio": case["poisson_ratio"] },
+        "friction": { "coefficient": case["friction"] },
+        "contact": { "type": "ellipse", "a_mm": case["a_mm"], "b_mm": case["b_mm"] },
+        "load": { "normal_force_n": case["normal_force_n"] },
+        "motion": { "creepage_x": case["creepage_x"], "creepage_y": case["creepage_y"], "spin_per_mm": case["spin_per_mm"] },
+        "solver": solver,
+        "outputs": outputs,
+    });
+    problem(&question)
+}
+
+pub fn problem(question: &Value) -> Problem {
+    check(question, &Limits::default()).expect("a valid case")
+}
+
+/// The answer if there is one, and the median time of a solve over `repeats`, fewer where one takes long.
+pub fn timed(problem: &Problem, repeats: usize) -> (Option<Solution>, f64) {
+    let (first, answer) = seconds_of(|| solve(problem, &Unwatched));
+    let Ok((solution, _)) = answer else {
+        return (None, first);
+    };
+    let repeats = if first > 0.1 { 1 } else { repeats };
+    let seconds = (0..repeats).map(|_| seconds_of(|| solve(problem, &Unwatched)).0);
+    (Some(solution), median(seconds.collect()))
+}
+
+/// Largest error of the resultants of a Hertz case, and the uncertainty of the reference.
+pub fn hertz_error(total: &Total, case: &Value) -> (f64, f64) {
+    let bound = number(case, "friction") * number(case, "normal_force_n");
+    let length = (number(case, "a_mm") * number(case, "b_mm")).sqrt();
+    let found = [
+        ("force_x", total.force_x_n / bound),
+        ("force_y", total.force_y_n / bound),
+        ("moment_z", total.moment_z_n_mm / (bound * length)),
+    ];
+    let error = |(name, value): &(&str, f64)| (value - number(&case[*name], "value")).abs();
+    (
+        found.iter().map(error).fold(0.0, f64::max),
+        found
+            .iter()
+            .map(|(name, _)| number(&case[*name], "unc"))
+            .fold(0.0, f64::max),
+    )
+}

@@ -1,0 +1,18 @@
+//! A copy of the data folder, also beside a running service.
+
+use std::process::ExitCode;
+
+use anyhow::Context;
+
+use crate::cli::{BackupArgs, print};
+use crate::jobs::backup::backup;
+
+/// Makes the copy and names it.
+pub(super) fn run(args: &BackupArgs) -> anyhow::Result<ExitCode> {
+    tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .context("the async runtime could not be started")?
+        .block_on(backup(&args.data_dir, &args.to))?;
+    print(&args.to.display().to_string())
+}

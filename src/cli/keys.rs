@@ -1,0 +1,62 @@
+//! API keys of a data folder: make, list, revoke; also beside a running service.
+
+use std::process::ExitCode;
+
+use anyhow::{Context, bail};
+
+use crate::cli::{KeysAction, KeysArgs, complain, print};
+use crate::jobs::keys::{Key, Keyring};
+
+/// Does what was asked of the keys.
+pub(super) fn run(args: &KeysArgs) -> anyhow::Result<ExitCode> {
+    tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .context("the async runtime could not be started")?
+        .block_on(act(args))
+}
+
+async fn act(args: &KeysArgs) -> anyhow::Result<ExitCode> {
+    let (KeysAction::Create { data_dir, .. }
+    | KeysAction::List { data_dir }
+    | KeysAction::Revoke { data_dir, .. }) = &args.action;
+    let keys = Keyring::open(data_dir).await?;
+    let done = match &args.action {
+        KeysAction::Create { tenant, name, .. } => {
+            let (key, secret) = keys.create(tenant, name.clone()).await?;
+            complain(&format!(
+                "key {} of tenant {} follows; it is shown this one time",
+                key.id, key.tenant
+            ));
+            print(&secret)
+        }
+        KeysAction::List { .. } => print(&table(&keys.list().await?)),
+        KeysAction::Revoke { id, .. } => match keys.revoke(id).await? {
+            Some(key) => print(&table(&[key])),
+            None => bail!("there is no key {id}; `railhead keys list` shows all"),
+        },
+    };
+    keys.close().await;
+    done
+}
+
+/// One line per key, columns parted by tabs.
+fn table(keys: &[Key]) -> String {
+    let time = |epoch_ms: i64| {
+        jiff::Timestamp::from_millisecond(epoch_ms)
+            .map_or_else(|_| epoch_ms.to_string(), |time| format!("{time:.0}"))
+    };
+    let mut lines = vec!["id\ttenant\tcreated\trevoked\tname".to_owned()];
+    lines.extend(keys.iter().map(|key| {
+        format!(
+            "{}\t{}\t{}\t{}\t{}",
+            key.id,
+            key.tenant,
+            time(key.created_at),
+            key.revoked_at.map_or_else(|| "-".to_owned(), time),
+            // Escaped: whoever named the key shall not draw on the operator's terminal.
+            key.name.as_deref().unwrap_or("-").escape_debug()
+        )
+    }));
+    lines.join("\n")
+}

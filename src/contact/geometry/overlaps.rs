@@ -1,0 +1,143 @@
+//! Which overlaps of wheel and rail are patches: near ones share a gap, bent ones are cut where they are thin.
+
+use crate::contact::geometry::contact_search::{Line, STEP, Search};
+
+/// Overlaps nearer to each other than this along the rail, in mm, whose mean inclinations differ less, in rad, share one gap:
+/// there they influence each other. (CONTACT keeps apart what is 8 mm or 30° from each other.)
+const TOGETHER: f64 = 8.0;
+const TOGETHER_ANGLE: f64 = 0.5;
+
+/// An overlap is cut where it is thinner than this part of the lobes on both sides. Two bodies touch where they overlap by more
+/// than half of the deepest overlap (Hertz), so that the surfaces of a lobe may be taken apart where it is thin.
+const VALLEY: f64 = 0.35;
+const THIN: f64 = 0.4;
+
+/// Lines that overlap: the first and the last one, and whether the overlap goes on beyond.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Overlap {
+    pub(super) ends: [usize; 2],
+    pub(super) cut: [bool; 2],
+}
+
+impl Search<'_> {
+    /// The lines that overlap, patch by patch.
+    pub(super) fn overlaps(&self, lowering: f64) -> Result<Vec<Overlap>, String> {
+        let inside = |k: &usize| self.lines[*k].clearance < lowering;
+        let places: Vec<usize> = (0..self.lines.len()).filter(inside).collect();
+        let mut found: Vec<Overlap> = Vec::new();
+        for run in places.chunk_by(|a, b| self.adjoin(*a, *b)) {
+            let (first, last) = (run[0], run[run.len() - 1]);
+            if first == 0 || !self.adjoin(first - 1, first) {
+                return Err(self.cut_off(first));
+            }
+            if !self.adjoin(last, last + 1) {
+                return Err(self.cut_off(last));
+            }
+            let whole = Overlap {
+                ends: [first, last],
+                cut: [false; 2],
+            };
+            for overlap in self.lobes(whole, lowering) {
+                match found.last_mut() {
+                    Some(before) if self.share_a_gap(*before, overlap, lowering) => {
+                        before.ends[1] = overlap.ends[1];
+                        before.cut[1] = overlap.cut[1];
+                    }
+                    _ => found.push(overlap),
+                }
+            }
+        }
+        Ok(found)
+    }
+
+    /// An overlap that bends, such as one of tread and flange together, cut where it is thin between two lobes of
+    /// different inclination: where the overlap along the normal is so small, nothing touches.
+    fn lobes(&self, whole: Overlap, lowering: f64) -> Vec<Overlap> {
+        let [first, last] = whole.ends;
+        let (depths, main) = self.depths(whole, lowering);
+        let angles: Vec<f64> = (first..=last)
+            .map(|k| self.inclination(self.lines[k].rail))
+            .collect();
+        let (after, before) = ((main..depths.len()).collect(), (0..=main).rev().collect());
+        let mut valleys = Vec::new();
+        for outward in [after, before] as [Vec<usize>; 2] {
+            let (mut valley, mut other) = (main, None);
+            for k in outward {
+                if depths[k] < depths[valley] {
+                    valley = k;
+                }
+                if depths[valley] <= VALLEY * depths[k]
+                    && (angles[k] - angles[main]).abs() > TOGETHER_ANGLE
+                    && other.is_none_or(|(deepest, _)| depths[k] > deepest)
+                {
+                    other = Some((depths[k], valley));
+                }
+            }
+            valleys.extend(other.map(|(_, valley)| first + valley));
+        }
+        let Some(valley) = valleys.first().copied() else {
+            return vec![whole];
+        };
+        let low = Overlap {
+            ends: [first, valley],
+            cut: [whole.cut[0], true],
+        };
+        let high = Overlap {
+            ends: [valley, last],
+            cut: [true, whole.cut[1]],
+        };
+        [self.lobes(low, lowering), self.lobes(high, lowering)].concat()
+    }
+
+    /// Are the lines at these places, one after the other, neighbours in space?
+    fn adjoin(&self, k: usize, next: usize) -> bool {
+        next == k + 1
+            && next < self.lines.len()
+            && self.lines[next].y - self.lines[k].y < 1.5 * STEP
+    }
+
+    /// The lines of an overlap with the one on either side.
+    pub(super) fn around(&self, [first, last]: [usize; 2]) -> &[Line] {
+        &self.lines[first - 1..=last + 1]
+    }
+
+    /// How deep the bodies overlap along the normal, line by line, and where most.
+    fn depths(&self, overlap: Overlap, lowering: f64) -> (Vec<f64>, usize) {
+        let [first, last] = overlap.ends;
+        let depth = |line: &Line| (lowering - line.clearance) * self.inclination(line.rail).cos();
+        let depths: Vec<f64> = self.lines[first..=last].iter().map(depth).collect();
+        let deeper = |a: &usize, b: &usize| depths[*a].total_cmp(&depths[*b]);
+        let main = (0..depths.len()).max_by(deeper).unwrap_or(0);
+        (depths, main)
+    }
+
+    /// The lines on which a cut overlap gets thin, before its ends: beyond them it touches nothing.
+    pub(super) fn thin_ends(&self, overlap: Overlap, lowering: f64) -> [Line; 2] {
+        let (depths, main) = self.depths(overlap, lowering);
+        let thin = |k: &usize| depths[*k] <= THIN * depths[main];
+        let before = (0..=main).rev().find(thin).unwrap_or(0);
+        let after = (main..depths.len()).find(thin).unwrap_or(depths.len() - 1);
+        [before, after].map(|k| self.lines[overlap.ends[0] + k])
+    }
+
+    fn share_a_gap(&self, one: Overlap, other: Overlap, lowering: f64) -> bool {
+        let apart = self.lines[other.ends[0]].rail - self.lines[one.ends[1]].rail;
+        let angle = |overlap: Overlap| self.frame(self.around(overlap.ends), lowering).angle;
+        !one.cut[1]
+            && apart.abs() <= TOGETHER
+            && (angle(one) - angle(other)).abs() <= TOGETHER_ANGLE
+    }
+
+    fn cut_off(&self, line: usize) -> String {
+        let line = self.lines[line];
+        let [rail, wheel] = [
+            self.geometry.on_rail(line.rail),
+            self.geometry.on_wheel(line.wheel),
+        ];
+        format!(
+            "the contact reaches the end of a profile, at y = {:.2} mm on the rail and {:.2} mm on the wheel; the true contact is \
+             cut off, longer profiles are needed",
+            rail[0], wheel[0]
+        )
+    }
+}

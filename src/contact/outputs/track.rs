@@ -1,0 +1,204 @@
+//! The answers for the parts of a wheel–rail contact put together, with their places and the sums in track axes.
+
+use crate::contact::geometry::contact_search::Frame;
+use crate::contact::geometry::wheel_rail::WheelRail;
+use crate::contact::normal::profiles::{PressedGap, PressedWheel};
+use crate::contact::problem::Problem;
+use crate::contact::solution::{
+    ErrorEstimate, Fields, NormalReport, Origin, Position, Solution, Total,
+};
+
+/// A patch over which the rail turns by more than this, in rad, is remarked on.
+const TURN_USUAL_MAX: f64 = 0.35;
+/// Axes, origins and signs in words.
+const FRAME: &str = "every patch in its own axes: x along rolling (leading edge at larger x), y to the left in the plane of \
+                     contact, z out of the rail, origin at its load centre; total in track axes: x along rolling, y to the left, \
+                     z up; forces, moments and tractions act on the lower body, slip is that of the upper body relative to the \
+                     lower one";
+
+/// Puts the answers for the parts together, in the order of the wheel's patches; `problem` is the whole, `answers` has at
+/// least one entry.
+///
+/// `total` holds the sums in track axes: `F_x`, `F_y cos α + N sin α` across, `F_y sin α − N cos α` upward, with the contact angle α and
+/// the normal force N, and the moment about the vertical line through the load centre of all patches, to which a part adds
+/// `M_z cos α` and its forces times their distance.
+#[must_use]
+pub fn merge(
+    problem: &Problem,
+    geometry: &WheelRail,
+    wheel: &PressedWheel,
+    answers: Vec<(Solution, Fields)>,
+) -> (Solution, Fields) {
+    let parts: Vec<Part> = wheel.patches.iter().map(Part::new).collect();
+    let origin = load_centre(&parts);
+    let motions = answers.first().map_or(0, |(first, _)| first.total.len());
+    let total = (0..motions)
+        .map(|motion| {
+            let part = |(part, (answer, _)): (&Part, &(Solution, Fields))| {
+                part.in_track(&answer.total[motion], origin)
+            };
+            parts.iter().zip(&answers).map(part).fold(None, sum)
+        })
+        .collect::<Option<Vec<Total>>>()
+        .unwrap_or_default();
+    let mut warnings = problem.warnings.clone();
+    warnings.extend_from_slice(&wheel.warnings);
+    let alone = answers.len() == 1;
+    let mut whole: Option<(Solution, Fields)> = None;
+    for (gap, (mut solution, fields)) in wheel.patches.iter().zip(answers) {
+        let before = whole.as_ref().map_or(0, |(whole, _)| whole.patches.len());
+        let remarks = gap.warnings.iter().chain(&solution.warnings);
+        warnings.extend(remarks.map(|remark| {
+            if alone {
+                remark.clone()
+            } else {
+                format!("patch {before}: {remark}")
+            }
+        }));
+        for (k, patch) in solution.patches.iter_mut().enumerate() {
+            let place = geometry.moved(&gap.frame, gap.field.load_centre(Some(k)), wheel.centre);
+            patch.position = Some(position(geometry, &place, &gap.frame));
+            let [.., y_min, y_max] = patch.extent_mm;
+            let turn = turn(geometry, gap, wheel.centre, [y_min, y_max]);
+            if turn > TURN_USUAL_MAX {
+                warnings.push(format!(
+                    "patch {}: the rail turns by {turn:.2} rad over the contact, which a plane of contact and half-spaces describe \
+                     roughly",
+                    before + k
+                ));
+            }
+        }
+        match &mut whole {
+            None => whole = Some((solution, fields)),
+            Some((all, all_fields)) => {
+                all.normal = both(all.normal, solution.normal);
+                all.patches.extend(solution.patches);
+                all_fields.patches.extend(fields.patches);
+            }
+        }
+    }
+    let Some((solution, fields)) = whole else {
+        unreachable!("a wheel at rest touches its rail")
+    };
+    let solution = Solution {
+        total,
+        warnings,
+        wheel_lowering_mm: Some(wheel.lowering),
+        origin: Origin {
+            x_mm: origin[0],
+            y_mm: origin[1],
+            meaning: "load centre of all patches in track axes, for the total; the origin of a patch is in its position"
+                .to_owned(),
+        },
+        frame: FRAME.to_owned(),
+        ..solution
+    };
+    (solution, fields)
+}
+
+/// By how much the rail's inclination changes over a patch, in rad.
+fn turn(geometry: &WheelRail, gap: &PressedGap, centre: f64, across: [f64; 2]) -> f64 {
+    let [low, high] = across.map(|y| {
+        let rail = geometry.moved(&gap.frame, [0.0, y], centre).rail;
+        let [y, z] = geometry.rail_at(rail).tangent();
+        (z / y).atan()
+    });
+    (high - low).abs()
+}
+
+/// A part of the contact in track axes.
+struct Part {
+    frame: Frame,
+    normal_force: f64,
+}
+
+impl Part {
+    fn new(gap: &PressedGap) -> Part {
+        Part {
+            frame: gap.frame,
+            normal_force: gap.normal_force(),
+        }
+    }
+
+    /// Sums over a part, turned into track axes, with the moment about the vertical line through `[x, y]`.
+    fn in_track(&self, own: &Total, about: [f64; 2]) -> Total {
+        let (sin, cos) = self.frame.angle.sin_cos();
+        let arm = [0, 1].map(|k| self.frame.origin[k] - about[k]);
+        let force_y = own.force_y_n * cos + self.normal_force * sin;
+        Total {
+            force_x_n: own.force_x_n,
+            force_y_n: force_y,
+            force_z_n: Some(own.force_y_n * sin - self.normal_force * cos),
+            moment_z_n_mm: own.moment_z_n_mm * cos + arm[0] * force_y - arm[1] * own.force_x_n,
+            error_estimate: own.error_estimate.map(|error| {
+                let across = error.force_y_n * cos.abs();
+                ErrorEstimate {
+                    force_x_n: error.force_x_n,
+                    force_y_n: across,
+                    moment_z_n_mm: error.moment_z_n_mm * cos.abs()
+                        + arm[0].abs() * across
+                        + arm[1].abs() * error.force_x_n,
+                }
+            }),
+        }
+    }
+}
+
+/// Mean place of the parts in track axes, weighted with their normal forces.
+fn load_centre(parts: &[Part]) -> [f64; 2] {
+    let force: f64 = parts.iter().map(|part| part.normal_force).sum();
+    [0, 1].map(|k| {
+        let weighted = parts
+            .iter()
+            .map(|part| part.normal_force * part.frame.origin[k]);
+        weighted.sum::<f64>() / force
+    })
+}
+
+fn sum(so_far: Option<Total>, part: Total) -> Option<Total> {
+    let Some(so_far) = so_far else {
+        return Some(part);
+    };
+    Some(Total {
+        force_x_n: so_far.force_x_n + part.force_x_n,
+        force_y_n: so_far.force_y_n + part.force_y_n,
+        force_z_n: so_far.force_z_n.zip(part.force_z_n).map(|(a, b)| a + b),
+        moment_z_n_mm: so_far.moment_z_n_mm + part.moment_z_n_mm,
+        error_estimate: so_far
+            .error_estimate
+            .zip(part.error_estimate)
+            .map(|(a, b)| ErrorEstimate {
+                force_x_n: a.force_x_n + b.force_x_n,
+                force_y_n: a.force_y_n + b.force_y_n,
+                moment_z_n_mm: a.moment_z_n_mm + b.moment_z_n_mm,
+            }),
+    })
+}
+
+/// One report for two parts: the finer grid, all the work, the worse residual.
+fn both(one: Option<NormalReport>, other: Option<NormalReport>) -> Option<NormalReport> {
+    let (Some(one), Some(other)) = (one, other) else {
+        return one.or(other);
+    };
+    Some(NormalReport {
+        cells: if one.cells >= other.cells {
+            one.cells
+        } else {
+            other.cells
+        },
+        iterations: one.iterations + other.iterations,
+        residual: one.residual.max(other.residual),
+        seconds: one.seconds + other.seconds,
+    })
+}
+
+fn position(geometry: &WheelRail, place: &Frame, frame: &Frame) -> Position {
+    Position {
+        track_mm: place.origin,
+        rail_mm: geometry.on_rail(place.rail),
+        wheel_mm: geometry.on_wheel(place.wheel),
+        contact_angle_rad: frame.angle,
+        rolling_radius_mm: geometry.meridian(place.wheel).radius,
+        origin_track_mm: frame.origin,
+    }
+}

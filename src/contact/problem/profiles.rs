@@ -1,0 +1,149 @@
+//! From the cross-sections of a case to a wheel in place over its rail, with every fault of both.
+
+use std::sync::Arc;
+
+use crate::contact::case::{Contact, CrossSection, Load, Motions, Wheelset};
+use crate::contact::error::Fault;
+use crate::contact::geometry::contact_search::Search;
+use crate::contact::geometry::formats;
+use crate::contact::geometry::profile::{Body, Profile, Reading};
+use crate::contact::geometry::wheel_rail::{Placement, WheelRail};
+use crate::contact::geometry::wheelset::WheelsetMotion;
+use crate::contact::normal::Region;
+use crate::contact::normal::profiles::{Loading, ProfileContact};
+
+/// The region of a wheel on a rail, yet to be found, with its remarks; `None` without faults where the load or the contact
+/// modulus in MPa is not known.
+///
+/// # Errors
+/// Every fault of the two cross-sections; or that they cannot meet.
+pub(super) fn region(
+    contact: &Contact,
+    load: Option<&Load>,
+    contact_modulus: Option<f64>,
+) -> Result<Option<(Region, Vec<String>)>, Vec<Fault>> {
+    let geometry = wheel_rail(contact)?;
+    if let Err(detail) = Search::new(&geometry) {
+        return Err(vec![fault("/contact".to_owned(), detail)]);
+    }
+    let warnings = geometry.warnings();
+    let loading = load.and_then(loading);
+    let (Some(loading), Some(contact_modulus)) = (loading, contact_modulus) else {
+        return Ok(None);
+    };
+    let contact = ProfileContact {
+        geometry,
+        loading,
+        contact_modulus,
+    };
+    Ok(Some((Region::Profiles(Arc::new(contact)), warnings)))
+}
+
+/// The motion of the wheelset, if the case gives it instead of creepages.
+pub(super) fn wheelset(motions: &Motions) -> Option<WheelsetMotion> {
+    let Motions::Wheelset { wheelset } = motions else {
+        return None;
+    };
+    let Wheelset {
+        speed_mm_per_s: speed,
+        angular_velocity_rad_per_s,
+        free_rolling_radius_mm,
+        lateral_velocity_mm_per_s,
+        yaw_rate_rad_per_s,
+        roll_rate_rad_per_s,
+    } = *wheelset;
+    let free = free_rolling_radius_mm.map(|radius| speed / radius);
+    Some(WheelsetMotion {
+        speed,
+        angular_velocity: angular_velocity_rad_per_s.or(free).unwrap_or(f64::NAN),
+        lateral_velocity: lateral_velocity_mm_per_s,
+        yaw_rate: yaw_rate_rad_per_s,
+        roll_rate: roll_rate_rad_per_s,
+    })
+}
+
+fn loading(load: &Load) -> Option<Loading> {
+    match (load.vertical_force_n, load.normal_force_n, load.approach_mm) {
+        (Some(force), _, _) => Some(Loading::Vertical(force)),
+        (None, Some(force), _) => Some(Loading::Normal(force)),
+        (None, None, Some(lowering)) => Some(Loading::Lowering(lowering)),
+        (None, None, None) => None,
+    }
+}
+
+fn wheel_rail(contact: &Contact) -> Result<WheelRail, Vec<Fault>> {
+    let Contact::Profiles {
+        rail,
+        wheel,
+        side,
+        rolling_radius_mm,
+        gauge_mm,
+        gauge_height_mm,
+        cant_rad,
+        flange_back_distance_mm,
+        flange_back_position_mm,
+        lateral_shift_mm,
+        yaw_rad,
+        roll_rad,
+    } = contact
+    else {
+        return Err(vec![fault(
+            "/contact/type".to_owned(),
+            "no profiles".to_owned(),
+        )]);
+    };
+    let rail = profile(Body::Rail, rail).map_err(|fault| vec![fault]);
+    let wheel = profile(Body::Wheel, wheel).map_err(|fault| vec![fault]);
+    let (rail, wheel) = match (rail, wheel) {
+        (Ok(rail), Ok(wheel)) => (rail, wheel),
+        (Err(rail), Err(wheel)) => return Err([rail, wheel].concat()),
+        (Err(faults), Ok(_)) | (Ok(_), Err(faults)) => return Err(faults),
+    };
+    let placement = Placement {
+        side: *side,
+        rolling_radius: *rolling_radius_mm,
+        gauge: *gauge_mm,
+        gauge_height: *gauge_height_mm,
+        cant: *cant_rad,
+        flange_back_distance: *flange_back_distance_mm,
+        flange_back_position: *flange_back_position_mm,
+        lateral_shift: *lateral_shift_mm,
+        yaw: *yaw_rad,
+        roll: *roll_rad,
+    };
+    WheelRail::new(rail, wheel, placement)
+        .map_err(|detail| vec![fault("/contact/rolling_radius_mm".to_owned(), detail)])
+}
+
+fn profile(body: Body, section: &CrossSection) -> Result<Profile, Fault> {
+    let name = match body {
+        Body::Rail => "rail",
+        Body::Wheel => "wheel",
+    };
+    let mut reading = Reading {
+        mirror_y: section.mirror_y,
+        mirror_z: section.mirror_z,
+        smoothing: section.smoothing_mm,
+    };
+    if let (Some(format), Some(text)) = (section.format, &section.text) {
+        let refuse = |detail| fault(format!("/contact/{name}/text"), detail);
+        let contents = formats::read(format, text).map_err(refuse)?;
+        let is_wheel = body == Body::Wheel;
+        if contents.wheel.is_some_and(|wheel| wheel != is_wheel) {
+            let other = if is_wheel { "rail" } else { "wheel" };
+            return Err(refuse(format!(
+                "the file says that it belongs to a {other}; that of a {name} is needed"
+            )));
+        }
+        reading.mirror_y = reading.mirror_y.or(contents.mirror_y);
+        reading.mirror_z = reading.mirror_z.or(contents.mirror_z);
+        return Profile::new(body, &contents.points, reading).map_err(refuse);
+    }
+    let points = section.points_mm.as_deref().unwrap_or_default();
+    Profile::new(body, points, reading)
+        .map_err(|detail| fault(format!("/contact/{name}/points_mm"), detail))
+}
+
+fn fault(pointer: String, detail: String) -> Fault {
+    Fault { pointer, detail }
+}

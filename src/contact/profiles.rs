@@ -1,0 +1,174 @@
+//! Solves a wheel on a rail: brings the wheel to rest, solves the patches one after the other, and lets friction share
+//! in the vertical load.
+
+use crate::contact::answer;
+use crate::contact::case::{Motion, Output};
+use crate::contact::error::SolveError;
+use crate::contact::geometry::contact_search::Search;
+use crate::contact::geometry::wheel_rail::WheelRail;
+use crate::contact::geometry::wheelset::{WheelsetMotion, creepages};
+use crate::contact::monitor::{Monitor, Watch};
+use crate::contact::normal::Region;
+use crate::contact::normal::profiles::{Loading, PressedGap, PressedWheel, ProfileContact, Wanted};
+use crate::contact::outputs::track::merge;
+use crate::contact::problem::{Problem, Resolution};
+use crate::contact::solution::{Fields, Solution};
+
+/// The vertical force may be missed by this part of it; the bound for a change of friction's share in one round.
+const BALANCE: f64 = 5e-4;
+/// Rounds of the balance; each leaves about a tenth of the difference before, on steep flanges a third.
+const ROUNDS_MAX: u32 = 8;
+/// Part of its normal forces' vertical part that a wheel carries at least; on a steep flange friction may take away all of it.
+const CARRIED_MIN: f64 = 0.1;
+/// Allowed error of the resultants in the first round, relative to μN.
+const TARGET_FIRST: f64 = 0.05;
+/// By which part the first rest may miss the force: friction's share hardly depends on it.
+const TOLERANCE_FIRST: f64 = 0.1;
+
+/// Solves a problem whose region is a wheel on a rail.
+///
+/// A vertical force is balanced by the normal and the tangential forces together if the case has one motion: friction's share
+/// is found on a coarse mesh, the wheel brought to rest again, and so on until the share is what it was taken for. Several
+/// motions share their patches, so that only normal forces balance then; a remark says so.
+///
+/// # Errors
+/// A named reason why there is no answer.
+pub(super) fn solve(
+    problem: &Problem,
+    contact: &ProfileContact,
+    monitor: &dyn Monitor,
+) -> Result<(Solution, Fields), SolveError> {
+    let search =
+        Search::new(&contact.geometry).map_err(|reason| SolveError::NormalProblem { reason })?;
+    let rest = |wanted: Wanted, before: Option<&PressedWheel>| -> Result<Rest, SolveError> {
+        let watch = Watch::new(monitor, problem.time_limit, 1);
+        let began = monitor.elapsed();
+        let wheel = contact.press(&search, wanted, before, &watch)?;
+        let seconds = (monitor.elapsed() - began).as_secs_f64();
+        Ok(Rest { wheel, seconds })
+    };
+    let exactly = |friction_share: f64| Wanted {
+        friction_share,
+        tolerance: 0.0,
+    };
+    let vertical = matches!(contact.loading, Loading::Vertical(_)) && problem.friction > 0.0;
+    if !vertical || problem.motions.len() > 1 {
+        let mut at_rest = rest(exactly(0.0), None)?;
+        let answers = at_rest.answers(problem, contact, monitor)?;
+        if vertical {
+            at_rest.wheel.warnings.push(
+                "normal forces alone balance the vertical force, because several motions share their patches; the total of a motion \
+                 has its friction on top"
+                    .to_owned(),
+            );
+        }
+        return Ok(merge(problem, &contact.geometry, &at_rest.wheel, answers));
+    }
+    let coarse = Problem {
+        resolution: match problem.resolution {
+            Resolution::Target(target) => Resolution::Target(target.max(TARGET_FIRST)),
+            mesh @ Resolution::Mesh(_) => mesh,
+        },
+        outputs: vec![Output::Resultants],
+        ..problem.clone()
+    };
+    let about = Wanted {
+        friction_share: 0.0,
+        tolerance: TOLERANCE_FIRST,
+    };
+    let mut at_rest = rest(about, None)?;
+    let answers = at_rest.answers(&coarse, contact, monitor)?;
+    let mut share = friction_share(&at_rest.wheel, &answers);
+    for _ in 0..ROUNDS_MAX {
+        let counted = share;
+        if 1.0 + counted < CARRIED_MIN {
+            break;
+        }
+        at_rest = at_rest.again(rest(exactly(counted), Some(&at_rest.wheel))?);
+        let answers = at_rest.answers(problem, contact, monitor)?;
+        share = friction_share(&at_rest.wheel, &answers);
+        if ((1.0 + share) / (1.0 + counted) - 1.0).abs() <= BALANCE {
+            return Ok(merge(problem, &contact.geometry, &at_rest.wheel, answers));
+        }
+    }
+    Err(SolveError::NormalProblem {
+        reason: format!(
+            "normal and tangential forces do not come to balance the vertical force in {ROUNDS_MAX} rounds; friction carries \
+             {share:+.3} of what the normal forces do. Give a normal_force_n or an approach_mm"
+        ),
+    })
+}
+
+/// Vertical part of the tangential forces on the wheel, relative to that of the normal ones.
+fn friction_share(wheel: &PressedWheel, answers: &[(Solution, Fields)]) -> f64 {
+    let lifted = |(gap, (answer, _)): (&PressedGap, &(Solution, Fields))| {
+        -answer.total[0].force_y_n * gap.frame.angle.sin()
+    };
+    let lifted: f64 = wheel.patches.iter().zip(answers).map(lifted).sum();
+    lifted / wheel.vertical_force()
+}
+
+/// The wheel at rest, and the time that took.
+struct Rest {
+    wheel: PressedWheel,
+    seconds: f64,
+}
+
+impl Rest {
+    /// A later rest, with the work of both.
+    fn again(&self, later: Rest) -> Rest {
+        let mut wheel = later.wheel;
+        wheel.heights += self.wheel.heights;
+        Rest {
+            wheel,
+            seconds: self.seconds + later.seconds,
+        }
+    }
+
+    /// Solves every motion on every part.
+    fn answers(
+        &self,
+        problem: &Problem,
+        contact: &ProfileContact,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<(Solution, Fields)>, SolveError> {
+        let parts = self.wheel.patches.len();
+        let watch = Watch::new(monitor, problem.time_limit, parts * problem.motions.len());
+        let mut answers = Vec::with_capacity(parts);
+        for (k, gap) in self.wheel.patches.iter().enumerate() {
+            // What all parts share is charged to the first.
+            let normal = gap
+                .report
+                .with_time(if k == 0 { self.seconds } else { 0.0 });
+            let motions = match &problem.wheelset {
+                None => problem.motions.clone(),
+                Some(wheelset) => vec![self.motion(gap, &contact.geometry, wheelset)],
+            };
+            let region = Region::Grid(gap.field.clone());
+            let part = problem.of_part(region, motions, normal)?;
+            answers.push(answer(&part, &watch)?);
+        }
+        Ok(answers)
+    }
+
+    /// Creepages and spin about the origin of a gap: those at its patches, weighted with their forces. Between patches
+    /// that share a gap the surfaces do not touch, so that the origin itself says nothing.
+    fn motion(&self, gap: &PressedGap, geometry: &WheelRail, wheelset: &WheelsetMotion) -> Motion {
+        let force = gap.normal_force();
+        let mut motion = Motion {
+            creepage_x: 0.0,
+            creepage_y: 0.0,
+            spin_per_mm: 0.0,
+        };
+        for (k, patch) in gap.field.patches().iter().enumerate() {
+            let [x, y] = gap.field.load_centre(Some(k));
+            let place = geometry.moved(&gap.frame, [x, y], self.wheel.centre);
+            let [along, across, spin] = creepages(geometry, &place, self.wheel.centre, wheelset);
+            let share = patch.normal_force / force;
+            motion.creepage_x += share * (along + spin * y);
+            motion.creepage_y += share * (across - spin * x);
+            motion.spin_per_mm += share * spin;
+        }
+        motion
+    }
+}

@@ -1,0 +1,193 @@
+//! Reads the body of a batch: cut into cases while it arrives, checked portion by portion.
+
+use axum::body::Body;
+use axum::extract::Request;
+use axum::http::{HeaderMap, header};
+use futures_util::StreamExt;
+use serde_json::Value;
+use tokio::time::timeout;
+use uuid::Uuid;
+
+use crate::http::HttpOptions;
+use crate::http::body::{essence, read_json, read_strict};
+use crate::http::coding::too_long;
+use crate::http::elements::{Element, Layout, Splitter};
+use crate::http::error::{ApiError, Kind};
+use crate::http::table_body::TableBody;
+use crate::jobs::Jobs;
+use crate::jobs::batch::Draft;
+
+/// Cases are checked in portions of about this many bytes.
+const PORTION_BYTES: usize = 256 << 10;
+
+/// The form of a body.
+#[derive(Debug)]
+pub enum Form {
+    /// A JSON array of cases.
+    Array,
+    /// One case per line.
+    Lines,
+    /// A table that fills a template.
+    Table(Box<TableBody>),
+}
+
+impl Form {
+    fn layout(&self) -> Layout {
+        match self {
+            Form::Array => Layout::Array,
+            Form::Lines => Layout::Lines,
+            Form::Table(_) => Layout::Rows,
+        }
+    }
+}
+
+/// The form that a body is declared to have.
+///
+/// # Errors
+/// The content type is none of a batch, or the template of a table is missing, unknown or not wanted.
+pub async fn form(
+    jobs: &Jobs,
+    headers: &HeaderMap,
+    template: Option<Uuid>,
+) -> Result<Form, ApiError> {
+    let essence = essence(headers);
+    if template.is_some() && essence != "text/csv" {
+        return Err(ApiError::bad_parameter(
+            "template",
+            "`template` belongs to a table; send it with `Content-Type: text/csv`",
+        ));
+    }
+    match (essence.as_str(), template) {
+        ("application/json", _) => Ok(Form::Array),
+        ("application/x-ndjson" | "application/ndjson" | "application/jsonl", _) => Ok(Form::Lines),
+        ("text/csv", Some(job)) => {
+            let case = read_json(&jobs.case(job).await?)?;
+            Ok(Form::Table(Box::new(TableBody::new(case))))
+        }
+        ("text/csv", None) => Err(ApiError::bad_parameter(
+            "template",
+            "a table needs `?template=` with the id of a job; its case is what the columns are filled into",
+        )),
+        (other, _) => Err(ApiError::new(
+            Kind::UnsupportedMediaType,
+            format!(
+                "the content type is `{other}`; send an array with `application/json`, one case per line with `application/x-ndjson`, or a table with `text/csv`"
+            ),
+        )),
+    }
+}
+
+/// Reads and checks the body as it arrives.
+///
+/// # Errors
+/// The body is too large, too slow, broken, or not of its form; faults of single cases are kept in the draft.
+pub async fn read_draft(
+    jobs: &Jobs,
+    options: HttpOptions,
+    mut form: Form,
+    request: Request<Body>,
+) -> Result<Draft, ApiError> {
+    let too_large = || {
+        ApiError::new(
+            Kind::BodyTooLarge,
+            format!(
+                "the body is larger than the {} bytes that are allowed for one batch",
+                options.batch_max_bytes
+            ),
+        )
+    };
+    let declared = request.headers().get(header::CONTENT_LENGTH);
+    let declared = declared.and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
+    if declared.is_some_and(|length| length > options.batch_max_bytes) {
+        return Err(too_large());
+    }
+    let mut draft = jobs.draft()?;
+    let mut splitter = Splitter::new(form.layout(), options.body_max_bytes);
+    let mut pieces = request.into_body().into_data_stream();
+    let mut portion = Vec::new();
+    let (mut total, mut held) = (0_u64, 0);
+    loop {
+        let piece = timeout(options.body_timeout, pieces.next()).await;
+        let piece = piece.map_err(|_| {
+            ApiError::new(
+                Kind::BodyTimeout,
+                format!(
+                    "nothing of the body arrived for {} s",
+                    options.body_timeout.as_secs_f64()
+                ),
+            )
+        })?;
+        let Some(piece) = piece else { break };
+        let piece = piece.map_err(|error| {
+            if too_long(&error) {
+                too_large()
+            } else {
+                ApiError::new(Kind::UnreadableBody, error.to_string())
+            }
+        })?;
+        total += piece.len() as u64;
+        if total > options.batch_max_bytes {
+            return Err(too_large());
+        }
+        held += piece.len();
+        splitter.feed(&piece, &mut portion)?;
+        if held >= PORTION_BYTES {
+            held = 0;
+            (draft, form) = check(jobs, draft, form, std::mem::take(&mut portion)).await?;
+            require_count(&draft, options)?;
+        }
+    }
+    splitter.end(&mut portion)?;
+    (draft, _) = check(jobs, draft, form, portion).await?;
+    require_count(&draft, options)?;
+    Ok(draft)
+}
+
+fn require_count(draft: &Draft, options: HttpOptions) -> Result<(), ApiError> {
+    if draft.cases <= options.batch_max_cases {
+        return Ok(());
+    }
+    Err(ApiError::new(
+        Kind::BodyTooLarge,
+        format!(
+            "the batch has more than the {} cases that are allowed",
+            options.batch_max_cases
+        ),
+    ))
+}
+
+/// Checks some cases off the threads that answer requests.
+async fn check(
+    jobs: &Jobs,
+    mut draft: Draft,
+    mut form: Form,
+    portion: Vec<Element>,
+) -> Result<(Draft, Form), ApiError> {
+    let jobs = jobs.clone();
+    let checked = tokio::task::spawn_blocking(move || {
+        for element in portion {
+            match &mut form {
+                Form::Array => {
+                    let case = read_strict(&element.text)
+                        .map_err(|error| ApiError::malformed_element(draft.cases, &error))?;
+                    draft.add(&jobs, element.line, &element.text, Ok(case))?;
+                }
+                Form::Lines => {
+                    let case = read_strict(&element.text)
+                        .map_err(|error| format!("the line is not JSON: {error}"));
+                    draft.add(&jobs, element.line, &element.text, case)?;
+                }
+                Form::Table(table) => {
+                    let Some(case) = table.take(&element.text)? else {
+                        continue;
+                    };
+                    let text = case.as_ref().map(Value::to_string);
+                    let text = text.map_or(element.text, String::into_bytes);
+                    draft.add(&jobs, element.line, &text, case)?;
+                }
+            }
+        }
+        Ok((draft, form))
+    });
+    checked.await.map_err(|error| ApiError::internal(&error))?
+}

@@ -1,0 +1,245 @@
+//! A table of cases: the first line names the columns, every other line fills a template case.
+//!
+//! A column is named by a JSON pointer into the case (`/load/normal_force_n`), by a short name (`normal_force_n`), or as
+//! `label:KEY` for a label. An empty field leaves what the template says.
+
+use serde_json::{Map, Value};
+
+use crate::http::error::{ApiError, Kind};
+
+/// Short names of columns and what they stand for.
+const SHORT_NAMES: [(&str, &str); 13] = [
+    ("name", "/name"),
+    ("normal_force_n", "/load/normal_force_n"),
+    ("approach_mm", "/load/approach_mm"),
+    ("creepage_x", "/motion/creepage_x"),
+    ("creepage_y", "/motion/creepage_y"),
+    ("spin_per_mm", "/motion/spin_per_mm"),
+    ("force_x_n", "/motion/force_x_n"),
+    ("force_y_n", "/motion/force_y_n"),
+    ("friction_coefficient", "/friction/coefficient"),
+    ("rolling_mm", "/contact/rolling_mm"),
+    ("lateral_mm", "/contact/lateral_mm"),
+    ("a_mm", "/contact/a_mm"),
+    ("b_mm", "/contact/b_mm"),
+];
+
+/// A table under way.
+#[derive(Debug)]
+pub struct TableBody {
+    template: Value,
+    columns: Option<Vec<Column>>,
+}
+
+#[derive(Debug, PartialEq, Eq)]
+struct Column {
+    /// As it stands in the header.
+    title: String,
+    /// The members that lead to the value.
+    path: Vec<String>,
+    /// The value is text, whatever it looks like.
+    text: bool,
+}
+
+impl TableBody {
+    /// A table that fills this case.
+    #[must_use]
+    pub fn new(template: Value) -> Self {
+        TableBody {
+            template,
+            columns: None,
+        }
+    }
+
+    /// Takes the next line; the case that it stands for, or why it stands for none. Nothing for the header.
+    ///
+    /// # Errors
+    /// `faulty-table`: the header cannot be understood.
+    pub fn take(&mut self, line: &[u8]) -> Result<Option<Result<Value, String>>, ApiError> {
+        let Some(columns) = &self.columns else {
+            let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
+            let columns = read_header(line)
+                .map_err(|detail| ApiError::new(Kind::FaultyTable, format!("line 1: {detail}")))?;
+            self.columns = Some(columns);
+            return Ok(None);
+        };
+        Ok(Some(fill(&self.template, columns, line)))
+    }
+}
+
+fn read_header(line: &[u8]) -> Result<Vec<Column>, String> {
+    let titles = fields(line)?;
+    let mut columns = Vec::with_capacity(titles.len());
+    for title in titles {
+        let column = column(title.trim())?;
+        if columns
+            .iter()
+            .any(|other: &Column| other.path == column.path)
+        {
+            return Err(format!("the column `{}` is there twice", column.title));
+        }
+        columns.push(column);
+    }
+    Ok(columns)
+}
+
+fn column(title: &str) -> Result<Column, String> {
+    let short = SHORT_NAMES.iter().find(|(name, _)| *name == title);
+    let path = if let Some((_, pointer)) = short {
+        pointed(pointer)
+    } else if let Some(key) = title.strip_prefix("label:").filter(|key| !key.is_empty()) {
+        vec!["labels".to_owned(), key.to_owned()]
+    } else if title.len() > 1 && title.starts_with('/') {
+        pointed(title)
+    } else {
+        let names: Vec<String> = SHORT_NAMES
+            .iter()
+            .map(|(name, _)| format!("`{name}`"))
+            .collect();
+        return Err(format!(
+            "`{title}` names no column; allowed: {}, `label:KEY`, or a JSON pointer such as `/load/normal_force_n`; columns are parted by commas",
+            names.join(", ")
+        ));
+    };
+    let text = path[0] == "labels" || path[0] == "name";
+    Ok(Column {
+        title: title.to_owned(),
+        path,
+        text,
+    })
+}
+
+/// The members of a JSON pointer (RFC 6901).
+fn pointed(pointer: &str) -> Vec<String> {
+    let parts = pointer.split('/').skip(1);
+    parts
+        .map(|part| part.replace("~1", "/").replace("~0", "~"))
+        .collect()
+}
+
+fn fill(template: &Value, columns: &[Column], line: &[u8]) -> Result<Value, String> {
+    let fields = fields(line)?;
+    if fields.len() != columns.len() {
+        return Err(format!(
+            "the line has {} fields, the header has {}",
+            fields.len(),
+            columns.len()
+        ));
+    }
+    let mut case = template.clone();
+    for (column, field) in columns.iter().zip(&fields) {
+        let field = field.trim();
+        if field.is_empty() {
+            continue;
+        }
+        let value = if column.text {
+            Value::from(field)
+        } else {
+            read_value(field)
+        };
+        set(&mut case, &column.path, value)
+            .map_err(|reason| format!("the column `{}` {reason}", column.title))?;
+    }
+    Ok(case)
+}
+
+/// A number, `true`, `false` or `null` as JSON has them; everything else is text, and the case says whether it may be.
+fn read_value(field: &str) -> Value {
+    match serde_json::from_str(field) {
+        Ok(value @ (Value::Number(_) | Value::Bool(_) | Value::Null)) => value,
+        _ => Value::from(field),
+    }
+}
+
+/// Puts a value where the members lead; objects on the way are made.
+fn set(case: &mut Value, path: &[String], value: Value) -> Result<(), String> {
+    let Some((last, way)) = path.split_last() else {
+        return Ok(());
+    };
+    let mut place = case;
+    for member in way {
+        place = step(place, member)?;
+    }
+    *step(place, last)? = value;
+    Ok(())
+}
+
+fn step<'a>(place: &'a mut Value, member: &str) -> Result<&'a mut Value, String> {
+    if place.is_null() {
+        *place = Value::Object(Map::new());
+    }
+    match place {
+        Value::Object(members) => Ok(members.entry(member).or_insert(Value::Null)),
+        Value::Array(items) => {
+            let count = items.len();
+            let index = member.parse::<usize>().ok();
+            let item = index.and_then(|index| items.get_mut(index));
+            item.ok_or_else(|| format!("leads to `{member}` of an array with {count} entries"))
+        }
+        _ => Err(format!(
+            "leads to `{member}` of what is neither an object nor an array in the template"
+        )),
+    }
+}
+
+/// The fields of one line of CSV.
+fn fields(line: &[u8]) -> Result<Vec<String>, String> {
+    let mut reader = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .from_reader(line);
+    let mut record = csv::StringRecord::new();
+    match reader.read_record(&mut record) {
+        Ok(true) => Ok(record.iter().map(str::to_owned).collect()),
+        Ok(false) => Ok(Vec::new()),
+        Err(error) => Err(format!("the line cannot be read: {error}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    fn filled(header: &str, line: &str) -> Result<Value, String> {
+        let template = json!({ "motion": { "creepage_x": 0.001 }, "contact": { "y_mm": [0, 1] }, "solver": "x" });
+        let mut table = TableBody::new(template);
+        assert!(table.take(header.as_bytes()).expect("a header").is_none());
+        table
+            .take(line.as_bytes())
+            .expect("a line")
+            .expect("a case")
+    }
+
+    #[test]
+    fn columns_lead_to_members_of_the_case() {
+        let header =
+            "\u{feff}label:km,normal_force_n, creepage_x ,/contact/y_mm/1,/solver,name\r\n";
+        let case = filled(header, "37.2,8e4,,-2,\"a, \"\"b\"\"\",12\r\n").unwrap();
+        let expected = json!({
+            "labels": { "km": "37.2" },
+            "load": { "normal_force_n": 8e4 },
+            "motion": { "creepage_x": 0.001 },
+            "contact": { "y_mm": [0, -2] },
+            "solver": "a, \"b\"",
+            "name": "12"
+        });
+        assert_eq!(case, expected);
+    }
+
+    #[test]
+    fn lines_that_do_not_fit_say_so() {
+        for (header, line, word) in [
+            ("name,a_mm", "x", "1 fields, the header has 2"),
+            ("/solver/mesh", "3", "neither an object nor an array"),
+            ("/contact/y_mm/2", "3", "array with 2 entries"),
+        ] {
+            let fault = filled(header, line).unwrap_err();
+            assert!(fault.contains(word), "{fault}");
+        }
+        for header in ["speed", "name,name", "a_mm;b_mm", "label:", "/"] {
+            let table = &mut TableBody::new(json!({}));
+            assert!(table.take(header.as_bytes()).is_err(), "{header}");
+        }
+    }
+}

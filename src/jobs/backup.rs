@@ -1,0 +1,66 @@
+//! A copy of a data folder that a service may be using at the same time.
+
+use std::io;
+use std::path::Path;
+
+use crate::jobs::error::JobsError;
+use crate::jobs::store::sqlite::SqliteStore;
+
+/// Copies the jobs and their results into a new folder, from which a service can be started.
+///
+/// The job table first, as it is at one moment, then the results outside it: they never change, and every result that
+/// the copied table names was there before. Only a job that is deleted while the copy is made can lose its result in it.
+///
+/// # Errors
+/// The folder `to` exists already, or something cannot be read or written.
+pub async fn backup(data_dir: &Path, to: &Path) -> Result<(), JobsError> {
+    let failed = |path: &Path, source| JobsError::DataDir {
+        path: path.to_owned(),
+        source,
+    };
+    let table = data_dir.join("jobs.db");
+    // Opening it would make an empty one.
+    std::fs::metadata(&table).map_err(|source| failed(&table, source))?;
+    std::fs::create_dir(to).map_err(|source| failed(to, source))?;
+    let store = SqliteStore::open(&table).await?;
+    let copied = store.copy_into(&to.join("jobs.db")).await;
+    store.close().await;
+    copied?;
+    let (from, to) = (data_dir.join("results"), to.join("results"));
+    if !from.exists() {
+        return Ok(());
+    }
+    let copied = tokio::task::spawn_blocking({
+        let from = from.clone();
+        move || copy_folder(&from, &to)
+    });
+    copied
+        .await
+        .map_err(|error| JobsError::Damaged(error.to_string()))?
+        .map_err(|source| failed(&from, source))
+}
+
+/// Copies what is there; what goes away meanwhile is left out.
+fn copy_folder(from: &Path, to: &Path) -> io::Result<()> {
+    std::fs::create_dir_all(to)?;
+    let entries = match std::fs::read_dir(from) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        entries => entries?,
+    };
+    for entry in entries {
+        let path = entry?.path();
+        let Some(name) = path.file_name() else {
+            continue;
+        };
+        let copied = if path.is_dir() {
+            copy_folder(&path, &to.join(name))
+        } else {
+            std::fs::copy(&path, to.join(name)).map(|_| ())
+        };
+        match copied {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            copied => copied?,
+        }
+    }
+    Ok(())
+}

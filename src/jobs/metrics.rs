@@ -1,0 +1,230 @@
+//! What the jobs room counts for the operator. Labels have few values, all known beforehand: never an id, never a name
+//! that a client chose.
+
+use prometheus_client::encoding::EncodeLabelSet;
+use prometheus_client::metrics::counter::Counter;
+use prometheus_client::metrics::family::Family;
+use prometheus_client::metrics::gauge::Gauge;
+use prometheus_client::metrics::histogram::Histogram;
+use prometheus_client::metrics::info::Info;
+use prometheus_client::registry::Registry;
+
+use crate::contact::case::Method;
+use crate::contact::solution::Solution;
+use crate::jobs::Jobs;
+use crate::jobs::error::JobsError;
+use crate::jobs::job::{FailureKind, State};
+use crate::jobs::store::Ending;
+
+/// Upper bounds of solve times in s.
+const SOLVE_SECONDS: [f64; 14] = [
+    0.0001, 0.0003, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 1000.0,
+];
+/// Upper bounds of Newton iterations of one motion on one patch.
+const ITERATIONS: [f64; 9] = [2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 50.0, 100.0, 200.0];
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+struct StateLabel {
+    state: &'static str,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+struct MethodLabel {
+    method: &'static str,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+struct ReasonLabel {
+    reason: &'static str,
+}
+
+/// Counters of one service; clones share them.
+#[derive(Debug, Clone)]
+pub(super) struct Metrics {
+    jobs: Family<StateLabel, Gauge>,
+    oldest_queued_seconds: Gauge<f64, std::sync::atomic::AtomicU64>,
+    database_bytes: Gauge,
+    result_bytes: Gauge,
+    solve_seconds: Family<MethodLabel, Histogram>,
+    iterations: Family<MethodLabel, Histogram>,
+    ended: Family<StateLabel, Counter>,
+    failures: Family<ReasonLabel, Counter>,
+    storage_failing: Gauge,
+    cache_hits: Counter,
+    cache_misses: Counter,
+}
+
+impl Metrics {
+    pub(super) fn new() -> Metrics {
+        let metrics = Metrics {
+            jobs: Family::default(),
+            oldest_queued_seconds: Gauge::default(),
+            database_bytes: Gauge::default(),
+            result_bytes: Gauge::default(),
+            solve_seconds: Family::new_with_constructor(|| Histogram::new(SOLVE_SECONDS)),
+            iterations: Family::new_with_constructor(|| Histogram::new(ITERATIONS)),
+            ended: Family::default(),
+            failures: Family::default(),
+            storage_failing: Gauge::default(),
+            cache_hits: Counter::default(),
+            cache_misses: Counter::default(),
+        };
+        // A series that appears only with its first event hides that event from a rate.
+        for state in State::ALL.into_iter().filter(|state| state.ended()) {
+            drop(metrics.ended.get_or_create(&state_label(state)));
+        }
+        for kind in FailureKind::ALL {
+            drop(metrics.failures.get_or_create(&reason_label(kind)));
+        }
+        metrics
+    }
+
+    /// A case was solved in `seconds`.
+    pub(super) fn solved(&self, asked: Method, solution: &Solution, seconds: f64) {
+        let points = || solution.patches.iter().flat_map(|patch| &patch.points);
+        let used = points().next().map_or(asked, |point| point.solver.method);
+        let used = MethodLabel {
+            method: used.name(),
+        };
+        self.solve_seconds.get_or_create(&used).observe(seconds);
+        for point in points() {
+            let method = MethodLabel {
+                method: point.solver.method.name(),
+            };
+            self.iterations
+                .get_or_create(&method)
+                .observe(f64::from(point.solver.iterations));
+        }
+    }
+
+    /// A job ended in this way.
+    pub(super) fn ending(&self, ending: &Ending) {
+        match ending {
+            Ending::Succeeded { .. } => self.ended(State::Succeeded, 1),
+            Ending::Cancelled => self.ended(State::Cancelled, 1),
+            Ending::Failed(failure) => self.failed(failure.kind),
+        }
+    }
+
+    /// A job failed for this reason.
+    pub(super) fn failed(&self, kind: FailureKind) {
+        self.ended(State::Failed, 1);
+        self.failures.get_or_create(&reason_label(kind)).inc();
+    }
+
+    /// Jobs ended in this state.
+    pub(super) fn ended(&self, state: State, jobs: u64) {
+        self.ended.get_or_create(&state_label(state)).inc_by(jobs);
+    }
+
+    /// Earlier results were looked for.
+    pub(super) fn looked_up(&self, hits: u64, misses: u64) {
+        self.cache_hits.inc_by(hits);
+        self.cache_misses.inc_by(misses);
+    }
+
+    /// The disk takes data, or does not.
+    pub(super) fn storage_failing(&self, failing: bool) {
+        self.storage_failing.set(i64::from(failing));
+    }
+
+    fn register(&self, registry: &mut Registry) {
+        registry.register(
+            "build",
+            "The running version",
+            Info::new([("version", env!("CARGO_PKG_VERSION"))]),
+        );
+        registry.register("jobs", "Jobs in the store by state", self.jobs.clone());
+        registry.register(
+            "queue_oldest_age_seconds",
+            "Age of the oldest queued job; 0 if none is queued",
+            self.oldest_queued_seconds.clone(),
+        );
+        registry.register(
+            "database_bytes",
+            "Size of the job table with its write-ahead log",
+            self.database_bytes.clone(),
+        );
+        registry.register(
+            "result_bytes",
+            "Size of the results kept outside the job table",
+            self.result_bytes.clone(),
+        );
+        registry.register(
+            "storage_failing",
+            "1 while the disk is full or cannot be written",
+            self.storage_failing.clone(),
+        );
+        registry.register(
+            "solve_seconds",
+            "Wall time of one case on a solver thread, by the method that gave the numbers",
+            self.solve_seconds.clone(),
+        );
+        registry.register(
+            "newton_iterations",
+            "Newton iterations of one motion on one patch",
+            self.iterations.clone(),
+        );
+        registry.register(
+            "jobs_ended",
+            "Jobs that ended, by state",
+            self.ended.clone(),
+        );
+        registry.register(
+            "cache_hits",
+            "Cases answered with the result of an identical earlier one",
+            self.cache_hits.clone(),
+        );
+        registry.register(
+            "cache_misses",
+            "Cases for which an earlier result was looked for in vain",
+            self.cache_misses.clone(),
+        );
+        registry.register(
+            "job_failures",
+            "Jobs that failed, by reason",
+            self.failures.clone(),
+        );
+    }
+}
+
+impl Jobs {
+    /// Adds what this room counts to a registry.
+    pub fn register_metrics(&self, registry: &mut Registry) {
+        self.shared.metrics.register(registry);
+    }
+
+    /// Brings those figures up to date that are read from the store and not counted as they happen.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn refresh_metrics(&self) -> Result<(), JobsError> {
+        let metrics = &self.shared.metrics;
+        let figures = self.shared.store.figures().await?;
+        for (state, jobs) in figures.jobs {
+            let gauge = metrics.jobs.get_or_create_owned(&state_label(state));
+            gauge.set(i64::try_from(jobs).unwrap_or(i64::MAX));
+        }
+        let age_ms = figures
+            .oldest_queued_at
+            .map_or(0, |created| (self.shared.now_ms() - created).max(0));
+        #[expect(clippy::cast_precision_loss, reason = "an age is far below 2^53 ms")]
+        metrics.oldest_queued_seconds.set(age_ms as f64 / 1000.0);
+        let bytes = |bytes: u64| i64::try_from(bytes).unwrap_or(i64::MAX);
+        metrics.database_bytes.set(bytes(figures.database_bytes));
+        metrics.result_bytes.set(bytes(figures.result_bytes));
+        Ok(())
+    }
+}
+
+fn state_label(state: State) -> StateLabel {
+    StateLabel {
+        state: state.name(),
+    }
+}
+
+fn reason_label(kind: FailureKind) -> ReasonLabel {
+    ReasonLabel {
+        reason: kind.name(),
+    }
+}

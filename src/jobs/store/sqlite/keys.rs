@@ -1,0 +1,83 @@
+//! API keys in the embedded job table.
+
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+
+use crate::jobs::error::JobsError;
+use crate::jobs::keys::Key;
+use crate::jobs::store::sqlite::SqliteStore;
+
+const ALL: &str = "SELECT id, hash, tenant, name, created_at, revoked_at FROM api_keys";
+const ONE: &str =
+    "SELECT id, hash, tenant, name, created_at, revoked_at FROM api_keys WHERE id = $1";
+
+impl SqliteStore {
+    /// Stores a key.
+    ///
+    /// # Errors
+    /// The database failed, or there is a key with this id.
+    pub async fn add_key(&self, key: &Key) -> Result<(), JobsError> {
+        sqlx::query(
+            "INSERT INTO api_keys (id, hash, tenant, name, created_at, revoked_at) VALUES ($1, $2, $3, $4, $5, $6)",
+        )
+        .bind(&key.id)
+        .bind(key.hash.as_bytes().as_slice())
+        .bind(&*key.tenant)
+        .bind(&key.name)
+        .bind(key.created_at)
+        .bind(key.revoked_at)
+        .execute(&self.writer)
+        .await?;
+        Ok(())
+    }
+
+    /// Looks a key up.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn key(&self, id: &str) -> Result<Option<Key>, JobsError> {
+        let row = sqlx::query(ONE)
+            .bind(id)
+            .fetch_optional(&self.readers)
+            .await?;
+        row.as_ref().map(read_key).transpose()
+    }
+
+    /// All keys, oldest first, the revoked ones included.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn keys(&self) -> Result<Vec<Key>, JobsError> {
+        let rows = sqlx::query(ALL).fetch_all(&self.readers).await?;
+        let mut keys = rows.iter().map(read_key).collect::<Result<Vec<_>, _>>()?;
+        keys.sort_by(|a, b| (a.created_at, &a.id).cmp(&(b.created_at, &b.id)));
+        Ok(keys)
+    }
+
+    /// Revokes a key; `None` if there is none. A key that was revoked before keeps its time.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn revoke_key(&self, id: &str, now: i64) -> Result<Option<Key>, JobsError> {
+        sqlx::query("UPDATE api_keys SET revoked_at = $1 WHERE id = $2 AND revoked_at IS NULL")
+            .bind(now)
+            .bind(id)
+            .execute(&self.writer)
+            .await?;
+        self.key(id).await
+    }
+}
+
+fn read_key(row: &SqliteRow) -> Result<Key, JobsError> {
+    let hash: Vec<u8> = row.try_get("hash")?;
+    let tenant: String = row.try_get("tenant")?;
+    Ok(Key {
+        id: row.try_get("id")?,
+        hash: blake3::Hash::from_slice(&hash)
+            .map_err(|error| JobsError::Damaged(format!("hash of a key: {error}")))?,
+        tenant: tenant.into(),
+        name: row.try_get("name")?,
+        created_at: row.try_get("created_at")?,
+        revoked_at: row.try_get("revoked_at")?,
+    })
+}

@@ -1,0 +1,51 @@
+//! Wheels on rails as questions: the benchmark's shapes and files, in place.
+
+use serde_json::{Value, json};
+
+use crate::profile_reference_files::reference_file;
+use crate::profile_shapes::{rail_60e1, s1002};
+
+/// A steel wheel on a steel rail with μ = 0.3, right side, placed as in the Manchester contact benchmark.
+pub fn wheel_on_rail(rail: Value, wheel: Value, cant: f64) -> Value {
+    json!({
+        "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
+        "friction": { "coefficient": 0.3 },
+        "contact": {
+            "type": "profiles", "rail": rail, "wheel": wheel, "side": "right",
+            "rolling_radius_mm": 460, "gauge_mm": 1435, "gauge_height_mm": 14, "cant_rad": cant,
+            "flange_back_distance_mm": 1360, "flange_back_position_mm": -70,
+        },
+        "load": { "vertical_force_n": 75000 },
+        "motion": { "creepage_x": 0.0, "creepage_y": 0.0, "spin_per_mm": 0.0 },
+        "outputs": ["resultants"],
+    })
+}
+
+/// S1002 on 60E1 inclined 1:40, generated from their definitions.
+pub fn generated() -> Value {
+    wheel_on_rail(
+        json!({ "points_mm": rail_60e1() }),
+        json!({ "points_mm": s1002() }),
+        0.025,
+    )
+}
+
+/// The benchmark's own files, if they are there; the rail has its inclination already.
+pub fn benchmark() -> Option<Value> {
+    let file = |name: &str| Some(json!({ "format": "simpack", "text": reference_file(name)? }));
+    Some(wheel_on_rail(
+        file("profiles/MBench_UIC60_v3.prr")?,
+        file("profiles/MBench_S1002_v3.prw")?,
+        0.0,
+    ))
+}
+
+/// The case with other members in one of its objects.
+pub fn put(case: &Value, object: &str, members: Value) -> Value {
+    let mut case = case.clone();
+    let target = case[object].as_object_mut().expect("an object");
+    for (name, value) in members.as_object().expect("members") {
+        target.insert(name.clone(), value.clone());
+    }
+    case
+}

@@ -1,0 +1,235 @@
+//! What must hold for a wheel on a rail, whatever the shapes: closed forms, balance, mirror images.
+
+use railhead::contact::normal::hertz::{Ellipse, Pressing};
+use railhead::contact::solution::{PatchSolution, Position, Solution};
+use serde_json::{Value, json};
+
+use crate::profile_cases::{generated, put, wheel_on_rail};
+use crate::reference::solve;
+
+fn position(patch: &PatchSolution) -> Position {
+    patch.position.expect("a position")
+}
+
+fn place(case: &Value, shift: f64, yaw: f64, roll: f64) -> Value {
+    put(
+        case,
+        "contact",
+        json!({ "lateral_shift_mm": shift, "yaw_rad": yaw, "roll_rad": roll }),
+    )
+}
+
+fn moving(case: &Value, x: f64, y: f64, spin: f64) -> Value {
+    put(
+        case,
+        "motion",
+        json!({ "creepage_x": x, "creepage_y": y, "spin_per_mm": spin }),
+    )
+}
+
+fn load(case: &Value, name: &str, value: f64) -> Value {
+    let mut case = case.clone();
+    case["load"] = json!({ name: value });
+    case
+}
+
+/// A rail of radius 300 mm under a wheel coned 1:20.
+fn cone_on_arc() -> Value {
+    let arc: Vec<[f64; 2]> = (-60..=60)
+        .map(|k| 0.5 * f64::from(k))
+        .map(|y| [y, 300.0 - (9e4 - y * y).sqrt()])
+        .collect();
+    let cone: Vec<[f64; 2]> = (-60..=60).map(f64::from).map(|y| [y, -0.05 * y]).collect();
+    let stated = |points: Vec<[f64; 2]>| json!({ "points_mm": points, "mirror_y": false, "mirror_z": false });
+    wheel_on_rail(stated(arc), stated(cone), 0.0)
+}
+
+#[test]
+fn a_cone_on_an_arc_is_hertzs_contact_at_its_angle() {
+    let angle = 0.05_f64.atan();
+    for force in [1e3, 75e3] {
+        let (solution, _) = solve(&load(&cone_on_arc(), "vertical_force_n", force));
+        assert_eq!(solution.patches.len(), 1);
+        let patch = &solution.patches[0];
+        let found = position(patch);
+        assert!((found.contact_angle_rad + angle).abs() < 2e-5, "{found:?}");
+        assert!(
+            (found.rail_mm[0] + 300.0 * angle.sin()).abs() < 0.03,
+            "{found:?}"
+        );
+        // The radius of curvature of a cone at right angles to its generator.
+        let rolling = found.rolling_radius_mm / angle.cos();
+        let normal = force / angle.cos();
+        let modulus = 82_000.0 / 0.72;
+        let hertz = Ellipse::of_radii(rolling, 300.0, Pressing::Force(normal), modulus);
+        let close = |found: f64, expected: f64, allowed: f64| {
+            assert!(
+                (found / expected - 1.0).abs() < allowed,
+                "{found} {expected}"
+            );
+        };
+        close(patch.normal_force_n, normal, 1e-5);
+        close(
+            patch.approach_mm.expect("an approach"),
+            hertz.approach,
+            1e-3,
+        );
+        close(
+            patch.area_mm2,
+            std::f64::consts::PI * hertz.a * hertz.b,
+            5e-3,
+        );
+        close(
+            patch.pressure_max_mpa,
+            1.5 * normal / (std::f64::consts::PI * hertz.a * hertz.b),
+            5e-3,
+        );
+        let lowering = solution.wheel_lowering_mm.expect("a lowering");
+        close(lowering * angle.cos(), hertz.approach, 1e-3);
+    }
+}
+
+#[test]
+fn normal_and_tangential_forces_together_carry_the_vertical_force() {
+    for (shift, y) in [(0.0, 0.0), (-2.0, 0.004), (-8.0, 0.02), (-8.0, -0.02)] {
+        let case = moving(&place(&generated(), shift, 0.0, 0.0), 0.001, y, 0.0);
+        let (solution, _) = solve(&case);
+        let total = solution.total[0];
+        let vertical = -total.force_z_n.expect("a vertical force");
+        assert!(
+            (vertical / 75e3 - 1.0).abs() < 1e-3,
+            "shift {shift}: {vertical}"
+        );
+        // The parts of every patch, turned by hand.
+        let (mut across, mut up) = (0.0, 0.0);
+        for patch in &solution.patches {
+            let (sin, cos) = position(patch).contact_angle_rad.sin_cos();
+            let (force_y, normal) = (patch.points[0].force_y_n, patch.normal_force_n);
+            across += force_y * cos + normal * sin;
+            up += force_y * sin - normal * cos;
+        }
+        assert!((across - total.force_y_n).abs() < 1e-6 * 75e3);
+        assert!((up + vertical).abs() < 1e-6 * 75e3);
+    }
+}
+
+#[test]
+fn friction_lifts_or_presses_a_flange_by_its_direction() {
+    let flange = place(&generated(), -8.0, 0.0, 0.0);
+    let normal_force = |y: f64| -> f64 {
+        let (solution, _) = solve(&moving(&flange, 0.0, y, 0.0));
+        solution
+            .patches
+            .iter()
+            .map(|patch| patch.normal_force_n)
+            .sum()
+    };
+    let (up, none, down) = (normal_force(-0.02), normal_force(0.0), normal_force(0.02));
+    assert!(down < 0.95 * none && up > 1.05 * none, "{down} {none} {up}");
+}
+
+#[test]
+fn a_wheel_lowered_by_what_a_force_gave_carries_that_force() {
+    let mut case = place(&generated(), -5.5, 0.0, 0.0);
+    case["friction"] = json!({ "coefficient": 0.0 });
+    let (by_force, _) = solve(&case);
+    let lowering = by_force.wheel_lowering_mm.expect("a lowering");
+    let (by_lowering, _) = solve(&load(&case, "approach_mm", lowering));
+    let vertical = |solution: &Solution| solution.total[0].force_z_n.expect("a force");
+    assert!((vertical(&by_lowering) / vertical(&by_force) - 1.0).abs() < 1e-3);
+    let normal: f64 = by_force
+        .patches
+        .iter()
+        .map(|patch| patch.normal_force_n)
+        .sum();
+    let (by_normal, _) = solve(&load(&case, "normal_force_n", normal));
+    let again: f64 = by_normal
+        .patches
+        .iter()
+        .map(|patch| patch.normal_force_n)
+        .sum();
+    assert!((again / normal - 1.0).abs() < 1e-9);
+    assert!((by_normal.wheel_lowering_mm.expect("a lowering") / lowering - 1.0).abs() < 1e-3);
+}
+
+#[test]
+fn left_and_right_are_mirror_images_in_every_number() {
+    let right = place(&generated(), -5.5, -0.004, -2e-4);
+    let left = put(
+        &place(&generated(), 5.5, 0.004, 2e-4),
+        "contact",
+        json!({ "side": "left" }),
+    );
+    let (right, _) = solve(&moving(&right, 0.001, 0.0005, 2e-4));
+    let (left, _) = solve(&moving(&left, 0.001, -0.0005, -2e-4));
+    assert_eq!(right.patches.len(), left.patches.len());
+    let close = |a: f64, b: f64, scale: f64| assert!((a - b).abs() < 1e-3 * scale, "{a} {b}");
+    for (a, b) in right.patches.iter().zip(left.patches.iter().rev()) {
+        close(a.normal_force_n, b.normal_force_n, b.normal_force_n);
+        close(a.area_mm2, b.area_mm2, b.area_mm2);
+        let (here, there) = (position(a), position(b));
+        close(here.contact_angle_rad, -there.contact_angle_rad, 1.0);
+        close(here.track_mm[1], -there.track_mm[1], 1.0);
+        close(here.rail_mm[0], there.rail_mm[0], 1.0);
+        close(here.wheel_mm[1], there.wheel_mm[1], 1.0);
+        let bound = 0.3 * a.normal_force_n;
+        close(a.points[0].force_x_n, b.points[0].force_x_n, 2.0 * bound);
+        close(a.points[0].force_y_n, -b.points[0].force_y_n, 2.0 * bound);
+    }
+    close(right.total[0].force_y_n, -left.total[0].force_y_n, 75e3);
+    close(
+        right.total[0].moment_z_n_mm,
+        -left.total[0].moment_z_n_mm,
+        75e3,
+    );
+}
+
+#[test]
+fn a_free_wheel_rolls_without_longitudinal_creepage_at_its_own_radius_only() {
+    let (still, _) = solve(&generated());
+    let radius = position(&still.patches[0]).rolling_radius_mm;
+    let mut rolling = generated();
+    let wheelset = |free: f64| json!({ "wheelset": { "speed_mm_per_s": 20000, "free_rolling_radius_mm": free } });
+    for free in [radius, radius + 1.0] {
+        rolling["motion"] = wheelset(free);
+        let (solution, _) = solve(&rolling);
+        let point = &solution.patches[0].points[0];
+        let angle = position(&solution.patches[0]).contact_angle_rad;
+        let expected = 1.0 - radius / free;
+        assert!(
+            (point.motion.creepage_x - expected).abs() < 1e-6,
+            "{:?}",
+            point.motion
+        );
+        assert!((point.motion.spin_per_mm + angle.sin() / free).abs() < 1e-7);
+        assert!(point.motion.creepage_y.abs() < 1e-15);
+    }
+}
+
+#[test]
+fn several_motions_share_their_patches_and_a_remark_says_what_balances() {
+    let mut case = place(&generated(), -8.0, 0.0, 0.0);
+    let motion = |y: f64| json!({ "creepage_y": y });
+    case["motion"] = json!([motion(0.0), motion(0.02)]);
+    let (solution, _) = solve(&case);
+    assert_eq!(solution.total.len(), 2);
+    assert!(
+        solution
+            .warnings
+            .iter()
+            .any(|w| w.contains("normal forces alone")),
+        "{:?}",
+        solution.warnings
+    );
+    let vertical = |k: usize| -solution.total[k].force_z_n.expect("a force");
+    assert!((vertical(0) / 75e3 - 1.0).abs() < 1e-3 && vertical(1) > 1.05 * 75e3);
+    // Each as if it were asked for alone with the forces that came out.
+    let normal: f64 = solution
+        .patches
+        .iter()
+        .map(|patch| patch.normal_force_n)
+        .sum();
+    case["motion"] = motion(0.02);
+    let (alone, _) = solve(&load(&case, "normal_force_n", normal));
+    assert!((alone.total[0].force_y_n / solution.total[1].force_y_n - 1.0).abs() < 1e-3);
+}

@@ -1,0 +1,120 @@
+//! Tables of cases: columns by name or pointer, faults by line.
+
+use serde_json::json;
+
+use crate::batches::{results, send, small};
+use crate::errors::assert_problem;
+use crate::server::Server;
+
+async fn template(server: &Server) -> String {
+    let path = server.submit(&small("template")).await;
+    let id = path.rsplit('/').next().expect("an id");
+    format!("?template={id}")
+}
+
+#[tokio::test]
+async fn table_makes_a_case_of_each_line() {
+    let server = Server::start().await;
+    let query = template(&server).await;
+    let table = "label:km,normal_force_n,/motion/creepage_x,name\r\n\
+                 37.2,80000,0.002,\"a, b\"\r\n\r\n\"37.4\nabove\",,,\r\n37.6,9e4,0,last";
+    let batch = send(&server, &query, "text/csv; charset=utf-8", table.to_owned()).await;
+    assert_eq!(
+        (batch.status, &batch.json["count"]),
+        (202, &json!(3)),
+        "{}",
+        batch.text
+    );
+    let lines = results(&server, &batch.json, "?wait=60").await;
+    let said: Vec<_> = lines
+        .iter()
+        .map(|line| {
+            (
+                &line["name"],
+                &line["labels"]["km"],
+                &line["labels"]["line"],
+            )
+        })
+        .collect();
+    let line = &json!("A12");
+    assert_eq!(
+        said,
+        [
+            (&json!("a, b"), &json!("37.2"), line),
+            (&json!("template"), &json!("37.4\nabove"), line),
+            (&json!("last"), &json!("37.6"), line),
+        ]
+    );
+    let loads: Vec<_> = lines
+        .iter()
+        .map(|line| &line["result"]["patches"][0]["normal_force_n"])
+        .map(|load| load.as_f64().expect("a load").round())
+        .collect();
+    assert_eq!(loads, [80_000.0, 100_000.0, 90_000.0]);
+}
+
+#[tokio::test]
+async fn faults_of_a_table_are_named_by_line() {
+    let server = Server::idle().await;
+    let query = template(&server).await;
+    let table =
+        "normal_force_n,creepage_x\n80000,0.001\n-5,0.001\n80000\n\"8\n0000\",0\n80000,fast\n";
+    let answer = send(&server, &query, "text/csv", table.to_owned()).await;
+    assert_problem(&answer, 422, "faulty-batch", "4 of 5");
+    let faults = answer.json["errors"].as_array().expect("errors");
+    let found: Vec<_> = faults
+        .iter()
+        .map(|fault| {
+            (
+                fault["line"].as_u64().expect("a line"),
+                fault["pointer"].as_str().expect("a pointer"),
+            )
+        })
+        .collect();
+    assert_eq!(
+        found,
+        [
+            (3, "/1/load/normal_force_n"),
+            (4, "/2"),
+            (5, "/3/load/normal_force_n"),
+            (7, "/4/motion/creepage_x")
+        ]
+    );
+    let taken = send(
+        &server,
+        &format!("{query}&accept=valid"),
+        "text/csv",
+        table.to_owned(),
+    )
+    .await;
+    assert_eq!(
+        (taken.status, &taken.json["count"], &taken.json["rejected"]),
+        (202, &json!(1), &json!(4))
+    );
+    for (query, table, status, kind, word) in [
+        (query.as_str(), "speed\n3\n", 422, "faulty-table", "`speed`"),
+        (
+            query.as_str(),
+            "name;a_mm\n3\n",
+            422,
+            "faulty-table",
+            "commas",
+        ),
+        (query.as_str(), "", 422, "faulty-batch", "no case"),
+        (query.as_str(), "name\n", 422, "faulty-batch", "no case"),
+        ("", "name\nx\n", 400, "bad-query", "template"),
+        ("?template=x", "name\nx\n", 400, "bad-query", "template"),
+        (
+            "?template=0198c0de-0000-7000-8000-000000000000",
+            "name\nx\n",
+            404,
+            "job-not-found",
+            "",
+        ),
+    ] {
+        let answer = send(&server, query, "text/csv", table.to_owned()).await;
+        assert_problem(&answer, status, kind, word);
+    }
+    let answer = send(&server, &query, "application/json", "[]".to_owned()).await;
+    assert_problem(&answer, 400, "bad-query", "text/csv");
+}

@@ -1,0 +1,262 @@
+//! Is an identical case answered from the earlier result, and only then?
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use railhead::contact;
+use railhead::contact::error::SolveError;
+use railhead::jobs::Options;
+use reqwest::{Method, RequestBuilder};
+use serde_json::{Value, json};
+
+use crate::metrics::samples;
+use crate::results::path_of;
+use crate::server::{Answer, Server, Setup};
+use crate::support::{Service, case};
+
+/// A service that counts its solves.
+async fn counting(change: impl FnOnce(&mut Options)) -> (Server, Arc<AtomicUsize>) {
+    let solves = Arc::new(AtomicUsize::new(0));
+    let counter = solves.clone();
+    let mut setup = Setup::new().solving(move |problem, monitor| {
+        counter.fetch_add(1, Ordering::SeqCst);
+        contact::solve(problem, monitor)
+    });
+    change(&mut setup.options);
+    (setup.start().await, solves)
+}
+
+fn renamed(name: &str) -> Value {
+    let mut case = case(name);
+    case["labels"] = json!({ "km": name });
+    case
+}
+
+/// The result of a job without what differs between jobs.
+fn bare(result: &Value) -> Value {
+    let mut result = result.clone();
+    let members = result.as_object_mut().expect("a result");
+    members.remove("links");
+    members.remove("cached");
+    result
+}
+
+async fn solve_fresh(server: &Server, case: &Value) -> Answer {
+    let shape = |request: RequestBuilder| {
+        let request = request.header("prefer", "wait=60");
+        request
+            .header("cache-control", "max-age=0, No-Cache")
+            .json(case)
+    };
+    server.send(Method::POST, "/v1/jobs", shape).await
+}
+
+#[tokio::test]
+async fn an_identical_case_is_answered_at_once_with_the_first_result() {
+    let (server, solves) = counting(|_| {}).await;
+    let first = server.solve(&renamed("first")).await;
+    assert_eq!(first["cached"], false);
+    assert_eq!(first["result"]["cached"], false);
+    // Not waited for: it has ended when it is accepted.
+    let answer = server.post("/v1/jobs", &renamed("second")).await;
+    assert_eq!(
+        (answer.status, &answer.json["state"]),
+        (202, &json!("succeeded"))
+    );
+    let second = server.get(&path_of(&answer.json)).await.json;
+    assert_eq!(second["cached"], true);
+    assert_eq!(
+        (&second["name"], &second["labels"]["km"]),
+        (&json!("second"), &json!("second"))
+    );
+    assert_eq!(
+        (&second["attempt"], &second["progress"]),
+        (&json!(0), &json!(1.0))
+    );
+    assert_eq!(second["warnings"], first["warnings"]);
+    let result = server
+        .get(&format!("{}/result", path_of(&second)))
+        .await
+        .json;
+    assert_eq!(result["cached"], true);
+    // The seconds are those of the one solve there was.
+    assert_eq!(bare(&result), bare(&first["result"]));
+    for part in ["tractions", "zones", "resultants"] {
+        let of = async |job: &Value| server.get(&format!("{}/{part}", path_of(job))).await.json;
+        assert_eq!(of(&second).await, of(&first).await, "{part}");
+    }
+    assert_eq!(solves.load(Ordering::SeqCst), 1);
+    let figures = samples(&server).await;
+    assert_eq!(figures["railhead_cache_hits_total"], 1.0);
+    assert_eq!(figures["railhead_cache_misses_total"], 1.0);
+    assert_eq!(
+        figures[r#"railhead_jobs_ended_total{state="succeeded"}"#],
+        2.0
+    );
+}
+
+#[tokio::test]
+async fn what_changes_the_answer_or_refuses_the_cache_is_solved() {
+    let (server, solves) = counting(|_| {}).await;
+    server.solve(&case("first")).await;
+    let mut other_outputs = case("first");
+    other_outputs["outputs"] = json!(["resultants"]);
+    let mut other_load = case("first");
+    other_load["load"]["normal_force_n"] = json!(100_001);
+    for (number, different) in [other_outputs, other_load].iter().enumerate() {
+        assert_eq!(server.solve(different).await["cached"], false);
+        assert_eq!(solves.load(Ordering::SeqCst), 2 + number);
+    }
+    let fresh = solve_fresh(&server, &case("first")).await;
+    assert_eq!((fresh.status, &fresh.json["cached"]), (200, &json!(false)));
+    assert_eq!(solves.load(Ordering::SeqCst), 4);
+
+    let (server, solves) = counting(|options| options.cache = false).await;
+    for _ in 0..2 {
+        assert_eq!(server.solve(&case("one")).await["cached"], false);
+    }
+    assert_eq!(solves.load(Ordering::SeqCst), 2);
+}
+
+#[tokio::test]
+async fn a_failure_is_not_used_again() {
+    let server = Setup::new()
+        .solving(|_, _| Err(SolveError::OutOfTime))
+        .start()
+        .await;
+    for _ in 0..2 {
+        let job = server.solve(&case("fails")).await;
+        assert_eq!(
+            (&job["state"], &job["cached"]),
+            (&json!("failed"), &json!(false))
+        );
+    }
+}
+
+#[tokio::test]
+async fn either_job_can_be_deleted_without_the_other() {
+    for small_result_max_bytes in [32 << 10, 0] {
+        for first_goes in [true, false] {
+            let mut setup = Setup::new();
+            setup.options.small_result_max_bytes = small_result_max_bytes;
+            let folder = setup.options.data_dir.join("results");
+            let server = setup.start().await;
+            let first = server.solve(&case("first")).await;
+            let second = server.solve(&case("second")).await;
+            let third = server.solve(&case("third")).await;
+            assert_eq!(
+                (&second["cached"], &third["cached"]),
+                (&json!(true), &json!(true))
+            );
+            let (gone, kept) = if first_goes {
+                (&first, &second)
+            } else {
+                (&second, &first)
+            };
+            assert_eq!(server.delete(&path_of(gone)).await.status, 204);
+            for stays in [kept, &third] {
+                let fields = server.get(&format!("{}/tractions", path_of(stays))).await;
+                assert_eq!(fields.status, 200, "{}", fields.text);
+            }
+            for last in [kept, &third] {
+                assert_eq!(server.delete(&path_of(last)).await.status, 204);
+            }
+            assert_eq!(files_below(&folder), 0, "nothing is left behind");
+            assert_eq!(server.solve(&case("again")).await["cached"], false);
+        }
+    }
+}
+
+fn files_below(folder: &std::path::Path) -> usize {
+    let Ok(entries) = std::fs::read_dir(folder) else {
+        return 0;
+    };
+    let paths = entries.map(|entry| entry.expect("an entry").path());
+    paths
+        .map(|path| if path.is_dir() { files_below(&path) } else { 1 })
+        .sum()
+}
+
+#[tokio::test]
+async fn a_batch_is_answered_from_earlier_results() {
+    let (server, solves) = counting(|_| {}).await;
+    let cases: Vec<Value> = (1..=30)
+        .map(|number| {
+            let mut case = case("one of many");
+            case["load"]["normal_force_n"] = json!(10_000 * number);
+            case
+        })
+        .collect();
+    let submit = async |cases: &[Value], fresh: bool| {
+        let shape = |request: RequestBuilder| match fresh {
+            true => request.header("cache-control", "no-cache").json(cases),
+            false => request.json(cases),
+        };
+        let answer = server.send(Method::POST, "/v1/batches", shape).await;
+        assert_eq!(answer.status, 202, "{}", answer.text);
+        answer.header("location").expect("a location").to_owned()
+    };
+    let lines = async |batch: &str| -> Vec<Value> {
+        let text = server.get(&format!("{batch}/results?wait=60")).await.text;
+        let lines = text
+            .lines()
+            .map(|line| serde_json::from_str(line).expect("a line"));
+        lines.collect()
+    };
+    let first = submit(&cases[..20], false).await;
+    let solved = lines(&first).await;
+    assert_eq!(solves.load(Ordering::SeqCst), 20);
+    let second = submit(&cases, false).await;
+    let known = server.get(&second).await.json;
+    assert!(known["states"]["succeeded"].as_u64() >= Some(20), "{known}");
+    let again = lines(&second).await;
+    assert_eq!(solves.load(Ordering::SeqCst), 30);
+    for (index, line) in again.iter().enumerate() {
+        assert_eq!(line["state"], "succeeded");
+        assert_eq!(line["result"]["cached"], index < 20);
+    }
+    for (old, new) in solved.iter().zip(&again) {
+        assert_eq!(bare(&new["result"]), bare(&old["result"]));
+    }
+    lines(&submit(&cases, true).await).await;
+    assert_eq!(solves.load(Ordering::SeqCst), 60);
+}
+
+#[tokio::test]
+async fn earlier_results_outlive_the_process_and_the_deletion_of_their_job() {
+    let folder = tempfile::tempdir().unwrap();
+    // Fine enough for fields that do not fit into the table.
+    let mut large = case("large");
+    large["solver"]["mesh"] = json!({ "strips": 40, "cells": 40 });
+    let solve = async |service: &Service| -> Value {
+        let request = service.request(Method::POST, "/v1/jobs");
+        let request = request.header("prefer", "wait=60").json(&large);
+        request.send().await.unwrap().json().await.unwrap()
+    };
+    let service = Service::start(folder.path(), &[]);
+    let first = solve(&service).await;
+    service.kill();
+    let service = Service::start(folder.path(), &[]);
+    let second = solve(&service).await;
+    assert_eq!(
+        (&first["cached"], &second["cached"]),
+        (&json!(false), &json!(true))
+    );
+    assert!(
+        files_below(&folder.path().join("results")) > 0,
+        "it is a large one"
+    );
+    let path = format!("/v1/jobs/{}", first["id"].as_str().unwrap());
+    let gone = service.request(Method::DELETE, &path).send().await.unwrap();
+    assert_eq!(gone.status(), 204);
+    service.kill();
+    // The sweep at the start leaves what another job needs.
+    let service = Service::start(folder.path(), &[]);
+    let path = format!("/v1/jobs/{}", second["id"].as_str().unwrap());
+    for _ in 0..20 {
+        service.get(&format!("{path}/tractions")).await;
+        crate::support::pause().await;
+    }
+    let result = service.get(&format!("{path}/result")).await;
+    assert_eq!(bare(&result), bare(&first["result"]));
+}

@@ -1,0 +1,268 @@
+//! What clients may keep, and bodies that are packed on the way.
+
+use std::io::Read;
+
+use railhead::http::HttpOptions;
+use reqwest::Method;
+use serde_json::{Value, json};
+
+use crate::errors::assert_problem;
+use crate::results::path_of;
+use crate::server::{Answer, Server, Setup, example, example_text, unpacked};
+
+async fn get_with(server: &Server, path: &str, name: &str, value: &str) -> Answer {
+    let send = server.send(Method::GET, path, |request| request.header(name, value));
+    send.await
+}
+
+#[tokio::test]
+async fn finished_results_are_kept_for_good_and_asked_for_by_tag() {
+    let server = Server::start().await;
+    let path = path_of(&server.solve(&example("spin.case.json")).await);
+    for part in [
+        "result",
+        "case",
+        "resultants",
+        "resultants?format=csv",
+        "tractions",
+        "tractions?format=npz",
+        "zones?grid=5x5",
+        "plot.svg",
+        "plot.png?field=pressure",
+    ] {
+        let path = format!("{path}/{part}");
+        let first = server.get(&path).await;
+        let tag = first.header("etag").expect("a tag").to_owned();
+        assert!(tag.starts_with('"') && tag.len() == 34, "{part}: {tag}");
+        let lifetime = first.header("cache-control").expect("a lifetime");
+        assert_eq!(lifetime, "private, max-age=31536000, immutable", "{part}");
+        assert_eq!(
+            server.get(&path).await.header("etag"),
+            Some(tag.as_str()),
+            "{part}"
+        );
+        let again = get_with(&server, &path, "if-none-match", &format!("\"x\", {tag}")).await;
+        assert_eq!((again.status, again.bytes.len()), (304, 0), "{part}");
+        assert_eq!(again.header("etag"), Some(tag.as_str()), "{part}");
+        let other = get_with(&server, &path, "if-none-match", "\"x\"").await;
+        assert_eq!((other.status, other.bytes), (200, first.bytes), "{part}");
+    }
+    let csv = server.get(&format!("{path}/slip?format=csv")).await;
+    let json = server.get(&format!("{path}/slip")).await;
+    assert_ne!(
+        csv.header("etag"),
+        json.header("etag"),
+        "each form has its tag"
+    );
+}
+
+#[tokio::test]
+async fn tag_of_a_job_changes_with_the_job() {
+    let server = Server::idle().await;
+    let path = server.submit(&example("spin.case.json")).await;
+    let queued = server.get(&path).await;
+    assert_eq!(queued.header("cache-control"), Some("private, no-cache"));
+    let tag = queued.header("etag").expect("a tag").to_owned();
+    assert_eq!(
+        get_with(&server, &path, "if-none-match", &tag).await.status,
+        304
+    );
+    let early = server.get(&format!("{path}/result")).await;
+    assert_eq!(
+        (early.status, early.header("cache-control")),
+        (409, Some("no-store"))
+    );
+    server.post(&format!("{path}/cancel"), &Value::Null).await;
+    let cancelled = get_with(&server, &path, "if-none-match", &tag).await;
+    assert_eq!(
+        (cancelled.status, &cancelled.json["state"]),
+        (200, &json!("cancelled"))
+    );
+    assert_ne!(cancelled.header("etag"), Some(tag.as_str()));
+    server.delete(&path).await;
+    let gone = get_with(&server, &path, "if-none-match", &tag).await;
+    assert_problem(&gone, 404, "job-not-found", "");
+    assert_eq!(gone.header("cache-control"), Some("no-store"));
+}
+
+#[tokio::test]
+async fn tag_of_a_batch_changes_with_its_jobs() {
+    let server = Server::idle().await;
+    let batch = server
+        .post("/v1/batches", &json!([example("spin.case.json")]))
+        .await;
+    let path = path_of(&batch.json);
+    let tag = server
+        .get(&path)
+        .await
+        .header("etag")
+        .expect("a tag")
+        .to_owned();
+    assert_eq!(
+        get_with(&server, &path, "if-none-match", &tag).await.status,
+        304
+    );
+    server.post(&format!("{path}/cancel"), &Value::Null).await;
+    assert_eq!(
+        get_with(&server, &path, "if-none-match", &tag).await.status,
+        200
+    );
+}
+
+#[tokio::test]
+async fn answers_are_packed_for_those_who_accept_it() {
+    let server = Server::start().await;
+    let path = path_of(&server.solve(&example("spin.case.json")).await);
+    for part in ["tractions", "tractions?format=csv", "plot.svg", "result"] {
+        let path = format!("{path}/{part}");
+        let plain = server.get(&path).await;
+        assert_eq!(plain.header("content-encoding"), None, "{part}");
+        for coding in ["gzip", "zstd"] {
+            let packed = get_with(&server, &path, "accept-encoding", coding).await;
+            assert_eq!(packed.header("content-encoding"), Some(coding), "{part}");
+            assert!(packed.bytes.len() < plain.bytes.len(), "{part} as {coding}");
+            assert_eq!(
+                unpacked(&packed.headers, &packed.bytes),
+                plain.bytes,
+                "{part} as {coding}"
+            );
+            let vary = packed.headers.get_all("vary").iter();
+            let vary: Vec<_> = vary.filter_map(|value| value.to_str().ok()).collect();
+            assert!(
+                vary.join(",").to_lowercase().contains("accept-encoding"),
+                "{vary:?}"
+            );
+            let tag = packed.header("etag").expect("a tag").to_owned();
+            assert!(tag.ends_with(&format!("-{coding}\"")), "{tag}");
+            let again = get_with(&server, &path, "if-none-match", &tag).await;
+            assert_eq!(
+                (again.status, again.header("etag")),
+                (304, Some(tag.as_str()))
+            );
+        }
+    }
+    for part in ["plot.png", "tractions?format=npz"] {
+        let answer = get_with(
+            &server,
+            &format!("{path}/{part}"),
+            "accept-encoding",
+            "gzip, zstd",
+        )
+        .await;
+        assert_eq!(
+            answer.header("content-encoding"),
+            None,
+            "{part} is packed already"
+        );
+    }
+}
+
+fn gzip(text: &[u8]) -> Vec<u8> {
+    let mut encoder = flate2::read::GzEncoder::new(text, flate2::Compression::best());
+    let mut out = Vec::new();
+    encoder.read_to_end(&mut out).expect("gzip");
+    out
+}
+
+async fn send_packed(
+    server: &Server,
+    path: &str,
+    kind: &str,
+    coding: &str,
+    body: Vec<u8>,
+) -> Answer {
+    let send = server.send(Method::POST, path, |request| {
+        request
+            .header("content-type", kind)
+            .header("content-encoding", coding)
+            .body(body)
+    });
+    send.await
+}
+
+#[tokio::test]
+async fn packed_cases_and_batches_are_unpacked() {
+    let server = Server::idle().await;
+    let text = example_text("spin.case.json");
+    let line = format!("{}\n", example("spin.case.json"));
+    let zstd = |text: &str| zstd::encode_all(text.as_bytes(), 3).expect("zstd");
+    for (coding, body) in [("gzip", gzip(text.as_bytes())), ("zstd", zstd(&text))] {
+        let answer = send_packed(&server, "/v1/jobs", "application/json", coding, body).await;
+        assert_eq!(answer.status, 202, "{}", answer.text);
+    }
+    for (coding, body) in [
+        ("gzip", gzip(line.repeat(30).as_bytes())),
+        ("zstd", zstd(&line.repeat(30))),
+    ] {
+        let answer =
+            send_packed(&server, "/v1/batches", "application/x-ndjson", coding, body).await;
+        assert_eq!(
+            (answer.status, &answer.json["count"]),
+            (202, &json!(30)),
+            "{}",
+            answer.text
+        );
+    }
+    let answer = send_packed(&server, "/v1/jobs", "application/json", "br", vec![1, 2]).await;
+    assert_problem(&answer, 415, "unsupported-encoding", "`br`");
+    assert_eq!(answer.header("accept-encoding"), Some("gzip, zstd"));
+    let answer = send_packed(
+        &server,
+        "/v1/jobs",
+        "application/json",
+        "gzip",
+        text.into_bytes(),
+    )
+    .await;
+    assert_problem(&answer, 400, "unreadable-body", "");
+}
+
+#[tokio::test]
+async fn limits_hold_before_and_after_unpacking() {
+    let mut setup = Setup::new();
+    setup.working = false;
+    setup.http = HttpOptions {
+        body_max_bytes: 20_000,
+        batch_max_bytes: 60_000,
+        ..HttpOptions::default()
+    };
+    let server = setup.start().await;
+    let case = example_text("spin.case.json");
+    let padded = |bytes: usize| format!("{}{case}", " ".repeat(bytes - case.len()));
+    let json = "application/json";
+    let fits = send_packed(
+        &server,
+        "/v1/jobs",
+        json,
+        "gzip",
+        gzip(padded(20_000).as_bytes()),
+    )
+    .await;
+    assert_eq!(fits.status, 202, "{}", fits.text);
+    for coding in ["gzip", "zstd"] {
+        // 200 MB of blanks, a few kB on the way.
+        let text = vec![b' '; 200_000_000];
+        let bomb = match coding {
+            "gzip" => gzip(&text),
+            _ => zstd::encode_all(text.as_slice(), 3).expect("zstd"),
+        };
+        let answer = send_packed(&server, "/v1/jobs", json, coding, bomb.clone()).await;
+        assert_problem(&answer, 413, "body-too-large", "20000");
+        let answer = send_packed(&server, "/v1/batches", json, coding, bomb).await;
+        assert_problem(&answer, 413, "body-too-large", "60000");
+    }
+    // Empty blocks without end: nothing comes out, but more goes in than is allowed; the length is not declared.
+    let head = vec![0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 0xff];
+    let blocks = std::iter::repeat_n([0, 0, 0, 0xff, 0xff].repeat(100), 1000);
+    let pieces = std::iter::once(head)
+        .chain(blocks)
+        .map(Ok::<_, std::io::Error>);
+    let body = reqwest::Body::wrap_stream(futures_util::stream::iter(pieces));
+    let send = server.send(Method::POST, "/v1/jobs", |request| {
+        request
+            .header("content-type", json)
+            .header("content-encoding", "gzip")
+            .body(body)
+    });
+    assert_problem(&send.await, 413, "body-too-large", "20000");
+}

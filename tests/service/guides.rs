@@ -1,0 +1,190 @@
+//! The guides are true: their blocks run as they stand, against the real program.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use crate::support::Service;
+
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+
+/// The blocks of a language in a guide, one after the other, with the address of the service under test.
+fn blocks(guide: &str, language: &str, service: &Service) -> String {
+    let text = std::fs::read_to_string(Path::new(ROOT).join(guide)).expect("a guide");
+    let mut inside = false;
+    let mut lines = Vec::new();
+    for line in text.lines() {
+        if let Some(fence) = line.strip_prefix("```") {
+            inside = !inside && fence == language;
+            continue;
+        }
+        if inside {
+            lines.push(line);
+        }
+    }
+    assert!(lines.len() > 3, "{guide} has no blocks of {language}");
+    let address = service.address().to_string();
+    lines.join("\n").replace("localhost:8080", &address)
+}
+
+/// A folder in which `api/examples` is found as in the repository.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::os::unix::fs::symlink(Path::new(ROOT).join("api"), folder.path().join("api"))
+        .expect("a link");
+    folder
+}
+
+fn run(program: &Path, arguments: &[&str], folder: &Path) -> Output {
+    let output = Command::new(program)
+        .args(arguments)
+        .current_dir(folder)
+        .env("MPLCONFIGDIR", folder)
+        .output()
+        .expect("the program runs");
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    assert!(
+        output.status.success(),
+        "{}: {}\n{}\n{}",
+        program.display(),
+        output.status,
+        text(&output.stdout),
+        text(&output.stderr)
+    );
+    output
+}
+
+fn succeeds(program: &Path, arguments: &[&str]) -> bool {
+    let output = Command::new(program).args(arguments).output();
+    output.is_ok_and(|output| output.status.success())
+}
+
+/// Says why a guide was not run; on a machine of continuous integration that is a failure.
+fn skip(reason: &str) {
+    assert!(std::env::var_os("CI").is_none(), "{reason}");
+    eprintln!("SKIPPED: {reason}");
+}
+
+fn begins_with(file: &Path, mark: &[u8]) {
+    let bytes = std::fs::read(file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+    assert!(
+        bytes.starts_with(mark),
+        "{} begins otherwise",
+        file.display()
+    );
+}
+
+fn has_shell_tools() -> bool {
+    let there =
+        succeeds(Path::new("curl"), &["--version"]) && succeeds(Path::new("jq"), &["--version"]);
+    if !there {
+        skip("the guides need curl and jq");
+    }
+    there
+}
+
+#[test]
+fn guide_to_forms_runs_as_it_stands() {
+    if !has_shell_tools() {
+        return;
+    }
+    let (folder, data) = (folder(), tempfile::tempdir().expect("a folder"));
+    let service = Service::start(data.path(), &[]);
+    let script = blocks("docs/formats.md", "sh", &service);
+    let output = run(Path::new("bash"), &["-euc", &script], folder.path());
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(
+        said.contains("x_mm,y_mm,dx_mm,dy_mm,strip,traction_x_mpa"),
+        "{said}"
+    );
+    assert!(
+        said.contains("event: state") && said.contains("\n304\n"),
+        "{said}"
+    );
+    for (file, mark) in [
+        ("pressure.npz", b"PK".as_slice()),
+        ("tractions.vtk", b"# vtk DataFile"),
+        ("traction.svg", b"<svg "),
+        ("zones.png", b"\x89PNG"),
+        ("slip.png", b"\x89PNG"),
+    ] {
+        begins_with(&folder.path().join(file), mark);
+    }
+}
+
+#[test]
+fn creep_curve_from_the_shell_runs_as_it_stands() {
+    if !has_shell_tools() {
+        return;
+    }
+    let (folder, data) = (folder(), tempfile::tempdir().expect("a folder"));
+    let service = Service::start(data.path(), &[]);
+    let script = blocks("docs/python.md", "sh", &service);
+    let output = run(Path::new("bash"), &["-euc", &script], folder.path());
+    let said = String::from_utf8_lossy(&output.stdout);
+    let curve: Vec<f64> = said
+        .lines()
+        .filter_map(|line| line.split_once('\t')?.1.parse().ok())
+        .collect();
+    assert!(
+        curve.len() == 25 && curve.is_sorted() && curve[24] > 0.9,
+        "{said}"
+    );
+    begins_with(&folder.path().join("picture.svg"), b"<svg ");
+    let loads: Vec<&str> = said
+        .lines()
+        .filter(|line| line.contains(",succeeded,"))
+        .collect();
+    assert_eq!(loads.len(), 3, "{said}");
+}
+
+#[test]
+fn creep_curve_from_python_runs_as_it_stands() {
+    let Some(python) = python() else {
+        return;
+    };
+    let (folder, data) = (folder(), tempfile::tempdir().expect("a folder"));
+    let service = Service::start(data.path(), &[]);
+    let script = blocks("docs/python.md", "python", &service);
+    let file = folder.path().join("creep_curve.py");
+    std::fs::write(&file, script).expect("a script");
+    let output = run(&python, &["creep_curve.py"], folder.path());
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(said.contains("largest force: 0.9"), "{said}");
+    for picture in ["creep-curve.png", "tractions.png", "picture.png"] {
+        begins_with(&folder.path().join(picture), b"\x89PNG");
+    }
+}
+
+/// A Python with the packages of the guide: `RAILHEAD_TEST_PYTHON`, `python3`, or in continuous integration an environment made for this.
+fn python() -> Option<PathBuf> {
+    let named = std::env::var_os("RAILHEAD_TEST_PYTHON");
+    let python = named.map_or_else(|| PathBuf::from("python3"), PathBuf::from);
+    let packages = ["-c", "import httpx, numpy, matplotlib"];
+    if succeeds(&python, &packages) {
+        return Some(python);
+    }
+    if std::env::var_os("CI").is_some() {
+        let place = Path::new(env!("CARGO_TARGET_TMPDIR")).join("guide-venv");
+        let own = place.join("bin/python");
+        let made = succeeds(&python, &["-m", "venv", &place.to_string_lossy()])
+            && succeeds(
+                &own,
+                &[
+                    "-m",
+                    "pip",
+                    "install",
+                    "--quiet",
+                    "httpx",
+                    "numpy",
+                    "matplotlib",
+                ],
+            );
+        if made && succeeds(&own, &packages) {
+            return Some(own);
+        }
+    }
+    skip(
+        "the guide for Python needs httpx, numpy and matplotlib; name a Python that has them in RAILHEAD_TEST_PYTHON",
+    );
+    None
+}

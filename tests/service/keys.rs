@@ -1,0 +1,188 @@
+//! Keys made and revoked beside the real program, what its start refuses, and what browsers are told.
+
+use std::path::{Path, PathBuf};
+use std::process::Output;
+use std::time::{Duration, Instant};
+
+use reqwest::Method;
+
+use crate::server::Server;
+use crate::support::{Service, pause, railhead};
+
+fn keys(data_dir: &Path, args: &[&str]) -> Output {
+    let mut command = railhead();
+    let command = command.arg("keys").args(args);
+    command.arg("--data-dir").arg(data_dir).output().unwrap()
+}
+
+fn make_key(data_dir: &Path, tenant: &str) -> String {
+    let made = keys(
+        data_dir,
+        &["create", "--tenant", tenant, "--name", "a test"],
+    );
+    assert!(made.status.success(), "{made:?}");
+    let text = String::from_utf8(made.stdout).unwrap();
+    let key = text.trim().to_owned();
+    assert_eq!(key.len(), "rh_".len() + 12 + 1 + 64, "{text:?}");
+    key
+}
+
+fn files_below(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let paths = entries.map(|entry| entry.unwrap().path());
+    paths
+        .flat_map(|path| {
+            if path.is_dir() {
+                files_below(&path)
+            } else {
+                vec![path]
+            }
+        })
+        .collect()
+}
+
+#[tokio::test]
+async fn a_key_works_at_once_and_is_refused_seconds_after_it_was_revoked() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &["--anonymous", "loopback"]);
+    // Made beside the running service.
+    let key = make_key(folder.path(), "north");
+    let ask = async || {
+        let request = service.request(Method::GET, "/v1/jobs").bearer_auth(&key);
+        request.send().await.unwrap().status()
+    };
+    assert_eq!(ask().await, 200);
+    let id = key.split('_').nth(1).unwrap();
+    let revoked = keys(folder.path(), &["revoke", id]);
+    assert!(revoked.status.success(), "{revoked:?}");
+    let since = Instant::now();
+    while ask().await != 401 {
+        assert!(since.elapsed() < Duration::from_secs(10), "still accepted");
+        pause().await;
+    }
+    let list = String::from_utf8(keys(folder.path(), &["list"]).stdout).unwrap();
+    let line = list.lines().find(|line| line.starts_with(id)).unwrap();
+    assert!(
+        line.contains("\tnorth\t") && !line.contains("\t-\t"),
+        "{line}"
+    );
+    let unknown = keys(folder.path(), &["revoke", "000000000000"]);
+    assert_eq!(unknown.status.code(), Some(1));
+
+    // The secret is nowhere: not in the list, not in the log, not in the data folder.
+    let secret = key.rsplit('_').next().unwrap();
+    assert!(!list.contains(secret));
+    assert!(!service.log_text().contains(secret));
+    for file in files_below(folder.path()) {
+        let bytes = std::fs::read(&file).unwrap();
+        let found = bytes
+            .windows(secret.len())
+            .any(|part| part == secret.as_bytes());
+        assert!(!found, "{}", file.display());
+    }
+}
+
+#[tokio::test]
+async fn a_service_that_nobody_or_everybody_could_use_says_so_at_the_start() {
+    let folder = tempfile::tempdir().unwrap();
+    let serve = |flags: &[&str]| {
+        let mut command = railhead();
+        command.args(["serve", "--data-dir"]).arg(folder.path());
+        command.args(flags).output().unwrap()
+    };
+    for flags in [
+        &["--listen", "0.0.0.0:0"][..],
+        &["--listen", "127.0.0.1:0", "--anonymous", "never"],
+    ] {
+        let refused = serve(flags);
+        assert_eq!(refused.status.code(), Some(1));
+        let text = String::from_utf8(refused.stderr).unwrap();
+        for word in ["no API key", "keys create --tenant", "--anonymous always"] {
+            assert!(text.contains(word), "{text}");
+        }
+    }
+    let everywhere = ["--listen", "0.0.0.0:0", "--anonymous", "always"];
+    let service = Service::start(folder.path(), &everywhere);
+    service.get("/v1/jobs").await;
+    assert_eq!(
+        service.logged("whoever reaches this address may use the service without a key"),
+        1
+    );
+    service.kill();
+
+    let key = make_key(folder.path(), "north");
+    let service = Service::start(folder.path(), &["--listen", "0.0.0.0:0"]);
+    let request = || service.request(Method::GET, "/v1/jobs");
+    assert_eq!(request().send().await.unwrap().status(), 401);
+    let known = request().bearer_auth(&key).send().await.unwrap();
+    assert_eq!(known.status(), 200);
+}
+
+#[tokio::test]
+async fn only_pages_of_listed_origins_may_read_answers() {
+    let folder = tempfile::tempdir().unwrap();
+    let listed = "https://a.example,http://localhost:3000";
+    let service = Service::start(folder.path(), &["--cors-origin", listed]);
+    for (origin, allowed) in [
+        ("https://a.example", true),
+        ("http://localhost:3000", true),
+        ("https://b.example", false),
+        ("http://a.example", false),
+    ] {
+        let get = service
+            .request(Method::GET, "/v1/jobs")
+            .header("origin", origin);
+        let preflight = service
+            .request(Method::OPTIONS, "/v1/jobs")
+            .header("origin", origin)
+            .header("access-control-request-method", "POST")
+            .header(
+                "access-control-request-headers",
+                "authorization,content-type",
+            );
+        for request in [get, preflight] {
+            let answer = request.send().await.unwrap();
+            let header = answer.headers().get("access-control-allow-origin");
+            let told = header.map(|value| value.to_str().unwrap());
+            assert_eq!(told, allowed.then_some(origin));
+        }
+    }
+    let mut command = railhead();
+    let bad = command
+        .args(["serve", "--cors-origin", "*"])
+        .output()
+        .unwrap();
+    assert_eq!(bad.status.code(), Some(2));
+}
+
+#[tokio::test]
+async fn browsers_are_told_to_be_careful_with_every_answer() {
+    let server = Server::idle().await;
+    for path in [
+        "/v1/jobs",
+        "/v1/jobs/none",
+        "/nothing",
+        "/docs/",
+        "/metrics",
+        "/openapi.json",
+    ] {
+        let answer = server.get(path).await;
+        assert_eq!(
+            answer.header("x-content-type-options"),
+            Some("nosniff"),
+            "{path}"
+        );
+        assert_eq!(answer.header("x-frame-options"), Some("DENY"), "{path}");
+        assert_eq!(
+            answer.header("referrer-policy"),
+            Some("no-referrer"),
+            "{path}"
+        );
+        let policy = answer.header("content-security-policy").unwrap_or_default();
+        assert!(
+            policy.contains("frame-ancestors 'none'"),
+            "{path}: {policy}"
+        );
+        assert_eq!(answer.header("access-control-allow-origin"), None, "{path}");
+    }
+}

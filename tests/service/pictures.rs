@@ -1,0 +1,170 @@
+//! Pictures: well-formed, true to scale, harmless whatever a case is called, readable without colour.
+
+use resvg::tiny_skia::Pixmap;
+use resvg::usvg::{Options, Tree};
+use serde_json::{Value, json};
+
+use crate::errors::assert_problem;
+use crate::results::path_of;
+use crate::server::{Server, example};
+
+fn asked(file: &str, outputs: &Value) -> Value {
+    let mut case = example(file);
+    case["outputs"] = outputs.clone();
+    case
+}
+
+fn everything() -> Value {
+    json!(["resultants", "zones", "tractions", "pressure", "slip"])
+}
+
+#[tokio::test]
+async fn every_field_is_drawn_as_svg_and_as_png() {
+    let server = Server::start().await;
+    let case = asked("two-patches.case.json", &everything());
+    let path = path_of(&server.solve(&case).await);
+    for (field, label, part) in [
+        ("traction", "traction in MPa", "tractions"),
+        ("pressure", "pressure in MPa", "pressure"),
+        ("slip", "slip / rolling speed in 10", "slip"),
+        ("zones", "stick", "zones"),
+    ] {
+        let svg = server
+            .get(&format!("{path}/plot.svg?field={field}&patch=1"))
+            .await;
+        assert_eq!(
+            (svg.status, svg.header("content-type")),
+            (200, Some("image/svg+xml"))
+        );
+        Tree::from_str(&svg.text, &Options::default()).expect("well-formed SVG");
+        for word in [label, "x in mm", "y in mm", "rolling", "patch 1 of 0 to 1"] {
+            assert!(
+                svg.text.contains(word),
+                "the picture of {field} lacks `{word}`"
+            );
+        }
+        let arrows = svg.text.contains("stroke-width=\"2.8\"");
+        assert_eq!(arrows, field != "pressure", "arrows of {field}");
+        let png = server
+            .get(&format!("{path}/plot.png?field={field}&patch=1&width=640"))
+            .await;
+        assert_eq!(
+            (png.status, png.header("content-type")),
+            (200, Some("image/png"))
+        );
+        let pixels = Pixmap::decode_png(&png.bytes).expect("a PNG");
+        assert_eq!(pixels.width(), 640);
+        let same = server
+            .get(&format!("{path}/{part}?format=svg&patch=1"))
+            .await;
+        assert_eq!(
+            same.text, svg.text,
+            "the part and the picture of {field} differ"
+        );
+    }
+}
+
+/// Lightness of a pixel, 0 to 255.
+fn light(pixels: &Pixmap, x: u32, y: u32) -> f64 {
+    let pixel = pixels.pixel(x, y).expect("a pixel");
+    0.2126 * f64::from(pixel.red())
+        + 0.7152 * f64::from(pixel.green())
+        + 0.0722 * f64::from(pixel.blue())
+}
+
+#[tokio::test]
+async fn pressure_is_light_in_the_middle_and_dark_at_the_border() {
+    let server = Server::start().await;
+    // Pressure alone: no line and no arrow lies over the cells.
+    let case = asked("spin.case.json", &json!(["pressure"]));
+    let path = path_of(&server.solve(&case).await);
+    let png = server.get(&format!("{path}/plot.png?field=pressure")).await;
+    let pixels = Pixmap::decode_png(&png.bytes).expect("a PNG");
+    // The plotting area begins at 78, 84 and is 560 wide; the ellipse of 16 mm by 8 mm fills it to 1/1.12 of its width.
+    let scale = 560.0 / (16.0 * 1.12);
+    let at = |x_mm: f64, y_mm: f64| {
+        let (x, y) = (
+            78.0 + 280.0 + x_mm * scale,
+            84.0 + 0.5 * 8.0 * 1.12 * scale - y_mm * scale,
+        );
+        light(&pixels, x as u32, y as u32)
+    };
+    let along: Vec<f64> = [0.0, 3.0, 5.0, 6.5, 7.3].map(|x| at(x, 0.2)).to_vec();
+    assert!(
+        along.is_sorted_by(|a, b| a >= b),
+        "lightness along x: {along:?}"
+    );
+    let across: Vec<f64> = [0.2, 1.5, 2.6, 3.4].map(|y| at(0.0, y)).to_vec();
+    assert!(
+        across.is_sorted_by(|a, b| a >= b),
+        "lightness across: {across:?}"
+    );
+    assert!(along[0] > 150.0 && along[4] < 0.6 * along[0], "{along:?}");
+    assert!(
+        at(0.0, 4.3) > 200.0 && at(8.3, 0.2) > 200.0,
+        "outside it is white"
+    );
+}
+
+#[tokio::test]
+async fn name_of_a_case_cannot_become_markup() {
+    let server = Server::start().await;
+    let mut case = asked("spin.case.json", &everything());
+    let name = "</text><script>alert(1)</script>&\"'<image href='http://x/'/> Ä ✓";
+    case["name"] = json!(name);
+    let path = path_of(&server.solve(&case).await);
+    let svg = server.get(&format!("{path}/plot.svg")).await;
+    assert!(!svg.text.contains("<script") && !svg.text.contains("<image"));
+    assert!(svg.text.contains("&lt;script&gt;"), "the name is shown");
+    Tree::from_str(&svg.text, &Options::default()).expect("well-formed SVG");
+    let policy = svg.header("content-security-policy").expect("a policy");
+    assert!(policy.contains("default-src 'none'"), "{policy}");
+}
+
+#[tokio::test]
+async fn stick_zone_is_drawn_where_zones_are_known() {
+    let server = Server::start().await;
+    let with = path_of(&server.solve(&asked("spin.case.json", &everything())).await);
+    let without = asked("spin.case.json", &json!(["tractions"]));
+    let without = path_of(&server.solve(&without).await);
+    let border = "border of the stick zone";
+    let text = server.get(&format!("{with}/plot.svg")).await.text;
+    assert!(text.contains(border));
+    let text = server.get(&format!("{without}/plot.svg")).await.text;
+    assert!(!text.contains(border) && text.contains("traction in MPa"));
+    let mut sliding = asked("spin.case.json", &everything());
+    sliding["motion"] = json!({ "creepage_x": 0.1, "creepage_y": 0, "spin_per_mm": 0 });
+    let sliding = path_of(&server.solve(&sliding).await);
+    let text = server.get(&format!("{sliding}/plot.svg")).await.text;
+    assert!(text.contains("slip everywhere") && !text.contains(border));
+}
+
+#[tokio::test]
+async fn pictures_that_cannot_be_drawn_say_why() {
+    let server = Server::start().await;
+    let case = asked("spin.case.json", &json!(["tractions"]));
+    let path = path_of(&server.solve(&case).await);
+    for (query, status, kind, word) in [
+        ("plot.svg?field=stress", 400, "bad-query", "`traction`"),
+        ("plot.png?width=100", 400, "bad-query", "200 to 2400"),
+        ("plot.svg?width=2401", 400, "bad-query", "200 to 2400"),
+        ("plot.svg?patch=1", 400, "bad-query", "patch"),
+        ("plot.svg?point=1", 400, "bad-query", "point"),
+        ("plot.svg?grid=4x4", 400, "bad-query", "`grid`"),
+        (
+            "tractions?format=png&grid=4x4",
+            400,
+            "bad-query",
+            "cells themselves",
+        ),
+        ("plot.svg?field=zones", 404, "output-not-asked", "`zones`"),
+        ("plot.png?field=slip", 404, "output-not-asked", "`slip`"),
+    ] {
+        let answer = server.get(&format!("{path}/{query}")).await;
+        assert_problem(&answer, status, kind, word);
+    }
+    let idle = Server::idle().await;
+    let path = idle.submit(&example("spin.case.json")).await;
+    let answer = idle.get(&format!("{path}/plot.svg")).await;
+    assert_problem(&answer, 409, "result-not-ready", "");
+}

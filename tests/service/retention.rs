@@ -1,0 +1,225 @@
+//! Are ended jobs kept for as long as was said, and then gone with all that belonged to them?
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, Ordering};
+use std::time::Duration;
+
+use bytes::Bytes;
+use railhead::jobs::clock::Clock;
+use railhead::jobs::store::NewJob;
+use railhead::jobs::store::sqlite::SqliteStore;
+use railhead::jobs::{Jobs, JobsError, Options};
+use serde_json::{Value, json};
+
+use crate::errors::assert_problem;
+use crate::results::path_of;
+use crate::server::{Server, Setup};
+use crate::store::{new_job, success};
+use crate::support::{case, endless_case, pause};
+
+const DAY_MS: i64 = 24 * 3600 * 1000;
+
+/// A clock that can be turned forward.
+#[derive(Clone, Default)]
+struct Turned(Arc<AtomicI64>);
+
+impl Turned {
+    fn clock(&self) -> Clock {
+        let (ahead, system) = (self.0.clone(), Clock::system());
+        Clock::new(move || system.now_ms() + ahead.load(Ordering::SeqCst))
+    }
+
+    fn turn(&self, days: i64) {
+        self.0.fetch_add(days * DAY_MS, Ordering::SeqCst);
+    }
+}
+
+/// A service that keeps ended jobs for 30 days, and its clock.
+fn keeping_30_days() -> (Setup, Turned) {
+    let mut setup = Setup::new();
+    let turned = Turned::default();
+    setup.options.retention = Some(Duration::from_secs(30 * 24 * 3600));
+    setup.options.clock = turned.clock();
+    (setup, turned)
+}
+
+fn files_below(folder: &Path) -> usize {
+    let entries = std::fs::read_dir(folder).into_iter().flatten();
+    let paths = entries.map(|entry| entry.unwrap().path());
+    paths
+        .map(|path| if path.is_dir() { files_below(&path) } else { 1 })
+        .sum()
+}
+
+fn epoch_ms(time: &Value) -> i64 {
+    let time: jiff::Timestamp = time.as_str().expect("a time").parse().unwrap();
+    time.as_millisecond()
+}
+
+async fn assert_expired(server: &Server, path: &str) {
+    let ways = ["", "/result", "/case", "/tractions", "/resultants"];
+    let ways: &[&str] = if path.contains("batches") {
+        &["", "/results"]
+    } else {
+        &ways
+    };
+    for part in ways {
+        let answer = server.get(&format!("{path}{part}")).await;
+        assert_problem(&answer, 410, "expired", "");
+    }
+}
+
+#[tokio::test]
+async fn an_ended_job_says_when_it_will_go_and_goes_then() {
+    for small_result_max_bytes in [32 << 10, 0] {
+        let (mut setup, turned) = keeping_30_days();
+        setup.options.small_result_max_bytes = small_result_max_bytes;
+        let results = setup.options.data_dir.join("results");
+        let server = setup.start().await;
+        let job = server.solve(&case("kept for 30 days")).await;
+        assert_eq!(
+            epoch_ms(&job["expires_at"]) - epoch_ms(&job["ended_at"]),
+            30 * DAY_MS
+        );
+        let path = path_of(&job);
+        turned.turn(29);
+        server.jobs.sweep_expired().await.unwrap();
+        assert_eq!(server.get(&format!("{path}/result")).await.status, 200);
+
+        turned.turn(1);
+        // Also before any sweep has come along.
+        assert_expired(&server, &path).await;
+        assert_eq!(server.get("/v1/jobs").await.json["jobs"], json!([]));
+        server.jobs.sweep_expired().await.unwrap();
+        assert_expired(&server, &path).await;
+        assert_eq!(files_below(&results), 0);
+        let id = path.rsplit('/').next().unwrap().parse().unwrap();
+        let foreign = server.jobs.of("another".into()).get(id).await;
+        assert!(matches!(foreign, Err(JobsError::NotFound)), "{foreign:?}");
+
+        // The id is remembered for 30 days more.
+        turned.turn(29);
+        server.jobs.sweep_expired().await.unwrap();
+        assert_expired(&server, &path).await;
+        turned.turn(2);
+        server.jobs.sweep_expired().await.unwrap();
+        assert_problem(&server.get(&path).await, 404, "job-not-found", "");
+    }
+}
+
+#[tokio::test]
+async fn a_running_service_removes_what_has_expired_by_itself() {
+    let (mut setup, _) = keeping_30_days();
+    setup.options.clock = Clock::system();
+    setup.options.retention = Some(Duration::from_millis(50));
+    setup.options.small_result_max_bytes = 0;
+    let results = setup.options.data_dir.join("results");
+    let server = setup.start().await;
+    let path = server.submit(&case("short-lived")).await;
+    while server.get(&path).await.status != 410 || files_below(&results) > 0 {
+        pause().await;
+    }
+}
+
+#[tokio::test]
+async fn jobs_that_have_not_ended_and_services_without_retention_lose_nothing() {
+    let (setup, turned) = keeping_30_days();
+    let server = setup.start().await;
+    let running = server.submit(&endless_case("runs")).await;
+    while server.get(&running).await.json["state"] != "running" {
+        pause().await;
+    }
+    let queued = server.submit(&endless_case("waits")).await;
+    turned.turn(400);
+    assert_eq!(server.jobs.sweep_expired().await.unwrap(), 0);
+    for path in [&running, &queued] {
+        let job = server.get(path).await;
+        assert_eq!((job.status, &job.json["expires_at"]), (200, &Value::Null));
+        server.post(&format!("{path}/cancel"), &json!({})).await;
+    }
+
+    let (mut setup, turned) = keeping_30_days();
+    setup.options.retention = None;
+    let server = setup.start().await;
+    let job = server.solve(&case("kept for ever")).await;
+    assert_eq!(job["expires_at"], Value::Null);
+    turned.turn(40_000);
+    assert_eq!(server.jobs.sweep_expired().await.unwrap(), 0);
+    let result = format!("{}/result", path_of(&job));
+    assert_eq!(server.get(&result).await.status, 200);
+}
+
+#[tokio::test]
+async fn a_batch_goes_with_the_last_of_its_jobs() {
+    let (setup, turned) = keeping_30_days();
+    let server = setup.start().await;
+    let cases: Vec<Value> = (1..=600)
+        .map(|number| {
+            let mut case = case("one of many");
+            case["load"]["normal_force_n"] = json!(10_000 + number);
+            case
+        })
+        .collect();
+    let answer = server.post("/v1/batches", &json!(cases)).await;
+    let batch = answer.header("location").unwrap().to_owned();
+    let lines = server.get(&format!("{batch}/results?wait=60")).await.text;
+    assert_eq!(lines.lines().count(), 600);
+    turned.turn(31);
+    assert_eq!(server.jobs.sweep_expired().await.unwrap(), 600);
+    assert_expired(&server, &batch).await;
+}
+
+#[tokio::test]
+async fn a_result_in_use_outlives_the_job_that_computed_it() {
+    let (mut setup, turned) = keeping_30_days();
+    setup.options.small_result_max_bytes = 0;
+    let results = setup.options.data_dir.join("results");
+    let server = setup.start().await;
+    let first = server.solve(&case("first")).await;
+    turned.turn(20);
+    let second = server.solve(&case("second")).await;
+    assert_eq!(second["cached"], true);
+    turned.turn(20);
+    assert_eq!(server.jobs.sweep_expired().await.unwrap(), 1);
+    assert_expired(&server, &path_of(&first)).await;
+    let fields = server.get(&format!("{}/tractions", path_of(&second))).await;
+    assert_eq!(fields.status, 200, "{}", fields.text);
+    turned.turn(20);
+    assert_eq!(server.jobs.sweep_expired().await.unwrap(), 1);
+    assert_eq!(files_below(&results), 0);
+}
+
+#[tokio::test]
+async fn the_database_shrinks_when_its_jobs_go() {
+    const JOBS: usize = 128;
+    const CASE_BYTES: usize = 400 << 10;
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("jobs.db");
+    let store = SqliteStore::open(&file).await.unwrap();
+    for _ in 0..JOBS {
+        let body = Bytes::from(vec![b' '; CASE_BYTES]);
+        let new = NewJob { body, ..new_job() };
+        store.enqueue(&new).await.unwrap();
+        let claim = store.claim("w", 0, 1000).await.unwrap().unwrap();
+        let now = Clock::system().now_ms();
+        store.finish(&claim, &success(), now).await.unwrap();
+    }
+    store.close().await;
+    let size = || std::fs::metadata(&file).unwrap().len();
+    let full = size();
+    assert!(full > (JOBS * CASE_BYTES) as u64, "{full}");
+
+    let turned = Turned::default();
+    turned.turn(31);
+    let options = Options {
+        retention: Some(Duration::from_secs(30 * 24 * 3600)),
+        clock: turned.clock(),
+        ..Options::new(folder.path())
+    };
+    let jobs = Jobs::open(options).await.unwrap();
+    assert_eq!(jobs.sweep_expired().await.unwrap(), JOBS as u64);
+    jobs.shutdown(Duration::ZERO).await;
+    // What is left is the spare that the next jobs will use.
+    assert!(size() < full / 2, "{} of {full}", size());
+}

@@ -1,0 +1,259 @@
+//! Is nothing lost, and everything said clearly, when the disk is full or cannot be written?
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use reqwest::Method;
+use serde_json::{Value, json};
+use sqlx::Connection;
+use tempfile::TempDir;
+
+use crate::errors::assert_problem;
+use crate::server::Answer;
+use crate::support::{Service, case, long_case, pause, railhead};
+
+/// A small file system of its own, unmounted when dropped.
+struct Disk {
+    folder: TempDir,
+}
+
+impl Disk {
+    /// `None` where this process may not mount.
+    fn mount(options: &str) -> Option<Disk> {
+        let folder = tempfile::tempdir().unwrap();
+        let mounted = Command::new("mount")
+            .args(["-t", "tmpfs", "-o", options, "none"])
+            .arg(folder.path())
+            .output();
+        let mounted = mounted.is_ok_and(|out| out.status.success());
+        mounted.then_some(Disk { folder })
+    }
+
+    fn data_dir(&self) -> PathBuf {
+        self.folder.path().join("data")
+    }
+
+    /// Takes all the room that is left.
+    fn fill(&self) -> PathBuf {
+        use std::io::Write;
+        let path = self.folder.path().join("ballast");
+        let mut file = std::fs::File::create(&path).unwrap();
+        for size in [1 << 16, 1 << 10, 1] {
+            while file.write_all(&vec![1; size]).is_ok() {}
+        }
+        path
+    }
+}
+
+impl Drop for Disk {
+    fn drop(&mut self) {
+        let path = self.folder.path();
+        let gone = Command::new("umount").arg("-l").arg(path).status();
+        assert!(gone.is_ok_and(|status| status.success()));
+    }
+}
+
+async fn answer(request: reqwest::RequestBuilder) -> Answer {
+    let response = request.send().await.unwrap();
+    let (status, headers) = (response.status().as_u16(), response.headers().clone());
+    let bytes = response.bytes().await.unwrap().to_vec();
+    Answer {
+        status,
+        headers,
+        json: serde_json::from_slice(&bytes).unwrap_or(Value::Null),
+        text: String::from_utf8_lossy(&bytes).into_owned(),
+        bytes,
+    }
+}
+
+async fn submit(service: &Service, case: &Value) -> Answer {
+    answer(service.request(Method::POST, "/v1/jobs").json(case)).await
+}
+
+async fn ready(service: &Service) -> Answer {
+    answer(service.request(Method::GET, "/readyz")).await
+}
+
+/// Submits until the service refuses; the jobs it acknowledged and the refusal.
+async fn submit_until_refused(service: &Service) -> (Vec<String>, Answer) {
+    let mut accepted = Vec::new();
+    for number in 0..5000 {
+        let mut case = case(&format!("number {number}"));
+        case["load"]["normal_force_n"] = json!(50_000 + number);
+        let answer = submit(service, &case).await;
+        match answer.status {
+            202 => accepted.push(answer.json["id"].as_str().unwrap().to_owned()),
+            _ => return (accepted, answer),
+        }
+    }
+    panic!("nothing was refused");
+}
+
+/// A job whose result lies outside the job table.
+fn large_case() -> Value {
+    let mut case = long_case("large", 150);
+    case["outputs"] = json!(["resultants", "tractions"]);
+    case
+}
+
+async fn until_ready(service: &Service) {
+    while ready(service).await.status != 200 {
+        pause().await;
+    }
+}
+
+async fn all_succeed(service: &Service, accepted: &[String]) {
+    for id in accepted {
+        let job = service.until(id, "succeeded").await;
+        assert_eq!(job["attempt"], 1, "no attempt was lost: {job}");
+        service.get(&format!("/v1/jobs/{id}/result")).await;
+    }
+}
+
+#[tokio::test]
+async fn a_full_disk_refuses_what_comes_and_loses_nothing_it_has() {
+    let Some(disk) = Disk::mount("size=24m") else {
+        eprintln!("SKIPPED: this process may not mount a file system");
+        return;
+    };
+    let flags = ["--cache", "false", "--workers", "1"];
+    let service = Service::start(&disk.data_dir(), &flags);
+    let large = service.submit(&large_case()).await;
+    service.until(&large, "running").await;
+    let ballast = disk.fill();
+    let (mut accepted, refusal) = submit_until_refused(&service).await;
+    assert_problem(&refusal, 507, "storage-full", "full");
+    assert!(refusal.header("retry-after").is_some());
+    assert_problem(&ready(&service).await, 507, "storage-full", "");
+    let cases = json!([case("a"), case("b")]);
+    let batch = service.request(Method::POST, "/v1/batches").json(&cases);
+    assert_problem(&answer(batch).await, 507, "storage-full", "");
+    // The result that is ready by then waits for room instead of being given up.
+    while service.logged("could not be written yet") == 0 {
+        pause().await;
+    }
+    let state = service.get(&format!("/v1/jobs/{large}")).await["state"].clone();
+    assert_eq!(state, "running", "what is known can still be read");
+
+    std::fs::remove_file(ballast).unwrap();
+    until_ready(&service).await;
+    accepted.push(large);
+    all_succeed(&service, &accepted).await;
+    let after = submit(&service, &case("after")).await;
+    assert_eq!(after.status, 202, "{}", after.text);
+    let list = service.get("/v1/jobs?limit=1000").await;
+    let known = list["jobs"].as_array().unwrap().len();
+    assert_eq!(known, accepted.len() + 1, "no more than were acknowledged");
+}
+
+#[tokio::test]
+async fn a_full_disk_and_a_kill_lose_nothing_either() {
+    let Some(disk) = Disk::mount("size=16m") else {
+        eprintln!("SKIPPED: this process may not mount a file system");
+        return;
+    };
+    let flags = ["--cache", "false", "--workers", "1"];
+    let service = Service::start(&disk.data_dir(), &flags);
+    service.submit(&case("first")).await;
+    let ballast = disk.fill();
+    let (accepted, refusal) = submit_until_refused(&service).await;
+    assert_problem(&refusal, 507, "storage-full", "");
+    service.kill();
+    std::fs::remove_file(ballast).unwrap();
+    let service = Service::start(&disk.data_dir(), &flags);
+    for id in &accepted {
+        service.until(id, "succeeded").await;
+    }
+}
+
+#[test]
+fn a_read_only_disk_is_named_at_the_start() {
+    let Some(disk) = Disk::mount("size=1m") else {
+        eprintln!("SKIPPED: this process may not mount a file system");
+        return;
+    };
+    let remounted = Command::new("mount")
+        .args(["-o", "remount,ro"])
+        .arg(disk.folder.path())
+        .status();
+    assert!(remounted.unwrap().success());
+    let mut serve = railhead();
+    let serve = serve.arg("serve").arg("--data-dir").arg(disk.data_dir());
+    let refused = serve.output().unwrap();
+    assert_eq!(refused.status.code(), Some(1));
+    let text = String::from_utf8(refused.stderr).unwrap();
+    assert!(text.contains("Read-only file system"), "{text}");
+    let folder = disk.data_dir().display().to_string();
+    assert!(text.contains(&folder), "{text}");
+}
+
+/// Lets a process write no file any more, or lets it again.
+fn limit_files(service: &Service, limit: &str) {
+    let limited = Command::new("prlimit")
+        .arg(format!("--pid={}", service.id()))
+        .arg(format!("--fsize={limit}:unlimited"))
+        .status();
+    assert!(limited.unwrap().success());
+}
+
+#[tokio::test]
+async fn a_disk_that_takes_nothing_is_told_from_a_full_one() {
+    let folder = tempfile::tempdir().unwrap();
+    // A write beyond the limit shall be an error, as on a disk that fails, and not the end of the process.
+    let service = Service::start_by(
+        Command::new("sh").args(["-c", "trap '' XFSZ; exec \"$0\" \"$@\""]),
+        folder.path(),
+        &["--cache", "false", "--workers", "1"],
+    );
+    let first = service.submit(&large_case()).await;
+    service.until(&first, "running").await;
+    limit_files(&service, "0");
+    let refusal = submit(&service, &case("refused")).await;
+    assert_problem(&refusal, 503, "storage-unwritable", "cannot be written");
+    assert_problem(&ready(&service).await, 503, "storage-unwritable", "");
+    service.get(&format!("/v1/jobs/{first}")).await;
+    let metrics = answer(service.request(Method::GET, "/metrics")).await.text;
+    assert!(
+        metrics.contains("\nrailhead_storage_failing 1\n"),
+        "{metrics}"
+    );
+    while service.logged("could not be written yet") == 0 {
+        pause().await;
+    }
+    limit_files(&service, "unlimited");
+    until_ready(&service).await;
+    all_succeed(&service, &[first]).await;
+    let after = submit(&service, &case("after")).await;
+    assert_eq!(after.status, 202, "{}", after.text);
+    assert_eq!(service.logged("the disk takes data again"), 1);
+}
+
+#[tokio::test]
+async fn a_table_locked_by_another_process_is_waited_for_and_then_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &[]);
+    let before = service.submit(&case("before")).await;
+    service.until(&before, "succeeded").await;
+    let file = url(&folder.path().join("jobs.db"));
+    let mut other = sqlx::SqliteConnection::connect(&file).await.unwrap();
+    sqlx::query("BEGIN IMMEDIATE")
+        .execute(&mut other)
+        .await
+        .unwrap();
+    let refusal = submit(&service, &case("refused")).await;
+    assert_problem(&refusal, 503, "storage-unwritable", "");
+    service.get(&format!("/v1/jobs/{before}/result")).await;
+    sqlx::query("ROLLBACK").execute(&mut other).await.unwrap();
+    until_ready(&service).await;
+    let mut another = case("after");
+    another["load"]["normal_force_n"] = json!(70_000);
+    let after = submit(&service, &another).await;
+    assert_eq!(after.status, 202, "{}", after.text);
+    service
+        .until(after.json["id"].as_str().unwrap(), "succeeded")
+        .await;
+}
+
+fn url(file: &Path) -> String {
+    format!("sqlite:{}", file.display())
+}
