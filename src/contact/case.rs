@@ -229,14 +229,35 @@ pub struct Motion {
     pub spin_per_mm: f64,
 }
 
+/// A motion as a case asks for it: creepages and spin, where a tangential force may stand in place of its creepage. The creepage that
+/// gives the force is found and reported with the answer.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct AskedMotion {
+    /// Longitudinal creepage, dimensionless; 0 when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub creepage_x: Option<f64>,
+    /// Lateral creepage, dimensionless; 0 when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub creepage_y: Option<f64>,
+    /// Spin in 1/mm.
+    #[schema(required = false)]
+    pub spin_per_mm: f64,
+    /// Longitudinal force on the lower body in N, over all patches, at most μN. Excludes `creepage_x`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_x_n: Option<f64>,
+    /// Lateral force on the lower body in N, over all patches, at most μN. Excludes `creepage_y`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_y_n: Option<f64>,
+}
+
 /// One motion, a list of motions on the same patch, or a sweep.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[serde(untagged)]
 pub enum Motions {
     /// One motion; components left out are 0, but at least one is written.
-    One(Motion),
+    One(AskedMotion),
     /// Several motions on the same patch, solved in order.
-    Many(Vec<Motion>),
+    Many(Vec<AskedMotion>),
     /// Motions generated from ranges.
     Sweep {
         /// What varies, and what stays.
@@ -289,8 +310,14 @@ pub struct Sweep {
     /// Spin in 1/mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spin_per_mm: Option<Range>,
+    /// Longitudinal force on the lower body in N, in place of `creepage_x`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_x_n: Option<Range>,
+    /// Lateral force on the lower body in N, in place of `creepage_y`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_y_n: Option<Range>,
     /// `together` (default): all ranges have the same number of points and run side by side; `grid`: every
-    /// combination, the last named component fastest.
+    /// combination, the last named component fastest, a force in the place of its creepage.
     #[schema(required = false)]
     pub combine: Combine,
 }

@@ -7,6 +7,7 @@ mod cases;
 mod convergence_domain;
 mod equations;
 mod fastsim;
+mod forces;
 mod friction;
 mod gap_faults;
 mod gap_hertz;
