@@ -19,8 +19,8 @@
 //! 2. [`contact::solve`]: [`Level`](contact::tangential::level::Level)s, coarse to fine: strips fitted to the patches
 //!    ([`contact::mesh`]), pressures of their cells, and how their surfaces give ([`contact::influence`]).
 //! 3. For every motion a [`Point`](contact::tangential::point::Point): tractions and slips
-//!    ([`contact::tangential`]: [`boundary_element`](contact::tangential::boundary_element) or
-//!    [`liu_hsu`](contact::tangential::liu_hsu)) with an estimate of their error.
+//!    ([`contact::tangential`]: [`boundary_element`](contact::tangential::boundary_element),
+//!    [`liu_hsu`](contact::tangential::liu_hsu) or [`fastsim`](contact::tangential::fastsim)) with an estimate of their error.
 //! 4. [`contact::outputs`]: resultants, zones and fields become a [`Solution`](contact::solution::Solution).
 //!
 //! Files are named after what a user can choose: a method, a route, a command, a store is a file of that name.

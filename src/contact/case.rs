@@ -229,14 +229,35 @@ pub struct Motion {
     pub spin_per_mm: f64,
 }
 
+/// A motion as a case asks for it: creepages and spin, where a tangential force may stand in place of its creepage. The creepage that
+/// gives the force is found and reported with the answer.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct AskedMotion {
+    /// Longitudinal creepage, dimensionless; 0 when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub creepage_x: Option<f64>,
+    /// Lateral creepage, dimensionless; 0 when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub creepage_y: Option<f64>,
+    /// Spin in 1/mm.
+    #[schema(required = false)]
+    pub spin_per_mm: f64,
+    /// Longitudinal force on the lower body in N, over all patches, at most μN. Excludes `creepage_x`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_x_n: Option<f64>,
+    /// Lateral force on the lower body in N, over all patches, at most μN. Excludes `creepage_y`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_y_n: Option<f64>,
+}
+
 /// One motion, a list of motions on the same patch, or a sweep.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[serde(untagged)]
 pub enum Motions {
     /// One motion; components left out are 0, but at least one is written.
-    One(Motion),
+    One(AskedMotion),
     /// Several motions on the same patch, solved in order.
-    Many(Vec<Motion>),
+    Many(Vec<AskedMotion>),
     /// Motions generated from ranges.
     Sweep {
         /// What varies, and what stays.
@@ -289,8 +310,14 @@ pub struct Sweep {
     /// Spin in 1/mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spin_per_mm: Option<Range>,
+    /// Longitudinal force on the lower body in N, in place of `creepage_x`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_x_n: Option<Range>,
+    /// Lateral force on the lower body in N, in place of `creepage_y`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_y_n: Option<Range>,
     /// `together` (default): all ranges have the same number of points and run side by side; `grid`: every
-    /// combination, the last named component fastest.
+    /// combination, the last named component fastest, a force in the place of its creepage.
     #[schema(required = false)]
     pub combine: Combine,
 }
@@ -331,6 +358,9 @@ pub struct Solver {
     /// An explicit mesh instead of a target.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh: Option<MeshSize>,
+    /// How much traction `fastsim` lets friction carry where; `elliptic` when left out. For no other method.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub traction_bound: Option<TractionBound>,
     /// Give up after this many seconds of solving.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(exclusive_minimum = 0.0)]
@@ -348,6 +378,19 @@ pub enum Method {
     BoundaryElement,
     /// The method of Liu and Hsu: Newton–Raphson with two initial guesses.
     LiuHsu,
+    /// Kalker's simplified theory: a draft in microseconds.
+    Fastsim,
+}
+
+/// Where `fastsim` lets tractions slip.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TractionBound {
+    /// At μ times the pressure, for an ellipse Hertz's semi-ellipsoid.
+    #[default]
+    Elliptic,
+    /// At the square of the pressure, scaled to carry the same μN: for an ellipse Kalker's paraboloid, 4/3 as high in the middle.
+    Parabolic,
 }
 
 /// An explicit mesh: equal strips, cosine-graded cells along x, no clustering.

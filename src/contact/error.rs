@@ -82,6 +82,7 @@ impl Method {
             Method::Auto => "auto",
             Method::BoundaryElement => "boundary_element",
             Method::LiuHsu => "liu_hsu",
+            Method::Fastsim => "fastsim",
         }
     }
 }

@@ -25,8 +25,9 @@ use crate::contact::normal::Region;
 use crate::contact::outputs::assemble::{assemble, wants_fields};
 use crate::contact::problem::{Limits, Problem};
 use crate::contact::solution::{Fields, Solution};
+use crate::contact::tangential::forces;
 use crate::contact::tangential::ladder::{Ladder, Plan, Regime};
-use crate::contact::tangential::point::{self, Point};
+use crate::contact::tangential::point::Point;
 
 /// Reads and checks a case.
 ///
@@ -59,7 +60,8 @@ fn answer(problem: &Problem, watch: &Watch) -> Result<(Solution, Fields), SolveE
     let mut ladder = Ladder::new(problem);
     let mut points = Vec::with_capacity(problem.motions.len());
     for index in 0..problem.motions.len() {
-        points.push(point::solve(problem, &mut ladder, index, watch)?);
+        let point = forces::solve(problem, &mut ladder, index, points.last(), watch)?;
+        points.push(point);
         watch.advance();
     }
     if wants_fields(problem) {
@@ -96,7 +98,7 @@ fn on_one_level(
         if ladder.get(point.level).plan == plan {
             return Ok(point);
         }
-        point::climb(problem, ladder, index, plan, Some(point), monitor)
+        forces::lift(problem, ladder, index, plan, point, monitor)
     };
     points.into_iter().enumerate().map(lift).collect()
 }

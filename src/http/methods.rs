@@ -85,9 +85,14 @@ pub struct RequestLimits {
 )]
 pub async fn methods(State(options): State<HttpOptions>) -> Json<Abilities> {
     Json(Abilities {
-        methods: [Method::Auto, Method::BoundaryElement, Method::LiuHsu]
-            .map(describe_method)
-            .into(),
+        methods: [
+            Method::Auto,
+            Method::BoundaryElement,
+            Method::LiuHsu,
+            Method::Fastsim,
+        ]
+        .map(describe_method)
+        .into(),
         contacts: contacts(),
         outputs: [
             Output::Resultants,
@@ -116,6 +121,9 @@ fn describe_method(method: Method) -> MethodAbility {
         Method::LiuHsu => {
             "The Newton–Raphson method of Liu and Hsu with its two initial guesses. Slower, for small meshes; \
              it does not converge at every spin and then says so."
+        }
+        Method::Fastsim => {
+            "Kalker's simplified theory: a draft in microseconds, with a stated error instead of an estimated one."
         }
     };
     MethodAbility {

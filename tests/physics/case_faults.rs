@@ -192,16 +192,6 @@ fn what_is_not_offered_yet_is_named_with_what_is() {
         ],
     );
     assert_fault(
-        &good_with("/solver/method", json!("fastsim")),
-        "/solver/method",
-        &["not offered by this version", "boundary_element"],
-    );
-    assert_fault(
-        &good_with("/motion", json!({ "force_x_n": 100, "creepage_y": 0 })),
-        "/motion/force_x_n",
-        &["prescribed tangential forces are not offered by this version"],
-    );
-    assert_fault(
         &good_with("/outputs/1", json!("damage")),
         "/outputs/1",
         &["not offered by this version"],

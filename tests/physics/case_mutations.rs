@@ -39,6 +39,7 @@ fn some_value() -> impl Strategy<Value = Value> {
             Just("pressure_grid"),
             Just("gap_grid"),
             Just("liu_hsu"),
+            Just("fastsim"),
             Just("grid"),
             Just("slip"),
             Just("é~/")

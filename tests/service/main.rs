@@ -13,6 +13,7 @@ mod crash;
 mod documents;
 mod errors;
 mod events;
+mod forces;
 mod formats;
 mod guides;
 mod keys;

@@ -29,8 +29,7 @@ pub fn assemble(problem: &Problem, ladder: &Ladder, points: &[Point]) -> (Soluti
             .collect(),
         total: points
             .iter()
-            .zip(&problem.motions)
-            .map(|(point, _)| total(problem, &patches, point))
+            .map(|point| total(problem, &patches, point))
             .collect(),
         warnings: warnings(problem, points),
         normal: problem.normal,
@@ -93,17 +92,7 @@ fn patch_solution(
         position: None,
         points: points
             .iter()
-            .zip(&problem.motions)
-            .map(|(point, motion)| {
-                point_solution(
-                    problem,
-                    ladder.get(point.level),
-                    patch,
-                    index,
-                    point,
-                    motion,
-                )
-            })
+            .map(|point| point_solution(problem, ladder.get(point.level), patch, index, point))
             .collect(),
     }
 }
@@ -114,8 +103,8 @@ fn point_solution(
     patch: &Patch,
     index: usize,
     point: &Point,
-    motion: &Motion,
 ) -> PointSolution {
+    let motion = &point.motion;
     let found = point.resultants[index];
     let cells = level.patch_cells(index);
     let traction = &point.tangential.traction;
@@ -156,7 +145,7 @@ fn point_solution(
             seconds: point.seconds,
         },
         target_met: target_met(problem, point),
-        saturated: false,
+        saturated: point.saturated,
     }
 }
 
@@ -274,6 +263,18 @@ fn warnings(problem: &Problem, points: &[Point]) -> Vec<String> {
                 .iter()
                 .map(|w| format!("motion {k}: {w}")),
         );
+        if point.saturated {
+            let [x, y] = problem.forces[k]
+                .map(|force| force.map_or("free".to_owned(), |force| format!("{force} N")));
+            let found = point
+                .resultants
+                .iter()
+                .fold(Resultants::default(), |sum, r| sum.plus(*r));
+            warnings.push(format!(
+                "motion {k}: no creepage gives the force asked for (x: {x}, y: {y}); the nearest found is {:.6e} N, {:.6e} N",
+                found.force_x, found.force_y
+            ));
+        }
         if let (Resolution::Target(target), Some(false)) =
             (problem.resolution, target_met(problem, point))
         {

@@ -11,6 +11,11 @@ const TARGET_DENSE: MeshSize = MeshSize {
     strips: 12,
     cells: 24,
 };
+/// The mesh of the simplified theory, whatever the target.
+const FASTSIM_MESH: MeshSize = MeshSize {
+    strips: 10,
+    cells: 16,
+};
 /// Cells that a target of 0.02 costs on average, all levels added, and how they grow as it falls.
 const TARGET_CELLS: f64 = 160.0;
 const TARGET_GROWTH: f64 = 0.65;
@@ -76,6 +81,7 @@ impl Size {
                 influence + (2.0 * cells).powi(2) * 8.0 * LIU_HSU_MATRICES,
                 4e-8 * cells * cells + 3e-11 * (2.0 * cells).powi(3) * 30.0 * motions,
             ),
+            Method::Fastsim => (0.0, 1e-7 * cells * (1.0 + 0.2 * motions)),
         };
         Cost {
             bytes: (bytes + fields) as u64,
@@ -123,6 +129,7 @@ impl Size {
         let size = match (self.resolution, self.method) {
             (Resolution::Mesh(size), _) => size,
             (Resolution::Target(_), Method::LiuHsu) => TARGET_DENSE,
+            (Resolution::Target(_), Method::Fastsim) => FASTSIM_MESH,
             (Resolution::Target(_), _) => {
                 // The cells are shared out among the patches; hollow ones have several segments in a strip.
                 let share = TARGET_CELLS_MAX / self.segments.len() as f64;

@@ -14,13 +14,16 @@ use std::time::Duration;
 use serde::Serialize;
 
 use crate::contact::case::{
-    Case, Contact, Load, Material, MeshSize, Method, Motion, Motions, Output, Solver, Wheelset,
+    Case, Contact, Load, Material, MeshSize, Method, Motion, Motions, Output, Solver,
+    TractionBound, Wheelset,
 };
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::normal::Region;
 use crate::contact::solution::NormalReport;
 use cost::Size;
+use motions::Expanded;
+pub use motions::Prescribed;
 
 /// Allowed error of the resultants when nothing else is asked for, relative to μN.
 pub(super) const TARGET_ERROR_DEFAULT: f64 = 0.005;
@@ -86,8 +89,12 @@ pub struct Problem {
     /// The motion of the wheelset that stands in place of the one motion above, which is then 0: the creepages of the patches
     /// follow from it.
     pub wheelset: Option<WheelsetMotion>,
+    /// Forces prescribed instead of creepages, motion by motion.
+    pub forces: Vec<Prescribed>,
     /// The method asked for.
     pub method: Method,
+    /// Where `fastsim` lets tractions slip.
+    pub traction_bound: TractionBound,
     /// Target or mesh.
     pub resolution: Resolution,
     /// Time allowed for the whole case.
@@ -121,6 +128,7 @@ impl Problem {
     pub fn new(case: &Case, limits: &Limits) -> Result<Problem, CaseError> {
         let given = Given {
             material: Some(&case.material),
+            friction: Some(case.friction.coefficient),
             contact: Some(&case.contact),
             load: case.load.as_ref(),
             motion: Some(&case.motion),
@@ -146,7 +154,8 @@ impl Problem {
             ));
         }
         warnings.extend(remarks);
-        let digest = digest(case, &elasticity, &motions);
+        let Expanded { motions, forces } = motions;
+        let digest = digest(case, &elasticity, &motions, &forces);
         Ok(Problem {
             name: case.name.clone(),
             labels: case.labels.clone(),
@@ -154,8 +163,10 @@ impl Problem {
             friction: case.friction.coefficient,
             region,
             motions,
+            forces,
             wheelset: profiles::wheelset(&case.motion),
             method: case.solver.method,
+            traction_bound: case.solver.traction_bound.unwrap_or_default(),
             resolution: resolution(&case.solver),
             time_limit: case.solver.time_limit_s.map(Duration::from_secs_f64),
             outputs: case.outputs.clone(),
@@ -177,6 +188,7 @@ impl Problem {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Given<'a> {
     pub(super) material: Option<&'a Material>,
+    pub(super) friction: Option<f64>,
     pub(super) contact: Option<&'a Contact>,
     pub(super) load: Option<&'a Load>,
     pub(super) motion: Option<&'a Motions>,
@@ -201,7 +213,7 @@ pub(super) fn faults_of(given: Given, limits: &Limits) -> Vec<Fault> {
 struct Parts {
     elasticity: Option<Elasticity>,
     region: Option<(Region, Vec<String>)>,
-    motions: Option<Vec<Motion>>,
+    motions: Option<Expanded>,
 }
 
 impl Parts {
@@ -222,6 +234,12 @@ impl Parts {
         };
         let motions = given.motion.map(|motion| motions::expand(motion, limits));
         let motions = motions.and_then(|motions| keep(motions, &mut faults));
+        if let (Some(expanded), Some(motion)) = (&motions, given.motion) {
+            let of_profiles = matches!(given.contact, Some(Contact::Profiles { .. }));
+            let force = normal_force(region.as_ref().map(|(region, _)| region), given.load);
+            let limit = given.friction.zip(force).map(|(mu, force)| mu * force);
+            faults.extend(expanded.faults(motion, limit, of_profiles));
+        }
         if let Some(solver) = given.solver {
             let size = Size {
                 method: solver.method,
@@ -230,7 +248,7 @@ impl Parts {
                 segments: region
                     .as_ref()
                     .map_or_else(|| vec![1.0], |(region, _)| region.segments_per_strip()),
-                motions: motions.as_ref().map_or(1, Vec::len),
+                motions: motions.as_ref().map_or(1, |m| m.motions.len()),
                 normal_seconds: region
                     .as_ref()
                     .map_or(0.0, |(region, _)| cost::normal_seconds(region)),
@@ -283,6 +301,14 @@ fn region(
     Some(region.map(|region| (region, Vec::new())))
 }
 
+/// The normal force of all patches in N, where it is known before the patches are.
+fn normal_force(region: Option<&Region>, load: Option<&Load>) -> Option<f64> {
+    let given = load.and_then(|load| load.normal_force_n);
+    let patches = region.map(Region::patches).unwrap_or_default();
+    let sum = || patches.iter().map(|patch| patch.normal_force).sum();
+    given.or_else(|| (!patches.is_empty()).then(sum))
+}
+
 fn missing_load() -> Fault {
     Fault {
         pointer: "/load".to_owned(),
@@ -307,8 +333,12 @@ struct Canonical<'a> {
     load: Option<&'a Load>,
     motions: &'a [Motion],
     #[serde(skip_serializing_if = "Option::is_none")]
+    forces: Option<&'a [Prescribed]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     wheelset: Option<&'a Wheelset>,
     method: Method,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    traction_bound: Option<TractionBound>,
     target_error: Option<f64>,
     mesh: Option<MeshSize>,
     time_limit_s: Option<f64>,
@@ -316,7 +346,12 @@ struct Canonical<'a> {
 }
 
 /// Hexadecimal BLAKE3 digest of the canonical case.
-fn digest(case: &Case, elasticity: &Elasticity, motions: &[Motion]) -> String {
+fn digest(
+    case: &Case,
+    elasticity: &Elasticity,
+    motions: &[Motion],
+    forces: &[Prescribed],
+) -> String {
     let target_error = match resolution(&case.solver) {
         Resolution::Target(target) => Some(target),
         Resolution::Mesh(_) => None,
@@ -332,11 +367,17 @@ fn digest(case: &Case, elasticity: &Elasticity, motions: &[Motion]) -> String {
         contact: &case.contact,
         load: case.load.as_ref(),
         motions,
+        forces: Some(forces).filter(|all| all.iter().any(|f| *f != [None; 2])),
         wheelset: match &case.motion {
             Motions::Wheelset { wheelset } => Some(wheelset),
             _ => None,
         },
         method: case.solver.method,
+        // What is left out means the same as the default.
+        traction_bound: case
+            .solver
+            .traction_bound
+            .filter(|bound| *bound != TractionBound::default()),
         target_error,
         mesh: case.solver.mesh,
         time_limit_s: case.solver.time_limit_s,

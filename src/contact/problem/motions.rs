@@ -1,22 +1,110 @@
 //! Writes out the motions of a case: sweeps become lists.
 
-use crate::contact::case::{Combine, Motion, Motions, Range, Sweep};
+use crate::contact::case::{AskedMotion, Combine, Motion, Motions, Range, Sweep};
 use crate::contact::error::Fault;
 use crate::contact::problem::Limits;
 
+/// The forces prescribed along x and across, in N, where they are.
+pub type Prescribed = [Option<f64>; 2];
+
 /// No creepage.
-const STILL: Motion = Motion {
-    creepage_x: 0.0,
-    creepage_y: 0.0,
+const STILL: AskedMotion = AskedMotion {
+    creepage_x: None,
+    creepage_y: None,
     spin_per_mm: 0.0,
+    force_x_n: None,
+    force_y_n: None,
 };
 
+/// The motions of a case in order, never empty.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Expanded {
+    /// Creepages are 0 where a force is prescribed.
+    pub(super) motions: Vec<Motion>,
+    /// What is prescribed instead, motion by motion.
+    pub(super) forces: Vec<Prescribed>,
+}
+
+/// The motions and prescribed forces of a case.
+///
+/// # Errors
+/// See [`list`].
+pub(super) fn expand(motions: &Motions, limits: &Limits) -> Result<Expanded, Fault> {
+    let list = list(motions, limits)?;
+    let motion = |asked: &AskedMotion| Motion {
+        creepage_x: asked.creepage_x.unwrap_or(0.0),
+        creepage_y: asked.creepage_y.unwrap_or(0.0),
+        spin_per_mm: asked.spin_per_mm,
+    };
+    Ok(Expanded {
+        motions: list.iter().map(motion).collect(),
+        forces: list.iter().map(|m| [m.force_x_n, m.force_y_n]).collect(),
+    })
+}
+
+impl Expanded {
+    /// Faults of prescribed forces: more than friction can carry, where the limit μN is known, or a contact without
+    /// one common frame.
+    pub(super) fn faults(
+        &self,
+        given: &Motions,
+        limit: Option<f64>,
+        of_profiles: bool,
+    ) -> Vec<Fault> {
+        let mut faults = Vec::new();
+        for (index, forces) in self.forces.iter().enumerate() {
+            let Some(k) = larger(forces) else { continue };
+            let pointer = pointer(given, index, ["force_x_n", "force_y_n"][k]);
+            let [x, y] = forces.map(|force| force.unwrap_or(0.0));
+            let length = x.hypot(y);
+            let detail = if of_profiles {
+                "given with profiles, whose patches have a frame each; give creepages or a wheelset"
+                    .to_owned()
+            } else if let Some(limit) = limit.filter(|limit| length > *limit) {
+                format!(
+                    "a tangential force of {length} N given; friction carries at most μN = {limit} N"
+                )
+            } else {
+                continue;
+            };
+            let fault = Fault { pointer, detail };
+            if faults.len() < FAULTS_MAX
+                && !faults.iter().any(|f: &Fault| f.pointer == fault.pointer)
+            {
+                faults.push(fault);
+            }
+        }
+        faults
+    }
+}
+
+/// Faults of forces that are named one by one.
+const FAULTS_MAX: usize = 100;
+
+/// The component with the larger prescribed force, if there is any.
+fn larger(forces: &Prescribed) -> Option<usize> {
+    match forces {
+        [None, None] => None,
+        [Some(_), None] => Some(0),
+        [None, Some(_)] => Some(1),
+        [Some(x), Some(y)] => Some(usize::from(y.abs() > x.abs())),
+    }
+}
+
+fn pointer(given: &Motions, index: usize, name: &str) -> String {
+    match given {
+        Motions::Many(_) => format!("/motion/{index}/{name}"),
+        Motions::Sweep { .. } => format!("/motion/sweep/{name}"),
+        Motions::One(_) | Motions::Wheelset { .. } => format!("/motion/{name}"),
+    }
+}
+
 /// The motions in order, never empty. In a grid the last named component varies fastest, in the fixed order
-/// `creepage_x`, `creepage_y`, `spin_per_mm`.
+/// `creepage_x`, `creepage_y`, `spin_per_mm`; a force stands in the place of its creepage.
 ///
 /// # Errors
 /// A fault at `/motion` if there are more than the limits allow.
-pub(super) fn expand(motions: &Motions, limits: &Limits) -> Result<Vec<Motion>, Fault> {
+fn list(motions: &Motions, limits: &Limits) -> Result<Vec<AskedMotion>, Fault> {
     let count = match motions {
         Motions::One(_) | Motions::Wheelset { .. } => 1,
         Motions::Many(list) => list.len() as u128,
@@ -41,7 +129,11 @@ pub(super) fn expand(motions: &Motions, limits: &Limits) -> Result<Vec<Motion>, 
 }
 
 fn ranges(sweep: &Sweep) -> [Option<Range>; 3] {
-    [sweep.creepage_x, sweep.creepage_y, sweep.spin_per_mm]
+    [
+        sweep.force_x_n.or(sweep.creepage_x),
+        sweep.force_y_n.or(sweep.creepage_y),
+        sweep.spin_per_mm,
+    ]
 }
 
 fn sweep_length(sweep: &Sweep) -> u128 {
@@ -55,14 +147,17 @@ fn sweep_length(sweep: &Sweep) -> u128 {
     }
 }
 
-fn write_out(sweep: &Sweep) -> Vec<Motion> {
+fn write_out(sweep: &Sweep) -> Vec<AskedMotion> {
     let values =
         ranges(sweep).map(|range| range.map_or_else(|| vec![0.0], |range| range_values(&range)));
     let [x, y, spin] = &values;
-    let motion = |i: usize, j: usize, k: usize| Motion {
-        creepage_x: x[i],
-        creepage_y: y[j],
+    let forced = [sweep.force_x_n.is_some(), sweep.force_y_n.is_some()];
+    let motion = |i: usize, j: usize, k: usize| AskedMotion {
+        creepage_x: (!forced[0]).then_some(x[i]),
+        creepage_y: (!forced[1]).then_some(y[j]),
         spin_per_mm: spin[k],
+        force_x_n: forced[0].then_some(x[i]),
+        force_y_n: forced[1].then_some(y[j]),
     };
     match sweep.combine {
         Combine::Together => (0..sweep_length(sweep) as usize)
@@ -118,9 +213,13 @@ mod tests {
             creepage_x: range(0.0, 0.004, 5),
             creepage_y: None,
             spin_per_mm: range(1.0, -1.0, 5),
+            force_x_n: None,
+            force_y_n: None,
             combine: Combine::Together,
         };
-        let list = expand(&Motions::Sweep { sweep }, &Limits::default()).unwrap();
+        let list = expand(&Motions::Sweep { sweep }, &Limits::default())
+            .unwrap()
+            .motions;
         assert_eq!(list.len(), 5);
         assert_eq!(triple(&list[0]), [0.0, 0.0, 1.0]);
         assert_eq!(triple(&list[2]), [0.002, 0.0, 0.0]);
@@ -133,9 +232,13 @@ mod tests {
             creepage_x: range(1.0, 2.0, 2),
             creepage_y: range(5.0, 5.0, 1),
             spin_per_mm: range(7.0, 9.0, 3),
+            force_x_n: None,
+            force_y_n: None,
             combine: Combine::Grid,
         };
-        let list = expand(&Motions::Sweep { sweep }, &Limits::default()).unwrap();
+        let list = expand(&Motions::Sweep { sweep }, &Limits::default())
+            .unwrap()
+            .motions;
         let expected = [
             [1.0, 7.0],
             [1.0, 8.0],
@@ -161,10 +264,12 @@ mod tests {
                 creepage_x: range(0.0, 1.0, n),
                 creepage_y: range(0.0, 1.0, m),
                 spin_per_mm: None,
+                force_x_n: None,
+                force_y_n: None,
                 combine: Combine::Grid,
             },
         };
-        assert_eq!(expand(&grid(10, 10), &limits).unwrap().len(), 100);
+        assert_eq!(expand(&grid(10, 10), &limits).unwrap().motions.len(), 100);
         let fault = expand(&grid(1_000_000, 1_000_000), &limits).unwrap_err();
         assert_eq!(fault.pointer, "/motion");
         assert!(
@@ -173,5 +278,23 @@ mod tests {
             fault.detail
         );
         assert!(expand(&grid(101, 1), &limits).is_err());
+    }
+
+    #[test]
+    fn a_swept_force_stands_in_the_place_of_its_creepage() {
+        let sweep = Sweep {
+            creepage_x: None,
+            creepage_y: range(1.0, 2.0, 2),
+            spin_per_mm: None,
+            force_x_n: range(-50.0, 50.0, 3),
+            force_y_n: None,
+            combine: Combine::Grid,
+        };
+        let found = expand(&Motions::Sweep { sweep }, &Limits::default()).unwrap();
+        let forces: Vec<Prescribed> = found.forces.clone();
+        assert_eq!(forces.len(), 6);
+        assert_eq!(forces[0], [Some(-50.0), None]);
+        assert_eq!(forces[5], [Some(50.0), None]);
+        assert_eq!(triple(&found.motions[1]), [0.0, 2.0, 0.0]);
     }
 }

@@ -72,6 +72,7 @@ impl Draft {
     pub(super) fn faults_beside(&self, limits: &Limits) -> Vec<Fault> {
         let given = Given {
             material: self.material.as_ref(),
+            friction: self.friction.as_ref().map(|f| f.coefficient),
             contact: self.contact.as_ref(),
             load: self.load.as_ref(),
             motion: self.motion.as_ref(),

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::contact::case::{Combine, Motion, Motions, Range, Sweep, Wheelset};
+use crate::contact::case::{AskedMotion, Combine, Motions, Range, Sweep, Wheelset};
 use crate::contact::read::object::{Faults, Interval, Object, join, shown};
 
 const CREEPAGE: Interval = Interval::closed(-1e6, 1e6, "");
@@ -12,12 +12,21 @@ const VELOCITY: Interval = Interval::closed(-1e9, 1e9, "mm/s");
 const RATE: Interval = Interval::closed(-1e6, 1e6, "rad/s");
 const RADIUS: Interval = Interval::positive(1e9, "mm");
 const POINTS_MAX: u32 = 1_000_000;
-const COMPONENTS: [&str; 3] = ["creepage_x", "creepage_y", "spin_per_mm"];
-const FORCES: [&str; 2] = ["force_x_n", "force_y_n"];
+const FORCE: Interval = Interval::closed(-1e15, 1e15, "N");
+/// The forces stand in the order of the creepages they replace.
+const COMPONENTS: [&str; 5] = [
+    "creepage_x",
+    "creepage_y",
+    "spin_per_mm",
+    "force_x_n",
+    "force_y_n",
+];
+const SPIN_AT: usize = 2;
+const FORCES_FROM: usize = 3;
 
 /// Reads the required member `motion` of a case.
 pub(super) fn read(case: &mut Object) -> Option<Motions> {
-    let what = "an object with at least one of creepage_x, creepage_y, spin_per_mm, an array of such objects, or {\"sweep\": …}";
+    let what = "an object with at least one of creepage_x, creepage_y, spin_per_mm, force_x_n, force_y_n, an array of such objects, or {\"sweep\": …}";
     let value = case.required("motion", what)?;
     let kind = case
         .value("contact")
@@ -47,7 +56,7 @@ pub(super) fn read(case: &mut Object) -> Option<Motions> {
         }
         Value::Object(_) => motion(value, pointer, faults).map(Motions::One),
         Value::Array(elements) if !elements.is_empty() => {
-            let motions: Vec<Option<Motion>> = elements
+            let motions: Vec<Option<AskedMotion>> = elements
                 .iter()
                 .enumerate()
                 .map(|(k, element)| motion(element, join(&pointer, k), faults))
@@ -64,17 +73,24 @@ pub(super) fn read(case: &mut Object) -> Option<Motions> {
     }
 }
 
-fn motion(value: &Value, pointer: String, faults: &mut Faults) -> Option<Motion> {
+fn motion(value: &Value, pointer: String, faults: &mut Faults) -> Option<AskedMotion> {
     let mut block = Object::open(value, pointer, faults)?;
-    let mut read = [Some(0.0); 3];
+    let mut read = [None; COMPONENTS.len()];
     components(&mut block, &[], |block, k, name| {
-        read[k] = block.number(name, interval(k));
+        read[k] = Some(block.number(name, interval(k)));
     })?;
-    let [creepage_x, creepage_y, spin_per_mm] = read;
-    Some(Motion {
-        creepage_x: creepage_x?,
-        creepage_y: creepage_y?,
-        spin_per_mm: spin_per_mm?,
+    // A faulty number has left its fault behind and ends the reading here.
+    if read.contains(&Some(None)) {
+        return None;
+    }
+    let [x, y, spin, force_x_n, force_y_n] = read.map(Option::flatten);
+    let left_out = |force: Option<f64>| force.is_none().then_some(0.0);
+    Some(AskedMotion {
+        creepage_x: x.or(left_out(force_x_n)),
+        creepage_y: y.or(left_out(force_y_n)),
+        spin_per_mm: spin.unwrap_or(0.0),
+        force_x_n,
+        force_y_n,
     })
 }
 
@@ -131,7 +147,7 @@ fn wheelset(block: &mut Object) -> Option<Wheelset> {
 }
 
 fn sweep(block: &mut Object) -> Option<Sweep> {
-    let mut read = [None; 3];
+    let mut read = [None; COMPONENTS.len()];
     components(block, &["combine"], |block, k, name| {
         read[k] = Some(range(block, k, name));
     })?;
@@ -144,7 +160,7 @@ fn sweep(block: &mut Object) -> Option<Sweep> {
         combine?;
     }
     // A faulty range has left its fault behind and ends the reading here.
-    let mut ranges = [None; 3];
+    let mut ranges = [None; COMPONENTS.len()];
     for (range, read) in ranges.iter_mut().zip(read) {
         *range = match read {
             Some(None) => return None,
@@ -152,7 +168,7 @@ fn sweep(block: &mut Object) -> Option<Sweep> {
             None => None,
         };
     }
-    let [creepage_x, creepage_y, spin_per_mm] = ranges;
+    let [creepage_x, creepage_y, spin_per_mm, force_x_n, force_y_n] = ranges;
     let combine = combine.unwrap_or_default();
     if combine == Combine::Together {
         let points: Vec<u32> = ranges
@@ -172,6 +188,8 @@ fn sweep(block: &mut Object) -> Option<Sweep> {
         creepage_x,
         creepage_y,
         spin_per_mm,
+        force_x_n,
+        force_y_n,
         combine,
     })
 }
@@ -183,14 +201,16 @@ fn components(
     mut visit: impl FnMut(&mut Object, usize, &'static str),
 ) -> Option<()> {
     let allowed: Vec<&str> = COMPONENTS.iter().chain(beside).copied().collect();
-    block.only(&allowed, &FORCES);
-    for name in FORCES {
-        if let Some(value) = block.value(name) {
-            let value = shown(value);
+    block.only(&allowed, &[]);
+    let (creepages, forces) = (&COMPONENTS[..SPIN_AT], &COMPONENTS[FORCES_FROM..]);
+    let mut both = false;
+    for (creepage, force) in creepages.iter().zip(forces) {
+        if block.has(creepage) && block.has(force) {
             block.fault(
-                name,
-                format!("{value} given; prescribed tangential forces are not offered by this version, give a creepage"),
+                force,
+                format!("given together with {creepage}; exactly one of the two is allowed"),
             );
+            both = true;
         }
     }
     for (k, name) in COMPONENTS.into_iter().enumerate() {
@@ -198,15 +218,14 @@ fn components(
             visit(block, k, name);
         }
     }
-    let forces = FORCES.iter().any(|name| block.has(name));
-    if !forces && !COMPONENTS.iter().any(|name| block.has(name)) {
+    if !COMPONENTS.iter().any(|name| block.has(name)) {
         block.fault_here(format!(
             "no motion given; at least one of {} is needed (write out zeros)",
             COMPONENTS.join(", ")
         ));
         return None;
     }
-    (!forces).then_some(())
+    (!both).then_some(())
 }
 
 fn range(block: &mut Object, k: usize, name: &str) -> Option<Range> {
@@ -227,5 +246,9 @@ fn range(block: &mut Object, k: usize, name: &str) -> Option<Range> {
 }
 
 fn interval(component: usize) -> Interval {
-    if component == 2 { SPIN } else { CREEPAGE }
+    match component {
+        SPIN_AT => SPIN,
+        FORCES_FROM.. => FORCE,
+        _ => CREEPAGE,
+    }
 }

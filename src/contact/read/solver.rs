@@ -1,6 +1,6 @@
 //! Reads `solver` and `outputs`: how to solve, how exactly, and what to answer.
 
-use crate::contact::case::{MeshSize, Method, Output, Solver};
+use crate::contact::case::{MeshSize, Method, Output, Solver, TractionBound};
 use crate::contact::problem::TARGET_ERROR_DEFAULT;
 use crate::contact::read::object::{Interval, Object, join, shown, word};
 
@@ -8,10 +8,15 @@ const TARGET_ERROR: Interval = Interval::closed(1e-4, 0.5, "");
 const TIME_LIMIT: Interval = Interval::positive(86_400.0, "s");
 const MESH_SIDE_MAX: u32 = 1000;
 
-const METHODS: [(&str, Method); 3] = [
+const METHODS: [(&str, Method); 4] = [
     ("auto", Method::Auto),
     ("boundary_element", Method::BoundaryElement),
     ("liu_hsu", Method::LiuHsu),
+    ("fastsim", Method::Fastsim),
+];
+const TRACTION_BOUNDS: [(&str, TractionBound); 2] = [
+    ("elliptic", TractionBound::Elliptic),
+    ("parabolic", TractionBound::Parabolic),
 ];
 const OUTPUTS: [(&str, Output); 5] = [
     ("resultants", Output::Resultants),
@@ -29,18 +34,36 @@ pub(super) fn read(case: &mut Object) -> Option<Solver> {
             method: Method::Auto,
             target_error: Some(TARGET_ERROR_DEFAULT),
             mesh: None,
+            traction_bound: None,
             time_limit_s: None,
         });
     }
     let mut block = case.child("solver")?;
-    block.only(&["method", "target_error", "mesh", "time_limit_s"], &[]);
-    let method = block.word("method", &METHODS, &["fastsim"]);
+    block.only(
+        &[
+            "method",
+            "target_error",
+            "mesh",
+            "traction_bound",
+            "time_limit_s",
+        ],
+        &[],
+    );
+    let method = block.word("method", &METHODS, &[]);
     let target_error = block.number("target_error", TARGET_ERROR);
     let mesh = if block.has("mesh") {
         mesh(&mut block)
     } else {
         None
     };
+    let traction_bound = block.word("traction_bound", &TRACTION_BOUNDS, &[]);
+    let another = !block.has("method") || method.is_some_and(|method| method != Method::Fastsim);
+    if traction_bound.is_some() && another {
+        block.fault(
+            "traction_bound",
+            "given for a method that has no choice of bounds; only \"method\": \"fastsim\" has it",
+        );
+    }
     let time_limit_s = block.number("time_limit_s", TIME_LIMIT);
     if block.has("target_error") && block.has("mesh") {
         block.fault(
@@ -52,6 +75,7 @@ pub(super) fn read(case: &mut Object) -> Option<Solver> {
         ("method", method.is_some()),
         ("target_error", target_error.is_some()),
         ("mesh", mesh.is_some()),
+        ("traction_bound", traction_bound.is_some()),
         ("time_limit_s", time_limit_s.is_some()),
     ] {
         if block.has(name) && !read {
@@ -66,6 +90,7 @@ pub(super) fn read(case: &mut Object) -> Option<Solver> {
             None
         }),
         mesh,
+        traction_bound,
         time_limit_s,
     })
 }

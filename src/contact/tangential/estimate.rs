@@ -1,10 +1,12 @@
 //! How wrong are the resultants? From two rules, two levels, and the cell that holds the spin pole.
 
+use crate::contact::case::Method;
 use crate::contact::mesh::Segment;
 use crate::contact::normal::Patch;
 use crate::contact::outputs::resultants::Resultants;
 use crate::contact::problem::Problem;
 use crate::contact::tangential::Tangential;
+use crate::contact::tangential::fastsim;
 use crate::contact::tangential::ladder::Regime;
 use crate::contact::tangential::level::Level;
 use crate::contact::tangential::liu_hsu::spin_pole::vortex_centre;
@@ -79,6 +81,13 @@ pub fn errors(
         } else {
             0.0
         }));
+    }
+    if problem.method == Method::Fastsim {
+        // No mesh tells what the theory leaves out.
+        return all(Some(fastsim::error_class(
+            problem.traction_bound,
+            level.plan.size,
+        )));
     }
     let of_rules = answer.second.as_ref().map(|second| {
         let second: Vec<Resultants> = (0..patches.len())

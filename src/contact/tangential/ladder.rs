@@ -4,6 +4,7 @@
 use crate::contact::case::{MeshSize, Method};
 use crate::contact::error::SolveError;
 use crate::contact::problem::{Problem, Resolution};
+use crate::contact::tangential::fastsim;
 use crate::contact::tangential::level::Level;
 use crate::contact::tangential::trail::Trail;
 
@@ -128,13 +129,15 @@ impl<'a> Ladder<'a> {
         }
     }
 
-    /// The sizes of a case that does not climb: an explicit mesh, or the two levels of the dense method.
+    /// The sizes of a case that does not climb: an explicit mesh, the two levels of the dense method, or the one of the
+    /// simplified theory.
     #[must_use]
     pub fn fixed_sizes(problem: &Problem) -> Option<Vec<MeshSize>> {
         let size = |strips, cells| MeshSize { strips, cells };
         match (problem.resolution, problem.method) {
             (Resolution::Mesh(size), _) => Some(vec![size]),
             (Resolution::Target(_), Method::LiuHsu) => Some(vec![size(6, 12), size(12, 24)]),
+            (Resolution::Target(_), Method::Fastsim) => Some(vec![fastsim::MESH]),
             (Resolution::Target(_), _) => None,
         }
     }

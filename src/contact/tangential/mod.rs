@@ -3,7 +3,10 @@
 pub mod boundary_element;
 pub mod equations;
 pub mod estimate;
+pub mod fastsim;
+pub mod forces;
 pub mod full_slip;
+pub mod kalker;
 pub mod ladder;
 pub mod level;
 pub mod liu_hsu;

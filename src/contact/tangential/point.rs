@@ -10,7 +10,7 @@ use crate::contact::tangential::ladder::{CELLS_FIRST, CELLS_MAX, Ladder, Plan, R
 use crate::contact::tangential::level::Level;
 use crate::contact::tangential::trail::Start;
 use crate::contact::tangential::{
-    Failure, Tangential, Work, boundary_element, full_slip, liu_hsu, nested,
+    Failure, Tangential, Work, boundary_element, fastsim, full_slip, liu_hsu, nested,
 };
 
 /// The coarse mesh that gives the method of Liu and Hsu its spin pole: fewer than 30 cells, as they found.
@@ -23,9 +23,22 @@ const RATIO_MIN: f64 = 1.3;
 /// Error of extrapolated resultants over that of the same without, as far as the climb counts on it.
 const EXTRAPOLATED: f64 = 0.6;
 
+/// A motion of a problem, and the creepages it is solved with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Asked {
+    /// The number of the motion.
+    pub index: usize,
+    /// Creepages and spin.
+    pub motion: Motion,
+}
+
 /// The answer for one motion on the finest level it needed.
 #[derive(Debug, Clone)]
 pub struct Point {
+    /// The motion it was solved for.
+    pub motion: Motion,
+    /// A prescribed force could not be reached.
+    pub saturated: bool,
     /// Tractions, slips and zones.
     pub tangential: Tangential,
     /// The number of that level in the ladder.
@@ -52,7 +65,7 @@ impl Point {
     }
 }
 
-/// Solves motion `index` of the problem, from the coarsest level up to the first that meets the target, each started from
+/// Solves a motion, from the coarsest level up to the first that meets the target, each started from
 /// the one before.
 ///
 /// # Errors
@@ -60,33 +73,52 @@ impl Point {
 pub fn solve(
     problem: &Problem,
     ladder: &mut Ladder,
-    index: usize,
+    asked: Asked,
     monitor: &dyn Monitor,
 ) -> Result<Point, SolveError> {
     let sizes = Ladder::fixed_sizes(problem);
     let last_path = std::mem::take(&mut ladder.path);
     match (sizes, problem.resolution) {
         (Some(sizes), _) => {
-            let mut point = climb(problem, ladder, index, sizes[0].into(), None, monitor)?;
+            let mut point = climb(problem, ladder, asked, sizes[0].into(), None, monitor)?;
             for size in &sizes[1..] {
-                point = climb(problem, ladder, index, (*size).into(), Some(point), monitor)?;
+                point = climb(problem, ladder, asked, (*size).into(), Some(point), monitor)?;
             }
             Ok(point)
         }
-        (None, Resolution::Mesh(size)) => climb(problem, ladder, index, size.into(), None, monitor),
+        (None, Resolution::Mesh(size)) => climb(problem, ladder, asked, size.into(), None, monitor),
         (None, Resolution::Target(target)) => {
-            let again = again(problem, ladder, index, &last_path, monitor)?;
+            let again = again(problem, ladder, asked, &last_path, monitor)?;
             let (begun, half_octaves) = match again {
                 Some(point) => (point, first_steps(target)),
                 None => {
                     let first = ladder.plan(CELLS_FIRST, Regime::Unknown);
-                    let point = climb(problem, ladder, index, first, None, monitor)?;
+                    let point = climb(problem, ladder, asked, first, None, monitor)?;
                     (point, 0)
                 }
             };
-            ascend(problem, ladder, index, begun, half_octaves, target, monitor)
+            ascend(problem, ladder, asked, begun, half_octaves, target, monitor)
         }
     }
+}
+
+/// Solves a motion on given levels, one after the other, so that the resultants are one function of the motion.
+///
+/// # Errors
+/// Why there is no answer.
+pub fn along(
+    problem: &Problem,
+    ladder: &mut Ladder,
+    asked: Asked,
+    path: &[Plan],
+    monitor: &dyn Monitor,
+) -> Result<Option<Point>, SolveError> {
+    ladder.path.clear();
+    let mut point = None;
+    for plan in path {
+        point = Some(climb(problem, ladder, asked, *plan, point, monitor)?);
+    }
+    Ok(point)
 }
 
 /// Begins a motion of a sweep on the level where the last motion had its first mesh made for its regime, if that serves
@@ -94,7 +126,7 @@ pub fn solve(
 fn again(
     problem: &Problem,
     ladder: &mut Ladder,
-    index: usize,
+    asked: Asked,
     last_path: &[usize],
     monitor: &dyn Monitor,
 ) -> Result<Option<Point>, SolveError> {
@@ -103,13 +135,13 @@ fn again(
         return Ok(None);
     };
     let level = ladder.get(number);
-    let motion = level.scale.motion(&problem.motions[index]);
+    let motion = level.scale.motion(&asked.motion);
     if ladder.trail.start(number, level, &motion).is_none() {
         return Ok(None);
     }
     let plan = level.plan;
-    let point = climb(problem, ladder, index, plan, None, monitor)?;
-    let found = regime_of(problem, ladder, index, &point);
+    let point = climb(problem, ladder, asked, plan, None, monitor)?;
+    let found = regime_of(ladder, asked, &point);
     if plan.serves(found) {
         return Ok(Some(point));
     }
@@ -117,11 +149,11 @@ fn again(
     ladder.path.clear();
     let cells = ladder.get(number).mesh.cells() as u32;
     let plan = ladder.plan(cells, found);
-    climb(problem, ladder, index, plan, Some(point), monitor).map(Some)
+    climb(problem, ladder, asked, plan, Some(point), monitor).map(Some)
 }
 
-fn regime_of(problem: &Problem, ladder: &Ladder, index: usize, point: &Point) -> Regime {
-    let spinning = problem.motions[index].spin_per_mm != 0.0;
+fn regime_of(ladder: &Ladder, asked: Asked, point: &Point) -> Regime {
+    let spinning = asked.motion.spin_per_mm != 0.0;
     estimate::regime(ladder.get(point.level), &point.tangential, spinning)
 }
 
@@ -129,7 +161,7 @@ fn regime_of(problem: &Problem, ladder: &Ladder, index: usize, point: &Point) ->
 fn ascend(
     problem: &Problem,
     ladder: &mut Ladder,
-    index: usize,
+    asked: Asked,
     mut point: Point,
     mut half_octaves: i32,
     target: f64,
@@ -145,7 +177,7 @@ fn ascend(
         if cells > f64::from(CELLS_MAX) {
             break;
         }
-        let regime = regime_of(problem, ladder, index, &point);
+        let regime = regime_of(ladder, asked, &point);
         let mut plan = ladder.plan(cells.round() as u32, regime);
         let before = ladder.get(point.level).plan.size.strips;
         if plan.size.strips == before {
@@ -155,7 +187,7 @@ fn ascend(
                 cells: (plan.size.cells * before).div_ceil(before + 2),
             };
         }
-        point = climb(problem, ladder, index, plan, Some(point), monitor)?;
+        point = climb(problem, ladder, asked, plan, Some(point), monitor)?;
     }
     Ok(point)
 }
@@ -172,14 +204,14 @@ fn steps(excess: f64) -> i32 {
     ((2.0 * (EXTRAPOLATED * excess).log2()).ceil() as i32).clamp(2, 4)
 }
 
-/// Solves motion `index` on the level of one size, from the point of a coarser one if there is one.
+/// Solves a motion on the level of one size, from the point of a coarser one if there is one.
 ///
 /// # Errors
 /// Why there is no answer.
 pub fn climb(
     problem: &Problem,
     ladder: &mut Ladder,
-    index: usize,
+    asked: Asked,
     plan: Plan,
     coarser: Option<Point>,
     monitor: &dyn Monitor,
@@ -190,11 +222,11 @@ pub fn climb(
     let below = coarser
         .as_ref()
         .map(|point| (ladder.get(point.level), &point.tangential));
-    let motion = level.scale.motion(&problem.motions[index]);
+    let motion = level.scale.motion(&asked.motion);
     let warm = ladder.trail.start(number, level, &motion);
     let start = warm.or_else(|| below.map(|(coarse, answer)| nested_start(coarse, answer, level)));
-    let tangential = solve_level(problem, level, &problem.motions[index], start, monitor)
-        .map_err(|f| named(f, problem, index))?;
+    let tangential = solve_level(problem, level, &asked.motion, start, monitor)
+        .map_err(|f| named(f, problem, asked.index))?;
     let patches = problem.region.patches().len();
     let summed: Vec<Resultants> = (0..patches)
         .map(|p| Resultants::of_patch(level, &tangential.traction, p))
@@ -218,7 +250,7 @@ pub fn climb(
         &tangential,
         &summed,
         opinion,
-        problem.motions[index].spin_per_mm != 0.0,
+        asked.motion.spin_per_mm != 0.0,
         tolerance(problem),
     );
     let resultants = match coarser_like {
@@ -236,6 +268,8 @@ pub fn climb(
     let seconds =
         (monitor.elapsed() - began).as_secs_f64() + coarser.map_or(0.0, |point| point.seconds);
     Ok(Point {
+        motion: asked.motion,
+        saturated: false,
         tangential,
         level: number,
         resultants,
@@ -268,13 +302,19 @@ fn method_used(problem: &Problem) -> Method {
     match problem.method {
         Method::Auto | Method::BoundaryElement => Method::BoundaryElement,
         Method::LiuHsu => Method::LiuHsu,
+        Method::Fastsim => Method::Fastsim,
     }
 }
 
 /// Residual to reach: far below the target, since every iteration below it is for nothing.
 fn tolerance(problem: &Problem) -> f64 {
     match problem.resolution {
-        Resolution::Target(target) => (0.04 * target).clamp(boundary_element::TOLERANCE, 4e-4),
+        Resolution::Target(target) => {
+            // A force is searched as a function of its creepage: what the iteration leaves is noise to that.
+            let searched = problem.forces.iter().any(|forces| *forces != [None; 2]);
+            let part = if searched { 0.004 } else { 0.04 };
+            (part * target).clamp(boundary_element::TOLERANCE, 4e-4)
+        }
         Resolution::Mesh(_) => boundary_element::TOLERANCE,
     }
 }
@@ -342,5 +382,8 @@ fn solve_level(
         );
     }
     let motion = level.scale.motion(motion);
+    if problem.method == Method::Fastsim {
+        return Ok(fastsim::solve(problem, level, &motion));
+    }
     boundary_element::solve(level, &motion, start.as_ref(), tolerance(problem), monitor)
 }

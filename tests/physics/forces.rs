@@ -1,0 +1,361 @@
+//! Prescribed tangential forces: the creepages that give them are found.
+
+use serde_json::{Value, json};
+
+use crate::cases::{assert_fault, faults, good, good_with, with};
+use crate::gap_samples::GapReference;
+use crate::reference::{Ellipse, assert_none, solve};
+use railhead::contact::solution::{PointSolution, Solution};
+
+const LIMIT: f64 = 0.3 * 60_000.0;
+
+/// The answer to a motion on the steel ellipse.
+fn answer(a_over_b: f64, motion: Value, solver: Value) -> Solution {
+    let mut case = Ellipse::steel(a_over_b, 0.28).case(1, 1);
+    case["motion"] = motion;
+    case["solver"] = solver;
+    case["outputs"] = json!(["resultants"]);
+    solve(&case).0
+}
+
+fn point(a_over_b: f64, motion: Value, solver: Value) -> PointSolution {
+    answer(a_over_b, motion, solver).patches[0].points[0].clone()
+}
+
+/// What is off after a round trip: a motion's forces are prescribed, and its creepages should come back.
+///
+/// A creepage is allowed the change that the estimated errors of both forces stand for: error over the slope of the force,
+/// which is at least that of the secant from no creepage times what friction leaves of it.
+fn round_trip(a_over_b: f64, motion: [f64; 3], named: [bool; 2], solver: &Value) -> Option<String> {
+    let steel = Ellipse::steel(a_over_b, 0.28).normalised(motion[0], motion[1], motion[2]);
+    let [x, y, spin] = steel.motion;
+    let given = json!({ "creepage_x": x, "creepage_y": y, "spin_per_mm": spin });
+    let there = point(a_over_b, given, solver.clone());
+    let mut asked = json!({ "spin_per_mm": spin });
+    let forces = [there.force_x_n, there.force_y_n];
+    for (k, (creepage, force)) in [("creepage_x", "force_x_n"), ("creepage_y", "force_y_n")]
+        .iter()
+        .enumerate()
+    {
+        if named[k] {
+            asked[*force] = json!(forces[k]);
+        } else {
+            asked[*creepage] = json!([x, y][k]);
+        }
+    }
+    let back = point(a_over_b, asked.clone(), solver.clone());
+    let error = |point: &PointSolution| point.error_estimate.map_or(1e-3 * LIMIT, |e| e.force_x_n);
+    let errors = (error(&there) + error(&back)) / LIMIT;
+    let left = (1.0 - forces[0].hypot(forces[1]) / LIMIT).max(0.05);
+    let unit = Ellipse::steel(a_over_b, 0.28)
+        .normalised(1.0, 0.0, 0.0)
+        .motion[0];
+    let allowed = unit * errors / left + 1e-9 * unit;
+    let off = (back.motion.creepage_x - x)
+        .abs()
+        .max((back.motion.creepage_y - y).abs());
+    let missed = [0, 1].map(|k| {
+        let found = [back.force_x_n, back.force_y_n][k];
+        if named[k] {
+            (found - forces[k]).abs() / LIMIT
+        } else {
+            0.0
+        }
+    });
+    let missed = missed[0].max(missed[1]);
+    println!(
+        "a/b {a_over_b} {motion:?} {named:?}: creepage off by {:.1e} of {:.1e}, force by {missed:.1e}, {} iterations for {}",
+        off / unit,
+        allowed / unit,
+        back.solver.iterations,
+        there.solver.iterations
+    );
+    let good =
+        off <= allowed && missed <= 1e-4 && !back.saturated && back.motion.spin_per_mm == spin;
+    (!good).then(|| format!("{motion:?} {named:?}: {asked} gives {back:?}"))
+}
+
+#[test]
+fn the_forces_of_a_motion_give_its_creepages_back() {
+    let mut failures = Vec::new();
+    for a_over_b in [0.5, 1.0, 3.0] {
+        for motion in [
+            [0.3, 0.0, 0.0],
+            [-0.5, 0.0, 0.0],
+            [0.3, 0.2, 0.0],
+            [0.3, -0.2, 0.8],
+            [-0.4, 0.4, -0.5],
+            [0.2, 0.1, 3.0],
+            [1e-4, 2e-4, 0.0],
+        ] {
+            for named in [[true, false], [false, true], [true, true]] {
+                failures.extend(round_trip(
+                    a_over_b,
+                    motion,
+                    named,
+                    &json!({ "target_error": 0.005 }),
+                ));
+            }
+        }
+    }
+    assert_none("round trips", &failures);
+}
+
+#[test]
+fn every_method_finds_prescribed_forces() {
+    let mut failures = Vec::new();
+    for solver in [
+        json!({ "method": "boundary_element", "mesh": { "strips": 10, "cells": 12 } }),
+        json!({ "method": "liu_hsu", "mesh": { "strips": 6, "cells": 8 } }),
+        json!({ "method": "fastsim" }),
+        json!({ "method": "fastsim", "traction_bound": "parabolic" }),
+    ] {
+        for named in [[true, false], [false, true], [true, true]] {
+            failures.extend(round_trip(1.0, [0.3, -0.2, 0.4], named, &solver));
+        }
+    }
+    assert_none("round trips", &failures);
+}
+
+#[test]
+fn equations_of_one_mesh_are_inverted_to_their_digits() {
+    let solver = json!({ "mesh": { "strips": 10, "cells": 12 } });
+    for [x, y] in [[0.5, 0.3], [-0.7, 0.6], [0.0, 0.2]] {
+        let motion =
+            json!({ "force_x_n": x * LIMIT, "force_y_n": y * LIMIT, "spin_per_mm": 0.0004 });
+        let found = point(1.0, motion, solver.clone());
+        let off = (found.force_x_n / LIMIT - x)
+            .abs()
+            .max((found.force_y_n / LIMIT - y).abs());
+        assert!(off < 2e-6 && !found.saturated, "{x} {y}: {off:e}");
+        let again = json!({
+            "creepage_x": found.motion.creepage_x, "creepage_y": found.motion.creepage_y, "spin_per_mm": 0.0004
+        });
+        let again = point(1.0, again, solver.clone());
+        assert!((again.force_x_n - found.force_x_n).abs() < 1e-5 * LIMIT);
+    }
+}
+
+#[test]
+fn forces_of_opposite_sign_have_opposite_creepages() {
+    for component in ["force_x_n", "force_y_n"] {
+        let found = [1.0, -1.0].map(|sign| {
+            let motion = json!({ component: sign * 0.6 * LIMIT });
+            let motion = point(1.0, motion, json!({ "target_error": 0.005 })).motion;
+            motion.creepage_x + motion.creepage_y
+        });
+        assert!(found[0] > 0.0, "a force has the sign of its creepage");
+        assert!((found[0] + found[1]).abs() < 1e-3 * found[0], "{found:?}");
+    }
+}
+
+#[test]
+fn the_force_zero_under_spin_takes_a_creepage_against_it() {
+    let found = point(
+        1.0,
+        json!({ "force_y_n": 0, "spin_per_mm": 0.0005 }),
+        json!({ "target_error": 0.005 }),
+    );
+    assert!(
+        found.motion.creepage_y < 0.0 && found.force_y_n.abs() < 1e-4 * LIMIT,
+        "{found:?}"
+    );
+    let nothing = point(
+        1.0,
+        json!({ "force_x_n": 0, "force_y_n": 0 }),
+        json!({ "target_error": 0.005 }),
+    );
+    assert_eq!(
+        [nothing.motion.creepage_x, nothing.motion.creepage_y],
+        [0.0; 2]
+    );
+}
+
+#[test]
+fn all_of_friction_is_reached_without_spin_and_not_with_it() {
+    let solver = json!({ "target_error": 0.005 });
+    let full = point(1.0, json!({ "force_x_n": LIMIT }), solver.clone());
+    assert!(
+        !full.saturated && (full.force_x_n / LIMIT - 1.0).abs() < 1e-6,
+        "{full:?}"
+    );
+    for motion in [
+        json!({ "force_x_n": LIMIT, "spin_per_mm": 0.003 }),
+        json!({ "force_x_n": -LIMIT, "creepage_y": 0.001 }),
+        json!({ "force_x_n": 0.6 * LIMIT, "force_y_n": 0.8 * LIMIT, "spin_per_mm": 0.003 }),
+    ] {
+        let solution = answer(1.0, motion.clone(), solver.clone());
+        let found = &solution.patches[0].points[0];
+        let force = found.force_x_n.hypot(found.force_y_n) / LIMIT;
+        assert!(
+            found.saturated && force < 1.0 + 1e-9 && force > 0.99,
+            "{motion}: {found:?}"
+        );
+        assert!(
+            solution
+                .warnings
+                .iter()
+                .any(|w| w.contains("no creepage gives")),
+            "{:?}",
+            solution.warnings
+        );
+    }
+}
+
+#[test]
+fn nearly_all_of_friction_is_found_with_spin() {
+    for part in [0.9, 0.97, 0.995] {
+        let motion = json!({ "force_x_n": part * LIMIT, "spin_per_mm": 0.001 });
+        let found = point(1.0, motion, json!({ "target_error": 0.005 }));
+        assert!(
+            !found.saturated && (found.force_x_n / LIMIT - part).abs() < 1e-4,
+            "{part}: {found:?}"
+        );
+    }
+}
+
+#[test]
+fn more_than_friction_carries_is_refused_where_it_stands() {
+    let limit = 0.3 * 100_000.0;
+    for (motion, pointer) in [
+        (json!({ "force_x_n": 1.001 * limit }), "/motion/force_x_n"),
+        (
+            json!({ "force_y_n": -1.001 * limit, "creepage_x": 0.001 }),
+            "/motion/force_y_n",
+        ),
+        (
+            json!({ "force_x_n": 0.7 * limit, "force_y_n": 0.72 * limit }),
+            "/motion/force_y_n",
+        ),
+        (
+            json!([{ "creepage_x": 0 }, { "force_x_n": 2.0 * limit }]),
+            "/motion/1/force_x_n",
+        ),
+        (
+            json!({ "sweep": { "force_x_n": { "from": 0, "to": 2.0 * limit, "points": 9 } } }),
+            "/motion/sweep/force_x_n",
+        ),
+    ] {
+        assert_fault(&good_with("/motion", motion), pointer, &["30000 N"]);
+    }
+    for motion in [
+        json!({ "force_x_n": limit }),
+        json!({ "force_x_n": -0.6 * limit, "force_y_n": 0.8 * limit }),
+    ] {
+        assert_eq!(faults(&good_with("/motion", motion)), []);
+    }
+    let frictionless = with(
+        &good_with("/motion", json!({ "force_x_n": 1 })),
+        "/friction/coefficient",
+        Some(json!(0)),
+    );
+    assert_fault(&frictionless, "/motion/force_x_n", &["μN = 0 N"]);
+}
+
+#[test]
+fn a_force_and_its_creepage_exclude_each_other() {
+    let motion = json!({ "force_x_n": 100, "creepage_x": 0.001 });
+    assert_fault(
+        &good_with("/motion", motion),
+        "/motion/force_x_n",
+        &["creepage_x", "exactly one"],
+    );
+    let range = json!({ "from": 0, "to": 1, "points": 2 });
+    let motion = json!({ "sweep": { "force_y_n": range, "creepage_y": range } });
+    assert_fault(
+        &good_with("/motion", motion),
+        "/motion/sweep/force_y_n",
+        &["creepage_y"],
+    );
+    assert_fault(
+        &good_with("/motion", json!({ "force_x_n": "much" })),
+        "/motion/force_x_n",
+        &["much"],
+    );
+}
+
+#[test]
+fn a_sweep_of_forces_gives_a_creep_curve() {
+    let sweep = json!({ "sweep": {
+        "force_x_n": { "from": -0.9 * LIMIT, "to": 0.9 * LIMIT, "points": 19 },
+        "spin_per_mm": { "from": 0.0003, "to": 0.0003, "points": 19 } } });
+    let solution = answer(1.0, sweep, json!({ "target_error": 0.005 }));
+    let points = &solution.patches[0].points;
+    assert_eq!(points.len(), 19);
+    for (n, pair) in points.windows(2).enumerate() {
+        assert!(
+            pair[0].motion.creepage_x < pair[1].motion.creepage_x,
+            "point {n}"
+        );
+    }
+    for (n, point) in points.iter().enumerate() {
+        let asked = -0.9 + 0.1 * n as f64;
+        assert!(
+            (point.force_x_n / LIMIT - asked).abs() < 1e-4,
+            "{n}: {}",
+            point.force_x_n / LIMIT
+        );
+    }
+}
+
+#[test]
+fn forces_are_kept_where_all_motions_share_one_mesh() {
+    let mut case = Ellipse::steel(2.0, 0.28).case(1, 1);
+    case["motion"] = json!([
+        { "force_x_n": 0.5 * LIMIT }, { "force_y_n": 0.5 * LIMIT, "spin_per_mm": 0.004 }, { "creepage_x": 0.001, "spin_per_mm": 0.002 }
+    ]);
+    case["solver"] = json!({ "target_error": 0.005 });
+    case["outputs"] = json!(["resultants", "zones", "tractions"]);
+    let (solution, fields) = solve(&case);
+    let points = &solution.patches[0].points;
+    assert!(
+        (points[0].force_x_n / LIMIT - 0.5).abs() < 1e-4,
+        "{}",
+        points[0].force_x_n
+    );
+    assert!(
+        (points[1].force_y_n / LIMIT - 0.5).abs() < 1e-4,
+        "{}",
+        points[1].force_y_n
+    );
+    assert_eq!(fields.patches[0].points.len(), 3);
+}
+
+#[test]
+fn several_patches_carry_a_prescribed_force_together() {
+    let cases = GapReference::profiles();
+    let case = cases
+        .iter()
+        .find(|case| case.id == "two_offset")
+        .expect("two patches");
+    let mut question = case.case();
+    question["motion"] = json!({ "force_x_n": 7000, "spin_per_mm": 0.0001 });
+    let (solution, _) = solve(&question);
+    assert_eq!(solution.patches.len(), 2);
+    assert!(
+        (solution.total[0].force_x_n - 7000.0).abs() < 1.0,
+        "{:?}",
+        solution.total
+    );
+    let motions = [0, 1].map(|p| solution.patches[p].points[0].motion);
+    assert_eq!(motions[0], motions[1]);
+}
+
+#[test]
+fn a_force_changes_the_digest() {
+    let digest = |motion: Value| crate::cases::problem(&good_with("/motion", motion)).digest;
+    let motions = [
+        json!({ "creepage_x": 0 }),
+        json!({ "force_x_n": 0 }),
+        json!({ "force_y_n": 0 }),
+        json!({ "force_x_n": 10 }),
+    ];
+    let digests = motions.map(digest);
+    for (k, one) in digests.iter().enumerate() {
+        assert!(digests[..k].iter().all(|other| other != one));
+    }
+    assert_eq!(
+        digest(good()["motion"].clone()),
+        digest(good()["motion"].clone())
+    );
+}
