@@ -168,14 +168,14 @@ fn tractions_obey_their_bound_and_zones_cover_the_patch() {
             values.traction_y_mpa.as_ref(),
         );
         let (sx, sy) = (values.slip_x.as_ref(), values.slip_y.as_ref());
-        for i in 0..pressure.len() {
+        for (i, &pressure) in pressure.iter().enumerate() {
             let (tx, ty) = (tx.expect("x")[i], ty.expect("y")[i]);
             let (sx, sy) = (sx.expect("x")[i], sy.expect("y")[i]);
             let allowed = if highest > 1.0 {
                 // The paraboloid is as high as 4/3 of the ellipsoid where that is highest.
-                0.3 * highest * 1.03 * pressure[i] * pressure[i] / peak
+                0.3 * highest * 1.03 * pressure * pressure / peak
             } else {
-                0.3 * pressure[i]
+                0.3 * pressure
             };
             assert!(
                 tx.hypot(ty) <= allowed * (1.0 + 1e-9),

@@ -14,6 +14,7 @@ use crate::contact::outputs::resultants::Resultants;
 use crate::contact::problem::{Prescribed, Problem, Resolution};
 use crate::contact::tangential::ladder::{Ladder, Plan};
 use crate::contact::tangential::point::{self, Asked, Point};
+use crate::contact::tangential::root::{PLACE_MAX, zero};
 use crate::contact::tangential::{Work, kalker};
 
 /// A prescribed force may be missed by this part of the target error.
@@ -26,10 +27,7 @@ const NEAR_LIMIT: f64 = 10.0;
 const MISSED_LEAST: f64 = 2e-7;
 /// From this place on the cubic law is continued by its tangent.
 const KNEE: f64 = 0.9;
-/// The farthest place: a hundred times the creepage at which everything slips by the cubic law.
-const PLACE_MAX: f64 = 65.0;
-/// Motions tried between two bounds, or for two forces at once.
-const TRIALS_MAX: u32 = 40;
+/// Motions tried for two forces at once.
 const TRIALS_AT_ONCE: u32 = 14;
 /// Longest step of two places at once, and trials in a row that may be worse.
 const STEP_MAX: f64 = 0.4;
@@ -393,74 +391,6 @@ impl<'a, 'p> Search<'a, 'p> {
         point.seconds = (self.monitor.elapsed() - began).as_secs_f64();
         Ok(point)
     }
-}
-
-/// Where an increasing function is 0.
-#[derive(Debug, Clone, Copy)]
-struct Root {
-    place: f64,
-    /// False if the function keeps its sign as far as the farthest place.
-    reached: bool,
-}
-
-/// Goes from `start` until the sign changes, then between the bounds by the Illinois rule (regula falsi that halves the value of
-/// a bound that stays). `f` gives the value at a place and sets the size below which it counts as 0.
-fn zero(
-    start: f64,
-    mut f: impl FnMut(f64, &mut f64) -> Result<f64, SolveError>,
-) -> Result<Root, SolveError> {
-    let mut tolerance = 0.0;
-    let (mut low, mut high): (Option<[f64; 2]>, Option<[f64; 2]>) = (None, None);
-    let mut place = start.clamp(-PLACE_MAX, PLACE_MAX);
-    let (mut stride, mut last) = (0.0_f64, None::<[f64; 2]>);
-    for _ in 0..TRIALS_MAX {
-        let value = f(place, &mut tolerance)?;
-        if value.abs() <= tolerance {
-            break;
-        }
-        let below = value < 0.0;
-        let (mine, other) = if below {
-            (&mut low, &mut high)
-        } else {
-            (&mut high, &mut low)
-        };
-        let stays = last.is_some_and(|[_, before]| (before < 0.0) == below);
-        *mine = Some([place, value]);
-        if let (Some([_, value]), true) = (other.as_mut(), stays) {
-            *value *= 0.5;
-        }
-        let slope = last.map(|[at, before]| (value - before) / (place - at));
-        last = Some([place, value]);
-        if let (Some([p, f]), Some([q, g])) = (low, high) {
-            if (q - p).abs() <= 1e-13 * q.abs().max(p.abs()) {
-                break;
-            }
-            place = (p * g - q * f) / (g - f);
-            continue;
-        }
-        if place.abs() >= PLACE_MAX && (place < 0.0) != below {
-            return Ok(Root {
-                place,
-                reached: false,
-            });
-        }
-        // One bound is known: as far as the line through the last two says, but not much farther than before.
-        let needed = match slope.filter(|slope| *slope > 0.0) {
-            Some(slope) => (value / slope).abs(),
-            None => value.abs(),
-        };
-        stride = if stride == 0.0 {
-            needed
-        } else {
-            needed.min(4.0 * stride)
-        };
-        let step = if below { stride } else { -stride };
-        place = (place + step).clamp(-PLACE_MAX, PLACE_MAX);
-    }
-    Ok(Root {
-        place,
-        reached: true,
-    })
 }
 
 fn total(point: &Point) -> Resultants {

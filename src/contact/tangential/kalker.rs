@@ -20,7 +20,7 @@ pub fn ratio(row: usize) -> f64 {
 /// `[C11, C22, C23]` for semi-axes a along rolling and b across, and Poisson's ratio 0 to 0.5.
 ///
 /// Between the entries `ln C` is a cubic in `ln a/b` and a quartic in ν (to one part in a thousand); beyond 1/32 and 32 the
-/// last entry is continued in proportion to the slender limits of [`slender`].
+/// last entry is continued in proportion to the limits of slender ellipses.
 #[must_use]
 pub fn coefficients(a_over_b: f64, poisson_ratio: f64) -> [f64; 3] {
     let inside = a_over_b.clamp(ratio(0), ratio(RATIOS - 1));

@@ -12,6 +12,7 @@ pub mod level;
 pub mod liu_hsu;
 pub mod nested;
 pub mod point;
+mod root;
 pub mod rules;
 pub mod trail;
 
