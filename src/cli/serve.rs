@@ -85,16 +85,14 @@ async fn serve(args: &ServeArgs) -> anyhow::Result<()> {
     let origins = args.cors_origin.iter().map(|origin| origin.parse());
     let origins = origins.collect::<Result<_, _>>().context("--cors-origin")?;
     let router = http::allow_origins(http::router(jobs.clone(), options), origins);
-    let server =
-        axum::serve(listener, router).with_graceful_shutdown(stop.clone().cancelled_owned());
-    let mut server = tokio::spawn(server.into_future());
+    let mut server = tokio::spawn(http::serve(listener, router, options, stop.clone()));
 
     let name = tokio::select! {
         name = signals.next() => name,
         ended = &mut server => {
             // The listener never ends by itself; if it does the jobs are still handed back.
             jobs.shutdown(args.shutdown_grace()).await;
-            return ended?.context("the listener failed");
+            return ended.context("the listener failed");
         }
     };
     tracing::info!(signal = name, "stopping");
@@ -108,7 +106,7 @@ async fn serve(args: &ServeArgs) -> anyhow::Result<()> {
     stop.cancel();
     // Requests first, for they need the job table; running jobs go on meanwhile.
     match timeout(REQUESTS_END_WITHIN, &mut server).await {
-        Ok(ended) => ended?.context("the listener failed")?,
+        Ok(ended) => ended.context("the listener failed")?,
         Err(_) => {
             tracing::warn!("some requests did not end and are cut off");
             server.abort();

@@ -16,6 +16,7 @@ use crate::contact::geometry::wheel_rail::Side;
 pub struct Case {
     /// Free text for people, at most 200 characters.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub name: Option<String>,
     /// Free key–value pairs to find the case again, at most 32 of them.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
@@ -29,6 +30,7 @@ pub struct Case {
     pub contact: Contact,
     /// How hard they are pressed together; needed unless the contact carries its own pressure.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub load: Option<Load>,
     /// One motion, a list of motions, or a sweep.
     pub motion: Motions,
@@ -60,11 +62,11 @@ pub enum Material {
 pub struct Elastic {
     /// Shear modulus G in MPa, more than 0.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(exclusive_minimum = 0.0)]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub shear_modulus_mpa: Option<f64>,
     /// Young's modulus E in MPa, more than 0.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(exclusive_minimum = 0.0)]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub young_modulus_mpa: Option<f64>,
     /// Poisson's ratio, 0 to 0.5.
     #[schema(minimum = 0.0, maximum = 0.5)]
@@ -178,19 +180,24 @@ pub enum Contact {
 pub struct CrossSection {
     /// Points `[y, z]` in mm, in order along the cross-section.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub points_mm: Option<Vec<[f64; 2]>>,
     /// Format of `text`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub format: Option<Format>,
     /// What the file says; its text, never a path.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub text: Option<String>,
     /// y of the points is positive to the track centre. Left out, the file tells; then a wheel's flange, and a rail is as
     /// above.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub mirror_y: Option<bool>,
     /// z of the points is positive up. Left out, the file tells, then the shape.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub mirror_z: Option<bool>,
     /// Waves shorter than about this along the cross-section are smoothed away, in mm; 0 (none) when left out.
     #[schema(required = false)]
@@ -202,16 +209,17 @@ pub struct CrossSection {
 pub struct Load {
     /// Normal force in N, more than 0. For `profiles` the sum over all patches, each along its own normal.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(exclusive_minimum = 0.0)]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub normal_force_n: Option<f64>,
     /// Vertical force of the wheel on the rail in N, more than 0; for `profiles` only.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(exclusive_minimum = 0.0)]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub vertical_force_n: Option<f64>,
     /// Approach of distant points in mm. For `radii` and `ellipse` it counts from first touch and is more than 0; for gaps it
     /// counts from gap = 0 of the given data and is more than the least gap; for `profiles` the wheel is lowered by it, vertically
     /// from first touch.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub approach_mm: Option<f64>,
 }
 
@@ -282,10 +290,11 @@ pub struct Wheelset {
     pub speed_mm_per_s: f64,
     /// Angular velocity Ω about the axle in rad/s, positive for rolling forward.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub angular_velocity_rad_per_s: Option<f64>,
     /// Radius in mm at which the wheel would roll freely: Ω is the speed divided by it.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(exclusive_minimum = 0.0)]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub free_rolling_radius_mm: Option<f64>,
     /// Velocity of the centre to the left in mm/s; 0 when left out.
     #[schema(required = false)]
@@ -303,12 +312,15 @@ pub struct Wheelset {
 pub struct Sweep {
     /// Longitudinal creepage.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub creepage_x: Option<Range>,
     /// Lateral creepage.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub creepage_y: Option<Range>,
     /// Spin in 1/mm.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub spin_per_mm: Option<Range>,
     /// Longitudinal force on the lower body in N, in place of `creepage_x`.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -353,17 +365,18 @@ pub struct Solver {
     pub method: Method,
     /// Allowed error of the resultants relative to μN (moment: μN√(A/π)), 1e-4 to 0.5. Excludes `mesh`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 0.0001, maximum = 0.5)]
+    #[schema(nullable = false, minimum = 0.0001, maximum = 0.5)]
     pub target_error: Option<f64>,
     /// An explicit mesh instead of a target.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub mesh: Option<MeshSize>,
     /// How much traction `fastsim` lets friction carry where; `elliptic` when left out. For no other method.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub traction_bound: Option<TractionBound>,
     /// Give up after this many seconds of solving.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(exclusive_minimum = 0.0)]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub time_limit_s: Option<f64>,
 }
 

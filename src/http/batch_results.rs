@@ -70,7 +70,7 @@ problems! {
     params(
         ("id" = String, Path, description = "Id of the batch", format = "uuid"),
         ("wait" = Option<u32>, Query, minimum = 0, maximum = 3600, description = "Wait for jobs that have not ended, at most this many seconds in all; lines are sent as soon as everything before them is there"),
-        ("format" = Option<String>, Query, description = "`ndjson` or `csv`; overrides `Accept`", example = "csv")
+        ("format" = Option<String>, Query, description = "`ndjson` or `csv`; overrides `Accept`", pattern = "^(ndjson|csv)$", example = "csv")
     ),
     responses((status = 200, description = "One line per job", content((BatchLine = "application/x-ndjson"), (String = "text/csv"))), BatchResultProblems)
 )]

@@ -131,9 +131,9 @@ problems! {
     tag = "batches",
     operation_id = "submit_batch",
     params(
-        ("accept" = Option<String>, Query, description = "`all` (when left out): one faulty case refuses the batch; `valid`: faulty cases are left out and reported", example = "valid"),
+        ("accept" = Option<String>, Query, description = "`all` (when left out): one faulty case refuses the batch; `valid`: faulty cases are left out and reported", pattern = "^(all|valid)$", example = "valid"),
         ("template" = Option<String>, Query, description = "With `text/csv`, and needed there: the job whose case is the template", format = "uuid"),
-        ("Idempotency-Key" = Option<String>, Header, description = "1 to 255 visible ASCII characters. Repeating a request with the same key and the same cases answers the first batch instead of making another"),
+        ("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[!-~]+$", description = "1 to 255 visible ASCII characters. Repeating a request with the same key and the same cases answers the first batch instead of making another"),
         ("Cache-Control" = Option<String>, Header, description = "`no-cache`: solve all cases, also those that are identical to cases solved before", example = "no-cache")
     ),
     request_body(content(

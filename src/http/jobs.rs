@@ -60,7 +60,7 @@ problems! {
     operation_id = "submit_job",
     params(
         ("Prefer" = Option<String>, Header, description = "`wait=N`: answer when the job has ended, at most N seconds (60 at most) later (RFC 7240)", example = "wait=10"),
-        ("Idempotency-Key" = Option<String>, Header, description = "1 to 255 visible ASCII characters. Repeating a request with the same key and the same case answers the first job instead of making another"),
+        ("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[!-~]+$", description = "1 to 255 visible ASCII characters. Repeating a request with the same key and the same case answers the first job instead of making another"),
         ("Cache-Control" = Option<String>, Header, description = "`no-cache`: solve the case even if an identical one was solved before", example = "no-cache")
     ),
     request_body(content = Case, description = "One case", content_type = "application/json"),
@@ -191,8 +191,8 @@ problems! {
         ("state" = Option<JobState>, Query, description = "Only jobs in this state"),
         ("batch" = Option<String>, Query, description = "Only jobs of this batch", format = "uuid"),
         ("label" = Option<String>, Query, description = "Only jobs with this label, written `key:value`", example = "line:A12"),
-        ("created_after" = Option<String>, Query, description = "Only jobs submitted at or after this time (RFC 3339)", example = "2026-01-31T09:30:00Z"),
-        ("created_before" = Option<String>, Query, description = "Only jobs submitted before this time (RFC 3339)"),
+        ("created_after" = Option<String>, Query, description = "Only jobs submitted at or after this time (RFC 3339)", format = "date-time", example = "2026-01-31T09:30:00Z"),
+        ("created_before" = Option<String>, Query, description = "Only jobs submitted before this time (RFC 3339)", format = "date-time"),
         ("limit" = Option<u32>, Query, minimum = 1, maximum = 1000, description = "Jobs in one page; 50 when left out"),
         ("cursor" = Option<String>, Query, description = "`next_cursor` of the page before, with the same filters")
     ),

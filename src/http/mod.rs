@@ -12,6 +12,7 @@ mod caching;
 mod cases;
 mod cells;
 mod coding;
+mod connections;
 mod elements;
 mod error;
 mod events;
@@ -53,6 +54,7 @@ use crate::http::access::{Access, Unscoped};
 use crate::http::error::{ApiError, Kind};
 use crate::jobs::Jobs;
 
+pub use crate::http::connections::serve;
 pub use crate::http::headers::allow_origins;
 pub use crate::http::openapi::openapi_json;
 
@@ -61,6 +63,8 @@ pub use crate::http::openapi::openapi_json;
 pub struct HttpOptions {
     /// Largest body of one case in bytes.
     pub body_max_bytes: usize,
+    /// Time for the next request's head to arrive on a connection, idle time included.
+    pub head_timeout: Duration,
     /// Time for a body to arrive whole; for a batch, time between two pieces.
     pub body_timeout: Duration,
     /// Largest body of a batch in bytes.
@@ -77,6 +81,8 @@ impl Default for HttpOptions {
     fn default() -> Self {
         HttpOptions {
             body_max_bytes: 8 << 20,
+            // Longer than the usual proxies keep an idle connection, so that they close it first.
+            head_timeout: Duration::from_secs(75),
             body_timeout: Duration::from_secs(60),
             batch_max_bytes: 1 << 30,
             batch_max_cases: 200_000,

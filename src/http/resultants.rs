@@ -76,7 +76,7 @@ problems! {
         ("id" = String, Path, description = "Id of the job", format = "uuid"),
         ("point" = Option<u32>, Query, description = "Only this motion, counted from 0"),
         ("patch" = Option<u32>, Query, description = "Only this patch, counted from 0; `total` stays the sum over all"),
-        ("format" = Option<String>, Query, description = "`json` or `csv`; overrides `Accept`", example = "csv")
+        ("format" = Option<String>, Query, description = "`json` or `csv`; overrides `Accept`", pattern = "^(json|csv)$", example = "csv")
     ),
     responses((status = 200, description = "Forces and moments on the lower body. CSV: one line per patch and motion, then one per motion with `total` as its patch", content((Resultants = "application/json"), (String = "text/csv"))), PartProblems)
 )]

@@ -16,6 +16,7 @@ use reqwest::header::HeaderMap;
 use reqwest::{Method, RequestBuilder};
 use serde_json::Value;
 use tempfile::TempDir;
+use tokio_util::sync::CancellationToken;
 
 use crate::schema::assert_documented;
 
@@ -85,7 +86,8 @@ impl Setup {
             .expect("a free port");
         let address = listener.local_addr().expect("an address");
         let service = router(jobs.clone(), self.http);
-        tokio::spawn(async move { axum::serve(listener, service).await });
+        let never = CancellationToken::new();
+        tokio::spawn(railhead::http::serve(listener, service, self.http, never));
         Server {
             jobs,
             address,

@@ -1,0 +1,47 @@
+//! Accepts connections, lets go of clients that never finish a request's head, and ends when told to.
+
+use axum::Router;
+use axum::serve::Listener;
+use hyper::server::conn::http1::Builder;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::server::graceful::GracefulShutdown;
+use hyper_util::service::TowerToHyperService;
+use tokio::net::TcpListener;
+use tokio_util::sync::CancellationToken;
+
+use crate::http::HttpOptions;
+
+/// Serves a router until `stop`; then no connection is accepted any more, and this returns when the open requests have
+/// been answered.
+///
+/// A connection whose next request head is not there within [`HttpOptions::head_timeout`] is closed, be it that a
+/// client sends a byte now and then or nothing at all; the time for bodies is kept by those who read them.
+pub async fn serve(
+    mut listener: TcpListener,
+    router: Router,
+    options: HttpOptions,
+    stop: CancellationToken,
+) {
+    let mut builder = Builder::new();
+    builder
+        .timer(TokioTimer::new())
+        .header_read_timeout(options.head_timeout);
+    let open = GracefulShutdown::new();
+    loop {
+        let stream = tokio::select! {
+            () = stop.cancelled() => break,
+            // Errors of single connections are passed over, a lack of descriptors is waited out.
+            (stream, _) = Listener::accept(&mut listener) => stream,
+        };
+        let service = TowerToHyperService::new(router.clone());
+        let connection = builder.serve_connection(TokioIo::new(stream), service);
+        let connection = open.watch(connection);
+        tokio::spawn(async move {
+            if let Err(error) = connection.await {
+                tracing::debug!(%error, "connection ended early");
+            }
+        });
+    }
+    drop(listener);
+    open.shutdown().await;
+}
