@@ -150,6 +150,12 @@ impl Differences {
         })
     }
 
+    /// Bytes of the matrix.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.matrix.bytes()
+    }
+
     /// Number of segments whose rows are stored: all, or half of them if folded.
     #[must_use]
     pub fn segments(&self) -> usize {

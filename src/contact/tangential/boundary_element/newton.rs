@@ -134,6 +134,12 @@ impl<'a> Newton<'a> {
         sum / (PROJECTION * self.parameter.len().max(1) as f64)
     }
 
+    /// Entries of the influence that one product touches.
+    #[must_use]
+    pub fn entries(&self) -> usize {
+        self.equations.entries()
+    }
+
     /// Number of cells with unknowns.
     #[must_use]
     pub fn cells(&self) -> usize {
