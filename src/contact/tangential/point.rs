@@ -119,7 +119,11 @@ fn on_mesh(
         strips: (size.strips / 4 * 2).max(SIDE_HALVED),
         cells: (size.cells / 2).max(SIDE_HALVED),
     };
-    if cells(size) >= CELLS_NESTED && 2 * cells(half) <= cells(size) {
+    let number = ladder.level(size.into())?;
+    let level = ladder.get(number);
+    let motion = level.scale.motion(&asked.motion);
+    let started = ladder.trail.start(number, level, &motion).is_some();
+    if !started && cells(size) >= CELLS_NESTED && 2 * cells(half) <= cells(size) {
         coarser = match on_mesh(problem, ladder, asked, half, monitor) {
             Ok(point) => Some(point),
             // The mesh that was asked for may do better.
@@ -272,12 +276,9 @@ pub fn climb(
         Some(point) => Opinion::Coarser(&point.summed, share),
         None => Opinion::Alone,
     };
-    let finer = if coarser_like.is_none() && tangential.slips.iter().all(|slips| *slips) {
-        let [strips, cells] = [level.plan.size.strips, level.plan.size.cells].map(|n| 2 * n);
-        let size = MeshSize { strips, cells };
-        Level::new(problem, Plan { size, ..level.plan }).ok()
-    } else {
-        None
+    let finer = match coarser_like {
+        None => finer_for_sums(problem, level, asked, &tangential),
+        Some(_) => None,
     };
     let errors = estimate::errors(
         problem,
@@ -318,6 +319,23 @@ pub fn climb(
         method: method_used(problem),
         seconds,
     })
+}
+
+/// A level of four times as many cells, where everything slips and the tractions turn: how they add up depends on the
+/// cells. Without spin all tractions point the same way, and cells of any size add up to the load.
+fn finer_for_sums(
+    problem: &Problem,
+    level: &Level,
+    asked: Asked,
+    answer: &Tangential,
+) -> Option<Level> {
+    let turns = asked.motion.spin_per_mm != 0.0 && problem.friction > 0.0;
+    if !turns || !answer.slips.iter().all(|slips| *slips) {
+        return None;
+    }
+    let [strips, cells] = [level.plan.size.strips, level.plan.size.cells].map(|n| 2 * n);
+    let size = MeshSize { strips, cells };
+    Level::new(problem, Plan { size, ..level.plan }).ok()
 }
 
 /// The resultants of every patch where the climb leads to.
