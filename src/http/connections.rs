@@ -1,15 +1,20 @@
 //! Accepts connections, lets go of clients that never finish a request's head, and ends when told to.
 
 use axum::Router;
+use axum::body::Body;
+use axum::http::Request;
 use axum::serve::Listener;
+use hyper::body::Incoming;
 use hyper::server::conn::http1::Builder;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
 use hyper_util::service::TowerToHyperService;
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
+use tower::ServiceExt;
 
 use crate::http::HttpOptions;
+use crate::http::access::Peer;
 
 /// Serves a router until `stop`; then no connection is accepted any more, and this returns when the open requests have
 /// been answered.
@@ -28,12 +33,19 @@ pub async fn serve(
         .header_read_timeout(options.head_timeout);
     let open = GracefulShutdown::new();
     loop {
-        let stream = tokio::select! {
+        let (stream, address) = tokio::select! {
             () = stop.cancelled() => break,
             // Errors of single connections are passed over, a lack of descriptors is waited out.
-            (stream, _) = Listener::accept(&mut listener) => stream,
+            accepted = Listener::accept(&mut listener) => accepted,
         };
-        let service = TowerToHyperService::new(router.clone());
+        let peer = Peer(address.ip());
+        let service = router
+            .clone()
+            .map_request(move |mut request: Request<Incoming>| {
+                request.extensions_mut().insert(peer);
+                request.map(Body::new)
+            });
+        let service = TowerToHyperService::new(service);
         let connection = builder.serve_connection(TokioIo::new(stream), service);
         let connection = open.watch(connection);
         tokio::spawn(async move {

@@ -10,7 +10,7 @@ pub mod backup;
 pub mod batch;
 pub mod clock;
 pub mod error;
-mod fetch;
+pub mod fetch;
 pub mod fields;
 mod follow;
 mod group;
@@ -28,6 +28,7 @@ mod solver_thread;
 mod spool;
 mod storage;
 pub mod store;
+pub mod trace;
 pub mod watch;
 pub mod worker;
 
@@ -38,6 +39,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use bytes::Bytes;
+use opentelemetry::KeyValue;
 use serde_json::Value;
 use tokio::sync::{Notify, broadcast};
 use tokio::time::{Instant, timeout, timeout_at};
@@ -155,6 +157,24 @@ impl Jobs {
         idempotency_key: Option<String>,
         fresh: bool,
     ) -> Result<Job, JobsError> {
+        let span = self.submitting();
+        let traceparent = span.traceparent();
+        let submitted = self.store_case(case, idempotency_key, fresh, traceparent);
+        span.end(submitted.await, |job| {
+            vec![
+                KeyValue::new("railhead.job.id", job.id.to_string()),
+                KeyValue::new("railhead.job.cached", job.cached),
+            ]
+        })
+    }
+
+    async fn store_case(
+        &self,
+        case: Value,
+        idempotency_key: Option<String>,
+        fresh: bool,
+        traceparent: Option<Arc<str>>,
+    ) -> Result<Job, JobsError> {
         if self.shared.draining.is_cancelled() {
             return Err(JobsError::Draining);
         }
@@ -188,6 +208,7 @@ impl Jobs {
             source: None,
             body: Bytes::from(body.map_err(|error| JobsError::Damaged(error.to_string()))?),
             idempotency,
+            traceparent,
         };
         if !fresh {
             self.find_sources(std::iter::once(&mut new)).await?;

@@ -102,6 +102,7 @@ impl Pair {
             reuse_key: None,
             source: None,
             idempotency: None,
+            traceparent: None,
         };
         self.store.enqueue(&new).await.unwrap();
         self.ids.push(id);

@@ -92,7 +92,7 @@ impl SqliteStore {
                 .map(|(_, job)| to_json(&job.labels))
                 .collect::<Result<Vec<_>, _>>()?;
             let mut rows = QueryBuilder::<Sqlite>::new(
-                "INSERT INTO jobs (id, state, name, labels, method, created_at, batch_id, batch_index, cost_us, outputs, reuse_key, tenant) ",
+                "INSERT INTO jobs (id, state, name, labels, method, created_at, batch_id, batch_index, cost_us, outputs, reuse_key, tenant, traceparent) ",
             );
             rows.push_values(
                 some.iter().zip(labels),
@@ -108,7 +108,8 @@ impl SqliteStore {
                         .push_bind(job.cost_us)
                         .push_bind(&job.outputs)
                         .push_bind(job.reuse_key.as_ref().map(ReuseKey::as_slice))
-                        .push_bind(&*job.tenant);
+                        .push_bind(&*job.tenant)
+                        .push_bind(job.traceparent.as_deref());
                 },
             );
             rows.build().execute(&mut *transaction).await?;

@@ -98,7 +98,7 @@ impl SqliteStore {
         update.push_bind(i64::try_from(ids.len()).unwrap_or(i64::MAX));
         update.push(", progress = 0, version = version + 1 WHERE id IN (");
         push_list(&mut update, &ids);
-        update.push(") RETURNING id, attempt, lease_number, method");
+        update.push(") RETURNING id, attempt, lease_number, method, traceparent");
         let rows = update.build().fetch_all(&mut *transaction).await?;
         transaction.commit().await?;
         *self.served() = tenant;
@@ -110,6 +110,7 @@ impl SqliteStore {
                     attempt: row.try_get("attempt")?,
                     lease_number: read_count(row, "lease_number")?,
                     method: row.try_get("method")?,
+                    traceparent: row.try_get("traceparent")?,
                 })
             })
             .collect::<Result<Vec<_>, JobsError>>()?;

@@ -139,8 +139,8 @@ impl SqliteStore {
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         let id = new.id.to_string();
         let mut row = sqlx::query(concat!(
-            "INSERT INTO jobs (id, state, name, labels, method, created_at, cost_us, outputs, reuse_key, tenant) \
-             VALUES ($1, 'queued', $2, $3, $4, $5, $6, $7, $8, $9) RETURNING ",
+            "INSERT INTO jobs (id, state, name, labels, method, created_at, cost_us, outputs, reuse_key, tenant, traceparent) \
+             VALUES ($1, 'queued', $2, $3, $4, $5, $6, $7, $8, $9, $10) RETURNING ",
             job_columns!()
         ))
         .bind(&id)
@@ -152,6 +152,7 @@ impl SqliteStore {
         .bind(&new.outputs)
         .bind(new.reuse_key.as_ref().map(ReuseKey::as_slice))
         .bind(&*new.tenant)
+        .bind(new.traceparent.as_deref())
         .fetch_one(&mut *transaction)
         .await?;
         if let Some((key, digest)) = &new.idempotency {
@@ -365,7 +366,7 @@ impl SqliteStore {
         let row = sqlx::query(concat!(
             "SELECT ",
             job_columns!(),
-            ", result_key, field_patches, EXISTS (SELECT 1 FROM results WHERE job_id = id) AS inside \
+            ", result_key, field_patches, outputs, EXISTS (SELECT 1 FROM results WHERE job_id = id) AS inside \
              FROM jobs WHERE id = $1"
         ))
         .bind(id.to_string())
@@ -375,10 +376,12 @@ impl SqliteStore {
         let patches: u32 = row.try_get("field_patches")?;
         let folder: Option<String> = row.try_get("result_key")?;
         let inside: bool = row.try_get("inside")?;
+        let outputs = row.try_get("outputs")?;
         let stored = (inside || folder.is_some()).then_some(StoredResult {
             job: id,
             folder,
             field_patches: patches as usize,
+            outputs,
         });
         Ok(Some((read_job(&row)?, stored)))
     }
