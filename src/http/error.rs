@@ -62,7 +62,7 @@ kinds! {
     OutputNotAsked 404 "output-not-asked" "This output was not asked for" "The case did not ask for this output, so it was not computed; submit the case again with the output named in `outputs`."
     MethodNotAllowed 405 "method-not-allowed" "This method is not allowed here" "The resource exists, but not for this HTTP method; the header `Allow` lists those it has."
     NotAcceptable 406 "not-acceptable" "This form cannot be answered" "The header `Accept` excludes every form in which this resource can be answered, or `format` names another; the detail names them. Most answer `application/json` only."
-    BodyTimeout 408 "body-timeout" "The body came too slowly" "The whole body did not arrive within the allowed time."
+    BodyTimeout 408 "body-timeout" "The body came too slowly" "The whole body did not arrive within the allowed time (60 s for one case), or a batch came at less than 1024 bytes per second."
     ResultNotReady 409 "result-not-ready" "The job has not ended" "The job is queued or running, so there is no result yet; ask again after `Retry-After` seconds, or submit with `Prefer: wait=N`."
     JobFailed 409 "job-failed" "The job failed" "The job ended without a result; the member `error` of the job says why."
     JobCancelled 409 "job-cancelled" "The job was cancelled" "The job was cancelled before it had a result."
@@ -87,6 +87,7 @@ kinds! {
     NotConverged 422 "not-converged" "The solver did not converge" "Only inside a job: the iteration ended without meeting its tolerance; `residual` and `iterations` belong to the best iterate, `detail` says what to try."
     Unsolvable 422 "unsolvable" "The contact has no answer" "Only inside a job: the region cannot be meshed or the contact does not exist; the detail says why."
     OutOfTime 422 "out-of-time" "The solve ran out of time" "Only inside a job: the case's `solver.time_limit_s` was used up."
+    DeadlinePassed 422 "deadline-passed" "The job came too late" "Only inside a job: `deadline_s` of the submission was over before the job had ended; it was not solved any further."
     SolverPanic 500 "solver-panic" "The solver failed" "Only inside a job: the solver stopped on a defect of its own. Other jobs are not affected."
     WorkerLost 500 "worker-lost" "The workers of this job were lost" "Only inside a job: each worker that took the job ended without an answer, as often as is allowed."
 }

@@ -36,6 +36,8 @@ mod spans;
 pub mod table_body;
 mod trace;
 mod unread;
+mod wishes;
+mod write_limit;
 mod zones;
 
 use std::time::Duration;
@@ -68,8 +70,12 @@ pub struct HttpOptions {
     pub body_max_bytes: usize,
     /// Time for the next request's head to arrive on a connection, idle time included.
     pub head_timeout: Duration,
-    /// Time for a body to arrive whole; for a batch, time between two pieces.
+    /// Time for a body to arrive whole; for a batch, time between two pieces, and the head start over its lowest rate.
     pub body_timeout: Duration,
+    /// How long a client may take nothing of its answer.
+    pub write_timeout: Duration,
+    /// Most open connections; further ones wait until others end.
+    pub connections_max: usize,
     /// Largest body of a batch in bytes.
     pub batch_max_bytes: u64,
     /// Most cases of a batch.
@@ -87,6 +93,9 @@ impl Default for HttpOptions {
             // Longer than the usual proxies keep an idle connection, so that they close it first.
             head_timeout: Duration::from_secs(75),
             body_timeout: Duration::from_secs(60),
+            write_timeout: Duration::from_secs(60),
+            // Files of the job table and of results need descriptors too; a process often has 1024.
+            connections_max: 800,
             batch_max_bytes: 1 << 30,
             batch_max_cases: 200_000,
             anonymous: true,

@@ -16,6 +16,7 @@ use crate::jobs::job::{Job, State};
 use crate::jobs::spool::{Card, Spool};
 use crate::jobs::store::{Begun, NewBatch, NewJob};
 use crate::jobs::watch::Reason;
+use crate::jobs::wishes::Wishes;
 use crate::jobs::{Jobs, LOOK_AGAIN, cost_us, created_at, idempotency, outputs_text};
 
 /// Jobs queued in one transaction.
@@ -24,6 +25,8 @@ const CHUNK_JOBS: usize = 1000;
 const CHUNK_BYTES: usize = 4 << 20;
 /// Faulty cases whose faults are kept; further ones are only counted.
 const FAULTY_KEPT: usize = 1000;
+/// Solutions read at once: once they are this large together, the rest is left for the next page.
+const PAGE_BYTES: usize = 1 << 20;
 /// Jobs removed in one transaction.
 const DELETED_AT_ONCE: u32 = 500;
 /// Pause between two looks at a batch that another request is filling.
@@ -102,8 +105,8 @@ pub struct Draft {
     pub rejected: u32,
     /// The first faulty ones.
     pub faulty: Vec<FaultyCase>,
-    /// Cases are solved even if identical ones were solved before.
-    pub fresh: bool,
+    /// What is wished for all jobs.
+    pub wishes: Wishes,
 }
 
 impl Draft {
@@ -179,7 +182,7 @@ impl Jobs {
             cases: 0,
             rejected: 0,
             faulty: Vec::new(),
-            fresh: false,
+            wishes: Wishes::default(),
         })
     }
 
@@ -234,7 +237,9 @@ impl Jobs {
         // A client that hangs up must not leave a batch half filled, so the filling goes on without it.
         let jobs = self.clone();
         let filled = tokio::spawn(async move {
-            let filled = jobs.fill(&new, draft.spool, draft.fresh, traceparent).await;
+            let filled = jobs
+                .fill(&new, draft.spool, draft.wishes, traceparent)
+                .await;
             if filled.is_err()
                 && let Err(error) = jobs.shared.store.drop_batch(new.id).await
             {
@@ -253,7 +258,7 @@ impl Jobs {
         &self,
         new: &NewBatch,
         spool: Spool,
-        fresh: bool,
+        wishes: Wishes,
         traceparent: Option<Arc<str>>,
     ) -> Result<(), JobsError> {
         self.admit(u64::from(new.count)).await?;
@@ -277,15 +282,15 @@ impl Jobs {
                 .into_iter()
                 .map(|(card, case)| {
                     let traceparent = traceparent.clone();
-                    (card.index, self.new_job(card, case, traceparent))
+                    (card.index, self.new_job(card, case, wishes, traceparent))
                 })
                 .collect();
-            if !fresh {
+            if !wishes.fresh {
                 self.find_sources(some.iter_mut().map(|(_, job)| job))
                     .await?;
             }
             let ended = self.shared.store.enqueue_many(new.id, &some).await?;
-            self.ended_cached(&ended);
+            self.shared.ended_cached(&ended);
             for _ in 0..self.shared.options.workers {
                 self.shared.wake.notify_one();
             }
@@ -358,9 +363,9 @@ impl Jobs {
         Ok(())
     }
 
-    /// The next jobs of a batch after the job `after`, in the order they were sent, at most `limit`. With `until`, only
-    /// jobs that have ended are returned as long as that time is not reached, and at least one is waited for. Empty at
-    /// the end of the batch.
+    /// The next jobs of a batch after the job `after`, in the order they were sent, at most `limit`, fewer if their
+    /// results are large. With `until`, only jobs that have ended are returned as long as that time is not reached, and at
+    /// least one is waited for. Empty at the end of the batch.
     ///
     /// # Errors
     /// A failed database, or a result that cannot be read.
@@ -403,16 +408,29 @@ impl Jobs {
                 }
                 lines.truncate(done);
             }
-            for line in &mut lines {
+            let mut bytes = 0;
+            for place in 0..lines.len() {
+                let line = &mut lines[place];
                 if let Some(folder) = &line.folder {
                     line.solution = Some(self.shared.results.solution(folder).await?);
+                }
+                bytes += line.solution.as_ref().map_or(0, Bytes::len);
+                if bytes >= PAGE_BYTES {
+                    lines.truncate(place + 1);
+                    break;
                 }
             }
             return Ok(lines);
         }
     }
 
-    fn new_job(&self, card: Card, case: Vec<u8>, traceparent: Option<Arc<str>>) -> NewJob {
+    fn new_job(
+        &self,
+        card: Card,
+        case: Vec<u8>,
+        wishes: Wishes,
+        traceparent: Option<Arc<str>>,
+    ) -> NewJob {
         let id = Uuid::now_v7();
         NewJob {
             id,
@@ -428,6 +446,7 @@ impl Jobs {
             source: None,
             idempotency: None,
             traceparent,
+            wishes,
         }
     }
 

@@ -30,6 +30,7 @@ mod storage;
 pub mod store;
 pub mod trace;
 pub mod watch;
+pub mod wishes;
 pub mod worker;
 
 use std::collections::HashMap;
@@ -62,6 +63,7 @@ pub use crate::jobs::store::list::{Filter, Page};
 use crate::jobs::store::sqlite::SqliteStore;
 use crate::jobs::store::{Deleted, Enqueued, NewJob};
 use crate::jobs::watch::{Reason, Watch};
+use crate::jobs::wishes::Wishes;
 
 /// Longest list page.
 pub const PAGE_MAX: u32 = 1000;
@@ -136,30 +138,23 @@ impl Jobs {
         case: Value,
         idempotency_key: Option<String>,
     ) -> Result<Job, JobsError> {
-        self.submit_case(case, idempotency_key, false).await
+        self.submit_with(case, idempotency_key, Wishes::default())
+            .await
     }
 
-    /// As [`Jobs::submit`], but the case is solved even if an identical one was solved before.
+    /// As [`Jobs::submit`], with wishes. A repeated idempotency key answers the job as it was first wished for.
     ///
     /// # Errors
     /// As [`Jobs::submit`].
-    pub async fn submit_fresh(
+    pub async fn submit_with(
         &self,
         case: Value,
         idempotency_key: Option<String>,
-    ) -> Result<Job, JobsError> {
-        self.submit_case(case, idempotency_key, true).await
-    }
-
-    async fn submit_case(
-        &self,
-        case: Value,
-        idempotency_key: Option<String>,
-        fresh: bool,
+        wishes: Wishes,
     ) -> Result<Job, JobsError> {
         let span = self.submitting();
         let traceparent = span.traceparent();
-        let submitted = self.store_case(case, idempotency_key, fresh, traceparent);
+        let submitted = self.store_case(case, idempotency_key, wishes, traceparent);
         span.end(submitted.await, |job| {
             vec![
                 KeyValue::new("railhead.job.id", job.id.to_string()),
@@ -172,7 +167,7 @@ impl Jobs {
         &self,
         case: Value,
         idempotency_key: Option<String>,
-        fresh: bool,
+        wishes: Wishes,
         traceparent: Option<Arc<str>>,
     ) -> Result<Job, JobsError> {
         if self.shared.draining.is_cancelled() {
@@ -209,8 +204,9 @@ impl Jobs {
             body: Bytes::from(body.map_err(|error| JobsError::Damaged(error.to_string()))?),
             idempotency,
             traceparent,
+            wishes,
         };
-        if !fresh {
+        if !wishes.fresh {
             self.find_sources(std::iter::once(&mut new)).await?;
         }
         if new.source.is_none() {
@@ -218,7 +214,7 @@ impl Jobs {
         }
         let job = replayed(self.noted(self.shared.store.enqueue(&new).await)?)?;
         if job.id == id && job.cached {
-            self.ended_cached(&[id]);
+            self.shared.ended_cached(&[id]);
             tracing::info!(job = %id, method = new.method, "job answered from an earlier result");
             return Ok(self.dated(job));
         }

@@ -155,10 +155,7 @@ impl Traced {
             return solve();
         };
         let from = SystemTime::now();
-        let queued = Duration::from_millis(created_at(traced.job).unsigned_abs());
-        // The clock may have been set back since.
-        let queued = (UNIX_EPOCH + queued).min(from);
-        traced.past("queue", [queued, from], Vec::new(), None);
+        traced.waited_until(from);
         let outcome = solve();
         let fault = match &outcome {
             Outcome::Solved { .. } => None,
@@ -170,6 +167,14 @@ impl Traced {
         let method = KeyValue::new("railhead.method", traced.method.clone());
         traced.past("solve", [from, SystemTime::now()], vec![method], fault);
         outcome
+    }
+
+    /// Writes down how long a job has waited.
+    pub(super) fn waited_until(&self, end: SystemTime) {
+        let queued = Duration::from_millis(created_at(self.job).unsigned_abs());
+        // The clock may have been set back since.
+        let queued = (UNIX_EPOCH + queued).min(end);
+        self.past("queue", [queued, end], Vec::new(), None);
     }
 
     /// Writes down how long the end of a job took to store, and what it was.

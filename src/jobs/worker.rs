@@ -25,6 +25,7 @@ use crate::jobs::solver_thread::{Outcome, SolverThread, solve_guarded};
 use crate::jobs::store::{Claim, Ending, Placed, Renewal};
 use crate::jobs::trace::Traced;
 use crate::jobs::watch::{Reason, Watch};
+use crate::jobs::wishes::too_late;
 
 /// How often an idle worker looks for jobs although nobody woke it.
 const POLL: Duration = Duration::from_secs(1);
@@ -361,6 +362,7 @@ pub(super) fn judge(outcome: Outcome, watch: &Watch) -> Verdict {
             Some(Reason::Cancel) => Verdict::End(Ending::Cancelled),
             Some(Reason::Shutdown) => Verdict::HandBack,
             Some(Reason::Lost) => Verdict::Lost,
+            Some(Reason::Deadline) => Verdict::End(Ending::Failed(too_late())),
             None => failed(
                 FailureKind::Internal,
                 "the solver stopped although nobody asked it to".to_owned(),

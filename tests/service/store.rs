@@ -6,6 +6,7 @@ use bytes::Bytes;
 use railhead::jobs::store::list::Filter;
 use railhead::jobs::store::sqlite::SqliteStore;
 use railhead::jobs::store::{Claim, Deleted, Ending, Enqueued, NewJob, Placed, Renewal};
+use railhead::jobs::wishes::Wishes;
 use railhead::jobs::{Failure, FailureKind, Job, State};
 use tempfile::TempDir;
 use uuid::Uuid;
@@ -58,6 +59,7 @@ pub fn new_job() -> NewJob {
         source: None,
         idempotency: None,
         traceparent: None,
+        wishes: Wishes::default(),
     }
 }
 

@@ -7,6 +7,7 @@ use proptest::prelude::*;
 use railhead::jobs::State;
 use railhead::jobs::store::sqlite::SqliteStore;
 use railhead::jobs::store::{Claim, Deleted, Ending, NewJob, Placed, Renewal};
+use railhead::jobs::wishes::Wishes;
 use uuid::Uuid;
 
 const LEASE: i64 = 10;
@@ -103,6 +104,7 @@ impl Pair {
             source: None,
             idempotency: None,
             traceparent: None,
+            wishes: Wishes::default(),
         };
         self.store.enqueue(&new).await.unwrap();
         self.ids.push(id);

@@ -15,6 +15,7 @@ use uuid::Uuid;
 
 use crate::jobs::job::{Failure, Job, State};
 use crate::jobs::results::Encoded;
+use crate::jobs::wishes::Wishes;
 
 /// Equal for cases of one tenant that have the same answer.
 pub type ReuseKey = [u8; 16];
@@ -48,6 +49,17 @@ pub struct NewJob {
     pub idempotency: Option<(String, [u8; 32])>,
     /// W3C trace context of its submission, if its trace is collected.
     pub traceparent: Option<Arc<str>>,
+    /// What else the client wishes.
+    pub wishes: Wishes,
+}
+
+impl NewJob {
+    /// When the job must have ended.
+    #[must_use]
+    pub fn deadline(&self) -> Option<i64> {
+        let within = i64::try_from(self.wishes.ends_within?.as_millis()).unwrap_or(i64::MAX);
+        Some(self.created_at.saturating_add(within))
+    }
 }
 
 /// A batch about to be filled.
@@ -104,6 +116,8 @@ pub struct Claim {
     pub method: String,
     /// W3C trace context of its submission, if its trace is collected.
     pub traceparent: Option<String>,
+    /// What tells identical cases; `None` for a job that must be solved.
+    pub reuse_key: Option<ReuseKey>,
 }
 
 /// The answer to a heartbeat.
