@@ -1,22 +1,27 @@
 //! Reads the body of a batch: cut into cases while it arrives, checked portion by portion.
 
+use std::time::Duration;
+
 use axum::body::Body;
 use axum::extract::Request;
 use axum::http::{HeaderMap, header};
 use futures_util::StreamExt;
 use serde_json::Value;
-use tokio::time::timeout;
+use tokio::time::{Instant, timeout_at};
 use uuid::Uuid;
 
 use crate::http::HttpOptions;
 use crate::http::body::{essence, read_json, read_strict};
-use crate::http::coding::too_long;
+use crate::http::coding::{Packed, too_long};
 use crate::http::elements::{Element, Layout, Splitter};
 use crate::http::error::{ApiError, Kind};
 use crate::http::table_body::TableBody;
 use crate::jobs::Jobs;
 use crate::jobs::batch::Draft;
 
+/// Bytes per second of a batch at least, on average and after a head start of the time that a piece may take: otherwise
+/// one byte at a time could keep a connection and a file open for ever.
+const LOWEST_RATE: f64 = 1024.0;
 /// Cases are checked in portions of about this many bytes.
 const PORTION_BYTES: usize = 256 << 10;
 
@@ -101,18 +106,26 @@ pub async fn read_draft(
     if declared.is_some_and(|length| length > options.batch_max_bytes) {
         return Err(too_large());
     }
+    let packed = request.extensions().get::<Packed>().cloned();
     let mut draft = jobs.draft()?;
     let mut splitter = Splitter::new(form.layout(), options.body_max_bytes);
     let mut pieces = request.into_body().into_data_stream();
     let mut portion = Vec::new();
     let (mut total, mut held) = (0_u64, 0);
+    let begun = Instant::now();
     loop {
-        let piece = timeout(options.body_timeout, pieces.next()).await;
-        let piece = piece.map_err(|_| {
+        #[expect(clippy::cast_precision_loss, reason = "far fewer bytes than 2^53")]
+        let owed = Duration::from_secs_f64(total as f64 / LOWEST_RATE);
+        let latest = begun + options.body_timeout + owed;
+        let piece = timeout_at(
+            latest.min(Instant::now() + options.body_timeout),
+            pieces.next(),
+        );
+        let piece = piece.await.map_err(|_| {
             ApiError::new(
                 Kind::BodyTimeout,
                 format!(
-                    "nothing of the body arrived for {} s",
+                    "nothing of the body arrived for {} s, or all of it at less than {LOWEST_RATE} bytes per second",
                     options.body_timeout.as_secs_f64()
                 ),
             )
@@ -128,6 +141,9 @@ pub async fn read_draft(
         total += piece.len() as u64;
         if total > options.batch_max_bytes {
             return Err(too_large());
+        }
+        if packed.as_ref().is_some_and(|packed| packed.is_bomb(total)) {
+            return Err(Packed::refusal());
         }
         held += piece.len();
         splitter.feed(&piece, &mut portion)?;

@@ -28,8 +28,9 @@ use crate::jobs::job::State as JobState;
 
 /// Longest time results are waited for, in s.
 const WAIT_MAX_SECONDS: u32 = 3600;
-/// Jobs read at once.
+/// Most jobs read at once, and how many the first time.
 const PAGE_JOBS: u32 = 500;
+const FIRST_PAGE_JOBS: u32 = 50;
 
 /// One line of the results of a batch.
 #[derive(Debug, Serialize, ToSchema)]
@@ -101,6 +102,7 @@ pub async fn results(
         format,
         until,
         after: None,
+        page: FIRST_PAGE_JOBS,
         head,
     };
     let body = Body::from_stream(try_unfold(place, next_piece));
@@ -122,6 +124,8 @@ struct Place {
     format: Format,
     until: Option<Instant>,
     after: Option<Uuid>,
+    /// Jobs to read at once; large results are read few at a time.
+    page: u32,
     head: Option<Bytes>,
 }
 
@@ -131,8 +135,10 @@ async fn next_piece(mut place: Place) -> Result<Option<(Bytes, Place)>, JobsErro
     }
     let lines = place
         .jobs
-        .batch_lines(place.batch, place.after, PAGE_JOBS, place.until)
+        .batch_lines(place.batch, place.after, place.page, place.until)
         .await?;
+    let read = u32::try_from(lines.len()).unwrap_or(PAGE_JOBS);
+    place.page = (2 * read).clamp(4, PAGE_JOBS);
     let Some(last) = lines.last() else {
         return Ok(None);
     };

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use axum::Json;
 use axum::extract::{Request, State};
-use axum::http::{StatusCode, Uri, header};
+use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -16,12 +16,23 @@ use crate::http::access::Caller;
 use crate::http::batch_body::{form, read_draft};
 use crate::http::error::{ApiError, Kind};
 use crate::http::job::{BatchId, rfc3339};
-use crate::http::jobs::{idempotency_key, wants_fresh};
+use crate::http::jobs::idempotency_key;
 use crate::http::problem::Fault;
 use crate::http::problems::problems;
 use crate::http::query::Query;
+use crate::http::wishes::{PARAMETERS, take_wishes};
 use crate::jobs::batch::{Batch, Draft};
 use crate::jobs::job::State as JobState;
+use crate::jobs::wishes::{Priority, Wishes};
+
+/// The cases of a batch.
+#[derive(ToSchema)]
+#[schema(min_items = 1, max_items = 200_000)]
+#[expect(
+    dead_code,
+    reason = "the form of a body that is cut into cases while it arrives"
+)]
+pub struct Cases(Vec<Case>);
 
 /// A batch that was accepted.
 #[derive(Debug, Serialize, ToSchema)]
@@ -133,11 +144,14 @@ problems! {
     params(
         ("accept" = Option<String>, Query, description = "`all` (when left out): one faulty case refuses the batch; `valid`: faulty cases are left out and reported", pattern = "^(all|valid)$", example = "valid"),
         ("template" = Option<String>, Query, description = "With `text/csv`, and needed there: the job whose case is the template", format = "uuid"),
+        ("priority" = Option<Priority>, Query, description = "Which of the queued jobs of the tenant are solved first: `high` before `normal` (when left out) before `low`. Tenants take turns whatever the priorities of their jobs", example = "high"),
+        ("deadline_s" = Option<u32>, Query, minimum = 1, maximum = 2_592_000, description = "Seconds from now within which a job must have ended. One that has not, queued or running, fails as `deadline-passed`", example = 600),
         ("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[!-~]+$", description = "1 to 255 visible ASCII characters. Repeating a request with the same key and the same cases answers the first batch instead of making another"),
-        ("Cache-Control" = Option<String>, Header, description = "`no-cache`: solve all cases, also those that are identical to cases solved before", example = "no-cache")
+        ("Cache-Control" = Option<String>, Header, description = "`no-cache`: solve all cases, also those that are identical to cases solved before", example = "no-cache"),
+        ("traceparent" = Option<String>, Header, description = "W3C trace context: where the service sends traces, that of the jobs goes on with the client's. What cannot be read is passed over", example = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01")
     ),
     request_body(content(
-        (Vec<Case> = "application/json"),
+        (Cases = "application/json"),
         (String = "application/x-ndjson"),
         (String = "text/csv")
     ), description = "Cases, at most 200 000, each of at most 8 MiB and together at most 1 GiB"),
@@ -154,12 +168,11 @@ pub async fn submit(
     request: Request,
 ) -> Result<Response, ApiError> {
     let key = idempotency_key(request.headers())?;
-    let (valid_only, template) = wishes(request.uri())?;
-    let form = form(&jobs, request.headers(), template).await?;
-    let fresh = wants_fresh(request.headers());
+    let (asked, wishes) = read_query(&request)?;
+    let form = form(&jobs, request.headers(), asked.template).await?;
     let mut draft = read_draft(&jobs, options, form, request).await?;
-    draft.fresh = fresh;
-    if draft.cases == draft.rejected || (draft.rejected > 0 && !valid_only) {
+    draft.wishes = wishes;
+    if draft.cases == draft.rejected || (draft.rejected > 0 && !asked.valid_only) {
         return Err(refusal(&draft));
     }
     let errors = faults(&draft);
@@ -175,9 +188,17 @@ pub async fn submit(
     Ok((StatusCode::ACCEPTED, location, Json(receipt)).into_response())
 }
 
-/// Are good cases taken without the faulty ones, and which job is the template of a table?
-fn wishes(uri: &Uri) -> Result<(bool, Option<Uuid>), ApiError> {
-    let mut query = Query::read(uri, &["accept", "template"]);
+/// What the query says about the batch itself.
+struct Asked {
+    /// Good cases are taken without the faulty ones.
+    valid_only: bool,
+    /// The job whose case is the template of a table.
+    template: Option<Uuid>,
+}
+
+fn read_query(request: &Request) -> Result<(Asked, Wishes), ApiError> {
+    let [priority, deadline] = PARAMETERS;
+    let mut query = Query::read(request.uri(), &["accept", "template", priority, deadline]);
     let valid = query.take("accept", "`all` or `valid`", |text| match text {
         "all" => Some(false),
         "valid" => Some(true),
@@ -186,8 +207,13 @@ fn wishes(uri: &Uri) -> Result<(bool, Option<Uuid>), ApiError> {
     let template = query.take("template", "the id of a job", |text| {
         Uuid::try_parse(text).ok()
     });
+    let wishes = take_wishes(&mut query, request.headers());
     query.finish()?;
-    Ok((valid.unwrap_or(false), template))
+    let asked = Asked {
+        valid_only: valid.unwrap_or(false),
+        template,
+    };
+    Ok((asked, wishes))
 }
 
 /// Why a batch is not taken.

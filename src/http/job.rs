@@ -12,6 +12,7 @@ use crate::http::error::{ApiError, Kind};
 use crate::http::problem::Problem;
 use crate::http::results::JobResult;
 use crate::jobs::job::{Job, State as JobState};
+use crate::jobs::wishes::Priority;
 
 /// A job as the client sees it. Times are RFC 3339 in UTC with milliseconds.
 #[derive(Debug, Serialize, ToSchema)]
@@ -29,6 +30,8 @@ pub struct JobAnswer {
     /// The batch that the job belongs to; null for a job submitted alone.
     #[schema(format = "uuid")]
     batch_id: Option<String>,
+    /// Its place among the queued jobs of the tenant.
+    priority: Priority,
     /// Time of submission.
     #[schema(format = "date-time", example = "2026-01-31T09:30:00.000Z")]
     created_at: String,
@@ -38,6 +41,9 @@ pub struct JobAnswer {
     /// End of the job; null before it.
     #[schema(format = "date-time")]
     ended_at: Option<String>,
+    /// When the job fails if it has not ended by then; null where no deadline was set.
+    #[schema(format = "date-time")]
+    deadline_at: Option<String>,
     /// When the job will be removed with its result; null before its end, and where ended jobs are kept for ever.
     #[schema(format = "date-time")]
     expires_at: Option<String>,
@@ -74,9 +80,11 @@ impl JobAnswer {
             name: job.name,
             labels: job.labels,
             batch_id: job.batch_id.map(|id| id.to_string()),
+            priority: job.priority,
             created_at: rfc3339(job.created_at),
             started_at: job.started_at.map(rfc3339),
             ended_at: job.ended_at.map(rfc3339),
+            deadline_at: job.deadline.map(rfc3339),
             expires_at: job.expires_at.map(rfc3339),
             attempt: job.attempt,
             cached: job.cached,

@@ -17,7 +17,9 @@ use crate::http::job::{JobAnswer, JobId};
 use crate::http::problems::problems;
 use crate::http::query::{Query, whole};
 use crate::http::results::result_of;
+use crate::http::wishes::{PARAMETERS, take_wishes};
 use crate::jobs::job::State as JobState;
+use crate::jobs::wishes::Priority;
 use crate::jobs::{Filter, PAGE_MAX};
 
 /// Longest time that `Prefer: wait` holds a request, in s.
@@ -44,7 +46,7 @@ pub struct JobPage {
 
 problems! {
     /// What `POST /v1/jobs` can fail with.
-    SubmitProblems: MalformedJson, UnreadableBody, BadHeader, BodyTimeout, BodyTooLarge, UnsupportedMediaType, UnsupportedEncoding, FaultyCase,
+    SubmitProblems: MalformedJson, UnreadableBody, BadQuery, BadHeader, BodyTimeout, BodyTooLarge, UnsupportedMediaType, UnsupportedEncoding, FaultyCase,
     IdempotencyConflict, QuotaExceeded, QueueFull, Draining, StorageFull, StorageUnwritable
 }
 
@@ -59,9 +61,12 @@ problems! {
     tag = "jobs",
     operation_id = "submit_job",
     params(
+        ("priority" = Option<Priority>, Query, description = "Which of the queued jobs of the tenant are solved first: `high` before `normal` (when left out) before `low`. Tenants take turns whatever the priorities of their jobs", example = "high"),
+        ("deadline_s" = Option<u32>, Query, minimum = 1, maximum = 2_592_000, description = "Seconds from now within which a job must have ended. One that has not, queued or running, fails as `deadline-passed`", example = 600),
         ("Prefer" = Option<String>, Header, description = "`wait=N`: answer when the job has ended, at most N seconds (60 at most) later (RFC 7240)", example = "wait=10"),
         ("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[!-~]+$", description = "1 to 255 visible ASCII characters. Repeating a request with the same key and the same case answers the first job instead of making another"),
-        ("Cache-Control" = Option<String>, Header, description = "`no-cache`: solve the case even if an identical one was solved before", example = "no-cache")
+        ("Cache-Control" = Option<String>, Header, description = "`no-cache`: solve the case even if an identical one was solved before", example = "no-cache"),
+        ("traceparent" = Option<String>, Header, description = "W3C trace context: where the service sends traces, that of the job goes on with the client's. What cannot be read is passed over", example = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01")
     ),
     request_body(content = Case, description = "One case", content_type = "application/json"),
     responses(
@@ -79,16 +84,16 @@ problems! {
 )]
 pub async fn submit(
     Caller(jobs): Caller,
+    uri: Uri,
     headers: HeaderMap,
     JsonBody(case): JsonBody,
 ) -> Result<Response, ApiError> {
     let key = idempotency_key(&headers)?;
     let wait = preferred_wait(&headers);
-    let mut job = if wants_fresh(&headers) {
-        jobs.submit_fresh(case, key).await?
-    } else {
-        jobs.submit(case, key).await?
-    };
+    let mut query = Query::read(&uri, &PARAMETERS);
+    let wishes = take_wishes(&mut query, &headers);
+    query.finish()?;
+    let mut job = jobs.submit_with(case, key, wishes).await?;
     let location = format!("/v1/jobs/{}", job.id);
     let mut result = None;
     if let Some(seconds) = wait {
@@ -144,17 +149,6 @@ fn preferred_wait(headers: &HeaderMap) -> Option<u32> {
     waits.next().map(|seconds| seconds.min(WAIT_MAX_SECONDS))
 }
 
-/// Does the client refuse results of earlier identical cases?
-#[must_use]
-pub fn wants_fresh(headers: &HeaderMap) -> bool {
-    let values = headers.get_all(header::CACHE_CONTROL);
-    let mut directives = values
-        .iter()
-        .filter_map(|value| value.to_str().ok())
-        .flat_map(|value| value.split(','));
-    directives.any(|directive| directive.trim().eq_ignore_ascii_case("no-cache"))
-}
-
 /// The idempotency key of a request, if it has one.
 ///
 /// # Errors
@@ -194,7 +188,7 @@ problems! {
         ("created_after" = Option<String>, Query, description = "Only jobs submitted at or after this time (RFC 3339)", format = "date-time", example = "2026-01-31T09:30:00Z"),
         ("created_before" = Option<String>, Query, description = "Only jobs submitted before this time (RFC 3339)", format = "date-time"),
         ("limit" = Option<u32>, Query, minimum = 1, maximum = 1000, description = "Jobs in one page; 50 when left out"),
-        ("cursor" = Option<String>, Query, description = "`next_cursor` of the page before, with the same filters")
+        ("cursor" = Option<String>, Query, pattern = "^[0-9a-f]{40}$", description = "`next_cursor` of the page before, with the same filters")
     ),
     responses((status = 200, description = "A page of jobs", body = JobPage), ListProblems)
 )]

@@ -7,13 +7,13 @@ mod access;
 mod batch_body;
 mod batch_results;
 mod batches;
-mod body;
+pub mod body;
 mod caching;
 mod cases;
 mod cells;
 mod coding;
 mod connections;
-mod elements;
+pub mod elements;
 mod error;
 mod events;
 mod fields;
@@ -32,8 +32,12 @@ mod problems;
 mod query;
 mod resultants;
 mod results;
-mod table_body;
+mod spans;
+pub mod table_body;
 mod trace;
+mod unread;
+mod wishes;
+mod write_limit;
 mod zones;
 
 use std::time::Duration;
@@ -54,6 +58,7 @@ use crate::http::access::{Access, Unscoped};
 use crate::http::error::{ApiError, Kind};
 use crate::jobs::Jobs;
 
+pub use crate::http::access::Peer;
 pub use crate::http::connections::serve;
 pub use crate::http::headers::allow_origins;
 pub use crate::http::openapi::openapi_json;
@@ -65,15 +70,19 @@ pub struct HttpOptions {
     pub body_max_bytes: usize,
     /// Time for the next request's head to arrive on a connection, idle time included.
     pub head_timeout: Duration,
-    /// Time for a body to arrive whole; for a batch, time between two pieces.
+    /// Time for a body to arrive whole; for a batch, time between two pieces, and the head start over its lowest rate.
     pub body_timeout: Duration,
+    /// How long a client may take nothing of its answer.
+    pub write_timeout: Duration,
+    /// Most open connections; further ones wait until others end.
+    pub connections_max: usize,
     /// Largest body of a batch in bytes.
     pub batch_max_bytes: u64,
     /// Most cases of a batch.
     pub batch_max_cases: u32,
     /// Requests without a key are answered, as those of a tenant of their own.
     pub anonymous: bool,
-    /// Requests per second of one key; 0 for any number.
+    /// Requests per second of one key, or of one address without a key; 0 for any number.
     pub requests_per_second: u32,
 }
 
@@ -84,6 +93,9 @@ impl Default for HttpOptions {
             // Longer than the usual proxies keep an idle connection, so that they close it first.
             head_timeout: Duration::from_secs(75),
             body_timeout: Duration::from_secs(60),
+            write_timeout: Duration::from_secs(60),
+            // Files of the job table and of results need descriptors too; a process often has 1024.
+            connections_max: 800,
             batch_max_bytes: 1 << 30,
             batch_max_cases: 200_000,
             anonymous: true,
@@ -124,9 +136,11 @@ pub fn router(jobs: Jobs, options: HttpOptions) -> Router {
         .layer(from_fn(error::name_instance))
         .layer(coding::packing())
         .layer(from_fn(caching::complete))
-        .layer(from_fn_with_state(metrics.clone(), metrics::count))
+        .layer(from_fn_with_state(metrics.clone(), metrics::count));
+    let router = spans::trace(router, jobs.tracer())
         .layer(trace::span_layer())
         .layer(from_fn(trace::carry_request_id))
+        .layer(from_fn(unread::read_away))
         .with_state(Shared {
             unscoped: Unscoped(jobs),
             access,

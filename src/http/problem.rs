@@ -100,6 +100,7 @@ impl Problem {
             FailureKind::NotConverged => Kind::NotConverged,
             FailureKind::Unsolvable => Kind::Unsolvable,
             FailureKind::OutOfTime => Kind::OutOfTime,
+            FailureKind::DeadlinePassed => Kind::DeadlinePassed,
             FailureKind::Panic => Kind::SolverPanic,
             FailureKind::WorkerLost => Kind::WorkerLost,
             FailureKind::Internal => Kind::Internal,

@@ -1,9 +1,11 @@
 //! Batches: many cases checked one by one, queued together, followed and cancelled as one.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Duration;
 
 use bytes::Bytes;
+use opentelemetry::KeyValue;
 use serde_json::Value;
 use tokio::time::{Instant, timeout_at};
 use uuid::Uuid;
@@ -14,6 +16,7 @@ use crate::jobs::job::{Job, State};
 use crate::jobs::spool::{Card, Spool};
 use crate::jobs::store::{Begun, NewBatch, NewJob};
 use crate::jobs::watch::Reason;
+use crate::jobs::wishes::Wishes;
 use crate::jobs::{Jobs, LOOK_AGAIN, cost_us, created_at, idempotency, outputs_text};
 
 /// Jobs queued in one transaction.
@@ -22,6 +25,8 @@ const CHUNK_JOBS: usize = 1000;
 const CHUNK_BYTES: usize = 4 << 20;
 /// Faulty cases whose faults are kept; further ones are only counted.
 const FAULTY_KEPT: usize = 1000;
+/// Solutions read at once: once they are this large together, the rest is left for the next page.
+const PAGE_BYTES: usize = 1 << 20;
 /// Jobs removed in one transaction.
 const DELETED_AT_ONCE: u32 = 500;
 /// Pause between two looks at a batch that another request is filling.
@@ -100,8 +105,8 @@ pub struct Draft {
     pub rejected: u32,
     /// The first faulty ones.
     pub faulty: Vec<FaultyCase>,
-    /// Cases are solved even if identical ones were solved before.
-    pub fresh: bool,
+    /// What is wished for all jobs.
+    pub wishes: Wishes,
 }
 
 impl Draft {
@@ -177,7 +182,7 @@ impl Jobs {
             cases: 0,
             rejected: 0,
             faulty: Vec::new(),
-            fresh: false,
+            wishes: Wishes::default(),
         })
     }
 
@@ -190,6 +195,23 @@ impl Jobs {
         &self,
         draft: Draft,
         idempotency_key: Option<String>,
+    ) -> Result<Batch, JobsError> {
+        let span = self.submitting();
+        let traceparent = span.traceparent();
+        let submitted = self.store_batch(draft, idempotency_key, traceparent);
+        span.end(submitted.await, |batch| {
+            vec![
+                KeyValue::new("railhead.batch.id", batch.id.to_string()),
+                KeyValue::new("railhead.batch.jobs", i64::from(batch.count)),
+            ]
+        })
+    }
+
+    async fn store_batch(
+        &self,
+        draft: Draft,
+        idempotency_key: Option<String>,
+        traceparent: Option<Arc<str>>,
     ) -> Result<Batch, JobsError> {
         let id = Uuid::now_v7();
         let digest = *draft.digest.finalize().as_bytes();
@@ -215,7 +237,9 @@ impl Jobs {
         // A client that hangs up must not leave a batch half filled, so the filling goes on without it.
         let jobs = self.clone();
         let filled = tokio::spawn(async move {
-            let filled = jobs.fill(&new, draft.spool, draft.fresh).await;
+            let filled = jobs
+                .fill(&new, draft.spool, draft.wishes, traceparent)
+                .await;
             if filled.is_err()
                 && let Err(error) = jobs.shared.store.drop_batch(new.id).await
             {
@@ -230,7 +254,13 @@ impl Jobs {
         self.batch(id).await
     }
 
-    async fn fill(&self, new: &NewBatch, spool: Spool, fresh: bool) -> Result<(), JobsError> {
+    async fn fill(
+        &self,
+        new: &NewBatch,
+        spool: Spool,
+        wishes: Wishes,
+        traceparent: Option<Arc<str>>,
+    ) -> Result<(), JobsError> {
         self.admit(u64::from(new.count)).await?;
         let mut reader = spool
             .into_reader()
@@ -250,14 +280,17 @@ impl Jobs {
             }
             let mut some: Vec<_> = cases
                 .into_iter()
-                .map(|(card, case)| (card.index, self.new_job(card, case)))
+                .map(|(card, case)| {
+                    let traceparent = traceparent.clone();
+                    (card.index, self.new_job(card, case, wishes, traceparent))
+                })
                 .collect();
-            if !fresh {
+            if !wishes.fresh {
                 self.find_sources(some.iter_mut().map(|(_, job)| job))
                     .await?;
             }
             let ended = self.shared.store.enqueue_many(new.id, &some).await?;
-            self.ended_cached(&ended);
+            self.shared.ended_cached(&ended);
             for _ in 0..self.shared.options.workers {
                 self.shared.wake.notify_one();
             }
@@ -330,9 +363,9 @@ impl Jobs {
         Ok(())
     }
 
-    /// The next jobs of a batch after the job `after`, in the order they were sent, at most `limit`. With `until`, only
-    /// jobs that have ended are returned as long as that time is not reached, and at least one is waited for. Empty at
-    /// the end of the batch.
+    /// The next jobs of a batch after the job `after`, in the order they were sent, at most `limit`, fewer if their
+    /// results are large. With `until`, only jobs that have ended are returned as long as that time is not reached, and at
+    /// least one is waited for. Empty at the end of the batch.
     ///
     /// # Errors
     /// A failed database, or a result that cannot be read.
@@ -375,16 +408,29 @@ impl Jobs {
                 }
                 lines.truncate(done);
             }
-            for line in &mut lines {
+            let mut bytes = 0;
+            for place in 0..lines.len() {
+                let line = &mut lines[place];
                 if let Some(folder) = &line.folder {
                     line.solution = Some(self.shared.results.solution(folder).await?);
+                }
+                bytes += line.solution.as_ref().map_or(0, Bytes::len);
+                if bytes >= PAGE_BYTES {
+                    lines.truncate(place + 1);
+                    break;
                 }
             }
             return Ok(lines);
         }
     }
 
-    fn new_job(&self, card: Card, case: Vec<u8>) -> NewJob {
+    fn new_job(
+        &self,
+        card: Card,
+        case: Vec<u8>,
+        wishes: Wishes,
+        traceparent: Option<Arc<str>>,
+    ) -> NewJob {
         let id = Uuid::now_v7();
         NewJob {
             id,
@@ -399,6 +445,8 @@ impl Jobs {
             reuse_key: self.reuse_key(&card.digest),
             source: None,
             idempotency: None,
+            traceparent,
+            wishes,
         }
     }
 

@@ -1,6 +1,7 @@
 //! What can go wrong between a client's wish and a job.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use thiserror::Error;
 
@@ -87,6 +88,9 @@ pub enum JobsError {
     /// The database failed.
     #[error("the job table failed: {0}")]
     Database(#[from] sqlx::Error),
+    /// Jobs that were to be stored together could not be; nothing of them was stored.
+    #[error(transparent)]
+    Together(Arc<JobsError>),
     /// The job table cannot be brought to the form this version needs.
     #[error("the job table cannot be migrated: {0}")]
     Migration(#[from] sqlx::migrate::MigrateError),

@@ -2,13 +2,14 @@
 //!
 //! A small job is solved faster than a transaction is written, so one transaction serves many. The promises stay: each
 //! job has its own fence, its own watch and its own end. A group that dies goes back to the queue uncounted and its
-//! jobs are then taken one at a time, so that only a job that dies alone counts an attempt.
+//! jobs are then taken one at a time, so that only a job that dies alone counts an attempt. Of identical jobs one is
+//! solved.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::pin::pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use bytes::Bytes;
 use tokio::sync::oneshot;
@@ -17,9 +18,11 @@ use tracing::Instrument;
 use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
+use crate::jobs::job::State;
 use crate::jobs::solver_thread::{Outcome, SolverThread, solve_guarded};
 use crate::jobs::store::sqlite::groups::GroupBounds;
 use crate::jobs::store::{Claim, Ending};
+use crate::jobs::trace::Traced;
 use crate::jobs::watch::{Reason, Watch};
 use crate::jobs::worker::{
     PATIENCE, Registered, Verdict, Worker, heartbeat, judge, lease_ms, not_stored,
@@ -56,16 +59,71 @@ impl Worker {
             .store
             .claim_group(&self.name, self.shared.now_ms(), lease, bounds)
             .await?;
-        match claims.len() {
-            0 => return Ok(false),
-            1 => {
-                let claim = claims.remove(0);
+        if claims.is_empty() {
+            return Ok(false);
+        }
+        if self.shared.options.cache {
+            claims = self.answer_from_earlier(claims).await?;
+        } else {
+            claims.iter_mut().for_each(|claim| claim.reuse_key = None);
+        }
+        let twins = set_aside_twins(&mut claims);
+        match claims.as_slice() {
+            [] => {}
+            [claim] if twins.is_empty() => {
                 let span = tracing::info_span!("job", job = %claim.id, attempt = claim.attempt, method = claim.method);
-                self.attempt(&claim).instrument(span).await?;
+                self.attempt(claim).instrument(span).await?;
             }
             _ => self.attempt_group(claims).await?,
         }
+        self.answer_with(twins).await?;
         Ok(true)
+    }
+
+    /// Ends those of the claimed jobs whose result has been there since they were queued; returns the others.
+    async fn answer_from_earlier(&self, claims: Vec<Claim>) -> Result<Vec<Claim>, JobsError> {
+        let keys: Vec<_> = claims.iter().filter_map(|claim| claim.reuse_key).collect();
+        let sources = self.shared.store.sources(&keys).await?;
+        let (known, others): (Vec<_>, Vec<_>) = claims.into_iter().partition(|claim| {
+            claim
+                .reuse_key
+                .is_some_and(|key| sources.contains_key(&key))
+        });
+        let pairs = known.into_iter().filter_map(|claim| {
+            let source = *sources.get(&claim.reuse_key?)?;
+            Some((claim, source))
+        });
+        self.answer_with(pairs.collect()).await?;
+        Ok(others)
+    }
+
+    /// Ends claimed jobs with the results of these others; where there is none, the job goes back to the queue.
+    async fn answer_with(&self, pairs: Vec<(Claim, Uuid)>) -> Result<(), JobsError> {
+        if pairs.is_empty() {
+            return Ok(());
+        }
+        let shared = &self.shared;
+        let from = shared.options.tracer.is_some().then(SystemTime::now);
+        let ended = shared
+            .write_patiently(|| shared.store.finish_with_sources(&pairs, shared.now_ms()))
+            .await?;
+        let ids: Vec<_> = ended.iter().copied().collect();
+        shared.metrics.looked_up(ids.len() as u64, 0);
+        if let Some(from) = from {
+            let claims = pairs.iter().map(|(claim, _)| claim);
+            for claim in claims.filter(|claim| ended.contains(&claim.id)) {
+                if let Some(traced) = shared.traced(claim) {
+                    traced.waited_until(from);
+                    traced.stored(from, State::Succeeded.name());
+                }
+            }
+        }
+        shared.ended_cached(&ids);
+        let back = pairs.into_iter().map(|(claim, _)| claim);
+        let back: Vec<_> = back.filter(|claim| !ended.contains(&claim.id)).collect();
+        let released = shared.store.release_to_be_solved(&back, shared.now_ms());
+        self.note_released(&released.await?);
+        Ok(())
     }
 
     async fn attempt_group(&mut self, claims: Vec<Claim>) -> Result<(), JobsError> {
@@ -119,17 +177,21 @@ impl Worker {
             let (shared, begun) = (self.shared.clone(), begun.clone());
             let work: Vec<_> = members
                 .iter()
-                .map(|member| (member.watch.clone(), member.body.clone()))
+                .map(|member| {
+                    let traced = shared.traced(&member.claim);
+                    (member.watch.clone(), member.body.clone(), traced)
+                })
                 .collect();
             Box::new(move || {
                 let start = Instant::now();
                 let mut outcomes = Vec::with_capacity(work.len());
-                for (watch, body) in work {
+                for (watch, body, traced) in work {
                     if start.elapsed() > GROUP_TIME || shared.stopping.is_cancelled() {
                         break;
                     }
                     begun.fetch_add(1, Ordering::AcqRel);
-                    outcomes.push(solve_guarded(&shared, &watch, &body));
+                    let solve = || solve_guarded(&shared, &watch, &body);
+                    outcomes.push(Traced::solving(traced.as_ref(), solve));
                 }
                 // An abandoned group has nobody listening.
                 let _ = reply.send(outcomes);
@@ -203,6 +265,7 @@ impl Worker {
         members: &[Member],
         outcomes: Vec<Outcome>,
     ) -> Result<usize, JobsError> {
+        let from = self.shared.options.tracer.is_some().then(SystemTime::now);
         let mut ends = Vec::with_capacity(outcomes.len());
         let mut back: Vec<&Member> = members[outcomes.len()..]
             .iter()
@@ -238,6 +301,9 @@ impl Worker {
         let ended = self.finish_group(&ends).await?;
         for (claim, ending) in &ends {
             if ended.contains(&claim.id) {
+                if let (Some(from), Some(traced)) = (from, self.shared.traced(claim)) {
+                    traced.stored(from, ending.state().name());
+                }
                 self.shared.metrics.ending(ending);
                 if claim.lease_number > 1 {
                     self.remove_earlier(claim.id, ending).await;
@@ -245,10 +311,22 @@ impl Worker {
                 self.shared.announce(claim.id);
             }
         }
-        for member in back {
-            self.hand_back(&member.claim).await?;
-        }
+        let back: Vec<_> = back.iter().map(|member| member.claim.clone()).collect();
+        self.hand_back_group(&back).await?;
         Ok(ended.len())
+    }
+
+    async fn hand_back_group(&self, claims: &[Claim]) -> Result<(), JobsError> {
+        let now = self.shared.now_ms();
+        self.note_released(&self.shared.store.release_group(claims, now).await?);
+        Ok(())
+    }
+
+    fn note_released(&self, released: &[(Uuid, State)]) {
+        for (id, state) in released.iter().filter(|(_, state)| state.ended()) {
+            self.shared.metrics.ended(*state, 1);
+            self.shared.announce(*id);
+        }
     }
 
     /// Ends the jobs in the table; a database that fails for a while does not cost the results.
@@ -258,4 +336,21 @@ impl Worker {
             .write_patiently(|| shared.store.finish_group(ends, shared.now_ms()))
             .await
     }
+}
+
+/// Takes out jobs that are identical to an earlier one of the group; each with that one.
+fn set_aside_twins(claims: &mut Vec<Claim>) -> Vec<(Claim, Uuid)> {
+    let mut firsts = HashMap::new();
+    let mut twins = Vec::new();
+    claims.retain(|claim| {
+        let Some(key) = claim.reuse_key else {
+            return true;
+        };
+        let first = *firsts.entry(key).or_insert(claim.id);
+        if first != claim.id {
+            twins.push((claim.clone(), first));
+        }
+        first == claim.id
+    });
+    twins
 }

@@ -7,6 +7,7 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use crate::contact::error::SolveError;
+use crate::jobs::wishes::Priority;
 
 /// What is known of one job. Times are epoch milliseconds (UTC).
 #[derive(Debug, Clone, PartialEq)]
@@ -23,12 +24,16 @@ pub struct Job {
     pub labels: BTreeMap<String, String>,
     /// The batch it belongs to, if it was submitted in one.
     pub batch_id: Option<Uuid>,
+    /// Its place among the queued jobs of the tenant.
+    pub priority: Priority,
     /// Time of submission.
     pub created_at: i64,
     /// Start of the current or last attempt; absent while queued.
     pub started_at: Option<i64>,
     /// End of the job; absent before it.
     pub ended_at: Option<i64>,
+    /// When it must have ended; it fails if it has not.
+    pub deadline: Option<i64>,
     /// When it will be removed with its result; absent before its end, and where ended jobs are kept for ever.
     pub expires_at: Option<i64>,
     /// Attempts that count, from 1 once running; an attempt handed back by a graceful shutdown does not count.
@@ -88,6 +93,8 @@ pub enum FailureKind {
     Unsolvable,
     /// The time limit of the case was reached.
     OutOfTime,
+    /// The deadline that the client set for the job passed before its end.
+    DeadlinePassed,
     /// The solver panicked; the fault is ours.
     Panic,
     /// Every allowed attempt ended with the loss of its worker.
@@ -98,10 +105,11 @@ pub enum FailureKind {
 
 impl FailureKind {
     /// Every kind there is.
-    pub const ALL: [FailureKind; 6] = [
+    pub const ALL: [FailureKind; 7] = [
         FailureKind::NotConverged,
         FailureKind::Unsolvable,
         FailureKind::OutOfTime,
+        FailureKind::DeadlinePassed,
         FailureKind::Panic,
         FailureKind::WorkerLost,
         FailureKind::Internal,
@@ -114,6 +122,7 @@ impl FailureKind {
             FailureKind::NotConverged => "not_converged",
             FailureKind::Unsolvable => "unsolvable",
             FailureKind::OutOfTime => "out_of_time",
+            FailureKind::DeadlinePassed => "deadline_passed",
             FailureKind::Panic => "panic",
             FailureKind::WorkerLost => "worker_lost",
             FailureKind::Internal => "internal",
@@ -159,7 +168,7 @@ impl State {
     #[must_use]
     pub fn may_become(self, next: State) -> bool {
         match self {
-            State::Queued => matches!(next, State::Running | State::Cancelled),
+            State::Queued => matches!(next, State::Running | State::Failed | State::Cancelled),
             State::Running => next != State::Running,
             State::Succeeded | State::Failed | State::Cancelled => false,
         }

@@ -19,8 +19,9 @@ use crate::jobs::metrics::Metrics;
 use crate::jobs::recipe::Recipe;
 use crate::jobs::results::Results;
 use crate::jobs::store::sqlite::SqliteStore;
+use crate::jobs::trace::Tracer;
 use crate::jobs::worker::Worker;
-use crate::jobs::{Admitted, Jobs, Shared, housekeeping, retention};
+use crate::jobs::{Admitted, Jobs, Shared, housekeeping, retention, wishes};
 
 /// How long a shutdown waits for workers that were told to stop, beyond their own patience.
 const STOPPED_WITHIN: Duration = Duration::from_secs(10);
@@ -52,13 +53,15 @@ pub struct Options {
     pub retention: Option<Duration>,
     /// What leases, ends and expiries are measured with.
     pub clock: Clock,
+    /// What makes spans of jobs, if somebody collects them.
+    pub tracer: Option<Tracer>,
 }
 
 impl Options {
     /// The defaults for a data folder: one worker, a lease of 30 s, 5 attempts, 300 000 queued jobs of which
     /// 250 000 of one tenant,
-    /// groups of 64, results up to 32 KiB in the database, results used again,
-    /// ended jobs kept for ever, the system's clock.
+    /// groups of 256, results up to 32 KiB in the database, results used again,
+    /// ended jobs kept for ever, the system's clock, no spans.
     #[must_use]
     pub fn new(data_dir: impl Into<PathBuf>) -> Options {
         Options {
@@ -69,11 +72,12 @@ impl Options {
             attempts_max: 5,
             queue_max: 300_000,
             tenant_queue_max: 250_000,
-            group_max: 64,
+            group_max: 256,
             small_result_max_bytes: 32 << 10,
             cache: true,
             retention: None,
             clock: Clock::system(),
+            tracer: None,
         }
     }
 }
@@ -134,8 +138,8 @@ impl Jobs {
         })
     }
 
-    /// Starts the workers, the reaper of expired leases and the sweeps of orphaned results and of
-    /// expired jobs.
+    /// Starts the workers, the reaper of expired leases, the sweeps of orphaned results and of expired jobs, and the
+    /// look-out for deadlines.
     ///
     /// # Errors
     /// A solver thread could not be started.
@@ -153,6 +157,9 @@ impl Jobs {
         self.shared
             .tasks
             .spawn(retention::sweep(self.shared.clone()));
+        self.shared
+            .tasks
+            .spawn(wishes::keep_deadlines(self.shared.clone()));
         Ok(())
     }
 

@@ -10,7 +10,7 @@ pub mod backup;
 pub mod batch;
 pub mod clock;
 pub mod error;
-mod fetch;
+pub mod fetch;
 pub mod fields;
 mod follow;
 mod group;
@@ -28,7 +28,9 @@ mod solver_thread;
 mod spool;
 mod storage;
 pub mod store;
+pub mod trace;
 pub mod watch;
+pub mod wishes;
 pub mod worker;
 
 use std::collections::HashMap;
@@ -38,6 +40,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use bytes::Bytes;
+use opentelemetry::KeyValue;
 use serde_json::Value;
 use tokio::sync::{Notify, broadcast};
 use tokio::time::{Instant, timeout, timeout_at};
@@ -60,6 +63,7 @@ pub use crate::jobs::store::list::{Filter, Page};
 use crate::jobs::store::sqlite::SqliteStore;
 use crate::jobs::store::{Deleted, Enqueued, NewJob};
 use crate::jobs::watch::{Reason, Watch};
+use crate::jobs::wishes::Wishes;
 
 /// Longest list page.
 pub const PAGE_MAX: u32 = 1000;
@@ -134,26 +138,37 @@ impl Jobs {
         case: Value,
         idempotency_key: Option<String>,
     ) -> Result<Job, JobsError> {
-        self.submit_case(case, idempotency_key, false).await
+        self.submit_with(case, idempotency_key, Wishes::default())
+            .await
     }
 
-    /// As [`Jobs::submit`], but the case is solved even if an identical one was solved before.
+    /// As [`Jobs::submit`], with wishes. A repeated idempotency key answers the job as it was first wished for.
     ///
     /// # Errors
     /// As [`Jobs::submit`].
-    pub async fn submit_fresh(
+    pub async fn submit_with(
         &self,
         case: Value,
         idempotency_key: Option<String>,
+        wishes: Wishes,
     ) -> Result<Job, JobsError> {
-        self.submit_case(case, idempotency_key, true).await
+        let span = self.submitting();
+        let traceparent = span.traceparent();
+        let submitted = self.store_case(case, idempotency_key, wishes, traceparent);
+        span.end(submitted.await, |job| {
+            vec![
+                KeyValue::new("railhead.job.id", job.id.to_string()),
+                KeyValue::new("railhead.job.cached", job.cached),
+            ]
+        })
     }
 
-    async fn submit_case(
+    async fn store_case(
         &self,
         case: Value,
         idempotency_key: Option<String>,
-        fresh: bool,
+        wishes: Wishes,
+        traceparent: Option<Arc<str>>,
     ) -> Result<Job, JobsError> {
         if self.shared.draining.is_cancelled() {
             return Err(JobsError::Draining);
@@ -188,8 +203,10 @@ impl Jobs {
             source: None,
             body: Bytes::from(body.map_err(|error| JobsError::Damaged(error.to_string()))?),
             idempotency,
+            traceparent,
+            wishes,
         };
-        if !fresh {
+        if !wishes.fresh {
             self.find_sources(std::iter::once(&mut new)).await?;
         }
         if new.source.is_none() {
@@ -197,7 +214,7 @@ impl Jobs {
         }
         let job = replayed(self.noted(self.shared.store.enqueue(&new).await)?)?;
         if job.id == id && job.cached {
-            self.ended_cached(&[id]);
+            self.shared.ended_cached(&[id]);
             tracing::info!(job = %id, method = new.method, "job answered from an earlier result");
             return Ok(self.dated(job));
         }

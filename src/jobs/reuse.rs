@@ -2,10 +2,10 @@
 
 use uuid::Uuid;
 
-use crate::jobs::Jobs;
 use crate::jobs::error::JobsError;
 use crate::jobs::job::State;
 use crate::jobs::store::{NewJob, ReuseKey};
+use crate::jobs::{Jobs, Shared};
 
 impl Jobs {
     /// The key of a case with this digest; `None` if results are not to be used again.
@@ -45,14 +45,14 @@ impl Jobs {
             .looked_up(hits, keys.len() as u64 - hits);
         Ok(())
     }
+}
 
+impl Shared {
     /// Jobs ended with the result of their source.
     pub(super) fn ended_cached(&self, ids: &[Uuid]) {
-        self.shared
-            .metrics
-            .ended(State::Succeeded, ids.len() as u64);
+        self.metrics.ended(State::Succeeded, ids.len() as u64);
         for id in ids {
-            self.shared.announce(*id);
+            self.announce(*id);
         }
     }
 }

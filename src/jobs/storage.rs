@@ -36,6 +36,7 @@ impl JobsError {
             JobsError::Database(sqlx::Error::Io(source)) | JobsError::DataDir { source, .. } => {
                 of_io(source)
             }
+            JobsError::Together(error) => error.trouble(),
             JobsError::Results(error) => {
                 let mut cause: Option<&(dyn Error + 'static)> = Some(error);
                 while let Some(error) = cause {

@@ -17,6 +17,8 @@ pub enum Reason {
     Shutdown = 2,
     /// The lease is lost; whatever comes out is discarded.
     Lost = 3,
+    /// The deadline of the job has passed.
+    Deadline = 4,
 }
 
 /// One attempt at a job, seen from both sides. The solver ticks, the async side reads and stops.
@@ -50,6 +52,7 @@ impl Watch {
             1 => Some(Reason::Cancel),
             2 => Some(Reason::Shutdown),
             3 => Some(Reason::Lost),
+            4 => Some(Reason::Deadline),
             _ => None,
         }
     }

@@ -222,6 +222,66 @@ async fn a_batch_is_answered_from_earlier_results() {
     assert_eq!(solves.load(Ordering::SeqCst), 60);
 }
 
+/// Sends a batch and returns its lines once all have ended.
+async fn batch_lines(server: &Server, cases: &[Value], fresh: bool) -> Vec<Value> {
+    let shape = |request: RequestBuilder| match fresh {
+        true => request.header("cache-control", "no-cache").json(cases),
+        false => request.json(cases),
+    };
+    let batch = server.send(Method::POST, "/v1/batches", shape).await.json;
+    let results = batch["links"]["results"].as_str().expect("a link");
+    let text = server.get(&format!("{results}?wait=60")).await.text;
+    let lines = text.lines();
+    lines
+        .map(|line| serde_json::from_str(line).expect("a line"))
+        .collect()
+}
+
+#[tokio::test]
+async fn of_identical_cases_in_one_batch_one_is_solved() {
+    let (server, solves) = counting(|_| {}).await;
+    let cases: Vec<Value> = (0..600)
+        .map(|number| {
+            let mut case = renamed(&format!("number {number}"));
+            case["load"]["normal_force_n"] = json!(50_000 + number % 2);
+            case
+        })
+        .collect();
+    let lines = batch_lines(&server, &cases, false).await;
+    assert_eq!(solves.load(Ordering::SeqCst), 2);
+    for (index, line) in lines.iter().enumerate() {
+        assert_eq!(line["state"], "succeeded", "{line}");
+        assert_eq!(line["result"]["cached"], index >= 2);
+        assert_eq!(
+            bare(&line["result"])["total"],
+            bare(&lines[index % 2]["result"])["total"]
+        );
+    }
+    batch_lines(&server, &cases[..10], true).await;
+    assert_eq!(solves.load(Ordering::SeqCst), 12, "no-cache is kept to");
+}
+
+#[tokio::test]
+async fn identical_cases_that_fail_all_say_why() {
+    let solves = Arc::new(AtomicUsize::new(0));
+    let counter = solves.clone();
+    let server = Setup::new()
+        .solving(move |_, _| {
+            counter.fetch_add(1, Ordering::SeqCst);
+            Err(SolveError::OutOfTime)
+        })
+        .start()
+        .await;
+    let lines = batch_lines(&server, &vec![case("hopeless"); 100], false).await;
+    for line in &lines {
+        assert_eq!(
+            line["error"]["type"], "/problems/out-of-time",
+            "a failure is not used again: {line}"
+        );
+    }
+    assert_eq!((lines.len(), solves.load(Ordering::SeqCst)), (100, 100));
+}
+
 #[tokio::test]
 async fn earlier_results_outlive_the_process_and_the_deletion_of_their_job() {
     let folder = tempfile::tempdir().unwrap();

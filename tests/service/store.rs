@@ -6,6 +6,7 @@ use bytes::Bytes;
 use railhead::jobs::store::list::Filter;
 use railhead::jobs::store::sqlite::SqliteStore;
 use railhead::jobs::store::{Claim, Deleted, Ending, Enqueued, NewJob, Placed, Renewal};
+use railhead::jobs::wishes::Wishes;
 use railhead::jobs::{Failure, FailureKind, Job, State};
 use tempfile::TempDir;
 use uuid::Uuid;
@@ -57,6 +58,8 @@ pub fn new_job() -> NewJob {
         reuse_key: None,
         source: None,
         idempotency: None,
+        traceparent: None,
+        wishes: Wishes::default(),
     }
 }
 

@@ -7,6 +7,7 @@ use proptest::prelude::*;
 use railhead::jobs::State;
 use railhead::jobs::store::sqlite::SqliteStore;
 use railhead::jobs::store::{Claim, Deleted, Ending, NewJob, Placed, Renewal};
+use railhead::jobs::wishes::Wishes;
 use uuid::Uuid;
 
 const LEASE: i64 = 10;
@@ -102,6 +103,8 @@ impl Pair {
             reuse_key: None,
             source: None,
             idempotency: None,
+            traceparent: None,
+            wishes: Wishes::default(),
         };
         self.store.enqueue(&new).await.unwrap();
         self.ids.push(id);

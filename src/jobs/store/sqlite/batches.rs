@@ -5,21 +5,16 @@
 
 use std::collections::BTreeMap;
 
-use sqlx::{QueryBuilder, Row, Sqlite};
+use sqlx::Row;
 use uuid::Uuid;
 
 use crate::jobs::batch::{Batch, Line};
 use crate::jobs::error::JobsError;
 use crate::jobs::job::State;
 use crate::jobs::store::sqlite::SqliteStore;
-use crate::jobs::store::sqlite::reuse::end_with_sources;
-use crate::jobs::store::sqlite::rows::{
-    job_columns, read_count, read_id, read_job, read_state, to_json,
-};
-use crate::jobs::store::{Begun, NewBatch, NewJob, ReuseKey};
-
-/// Jobs in one statement; with 12 values each far below the bound of SQLite.
-const ROWS_PER_STATEMENT: usize = 250;
+use crate::jobs::store::sqlite::insert::insert_jobs;
+use crate::jobs::store::sqlite::rows::{job_columns, read_count, read_id, read_job, read_state};
+use crate::jobs::store::{Begun, NewBatch, NewJob};
 
 impl SqliteStore {
     /// Begins a batch, or finds the one its idempotency key stands for.
@@ -83,60 +78,12 @@ impl SqliteStore {
         batch: Uuid,
         jobs: &[(u32, NewJob)],
     ) -> Result<Vec<Uuid>, JobsError> {
-        let mut ended = Vec::new();
-        let batch = batch.to_string();
+        let jobs: Vec<_> = jobs
+            .iter()
+            .map(|(index, job)| (Some(*index), job))
+            .collect();
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
-        for some in jobs.chunks(ROWS_PER_STATEMENT) {
-            let labels = some
-                .iter()
-                .map(|(_, job)| to_json(&job.labels))
-                .collect::<Result<Vec<_>, _>>()?;
-            let mut rows = QueryBuilder::<Sqlite>::new(
-                "INSERT INTO jobs (id, state, name, labels, method, created_at, batch_id, batch_index, cost_us, outputs, reuse_key, tenant) ",
-            );
-            rows.push_values(
-                some.iter().zip(labels),
-                |mut row, ((index, job), labels)| {
-                    row.push_bind(job.id.to_string())
-                        .push("'queued'")
-                        .push_bind(&job.name)
-                        .push_bind(labels)
-                        .push_bind(&job.method)
-                        .push_bind(job.created_at)
-                        .push_bind(&batch)
-                        .push_bind(*index)
-                        .push_bind(job.cost_us)
-                        .push_bind(&job.outputs)
-                        .push_bind(job.reuse_key.as_ref().map(ReuseKey::as_slice))
-                        .push_bind(&*job.tenant);
-                },
-            );
-            rows.build().execute(&mut *transaction).await?;
-            let mut cases = QueryBuilder::<Sqlite>::new("INSERT INTO cases (job_id, body) ");
-            cases.push_values(some, |mut row, (_, job)| {
-                row.push_bind(job.id.to_string())
-                    .push_bind(job.body.as_ref());
-            });
-            cases.build().execute(&mut *transaction).await?;
-            let labels: Vec<_> = some
-                .iter()
-                .flat_map(|(_, job)| job.labels.iter().map(move |label| (job, label)))
-                .collect();
-            for some in labels.chunks(ROWS_PER_STATEMENT) {
-                let mut rows = QueryBuilder::<Sqlite>::new(
-                    "INSERT INTO job_labels (of_tenant, key, value, job_id) ",
-                );
-                rows.push_values(some, |mut row, (job, (key, value))| {
-                    row.push_bind(&*job.tenant)
-                        .push_bind(*key)
-                        .push_bind(*value)
-                        .push_bind(job.id.to_string());
-                });
-                rows.build().execute(&mut *transaction).await?;
-            }
-            let jobs = some.iter().map(|(_, job)| job);
-            ended.extend(end_with_sources(&mut transaction, jobs).await?);
-        }
+        let ended = insert_jobs(&mut transaction, Some(batch), &jobs).await?;
         transaction.commit().await?;
         Ok(ended)
     }

@@ -28,6 +28,8 @@ fn forms() -> Vec<Migration> {
         form(4, "reuse", include_str!("reuse.sql")),
         form(5, "tenants", include_str!("tenants.sql")),
         form(6, "tombstones", include_str!("tombstones.sql")),
+        form(7, "order", include_str!("order.sql")),
+        form(8, "trace", include_str!("trace.sql")),
     ]
 }
 

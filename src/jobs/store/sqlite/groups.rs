@@ -9,16 +9,19 @@ use sqlx::{QueryBuilder, Row, Sqlite};
 use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
+use crate::jobs::job::State;
 use crate::jobs::store::sqlite::SqliteStore;
 use crate::jobs::store::sqlite::claims::{EndRow, fence};
-use crate::jobs::store::sqlite::rows::{read_count, read_id};
+use crate::jobs::store::sqlite::rows::{read_count, read_id, read_reuse_key, read_state};
 use crate::jobs::store::{Claim, Ending};
 
 /// The tenant with queued jobs that comes next in the alphabet.
 pub(super) const NEXT_TENANT: &str =
     "SELECT tenant FROM jobs WHERE state = 'queued' AND tenant > $1 ORDER BY tenant LIMIT 1";
-/// The oldest queued jobs of a tenant.
-pub(super) const PEEK: &str = "SELECT id, alone, cost_us FROM jobs WHERE state = 'queued' AND tenant = $1 ORDER BY id LIMIT $2";
+/// The queued jobs of a tenant that come first: by priority, the oldest of each first. Jobs whose deadline has passed are
+/// left to whoever ends them.
+pub(super) const PEEK: &str = "SELECT id, alone, cost_us FROM jobs \
+     WHERE state = 'queued' AND tenant = $1 AND (deadline IS NULL OR deadline > $3) ORDER BY rank, id LIMIT $2";
 
 /// How large a group may be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,7 +35,7 @@ pub struct GroupBounds {
 }
 
 impl SqliteStore {
-    /// Claims the oldest queued job of the tenant whose turn it is, for `lease_ms` milliseconds.
+    /// Claims the first queued job of the tenant whose turn it is, for `lease_ms` milliseconds.
     ///
     /// # Errors
     /// The database failed.
@@ -50,8 +53,8 @@ impl SqliteStore {
         Ok(self.claim_group(worker, now, lease_ms, one).await?.pop())
     }
 
-    /// Claims the oldest queued job of the tenant whose turn it is, together with those behind it that are as small,
-    /// oldest first. A job whose group died comes alone. Tenants take turns, so that a long queue of one holds up no
+    /// Claims the first queued job of the tenant whose turn it is, together with those behind it that are as small, in
+    /// their order: by priority, then by age. A job whose group died comes alone. Tenants take turns, so that a long queue of one holds up no
     /// other.
     ///
     /// # Errors
@@ -82,6 +85,7 @@ impl SqliteStore {
         let queued = sqlx::query(PEEK)
             .bind(&tenant)
             .bind(i64::try_from(look).unwrap_or(i64::MAX))
+            .bind(now)
             .fetch_all(&mut *transaction)
             .await?;
         let ids = choose(&queued, bounds)?;
@@ -98,7 +102,9 @@ impl SqliteStore {
         update.push_bind(i64::try_from(ids.len()).unwrap_or(i64::MAX));
         update.push(", progress = 0, version = version + 1 WHERE id IN (");
         push_list(&mut update, &ids);
-        update.push(") RETURNING id, attempt, lease_number, method");
+        update.push(
+            ") RETURNING id, attempt, lease_number, method, traceparent, CASE WHEN fresh THEN NULL ELSE reuse_key END AS reuse_key",
+        );
         let rows = update.build().fetch_all(&mut *transaction).await?;
         transaction.commit().await?;
         *self.served() = tenant;
@@ -110,10 +116,13 @@ impl SqliteStore {
                     attempt: row.try_get("attempt")?,
                     lease_number: read_count(row, "lease_number")?,
                     method: row.try_get("method")?,
+                    traceparent: row.try_get("traceparent")?,
+                    reuse_key: read_reuse_key(row)?,
                 })
             })
             .collect::<Result<Vec<_>, JobsError>>()?;
-        claims.sort_unstable_by_key(|claim| claim.id);
+        let places: HashMap<_, _> = ids.iter().zip(0..).collect();
+        claims.sort_unstable_by_key(|claim| places.get(&claim.id).copied().unwrap_or(usize::MAX));
         Ok(claims)
     }
 
@@ -151,19 +160,64 @@ impl SqliteStore {
         now: i64,
         lease_ms: i64,
     ) -> Result<HashMap<Uuid, bool>, JobsError> {
-        let mut query = QueryBuilder::<Sqlite>::new("WITH held (id, lease_number) AS (");
-        query.push_values(claims, |mut row, claim| {
-            row.push_bind(claim.id.to_string()).push_bind(fence(claim));
-        });
-        query.push(") UPDATE jobs SET lease_until = ");
+        let mut query = with_held(claims);
+        query.push(" UPDATE jobs SET lease_until = ");
         query.push_bind(now.saturating_add(lease_ms));
-        query.push(
-            " FROM held WHERE jobs.id = held.id AND jobs.lease_number = held.lease_number \
-             AND jobs.state = 'running' RETURNING id, cancel_requested",
-        );
+        query.push(OF_HELD).push("id, cancel_requested");
         let rows = query.build().fetch_all(&self.writer).await?;
         rows.iter()
             .map(|row| Ok((read_id(row)?, row.try_get("cancel_requested")?)))
+            .collect()
+    }
+
+    /// Hands running jobs back to the queue without counting their attempts; those whose cancellation was asked for end as
+    /// cancelled instead. Returns those that were still held, with their new states.
+    ///
+    /// # Errors
+    /// The database failed; nothing changed.
+    pub async fn release_group(
+        &self,
+        claims: &[Claim],
+        now: i64,
+    ) -> Result<Vec<(Uuid, State)>, JobsError> {
+        self.release_many(claims, now, "fresh").await
+    }
+
+    /// As [`SqliteStore::release_group`]; these jobs will not get the result of another any more.
+    ///
+    /// # Errors
+    /// The database failed; nothing changed.
+    pub async fn release_to_be_solved(
+        &self,
+        claims: &[Claim],
+        now: i64,
+    ) -> Result<Vec<(Uuid, State)>, JobsError> {
+        self.release_many(claims, now, "1").await
+    }
+
+    async fn release_many(
+        &self,
+        claims: &[Claim],
+        now: i64,
+        fresh: &'static str,
+    ) -> Result<Vec<(Uuid, State)>, JobsError> {
+        if claims.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut query = with_held(claims);
+        query.push(
+            " UPDATE jobs SET state = CASE WHEN cancel_requested = 1 THEN 'cancelled' ELSE 'queued' END, \
+             started_at = CASE WHEN cancel_requested = 1 THEN started_at ELSE NULL END, \
+             attempt = attempt - 1, progress = 0, lease_until = NULL, worker = NULL, version = version + 1, \
+             fresh = ",
+        );
+        query.push(fresh);
+        query.push(", ended_at = CASE WHEN cancel_requested = 1 THEN ");
+        query.push_bind(now);
+        query.push(" ELSE NULL END").push(OF_HELD).push("id, state");
+        let rows = query.build().fetch_all(&self.writer).await?;
+        rows.iter()
+            .map(|row| Ok((read_id(row)?, read_state(row)?)))
             .collect()
     }
 
@@ -233,7 +287,7 @@ impl SqliteStore {
     }
 }
 
-/// The ids of the next group among the oldest queued jobs.
+/// The ids of the next group among the first queued jobs.
 fn choose(queued: &[SqliteRow], bounds: GroupBounds) -> Result<Vec<Uuid>, JobsError> {
     let share = queued
         .len()
@@ -253,6 +307,19 @@ fn choose(queued: &[SqliteRow], bounds: GroupBounds) -> Result<Vec<Uuid>, JobsEr
         }
     }
     Ok(ids)
+}
+
+/// The end of an update of claimed jobs, as long as their leases are held.
+const OF_HELD: &str = " FROM held WHERE jobs.id = held.id AND jobs.lease_number = held.lease_number \
+     AND jobs.state = 'running' RETURNING ";
+
+fn with_held(claims: &[Claim]) -> QueryBuilder<Sqlite> {
+    let mut query = QueryBuilder::new("WITH held (id, lease_number) AS (");
+    query.push_values(claims, |mut row, claim| {
+        row.push_bind(claim.id.to_string()).push_bind(fence(claim));
+    });
+    query.push(")");
+    query
 }
 
 fn push_list(query: &mut QueryBuilder<Sqlite>, ids: &[Uuid]) {

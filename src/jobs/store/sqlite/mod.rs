@@ -5,14 +5,18 @@
 //! transaction that writes begins with `BEGIN IMMEDIATE`: a deferred one that reads first fails at once when it
 //! turns into a writer. The statements keep to what PostgreSQL understands too.
 //!
-//! Here: opening, and what a client asks for. [`claims`] holds what workers ask for, [`lists`] the lists.
+//! Here: opening, and what a client asks for. [`intake`] holds the submission of single jobs, [`claims`] what workers ask
+//! for, [`lists`] the lists.
 
 pub mod batches;
 pub mod claims;
+pub mod deadlines;
 pub mod expiry;
 pub mod figures;
 mod forms;
 pub mod groups;
+mod insert;
+pub mod intake;
 pub mod keys;
 pub mod lists;
 pub mod reuse;
@@ -34,9 +38,9 @@ use crate::jobs::error::JobsError;
 use crate::jobs::job::Job;
 use crate::jobs::results::Encoded;
 use crate::jobs::store::sqlite::forms::{allow_shrinking, migrations};
-use crate::jobs::store::sqlite::reuse::end_with_sources;
-use crate::jobs::store::sqlite::rows::{job_columns, read_job, to_json};
-use crate::jobs::store::{Deleted, Enqueued, NewJob, ReuseKey, StoredResult};
+use crate::jobs::store::sqlite::intake::Intake;
+use crate::jobs::store::sqlite::rows::{job_columns, read_job};
+use crate::jobs::store::{Deleted, Enqueued, StoredResult};
 
 const GET: &str = concat!("SELECT ", job_columns!(), " FROM jobs WHERE id = $1");
 /// The write-ahead log is cut to this size when it was larger for a while.
@@ -52,6 +56,7 @@ pub struct SqliteStore {
     served: Arc<Mutex<String>>,
     writer: SqlitePool,
     readers: SqlitePool,
+    intake: Intake,
 }
 
 impl SqliteStore {
@@ -86,6 +91,7 @@ impl SqliteStore {
         Ok(SqliteStore {
             file: file.to_owned(),
             served: Arc::default(),
+            intake: Intake::start(writer.clone()),
             writer,
             readers,
         })
@@ -131,76 +137,6 @@ impl SqliteStore {
         Ok(())
     }
 
-    /// Queues a job, or finds the one its idempotency key already stands for. Durable once it returns.
-    ///
-    /// # Errors
-    /// The database failed; nothing was stored.
-    pub async fn enqueue(&self, new: &NewJob) -> Result<Enqueued, JobsError> {
-        let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
-        let id = new.id.to_string();
-        let mut row = sqlx::query(concat!(
-            "INSERT INTO jobs (id, state, name, labels, method, created_at, cost_us, outputs, reuse_key, tenant) \
-             VALUES ($1, 'queued', $2, $3, $4, $5, $6, $7, $8, $9) RETURNING ",
-            job_columns!()
-        ))
-        .bind(&id)
-        .bind(&new.name)
-        .bind(to_json(&new.labels)?)
-        .bind(&new.method)
-        .bind(new.created_at)
-        .bind(new.cost_us)
-        .bind(&new.outputs)
-        .bind(new.reuse_key.as_ref().map(ReuseKey::as_slice))
-        .bind(&*new.tenant)
-        .fetch_one(&mut *transaction)
-        .await?;
-        if let Some((key, digest)) = &new.idempotency {
-            let inserted = sqlx::query(
-                "INSERT INTO idempotency_keys (of_tenant, key, digest, job_id) VALUES ($1, $2, $3, $4) \
-                 ON CONFLICT (of_tenant, key) DO NOTHING",
-            )
-            .bind(&*new.tenant)
-            .bind(key)
-            .bind(digest.as_slice())
-            .bind(&id)
-            .execute(&mut *transaction)
-            .await?;
-            if inserted.rows_affected() == 0 {
-                transaction.rollback().await?;
-                let found = self.by_key(&new.tenant, key, digest).await?;
-                // The job of the key was deleted in between; the client's next try will find the key free.
-                return found.ok_or(JobsError::IdempotencyConflict);
-            }
-        }
-        sqlx::query("INSERT INTO cases (job_id, body) VALUES ($1, $2)")
-            .bind(&id)
-            .bind(new.body.as_ref())
-            .execute(&mut *transaction)
-            .await?;
-        for (key, value) in &new.labels {
-            sqlx::query(
-                "INSERT INTO job_labels (of_tenant, key, value, job_id) VALUES ($1, $2, $3, $4)",
-            )
-            .bind(&*new.tenant)
-            .bind(key)
-            .bind(value)
-            .bind(&id)
-            .execute(&mut *transaction)
-            .await?;
-        }
-        if !end_with_sources(&mut transaction, std::iter::once(new))
-            .await?
-            .is_empty()
-        {
-            row = sqlx::query(GET)
-                .bind(&id)
-                .fetch_one(&mut *transaction)
-                .await?;
-        }
-        transaction.commit().await?;
-        Ok(Enqueued::Created(read_job(&row)?))
-    }
-
     /// What an idempotency key of a tenant stands for, if it was used.
     ///
     /// # Errors
@@ -211,22 +147,8 @@ impl SqliteStore {
         key: &str,
         digest: &[u8; 32],
     ) -> Result<Option<Enqueued>, JobsError> {
-        let row = sqlx::query(concat!(
-            "SELECT ",
-            job_columns!(),
-            ", digest FROM idempotency_keys JOIN jobs ON jobs.id = idempotency_keys.job_id WHERE of_tenant = $1 AND key = $2"
-        ))
-        .bind(tenant)
-        .bind(key)
-        .fetch_optional(&self.readers)
-        .await?;
-        let Some(row) = row else { return Ok(None) };
-        let stored: Vec<u8> = row.try_get("digest")?;
-        Ok(Some(if stored == digest {
-            Enqueued::Existing(read_job(&row)?)
-        } else {
-            Enqueued::Conflict
-        }))
+        let mut connection = self.readers.acquire().await?;
+        intake::by_key(&mut connection, tenant, key, digest).await
     }
 
     /// Number of queued jobs, counted no further than `at_most`.
@@ -365,7 +287,7 @@ impl SqliteStore {
         let row = sqlx::query(concat!(
             "SELECT ",
             job_columns!(),
-            ", result_key, field_patches, EXISTS (SELECT 1 FROM results WHERE job_id = id) AS inside \
+            ", result_key, field_patches, outputs, EXISTS (SELECT 1 FROM results WHERE job_id = id) AS inside \
              FROM jobs WHERE id = $1"
         ))
         .bind(id.to_string())
@@ -375,10 +297,12 @@ impl SqliteStore {
         let patches: u32 = row.try_get("field_patches")?;
         let folder: Option<String> = row.try_get("result_key")?;
         let inside: bool = row.try_get("inside")?;
+        let outputs = row.try_get("outputs")?;
         let stored = (inside || folder.is_some()).then_some(StoredResult {
             job: id,
             folder,
             field_patches: patches as usize,
+            outputs,
         });
         Ok(Some((read_job(&row)?, stored)))
     }

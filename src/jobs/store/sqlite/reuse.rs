@@ -3,15 +3,16 @@
 //! A small result is copied. A large one stays in the folder of the job that computed it, which is kept for as long as
 //! any job needs it.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use sqlx::{QueryBuilder, Row, Sqlite, SqliteConnection};
 use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
 use crate::jobs::store::sqlite::SqliteStore;
-use crate::jobs::store::sqlite::rows::read_id;
-use crate::jobs::store::{NewJob, ReuseKey};
+use crate::jobs::store::sqlite::claims::fence;
+use crate::jobs::store::sqlite::rows::{read_id, read_reuse_key};
+use crate::jobs::store::{Claim, NewJob, ReuseKey};
 
 /// One seek in the index, however many jobs have the same key.
 const SOURCE: &str =
@@ -35,14 +36,38 @@ impl SqliteStore {
         let rows = query.build().fetch_all(&self.readers).await?;
         let mut sources = HashMap::new();
         for row in &rows {
-            if row.try_get::<Option<&str>, _>("id")?.is_some() {
-                let key: Vec<u8> = row.try_get("reuse_key")?;
-                let key = ReuseKey::try_from(key)
-                    .map_err(|_| JobsError::Damaged("a reuse key has a wrong length".to_owned()))?;
+            if row.try_get::<Option<&str>, _>("id")?.is_some()
+                && let Some(key) = read_reuse_key(row)?
+            {
                 sources.insert(key, read_id(row)?);
             }
         }
         Ok(sources)
+    }
+
+    /// Ends claimed jobs with the results of their sources, as long as their leases are held. Returns those that ended; the
+    /// source of another is gone, or its lease is lost.
+    ///
+    /// # Errors
+    /// The database failed; nothing changed.
+    pub async fn finish_with_sources(
+        &self,
+        pairs: &[(Claim, Uuid)],
+        now: i64,
+    ) -> Result<HashSet<Uuid>, JobsError> {
+        let pairs: Vec<_> = pairs
+            .iter()
+            .map(|(claim, source)| Pair {
+                job: claim.id,
+                source: *source,
+                at: now,
+                lease_number: Some(fence(claim)),
+            })
+            .collect();
+        let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
+        let ended = end_pairs(&mut transaction, &pairs).await?;
+        transaction.commit().await?;
+        Ok(ended.into_iter().collect())
     }
 
     /// The folders of these jobs that another job's result lies in.
@@ -69,35 +94,73 @@ pub(super) async fn end_with_sources(
     connection: &mut SqliteConnection,
     jobs: impl Iterator<Item = &NewJob>,
 ) -> Result<Vec<Uuid>, JobsError> {
-    let pairs: Vec<_> = jobs.filter_map(|job| Some((job.id, job.source?))).collect();
+    let pairs: Vec<_> = jobs
+        .filter_map(|job| {
+            let (source, at) = job.source?;
+            Some(Pair {
+                job: job.id,
+                source,
+                at,
+                lease_number: None,
+            })
+        })
+        .collect();
+    end_pairs(connection, &pairs).await
+}
+
+/// A job and the one whose result it gets.
+struct Pair {
+    job: Uuid,
+    source: Uuid,
+    at: i64,
+    /// Of a claimed job.
+    lease_number: Option<i64>,
+}
+
+/// Ends jobs that are queued, or running under the given lease; returns them.
+async fn end_pairs(
+    connection: &mut SqliteConnection,
+    pairs: &[Pair],
+) -> Result<Vec<Uuid>, JobsError> {
     if pairs.is_empty() {
         return Ok(Vec::new());
     }
-    let mut update = with_pairs(&pairs);
+    let mut update = with_pairs(pairs);
     update.push(
         " UPDATE jobs SET state = 'succeeded', started_at = pairs.at, ended_at = pairs.at, progress = 1.0, cached = 1, \
          warnings = source.warnings, result_key = source.result_key, field_patches = source.field_patches, \
          result_owner = CASE WHEN source.result_key IS NULL THEN NULL ELSE COALESCE(source.result_owner, source.id) END, \
-         reuse_key = NULL, version = jobs.version + 1 \
+         reuse_key = NULL, lease_until = NULL, worker = NULL, version = jobs.version + 1, \
+         attempt = jobs.attempt - (pairs.lease_number IS NOT NULL) \
          FROM pairs JOIN jobs AS source ON source.id = pairs.source AND source.state = 'succeeded' \
-         WHERE jobs.id = pairs.job RETURNING id",
+         WHERE jobs.id = pairs.job AND (jobs.state = 'queued' AND pairs.lease_number IS NULL \
+         OR jobs.state = 'running' AND jobs.lease_number = pairs.lease_number) RETURNING id",
     );
-    let ended = update.build().fetch_all(&mut *connection).await?;
-    let mut copy = with_pairs(&pairs);
-    copy.push(
-        " INSERT INTO results (job_id, solution, fields) SELECT pairs.job, solution, fields \
-         FROM pairs JOIN results ON results.job_id = pairs.source",
-    );
-    copy.build().execute(&mut *connection).await?;
-    ended.iter().map(read_id).collect()
+    let rows = update.build().fetch_all(&mut *connection).await?;
+    let ended = rows.iter().map(read_id).collect::<Result<Vec<_>, _>>()?;
+    let done: HashSet<_> = ended.iter().collect();
+    let copied: Vec<_> = pairs
+        .iter()
+        .filter(|pair| done.contains(&pair.job))
+        .collect();
+    if !copied.is_empty() {
+        let mut copy = with_pairs(copied);
+        copy.push(
+            " INSERT INTO results (job_id, solution, fields) SELECT pairs.job, solution, fields \
+             FROM pairs JOIN results ON results.job_id = pairs.source",
+        );
+        copy.build().execute(&mut *connection).await?;
+    }
+    Ok(ended)
 }
 
-fn with_pairs(pairs: &[(Uuid, (Uuid, i64))]) -> QueryBuilder<Sqlite> {
-    let mut query = QueryBuilder::new("WITH pairs (job, at, source) AS (");
-    query.push_values(pairs, |mut row, (job, (source, at))| {
-        row.push_bind(job.to_string())
-            .push_bind(*at)
-            .push_bind(source.to_string());
+fn with_pairs<'a>(pairs: impl IntoIterator<Item = &'a Pair>) -> QueryBuilder<Sqlite> {
+    let mut query = QueryBuilder::new("WITH pairs (job, at, source, lease_number) AS (");
+    query.push_values(pairs, |mut row, pair| {
+        row.push_bind(pair.job.to_string())
+            .push_bind(pair.at)
+            .push_bind(pair.source.to_string())
+            .push_bind(pair.lease_number);
     });
     query.push(")");
     query

@@ -8,11 +8,13 @@ use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
 use crate::jobs::job::{Job, State};
+use crate::jobs::store::ReuseKey;
+use crate::jobs::wishes::Priority;
 
 /// The columns a [`Job`] is read from.
 macro_rules! job_columns {
     () => {
-        "id, tenant, state, name, labels, batch_id, created_at, started_at, ended_at, attempt, progress, warnings, failure, cached, version"
+        "id, tenant, state, name, labels, batch_id, created_at, started_at, ended_at, attempt, progress, warnings, failure, cached, version, rank, deadline"
     };
 }
 pub(super) use job_columns;
@@ -32,9 +34,12 @@ pub(super) fn read_job(row: &SqliteRow) -> Result<Job, JobsError> {
             .map(Uuid::try_parse)
             .transpose()
             .map_err(|error| JobsError::Damaged(format!("batch id: {error}")))?,
+        priority: Priority::from_rank(row.try_get("rank")?)
+            .ok_or_else(|| JobsError::Damaged("a rank is none of 0 to 2".to_owned()))?,
         created_at: row.try_get("created_at")?,
         started_at: row.try_get("started_at")?,
         ended_at: row.try_get("ended_at")?,
+        deadline: row.try_get("deadline")?,
         expires_at: None,
         attempt: row.try_get("attempt")?,
         progress: row.try_get("progress")?,
@@ -48,6 +53,14 @@ pub(super) fn read_job(row: &SqliteRow) -> Result<Job, JobsError> {
 pub(super) fn read_id(row: &SqliteRow) -> Result<Uuid, JobsError> {
     let text: &str = row.try_get("id")?;
     Uuid::try_parse(text).map_err(|error| JobsError::Damaged(format!("job id {text:?}: {error}")))
+}
+
+/// The key of identical cases, if the row has one.
+pub(super) fn read_reuse_key(row: &SqliteRow) -> Result<Option<ReuseKey>, JobsError> {
+    let key: Option<Vec<u8>> = row.try_get("reuse_key")?;
+    key.map(ReuseKey::try_from)
+        .transpose()
+        .map_err(|_| JobsError::Damaged("a reuse key has a wrong length".to_owned()))
 }
 
 pub(super) fn read_state(row: &SqliteRow) -> Result<State, JobsError> {

@@ -1,0 +1,109 @@
+//! One client of the service: a connection of its own, and what it met.
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use reqwest::{Method, RequestBuilder, Response};
+use serde_json::Value;
+
+/// Pause after a refusal that says to come back later.
+const REFUSED: Duration = Duration::from_secs(1);
+
+/// A client, and the refusals it was given: documented `429` and `503`, by status.
+pub struct Client {
+    client: reqwest::Client,
+    url: String,
+    /// How often it was told to come back later.
+    pub refused: BTreeMap<u16, usize>,
+}
+
+impl Client {
+    /// A client of the service at this address.
+    pub fn new(url: &str) -> Client {
+        let client = reqwest::Client::builder()
+            .pool_max_idle_per_host(1)
+            .tcp_nodelay(true)
+            .build();
+        Client {
+            client: client.expect("a client"),
+            url: url.to_owned(),
+            refused: BTreeMap::new(),
+        }
+    }
+
+    /// A request that `shape` completes, sent again after each refusal; its answer must have one of the statuses.
+    pub async fn send(
+        &mut self,
+        method: Method,
+        path: &str,
+        statuses: &[u16],
+        shape: impl Fn(RequestBuilder) -> RequestBuilder,
+    ) -> Response {
+        loop {
+            let request = self
+                .client
+                .request(method.clone(), format!("{}{path}", self.url));
+            let answer = shape(request).send().await.expect("an answer");
+            let status = answer.status().as_u16();
+            if matches!(status, 429 | 503) {
+                assert!(
+                    answer.headers().contains_key("retry-after"),
+                    "{status} without retry-after"
+                );
+                *self.refused.entry(status).or_default() += 1;
+                tokio::time::sleep(REFUSED).await;
+                continue;
+            }
+            if !statuses.contains(&status) {
+                panic!(
+                    "{method} {path}: {status} {}",
+                    answer.text().await.unwrap_or_default()
+                );
+            }
+            return answer;
+        }
+    }
+
+    /// The bytes of an answer with 200, and the seconds from the request to the last of them.
+    pub async fn get(&mut self, path: &str) -> (Vec<u8>, f64) {
+        let start = Instant::now();
+        let answer = self
+            .send(Method::GET, path, &[200], |request| request)
+            .await;
+        let bytes = answer.bytes().await.expect("a body").to_vec();
+        (bytes, start.elapsed().as_secs_f64())
+    }
+
+    /// The JSON answer to a GET.
+    pub async fn json(&mut self, path: &str) -> Value {
+        let (bytes, _) = self.get(path).await;
+        serde_json::from_slice(&bytes).expect("JSON")
+    }
+
+    /// Submits a case; the job as answered.
+    pub async fn submit(&mut self, case: &Value, prefer: Option<&str>) -> Value {
+        let answer = self.send(Method::POST, "/v1/jobs", &[202, 200], |request| {
+            let request = request.json(case);
+            match prefer {
+                Some(prefer) => request.header("prefer", prefer),
+                None => request,
+            }
+        });
+        answer.await.json().await.expect("JSON")
+    }
+
+    /// A figure of `/metrics`, 0 if it is not there.
+    pub async fn metric(&mut self, name: &str) -> f64 {
+        let (text, _) = self.get("/metrics").await;
+        let text = String::from_utf8_lossy(&text).into_owned();
+        let value = text
+            .lines()
+            .find_map(|line| line.strip_prefix(name)?.trim().parse().ok());
+        value.unwrap_or(0.0)
+    }
+}
+
+/// The id of a job.
+pub fn id_of(job: &Value) -> String {
+    job["id"].as_str().expect("an id").to_owned()
+}

@@ -1,0 +1,73 @@
+//! What does the service do under load, against the bare solver on the same machine in the same run?
+//!
+//! `cargo bench --bench load [-- PART … [workers=N]]` starts the real program on loopback with a data folder of its own and
+//! prints a table. The parts: `mixed` (64 clients for a minute), `soak` (20 000 small jobs, one by one, removed after a
+//! while), `batch` (20 000 cases in one request); all of them without a name. The driver runs on one thread of the same
+//! machine. A broken promise (a wrong answer, a lost or doubled job) ends it with a panic; missed goals are printed.
+
+#[path = "../machine.rs"]
+mod machine;
+
+mod batch;
+mod cases;
+mod client;
+mod mixed;
+mod service;
+mod soak;
+
+/// One line of the table: what was measured, the figure, and the goal if there is one.
+pub struct Row(pub String, pub String, pub String);
+
+impl Row {
+    /// A figure with a goal that it meets or misses.
+    pub fn judged(what: &str, figure: String, goal: &str, met: bool) -> Row {
+        let verdict = if met { "met" } else { "MISSED" };
+        Row(what.to_owned(), figure, format!("{goal}: {verdict}"))
+    }
+
+    /// A figure without a goal.
+    pub fn plain(what: &str, figure: String) -> Row {
+        Row(what.to_owned(), figure, String::new())
+    }
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    // Run by `cargo test --benches` as well, where there is nothing to measure.
+    if !arguments.iter().any(|argument| argument == "--bench") {
+        return;
+    }
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let workers = arguments
+        .iter()
+        .find_map(|argument| argument.strip_prefix("workers=")?.parse().ok())
+        // As the service has by default.
+        .unwrap_or((cores - 1).max(1));
+    let wanted = |part: &str| {
+        let names = ["mixed", "soak", "batch"];
+        !arguments
+            .iter()
+            .any(|argument| names.contains(&argument.as_str()))
+            || arguments.iter().any(|argument| argument == part)
+    };
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .expect("a runtime");
+    println!("{cores} cores, {workers} worker(s), driver on one thread of the same machine\n");
+    println!("| what | measured | goal |\n|---|---|---|");
+    let print = |rows: Vec<Row>| {
+        for Row(what, figure, goal) in rows {
+            println!("| {what} | {figure} | {goal} |");
+        }
+    };
+    if wanted("mixed") {
+        print(runtime.block_on(mixed::run(workers)));
+    }
+    if wanted("soak") {
+        print(runtime.block_on(soak::run(workers)));
+    }
+    if wanted("batch") {
+        print(runtime.block_on(batch::run(workers)));
+    }
+}

@@ -1,0 +1,123 @@
+//! 20 000 small jobs, submitted one by one and removed some seconds after their end: do memory, files and the job table stay
+//! in proportion to what is kept?
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use crate::Row;
+use crate::cases::meshed;
+use crate::client::Client;
+use crate::mixed::memory;
+use crate::service::Service;
+
+const JOBS: usize = 20_000;
+const CLIENTS: usize = 64;
+/// How long ended jobs are kept.
+const KEPT: &str = "5s";
+const SAMPLE: Duration = Duration::from_millis(500);
+/// How long the end may take, and the removal of the last jobs.
+const ENDS_WITHIN: Duration = Duration::from_secs(60);
+
+/// Runs the soak and says what came of it.
+pub async fn run(workers: usize) -> Vec<Row> {
+    let service = Service::start(workers, &["--retention", KEPT]);
+    let before = service.usage();
+    let start = Instant::now();
+    let next = Arc::new(AtomicUsize::new(0));
+    let clients: Vec<_> = (0..CLIENTS)
+        .map(|_| tokio::spawn(submit_all(service.url.clone(), next.clone())))
+        .collect();
+    let mut samples = Vec::new();
+    let mut watch = Client::new(&service.url);
+    let mut kept_max = 0.0_f64;
+    let mut ended = 0.0;
+    while ended < JOBS as f64 {
+        assert!(
+            start.elapsed() < 4 * ENDS_WITHIN,
+            "{ended} of {JOBS} jobs have ended"
+        );
+        tokio::time::sleep(SAMPLE).await;
+        ended = watch
+            .metric("railhead_jobs_ended_total{state=\"succeeded\"}")
+            .await;
+        kept_max = kept_max.max(kept(&mut watch).await);
+        samples.push(service.usage());
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    for client in clients {
+        client.await.expect("a client without errors");
+    }
+    let last = Instant::now();
+    while kept(&mut watch).await > 0.0 {
+        assert!(last.elapsed() < ENDS_WITHIN, "expired jobs are removed");
+        tokio::time::sleep(SAMPLE).await;
+    }
+    // What the log of the table and its free pages take goes back in portions.
+    let mut after = service.usage();
+    while after.stored_mb > 90.0 && last.elapsed() < ENDS_WITHIN {
+        tokio::time::sleep(SAMPLE).await;
+        after = service.usage();
+    }
+    let largest =
+        |of: fn(&crate::service::Usage) -> f64| samples.iter().map(of).fold(0.0, f64::max);
+    let failed = watch
+        .metric("railhead_jobs_ended_total{state=\"failed\"}")
+        .await;
+    assert_eq!(
+        (ended, failed),
+        (JOBS as f64, 0.0),
+        "each job succeeded once"
+    );
+    vec![
+        Row::plain(
+            "soak: small jobs submitted one by one, all ended",
+            format!("{JOBS} in {seconds:.0} s, {:.0}/s", JOBS as f64 / seconds),
+        ),
+        memory("soak: memory at 25, 50, 75, 100 % of the time", &samples),
+        Row::plain(
+            "soak: jobs kept at most; data folder before, at most, after all were removed",
+            format!(
+                "{kept_max:.0}; {:.1}, {:.1}, {:.1} MB",
+                before.stored_mb,
+                largest(|usage| usage.stored_mb),
+                after.stored_mb
+            ),
+        ),
+        Row::judged(
+            "soak: files before, at most, after; descriptors at most, after",
+            format!(
+                "{}, {:.0}, {}; {:.0}, {}",
+                before.files,
+                largest(|usage| usage.files as f64),
+                after.files,
+                largest(|usage| usage.descriptors as f64),
+                after.descriptors
+            ),
+            "bounded",
+            largest(|usage| usage.files as f64) <= 10.0 && after.descriptors < 2 * CLIENTS,
+        ),
+    ]
+}
+
+/// Jobs in the table, whatever their state.
+async fn kept(watch: &mut Client) -> f64 {
+    let mut kept = 0.0;
+    for state in ["queued", "running", "succeeded", "failed", "cancelled"] {
+        kept += watch
+            .metric(&format!("railhead_jobs{{state=\"{state}\"}}"))
+            .await;
+    }
+    kept
+}
+
+async fn submit_all(url: String, next: Arc<AtomicUsize>) {
+    let mut client = Client::new(&url);
+    loop {
+        let number = next.fetch_add(1, Ordering::Relaxed);
+        if number >= JOBS {
+            return;
+        }
+        client.submit(&meshed(number, 4), None).await;
+    }
+}

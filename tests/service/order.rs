@@ -1,0 +1,199 @@
+//! Priorities, deadlines, and clocks that jump: who is solved first, and who too late?
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, Ordering};
+use std::time::Duration;
+
+use railhead::contact;
+use railhead::jobs::State;
+use railhead::jobs::clock::Clock;
+use railhead::jobs::store::NewJob;
+use railhead::jobs::wishes::{Priority, Wishes};
+use reqwest::{Method, RequestBuilder};
+use serde_json::{Value, json};
+
+use crate::batches::small;
+use crate::errors::assert_problem;
+use crate::server::{Server, Setup};
+use crate::store::{Table, new_job};
+use crate::support::{case, pause, tick_forever};
+
+const DAY_MS: i64 = 24 * 3600 * 1000;
+
+fn wishing(tenant: &str, priority: Priority) -> NewJob {
+    NewJob {
+        tenant: tenant.into(),
+        wishes: Wishes {
+            priority,
+            ..Wishes::default()
+        },
+        ..new_job()
+    }
+}
+
+#[tokio::test]
+async fn jobs_are_claimed_by_priority_and_then_by_age() {
+    let table = Table::new().await;
+    let mut added = Vec::new();
+    for priority in [
+        Priority::Low,
+        Priority::Normal,
+        Priority::High,
+        Priority::Normal,
+        Priority::High,
+    ] {
+        added.push(table.add(wishing("t", priority)).await.id);
+    }
+    let mut claimed = Vec::new();
+    while let Some(claim) = table.claim(0).await {
+        claimed.push(claim.id);
+    }
+    assert_eq!(claimed, [2, 4, 1, 3, 0].map(|place: usize| added[place]));
+}
+
+#[tokio::test]
+async fn priorities_win_no_turn_from_another_tenant() {
+    let table = Table::new().await;
+    for _ in 0..20 {
+        table.add(wishing("pusher", Priority::High)).await;
+    }
+    let modest = [
+        table.add(wishing("z", Priority::Low)).await.id,
+        table.add(wishing("z", Priority::Low)).await.id,
+    ];
+    let mut places = Vec::new();
+    for place in 0..6 {
+        if modest.contains(&table.claim(0).await.unwrap().id) {
+            places.push(place);
+        }
+    }
+    assert_eq!(places, [1, 3], "pusher, z, pusher, z, …");
+}
+
+/// A clock that a test turns.
+fn turned() -> (Clock, Arc<AtomicI64>) {
+    let ahead = Arc::new(AtomicI64::new(0));
+    let (shown, system) = (ahead.clone(), Clock::system());
+    let clock = Clock::new(move || system.now_ms() + shown.load(Ordering::SeqCst));
+    (clock, ahead)
+}
+
+async fn submit(server: &Server, query: &str, case: &Value) -> Value {
+    let answer = server.post(&format!("/v1/jobs{query}"), case).await;
+    assert_eq!(answer.status, 202, "{}", answer.text);
+    answer.json
+}
+
+async fn until(server: &Server, job: &Value, state: &str) -> Value {
+    let path = job["links"]["self"].as_str().expect("a link");
+    loop {
+        let job = server.get(path).await.json;
+        if job["state"] == state {
+            return job;
+        }
+        assert!(job["ended_at"].is_null(), "{state} was expected: {job}");
+        pause().await;
+    }
+}
+
+#[tokio::test]
+async fn late_jobs_fail_whether_queued_or_running_and_others_do_not() {
+    let mut setup = Setup::new().solving(|problem, monitor| match problem.name.as_deref() {
+        Some("endless") => Err(tick_forever(monitor)),
+        _ => contact::solve(problem, monitor),
+    });
+    let (clock, ahead) = turned();
+    setup.options.clock = clock;
+    // The jump shall not cost the running job its lease.
+    setup.options.lease = Duration::from_secs(3600);
+    let server = setup.start().await;
+    let running = submit(&server, "?deadline_s=60", &case("endless")).await;
+    assert!(running["deadline_at"].is_string(), "{running}");
+    until(&server, &running, "running").await;
+    let queued = submit(&server, "?deadline_s=60&priority=high", &small("late")).await;
+    let patient = submit(&server, "", &small("has time")).await;
+    assert_eq!(
+        (&queued["priority"], &patient["priority"]),
+        (&json!("high"), &json!("normal"))
+    );
+    assert_eq!(patient["deadline_at"], Value::Null);
+    ahead.store(61_000, Ordering::SeqCst);
+    for job in [&queued, &running] {
+        let job = until(&server, job, "failed").await;
+        assert_eq!(job["error"]["type"], "/problems/deadline-passed", "{job}");
+    }
+    until(&server, &patient, "succeeded").await;
+    let metrics = server.get("/metrics").await.text;
+    assert!(
+        metrics.contains("railhead_job_failures_total{reason=\"deadline_passed\"} 2\n"),
+        "{metrics}"
+    );
+}
+
+#[tokio::test]
+async fn wishes_hold_for_every_job_of_a_batch_and_bad_ones_are_refused() {
+    let server = Server::idle().await;
+    let cases = json!([small("a"), small("b")]);
+    let batch = server
+        .post("/v1/batches?priority=low&deadline_s=3600", &cases)
+        .await
+        .json;
+    let path = batch["links"]["jobs"].as_str();
+    let id = batch["id"].as_str().expect("an id");
+    let path = path.map_or(format!("/v1/jobs?batch={id}"), ToOwned::to_owned);
+    let jobs = server.get(&path).await.json;
+    let jobs = jobs["jobs"].as_array().expect("jobs");
+    assert_eq!(jobs.len(), 2);
+    for job in jobs {
+        assert_eq!(job["priority"], "low");
+        assert!(job["deadline_at"].is_string(), "{job}");
+    }
+    for path in ["/v1/jobs", "/v1/batches"] {
+        for query in [
+            "priority=urgent",
+            "deadline_s=0",
+            "deadline_s=2592001",
+            "deadline_s=soon",
+            "prio=high",
+        ] {
+            let answer = server.post(&format!("{path}?{query}"), &cases).await;
+            let name = query.split('=').next().expect("a name");
+            assert_problem(&answer, 400, "bad-query", name);
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_clock_that_jumps_loses_no_job() {
+    let mut setup = Setup::new();
+    let (clock, ahead) = turned();
+    setup.options.clock = clock;
+    setup.options.workers = 2;
+    setup.options.cache = false;
+    let server = setup.start().await;
+    let mut jobs = Vec::new();
+    for jump in [400 * DAY_MS, -400 * DAY_MS, 0] {
+        let cases: Vec<Value> = (0..200)
+            .map(|number| small(&format!("{jump} {number}")))
+            .collect();
+        let batch = server.post("/v1/batches", &json!(cases)).await.json;
+        jobs.push(
+            batch["links"]["results"]
+                .as_str()
+                .expect("a link")
+                .to_owned(),
+        );
+        ahead.store(jump, Ordering::SeqCst);
+        let single =
+            |request: RequestBuilder| request.header("prefer", "wait=30").json(&case("single"));
+        let job = server.send(Method::POST, "/v1/jobs", single).await.json;
+        assert_eq!(job["state"], "succeeded", "{job}");
+    }
+    for results in jobs {
+        let text = server.get(&format!("{results}?wait=60")).await.text;
+        let succeeded = text
+            .lines()
+            .filter(|line| line.contains(State::Succeeded.name()));
+        assert_eq!((text.lines().count(), succeeded.count()), (200, 200));
+    }
+}

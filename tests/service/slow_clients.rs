@@ -1,0 +1,221 @@
+//! Clients that send too slowly, read nothing, or come in too great a number: they are let go, and nobody else notices.
+
+use std::time::{Duration, Instant};
+
+use reqwest::Method;
+use serde_json::{Value, json};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::{TcpSocket, TcpStream};
+
+use crate::server::{Server, Setup, example};
+use crate::support::{Service, long_case};
+
+/// Between two bytes of a slow client.
+const DRIP: Duration = Duration::from_millis(10);
+/// Far beyond every limit that the tests set.
+const FOR_EVER: Duration = Duration::from_secs(60);
+
+async fn connect(server: &Server) -> TcpStream {
+    TcpStream::connect(server.address)
+        .await
+        .expect("a connection")
+}
+
+/// Sends bytes one by one until the service closes the connection; what it answered by then.
+async fn drip(mut stream: TcpStream, bytes: impl Iterator<Item = u8>) -> String {
+    let (mut read, mut write) = stream.split();
+    let mut answer = Vec::new();
+    let sending = async {
+        for byte in bytes {
+            if write.write_all(&[byte]).await.is_err() {
+                break;
+            }
+            tokio::time::sleep(DRIP).await;
+        }
+        std::future::pending::<()>().await;
+    };
+    tokio::select! {
+        // A connection that is reset has been closed as well.
+        _ = read.read_to_end(&mut answer) => {}
+        () = sending => {}
+        () = tokio::time::sleep(FOR_EVER) => panic!("the connection is still open"),
+    }
+    String::from_utf8_lossy(&answer).into_owned()
+}
+
+#[tokio::test]
+async fn heads_that_never_end_are_given_up_and_others_are_served_meanwhile() {
+    let mut setup = Setup::new();
+    setup.http.head_timeout = Duration::from_millis(300);
+    let server = setup.start().await;
+    let mut slow = Vec::new();
+    for _ in 0..100 {
+        let head = "GET /healthz HTTP/1.1\r\nhost: x\r\nx-slow: ".bytes();
+        let head = head.chain(std::iter::repeat(b'a'));
+        slow.push(tokio::spawn(drip(connect(&server).await, head)));
+        slow.push(tokio::spawn(drip(
+            connect(&server).await,
+            std::iter::empty(),
+        )));
+    }
+    assert_eq!(
+        server.solve(&example("spin.case.json")).await["state"],
+        "succeeded"
+    );
+    for client in slow {
+        let answer = client.await.expect("a closed connection");
+        assert!(
+            answer.is_empty() || answer.starts_with("HTTP/1.1 408"),
+            "{answer}"
+        );
+    }
+}
+
+#[tokio::test]
+async fn bodies_that_come_byte_by_byte_are_cut_off() {
+    let mut setup = Setup::new();
+    setup.http.body_timeout = Duration::from_millis(300);
+    let server = setup.start().await;
+    for path in ["/v1/jobs", "/v1/batches"] {
+        let mut stream = connect(&server).await;
+        let head = format!(
+            "POST {path} HTTP/1.1\r\nhost: x\r\nconnection: close\r\ncontent-type: application/json\r\ncontent-length: 1000000\r\n\r\n["
+        );
+        stream.write_all(head.as_bytes()).await.expect("sent");
+        // Each byte comes long before the time for a piece is over.
+        let answer = drip(stream, std::iter::repeat(b' ')).await;
+        assert!(
+            answer.starts_with("HTTP/1.1 408") && answer.contains("/problems/body-timeout"),
+            "{path}: {answer}"
+        );
+    }
+}
+
+#[tokio::test]
+async fn an_answer_that_is_not_taken_is_given_up() {
+    let mut setup = Setup::new();
+    setup.http.write_timeout = Duration::from_millis(300);
+    let server = setup.start().await;
+    let (path, whole) = large_results(&server).await;
+    let socket = TcpSocket::new_v4().expect("a socket");
+    socket.set_recv_buffer_size(4096).expect("a small buffer");
+    let mut stream = socket.connect(server.address).await.expect("a connection");
+    let request = format!("GET {path} HTTP/1.1\r\nhost: x\r\n\r\n");
+    stream.write_all(request.as_bytes()).await.expect("sent");
+    tokio::time::sleep(Duration::from_millis(1500)).await;
+    let start = Instant::now();
+    let mut answer = Vec::new();
+    // What lies in the buffers of the system still comes, then the end.
+    let _ = tokio::time::timeout(FOR_EVER, stream.read_to_end(&mut answer))
+        .await
+        .expect("an end");
+    assert!(
+        answer.len() < whole,
+        "{} of {whole} bytes after {:?}",
+        answer.len(),
+        start.elapsed()
+    );
+}
+
+/// The path of results that fill every buffer on the way, and their size in bytes.
+async fn large_results(server: &Server) -> (String, usize) {
+    let cases: Vec<Value> = (0..40).map(|number| large_case(number)).collect();
+    let batch = server.post("/v1/batches", &json!(cases)).await.json;
+    let path = format!(
+        "{}?wait=60",
+        batch["links"]["results"].as_str().expect("a link")
+    );
+    let whole = server.get(&path).await.bytes.len();
+    assert!(whole > 12 << 20, "{whole} bytes do not fill the buffers");
+    (path, whole)
+}
+
+/// A case with a result of some 300 kB.
+fn large_case(number: u32) -> Value {
+    let mut case = long_case(&format!("case {number}"), 400);
+    case["load"]["normal_force_n"] = json!(50_000 + number);
+    case["solver"]["mesh"] = json!({ "strips": 2, "cells": 2 });
+    case
+}
+
+#[tokio::test]
+async fn clients_that_read_nothing_cost_little_memory() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let service = Service::start(folder.path(), &["--workers", "2"]);
+    let cases: Vec<Value> = (0..40).map(|number| large_case(number)).collect();
+    let batch = service.request(Method::POST, "/v1/batches").json(&cases);
+    let batch: Value = batch
+        .send()
+        .await
+        .expect("an answer")
+        .json()
+        .await
+        .expect("JSON");
+    let results = format!(
+        "{}?wait=60",
+        batch["links"]["results"].as_str().expect("a link")
+    );
+    let events = batch["links"]["events"]
+        .as_str()
+        .expect("a link")
+        .to_owned();
+    let read = service
+        .request(Method::GET, &results)
+        .send()
+        .await
+        .expect("an answer");
+    let whole = read.bytes().await.expect("a body").len();
+    let before = resident_bytes(service.id());
+    let mut silent = Vec::new();
+    for path in [&results, &events] {
+        for _ in 0..40 {
+            let mut stream = TcpStream::connect(service.address())
+                .await
+                .expect("a connection");
+            let request = format!("GET {path} HTTP/1.1\r\nhost: x\r\n\r\n");
+            stream.write_all(request.as_bytes()).await.expect("sent");
+            silent.push(stream);
+        }
+    }
+    tokio::time::sleep(Duration::from_secs(2)).await;
+    let grown = resident_bytes(service.id()).saturating_sub(before);
+    assert!(grown < 40 * whole / 4, "{grown} bytes for 40 times {whole}");
+    service.submit(&example("spin.case.json")).await;
+    drop(silent);
+}
+
+/// Resident memory of a process.
+fn resident_bytes(process: u32) -> usize {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).expect("a process");
+    let line = status
+        .lines()
+        .find_map(|line| line.strip_prefix("VmRSS:"))
+        .expect("its memory");
+    let kilobytes: usize = line
+        .trim()
+        .trim_end_matches(" kB")
+        .parse()
+        .expect("a number");
+    kilobytes * 1024
+}
+
+#[tokio::test]
+async fn connections_beyond_the_limit_wait_for_a_place() {
+    let mut setup = Setup::new();
+    setup.http.connections_max = 3;
+    setup.http.head_timeout = FOR_EVER;
+    let server = setup.start().await;
+    let mut open = Vec::new();
+    for _ in 0..3 {
+        open.push(connect(&server).await);
+    }
+    let mut late = connect(&server).await;
+    let request = "GET /healthz HTTP/1.1\r\nhost: x\r\nconnection: close\r\n\r\n";
+    late.write_all(request.as_bytes()).await.expect("sent");
+    let mut answer = String::new();
+    let early = tokio::time::timeout(Duration::from_millis(300), late.read_to_string(&mut answer));
+    assert!(early.await.is_err(), "{answer}");
+    open.pop();
+    late.read_to_string(&mut answer).await.expect("an answer");
+    assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
+}

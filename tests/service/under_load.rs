@@ -1,0 +1,245 @@
+//! Is nothing lost and nothing doubled when the process is killed, or told to stop, while clients flood it?
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use reqwest::{Client, Method};
+use serde_json::{Value, json};
+
+use crate::support::{Service, case, pause};
+
+const KILLS: usize = 20;
+const STOPS: usize = 3;
+const CLIENTS: usize = 4;
+/// Most cases that a client submits between two kills.
+const CASES_PER_ROUND: usize = 40;
+/// Cases of the batch that is sent in every third round.
+const BATCH: usize = 60;
+const FLAGS: [&str; 4] = ["--workers", "2", "--shutdown-grace-s", "0"];
+
+/// Pseudo-random numbers, the same in every run.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, bound: u64) -> u64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) % bound
+    }
+}
+
+/// A case that no other one of the test equals; every tenth one is larger.
+fn distinct(number: usize) -> Value {
+    let mut case = case(&format!("case {number}"));
+    case["load"]["normal_force_n"] = json!(20_000 + number);
+    let mesh = if number % 10 == 0 { 14 } else { 6 };
+    case["solver"]["mesh"] = json!({ "strips": mesh, "cells": mesh });
+    case
+}
+
+/// What a client knows: the id answered for each of its idempotency keys, and the keys that were never answered.
+#[derive(Default)]
+struct Known {
+    answered: BTreeMap<String, String>,
+    open: Vec<(String, usize)>,
+}
+
+/// Submits under a key until it is answered or the service is gone. Whatever is answered is documented.
+async fn submit(client: &Client, url: &str, path: &str, key: &str, body: &Value) -> Option<String> {
+    let request = client.request(Method::POST, format!("{url}{path}"));
+    let request = request.header("idempotency-key", key).json(body);
+    let answer = request.send().await.ok()?;
+    let status = answer.status().as_u16();
+    if status == 503 {
+        return None;
+    }
+    assert!(
+        status == 202 || status == 200,
+        "{status}: {}",
+        answer.text().await.unwrap()
+    );
+    let answer: Value = answer.json().await.ok()?;
+    Some(answer["id"].as_str().unwrap().to_owned())
+}
+
+/// One client between two kills: first what was not answered the last time, then new cases.
+async fn flood(
+    mut known: Known,
+    url: String,
+    name: String,
+    first: usize,
+    stop: Arc<AtomicBool>,
+) -> Known {
+    let client = Client::new();
+    let new = (0..CASES_PER_ROUND).map(|number| (format!("{name}-{number}"), first + number));
+    let todo: Vec<_> = std::mem::take(&mut known.open)
+        .into_iter()
+        .chain(new)
+        .collect();
+    for (key, number) in todo {
+        if stop.load(Ordering::SeqCst) {
+            // A key that was never sent needs no answer.
+            break;
+        }
+        match submit(&client, &url, "/v1/jobs", &key, &distinct(number)).await {
+            Some(id) => {
+                let before = known.answered.insert(key, id.clone());
+                assert!(before.is_none_or(|before| before == id));
+            }
+            None => known.open.push((key, number)),
+        }
+    }
+    known
+}
+
+/// A service on this folder that is ended in the middle of a flood, so many times, and what its clients know.
+async fn ended_in_floods(
+    folder: &Path,
+    times: usize,
+    end: impl Fn(Service),
+) -> (Vec<Known>, BTreeMap<String, Option<String>>) {
+    let mut random = Random(7);
+    let mut clients: Vec<Known> = (0..CLIENTS).map(|_| Known::default()).collect();
+    let mut batches = BTreeMap::new();
+    for round in 0..times {
+        let service = Service::start(folder, &FLAGS);
+        let url = format!("http://{}", service.address());
+        let stop = Arc::new(AtomicBool::new(false));
+        let floods: Vec<_> = clients
+            .drain(..)
+            .enumerate()
+            .map(|(number, known)| {
+                let name = format!("{round}-{number}");
+                let first = (round * CLIENTS + number) * CASES_PER_ROUND;
+                tokio::spawn(flood(known, url.clone(), name, first, stop.clone()))
+            })
+            .collect();
+        let batch = (round % 3 == 0).then(|| {
+            let cases: Vec<Value> = (0..BATCH)
+                .map(|case| distinct(1_000_000 + round * BATCH + case))
+                .collect();
+            let (url, key) = (url.clone(), format!("batch-{round}"));
+            tokio::spawn(async move {
+                let id = submit(&Client::new(), &url, "/v1/batches", &key, &json!(cases)).await;
+                (key, id)
+            })
+        });
+        tokio::time::sleep(Duration::from_millis(30 + random.below(500))).await;
+        end(service);
+        stop.store(true, Ordering::SeqCst);
+        for flood in floods {
+            clients.push(flood.await.unwrap());
+        }
+        if let Some(batch) = batch {
+            batches.extend([batch.await.unwrap()]);
+        }
+    }
+    (clients, batches)
+}
+
+/// Every job of the service by id, page by page.
+async fn all_jobs(service: &Service) -> BTreeMap<String, Value> {
+    let (mut jobs, mut cursor) = (BTreeMap::new(), String::new());
+    loop {
+        let page = service.get(&format!("/v1/jobs?limit=1000{cursor}")).await;
+        for job in page["jobs"].as_array().unwrap() {
+            let id = job["id"].as_str().unwrap().to_owned();
+            assert_eq!(jobs.insert(id, job.clone()), None, "listed twice");
+        }
+        match page["next_cursor"].as_str() {
+            Some(next) => cursor = format!("&cursor={next}"),
+            None => return jobs,
+        }
+    }
+}
+
+/// A last service answers what was never answered; then every accepted case has one job, and it succeeds.
+async fn assert_all_is_there(
+    folder: &Path,
+    clients: Vec<Known>,
+    batches: BTreeMap<String, Option<String>>,
+) {
+    let service = Service::start(folder, &FLAGS);
+    let url = format!("http://{}", service.address());
+    let stop = Arc::new(AtomicBool::new(false));
+    let mut singles = BTreeSet::new();
+    let mut keys = 0;
+    for (number, known) in clients.into_iter().enumerate() {
+        let name = format!("last-{number}");
+        let known = flood(
+            known,
+            url.clone(),
+            name,
+            2_000_000 + number * CASES_PER_ROUND,
+            stop.clone(),
+        )
+        .await;
+        assert_eq!(known.open, [], "everything is answered in the end");
+        keys += known.answered.len();
+        singles.extend(known.answered.into_values());
+    }
+    assert_eq!(singles.len(), keys, "each key has a job of its own");
+    assert!(
+        keys > CLIENTS * CASES_PER_ROUND,
+        "the flood was more than its last part"
+    );
+    while service.get("/v1/jobs?limit=1&state=queued").await["jobs"] != json!([])
+        || service.get("/v1/jobs?limit=1&state=running").await["jobs"] != json!([])
+    {
+        pause().await;
+    }
+    let jobs = all_jobs(&service).await;
+    let unsuccessful: Vec<_> = jobs
+        .values()
+        .filter(|job| job["state"] != "succeeded")
+        .collect();
+    assert_eq!(unsuccessful, Vec::<&Value>::new());
+    let (of_batches, alone): (BTreeMap<_, _>, BTreeMap<_, _>) = jobs
+        .into_iter()
+        .partition(|(_, job)| job["batch_id"].is_string());
+    let alone: BTreeSet<String> = alone.into_keys().collect();
+    assert_eq!(alone, singles, "no job is lost and none is there twice");
+    let mut in_batch: BTreeMap<&str, usize> = BTreeMap::new();
+    for job in of_batches.values() {
+        *in_batch
+            .entry(job["batch_id"].as_str().unwrap())
+            .or_default() += 1;
+    }
+    for id in batches.values().flatten() {
+        assert!(
+            in_batch.contains_key(id.as_str()),
+            "batch {id} was acknowledged and is lost"
+        );
+    }
+    assert!(
+        in_batch.values().all(|jobs| *jobs == BATCH),
+        "batches are there whole: {in_batch:?}"
+    );
+    for id in singles.iter().step_by(97) {
+        let result = service.get(&format!("/v1/jobs/{id}/result")).await;
+        assert!(result["total"][0]["force_x_n"].is_number(), "{result}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn twenty_kills_lose_nothing_and_double_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let (clients, batches) = ended_in_floods(folder.path(), KILLS, Service::kill).await;
+    assert_all_is_there(folder.path(), clients, batches).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn stopping_under_load_ends_well_and_loses_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let stop = |service: Service| {
+        service.signal("TERM");
+        assert_eq!(service.wait().code(), Some(0));
+    };
+    let (clients, batches) = ended_in_floods(folder.path(), STOPS, stop).await;
+    assert_all_is_there(folder.path(), clients, batches).await;
+}
