@@ -9,7 +9,7 @@
 //! | [`http`] | what may a client ask, and how is it answered? |
 //! | [`cli`] | what can be started, with which settings? Then `main` |
 //!
-//! [`telemetry`] decides where logs go and is used by [`cli`] only.
+//! [`telemetry`] decides where logs and spans go and is used by [`cli`] only.
 //!
 //! Inside [`contact`] a case passes these stages, each of which returns a type of its own:
 //!

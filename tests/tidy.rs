@@ -149,12 +149,26 @@ fn contact_knows_no_files_no_clock_no_network_and_prints_nothing() {
 #[test]
 fn outside_libraries_stay_in_their_rooms() {
     for (room, forbidden) in [
-        ("src/jobs", &["axum", "StatusCode", "faer", "clap"][..]),
+        (
+            "src/jobs",
+            &["axum", "StatusCode", "faer", "clap", "opentelemetry_otlp"][..],
+        ),
         (
             "src/http",
-            &["sqlx", "object_store", "faer", "clap", "std::env"],
+            &[
+                "sqlx",
+                "object_store",
+                "faer",
+                "clap",
+                "std::env",
+                "opentelemetry_otlp",
+                "opentelemetry_sdk",
+            ],
         ),
-        ("src/cli", &["sqlx", "object_store", "faer"]),
+        (
+            "src/cli",
+            &["sqlx", "object_store", "faer", "opentelemetry"],
+        ),
     ] {
         assert_eq!(mentions(room, forbidden), Vec::<String>::new(), "{room}");
     }

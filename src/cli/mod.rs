@@ -17,7 +17,7 @@ use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::contact::problem::Limits;
 use crate::http;
-use crate::telemetry::LogFormat;
+use crate::telemetry::{Endpoint, LogFormat};
 
 /// Rolling-contact stress service: tractions, stick and slip zones and forces between wheel and rail.
 #[derive(Debug, Parser)]
@@ -108,7 +108,8 @@ pub struct ServeArgs {
         default_value = "loopback"
     )]
     pub anonymous: Anonymous,
-    /// Requests per second of one API key, twice as many at once; 0: any number. Requests without a key are not counted.
+    /// Requests per second of one API key, twice as many at once; 0: any number. Requests without a key are counted by
+    /// address, those from this machine itself not at all.
     #[arg(
         long,
         env = "RAILHEAD_RATE_LIMIT",
@@ -119,6 +120,10 @@ pub struct ServeArgs {
     /// Origins of web pages that may read answers, such as `https://dashboard.example`, separated by commas.
     #[arg(long, env = "RAILHEAD_CORS_ORIGIN", value_delimiter = ',', value_name = "ORIGIN", value_parser = origin)]
     pub cors_origin: Vec<String>,
+    /// Collector that gets the spans of requests and jobs by OTLP over HTTP, such as `http://127.0.0.1:4318`; without it
+    /// none are made.
+    #[arg(long, env = "RAILHEAD_OTLP_ENDPOINT", value_name = "URL")]
+    pub otlp_endpoint: Option<Endpoint>,
     #[command(flatten)]
     pub log: LogArgs,
 }

@@ -4,8 +4,8 @@
 //! `listening` with the bound address says that requests are answered.
 //!
 //! Stop, on SIGTERM or SIGINT: not ready and nobody waits any more; no new connections; open requests end; running jobs
-//! get their grace period, then go back to the queue uncounted; the data folder is closed. A second signal ends the
-//! process at once, which loses nothing either: the next start takes the running jobs back.
+//! get their grace period, then go back to the queue uncounted; the data folder is closed; the last spans are sent. A
+//! second signal ends the process at once, which loses nothing either: the next start takes the running jobs back.
 
 use std::process::ExitCode;
 use std::time::Duration;
@@ -18,8 +18,9 @@ use tokio_util::sync::CancellationToken;
 
 use crate::cli::{Anonymous, ServeArgs};
 use crate::http::{self, HttpOptions};
+use crate::jobs::trace::Tracer;
 use crate::jobs::{Jobs, Options};
-use crate::telemetry;
+use crate::telemetry::{self, Traces};
 
 /// How long open requests may take to end once the service stops.
 const REQUESTS_END_WITHIN: Duration = Duration::from_secs(5);
@@ -41,6 +42,7 @@ pub(super) fn run(args: &ServeArgs) -> anyhow::Result<ExitCode> {
 async fn serve(args: &ServeArgs) -> anyhow::Result<()> {
     let mut signals = Signals::listen()?;
     let workers = args.worker_count();
+    let traces = args.otlp_endpoint.as_ref().map(Traces::start).transpose()?;
     let jobs = Jobs::open(Options {
         workers,
         limits: args.case.limits(),
@@ -49,6 +51,7 @@ async fn serve(args: &ServeArgs) -> anyhow::Result<()> {
         cache: args.cache,
         retention: args.retention.0,
         tenant_queue_max: args.tenant_queue_max,
+        tracer: traces.as_ref().map(|traces| Tracer::new(traces.tracer())),
         ..Options::new(&args.data_dir)
     })
     .await?;
@@ -114,6 +117,9 @@ async fn serve(args: &ServeArgs) -> anyhow::Result<()> {
     }
     jobs.shutdown(args.shutdown_grace().saturating_sub(start.elapsed()))
         .await;
+    if let Some(traces) = traces {
+        traces.stop().await;
+    }
     tracing::info!("stopped");
     Ok(())
 }

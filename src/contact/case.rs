@@ -324,9 +324,11 @@ pub struct Sweep {
     pub spin_per_mm: Option<Range>,
     /// Longitudinal force on the lower body in N, in place of `creepage_x`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub force_x_n: Option<Range>,
     /// Lateral force on the lower body in N, in place of `creepage_y`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub force_y_n: Option<Range>,
     /// `together` (default): all ranges have the same number of points and run side by side; `grid`: every
     /// combination, the last named component fastest, a force in the place of its creepage.
@@ -373,6 +375,7 @@ pub struct Solver {
     pub mesh: Option<MeshSize>,
     /// How much traction `fastsim` lets friction carry where; `elliptic` when left out. For no other method.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub traction_bound: Option<TractionBound>,
     /// Give up after this many seconds of solving.
     #[serde(skip_serializing_if = "Option::is_none")]

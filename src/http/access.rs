@@ -1,5 +1,6 @@
 //! Who asks? API keys, tenants, requests per second.
 
+use std::net::{IpAddr, Ipv6Addr};
 use std::num::NonZeroU32;
 use std::sync::Arc;
 
@@ -19,6 +20,35 @@ use crate::jobs::keys::{ANONYMOUS, OPERATOR};
 /// Requests that a key may send at once, in seconds of its rate.
 const BURST_SECONDS: u32 = 2;
 
+/// Senders beyond which those that have not asked for a while are forgotten.
+const SENDERS_KEPT: usize = 10_000;
+
+/// The address that a request comes from; in its extensions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Peer(pub IpAddr);
+
+/// Whose requests are counted together.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+enum Sender {
+    Key(String),
+    Address(IpAddr),
+}
+
+impl Sender {
+    /// The sender of a request without a key. Loopback is this machine itself, perhaps a proxy that speaks for many: not
+    /// counted. One customer has a whole IPv6 network of 64 bits.
+    fn at(peer: Peer) -> Option<Sender> {
+        match peer.0.to_canonical() {
+            address if address.is_loopback() => None,
+            IpAddr::V6(address) => {
+                let network = address.to_bits() >> 64 << 64;
+                Some(Sender::Address(Ipv6Addr::from_bits(network).into()))
+            }
+            address => Some(Sender::Address(address)),
+        }
+    }
+}
+
 /// The jobs that the client may see: those of its tenant. Every handler that touches jobs takes this.
 #[derive(Debug, Clone)]
 pub struct Caller(pub Jobs);
@@ -36,7 +66,7 @@ pub struct Unscoped(pub Jobs);
 pub struct Access {
     jobs: Jobs,
     anonymous: bool,
-    limiter: Option<Arc<RateLimiter<String, HashMapStateStore<String>, DefaultClock>>>,
+    limiter: Option<Arc<RateLimiter<Sender, HashMapStateStore<Sender>, DefaultClock>>>,
 }
 
 impl Access {
@@ -61,7 +91,13 @@ impl Access {
     async fn tenant(&self, parts: &Parts) -> Result<Option<Arc<str>>, ApiError> {
         let mut given = parts.headers.get_all(header::AUTHORIZATION).iter();
         let text = match (given.next(), given.next()) {
-            (None, _) if self.anonymous => return Ok(None),
+            (None, _) if self.anonymous => {
+                let peer = parts.extensions.get::<Peer>().copied();
+                if let Some(sender) = peer.and_then(Sender::at) {
+                    self.require_turn(sender, "this address")?;
+                }
+                return Ok(None);
+            }
             (None, _) => {
                 return Err(unauthorized(
                     "the request has no key; send `Authorization: Bearer` with one",
@@ -78,18 +114,28 @@ impl Access {
         let span = tracing::Span::current();
         span.record("tenant", display(&key.tenant));
         span.record("key", display(&key.id));
-        if let Some(limiter) = &self.limiter
-            && let Err(early) = limiter.check_key(&key.id)
-        {
-            let wait = early.wait_time_from(DefaultClock::default().now());
-            let seconds = u32::try_from(wait.as_secs_f64().ceil() as u64).unwrap_or(u32::MAX);
-            return Err(ApiError::new(
-                Kind::TooManyRequests,
-                "this key sends more requests per second than it may",
-            )
-            .after(seconds.max(1)));
-        }
+        self.require_turn(Sender::Key(key.id), "this key")?;
         Ok(Some(key.tenant))
+    }
+
+    /// Counts a request of a sender.
+    fn require_turn(&self, sender: Sender, who: &str) -> Result<(), ApiError> {
+        let Some(limiter) = &self.limiter else {
+            return Ok(());
+        };
+        if limiter.len() > SENDERS_KEPT {
+            limiter.retain_recent();
+        }
+        let Err(early) = limiter.check_key(&sender) else {
+            return Ok(());
+        };
+        let wait = early.wait_time_from(DefaultClock::default().now());
+        let seconds = u32::try_from(wait.as_secs_f64().ceil() as u64).unwrap_or(u32::MAX);
+        Err(ApiError::new(
+            Kind::TooManyRequests,
+            format!("{who} sends more requests per second than it may"),
+        )
+        .after(seconds.max(1)))
     }
 }
 
@@ -133,6 +179,18 @@ fn bearer(header: &str) -> Option<&str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn senders_without_a_key_are_their_addresses() {
+        let sender = |text: &str| Sender::at(Peer(text.parse().unwrap()));
+        for here in ["127.0.0.1", "127.9.9.9", "::1", "::ffff:127.0.0.1"] {
+            assert_eq!(sender(here), None, "{here}");
+        }
+        assert_eq!(sender("192.0.2.1"), sender("::ffff:192.0.2.1"));
+        assert_ne!(sender("192.0.2.1"), sender("192.0.2.2"));
+        assert_eq!(sender("2001:db8:1:2::3"), sender("2001:db8:1:2:ffff::4"));
+        assert_ne!(sender("2001:db8:1:2::3"), sender("2001:db8:1:3::3"));
+    }
 
     #[test]
     fn only_bearer_credentials_are_read() {

@@ -12,7 +12,7 @@ use uuid::Uuid;
 
 use crate::http::HttpOptions;
 use crate::http::body::{essence, read_json, read_strict};
-use crate::http::coding::too_long;
+use crate::http::coding::{Packed, too_long};
 use crate::http::elements::{Element, Layout, Splitter};
 use crate::http::error::{ApiError, Kind};
 use crate::http::table_body::TableBody;
@@ -106,6 +106,7 @@ pub async fn read_draft(
     if declared.is_some_and(|length| length > options.batch_max_bytes) {
         return Err(too_large());
     }
+    let packed = request.extensions().get::<Packed>().cloned();
     let mut draft = jobs.draft()?;
     let mut splitter = Splitter::new(form.layout(), options.body_max_bytes);
     let mut pieces = request.into_body().into_data_stream();
@@ -140,6 +141,9 @@ pub async fn read_draft(
         total += piece.len() as u64;
         if total > options.batch_max_bytes {
             return Err(too_large());
+        }
+        if packed.as_ref().is_some_and(|packed| packed.is_bomb(total)) {
+            return Err(Packed::refusal());
         }
         held += piece.len();
         splitter.feed(&piece, &mut portion)?;

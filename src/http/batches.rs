@@ -25,6 +25,15 @@ use crate::jobs::batch::{Batch, Draft};
 use crate::jobs::job::State as JobState;
 use crate::jobs::wishes::{Priority, Wishes};
 
+/// The cases of a batch.
+#[derive(ToSchema)]
+#[schema(min_items = 1, max_items = 200_000)]
+#[expect(
+    dead_code,
+    reason = "the form of a body that is cut into cases while it arrives"
+)]
+pub struct Cases(Vec<Case>);
+
 /// A batch that was accepted.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct BatchReceipt {
@@ -138,10 +147,11 @@ problems! {
         ("priority" = Option<Priority>, Query, description = "Which of the queued jobs of the tenant are solved first: `high` before `normal` (when left out) before `low`. Tenants take turns whatever the priorities of their jobs", example = "high"),
         ("deadline_s" = Option<u32>, Query, minimum = 1, maximum = 2_592_000, description = "Seconds from now within which a job must have ended. One that has not, queued or running, fails as `deadline-passed`", example = 600),
         ("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[!-~]+$", description = "1 to 255 visible ASCII characters. Repeating a request with the same key and the same cases answers the first batch instead of making another"),
-        ("Cache-Control" = Option<String>, Header, description = "`no-cache`: solve all cases, also those that are identical to cases solved before", example = "no-cache")
+        ("Cache-Control" = Option<String>, Header, description = "`no-cache`: solve all cases, also those that are identical to cases solved before", example = "no-cache"),
+        ("traceparent" = Option<String>, Header, description = "W3C trace context: where the service sends traces, that of the jobs goes on with the client's. What cannot be read is passed over", example = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01")
     ),
     request_body(content(
-        (Vec<Case> = "application/json"),
+        (Cases = "application/json"),
         (String = "application/x-ndjson"),
         (String = "text/csv")
     ), description = "Cases, at most 200 000, each of at most 8 MiB and together at most 1 GiB"),

@@ -3,12 +3,15 @@
 //! The limits of a body hold before and after it is unpacked, so a small body that unpacks to a large one is given up as soon
 //! as the limit is passed, and one that unpacks to nothing cannot be sent for ever.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use axum::body::Body;
 use axum::extract::{Request, State};
 use axum::http::{Extensions, HeaderMap, HeaderValue, StatusCode, Version, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
-use http_body_util::{LengthLimitError, Limited};
+use http_body_util::{BodyExt, LengthLimitError, Limited};
 use tower_http::compression::CompressionLayer;
 use tower_http::compression::predicate::{NotForContentType, Predicate, SizeAbove};
 
@@ -17,6 +20,12 @@ use crate::http::error::{ApiError, Kind};
 
 /// Bodies that are smaller do not become smaller.
 const SMALLEST: u64 = 256;
+
+/// Bytes that a packed batch may unpack to for each of its own; tables of numbers reach some 30.
+const UNPACKED_PER_BYTE: u64 = 200;
+
+/// Bytes up to which nobody asks how small they were before.
+const UNPACKED_FREE: u64 = 16 << 20;
 
 /// The codings that a body may have.
 const ACCEPTED: HeaderValue = HeaderValue::from_static("gzip, zstd");
@@ -37,6 +46,30 @@ pub fn packing() -> CompressionLayer<impl Predicate> {
             .and(NotForContentType::const_new("application/x-npz"))
             .and(not_live),
     )
+}
+
+/// How much of a packed body has arrived; in the extensions of its request.
+#[derive(Debug, Clone, Default)]
+pub struct Packed(Arc<AtomicU64>);
+
+impl Packed {
+    /// Has a body that so far unpacked to so many bytes grown out of all proportion?
+    #[must_use]
+    pub fn is_bomb(&self, unpacked: u64) -> bool {
+        let packed = self.0.load(Ordering::Relaxed);
+        unpacked > UNPACKED_FREE.saturating_add(packed.saturating_mul(UNPACKED_PER_BYTE))
+    }
+
+    /// Why such a body is refused.
+    #[must_use]
+    pub fn refusal() -> ApiError {
+        ApiError::new(
+            Kind::BodyTooLarge,
+            format!(
+                "the body unpacks to more than {UNPACKED_PER_BYTE} times its size; send it in parts, or as it is"
+            ),
+        )
+    }
 }
 
 /// Refuses codings that cannot be unpacked, and limits a packed body before it is; layer around the unpacking.
@@ -81,8 +114,18 @@ pub async fn limit_packed(
         .into_response();
     }
     let most = usize::try_from(most).unwrap_or(usize::MAX);
-    next.run(request.map(|body| Body::new(Limited::new(body, most))))
-        .await
+    let packed = Packed::default();
+    let arrived = packed.clone();
+    let mut request = request.map(|body| {
+        let counted = Limited::new(body, most).map_frame(move |frame| {
+            let bytes = frame.data_ref().map_or(0, |data| data.len() as u64);
+            arrived.0.fetch_add(bytes, Ordering::Relaxed);
+            frame
+        });
+        Body::new(counted)
+    });
+    request.extensions_mut().insert(packed);
+    next.run(request).await
 }
 
 /// Did reading a body fail because it passed a limit?

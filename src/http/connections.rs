@@ -4,7 +4,10 @@
 use std::sync::Arc;
 
 use axum::Router;
+use axum::body::Body;
+use axum::http::Request;
 use axum::serve::Listener;
+use hyper::body::Incoming;
 use hyper::server::conn::http1::Builder;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
@@ -12,8 +15,10 @@ use hyper_util::service::TowerToHyperService;
 use tokio::net::TcpListener;
 use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
+use tower::ServiceExt;
 
 use crate::http::HttpOptions;
+use crate::http::access::Peer;
 use crate::http::write_limit::WriteLimit;
 
 /// Serves a router until `stop`; then no connection is accepted any more, and this returns when the open requests have
@@ -39,14 +44,21 @@ pub async fn serve(
         let accepted = async {
             let place = places.clone().acquire_owned().await;
             // Errors of single connections are passed over, a lack of descriptors is waited out.
-            (Listener::accept(&mut listener).await.0, place)
+            (Listener::accept(&mut listener).await, place)
         };
-        let (stream, place) = tokio::select! {
+        let ((stream, address), place) = tokio::select! {
             () = stop.cancelled() => break,
             accepted = accepted => accepted,
         };
         let stream = WriteLimit::new(stream, options.write_timeout);
-        let service = TowerToHyperService::new(router.clone());
+        let peer = Peer(address.ip());
+        let service = router
+            .clone()
+            .map_request(move |mut request: Request<Incoming>| {
+                request.extensions_mut().insert(peer);
+                request.map(Body::new)
+            });
+        let service = TowerToHyperService::new(service);
         let connection = builder.serve_connection(TokioIo::new(stream), service);
         let connection = open.watch(connection);
         tokio::spawn(async move {

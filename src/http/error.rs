@@ -75,7 +75,7 @@ kinds! {
     FaultyCase 422 "faulty-case" "The case has faults" "The body is JSON but not a case that can be solved; `errors` names every fault by its JSON pointer, with the value given and what is allowed."
     FaultyBatch 422 "faulty-batch" "The batch has faults" "The body holds no cases, or some of them have faults: `errors` names every fault by a JSON pointer that begins with the place of its case (counted from 0), and by its line in NDJSON. Nothing was stored; with `?accept=valid` the good cases are taken."
     FaultyTable 422 "faulty-table" "The header of the table has faults" "The first line of a table names its columns by JSON pointers such as `/load/normal_force_n` or by short names; the detail names the column and what is allowed."
-    TooManyRequests 429 "too-many-requests" "Too many requests" "The key sends more requests per second than it may; try again after `Retry-After` seconds."
+    TooManyRequests 429 "too-many-requests" "Too many requests" "The key, or without one the address, sends more requests per second than it may; try again after `Retry-After` seconds."
     QuotaExceeded 429 "quota-exceeded" "Too many jobs are waiting" "The tenant has as many queued jobs as it may; nothing was stored, try again after `Retry-After` seconds."
     IdempotencyConflict 422 "idempotency-conflict" "The idempotency key belongs to another case" "The `Idempotency-Key` was used before with a different body; use a new key for a new case."
     Internal 500 "internal" "The service failed" "Something went wrong inside the service; its log has the reason under the request id in the header `x-request-id`."

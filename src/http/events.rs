@@ -12,7 +12,11 @@ use axum::response::{IntoResponse, Response};
 use futures_util::Stream;
 use futures_util::stream::unfold;
 use serde::Serialize;
-use utoipa::ToSchema;
+use serde_json::json;
+use utoipa::openapi::extensions::Extensions;
+use utoipa::openapi::schema::Type;
+use utoipa::openapi::{ObjectBuilder, RefOr, Schema};
+use utoipa::{PartialSchema, ToSchema};
 use uuid::Uuid;
 
 use crate::http::accept::{Format, choose};
@@ -43,6 +47,59 @@ pub struct JobEvent {
     version: u64,
 }
 
+/// One event of the stream of a job, in the contract.
+pub struct JobEventSent;
+
+/// One event of the stream of a batch, in the contract.
+pub struct BatchEventSent;
+
+impl PartialSchema for JobEventSent {
+    fn schema() -> RefOr<Schema> {
+        event_schema::<JobEvent>()
+    }
+}
+
+impl ToSchema for JobEventSent {
+    fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
+        // Only its data leads to it, in a way that is not followed.
+        schemas.push((JobEvent::name().into_owned(), JobEvent::schema()));
+        JobEvent::schemas(schemas);
+    }
+}
+
+impl PartialSchema for BatchEventSent {
+    fn schema() -> RefOr<Schema> {
+        event_schema::<BatchAnswer>()
+    }
+}
+
+impl ToSchema for BatchEventSent {}
+
+/// An event line by line; its data is `T` as JSON text.
+fn event_schema<T: ToSchema>() -> RefOr<Schema> {
+    let text = |what: &str| {
+        let text = ObjectBuilder::new().schema_type(Type::String);
+        text.description(Some(what))
+    };
+    let holds = json!({ "$ref": format!("#/components/schemas/{}", T::name()) });
+    let data = text("What changed, as JSON")
+        .content_media_type("application/json")
+        .extensions(Some(Extensions::from_iter([("contentSchema", holds)])));
+    let retry = ObjectBuilder::new()
+        .schema_type(Type::Integer)
+        .description(Some("Milliseconds after which to connect again"));
+    let event = ObjectBuilder::new()
+        .description(Some("One event of the stream, line by line"))
+        .property("event", text("`state`"))
+        .required("event")
+        .property("id", text("What was seen, for `Last-Event-ID`"))
+        .required("id")
+        .property("retry", retry)
+        .property("data", data)
+        .required("data");
+    event.into()
+}
+
 impl JobEvent {
     fn of(job: &Job) -> Self {
         JobEvent {
@@ -69,7 +126,7 @@ impl JobEvent {
         ("Last-Event-ID" = Option<String>, Header, description = "Id of the last event that was seen")
     ),
     responses(
-        (status = 200, description = "One event per change", content((JobEvent = "text/event-stream"))),
+        (status = 200, description = "One event per change", content((JobEventSent = "text/event-stream"))),
         (status = 204, description = "The job has ended and the client has seen it"),
         LookProblems
     )
@@ -117,7 +174,7 @@ async fn next_of_job(
         ("Last-Event-ID" = Option<String>, Header, description = "Id of the last event that was seen")
     ),
     responses(
-        (status = 200, description = "One event per change", content((BatchAnswer = "text/event-stream"))),
+        (status = 200, description = "One event per change", content((BatchEventSent = "text/event-stream"))),
         (status = 204, description = "Every job has ended and the client has seen it"),
         LookBatchProblems
     )

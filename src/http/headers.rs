@@ -48,6 +48,8 @@ pub fn allow_origins(router: Router, origins: Vec<HeaderValue>) -> Router {
                 "if-none-match",
                 "last-event-id",
                 "prefer",
+                "traceparent",
+                "tracestate",
                 "x-request-id",
             ]))
             .expose_headers(known(&[

@@ -65,7 +65,8 @@ problems! {
         ("deadline_s" = Option<u32>, Query, minimum = 1, maximum = 2_592_000, description = "Seconds from now within which a job must have ended. One that has not, queued or running, fails as `deadline-passed`", example = 600),
         ("Prefer" = Option<String>, Header, description = "`wait=N`: answer when the job has ended, at most N seconds (60 at most) later (RFC 7240)", example = "wait=10"),
         ("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[!-~]+$", description = "1 to 255 visible ASCII characters. Repeating a request with the same key and the same case answers the first job instead of making another"),
-        ("Cache-Control" = Option<String>, Header, description = "`no-cache`: solve the case even if an identical one was solved before", example = "no-cache")
+        ("Cache-Control" = Option<String>, Header, description = "`no-cache`: solve the case even if an identical one was solved before", example = "no-cache"),
+        ("traceparent" = Option<String>, Header, description = "W3C trace context: where the service sends traces, that of the job goes on with the client's. What cannot be read is passed over", example = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01")
     ),
     request_body(content = Case, description = "One case", content_type = "application/json"),
     responses(
@@ -187,7 +188,7 @@ problems! {
         ("created_after" = Option<String>, Query, description = "Only jobs submitted at or after this time (RFC 3339)", format = "date-time", example = "2026-01-31T09:30:00Z"),
         ("created_before" = Option<String>, Query, description = "Only jobs submitted before this time (RFC 3339)", format = "date-time"),
         ("limit" = Option<u32>, Query, minimum = 1, maximum = 1000, description = "Jobs in one page; 50 when left out"),
-        ("cursor" = Option<String>, Query, description = "`next_cursor` of the page before, with the same filters")
+        ("cursor" = Option<String>, Query, pattern = "^[0-9a-f]{40}$", description = "`next_cursor` of the page before, with the same filters")
     ),
     responses((status = 200, description = "A page of jobs", body = JobPage), ListProblems)
 )]

@@ -7,13 +7,13 @@ mod access;
 mod batch_body;
 mod batch_results;
 mod batches;
-mod body;
+pub mod body;
 mod caching;
 mod cases;
 mod cells;
 mod coding;
 mod connections;
-mod elements;
+pub mod elements;
 mod error;
 mod events;
 mod fields;
@@ -32,8 +32,10 @@ mod problems;
 mod query;
 mod resultants;
 mod results;
-mod table_body;
+mod spans;
+pub mod table_body;
 mod trace;
+mod unread;
 mod wishes;
 mod write_limit;
 mod zones;
@@ -56,6 +58,7 @@ use crate::http::access::{Access, Unscoped};
 use crate::http::error::{ApiError, Kind};
 use crate::jobs::Jobs;
 
+pub use crate::http::access::Peer;
 pub use crate::http::connections::serve;
 pub use crate::http::headers::allow_origins;
 pub use crate::http::openapi::openapi_json;
@@ -79,7 +82,7 @@ pub struct HttpOptions {
     pub batch_max_cases: u32,
     /// Requests without a key are answered, as those of a tenant of their own.
     pub anonymous: bool,
-    /// Requests per second of one key; 0 for any number.
+    /// Requests per second of one key, or of one address without a key; 0 for any number.
     pub requests_per_second: u32,
 }
 
@@ -133,9 +136,11 @@ pub fn router(jobs: Jobs, options: HttpOptions) -> Router {
         .layer(from_fn(error::name_instance))
         .layer(coding::packing())
         .layer(from_fn(caching::complete))
-        .layer(from_fn_with_state(metrics.clone(), metrics::count))
+        .layer(from_fn_with_state(metrics.clone(), metrics::count));
+    let router = spans::trace(router, jobs.tracer())
         .layer(trace::span_layer())
         .layer(from_fn(trace::carry_request_id))
+        .layer(from_fn(unread::read_away))
         .with_state(Shared {
             unscoped: Unscoped(jobs),
             access,

@@ -4,6 +4,7 @@ use std::sync::LazyLock;
 
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
+use serde_json::Value;
 use utoipa::OpenApi;
 use utoipa::openapi::RefOr;
 use utoipa::openapi::example::ExampleBuilder;
@@ -127,6 +128,7 @@ static DOCUMENT: LazyLock<String> = LazyLock::new(|| {
     for path in ["/v1/jobs", "/v1/cases/check"] {
         add_examples(&mut document, path);
     }
+    add_batches(&mut document);
     require_keys(&mut document);
     let text = document.to_pretty_json();
     // Only a map with keys that are not strings cannot be written; the document has none.
@@ -175,25 +177,45 @@ fn require_keys(document: &mut utoipa::openapi::OpenApi) {
 }
 
 fn add_examples(document: &mut utoipa::openapi::OpenApi, path: &str) {
+    for (name, summary, text) in EXAMPLES {
+        let Ok(value) = serde_json::from_str::<Value>(text) else {
+            continue;
+        };
+        add_example(document, path, "application/json", [name, summary], value);
+    }
+}
+
+/// Shows a batch in the forms that need nothing else.
+fn add_batches(document: &mut utoipa::openapi::OpenApi) {
+    let cases = EXAMPLES.iter().take(2);
+    let cases = cases.filter_map(|(_, _, text)| serde_json::from_str(text).ok());
+    let cases: Vec<Value> = cases.collect();
+    let lines: String = cases.iter().map(|case| format!("{case}\n")).collect();
+    let path = "/v1/batches";
+    let words = ["two", "Two cases"];
+    add_example(document, path, "application/x-ndjson", words, lines.into());
+    add_example(document, path, "application/json", words, cases.into());
+}
+
+fn add_example(
+    document: &mut utoipa::openapi::OpenApi,
+    path: &str,
+    media: &str,
+    [name, summary]: [&str; 2],
+    value: Value,
+) {
     let item = document.paths.paths.get_mut(path);
     let operation = item.and_then(|item| item.post.as_mut());
     let Some(RefOr::T(body)) = operation.and_then(|operation| operation.request_body.as_mut())
     else {
         return;
     };
-    let Some(RefOr::T(content)) = body.content.get_mut("application/json") else {
+    let Some(RefOr::T(content)) = body.content.get_mut(media) else {
         return;
     };
-    for (name, summary, text) in EXAMPLES {
-        let Ok(value) = serde_json::from_str::<serde_json::Value>(text) else {
-            continue;
-        };
-        let example = ExampleBuilder::new()
-            .summary(summary)
-            .value(Some(value))
-            .build();
-        content.examples.insert(name.to_owned(), RefOr::T(example));
-    }
+    let example = ExampleBuilder::new().summary(summary).value(Some(value));
+    let example = RefOr::T(example.build());
+    content.examples.insert(name.to_owned(), example);
 }
 
 /// This document.
@@ -202,7 +224,7 @@ fn add_examples(document: &mut utoipa::openapi::OpenApi, path: &str) {
     path = "/openapi.json",
     tag = "service",
     operation_id = "get_contract",
-    responses((status = 200, description = "The contract in OpenAPI 3.1", body = serde_json::Value))
+    responses((status = 200, description = "The contract in OpenAPI 3.1", body = Value))
 )]
 pub async fn contract() -> Response {
     (

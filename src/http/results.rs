@@ -50,15 +50,12 @@ pub async fn result(Caller(jobs): Caller, JobId(id): JobId) -> Result<Json<JobRe
 /// # Errors
 /// The job is unknown, has not ended or has no result.
 pub async fn result_of(jobs: &Jobs, id: Uuid) -> Result<JobResult, ApiError> {
-    let solution = jobs.solution(id).await?;
-    let outputs = outputs_asked(jobs, id).await?;
-    let outputs: Vec<&str> = outputs.into_iter().map(name_of).collect();
-    let links = JobResult::links(id, &outputs);
-    let cached = jobs.get(id).await?.cached;
+    let answer = jobs.answer(id).await?;
+    let outputs: Vec<&str> = answer.outputs.into_iter().map(name_of).collect();
     Ok(JobResult {
-        solution,
-        cached,
-        links,
+        solution: answer.solution,
+        cached: answer.cached,
+        links: JobResult::links(id, &outputs),
     })
 }
 
@@ -102,26 +99,13 @@ pub fn require_index(name: &str, index: Option<usize>, count: usize) -> Result<(
     }
 }
 
-/// The outputs that the case of a job asked for.
-///
-/// # Errors
-/// The job is unknown.
-pub async fn outputs_asked(jobs: &Jobs, id: Uuid) -> Result<Vec<Output>, ApiError> {
-    let text = jobs.case(id).await?;
-    let case: serde_json::Value =
-        serde_json::from_slice(&text).map_err(|error| ApiError::internal(&error))?;
-    let jobs = jobs.clone();
-    let problem = tokio::task::spawn_blocking(move || jobs.check(&case)).await;
-    let problem = problem.map_err(|error| ApiError::internal(&error))?;
-    Ok(problem.map_err(|error| ApiError::internal(&error))?.outputs)
-}
-
 /// The failure of a client that fetches what its case did not ask for.
 ///
 /// # Errors
 /// Always: `output-not-asked`, or what went wrong while finding out.
 pub async fn not_asked<T>(jobs: &Jobs, id: Uuid, output: Output) -> Result<T, ApiError> {
-    let asked: Vec<String> = outputs_asked(jobs, id)
+    let asked: Vec<String> = jobs
+        .outputs(id)
         .await?
         .into_iter()
         .map(|output| format!("`{}`", name_of(output)))

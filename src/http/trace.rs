@@ -79,6 +79,7 @@ impl MakeSpan<Body> for RequestSpan {
             job = field::Empty,
             tenant = field::Empty,
             key = field::Empty,
+            trace_id = field::Empty,
         )
     }
 }

@@ -1,9 +1,11 @@
 //! Batches: many cases checked one by one, queued together, followed and cancelled as one.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Duration;
 
 use bytes::Bytes;
+use opentelemetry::KeyValue;
 use serde_json::Value;
 use tokio::time::{Instant, timeout_at};
 use uuid::Uuid;
@@ -194,6 +196,23 @@ impl Jobs {
         draft: Draft,
         idempotency_key: Option<String>,
     ) -> Result<Batch, JobsError> {
+        let span = self.submitting();
+        let traceparent = span.traceparent();
+        let submitted = self.store_batch(draft, idempotency_key, traceparent);
+        span.end(submitted.await, |batch| {
+            vec![
+                KeyValue::new("railhead.batch.id", batch.id.to_string()),
+                KeyValue::new("railhead.batch.jobs", i64::from(batch.count)),
+            ]
+        })
+    }
+
+    async fn store_batch(
+        &self,
+        draft: Draft,
+        idempotency_key: Option<String>,
+        traceparent: Option<Arc<str>>,
+    ) -> Result<Batch, JobsError> {
         let id = Uuid::now_v7();
         let digest = *draft.digest.finalize().as_bytes();
         let new = NewBatch {
@@ -218,7 +237,9 @@ impl Jobs {
         // A client that hangs up must not leave a batch half filled, so the filling goes on without it.
         let jobs = self.clone();
         let filled = tokio::spawn(async move {
-            let filled = jobs.fill(&new, draft.spool, draft.wishes).await;
+            let filled = jobs
+                .fill(&new, draft.spool, draft.wishes, traceparent)
+                .await;
             if filled.is_err()
                 && let Err(error) = jobs.shared.store.drop_batch(new.id).await
             {
@@ -233,7 +254,13 @@ impl Jobs {
         self.batch(id).await
     }
 
-    async fn fill(&self, new: &NewBatch, spool: Spool, wishes: Wishes) -> Result<(), JobsError> {
+    async fn fill(
+        &self,
+        new: &NewBatch,
+        spool: Spool,
+        wishes: Wishes,
+        traceparent: Option<Arc<str>>,
+    ) -> Result<(), JobsError> {
         self.admit(u64::from(new.count)).await?;
         let mut reader = spool
             .into_reader()
@@ -253,7 +280,10 @@ impl Jobs {
             }
             let mut some: Vec<_> = cases
                 .into_iter()
-                .map(|(card, case)| (card.index, self.new_job(card, case, wishes)))
+                .map(|(card, case)| {
+                    let traceparent = traceparent.clone();
+                    (card.index, self.new_job(card, case, wishes, traceparent))
+                })
                 .collect();
             if !wishes.fresh {
                 self.find_sources(some.iter_mut().map(|(_, job)| job))
@@ -394,7 +424,13 @@ impl Jobs {
         }
     }
 
-    fn new_job(&self, card: Card, case: Vec<u8>, wishes: Wishes) -> NewJob {
+    fn new_job(
+        &self,
+        card: Card,
+        case: Vec<u8>,
+        wishes: Wishes,
+        traceparent: Option<Arc<str>>,
+    ) -> NewJob {
         let id = Uuid::now_v7();
         NewJob {
             id,
@@ -409,6 +445,7 @@ impl Jobs {
             reuse_key: self.reuse_key(&card.digest),
             source: None,
             idempotency: None,
+            traceparent,
             wishes,
         }
     }

@@ -1,13 +1,26 @@
 //! What is kept of a job besides its row: the case, the solution, the fields.
 
 use bytes::Bytes;
+use serde_json::Value;
 use uuid::Uuid;
 
+use crate::contact::case::Output;
 use crate::contact::solution::{PatchFields, Solution};
-use crate::jobs::Jobs;
 use crate::jobs::error::JobsError;
 use crate::jobs::results::Encoded;
 use crate::jobs::store::StoredResult;
+use crate::jobs::{Job, Jobs};
+
+/// The answer of a succeeded job, without fields.
+#[derive(Debug)]
+pub struct Answer {
+    /// What was computed.
+    pub solution: Solution,
+    /// It was computed for an identical case before.
+    pub cached: bool,
+    /// What the case asked for.
+    pub outputs: Vec<Output>,
+}
 
 impl Jobs {
     /// The case of a job as submitted, as JSON text.
@@ -30,13 +43,51 @@ impl Jobs {
     /// # Errors
     /// [`JobsError::NotReady`], [`JobsError::NotSucceeded`], [`JobsError::NotFound`], or a failed store.
     pub async fn solution(&self, id: Uuid) -> Result<Solution, JobsError> {
-        let stored = self.stored(id).await?;
+        Ok(self.answer(id).await?.solution)
+    }
+
+    /// As [`Jobs::solution`], with what else is told of an answer.
+    ///
+    /// # Errors
+    /// As [`Jobs::solution`].
+    pub async fn answer(&self, id: Uuid) -> Result<Answer, JobsError> {
+        let (job, stored) = self.stored(id).await?;
         let text = match &stored.folder {
             Some(folder) => self.shared.results.solution(folder).await?,
             None => self.small(&stored).await?.solution,
         };
-        serde_json::from_slice(&text)
-            .map_err(|error| JobsError::Damaged(format!("solution of job {id}: {error}")))
+        let damaged = |error| JobsError::Damaged(format!("solution of job {id}: {error}"));
+        let solution = serde_json::from_slice(&text).map_err(damaged)?;
+        Ok(Answer {
+            solution,
+            cached: job.cached,
+            outputs: self.outputs_of(id, stored).await?,
+        })
+    }
+
+    /// The outputs that the case of a succeeded job asked for.
+    ///
+    /// # Errors
+    /// As [`Jobs::solution`].
+    pub async fn outputs(&self, id: Uuid) -> Result<Vec<Output>, JobsError> {
+        let (_, stored) = self.stored(id).await?;
+        self.outputs_of(id, stored).await
+    }
+
+    async fn outputs_of(&self, id: Uuid, stored: StoredResult) -> Result<Vec<Output>, JobsError> {
+        let damaged = |error: &dyn std::fmt::Display| {
+            JobsError::Damaged(format!("outputs of job {id}: {error}"))
+        };
+        if let Some(text) = stored.outputs {
+            return serde_json::from_str(&text).map_err(|error| damaged(&error));
+        }
+        // The table of an early version did not have them: the case says it.
+        let case: Value =
+            serde_json::from_slice(&self.case(id).await?).map_err(|error| damaged(&error))?;
+        let jobs = self.clone();
+        let problem = tokio::task::spawn_blocking(move || jobs.check(&case)).await;
+        let problem = problem.map_err(|error| damaged(&error))?;
+        Ok(problem.map_err(|error| damaged(&error))?.outputs)
     }
 
     /// The cells of one patch with the values of every motion; reads no other patch.
@@ -66,7 +117,7 @@ impl Jobs {
         patch: usize,
         point: Option<usize>,
     ) -> Result<PatchFields, JobsError> {
-        let stored = self.stored(id).await?;
+        let (_, stored) = self.stored(id).await?;
         if patch >= stored.field_patches {
             return Err(JobsError::NoSuchPatch {
                 patches: stored.field_patches,
@@ -85,14 +136,14 @@ impl Jobs {
     }
 
     /// Where the result of a job lies.
-    async fn stored(&self, id: Uuid) -> Result<StoredResult, JobsError> {
+    async fn stored(&self, id: Uuid) -> Result<(Job, StoredResult), JobsError> {
         let found = self.shared.store.result(id).await?;
         let Some((job, stored)) = found.filter(|(job, _)| *job.tenant == *self.tenant) else {
             return Err(self.missing(id, JobsError::NotFound).await);
         };
         let job = self.unexpired(job)?;
         match stored {
-            Some(stored) => Ok(stored),
+            Some(stored) => Ok((job, stored)),
             None if job.state.ended() => Err(JobsError::NotSucceeded(Box::new(job))),
             None => Err(JobsError::NotReady(job.state)),
         }

@@ -9,7 +9,7 @@ use std::collections::{HashMap, HashSet};
 use std::pin::pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use bytes::Bytes;
 use tokio::sync::oneshot;
@@ -22,6 +22,7 @@ use crate::jobs::job::State;
 use crate::jobs::solver_thread::{Outcome, SolverThread, solve_guarded};
 use crate::jobs::store::sqlite::groups::GroupBounds;
 use crate::jobs::store::{Claim, Ending};
+use crate::jobs::trace::Traced;
 use crate::jobs::watch::{Reason, Watch};
 use crate::jobs::worker::{
     PATIENCE, Registered, Verdict, Worker, heartbeat, judge, lease_ms, not_stored,
@@ -102,11 +103,21 @@ impl Worker {
             return Ok(());
         }
         let shared = &self.shared;
+        let from = shared.options.tracer.is_some().then(SystemTime::now);
         let ended = shared
             .write_patiently(|| shared.store.finish_with_sources(&pairs, shared.now_ms()))
             .await?;
         let ids: Vec<_> = ended.iter().copied().collect();
         shared.metrics.looked_up(ids.len() as u64, 0);
+        if let Some(from) = from {
+            let claims = pairs.iter().map(|(claim, _)| claim);
+            for claim in claims.filter(|claim| ended.contains(&claim.id)) {
+                if let Some(traced) = shared.traced(claim) {
+                    traced.waited_until(from);
+                    traced.stored(from, State::Succeeded.name());
+                }
+            }
+        }
         shared.ended_cached(&ids);
         let back = pairs.into_iter().map(|(claim, _)| claim);
         let back: Vec<_> = back.filter(|claim| !ended.contains(&claim.id)).collect();
@@ -166,17 +177,21 @@ impl Worker {
             let (shared, begun) = (self.shared.clone(), begun.clone());
             let work: Vec<_> = members
                 .iter()
-                .map(|member| (member.watch.clone(), member.body.clone()))
+                .map(|member| {
+                    let traced = shared.traced(&member.claim);
+                    (member.watch.clone(), member.body.clone(), traced)
+                })
                 .collect();
             Box::new(move || {
                 let start = Instant::now();
                 let mut outcomes = Vec::with_capacity(work.len());
-                for (watch, body) in work {
+                for (watch, body, traced) in work {
                     if start.elapsed() > GROUP_TIME || shared.stopping.is_cancelled() {
                         break;
                     }
                     begun.fetch_add(1, Ordering::AcqRel);
-                    outcomes.push(solve_guarded(&shared, &watch, &body));
+                    let solve = || solve_guarded(&shared, &watch, &body);
+                    outcomes.push(Traced::solving(traced.as_ref(), solve));
                 }
                 // An abandoned group has nobody listening.
                 let _ = reply.send(outcomes);
@@ -250,6 +265,7 @@ impl Worker {
         members: &[Member],
         outcomes: Vec<Outcome>,
     ) -> Result<usize, JobsError> {
+        let from = self.shared.options.tracer.is_some().then(SystemTime::now);
         let mut ends = Vec::with_capacity(outcomes.len());
         let mut back: Vec<&Member> = members[outcomes.len()..]
             .iter()
@@ -285,6 +301,9 @@ impl Worker {
         let ended = self.finish_group(&ends).await?;
         for (claim, ending) in &ends {
             if ended.contains(&claim.id) {
+                if let (Some(from), Some(traced)) = (from, self.shared.traced(claim)) {
+                    traced.stored(from, ending.state().name());
+                }
                 self.shared.metrics.ending(ending);
                 if claim.lease_number > 1 {
                     self.remove_earlier(claim.id, ending).await;

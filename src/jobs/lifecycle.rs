@@ -20,6 +20,7 @@ use crate::jobs::metrics::Metrics;
 use crate::jobs::recipe::Recipe;
 use crate::jobs::results::Results;
 use crate::jobs::store::sqlite::SqliteStore;
+use crate::jobs::trace::Tracer;
 use crate::jobs::worker::Worker;
 use crate::jobs::{Admitted, Jobs, Shared, housekeeping, retention, wishes};
 
@@ -53,13 +54,15 @@ pub struct Options {
     pub retention: Option<Duration>,
     /// What leases, ends and expiries are measured with.
     pub clock: Clock,
+    /// What makes spans of jobs, if somebody collects them.
+    pub tracer: Option<Tracer>,
 }
 
 impl Options {
     /// The defaults for a data folder: one worker, a lease of 30 s, 5 attempts, 300 000 queued jobs of which
     /// 250 000 of one tenant,
     /// groups of 256, results up to 32 KiB in the database, results used again,
-    /// ended jobs kept for ever, the system's clock.
+    /// ended jobs kept for ever, the system's clock, no spans.
     #[must_use]
     pub fn new(data_dir: impl Into<PathBuf>) -> Options {
         Options {
@@ -75,6 +78,7 @@ impl Options {
             cache: true,
             retention: None,
             clock: Clock::system(),
+            tracer: None,
         }
     }
 }

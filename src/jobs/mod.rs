@@ -10,7 +10,7 @@ pub mod backup;
 pub mod batch;
 pub mod clock;
 pub mod error;
-mod fetch;
+pub mod fetch;
 pub mod fields;
 mod follow;
 mod group;
@@ -28,6 +28,7 @@ mod solver_thread;
 mod spool;
 mod storage;
 pub mod store;
+pub mod trace;
 pub mod watch;
 pub mod wishes;
 pub mod worker;
@@ -39,6 +40,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use bytes::Bytes;
+use opentelemetry::KeyValue;
 use serde_json::Value;
 use tokio::sync::{Notify, Semaphore, broadcast};
 use tokio::time::{Instant, timeout, timeout_at};
@@ -152,6 +154,24 @@ impl Jobs {
         idempotency_key: Option<String>,
         wishes: Wishes,
     ) -> Result<Job, JobsError> {
+        let span = self.submitting();
+        let traceparent = span.traceparent();
+        let submitted = self.store_case(case, idempotency_key, wishes, traceparent);
+        span.end(submitted.await, |job| {
+            vec![
+                KeyValue::new("railhead.job.id", job.id.to_string()),
+                KeyValue::new("railhead.job.cached", job.cached),
+            ]
+        })
+    }
+
+    async fn store_case(
+        &self,
+        case: Value,
+        idempotency_key: Option<String>,
+        wishes: Wishes,
+        traceparent: Option<Arc<str>>,
+    ) -> Result<Job, JobsError> {
         if self.shared.draining.is_cancelled() {
             return Err(JobsError::Draining);
         }
@@ -188,6 +208,7 @@ impl Jobs {
             source: None,
             body: Bytes::from(body.map_err(|error| JobsError::Damaged(error.to_string()))?),
             idempotency,
+            traceparent,
             wishes,
         };
         if !wishes.fresh {

@@ -260,6 +260,7 @@ mod tests {
             attempt: 1,
             lease_number,
             method: "auto".to_owned(),
+            traceparent: None,
         }
     }
 

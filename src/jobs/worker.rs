@@ -7,7 +7,7 @@
 
 use std::pin::pin;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use bytes::Bytes;
 use tokio::sync::oneshot;
@@ -23,6 +23,7 @@ use crate::jobs::job::{Failure, FailureKind, Job, State};
 use crate::jobs::results::Encoded;
 use crate::jobs::solver_thread::{Outcome, SolverThread, solve_guarded};
 use crate::jobs::store::{Claim, Ending, Placed, Renewal};
+use crate::jobs::trace::Traced;
 use crate::jobs::watch::{Reason, Watch};
 use crate::jobs::wishes::too_late;
 
@@ -130,8 +131,10 @@ impl Worker {
         let (reply, outcome) = oneshot::channel();
         let task = {
             let (shared, watch, span) = (self.shared.clone(), watch.clone(), Span::current());
+            let traced = shared.traced(claim);
             Box::new(move || {
-                let outcome = span.in_scope(|| solve_guarded(&shared, &watch, &body));
+                let solve = || solve_guarded(&shared, &watch, &body);
+                let outcome = span.in_scope(|| Traced::solving(traced.as_ref(), solve));
                 // An abandoned attempt has nobody listening.
                 let _ = reply.send(outcome);
             })
@@ -216,6 +219,10 @@ impl Worker {
         watch: &Watch,
         outcome: Outcome,
     ) -> Result<Step, JobsError> {
+        let traced = self
+            .shared
+            .traced(claim)
+            .map(|traced| (traced, SystemTime::now()));
         let ending = match judge(outcome, watch) {
             Verdict::Lost => return Ok(Step::Lost(claim.id)),
             Verdict::HandBack => return self.hand_back(claim).await,
@@ -240,6 +247,9 @@ impl Worker {
         };
         if claim.lease_number > 1 {
             self.remove_earlier(claim.id, &ending).await;
+        }
+        if let Some((traced, from)) = traced {
+            traced.stored(from, job.state.name());
         }
         self.shared.metrics.ending(&ending);
         self.shared.announce(claim.id);

@@ -37,10 +37,13 @@ mod profile_reference_files;
 mod profile_robustness;
 mod profile_shapes;
 mod profile_solutions;
+#[path = "../../benches/stress/random.rs"]
+mod random;
 mod reference;
 mod reference_hertz;
 mod regions;
 mod robustness;
 mod skips;
+mod stress;
 mod sweeps;
 mod targets;

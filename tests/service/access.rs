@@ -5,11 +5,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use railhead::contact;
-use railhead::jobs::Options;
+use railhead::http::{HttpOptions, Peer};
 use railhead::jobs::keys::Keyring;
 use railhead::jobs::store::NewJob;
+use railhead::jobs::{Jobs, Options};
 use reqwest::Method;
 use serde_json::{Value, json};
+use tower::ServiceExt;
 
 use crate::errors::assert_problem;
 use crate::server::{Answer, Server, Setup};
@@ -284,6 +286,99 @@ async fn a_key_that_asks_too_often_is_told_when_to_come_back() {
     assert_eq!(statuses[..2], [200, 200]);
     assert!(statuses.contains(&429), "{statuses:?}");
     assert_eq!(guarded.get(&guarded.south, "/v1/jobs").await.status, 200);
+}
+
+#[tokio::test]
+async fn an_address_without_a_key_may_ask_so_often_and_no_more() {
+    let folder = tempfile::tempdir().unwrap();
+    let jobs = Jobs::open(Options::new(folder.path())).await.unwrap();
+    let options = HttpOptions {
+        requests_per_second: 1,
+        ..HttpOptions::default()
+    };
+    let router = railhead::http::router(jobs, options);
+    let ask = async |address: &str| {
+        let mut request = axum::http::Request::get("/v1/jobs")
+            .body(axum::body::Body::empty())
+            .unwrap();
+        let peer = Peer(address.parse().unwrap());
+        request.extensions_mut().insert(peer);
+        let answer = router.clone().oneshot(request).await.unwrap();
+        let later = answer.headers().contains_key("retry-after");
+        (answer.status().as_u16(), later)
+    };
+    for _ in 0..2 {
+        assert_eq!(ask("192.0.2.1").await, (200, false));
+    }
+    assert_eq!(ask("192.0.2.1").await, (429, true));
+    assert_eq!(ask("192.0.2.2").await, (200, false), "somebody else");
+    for _ in 0..9 {
+        assert_eq!(ask("127.0.0.1").await, (200, false), "this machine");
+    }
+}
+
+/// Every path of the contract with a parameter belongs to a job or a batch, whose operations are all tried below, or
+/// concerns no tenant.
+#[test]
+fn whatever_has_an_id_belongs_to_a_job_or_a_batch() {
+    let contract: Value = serde_json::from_str(&railhead::http::openapi_json()).unwrap();
+    let paths = contract["paths"].as_object().unwrap().keys();
+    let others: Vec<&String> = paths
+        .filter(|path| path.contains('{'))
+        .filter(|path| !path.starts_with("/v1/jobs/{id}") && !path.starts_with("/v1/batches/{id}"))
+        .collect();
+    assert_eq!(
+        others,
+        ["/problems/{name}"],
+        "give the new ones a test of foreign keys"
+    );
+}
+
+#[tokio::test]
+async fn ids_of_another_tenant_open_nothing_by_other_ways_either() {
+    let guarded = Guarded::start(Setup::new(), |_| {}).await;
+    let (north, south) = (&guarded.north, &guarded.south);
+    let path = guarded.submit(north, &case("north's")).await;
+    guarded.until_ended(north, &path).await;
+    let job = path.rsplit('/').next().unwrap();
+    for query in [
+        "tractions?format=npz",
+        "tractions?grid=5x5&format=csv",
+        "zones?format=vtk",
+        "pressure?patch=7",
+        "plot.svg?field=traction",
+        "plot.png?width=300",
+        "resultants?format=csv",
+    ] {
+        let answer = guarded.get(south, &format!("{path}/{query}")).await;
+        assert_problem(&answer, 404, "job-not-found", "");
+    }
+    let tag = guarded.get(north, &format!("{path}/result")).await;
+    let tag = tag.header("etag").unwrap().to_owned();
+    for (name, value) in [("last-event-id", "3"), ("if-none-match", &tag)] {
+        let part = if name == "if-none-match" {
+            "result"
+        } else {
+            "events"
+        };
+        let shape =
+            |request: reqwest::RequestBuilder| request.bearer_auth(south).header(name, value);
+        let answer = guarded
+            .server
+            .send(Method::GET, &format!("{path}/{part}"), shape)
+            .await;
+        assert_problem(&answer, 404, "job-not-found", "");
+    }
+    let batches = format!("/v1/batches?template={job}");
+    let table = async |key: &str| {
+        let shape = |request: reqwest::RequestBuilder| {
+            let request = request.bearer_auth(key).header("content-type", "text/csv");
+            request.body("name\nx\n")
+        };
+        guarded.server.send(Method::POST, &batches, shape).await
+    };
+    assert_problem(&table(south).await, 404, "job-not-found", "");
+    assert_eq!(table(north).await.status, 202);
 }
 
 #[tokio::test]

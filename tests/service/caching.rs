@@ -251,6 +251,21 @@ async fn limits_hold_before_and_after_unpacking() {
         let answer = send_packed(&server, "/v1/batches", json, coding, bomb).await;
         assert_problem(&answer, 413, "body-too-large", "60000");
     }
+    // A large body is still refused once it has unpacked to many times what has come.
+    let server = Server::idle().await;
+    let text = vec![b'\n'; 200_000_000];
+    for (coding, bomb) in [
+        ("gzip", gzip(&text)),
+        ("zstd", zstd::encode_all(text.as_slice(), 3).expect("zstd")),
+    ] {
+        let lines = "application/x-ndjson";
+        let answer = send_packed(&server, "/v1/batches", lines, coding, bomb).await;
+        assert_problem(&answer, 413, "body-too-large", "200 times its size");
+    }
+    let mut setup = Setup::new();
+    setup.working = false;
+    setup.http.body_max_bytes = 20_000;
+    let server = setup.start().await;
     // Empty blocks without end: nothing comes out, but more goes in than is allowed; the length is not declared.
     let head = vec![0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 0xff];
     let blocks = std::iter::repeat_n([0, 0, 0, 0xff, 0xff].repeat(100), 1000);

@@ -157,6 +157,45 @@ async fn body_that_breaks_is_refused() {
 }
 
 #[tokio::test]
+async fn a_refusal_in_the_middle_of_a_body_leaves_the_connection_usable_or_says_so() {
+    let server = Server::idle().await;
+    let head = |length: usize| {
+        format!(
+            "POST /v1/batches HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: {length}\r\n\r\n{{"
+        )
+    };
+    let rest = " ".repeat(99_999);
+    let mut stream = tokio::net::TcpStream::connect(server.address)
+        .await
+        .expect("a connection");
+    let mut answer = Vec::new();
+    let again = "GET /healthz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n";
+    for (piece, pause) in [
+        (head(100_000), 100),
+        (rest.clone(), 0),
+        (again.to_owned(), 0),
+    ] {
+        stream.write_all(piece.as_bytes()).await.expect("sent");
+        tokio::time::sleep(Duration::from_millis(pause)).await;
+    }
+    stream.read_to_end(&mut answer).await.expect("two answers");
+    let answer = String::from_utf8_lossy(&answer);
+    assert!(answer.starts_with("HTTP/1.1 422"), "{answer}");
+    assert!(answer.contains("HTTP/1.1 200"), "{answer}");
+
+    // More than is read away: the rest never comes.
+    let answer = raw(&server, &head(100_000_000)).await;
+    assert!(answer.starts_with("HTTP/1.1 422"), "{answer}");
+    assert!(answer.contains("connection: close"), "{answer}");
+    // A client that asks first is not told to send.
+    let asking = head(100).replace("\r\n\r\n{", "\r\nExpect: 100-continue\r\n\r\n");
+    let asking = asking.replace("application/json", "text/plain");
+    let answer = raw(&server, &asking).await;
+    assert!(answer.starts_with("HTTP/1.1 415"), "{answer}");
+    assert!(answer.contains("connection: close"), "{answer}");
+}
+
+#[tokio::test]
 async fn bad_query_names_every_parameter_with_its_value() {
     let server = Server::idle().await;
     let answer = server.get("/v1/jobs?limit=0&state=done&label=x&created_after=yesterday&colour=red&cursor=a&cursor=b").await;

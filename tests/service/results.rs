@@ -1,8 +1,11 @@
 //! What comes out: fields, zones, grids and sweeps, against each other and against the real solver.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use serde_json::{Value, json};
 
-use crate::server::{Server, example};
+use crate::server::{Server, Setup, example};
 
 /// The numbers of an array.
 pub fn numbers(value: &Value) -> Vec<f64> {
@@ -35,6 +38,28 @@ fn assert_close(left: f64, right: f64, scale: f64, what: &str) {
         (left - right).abs() <= 1e-9 * scale,
         "{what}: {left} and {right} differ"
     );
+}
+
+#[tokio::test]
+async fn a_result_is_read_without_a_look_at_the_case() {
+    let checks = Arc::new(AtomicUsize::new(0));
+    let counter = checks.clone();
+    let mut setup = Setup::new();
+    setup.recipe.check = Arc::new(move |case, limits| {
+        counter.fetch_add(1, Ordering::SeqCst);
+        railhead::contact::check(case, limits)
+    });
+    let server = setup.start().await;
+    let mut case = example("spin.case.json");
+    case["outputs"] = json!(["resultants"]);
+    let job = server.solve(&case).await;
+    let before = checks.load(Ordering::SeqCst);
+    let path = job["links"]["result"].as_str().expect("a link");
+    let result = server.get(path).await;
+    assert_eq!(result.json["links"], job["result"]["links"]);
+    let slip = path.replace("result", "slip");
+    assert_eq!(server.get(&slip).await.status, 404, "it was not asked for");
+    assert_eq!(checks.load(Ordering::SeqCst), before);
 }
 
 #[tokio::test]

@@ -58,6 +58,7 @@ pub fn new_job() -> NewJob {
         reuse_key: None,
         source: None,
         idempotency: None,
+        traceparent: None,
         wishes: Wishes::default(),
     }
 }

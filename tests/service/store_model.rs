@@ -103,6 +103,7 @@ impl Pair {
             reuse_key: None,
             source: None,
             idempotency: None,
+            traceparent: None,
             wishes: Wishes::default(),
         };
         self.store.enqueue(&new).await.unwrap();

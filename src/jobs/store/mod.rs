@@ -47,6 +47,8 @@ pub struct NewJob {
     pub source: Option<(Uuid, i64)>,
     /// The client's idempotency key with the digest of the case; not used inside a batch.
     pub idempotency: Option<(String, [u8; 32])>,
+    /// W3C trace context of its submission, if its trace is collected.
+    pub traceparent: Option<Arc<str>>,
     /// What else the client wishes.
     pub wishes: Wishes,
 }
@@ -112,6 +114,8 @@ pub struct Claim {
     pub lease_number: u64,
     /// The method asked for.
     pub method: String,
+    /// W3C trace context of its submission, if its trace is collected.
+    pub traceparent: Option<String>,
     /// What tells identical cases; `None` for a job that must be solved.
     pub reuse_key: Option<ReuseKey>,
 }
@@ -146,6 +150,18 @@ pub enum Ending {
     Cancelled,
 }
 
+impl Ending {
+    /// The state of the job that ended so.
+    #[must_use]
+    pub fn state(&self) -> State {
+        match self {
+            Ending::Succeeded { .. } => State::Succeeded,
+            Ending::Failed(_) => State::Failed,
+            Ending::Cancelled => State::Cancelled,
+        }
+    }
+}
+
 /// Where a result is kept once its job has ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Placed {
@@ -164,6 +180,8 @@ pub struct StoredResult {
     pub folder: Option<String>,
     /// Patches with stored fields; 0 if there is no fields object.
     pub field_patches: usize,
+    /// The outputs the case asks for, as the JSON list of their names; `None` for a job of an early version.
+    pub outputs: Option<String>,
 }
 
 /// What became of a wish to delete a job.

@@ -29,6 +29,7 @@ fn forms() -> Vec<Migration> {
         form(5, "tenants", include_str!("tenants.sql")),
         form(6, "tombstones", include_str!("tombstones.sql")),
         form(7, "order", include_str!("order.sql")),
+        form(8, "trace", include_str!("trace.sql")),
     ]
 }
 

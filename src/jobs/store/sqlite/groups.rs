@@ -103,7 +103,7 @@ impl SqliteStore {
         update.push(", progress = 0, version = version + 1 WHERE id IN (");
         push_list(&mut update, &ids);
         update.push(
-            ") RETURNING id, attempt, lease_number, method, CASE WHEN fresh THEN NULL ELSE reuse_key END AS reuse_key",
+            ") RETURNING id, attempt, lease_number, method, traceparent, CASE WHEN fresh THEN NULL ELSE reuse_key END AS reuse_key",
         );
         let rows = update.build().fetch_all(&mut *transaction).await?;
         transaction.commit().await?;
@@ -116,6 +116,7 @@ impl SqliteStore {
                     attempt: row.try_get("attempt")?,
                     lease_number: read_count(row, "lease_number")?,
                     method: row.try_get("method")?,
+                    traceparent: row.try_get("traceparent")?,
                     reuse_key: read_reuse_key(row)?,
                 })
             })

@@ -8,7 +8,7 @@ use crate::jobs::store::sqlite::reuse::end_with_sources;
 use crate::jobs::store::sqlite::rows::to_json;
 use crate::jobs::store::{NewJob, ReuseKey};
 
-/// Jobs in one statement; with 15 values each far below the bound of SQLite.
+/// Jobs in one statement; with 16 values each far below the bound of SQLite.
 const ROWS_PER_STATEMENT: usize = 250;
 
 /// Queues jobs within the caller's transaction, those of a batch with their places in it. Returns those that ended at
@@ -27,7 +27,7 @@ pub(super) async fn insert_jobs(
             .collect::<Result<Vec<_>, _>>()?;
         let mut rows = QueryBuilder::<Sqlite>::new(
             "INSERT INTO jobs (id, state, name, labels, method, created_at, batch_id, batch_index, cost_us, outputs, \
-             reuse_key, tenant, fresh, rank, deadline) ",
+             reuse_key, tenant, fresh, rank, deadline, traceparent) ",
         );
         rows.push_values(
             some.iter().zip(labels),
@@ -46,7 +46,8 @@ pub(super) async fn insert_jobs(
                     .push_bind(&*job.tenant)
                     .push_bind(job.wishes.fresh)
                     .push_bind(job.wishes.priority.rank())
-                    .push_bind(job.deadline());
+                    .push_bind(job.deadline())
+                    .push_bind(job.traceparent.as_deref());
             },
         );
         rows.build().execute(&mut *connection).await?;

@@ -287,7 +287,7 @@ impl SqliteStore {
         let row = sqlx::query(concat!(
             "SELECT ",
             job_columns!(),
-            ", result_key, field_patches, EXISTS (SELECT 1 FROM results WHERE job_id = id) AS inside \
+            ", result_key, field_patches, outputs, EXISTS (SELECT 1 FROM results WHERE job_id = id) AS inside \
              FROM jobs WHERE id = $1"
         ))
         .bind(id.to_string())
@@ -297,10 +297,12 @@ impl SqliteStore {
         let patches: u32 = row.try_get("field_patches")?;
         let folder: Option<String> = row.try_get("result_key")?;
         let inside: bool = row.try_get("inside")?;
+        let outputs = row.try_get("outputs")?;
         let stored = (inside || folder.is_some()).then_some(StoredResult {
             job: id,
             folder,
             field_patches: patches as usize,
+            outputs,
         });
         Ok(Some((read_job(&row)?, stored)))
     }

@@ -1,0 +1,98 @@
+//! What a client still sends when its request has been answered already.
+//!
+//! A faulty batch is refused at its first fault, while the rest of it is on the way. The connection cannot be used again
+//! before that rest has been read, and closing it without a word breaks the client's next request. So a short rest is read
+//! away, and where more comes the answer says that the connection ends.
+
+use std::pin::Pin;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::task::{Context, Poll, ready};
+use std::time::Duration;
+
+use axum::body::{Body, Bytes, HttpBody};
+use axum::extract::Request;
+use axum::http::{HeaderValue, header};
+use axum::middleware::Next;
+use axum::response::Response;
+use http_body_util::{BodyExt, Limited};
+use hyper::body::{Frame, SizeHint};
+use tokio::time::timeout;
+
+/// Longest rest that is read away, in bytes.
+const REST_BYTES: usize = 1 << 20;
+/// How long the client may take to send it.
+const REST_WITHIN: Duration = Duration::from_millis(500);
+
+type Slot = Arc<Mutex<Option<Body>>>;
+
+/// Reads away what is left of a body, or ends the connection; layer around everything that reads bodies.
+pub async fn read_away(request: Request, next: Next) -> Response {
+    if request.body().is_end_stream() {
+        return next.run(request).await;
+    }
+    // A client that asks before it sends has not begun, and reading would tell it to.
+    let asks = request.headers().contains_key(header::EXPECT);
+    let slot = Slot::default();
+    let kept = slot.clone();
+    let request = request.map(|body| Body::new(Kept(Some(body), kept)));
+    let mut response = next.run(request).await;
+    let rest = slot.lock().unwrap_or_else(PoisonError::into_inner).take();
+    if let Some(rest) = rest
+        && (asks || timeout(REST_WITHIN, ends(rest)).await != Ok(true))
+    {
+        let close = HeaderValue::from_static("close");
+        response.headers_mut().insert(header::CONNECTION, close);
+    }
+    response
+}
+
+/// Reads a body to its end; `false` if it breaks or is longer than allowed.
+async fn ends(body: Body) -> bool {
+    let mut body = Limited::new(body, REST_BYTES);
+    while let Some(frame) = body.frame().await {
+        if frame.is_err() {
+            return false;
+        }
+    }
+    true
+}
+
+/// A body that goes into the slot when its reader loses interest before the end.
+struct Kept(Option<Body>, Slot);
+
+impl HttpBody for Kept {
+    type Data = Bytes;
+    type Error = axum::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
+        let Some(body) = &mut self.0 else {
+            return Poll::Ready(None);
+        };
+        let frame = ready!(Pin::new(body).poll_frame(context));
+        if !matches!(frame, Some(Ok(_))) {
+            self.0 = None;
+        }
+        Poll::Ready(frame)
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.0.as_ref().is_none_or(HttpBody::is_end_stream)
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        let none = || SizeHint::with_exact(0);
+        self.0.as_ref().map_or_else(none, HttpBody::size_hint)
+    }
+}
+
+impl Drop for Kept {
+    fn drop(&mut self) {
+        if let Some(body) = self.0.take().filter(|body| !body.is_end_stream()) {
+            let mut slot = self.1.lock().unwrap_or_else(PoisonError::into_inner);
+            *slot = Some(body);
+        }
+    }
+}

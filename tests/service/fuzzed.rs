@@ -1,0 +1,31 @@
+//! What fuzzers start from and what they once found: none of it breaks a promise.
+
+#[path = "../../fuzz/src/lib.rs"]
+mod promises;
+
+use std::path::Path;
+
+#[test]
+fn bytes_that_were_interesting_once_break_no_promise() {
+    let seeds = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds");
+    for (target, promise) in [
+        ("case", promises::case as fn(&[u8])),
+        ("profile", promises::profile),
+        ("table", promises::table),
+        ("batch", promises::batch),
+    ] {
+        let files = std::fs::read_dir(seeds.join(target)).expect("seeds");
+        let mut tried = 0;
+        for file in files {
+            let path = file.expect("an entry").path();
+            println!("{}", path.display());
+            promise(&std::fs::read(&path).expect("a seed"));
+            tried += 1;
+        }
+        assert!(tried >= 2, "{target}");
+    }
+    for example in std::fs::read_dir(seeds.join("../../api/examples")).expect("examples") {
+        let path = example.expect("an entry").path();
+        promises::case(&std::fs::read(&path).expect("an example"));
+    }
+}
