@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use railhead::contact::monitor::Unwatched;
 use railhead::contact::problem::Limits;
-use railhead::contact::{check, solve};
+use railhead::jobs::recipe::Recipe;
 use serde_json::{Value, json};
 
 use crate::machine::{median, seconds_of};
@@ -40,10 +40,11 @@ pub fn meshed(number: usize, size: u32) -> Value {
 
 /// The mesh on which one case takes about `seconds`, and how long it does take.
 pub fn size_of(seconds: f64) -> (u32, f64) {
+    let recipe = Recipe::contact();
     let time = |size| {
         median(
             (0..7)
-                .map(|number| seconds_of(|| solve_one(&meshed(number, size))).0)
+                .map(|number| seconds_of(|| solve_one(&recipe, &meshed(number, size))).0)
                 .collect(),
         )
     };
@@ -60,13 +61,13 @@ pub fn size_of(seconds: f64) -> (u32, f64) {
 
 /// Cases per second of the bare solver on so many threads, measured for about `time`.
 pub fn bare_rate(threads: usize, time: Duration, case: impl Fn(usize) -> Value + Sync) -> f64 {
-    let next = AtomicUsize::new(0);
+    let (recipe, next) = (Recipe::contact(), AtomicUsize::new(0));
     let start = Instant::now();
     std::thread::scope(|scope| {
         for _ in 0..threads {
             scope.spawn(|| {
                 while start.elapsed() < time {
-                    solve_one(&case(next.fetch_add(1, Ordering::Relaxed)));
+                    solve_one(&recipe, &case(next.fetch_add(1, Ordering::Relaxed)));
                 }
             });
         }
@@ -74,7 +75,8 @@ pub fn bare_rate(threads: usize, time: Duration, case: impl Fn(usize) -> Value +
     next.into_inner() as f64 / start.elapsed().as_secs_f64()
 }
 
-fn solve_one(case: &Value) {
-    let problem = check(case, &Limits::default()).expect("a case");
-    solve(&problem, &Unwatched).expect("a solution");
+/// As a worker does it, matrices kept by its thread included.
+fn solve_one(recipe: &Recipe, case: &Value) {
+    let problem = (recipe.check)(case, &Limits::default()).expect("a case");
+    (recipe.solve)(&problem, &Unwatched).expect("a solution");
 }
