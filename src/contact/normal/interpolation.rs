@@ -78,12 +78,8 @@ impl Cubic {
         let pieces = [(0.0, first), (first, second), (second, 1.0)];
         pieces.into_iter().filter_map(move |(low, high)| {
             let (at_low, at_high) = (cubic.value(low) > 0.0, cubic.value(high) > 0.0);
-            (at_low != at_high).then(|| {
-                (
-                    cubic.start + cubic.length * cubic.root(low, high),
-                    at_high,
-                )
-            })
+            (at_low != at_high)
+                .then(|| (cubic.start + cubic.length * cubic.root(low, high), at_high))
         })
     }
 

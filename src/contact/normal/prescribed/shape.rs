@@ -67,7 +67,7 @@ impl PressureField {
     pub(super) fn measure(&self, label: usize, shape: &Shape) -> ([f64; 4], f64) {
         let [y_min, y_max] = self.extent_across(shape, label);
         // Chords have a root at both ends of the patch, so the lines crowd there.
-        let lines = 32 + shape.rows.clone().count();
+        let lines = (32 + shape.rows.clone().count()).max(72);
         let (middle, half) = (0.5 * (y_min + y_max), 0.5 * (y_max - y_min));
         let step = PI / lines as f64;
         let at = |n: f64| middle - half * (n * step).cos();
@@ -108,8 +108,8 @@ impl PressureField {
 
     /// First and last y of lines that meet the patch.
     fn extent_across(&self, shape: &Shape, label: usize) -> [f64; 2] {
-        // Two spacings halved so often are a millionth of a hundredth.
-        const STEPS: usize = 28;
+        // Two spacings halved so often are too small to matter.
+        const STEPS: usize = 36;
         let y = &self.grid.y;
         // The outermost samples are two lines inside the range of cells (see `shapes_from_samples`).
         let [first, last] = [*shape.rows.start(), *shape.rows.end() + 1];
