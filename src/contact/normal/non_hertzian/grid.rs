@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::contact::influence::fft::Convolution;
+use crate::contact::normal::non_hertzian::edges;
 use crate::contact::normal::non_hertzian::gap::{Gap, Window};
 use crate::contact::normal::non_hertzian::gradients::Pressed;
 use crate::contact::normal::non_hertzian::window::Reach;
@@ -91,7 +92,8 @@ impl Grid {
         [self.middle[axis] - half, self.middle[axis] + half]
     }
 
-    pub(super) fn influence(&self, contact_modulus: f64) -> Convolution {
+    /// Single precision does for the violations of the contact conditions that are asked for.
+    pub(super) fn influence(&self, contact_modulus: f64) -> Convolution<f32> {
         let ([nx, ny], [dx, dy]) = (self.cells, self.step);
         Convolution::new(nx, ny, dx, dy, contact_modulus)
     }
@@ -136,8 +138,10 @@ impl Grid {
         gap.iter().map(|h| largest * part(h).sqrt()).collect()
     }
 
-    /// Pressures of another grid at the centres of this one, bilinear, 0 beyond it.
+    /// Pressures of another grid at the centres of this one: the root of their squares, which fall linearly to 0 at the
+    /// edge and are continued beyond it, interpolated bilinearly.
     pub(super) fn interpolate(&self, other: &Grid, pressure: &[f64], gap: &[f64]) -> Vec<f64> {
+        let squares = edges::continued(other.cells[0], edges::squares(other.cells[0], pressure));
         let places = [0, 1].map(|axis| -> Vec<(isize, f64)> {
             let first = other.range(axis)[0] + 0.5 * other.step[axis];
             self.centres(axis)
@@ -151,7 +155,7 @@ impl Grid {
         let value = |i: isize, j: isize| {
             let inside = |k: isize, axis: usize| (0..other.cells[axis] as isize).contains(&k);
             if inside(i, 0) && inside(j, 1) {
-                pressure[j as usize * other.cells[0] + i as usize]
+                squares[j as usize * other.cells[0] + i as usize]
             } else {
                 0.0
             }
@@ -160,7 +164,8 @@ impl Grid {
         for &(j, v) in &places[1] {
             for &(i, u) in &places[0] {
                 let row = |j: isize| (1.0 - u) * value(i, j) + u * value(i + 1, j);
-                out.push((1.0 - v) * row(j) + v * row(j + 1));
+                let square = (1.0 - v) * row(j) + v * row(j + 1);
+                out.push(square.max(0.0).sqrt());
             }
         }
         if out.iter().all(|p| *p == 0.0) {

@@ -35,8 +35,8 @@ const PRESSURE_CHANGE: f64 = 0.015;
 /// How much finer the next grid is.
 const REFINEMENT: f64 = 1.6;
 /// Violation of the contact conditions relative to the deepest overlap, on the first grid and on the others.
-const TOLERANCE_FIRST: f64 = 1e-3;
-const TOLERANCE: f64 = 1e-4;
+const TOLERANCE_FIRST: f64 = 2e-3;
+const TOLERANCE: f64 = 2e-4;
 /// Grids tried; each is larger, shifted or finer than the one before.
 const GRIDS_MAX: usize = 12;
 /// Cells outside the contact that nearly touch, relative to the deepest overlap, belong to the next grid.
