@@ -29,8 +29,16 @@ const CLASSES: [(&str, &str, &str); 4] = [
         "`gap_profile`, a sample every 0.1 mm",
         "rad_",
     ),
-    ("Quartics", "likewise", "quart_"),
-    ("Two patches", "likewise", "two_"),
+    (
+        "Quartics",
+        "`gap_profile` of y² and y⁴, sampled likewise",
+        "quart_",
+    ),
+    (
+        "Two patches",
+        "`gap_profile` of two parabolas, sampled likewise",
+        "two_",
+    ),
 ];
 
 pub fn section(lu: f64) -> String {
