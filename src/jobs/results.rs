@@ -261,6 +261,7 @@ mod tests {
             lease_number,
             method: "auto".to_owned(),
             traceparent: None,
+            reuse_key: None,
         }
     }
 
