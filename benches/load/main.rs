@@ -1,8 +1,8 @@
 //! What does the service do under load, against the bare solver on the same machine in the same run?
 //!
-//! `cargo bench --bench load [-- PART … [workers=N]]` starts the real program on loopback with a data folder of its own and
+//! `cargo bench --bench load [-- PART … [workers=N] [jobs=N]]` starts the real program on loopback with a data folder of its own and
 //! prints a table. The parts: `mixed` (64 clients for a minute), `soak` (20 000 small jobs, one by one, removed after a
-//! while), `batch` (20 000 cases in one request); all of them without a name. The driver runs on one thread of the same
+//! while; `jobs=N` for another number), `batch` (20 000 cases in one request); all of them without a name. The driver runs on one thread of the same
 //! machine. A broken promise (a wrong answer, a lost or doubled job) ends it with a panic; missed goals are printed.
 
 #[path = "../machine.rs"]
@@ -38,11 +38,13 @@ fn main() {
         return;
     }
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let workers = arguments
-        .iter()
-        .find_map(|argument| argument.strip_prefix("workers=")?.parse().ok())
-        // As the service has by default.
-        .unwrap_or((cores - 1).max(1));
+    let number = |name: &str| {
+        let mut values = arguments.iter().filter_map(|one| one.strip_prefix(name));
+        values.find_map(|value| value.parse::<usize>().ok())
+    };
+    // As the service has by default.
+    let workers = number("workers=").unwrap_or((cores - 1).max(1));
+    let jobs = number("jobs=").unwrap_or(20_000);
     let wanted = |part: &str| {
         let names = ["mixed", "soak", "batch"];
         !arguments
@@ -65,7 +67,7 @@ fn main() {
         print(runtime.block_on(mixed::run(workers)));
     }
     if wanted("soak") {
-        print(runtime.block_on(soak::run(workers)));
+        print(runtime.block_on(soak::run(workers, jobs)));
     }
     if wanted("batch") {
         print(runtime.block_on(batch::run(workers)));

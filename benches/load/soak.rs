@@ -1,4 +1,4 @@
-//! 20 000 small jobs, submitted one by one and removed some seconds after their end: do memory, files and the job table stay
+//! Many small jobs, submitted one by one and removed some seconds after their end: do memory, files and the job table stay
 //! in proportion to what is kept?
 
 use std::sync::Arc;
@@ -11,7 +11,6 @@ use crate::client::Client;
 use crate::mixed::memory;
 use crate::service::Service;
 
-const JOBS: usize = 20_000;
 const CLIENTS: usize = 64;
 /// How long ended jobs are kept.
 const KEPT: &str = "5s";
@@ -20,22 +19,22 @@ const SAMPLE: Duration = Duration::from_millis(500);
 const ENDS_WITHIN: Duration = Duration::from_secs(60);
 
 /// Runs the soak and says what came of it.
-pub async fn run(workers: usize) -> Vec<Row> {
+pub async fn run(workers: usize, jobs: usize) -> Vec<Row> {
     let service = Service::start(workers, &["--retention", KEPT]);
     let before = service.usage();
     let start = Instant::now();
     let next = Arc::new(AtomicUsize::new(0));
     let clients: Vec<_> = (0..CLIENTS)
-        .map(|_| tokio::spawn(submit_all(service.url.clone(), next.clone())))
+        .map(|_| tokio::spawn(submit_all(service.url.clone(), next.clone(), jobs)))
         .collect();
     let mut samples = Vec::new();
     let mut watch = Client::new(&service.url);
     let mut kept_max = 0.0_f64;
     let mut ended = 0.0;
-    while ended < JOBS as f64 {
+    while ended < jobs as f64 {
         assert!(
             start.elapsed() < 4 * ENDS_WITHIN,
-            "{ended} of {JOBS} jobs have ended"
+            "{ended} of {jobs} jobs have ended"
         );
         tokio::time::sleep(SAMPLE).await;
         ended = watch
@@ -66,13 +65,13 @@ pub async fn run(workers: usize) -> Vec<Row> {
         .await;
     assert_eq!(
         (ended, failed),
-        (JOBS as f64, 0.0),
+        (jobs as f64, 0.0),
         "each job succeeded once"
     );
     vec![
         Row::plain(
             "soak: small jobs submitted one by one, all ended",
-            format!("{JOBS} in {seconds:.0} s, {:.0}/s", JOBS as f64 / seconds),
+            format!("{jobs} in {seconds:.0} s, {:.0}/s", jobs as f64 / seconds),
         ),
         memory("soak: memory at 25, 50, 75, 100 % of the time", &samples),
         Row::plain(
@@ -111,11 +110,11 @@ async fn kept(watch: &mut Client) -> f64 {
     kept
 }
 
-async fn submit_all(url: String, next: Arc<AtomicUsize>) {
+async fn submit_all(url: String, next: Arc<AtomicUsize>, jobs: usize) {
     let mut client = Client::new(&url);
     loop {
         let number = next.fetch_add(1, Ordering::Relaxed);
-        if number >= JOBS {
+        if number >= jobs {
             return;
         }
         client.submit(&meshed(number, 4), None).await;

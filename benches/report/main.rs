@@ -7,6 +7,7 @@
 #[path = "../machine.rs"]
 mod machine;
 
+mod allocations;
 mod gaps;
 mod meshes;
 mod plot;
@@ -19,6 +20,9 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use machine::lu_seconds;
+
+#[global_allocator]
+static ALLOCATOR: allocations::Counting = allocations::Counting;
 
 const HEAD: &str = "# Accuracy and speed
 

@@ -1,12 +1,20 @@
 //! What is saved by skipping what a case does not need.
 
 use std::fmt::Write as _;
+use std::rc::Rc;
 
+use railhead::contact::monitor::Unwatched;
+use railhead::contact::problem::Problem;
+use railhead::contact::tangential::prepared::Cache;
+use railhead::contact::{solve, solve_with};
 use serde_json::{Value, json};
 
+use crate::allocations::during;
+use crate::machine::seconds_of;
 use crate::questions::{problem, timed};
 
 const REPEATS: usize = 21;
+const CASES_OF_A_SHAPE: u32 = 500;
 
 pub fn section(lu: f64) -> String {
     let resultants = json!(["resultants"]);
@@ -18,7 +26,7 @@ pub fn section(lu: f64) -> String {
         .map(|k| json!({ "creepage_x": 0.0001 * f64::from(k) }))
         .collect();
     let mut text = "## What skipping saves\n\nWheel on rail (radii 460 and 300 mm, 100 kN, μ 0.3), target 0.005.\n\n\
-                    | case | LU | products |\n|---|---|---|\n"
+                    | case | LU | products | allocations |\n|---|---|---|---|\n"
         .to_owned();
     for (name, motion, outputs, friction) in [
         (
@@ -55,31 +63,78 @@ pub fn section(lu: f64) -> String {
             0.3,
         ),
     ] {
-        let (seconds, products) = cost(motion, outputs, friction);
-        let _ = writeln!(text, "| {name} | {:.3} | {products} |", seconds / lu);
+        let cost = cost(motion, outputs, friction);
+        let _ = writeln!(
+            text,
+            "| {name} | {:.3} | {} | {} |",
+            cost.seconds / lu,
+            cost.products,
+            cost.allocations
+        );
     }
-    let costs: Vec<(f64, u32)> = alone.iter().map(|m| cost(m, &resultants, 0.3)).collect();
+    let costs: Vec<Cost> = alone.iter().map(|m| cost(m, &resultants, 0.3)).collect();
     let _ = writeln!(
         text,
-        "| the 51 points one by one | {:.3} | {} |\n",
-        costs.iter().map(|c| c.0).sum::<f64>() / lu,
-        costs.iter().map(|c| c.1).sum::<u32>()
+        "| the 51 points one by one | {:.3} | {} | {} |\n",
+        costs.iter().map(|c| c.seconds).sum::<f64>() / lu,
+        costs.iter().map(|c| c.products).sum::<u32>(),
+        costs.iter().map(|c| c.allocations).sum::<u64>()
     );
+    text.push_str(&one_shape(lu));
     text
 }
 
-/// Seconds and products of a case.
-fn cost(motion: &Value, outputs: &Value, friction: f64) -> (f64, u32) {
-    let problem = problem(&json!({
+/// Cases of one shape under many loads and motions, each on its own and with the influence kept.
+fn one_shape(lu: f64) -> String {
+    let problems: Vec<Problem> = (0..CASES_OF_A_SHAPE)
+        .map(|k| {
+            let part = f64::from(k) / f64::from(CASES_OF_A_SHAPE);
+            let motion =
+                json!({ "creepage_x": 0.003 * part, "spin_per_mm": 0.0004 * (1.0 - part) });
+            let load = 60_000.0 + 80_000.0 * (7.0 * part).fract();
+            problem(&question(&motion, &json!(["resultants"]), 0.3, load))
+        })
+        .collect();
+    let cache = Rc::new(Cache::new(64 << 20));
+    let (alone, _) = seconds_of(|| problems.iter().map(|p| solve(p, &Unwatched)).count());
+    let solve_kept = |p| solve_with(&cache, p, &Unwatched);
+    let (kept, _) = seconds_of(|| problems.iter().map(solve_kept).count());
+    let each = |seconds: f64| seconds / lu / f64::from(CASES_OF_A_SHAPE);
+    format!(
+        "{CASES_OF_A_SHAPE} cases of this shape under other loads and motions take {:.3} LU each on their own, {:.3} LU each with the \
+         influence of earlier ones kept ({:.1} MB of matrices), as a worker of the service does.\n\n",
+        each(alone),
+        each(kept),
+        cache.bytes() as f64 / 1e6
+    )
+}
+
+/// What one solve costs.
+struct Cost {
+    seconds: f64,
+    products: u32,
+    allocations: u64,
+}
+
+fn cost(motion: &Value, outputs: &Value, friction: f64) -> Cost {
+    let problem = problem(&question(motion, outputs, friction, 100_000.0));
+    let (solution, seconds) = timed(&problem, REPEATS);
+    let points = &solution.expect("an answer").patches[0].points;
+    Cost {
+        seconds,
+        products: points.iter().map(|p| p.solver.products).sum(),
+        allocations: during(|| solve(&problem, &Unwatched)),
+    }
+}
+
+fn question(motion: &Value, outputs: &Value, friction: f64, load: f64) -> Value {
+    json!({
         "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
         "friction": { "coefficient": friction },
         "contact": { "type": "radii", "rolling_mm": 460, "lateral_mm": 300 },
-        "load": { "normal_force_n": 100_000 },
+        "load": { "normal_force_n": load },
         "motion": motion,
         "solver": { "target_error": 0.005 },
         "outputs": outputs,
-    }));
-    let (solution, seconds) = timed(&problem, REPEATS);
-    let points = &solution.expect("an answer").patches[0].points;
-    (seconds, points.iter().map(|p| p.solver.products).sum())
+    })
 }

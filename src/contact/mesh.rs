@@ -272,6 +272,24 @@ impl Mesh {
         }
     }
 
+    /// Rounds all lengths to multiples of `step`; cells that touched still do.
+    pub fn round(&mut self, step: f64) {
+        let round = |value: &mut f64| *value = (*value / step).round() * step;
+        let places = [
+            &mut self.left,
+            &mut self.right,
+            &mut self.node,
+            &mut self.arm,
+        ];
+        places.into_iter().flatten().for_each(round);
+        for segment in &mut self.segments {
+            let Chord {
+                y, dy, left, right, ..
+            } = &mut segment.chord;
+            [y, dy, left, right].into_iter().for_each(round);
+        }
+    }
+
     /// The y about which segment `j` is the mirror image of segment `m − 1 − j` for every `j`, if there is one and
     /// no segment is its own image. Lengths are compared to 1e-10 of the mesh's extent.
     #[must_use]

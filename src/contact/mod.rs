@@ -17,6 +17,8 @@ pub mod solution;
 pub mod tangential;
 pub mod zones;
 
+use std::rc::Rc;
+
 use serde_json::Value;
 
 use crate::contact::error::{CaseError, SolveError};
@@ -28,6 +30,7 @@ use crate::contact::solution::{Fields, Solution};
 use crate::contact::tangential::forces;
 use crate::contact::tangential::ladder::{Ladder, Plan, Regime};
 use crate::contact::tangential::point::Point;
+use crate::contact::tangential::prepared::Cache;
 
 /// Reads and checks a case.
 ///
@@ -48,16 +51,32 @@ pub fn check(case: &Value, limits: &Limits) -> Result<Problem, CaseError> {
 /// # Errors
 /// A named reason why there is no answer.
 pub fn solve(problem: &Problem, monitor: &dyn Monitor) -> Result<(Solution, Fields), SolveError> {
+    solve_with(&Rc::default(), problem, monitor)
+}
+
+/// The same for one of many problems: what patches of the same shape have in common is kept for the next.
+///
+/// # Errors
+/// The same.
+pub fn solve_with(
+    cache: &Rc<Cache>,
+    problem: &Problem,
+    monitor: &dyn Monitor,
+) -> Result<(Solution, Fields), SolveError> {
     if let Region::Profiles(contact) = &problem.region {
-        return profiles::solve(problem, contact, monitor);
+        return profiles::solve(cache, problem, contact, monitor);
     }
     let watch = Watch::new(monitor, problem.time_limit, problem.motions.len());
-    answer(problem.pressed(&watch)?.as_ref(), &watch)
+    answer(cache, problem.pressed(&watch)?.as_ref(), &watch)
 }
 
 /// Solves every motion of a problem whose region and pressure are known.
-fn answer(problem: &Problem, watch: &Watch) -> Result<(Solution, Fields), SolveError> {
-    let mut ladder = Ladder::new(problem);
+fn answer(
+    cache: &Rc<Cache>,
+    problem: &Problem,
+    watch: &Watch,
+) -> Result<(Solution, Fields), SolveError> {
+    let mut ladder = Ladder::new(problem, cache);
     let mut points = Vec::with_capacity(problem.motions.len());
     for index in 0..problem.motions.len() {
         let point = forces::solve(problem, &mut ladder, index, points.last(), watch)?;

@@ -1,6 +1,8 @@
 //! Solves a wheel on a rail: brings the wheel to rest, solves the patches one after the other, and lets friction share
 //! in the vertical load.
 
+use std::rc::Rc;
+
 use crate::contact::answer;
 use crate::contact::case::{Motion, Output};
 use crate::contact::error::SolveError;
@@ -13,6 +15,7 @@ use crate::contact::normal::profiles::{Loading, PressedGap, PressedWheel, Profil
 use crate::contact::outputs::track::merge;
 use crate::contact::problem::{Problem, Resolution};
 use crate::contact::solution::{Fields, Solution};
+use crate::contact::tangential::prepared::Cache;
 
 /// The vertical force may be missed by this part of it; the bound for a change of friction's share in one round.
 const BALANCE: f64 = 5e-4;
@@ -34,6 +37,7 @@ const TOLERANCE_FIRST: f64 = 0.1;
 /// # Errors
 /// A named reason why there is no answer.
 pub(super) fn solve(
+    cache: &Rc<Cache>,
     problem: &Problem,
     contact: &ProfileContact,
     monitor: &dyn Monitor,
@@ -54,7 +58,7 @@ pub(super) fn solve(
     let vertical = matches!(contact.loading, Loading::Vertical(_)) && problem.friction > 0.0;
     if !vertical || problem.motions.len() > 1 {
         let mut at_rest = rest(exactly(0.0), None)?;
-        let answers = at_rest.answers(problem, contact, monitor)?;
+        let answers = at_rest.answers(cache, problem, contact, monitor)?;
         if vertical {
             at_rest.wheel.warnings.push(
                 "normal forces alone balance the vertical force, because several motions share their patches; the total of a motion \
@@ -77,7 +81,7 @@ pub(super) fn solve(
         tolerance: TOLERANCE_FIRST,
     };
     let mut at_rest = rest(about, None)?;
-    let answers = at_rest.answers(&coarse, contact, monitor)?;
+    let answers = at_rest.answers(cache, &coarse, contact, monitor)?;
     let mut share = friction_share(&at_rest.wheel, &answers);
     for _ in 0..ROUNDS_MAX {
         let counted = share;
@@ -85,7 +89,7 @@ pub(super) fn solve(
             break;
         }
         at_rest = at_rest.again(rest(exactly(counted), Some(&at_rest.wheel))?);
-        let answers = at_rest.answers(problem, contact, monitor)?;
+        let answers = at_rest.answers(cache, problem, contact, monitor)?;
         share = friction_share(&at_rest.wheel, &answers);
         if ((1.0 + share) / (1.0 + counted) - 1.0).abs() <= BALANCE {
             return Ok(merge(problem, &contact.geometry, &at_rest.wheel, answers));
@@ -128,6 +132,7 @@ impl Rest {
     /// Solves every motion on every part.
     fn answers(
         &self,
+        cache: &Rc<Cache>,
         problem: &Problem,
         contact: &ProfileContact,
         monitor: &dyn Monitor,
@@ -146,7 +151,7 @@ impl Rest {
             };
             let region = Region::Grid(gap.field.clone());
             let part = problem.of_part(region, motions, normal)?;
-            answers.push(answer(&part, &watch)?);
+            answers.push(answer(cache, &part, &watch)?);
         }
         Ok(answers)
     }

@@ -4,9 +4,10 @@ use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::available_parallelism;
 use std::time::Duration;
 
-use tokio::sync::{Notify, broadcast};
+use tokio::sync::{Notify, Semaphore, broadcast};
 use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
@@ -129,6 +130,7 @@ impl Jobs {
                 metrics: Metrics::new(),
                 storage_failing: AtomicBool::new(false),
                 trusted: Mutex::default(),
+                checks: Semaphore::new(available_parallelism().map_or(1, usize::from)),
                 queued_at_most: tokio::sync::Mutex::new(Admitted {
                     all: queued,
                     ..Admitted::default()

@@ -42,7 +42,7 @@ use std::time::Duration;
 use bytes::Bytes;
 use opentelemetry::KeyValue;
 use serde_json::Value;
-use tokio::sync::{Notify, broadcast};
+use tokio::sync::{Notify, Semaphore, broadcast};
 use tokio::time::{Instant, timeout, timeout_at};
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
@@ -102,6 +102,8 @@ struct Shared {
     storage_failing: AtomicBool,
     /// Keys found good a moment ago.
     trusted: Mutex<Trusted>,
+    /// Cases of single jobs that may be checked at the same time.
+    checks: Semaphore,
     /// Upper bounds of the number of queued jobs, recounted when they reach their limits.
     queued_at_most: tokio::sync::Mutex<Admitted>,
     /// Held as long as this process uses the data folder.
@@ -174,7 +176,9 @@ impl Jobs {
             return Err(JobsError::Draining);
         }
         let jobs = self.clone();
-        // Checking a large case is arithmetic; it stays off the threads that answer requests.
+        // Checking a large case is arithmetic; it stays off the threads that answer requests, and a crowd of submitters does
+        // not take the cores from them either.
+        let turn = self.shared.checks.acquire().await;
         let read = tokio::task::spawn_blocking(move || {
             let idempotency = idempotency_key.map(|key| (key, idempotency::digest(&case)));
             (jobs.check(&case), serde_json::to_vec(&case), idempotency)
@@ -182,6 +186,7 @@ impl Jobs {
         let (problem, body, idempotency) = read
             .await
             .map_err(|error| JobsError::Damaged(error.to_string()))?;
+        drop(turn);
         if let Some((key, digest)) = &idempotency
             && let Some(enqueued) = self.shared.store.by_key(&self.tenant, key, digest).await?
         {

@@ -1,6 +1,7 @@
 //! What the workers do with a case: check it, solve it. Production uses `contact`; tests may put in their own.
 
 use std::fmt;
+use std::rc::Rc;
 use std::sync::Arc;
 
 use serde_json::Value;
@@ -10,6 +11,14 @@ use crate::contact::error::{CaseError, SolveError};
 use crate::contact::monitor::Monitor;
 use crate::contact::problem::{Limits, Problem};
 use crate::contact::solution::{Fields, Solution};
+use crate::contact::tangential::prepared::Cache;
+
+/// Bytes of influence matrices that each solver thread keeps for the next patches of the same shape.
+const PREPARED_BYTES: usize = 64 << 20;
+
+thread_local! {
+    static PREPARED: Rc<Cache> = Rc::new(Cache::new(PREPARED_BYTES));
+}
 
 /// Checks a case against limits.
 pub type Check = dyn Fn(&Value, &Limits) -> Result<Problem, CaseError> + Send + Sync;
@@ -32,7 +41,9 @@ impl Recipe {
     pub fn contact() -> Recipe {
         Recipe {
             check: Arc::new(contact::check),
-            solve: Arc::new(contact::solve),
+            solve: Arc::new(|problem, monitor| {
+                PREPARED.with(|cache| contact::solve_with(cache, problem, monitor))
+            }),
         }
     }
 }

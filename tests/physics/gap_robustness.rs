@@ -19,8 +19,8 @@ use railhead::contact::{self, check};
 use serde_json::{Value, json};
 
 use crate::gap_samples::{Across, grid, profile, spread, steel};
+use crate::random::Random;
 use crate::reference::assert_none;
-use crate::robustness::Random;
 
 const G: f64 = 82_000.0;
 const NU: f64 = 0.28;

@@ -7,7 +7,7 @@ use railhead::contact::{check, solve};
 use serde_json::json;
 
 use crate::profile_cases::{generated, put};
-use crate::robustness::Random;
+use crate::random::Random;
 
 const COUNT: usize = 60;
 

@@ -5,33 +5,11 @@ use railhead::contact::monitor::Unwatched;
 use railhead::contact::problem::Limits;
 use serde_json::json;
 
+use crate::random::Random;
 use crate::reference::{Ellipse, assert_none};
 
 /// Newton iterations allowed for one rule on one level; an explicit mesh has one level and two rules.
 const ITERATIONS_PER_RULE: u32 = 25;
-
-/// SplitMix64 (Steele, Lea, Flood 2014): the same motions on every machine.
-pub struct Random(pub u64);
-
-impl Random {
-    /// Uniform from 0 to 1.
-    pub fn part(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.part()
-    }
-
-    /// Every decade equally likely.
-    pub fn decades(&mut self, low: f64, high: f64) -> f64 {
-        low * (high / low).powf(self.part())
-    }
-}
 
 /// Creepage 1e-6…1e2 of saturation in any direction, normalised spin 0…100 with either sign, a/b 0.05…20, ν 0…0.5.
 /// One motion in four has no spin, one in four no creepage.

@@ -1,18 +1,18 @@
 //! How wrong are the resultants? From two rules, two levels, and the cell that holds the spin pole.
 
-use crate::contact::case::Method;
+use crate::contact::case::{Method, Motion};
 use crate::contact::mesh::Segment;
 use crate::contact::normal::Patch;
 use crate::contact::outputs::resultants::Resultants;
 use crate::contact::problem::Problem;
 use crate::contact::tangential::Tangential;
-use crate::contact::tangential::fastsim;
 use crate::contact::tangential::ladder::Regime;
 use crate::contact::tangential::level::Level;
 use crate::contact::tangential::liu_hsu::spin_pole::vortex_centre;
+use crate::contact::tangential::{fastsim, full_slip};
 
 /// Factor on the difference of the two rules on a mesh that was chosen without knowing the tractions.
-const RULES_UNKNOWING: f64 = 2.5;
+const RULES_UNKNOWING: f64 = 2.3;
 /// The same on a mesh made for them.
 const RULES_ALONE: f64 = 1.4;
 /// Factor on these two where region and pressure are not known in closed form: strips may miss what the rules share.
@@ -23,6 +23,11 @@ const RULES_BESIDE: f64 = 0.5;
 const LEVELS: f64 = 1.25;
 /// Factor on the step where nothing is extrapolated.
 const LEVELS_ALONE: f64 = 1.25;
+/// The factors grow as this power of the slenderness of a patch, whose strips or cells are few for what they have to tell.
+const CAUTION: f64 = 0.4;
+/// With the load on fewer strips than these, counted by `(Σ load)² / Σ load²`, the factors grow as the square of what is missing;
+/// four strips of an ellipse count as 3.5.
+const STRIPS_FEW: f64 = 3.5;
 /// Error of sampling the vortex of the tractions by one cell, over p h² / N.
 const POLE: f64 = 0.45;
 /// Relative error where everything slips along the rigid slip.
@@ -49,6 +54,19 @@ pub enum Opinion<'a> {
     Coarser(&'a [Resultants], f64),
 }
 
+/// What an estimate depends on beside the answers.
+#[derive(Debug, Clone, Copy)]
+pub struct Circumstances<'a> {
+    /// The motion in mm.
+    pub motion: &'a Motion,
+    /// A finer level, where everything slips and no coarser one has its say.
+    pub finer: Option<&'a Level>,
+    /// How many times more slender the patch is than the factors were found for; at least 1.
+    pub slenderness: f64,
+    /// Residual of the solve.
+    pub tolerance: f64,
+}
+
 /// Estimates the errors of resultants, relative to μN (moment: μN√(A/π)): the largest component for all three, since
 /// single ones cross zero.
 ///
@@ -57,6 +75,8 @@ pub enum Opinion<'a> {
 ///   that where region and pressure come from samples;
 /// - `max(1.25 s |change|, 0.5 |trapezoid − mirror|)` for resultants extrapolated by the share s of the change from a coarser
 ///   level of the same kind;
+/// - both more in slender patches, and where few strips carry the load;
+/// - never less than the error of the sums over cells where everything slips;
 /// - never less than the tolerance of the solve, nor, unless extrapolated on cells that gather about the pole, than
 ///   `0.45 p h² / N` with the pressure p and longer side h of the cell that holds the centre of the traction vortex:
 ///   sampling the vortex at nodes makes an error of that size which two rules on one mesh share.
@@ -67,20 +87,30 @@ pub fn errors(
     answer: &Tangential,
     found: &[Resultants],
     opinion: Opinion,
-    spinning: bool,
-    tolerance: f64,
+    circumstances: Circumstances,
 ) -> Errors {
+    let Circumstances {
+        motion,
+        finer,
+        slenderness,
+        tolerance,
+    } = circumstances;
+    let spinning = motion.spin_per_mm != 0.0;
+    let caution = slenderness.powf(CAUTION) * few_strips(level);
     let patches = problem.region.patches();
     let all = |value| vec![value; patches.len() + 1];
     if problem.friction == 0.0 {
         return all(Some(0.0));
     }
+    let of_sums = finer.map_or_else(
+        || vec![0.0; patches.len() + 1],
+        |finer| sum_errors(problem, &patches, [level, finer], motion),
+    );
     if answer.second.is_none() && answer.work.products == 0 && answer.work.iterations == 0 {
-        return all(Some(if answer.slips.iter().any(|s| *s) {
-            RIGID
-        } else {
-            0.0
-        }));
+        if !answer.slips.iter().any(|s| *s) {
+            return all(Some(0.0));
+        }
+        return of_sums.iter().map(|e| Some(e.max(RIGID))).collect();
     }
     if problem.method == Method::Fastsim {
         // No mesh tells what the theory leaves out.
@@ -120,15 +150,64 @@ pub fn errors(
         pole_error(problem, level, answer)
     };
     (0..=patches.len())
-        .map(|k| match (&of_rules, &of_levels) {
-            (Some(rules), Some(levels)) => Some((rules_factor * rules[k]).max(LEVELS * levels[k])),
-            (Some(rules), None) => Some(rules_factor * rules[k]),
-            // The dense method has one rule; the change between its levels is all there is.
-            (None, Some(levels)) => Some(LEVELS_ALONE * levels[k]),
-            (None, None) => None,
+        .map(|k| {
+            let error = match (&of_rules, &of_levels) {
+                (Some(rules), Some(levels)) => (rules_factor * rules[k]).max(LEVELS * levels[k]),
+                (Some(rules), None) => rules_factor * rules[k],
+                // The dense method has one rule; the change between its levels is all there is.
+                (None, Some(levels)) => LEVELS_ALONE * levels[k],
+                (None, None) => return None,
+            };
+            Some((caution * error).max(of_sums[k]).max(pole).max(tolerance))
         })
-        .map(|error| error.map(|e| e.max(pole).max(tolerance)))
         .collect()
+}
+
+/// Errors of the sums over cells, which both rules share: where everything slips along the rigid slip, those sums are all there is.
+/// The change to a level of four times as many cells tells them.
+fn sum_errors(
+    problem: &Problem,
+    patches: &[Patch],
+    levels: [&Level; 2],
+    motion: &Motion,
+) -> Vec<f64> {
+    let [here, finer] = levels.map(|level| -> Vec<Resultants> {
+        let traction = full_slip::along_rigid_slip(level, &level.scale.motion(motion));
+        (0..patches.len())
+            .map(|p| Resultants::of_patch(level, &traction, p))
+            .collect()
+    });
+    let mut errors = distances(problem, patches, &here, &finer);
+    errors.iter_mut().for_each(|e| *e *= 4.0 / 3.0);
+    errors
+}
+
+/// A factor for a patch whose load lies on few of its strips.
+fn few_strips(level: &Level) -> f64 {
+    let mut loads: Vec<(usize, usize, f64)> = Vec::new();
+    for segment in &level.mesh.segments {
+        let load = |i: usize| level.pressure[i] * level.area[i];
+        let load: f64 = segment.cells.clone().map(load).sum();
+        let (patch, strip) = (segment.chord.patch, segment.chord.strip);
+        match loads.last_mut() {
+            Some(last) if (last.0, last.1) == (patch, strip) => last.2 += load,
+            _ => loads.push((patch, strip, load)),
+        }
+    }
+    let counted = |patch: &[(usize, usize, f64)]| {
+        let sum = |power: i32| patch.iter().map(|(.., load)| load.powi(power)).sum::<f64>();
+        let (load, squares) = (sum(1), sum(2));
+        if squares > 0.0 {
+            load * load / squares
+        } else {
+            STRIPS_FEW
+        }
+    };
+    let fewest = loads
+        .chunk_by(|a, b| a.0 == b.0)
+        .map(counted)
+        .fold(STRIPS_FEW, f64::min);
+    (STRIPS_FEW / fewest).powi(2)
 }
 
 /// Which mesh the next level should have, seen from this one.

@@ -17,21 +17,50 @@ const FIXED_POINT_FROM: f64 = 30.0;
 /// Sweeps of the fixed point before Newton takes over.
 const SWEEPS_MAX: u32 = 12;
 
+/// Tractions at the bound along the rigid slip of a dimensionless motion, on every cell.
+#[must_use]
+pub fn along_rigid_slip(level: &Level, motion: &Motion) -> [Vec<f64>; 2] {
+    along(level, &rigid_slip(level, motion))
+}
+
+fn rigid_slip(level: &Level, motion: &Motion) -> [Vec<f64>; 2] {
+    let normalised = &level.normalised;
+    let x = normalised.rows();
+    let x = x.iter().map(|y| motion.creepage_x - motion.spin_per_mm * y);
+    let y = normalised.node.iter();
+    let y = y.map(|x| motion.creepage_y + motion.spin_per_mm * x);
+    [x.collect(), y.collect()]
+}
+
+/// Tractions at the bound in the directions of the slips.
+fn along(level: &Level, slip: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
+    let lengths: Vec<f64> = slip[0]
+        .iter()
+        .zip(&slip[1])
+        .map(|(x, y)| x.hypot(*y))
+        .collect();
+    [0, 1].map(|k| {
+        let cells = slip[k].iter().zip(&lengths).zip(&level.bound);
+        cells
+            .map(|((s, length), bound)| {
+                if *length > 0.0 {
+                    bound * s / length
+                } else {
+                    0.0
+                }
+            })
+            .collect()
+    })
+}
+
 /// The answer if the rigid slip decides everything: no motion, no friction, or a rigid slip so large that elastic
 /// slip cannot turn it (relative change of the tractions below 1e-6).
 #[must_use]
 pub fn rigid_answer(level: &Level, motion: &Motion) -> Option<Tangential> {
     let cells = level.mesh.cells();
-    let mut slip = [vec![0.0; cells], vec![0.0; cells]];
-    let mut smallest = f64::INFINITY;
-    let normalised = &level.normalised;
-    for (segment, y) in normalised.segments.iter().zip(&normalised.arm) {
-        for i in segment.cells.clone() {
-            slip[0][i] = motion.creepage_x - motion.spin_per_mm * y;
-            slip[1][i] = motion.creepage_y + motion.spin_per_mm * normalised.node[i];
-            smallest = smallest.min(slip[0][i].hypot(slip[1][i]));
-        }
-    }
+    let slip = rigid_slip(level, motion);
+    let sizes = slip[0].iter().zip(&slip[1]).map(|(x, y)| x.hypot(*y));
+    let smallest = sizes.fold(f64::INFINITY, f64::min);
     let still = motion.creepage_x == 0.0 && motion.creepage_y == 0.0 && motion.spin_per_mm == 0.0;
     let reason = if still {
         "no creepage and no spin: nothing to solve"
@@ -40,19 +69,7 @@ pub fn rigid_answer(level: &Level, motion: &Motion) -> Option<Tangential> {
     } else {
         return None;
     };
-    let direction = |k: usize, i: usize| {
-        let length = slip[0][i].hypot(slip[1][i]);
-        if length > 0.0 {
-            slip[k][i] / length
-        } else {
-            0.0
-        }
-    };
-    let traction = [0, 1].map(|k| {
-        (0..cells)
-            .map(|i| level.bound[i] * direction(k, i))
-            .collect()
-    });
+    let traction = along(level, &slip);
     Some(Tangential {
         traction,
         second: None,

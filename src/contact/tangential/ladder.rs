@@ -1,19 +1,24 @@
 //! Which meshes a case climbs: sizes from the number of cells and the shape of the patch, made once and shared by all
 //! motions.
 
+use std::rc::Rc;
+
 use crate::contact::case::{MeshSize, Method};
 use crate::contact::error::SolveError;
 use crate::contact::problem::{Problem, Resolution};
 use crate::contact::tangential::fastsim;
 use crate::contact::tangential::level::Level;
+use crate::contact::tangential::prepared::Cache;
 use crate::contact::tangential::trail::Trail;
 
-/// Cells of the first level.
-pub const CELLS_FIRST: u32 = 64;
+/// Cells of the first level of a patch that is not slender.
+const CELLS_FIRST: f64 = 64.0;
 /// Cells of the finest level a target may ask for.
 pub const CELLS_MAX: u32 = 2048;
-/// Fewest strips, and cells in one, that the rules are good for.
+/// Fewest strips, and cells in one, that the rules are good for; twice as many in slender patches.
 const SIDE_MIN: f64 = 4.0;
+/// Patches longer than this many times their width, or the reverse, are slender.
+const SLENDER: f64 = 5.0;
 
 /// A mesh serves as long as the pole is this near to where the cells gather: within the bump of their density.
 const POLE_MOVED: f64 = 0.15;
@@ -98,6 +103,7 @@ impl From<MeshSize> for Plan {
 #[derive(Debug)]
 pub struct Ladder<'a> {
     problem: &'a Problem,
+    cache: Rc<Cache>,
     levels: Vec<Level>,
     /// What the motions solved so far left on the levels.
     pub trail: Trail,
@@ -109,9 +115,9 @@ pub struct Ladder<'a> {
 }
 
 impl<'a> Ladder<'a> {
-    /// No levels yet.
+    /// No levels yet; their influence may come from the cache.
     #[must_use]
-    pub fn new(problem: &'a Problem) -> Ladder<'a> {
+    pub fn new(problem: &'a Problem, cache: &Rc<Cache>) -> Ladder<'a> {
         let patches = problem.region.patches();
         let heaviest = patches
             .iter()
@@ -121,6 +127,7 @@ impl<'a> Ladder<'a> {
         });
         Ladder {
             problem,
+            cache: Rc::clone(cache),
             levels: Vec::new(),
             trail: Trail::default(),
             path: Vec::new(),
@@ -129,13 +136,26 @@ impl<'a> Ladder<'a> {
         }
     }
 
-    /// The sizes of a case that does not climb: an explicit mesh, the two levels of the dense method, or the one of the
-    /// simplified theory.
+    /// How many times more slender the patch is than the meshes were made for; at least 1.
+    #[must_use]
+    pub fn slenderness(&self) -> f64 {
+        (self.a_over_b.max(1.0 / self.a_over_b) / SLENDER).max(1.0)
+    }
+
+    /// Cells of the first level.
+    #[must_use]
+    pub fn cells_first(&self) -> f64 {
+        CELLS_FIRST * self.slenderness().sqrt().min(2.0)
+    }
+
+    /// The sizes that a method always takes: the mesh of the client, else the two levels of the dense method or the one of
+    /// the simplified theory.
     #[must_use]
     pub fn fixed_sizes(problem: &Problem) -> Option<Vec<MeshSize>> {
         let size = |strips, cells| MeshSize { strips, cells };
         match (problem.resolution, problem.method) {
-            (Resolution::Mesh(size), _) => Some(vec![size]),
+            (Resolution::Mesh(size), Method::LiuHsu | Method::Fastsim) => Some(vec![size]),
+            (Resolution::Mesh(_), _) => None,
             (Resolution::Target(_), Method::LiuHsu) => Some(vec![size(6, 12), size(12, 24)]),
             (Resolution::Target(_), Method::Fastsim) => Some(vec![fastsim::MESH]),
             (Resolution::Target(_), _) => None,
@@ -162,9 +182,10 @@ impl<'a> Ladder<'a> {
     fn size(&self, cells: u32, regime: Regime) -> MeshSize {
         let cells = f64::from(cells) / self.patches;
         let shape = regime.shape(self.a_over_b);
+        let least = SIDE_MIN * self.slenderness().min(2.0);
         let strips =
-            (2.0 * (0.5 * (cells / shape).sqrt()).round()).clamp(SIDE_MIN, cells.max(SIDE_MIN));
-        let along = (cells / strips).round().max(SIDE_MIN);
+            (2.0 * (0.5 * (cells / shape).sqrt().max(least)).round()).min(cells.max(least));
+        let along = (cells / strips).round().max(least);
         MeshSize {
             strips: strips as u32,
             cells: along as u32,
@@ -179,7 +200,9 @@ impl<'a> Ladder<'a> {
         if let Some(found) = self.levels.iter().position(|level| level.plan == plan) {
             return Ok(found);
         }
-        self.levels.push(Level::new(self.problem, plan)?);
+        let cache = Rc::clone(&self.cache);
+        self.levels
+            .push(Level::with_cache(self.problem, plan, cache)?);
         Ok(self.levels.len() - 1)
     }
 

@@ -2,6 +2,7 @@
 
 use std::cell::OnceCell;
 use std::f64::consts::PI;
+use std::rc::Rc;
 
 use crate::contact::case::Motion;
 use crate::contact::error::SolveError;
@@ -11,11 +12,15 @@ use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::Region;
 use crate::contact::normal::fitted::{self, Fitted};
 use crate::contact::problem::{Elasticity, Problem, Resolution};
-use crate::contact::tangential::boundary_element::strip_blocks::SharedBlocks;
 use crate::contact::tangential::ladder::Plan;
+use crate::contact::tangential::prepared::{Cache, Kind, Prepared};
 
 /// Targets from here on are met with a matrix in single precision.
 const SINGLE_PRECISION_FROM: f64 = 5e-4;
+
+/// Dimensionless coordinates in single precision are multiples of this: patches of one shape get the same mesh, to the last
+/// digit, whatever their size.
+const COORDINATE_STEP: f64 = 1.0 / (1_u64 << 34) as f64;
 
 /// The contact made dimensionless: lengths by `length`, tractions by `traction`, slips by `traction / G`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,12 +75,11 @@ pub struct Level {
     pub normalised: Mesh,
     /// Friction bound of every cell, dimensionless.
     pub bound: Vec<f64>,
-    /// What the fast solver prepares for all motions.
-    pub own_blocks: SharedBlocks,
     poisson_ratio: f64,
     precision: Precision,
     mirrored: bool,
-    influence: OnceCell<Differences>,
+    cache: Rc<Cache>,
+    prepared: OnceCell<Rc<Prepared>>,
 }
 
 impl Level {
@@ -85,6 +89,18 @@ impl Level {
     /// # Errors
     /// [`SolveError::Unmeshable`] if no strip meets a patch.
     pub fn new(problem: &Problem, plan: impl Into<Plan>) -> Result<Level, SolveError> {
+        Level::with_cache(problem, plan, Rc::default())
+    }
+
+    /// The same, with a cache to take the influence from.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn with_cache(
+        problem: &Problem,
+        plan: impl Into<Plan>,
+        cache: Rc<Cache>,
+    ) -> Result<Level, SolveError> {
         let plan: Plan = plan.into();
         let size = plan.size;
         let (region, friction) = (&problem.region, problem.friction);
@@ -133,9 +149,12 @@ impl Level {
             shear_modulus,
             origin: [x, mirror.unwrap_or(y)],
         };
-        let normalised = mesh.normalised(scale.origin, 1.0 / scale.length);
+        let precision = precision(problem);
+        let mut normalised = mesh.normalised(scale.origin, 1.0 / scale.length);
+        if precision == Precision::Single {
+            normalised.round(COORDINATE_STEP);
+        }
         let bound = pressure.iter().map(|p| p / largest).collect();
-        let influence = OnceCell::new();
         Ok(Level {
             plan,
             mesh,
@@ -144,30 +163,38 @@ impl Level {
             scale,
             normalised,
             bound,
-            own_blocks: SharedBlocks::default(),
             poisson_ratio,
-            precision: precision(problem),
+            precision,
             mirrored: mirror.is_some(),
-            influence,
+            cache,
+            prepared: OnceCell::new(),
         })
     }
 
-    /// The influence of the dimensionless mesh; computed at the first call.
+    /// The influence of the dimensionless mesh and what else all motions share; taken from the cache or computed at the
+    /// first call.
     ///
     /// # Errors
     /// The monitor may stop the work.
-    pub fn influence(&self, monitor: &dyn Monitor) -> Result<&Differences, Stop> {
-        if let Some(influence) = self.influence.get() {
-            return Ok(influence);
+    pub fn prepared(&self, monitor: &dyn Monitor) -> Result<&Prepared, Stop> {
+        if let Some(prepared) = self.prepared.get() {
+            return Ok(prepared);
         }
-        let influence = Differences::new(
-            &self.normalised,
-            self.poisson_ratio,
-            self.mirrored,
-            self.precision,
-            monitor,
-        )?;
-        Ok(self.influence.get_or_init(|| influence))
+        let kind = Kind {
+            poisson_ratio: self.poisson_ratio,
+            folded: self.mirrored,
+            precision: self.precision,
+        };
+        let prepared = self.cache.get(&self.normalised, kind, monitor)?;
+        Ok(self.prepared.get_or_init(|| prepared))
+    }
+
+    /// The influence of the dimensionless mesh.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn influence(&self, monitor: &dyn Monitor) -> Result<&Differences, Stop> {
+        Ok(&self.prepared(monitor)?.influence)
     }
 
     /// Which half of the unknowns a dimensionless motion moves, if the level has a mirror line and the motion only

@@ -12,6 +12,7 @@ pub mod level;
 pub mod liu_hsu;
 pub mod nested;
 pub mod point;
+pub mod prepared;
 mod root;
 pub mod rules;
 pub mod trail;
@@ -44,6 +45,8 @@ pub struct Work {
     pub iterations: u32,
     /// Products of the influence with a vector.
     pub products: u32,
+    /// Entries of the influence that these products touched.
+    pub entries: u64,
     /// Last residual of the friction law relative to the traction scale.
     pub residual: f64,
 }
@@ -53,6 +56,7 @@ impl Work {
     pub fn add(&mut self, later: Work) {
         self.iterations += later.iterations;
         self.products += later.products;
+        self.entries += later.entries;
         self.residual = later.residual;
     }
 }

@@ -5,8 +5,8 @@ use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
 use crate::contact::outputs::resultants::Resultants;
 use crate::contact::problem::{Problem, Resolution};
-use crate::contact::tangential::estimate::{self, Errors, Opinion};
-use crate::contact::tangential::ladder::{CELLS_FIRST, CELLS_MAX, Ladder, Plan, Regime};
+use crate::contact::tangential::estimate::{self, Circumstances, Errors, Opinion};
+use crate::contact::tangential::ladder::{CELLS_MAX, Ladder, Plan, Regime};
 use crate::contact::tangential::level::Level;
 use crate::contact::tangential::trail::Start;
 use crate::contact::tangential::{
@@ -18,6 +18,9 @@ const POLE_MESH: MeshSize = MeshSize {
     strips: 5,
     cells: 5,
 };
+/// A mesh of so many cells is worth a start on a coarser one, whose sides are no shorter than this.
+const CELLS_NESTED: u64 = 1000;
+const SIDE_HALVED: u32 = 8;
 /// Levels of nearly the same size say nothing about each other.
 const RATIO_MIN: f64 = 1.3;
 /// Error of extrapolated resultants over that of the same without, as far as the climb counts on it.
@@ -86,13 +89,13 @@ pub fn solve(
             }
             Ok(point)
         }
-        (None, Resolution::Mesh(size)) => climb(problem, ladder, asked, size.into(), None, monitor),
+        (None, Resolution::Mesh(size)) => on_mesh(problem, ladder, asked, size, monitor),
         (None, Resolution::Target(target)) => {
             let again = again(problem, ladder, asked, &last_path, monitor)?;
             let (begun, half_octaves) = match again {
                 Some(point) => (point, first_steps(target)),
                 None => {
-                    let first = ladder.plan(CELLS_FIRST, Regime::Unknown);
+                    let first = ladder.plan(ladder.cells_first().round() as u32, Regime::Unknown);
                     let point = climb(problem, ladder, asked, first, None, monitor)?;
                     (point, 0)
                 }
@@ -100,6 +103,35 @@ pub fn solve(
             ascend(problem, ladder, asked, begun, half_octaves, target, monitor)
         }
     }
+}
+
+/// Solves a motion on a mesh of the client's, a large one from a start on meshes of half as many strips and cells.
+fn on_mesh(
+    problem: &Problem,
+    ladder: &mut Ladder,
+    asked: Asked,
+    size: MeshSize,
+    monitor: &dyn Monitor,
+) -> Result<Point, SolveError> {
+    let cells = |size: MeshSize| u64::from(size.strips) * u64::from(size.cells);
+    let mut coarser = None;
+    let half = MeshSize {
+        strips: (size.strips / 4 * 2).max(SIDE_HALVED),
+        cells: (size.cells / 2).max(SIDE_HALVED),
+    };
+    let number = ladder.level(size.into())?;
+    let level = ladder.get(number);
+    let motion = level.scale.motion(&asked.motion);
+    let started = ladder.trail.start(number, level, &motion).is_some();
+    if !started && cells(size) >= CELLS_NESTED && 2 * cells(half) <= cells(size) {
+        coarser = match on_mesh(problem, ladder, asked, half, monitor) {
+            Ok(point) => Some(point),
+            // The mesh that was asked for may do better.
+            Err(SolveError::NotConverged { .. } | SolveError::Unmeshable { .. }) => None,
+            Err(error) => return Err(error),
+        };
+    }
+    climb(problem, ladder, asked, size.into(), coarser, monitor)
 }
 
 /// Solves a motion on given levels, one after the other, so that the resultants are one function of the motion.
@@ -173,7 +205,7 @@ fn ascend(
         } else {
             half_octaves + steps(error / target)
         };
-        let cells = f64::from(CELLS_FIRST) * 2.0_f64.powf(0.5 * f64::from(half_octaves));
+        let cells = ladder.cells_first() * 2.0_f64.powf(0.5 * f64::from(half_octaves));
         if cells > f64::from(CELLS_MAX) {
             break;
         }
@@ -244,14 +276,22 @@ pub fn climb(
         Some(point) => Opinion::Coarser(&point.summed, share),
         None => Opinion::Alone,
     };
+    let finer = match coarser_like {
+        None => finer_for_sums(problem, level, asked, &tangential),
+        Some(_) => None,
+    };
     let errors = estimate::errors(
         problem,
         level,
         &tangential,
         &summed,
         opinion,
-        asked.motion.spin_per_mm != 0.0,
-        tolerance(problem),
+        Circumstances {
+            motion: &asked.motion,
+            finer: finer.as_ref(),
+            slenderness: ladder.slenderness(),
+            tolerance: tolerance(problem),
+        },
     );
     let resultants = match coarser_like {
         // The rules of the fast solver share one order of convergence; the dense method has no such record.
@@ -279,6 +319,23 @@ pub fn climb(
         method: method_used(problem),
         seconds,
     })
+}
+
+/// A level of four times as many cells, where everything slips and the tractions turn: how they add up depends on the
+/// cells. Without spin all tractions point the same way, and cells of any size add up to the load.
+fn finer_for_sums(
+    problem: &Problem,
+    level: &Level,
+    asked: Asked,
+    answer: &Tangential,
+) -> Option<Level> {
+    let turns = asked.motion.spin_per_mm != 0.0 && problem.friction > 0.0;
+    if !turns || !answer.slips.iter().all(|slips| *slips) {
+        return None;
+    }
+    let [strips, cells] = [level.plan.size.strips, level.plan.size.cells].map(|n| 2 * n);
+    let size = MeshSize { strips, cells };
+    Level::new(problem, Plan { size, ..level.plan }).ok()
 }
 
 /// The resultants of every patch where the climb leads to.

@@ -10,6 +10,8 @@
 mod assembly;
 mod product;
 
+use std::cell::RefCell;
+
 use pulp::Arch;
 
 use crate::contact::influence::strips::assembly::Assembly;
@@ -61,6 +63,16 @@ pub struct Differences {
     /// First cell of each stored segment, and one more.
     first_cell: Vec<usize>,
     matrix: Matrix,
+    buffers: Buffers,
+}
+
+/// What products need beside their arguments; kept, so that a product allocates nothing.
+#[derive(Debug, Clone, Default)]
+struct Buffers {
+    /// Tractions in single precision.
+    narrow: RefCell<[Vec<f32>; 2]>,
+    /// Tractions, then displacement differences of the two parities.
+    halves: RefCell<[Vec<f64>; 2]>,
 }
 
 /// Number of difference rows of a segment with `cells` cells.
@@ -147,7 +159,14 @@ impl Differences {
             first_row,
             first_cell,
             matrix,
+            buffers: Buffers::default(),
         })
+    }
+
+    /// Bytes of the matrix.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.matrix.bytes()
     }
 
     /// Number of segments whose rows are stored: all, or half of them if folded.
@@ -294,9 +313,12 @@ impl Differences {
         let (stride, arch) = (self.stride, Arch::new());
         match &self.matrix {
             Matrix::Single(matrix) => {
-                let narrow =
-                    |values: &[f64]| values.iter().map(|v| *v as f32).collect::<Vec<f32>>();
-                let (tx, ty) = (&narrow(tx), &narrow(ty));
+                let mut narrow = self.buffers.narrow.borrow_mut();
+                for (narrow, values) in narrow.iter_mut().zip([tx, ty]) {
+                    narrow.clear();
+                    narrow.extend(values.iter().map(|v| *v as f32));
+                }
+                let [tx, ty] = &*narrow;
                 arch.dispatch(Product {
                     matrix,
                     blocks,
@@ -326,13 +348,15 @@ impl Differences {
     /// Splits the tractions into their two parities, applies each part, and puts the halves together again.
     fn apply_both(&self, tx: &[f64], ty: &[f64], out_x: &mut [f64], out_y: &mut [f64]) {
         let (stride, rows) = (self.stride, self.row_count());
-        let mut parts = vec![0.0; 4 * stride];
+        let mut halves = self.buffers.halves.borrow_mut();
+        let [parts, sums] = &mut *halves;
+        parts.resize(4 * stride, 0.0);
+        sums.resize(4 * rows, 0.0);
         let (x_parts, y_parts) = parts.split_at_mut(2 * stride);
         self.split(tx, x_parts);
         self.split(ty, y_parts);
         let ((x_same, x_opposite), (y_same, y_opposite)) =
             (x_parts.split_at(stride), y_parts.split_at(stride));
-        let mut sums = vec![0.0; 4 * rows];
         let (first, second) = sums.split_at_mut(2 * rows);
         let ((ux_same, uy_opposite), (ux_opposite, uy_same)) =
             (first.split_at_mut(rows), second.split_at_mut(rows));

@@ -10,6 +10,13 @@ pub(super) enum Matrix {
 }
 
 impl Matrix {
+    pub(super) fn bytes(&self) -> usize {
+        match self {
+            Matrix::Single(matrix) => size_of_val(&matrix[..]),
+            Matrix::Double(matrix) => size_of_val(&matrix[..]),
+        }
+    }
+
     pub(super) fn at(&self, place: usize) -> f64 {
         match self {
             Matrix::Single(matrix) => f64::from(matrix[place]),

@@ -19,6 +19,8 @@ pub struct Gmres {
     rhs: Vec<f64>,
     direction: Vec<f64>,
     product: Vec<f64>,
+    residual: Vec<f64>,
+    weights: Vec<f64>,
 }
 
 /// How a linear solve went.
@@ -64,7 +66,9 @@ impl Gmres {
         }
         self.direction.resize(b.len(), 0.0);
         self.product.resize(b.len(), 0.0);
-        let mut residual = b.to_vec();
+        let mut residual = std::mem::take(&mut self.residual);
+        residual.clear();
+        residual.extend_from_slice(b);
         let mut beta = norm_b;
         for restart in 0..=RESTARTS_MAX {
             if restart > 0 {
@@ -83,6 +87,7 @@ impl Gmres {
                 break;
             }
         }
+        self.residual = residual;
         report.residual = beta / norm_b;
         Ok(report)
     }
@@ -97,7 +102,6 @@ impl Gmres {
         x: &mut [f64],
         report: &mut LinearReport,
     ) -> Result<f64, Stop> {
-        self.columns.clear();
         self.rotations.clear();
         self.rhs.clear();
         self.rhs.push(beta);
@@ -136,7 +140,11 @@ impl Gmres {
     /// rotations. Returns true if nothing is left of it.
     fn orthogonalise(&mut self, k: usize) -> bool {
         let before = norm(&self.product);
-        let mut column = Vec::with_capacity(k + 1);
+        if self.columns.len() <= k {
+            self.columns.push(Vec::with_capacity(k + 1));
+        }
+        let mut column = std::mem::take(&mut self.columns[k]);
+        column.clear();
         for basis in &self.basis[..=k] {
             let h = dot(basis, &self.product);
             for (p, b) in self.product.iter_mut().zip(basis) {
@@ -157,7 +165,7 @@ impl Gmres {
             (column[k] / length, rest / length)
         };
         column[k] = length;
-        self.columns.push(column);
+        self.columns[k] = column;
         self.rotations.push((c, s));
         let last = self.rhs[k];
         self.rhs[k] = c * last;
@@ -173,7 +181,9 @@ impl Gmres {
 
     /// `x ← x + P⁻¹ V y` with `y` from the triangular system.
     fn add_solution(&mut self, k: usize, system: &mut dyn LinearSystem, x: &mut [f64]) {
-        let mut y = self.rhs[..k].to_vec();
+        let y = &mut self.weights;
+        y.clear();
+        y.extend_from_slice(&self.rhs[..k]);
         for i in (0..k).rev() {
             for j in i + 1..k {
                 y[i] -= self.columns[j][i] * y[j];
@@ -182,7 +192,7 @@ impl Gmres {
             y[i] = if pivot == 0.0 { 0.0 } else { y[i] / pivot };
         }
         self.direction.fill(0.0);
-        for (weight, basis) in y.iter().zip(&self.basis) {
+        for (weight, basis) in self.weights.iter().zip(&self.basis) {
             for (d, b) in self.direction.iter_mut().zip(basis) {
                 *d += weight * b;
             }

@@ -10,13 +10,14 @@ pub mod newton;
 pub mod strip_blocks;
 
 use crate::contact::case::Motion;
-use crate::contact::influence::strips::{Differences, Parity};
+use crate::contact::influence::strips::Parity;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::tangential::boundary_element::newton::{Convergence, FrictionLaw, Newton};
 use crate::contact::tangential::boundary_element::strip_blocks::OwnBlocks;
 use crate::contact::tangential::equations::Equations;
 use crate::contact::tangential::full_slip;
 use crate::contact::tangential::level::Level;
+use crate::contact::tangential::prepared::Prepared;
 use crate::contact::tangential::rules::Rule;
 use crate::contact::tangential::trail::Start;
 use crate::contact::tangential::{Failure, Tangential, Work, obey_coulomb};
@@ -39,9 +40,9 @@ pub fn solve(
     if let Some(answer) = full_slip::rigid_answer(level, motion) {
         return Ok(answer);
     }
-    let influence = level.influence(monitor)?;
+    let prepared = level.prepared(monitor)?;
     let parity = level.parity(motion);
-    let mut solve = Solve::new(level, motion, influence, parity, tolerance, monitor);
+    let mut solve = Solve::new(level, motion, prepared, parity, tolerance, monitor);
     let mut skipped = Vec::new();
     if parity.is_some() {
         skipped.push("mirror symmetry of patch and motion: half the cells".to_owned());
@@ -91,7 +92,7 @@ struct MirrorAnswer {
 struct Solve<'a> {
     level: &'a Level,
     motion: &'a Motion,
-    influence: &'a Differences,
+    prepared: &'a Prepared,
     parity: Option<Parity>,
     bound: Vec<f64>,
     area: Vec<f64>,
@@ -104,12 +105,12 @@ impl<'a> Solve<'a> {
     fn new(
         level: &'a Level,
         motion: &'a Motion,
-        influence: &'a Differences,
+        prepared: &'a Prepared,
         parity: Option<Parity>,
         tolerance: f64,
         monitor: &'a dyn Monitor,
     ) -> Solve<'a> {
-        let padded = influence.padded(parity);
+        let padded = prepared.influence.padded(parity);
         let resized = |values: &[f64]| {
             let mut values = values.to_vec();
             values.resize(padded.max(values.len()), 0.0);
@@ -118,7 +119,7 @@ impl<'a> Solve<'a> {
         Solve {
             level,
             motion,
-            influence,
+            prepared,
             parity,
             bound: resized(&level.bound),
             area: resized(&level.normalised.areas()),
@@ -129,13 +130,18 @@ impl<'a> Solve<'a> {
     }
 
     fn equations(&self, rule: Rule) -> Equations<'a> {
-        Equations::new(rule, &self.level.normalised, self.influence, self.parity)
+        Equations::new(
+            rule,
+            &self.level.normalised,
+            &self.prepared.influence,
+            self.parity,
+        )
     }
 
     /// A solver that shares its own blocks with the other motions of the level.
     fn newton<'e>(&self, equations: &'e Equations<'e>) -> Newton<'e> {
         let own = self
-            .level
+            .prepared
             .own_blocks
             .get(equations.rule, self.parity, || OwnBlocks::new(equations));
         Newton::with_blocks(equations, own)
@@ -143,7 +149,7 @@ impl<'a> Solve<'a> {
 
     /// The start brought onto the unknowns, or zero tractions.
     fn start(&self, start: Option<&[Vec<f64>; 2]>) -> Vec<f64> {
-        let padded = self.influence.padded(self.parity);
+        let padded = self.prepared.influence.padded(self.parity);
         let mut t = vec![0.0; 2 * padded];
         if let Some([x, y]) = start {
             let unknowns = self.equations(Rule::Upwind).cells();
@@ -182,6 +188,7 @@ impl<'a> Solve<'a> {
         self.work.add(Work {
             iterations: report.iterations,
             products: report.products,
+            entries: u64::from(report.products) * newton.entries() as u64,
             residual: report.residual,
         });
         Ok((report, by_fixed_point))

@@ -99,6 +99,17 @@ pub struct Newton<'a> {
     slip: Vec<f64>,
     scratch: Vec<f64>,
     expanded: Vec<f64>,
+    steps: Steps,
+}
+
+/// Vectors that one Newton step after the other uses.
+#[derive(Debug, Default)]
+struct Steps {
+    step: Vec<f64>,
+    rhs: Vec<f64>,
+    best: Vec<f64>,
+    before: Vec<f64>,
+    candidate: Vec<f64>,
 }
 
 impl<'a> Newton<'a> {
@@ -124,6 +135,7 @@ impl<'a> Newton<'a> {
             slip: vec![0.0; length],
             scratch: vec![0.0; 2 * equations.row_count()],
             expanded: vec![0.0; length],
+            steps: Steps::default(),
         }
     }
 
@@ -132,6 +144,12 @@ impl<'a> Newton<'a> {
     pub fn compliance(&self) -> f64 {
         let sum: f64 = self.parameter.iter().sum();
         sum / (PROJECTION * self.parameter.len().max(1) as f64)
+    }
+
+    /// Entries of the influence that one product touches.
+    #[must_use]
+    pub fn entries(&self) -> usize {
+        self.equations.entries()
     }
 
     /// Number of cells with unknowns.
@@ -156,29 +174,38 @@ impl<'a> Newton<'a> {
             products: 0,
             residual: f64::INFINITY,
         };
-        let mut step = vec![0.0; t.len()];
-        let mut rhs = vec![0.0; t.len()];
-        let mut best = (f64::INFINITY, t.to_vec());
+        let Steps {
+            mut step,
+            mut rhs,
+            mut best,
+            mut before,
+            mut candidate,
+        } = std::mem::take(&mut self.steps);
+        for values in [&mut step, &mut rhs, &mut best, &mut before, &mut candidate] {
+            values.clear();
+            values.extend_from_slice(t);
+        }
+        let mut least = f64::INFINITY;
         let mut recent = [0.0_f64; 3];
         let mut last = f64::INFINITY;
         report.residual = self.evaluate(law, t, &mut report);
         while report.iterations < ITERATIONS_MAX {
-            if report.residual < best.0 {
-                best.0 = report.residual;
-                best.1.copy_from_slice(t);
+            if report.residual < least {
+                least = report.residual;
+                best.copy_from_slice(t);
             }
             if report.residual <= law.tolerance {
                 report.converged = true;
                 break;
             }
             recent[report.iterations as usize % 3] = report.residual;
-            let before = t.to_vec();
+            before.copy_from_slice(t);
             self.linearise(law, t, &mut rhs, &mut report);
             self.blocks.factor(&self.own, self.equations, &self.linear);
             let inner = inner_tolerance(report.residual, last, law.tolerance);
             self.linear_step(&rhs, inner, &mut step, monitor, &mut report)?;
             last = report.residual;
-            let candidate = self.candidate(law, t, &step);
+            self.candidate(law, t, &step, &mut candidate);
             t.copy_from_slice(&candidate);
             report.residual = self.evaluate(law, t, &mut report);
             let allowed = if report.iterations < FREE_STEPS {
@@ -198,9 +225,16 @@ impl<'a> Newton<'a> {
             report.iterations += 1;
         }
         if !report.converged {
-            report.residual = best.0;
-            t.copy_from_slice(&best.1);
+            report.residual = least;
+            t.copy_from_slice(&best);
         }
+        self.steps = Steps {
+            step,
+            rhs,
+            best,
+            before,
+            candidate,
+        };
         Ok(report)
     }
 
@@ -219,7 +253,7 @@ impl<'a> Newton<'a> {
             t[cell] + r * self.slip[cell],
             t[padded + cell] + r * self.slip[padded + cell],
         );
-        zx.hypot(zy) > bound[cell]
+        (zx * zx + zy * zy).sqrt() > bound[cell]
     }
 
     /// Computes the slips of `t` and the residual of the projected law.
@@ -234,7 +268,7 @@ impl<'a> Newton<'a> {
         for i in 0..self.equations.cells() {
             let (tx, ty, r) = (t[i], t[padded + i], self.parameter[i]);
             let (zx, zy) = (tx + r * self.slip[i], ty + r * self.slip[padded + i]);
-            let length = zx.hypot(zy);
+            let length = (zx * zx + zy * zy).sqrt();
             let shrink = if length > law.bound[i] {
                 law.bound[i] / length
             } else {
@@ -266,7 +300,7 @@ impl<'a> Newton<'a> {
                 t[i] + r * self.slip[i],
                 t[padded + i] + r * self.slip[padded + i],
             );
-            let (length, bound) = (zx.hypot(zy), law.bound[i]);
+            let (length, bound) = ((zx * zx + zy * zy).sqrt(), law.bound[i]);
             weight += law.area[i];
             if length <= bound {
                 self.linear.direction.push((1.0, 0.0));
@@ -338,10 +372,10 @@ impl<'a> Newton<'a> {
         Ok(())
     }
 
-    /// `t` plus the step, slipping cells brought back to the circle.
-    fn candidate(&self, law: &FrictionLaw, t: &[f64], step: &[f64]) -> Vec<f64> {
+    /// `next` is `t` plus the step, slipping cells brought back to the circle.
+    fn candidate(&self, law: &FrictionLaw, t: &[f64], step: &[f64], next: &mut [f64]) {
         let padded = self.equations.padded();
-        let mut next = t.to_vec();
+        next.copy_from_slice(t);
         for i in 0..self.equations.cells() {
             if self.linear.slips(i) {
                 let (ux, uy) = self.linear.direction[i];
@@ -359,7 +393,6 @@ impl<'a> Newton<'a> {
                 next[padded + i] += step[padded + i];
             }
         }
-        next
     }
 }
 

@@ -85,6 +85,8 @@ pub struct StripBlocks {
     /// Start of each block's matrix in `factors`.
     offsets: Vec<usize>,
     gathered: Vec<f64>,
+    /// Cells of the newest block that stick.
+    stick: Vec<usize>,
     scratch: Scratch,
 }
 
@@ -191,7 +193,10 @@ impl StripBlocks {
         let base = self.factors.len();
         self.factors.resize(base + size * size, 0.0);
         let block = &mut self.factors[base..];
-        let stick: Vec<usize> = (0..n).filter(|k| !linear.slips(first + k)).collect();
+        self.stick.clear();
+        self.stick
+            .extend((0..n).filter(|k| !linear.slips(first + k)));
+        let stick = &self.stick;
         for column in 0..n {
             let (xx, yy) = (
                 &xx[column * n..(column + 1) * n],

@@ -76,6 +76,7 @@ fn work(outcome: &Outcome) -> Work {
     Work {
         iterations: outcome.newton_iterations(),
         products: 0,
+        entries: 0,
         residual: outcome.residual,
     }
 }

@@ -1,0 +1,60 @@
+//! How ill-conditioned are the equations? Singular values of the whole map from tractions to slips.
+
+use std::fmt::Write as _;
+
+use faer::Mat;
+use railhead::contact::case::MeshSize;
+use railhead::contact::check;
+use railhead::contact::monitor::Unwatched;
+use railhead::contact::problem::Limits;
+use railhead::contact::tangential::equations::Equations;
+use railhead::contact::tangential::level::Level;
+use railhead::contact::tangential::rules::Rule;
+use serde_json::json;
+
+/// Largest over smallest singular value of the map of a rule, ν = 0.28.
+fn condition(a_over_b: f64, strips: u32, cells: u32, rule: Rule) -> f64 {
+    let case = json!({
+        "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
+        "friction": { "coefficient": 0.3 },
+        "contact": { "type": "ellipse", "a_mm": 5.0 * a_over_b.sqrt(), "b_mm": 5.0 / a_over_b.sqrt() },
+        "load": { "normal_force_n": 60_000 },
+        "motion": { "creepage_x": 0.001, "creepage_y": 0.0, "spin_per_mm": 0.0 },
+        "solver": { "mesh": { "strips": strips, "cells": cells } },
+    });
+    let problem = check(&case, &Limits::default()).expect("a valid case");
+    let level = Level::new(&problem, MeshSize { strips, cells }).expect("a mesh");
+    let influence = level.influence(&Unwatched).expect("never stopped");
+    let equations = Equations::new(rule, &level.normalised, influence, None);
+    let values = equations.dense(&Unwatched).expect("never stopped");
+    let n = 2 * equations.cells();
+    let matrix = Mat::from_fn(n, n, |i, j| values[j * n + i]);
+    let singular = matrix.singular_values().expect("singular values");
+    singular.iter().copied().fold(0.0, f64::max)
+        / singular.iter().copied().fold(f64::INFINITY, f64::min)
+}
+
+pub fn section() -> String {
+    let mut text = "## Condition of the equations\n\nLargest over smallest singular value of the map from tractions to slips, everything sticking, ν = 0.28.\n\n\
+         | a/b | cells × strips | three-point rule | trapezoid | upwind |\n|---|---|---|---|---|\n"
+        .to_owned();
+    for (a_over_b, strips, cells) in [
+        (1.0, 4, 4),
+        (1.0, 8, 8),
+        (1.0, 12, 12),
+        (1.0, 16, 16),
+        (1.0, 6, 24),
+        (1.0, 24, 6),
+        (0.02, 12, 12),
+        (50.0, 12, 12),
+    ] {
+        let [mirror, trapezoid, upwind] = [Rule::Mirror, Rule::Trapezoid, Rule::Upwind]
+            .map(|rule| condition(a_over_b, strips, cells, rule));
+        let _ = writeln!(
+            text,
+            "| {a_over_b} | {cells} × {strips} | {mirror:.1e} | {trapezoid:.1e} | {upwind:.1e} |"
+        );
+    }
+    text.push('\n');
+    text
+}

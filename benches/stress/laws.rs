@@ -1,0 +1,215 @@
+//! What every answer must obey, whatever the case.
+
+use railhead::contact::outputs::resultants::Resultants;
+use railhead::contact::solution::{Fields, PatchFields, PatchSolution, PointFields, Solution};
+use railhead::contact::zones::Zone;
+use serde_json::Value;
+
+/// Rounding, relative to the largest value of its kind.
+const ROUNDING: f64 = 1e-9;
+/// What the sums over cells in single precision may lose.
+const SUMS: f64 = 1e-6;
+
+/// Scales of one patch.
+struct Scales {
+    /// Largest friction bound in MPa.
+    bound: f64,
+    /// Friction bound of the whole patch in N.
+    force: f64,
+    /// Largest distance of a cell from the origin in mm.
+    arm: f64,
+    /// Largest rigid slip.
+    slip: f64,
+}
+
+/// The laws that an answer breaks, in words.
+pub fn broken(case: &Value, solution: &Solution, fields: &Fields) -> Vec<String> {
+    let friction = case["friction"]["coefficient"].as_f64().unwrap_or(0.0);
+    let mut broken = Vec::new();
+    let mut load = 0.0;
+    for (patch, cells) in solution.patches.iter().zip(&fields.patches) {
+        load += patch.normal_force_n;
+        normal(patch, cells, &mut broken);
+        let paraboloid = case["solver"]["traction_bound"] == "parabolic";
+        tangential(friction, paraboloid, patch, cells, &mut broken);
+    }
+    if let Some(given) = case["load"]["normal_force_n"].as_f64()
+        && (load / given - 1.0).abs() > SUMS
+    {
+        broken.push(format!("the patches carry {load} of {given} N"));
+    }
+    broken
+}
+
+fn normal(patch: &PatchSolution, cells: &PatchFields, broken: &mut Vec<String>) {
+    let Some(pressure) = &cells.pressure_mpa else {
+        return broken.push("there is no pressure".to_owned());
+    };
+    let areas = cells.dx_mm.iter().zip(&cells.dy_mm).map(|(dx, dy)| dx * dy);
+    let load: f64 = pressure.iter().zip(areas).map(|(p, area)| p * area).sum();
+    if pressure.iter().any(|p| !p.is_finite() || *p < 0.0) {
+        broken.push("a pressure is negative or not a number".to_owned());
+    }
+    if (load / patch.normal_force_n - 1.0).abs() > SUMS {
+        broken.push(format!(
+            "the cells carry {load} of {} N",
+            patch.normal_force_n
+        ));
+    }
+}
+
+fn tangential(
+    friction: f64,
+    paraboloid: bool,
+    patch: &PatchSolution,
+    cells: &PatchFields,
+    broken: &mut Vec<String>,
+) {
+    let (point, fields) = (&patch.points[0], &cells.points[0]);
+    let (Some(tx), Some(ty)) = (&fields.traction_x_mpa, &fields.traction_y_mpa) else {
+        return broken.push("there are no tractions".to_owned());
+    };
+    let motion = &point.motion;
+    let corners = patch.extent_mm;
+    let arm = corners.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
+    let scales = Scales {
+        bound: friction * patch.pressure_max_mpa,
+        force: friction * patch.normal_force_n,
+        arm,
+        slip: motion.creepage_x.hypot(motion.creepage_y) + motion.spin_per_mm.abs() * arm,
+    };
+    let found = [point.force_x_n, point.force_y_n, point.moment_z_n_mm];
+    if found.iter().chain(tx).chain(ty).any(|v| !v.is_finite()) {
+        return broken.push(format!("a traction or one of {found:?} is not a number"));
+    }
+    if point.force_x_n.hypot(point.force_y_n) > scales.force * (1.0 + ROUNDING) {
+        broken.push(format!("{found:?} is more than {} N", scales.force));
+    }
+    // Few cells gain as much as their error allows.
+    let uncertain = point.error_estimate.map_or(0.0, |e| e.force_x_n) + SUMS * scales.force;
+    if point.friction_power_n < -uncertain * scales.slip {
+        broken.push(format!("friction gains {} N", point.friction_power_n));
+    }
+    if !paraboloid {
+        coulomb(friction, &scales, cells, fields, broken);
+    }
+    sums(&scales, &found, cells, fields, broken);
+    if let (Some(stick), Some(slip)) = (point.stick_area_mm2, point.slip_area_mm2) {
+        // `fastsim` sums up its cells, the others share out the patch.
+        if ((stick + slip) / patch.area_mm2 - 1.0).abs() > SUMS && fields.slip_x.is_some() {
+            broken.push(format!("{stick} + {slip} mm² of {}", patch.area_mm2));
+        }
+    }
+}
+
+/// Coulomb's law cell by cell: the bound holds, slip is along the traction, what sticks does not slip.
+fn coulomb(
+    friction: f64,
+    scales: &Scales,
+    cells: &PatchFields,
+    fields: &PointFields,
+    broken: &mut Vec<String>,
+) {
+    let (Some(pressure), Some(tx), Some(ty)) = (
+        &cells.pressure_mpa,
+        &fields.traction_x_mpa,
+        &fields.traction_y_mpa,
+    ) else {
+        return;
+    };
+    let (Some(sx), Some(sy), Some(zone)) = (&fields.slip_x, &fields.slip_y, &fields.zone) else {
+        return; // `fastsim` knows no slips.
+    };
+    let mut worst = [0.0_f64; 3];
+    for i in 0..tx.len() {
+        let [x, y] = [tx[i], ty[i]].map(|t| t / scales.bound);
+        let [u, v] = [sx[i], sy[i]].map(|s| s / scales.slip.max(f64::MIN_POSITIVE));
+        worst[0] = worst[0].max(x.hypot(y) - friction * pressure[i] / scales.bound);
+        worst[1] = worst[1].max(x.hypot(y) * u.hypot(v) - (x * u + y * v));
+        if zone[i] == Zone::Stick {
+            worst[2] = worst[2].max(u.hypot(v));
+        }
+    }
+    for (what, excess) in [
+        "beyond the friction bound",
+        "of power lost by slip across the traction",
+        "of slip where a cell sticks",
+    ]
+    .iter()
+    .zip(worst)
+    {
+        if excess > ROUNDING {
+            broken.push(format!("{excess:.2e} {what}"));
+        }
+    }
+}
+
+/// The resultants are the sums of the tractions.
+fn sums(
+    scales: &Scales,
+    found: &[f64; 3],
+    cells: &PatchFields,
+    fields: &PointFields,
+    broken: &mut Vec<String>,
+) {
+    let (Some(tx), Some(ty)) = (&fields.traction_x_mpa, &fields.traction_y_mpa) else {
+        return;
+    };
+    let mut sum = Resultants::default();
+    for i in 0..tx.len() {
+        let area = cells.dx_mm[i] * cells.dy_mm[i];
+        sum.force_x += tx[i] * area;
+        sum.force_y += ty[i] * area;
+    }
+    for (given, sum) in found.iter().zip([sum.force_x, sum.force_y]) {
+        if (given - sum).abs() > SUMS * scales.force {
+            broken.push(format!("the tractions add up to {sum} N, not {given}"));
+        }
+    }
+    if found[2].abs() > scales.force * scales.arm * 2.0_f64.sqrt() {
+        broken.push(format!("{} N mm of moment", found[2]));
+    }
+}
+
+/// F_x/μN, F_y/μN and M_z/(μN√(A/π)) of the sum over the patches, and the estimate of their error.
+pub fn relative(case: &Value, solution: &Solution) -> ([f64; 3], f64) {
+    let friction = case["friction"]["coefficient"].as_f64().unwrap_or(0.0);
+    let load: f64 = solution.patches.iter().map(|p| p.normal_force_n).sum();
+    let area: f64 = solution.patches.iter().map(|p| p.area_mm2).sum();
+    let (force, length) = (friction * load, (area / std::f64::consts::PI).sqrt());
+    let total = &solution.total[0];
+    let relative = [
+        total.force_x_n / force,
+        total.force_y_n / force,
+        total.moment_z_n_mm / (force * length),
+    ];
+    let estimate = total.error_estimate.map_or(0.0, |e| e.force_x_n / force);
+    (relative, estimate)
+}
+
+/// Power that the cells turn to heat over what the motion puts in, minus 1, where enough slips to tell.
+pub fn energy(solution: &Solution, fields: &Fields) -> Option<f64> {
+    let mut heat = 0.0;
+    for cells in &fields.patches {
+        let point = &cells.points[0];
+        let (tx, ty) = (
+            point.traction_x_mpa.as_ref()?,
+            point.traction_y_mpa.as_ref()?,
+        );
+        let (sx, sy) = (point.slip_x.as_ref()?, point.slip_y.as_ref()?);
+        for i in 0..tx.len() {
+            heat += (tx[i] * sx[i] + ty[i] * sy[i]) * cells.dx_mm[i] * cells.dy_mm[i];
+        }
+    }
+    let work: f64 = solution
+        .patches
+        .iter()
+        .map(|p| p.points[0].friction_power_n)
+        .sum();
+    let motion = &solution.patches[0].points[0].motion;
+    let usual = solution.total[0]
+        .force_x_n
+        .hypot(solution.total[0].force_y_n)
+        * motion.creepage_x.hypot(motion.creepage_y);
+    (work > 0.05 * usual && work > 0.0).then(|| heat / work - 1.0)
+}

@@ -1,0 +1,182 @@
+//! Solves a case under watch, and looks at the answer from all sides.
+
+use std::ops::ControlFlow;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::{Duration, Instant};
+
+use railhead::contact::error::SolveError;
+use railhead::contact::monitor::{Monitor, Stop};
+use railhead::contact::problem::Limits;
+use railhead::contact::solution::{Fields, Solution};
+use railhead::contact::{check, solve};
+use serde_json::{Value, json};
+
+use super::contacts::{Sample, reversed, scaled};
+use super::laws::{broken, energy, relative};
+
+/// A solve that takes longer hangs.
+const HANGS_AFTER: Duration = Duration::from_secs(60);
+/// Forces of twins on one mesh differ by no more: what converged iterations leave.
+const TWINS: f64 = 2e-5;
+/// The same where region and pressure are found first, as exactly as a mesh needs them.
+const TWINS_OF_GAPS: f64 = 1e-3;
+/// Cells up to which the method of Liu and Hsu is tried as well.
+const DENSE_CELLS_MAX: u64 = 120;
+/// How many times smaller the target of the finer answer is.
+const FINER: f64 = 8.0;
+
+/// How a case ended.
+pub enum End {
+    Solved,
+    /// The case has no answer, and why.
+    Refused(String),
+    NotConverged(String),
+    /// A crash, a hang or an error that should not be.
+    Failed(String),
+}
+
+/// What one case showed.
+pub struct Trial {
+    pub end: End,
+    pub iterations: Option<u32>,
+    pub residual: Option<f64>,
+    pub broken: Vec<String>,
+    pub energy: Option<f64>,
+    /// Largest difference of the forces from those of the method of Liu and Hsu on the same mesh.
+    pub from_liu_hsu: Option<f64>,
+    /// True error and estimate.
+    pub error: Option<(f64, f64)>,
+}
+
+struct Clock(Instant);
+
+impl Monitor for Clock {
+    fn tick(&self, _progress: f64) -> ControlFlow<Stop> {
+        if self.0.elapsed() > HANGS_AFTER {
+            return ControlFlow::Break(Stop::OutOfTime);
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn elapsed(&self) -> Duration {
+        self.0.elapsed()
+    }
+}
+
+fn attempt(case: &Value) -> Result<(Solution, Fields), End> {
+    let limits = Limits {
+        memory_bytes: 4 << 30,
+        ..Limits::default()
+    };
+    let work = || -> Result<(Solution, Fields), End> {
+        let problem = check(case, &limits).map_err(|error| End::Refused(error.to_string()))?;
+        solve(&problem, &Clock(Instant::now())).map_err(|error| match error {
+            SolveError::NormalProblem { reason } => End::Refused(reason),
+            SolveError::Unmeshable { .. } => End::Refused(error.to_string()),
+            SolveError::NotConverged { .. } => End::NotConverged(error.to_string()),
+            error => End::Failed(format!("hangs: {error}")),
+        })
+    };
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| Err(End::Failed("crashes".to_owned())))
+}
+
+/// Solves a sample and whatever it is compared with.
+pub fn trial(sample: &Sample) -> Trial {
+    let mut trial = Trial {
+        end: End::Solved,
+        iterations: None,
+        residual: None,
+        broken: Vec::new(),
+        energy: None,
+        from_liu_hsu: None,
+        error: None,
+    };
+    let (solution, fields) = match attempt(&sample.case) {
+        Ok(answer) => answer,
+        Err(end) => {
+            trial.end = end;
+            return trial;
+        }
+    };
+    let reports = solution.patches.iter().map(|p| &p.points[0].solver);
+    trial.iterations = reports.clone().map(|report| report.iterations).max();
+    trial.residual = reports.map(|report| report.residual).reduce(f64::max);
+    trial.broken = broken(&sample.case, &solution, &fields);
+    trial.energy = energy(&solution, &fields);
+    if sample.kind == "ellipse, huge mesh" {
+        return trial;
+    }
+    let found = relative(&sample.case, &solution);
+    if sample.number % 4 == 0 {
+        trial
+            .broken
+            .extend(twins(&sample.case, found, sample.number));
+    }
+    let solver = &sample.case["solver"];
+    let cells = solver["mesh"]["strips"]
+        .as_u64()
+        .zip(solver["mesh"]["cells"].as_u64());
+    if let Some((strips, cells)) = cells
+        && strips * cells <= DENSE_CELLS_MAX
+        && sample.number % 3 == 0
+    {
+        let mut dense = sample.case.clone();
+        dense["solver"]["method"] = json!("liu_hsu");
+        if let Ok((other, _)) = attempt(&dense) {
+            trial.from_liu_hsu = Some(distance(found.0, relative(&dense, &other).0));
+        }
+    }
+    if let Some(target) = solver["target_error"].as_f64()
+        && sample.number % 5 == 1
+    {
+        let mut finer = sample.case.clone();
+        finer["solver"] = json!({ "target_error": (target / FINER).max(3e-4) });
+        finer["outputs"] = json!(["resultants"]);
+        if let Ok((exact, _)) = attempt(&finer) {
+            let exact = relative(&finer, &exact);
+            let error = distance(found.0, exact.0);
+            trial.error = Some((error, found.1 + exact.1));
+        }
+    }
+    trial
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max)
+}
+
+/// The same contact turned round and in other units must give the same forces.
+fn twins(case: &Value, (found, estimate): ([f64; 3], f64), number: usize) -> Vec<String> {
+    let (name, twin, sign) = if number % 8 == 0 {
+        ("reversed", reversed(case), -1.0)
+    } else {
+        ("in other units", scaled(case, 37.0, 1.23e-4), 1.0)
+    };
+    let of_gap = case["contact"]["type"]
+        .as_str()
+        .is_some_and(|t| t.starts_with("gap"));
+    let searched = case["motion"]
+        .as_object()
+        .is_some_and(|m| m.keys().any(|k| k.starts_with("force")));
+    let same_mesh = if of_gap { TWINS_OF_GAPS } else { TWINS };
+    // With a target, an estimate on the edge may end the climb one level apart.
+    let climbs = case["solver"]["mesh"].is_null() || searched;
+    let allowed = same_mesh + if climbs { 2.0 * estimate } else { 0.0 };
+    match attempt(&twin) {
+        Ok((solution, _)) => {
+            let other = relative(&twin, &solution).0.map(|value| sign * value);
+            let apart = distance(found, other);
+            if apart > allowed {
+                vec![format!(
+                    "{name}: {other:?} for {found:?}, {apart:.2e} apart"
+                )]
+            } else {
+                Vec::new()
+            }
+        }
+        Err(End::Failed(reason) | End::NotConverged(reason) | End::Refused(reason)) => {
+            vec![format!("{name}: {reason}")]
+        }
+        Err(End::Solved) => Vec::new(),
+    }
+}
