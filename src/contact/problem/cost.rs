@@ -76,7 +76,11 @@ impl Size {
         let (cells, segments) = self.finest();
         let motions = self.motions as f64;
         let fields = cells * (VECTORS_PER_CELL + FIELDS_PER_CELL * motions) * 8.0;
-        let prescribed = self.forces.iter().filter(|forces| **forces != [None; 2]).count();
+        let prescribed = self
+            .forces
+            .iter()
+            .filter(|forces| **forces != [None; 2])
+            .count();
         let solves = motions + TRIALS * prescribed as f64;
         let influence = 3.0 * cells * (cells + 2.0 * segments) * 8.0 * BYTES_BESIDE;
         let (bytes, seconds) = match self.method {
