@@ -28,7 +28,9 @@ pub fn section(lu: f64, pictures: &Path) -> String {
         let fastsim = [run(&cases, &json!({ "method": "fastsim" }), lu)];
         let theirs: Vec<(f64, f64)> = (0..RUNS).map(|k| of_contact(&cases, k, lu)).collect();
         let list = |points: &[(f64, f64)]| {
-            let points = points.iter().map(|(time, error)| format!("{error:.4} ({time:.2})"));
+            let points = points
+                .iter()
+                .map(|(time, error)| format!("{error:.4} ({time:.2})"));
             points.collect::<Vec<_>>().join(", ")
         };
         let _ = writeln!(
@@ -75,7 +77,9 @@ fn run(cases: &[&Value], solver: &Value, lu: f64) -> (f64, f64) {
 }
 
 fn of_contact(cases: &[&Value], run: usize, lu: f64) -> (f64, f64) {
-    let runs = cases.iter().filter_map(|case| case["contact_runs"].get(run));
+    let runs = cases
+        .iter()
+        .filter_map(|case| case["contact_runs"].get(run));
     let of = |name: &str| median(runs.clone().map(|run| number(run, name)).collect());
     (of("cpu_s") / lu, of("error"))
 }

@@ -18,7 +18,7 @@ use crate::questions::{number, problem, stored, timed};
 const REPEATS: usize = 11;
 
 /// Classes of the reference: heading, what it is, and how the names of its cases begin.
-const CLASSES: [(&str, &str, &str); 4] = [
+pub const CLASSES: [(&str, &str, &str); 4] = [
     (
         "Wheel on rail",
         "`gap_grid` of the undeformed distance of S1002 and UIC60 profiles, 61 to 100 samples a side",
@@ -100,7 +100,7 @@ fn table<'a>(cases: impl Iterator<Item = &'a Value>, lu: f64) -> String {
 }
 
 /// Largest error of the resultants and the largest estimate, both as the report counts errors.
-fn error(case: &Value, solution: &Solution, area: f64) -> (f64, f64) {
+pub fn error(case: &Value, solution: &Solution, area: f64) -> (f64, f64) {
     let total = &solution.total[0];
     let bound = 0.3 * number(case, "normal_force_n");
     let arm = bound * (area / PI).sqrt();
@@ -125,7 +125,7 @@ fn error(case: &Value, solution: &Solution, area: f64) -> (f64, f64) {
 }
 
 /// A stored case as a question.
-fn question(case: &Value) -> Value {
+pub fn question(case: &Value) -> Value {
     let contact = if case["gap_mm"].is_array() {
         json!({ "type": "gap_grid", "x_mm": case["x_mm"], "y_mm": case["y_mm"], "gap_mm": case["gap_mm"] })
     } else {
