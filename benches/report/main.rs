@@ -8,6 +8,7 @@
 mod machine;
 
 mod allocations;
+mod gap_runs;
 mod gaps;
 mod meshes;
 mod plot;
@@ -48,6 +49,7 @@ fn main() {
     text.push_str(&targets::section(&cases, lu));
     text.push_str(&meshes::section(&cases, lu, &pictures));
     text.push_str(&gaps::section(lu));
+    text.push_str(&gap_runs::section(lu, &pictures));
     text.push_str(&savings::section(lu));
     text.push_str(&scaling::section(lu, &pictures));
     let path = folder.join("accuracy-and-speed.md");

@@ -107,7 +107,7 @@ pub fn trial(sample: &Sample) -> Trial {
         return trial;
     }
     let found = relative(&sample.case, &solution);
-    if sample.number % 4 == 0 {
+    if sample.number.is_multiple_of(4) {
         trial
             .broken
             .extend(twins(&sample.case, found, sample.number));
@@ -118,7 +118,7 @@ pub fn trial(sample: &Sample) -> Trial {
         .zip(solver["mesh"]["cells"].as_u64());
     if let Some((strips, cells)) = cells
         && strips * cells <= DENSE_CELLS_MAX
-        && sample.number % 3 == 0
+        && sample.number.is_multiple_of(3)
     {
         let mut dense = sample.case.clone();
         dense["solver"]["method"] = json!("liu_hsu");
@@ -147,7 +147,7 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
 
 /// The same contact turned round and in other units must give the same forces.
 fn twins(case: &Value, (found, estimate): ([f64; 3], f64), number: usize) -> Vec<String> {
-    let (name, twin, sign) = if number % 8 == 0 {
+    let (name, twin, sign) = if number.is_multiple_of(8) {
         ("reversed", reversed(case), -1.0)
     } else {
         ("in other units", scaled(case, 37.0, 1.23e-4), 1.0)

@@ -159,7 +159,11 @@ pub fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, ApiError> 
     };
     let key = value.to_str().unwrap_or_default();
     let allowed = 1..=IDEMPOTENCY_KEY_MAX_CHARS;
-    if allowed.contains(&key.len()) && headers.get_all(&IDEMPOTENCY_KEY).iter().count() == 1 {
+    let visible = key.bytes().all(|byte| byte.is_ascii_graphic());
+    if visible
+        && allowed.contains(&key.len())
+        && headers.get_all(&IDEMPOTENCY_KEY).iter().count() == 1
+    {
         return Ok(Some(key.to_owned()));
     }
     Err(ApiError::bad_header(

@@ -75,7 +75,7 @@ pub fn conditional<S: Clone + Send + Sync + 'static>(
 }
 
 /// Cases that the document shows: name, summary, text.
-const EXAMPLES: [(&str, &str, &str); 9] = [
+const EXAMPLES: [(&str, &str, &str); 12] = [
     (
         "hertz-steel",
         "A wheel on a rail by its radii, with both creepages and spin",
@@ -120,6 +120,21 @@ const EXAMPLES: [(&str, &str, &str); 9] = [
         "sweep",
         "A creep curve: many motions on the same patch",
         include_str!("../../api/examples/sweep.case.json"),
+    ),
+    (
+        "paper-figure-3",
+        "Slip and stick under longitudinal creepage and several spins, as figure 3 of Liu and Hsu, on a patch without symmetry",
+        include_str!("../../api/examples/paper-figure-3.case.json"),
+    ),
+    (
+        "paper-figure-4",
+        "Slip and stick under pure spin, down to separate poles, as their figure 4",
+        include_str!("../../api/examples/paper-figure-4.case.json"),
+    ),
+    (
+        "paper-figure-5",
+        "Force and moment against longitudinal creepage, as their figure 5",
+        include_str!("../../api/examples/paper-figure-5.case.json"),
     ),
 ];
 

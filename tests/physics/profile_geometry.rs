@@ -2,7 +2,7 @@
 
 use railhead::contact::geometry::contact_search::Search;
 use railhead::contact::geometry::formats::{self, Format};
-use railhead::contact::geometry::local_gap::LocalGap;
+use railhead::contact::geometry::local_gap::{Detail, LocalGap};
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
 use railhead::contact::geometry::wheel_rail::{Placement, Side, WheelRail};
 
@@ -116,7 +116,7 @@ fn manchester(profiles: &[Profile; 2], cant: f64) -> Vec<(f64, f64, f64)> {
         let search = Search::new(&geometry).unwrap();
         let touching = search.frames(1e-3).unwrap()[0];
         let lowering = approach / touching.angle.cos();
-        let gaps = search.gaps(lowering).unwrap();
+        let gaps = search.gaps(lowering, Detail::Fine).unwrap();
         found.push((shift, place, -centre_of_overlap(&gaps) - RAIL_ORIGIN));
     }
     found
@@ -164,8 +164,12 @@ fn left_and_right_are_mirror_images() {
     let [left, right] = [left, right].map(|placement| {
         WheelRail::new(profiles[0].clone(), profiles[1].clone(), placement).unwrap()
     });
-    let [left, right] =
-        [&left, &right].map(|geometry| Search::new(geometry).unwrap().gaps(0.03).unwrap());
+    let [left, right] = [&left, &right].map(|geometry| {
+        Search::new(geometry)
+            .unwrap()
+            .gaps(0.03, Detail::Fine)
+            .unwrap()
+    });
     assert_eq!((left.len(), right.len()), (1, 1));
     let (left, right) = (&left[0], &right[0]);
     assert!((left.frame.origin[1] + right.frame.origin[1]).abs() < 1e-9);
@@ -205,7 +209,10 @@ fn the_gap_of_a_cone_on_an_arc_has_the_closed_form() {
     )
     .unwrap();
     let lowering = 0.05;
-    let gaps = Search::new(&geometry).unwrap().gaps(lowering).unwrap();
+    let gaps = Search::new(&geometry)
+        .unwrap()
+        .gaps(lowering, Detail::Fine)
+        .unwrap();
     assert_eq!(gaps.len(), 1);
     let (gap, angle) = (&gaps[0], 0.05_f64.atan());
     assert!(

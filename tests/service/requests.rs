@@ -277,6 +277,12 @@ async fn bad_idempotency_keys_are_refused() {
     };
     assert_problem(&send("x".repeat(256)).await, 400, "bad-header", "255");
     assert_problem(&send(String::new()).await, 400, "bad-header", "255");
+    assert_problem(
+        &send("two words".to_owned()).await,
+        400,
+        "bad-header",
+        "visible",
+    );
     assert_eq!(send("x".repeat(255)).await.status, 202);
 }
 

@@ -52,10 +52,13 @@ async fn what_schemathesis_makes_of_the_contract_is_answered_as_documented() {
     };
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(folder.path(), &["--log", "warn,railhead::cli=info"]);
-    let settings = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/schemathesis.toml");
+    let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
     let output = Command::new(program)
+        .env("PYTHONPATH", &tests)
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .env("SCHEMATHESIS_HOOKS", "schemathesis_hooks")
         .arg("--config-file")
-        .arg(settings)
+        .arg(tests.join("schemathesis.toml"))
         .args(["run", "--no-color", "--checks", "all"])
         .arg(format!("http://{}/openapi.json", service.address()))
         .current_dir(folder.path())

@@ -119,7 +119,7 @@ async fn an_answer_that_is_not_taken_is_given_up() {
 
 /// The path of results that fill every buffer on the way, and their size in bytes.
 async fn large_results(server: &Server) -> (String, usize) {
-    let cases: Vec<Value> = (0..40).map(|number| large_case(number)).collect();
+    let cases: Vec<Value> = (0..40).map(large_case).collect();
     let batch = server.post("/v1/batches", &json!(cases)).await.json;
     let path = format!(
         "{}?wait=60",
@@ -142,7 +142,7 @@ fn large_case(number: u32) -> Value {
 async fn clients_that_read_nothing_cost_little_memory() {
     let folder = tempfile::tempdir().expect("a folder");
     let service = Service::start(folder.path(), &["--workers", "2"]);
-    let cases: Vec<Value> = (0..40).map(|number| large_case(number)).collect();
+    let cases: Vec<Value> = (0..40).map(large_case).collect();
     let batch = service.request(Method::POST, "/v1/batches").json(&cases);
     let batch: Value = batch
         .send()

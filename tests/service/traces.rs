@@ -46,7 +46,8 @@ impl Collector {
         format!("http://{}", self.address)
     }
 
-    /// The spans of a trace, in the order of their beginnings.
+    /// The spans of a trace: of requests first, then those of a job in the order of its life. (The beginning of `queue` is
+    /// the job's, in whole milliseconds, and so may lie before its request's.)
     fn trace(&self, id: &str) -> Vec<Span> {
         let spans = self.spans.lock().unwrap();
         let mut found: Vec<Span> = spans
@@ -54,7 +55,8 @@ impl Collector {
             .filter(|span| hex(&span.trace_id) == id)
             .cloned()
             .collect();
-        found.sort_by_key(|span| span.start_time_unix_nano);
+        let life = ["submit", "queue", "solve", "store"];
+        found.sort_by_key(|span| life.iter().position(|name| *name == span.name));
         found
     }
 }

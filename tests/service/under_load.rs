@@ -37,7 +37,7 @@ impl Random {
 fn distinct(number: usize) -> Value {
     let mut case = case(&format!("case {number}"));
     case["load"]["normal_force_n"] = json!(20_000 + number);
-    let mesh = if number % 10 == 0 { 14 } else { 6 };
+    let mesh = if number.is_multiple_of(10) { 14 } else { 6 };
     case["solver"]["mesh"] = json!({ "strips": mesh, "cells": mesh });
     case
 }

@@ -6,7 +6,7 @@
 //! area (power 5/2 on a line), with the mean inclination of the rail. In that frame the gap is taken along the normal, exactly: the
 //! wheel as surface of revolution, the rail as cylinder.
 
-use crate::contact::geometry::local_gap::LocalGap;
+use crate::contact::geometry::local_gap::{Detail, LocalGap};
 use crate::contact::geometry::overlaps::Overlap;
 use crate::contact::geometry::wheel_rail::WheelRail;
 
@@ -143,10 +143,10 @@ impl<'g> Search<'g> {
     ///
     /// # Errors
     /// A sentence, if an overlap reaches the end of a profile.
-    pub fn gaps(&self, lowering: f64) -> Result<Vec<LocalGap>, String> {
+    pub fn gaps(&self, lowering: f64, detail: Detail) -> Result<Vec<LocalGap>, String> {
         self.overlaps(lowering)?
             .into_iter()
-            .map(|overlap| self.gap(overlap, lowering))
+            .map(|overlap| self.gap(overlap, lowering, detail))
             .collect()
     }
 
@@ -217,7 +217,7 @@ impl<'g> Search<'g> {
         (z / y).atan()
     }
 
-    fn gap(&self, overlap: Overlap, lowering: f64) -> Result<LocalGap, String> {
+    fn gap(&self, overlap: Overlap, lowering: f64, detail: Detail) -> Result<LocalGap, String> {
         let lines = self.around(overlap.ends);
         let frame = self.frame(lines, lowering);
         let mut across = [f64::INFINITY, f64::NEG_INFINITY];
@@ -242,6 +242,7 @@ impl<'g> Search<'g> {
             frame,
             self.touch - lowering,
             [widen(along), widen(across)],
+            detail,
         )?;
         // With yaw a hollow flange root follows the rail farther than a circle would.
         for _ in 0..WIDENINGS_MAX {
@@ -250,7 +251,7 @@ impl<'g> Search<'g> {
             }
             along = along.map(|end| WIDENING * end);
             let window = [widen(along), widen(across)];
-            gap = LocalGap::new(self.geometry, frame, self.touch - lowering, window)?;
+            gap = LocalGap::new(self.geometry, frame, self.touch - lowering, window, detail)?;
         }
         // Beyond a cut lies another patch, which keeps the surfaces apart between the two.
         let ends = self

@@ -3,9 +3,25 @@
 use crate::contact::geometry::contact_search::Frame;
 use crate::contact::geometry::wheel_rail::WheelRail;
 
-/// Samples of a gap along and across.
-const COLUMNS: usize = 33;
-const ROWS: usize = 161;
+/// How closely a gap is sampled. Along x it is as smooth as the wheel is round; across it has what the profiles have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Detail {
+    /// Enough to tell what a height of the wheel carries, to some tenths of a per cent.
+    Coarse,
+    /// Enough for the answer.
+    Fine,
+}
+
+impl Detail {
+    /// Samples along and across.
+    fn samples(self) -> [usize; 2] {
+        match self {
+            Detail::Coarse => [17, 81],
+            Detail::Fine => [17, 161],
+        }
+    }
+}
+
 /// Spacing along the rail's curve, in mm.
 const CURVE_STEP: f64 = 0.1;
 /// The rail belongs to a patch as far as its tangent keeps this much of the frame's direction.
@@ -35,9 +51,11 @@ impl LocalGap {
         frame: Frame,
         centre: f64,
         window: [[f64; 2]; 2],
+        detail: Detail,
     ) -> Result<LocalGap, String> {
         let rail = RailInFrame::new(geometry, &frame);
-        let [x, y] = [(window[0], COLUMNS), (window[1], ROWS)].map(|([low, high], count)| {
+        let [columns, rows] = detail.samples();
+        let [x, y] = [(window[0], columns), (window[1], rows)].map(|([low, high], count)| {
             // Measured from the middle, so that a symmetric window has symmetric coordinates.
             let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
             let at = |k: usize| (2.0 * k as f64 - (count - 1) as f64) / (count - 1) as f64;
@@ -47,7 +65,7 @@ impl LocalGap {
         });
         let y: Vec<f64> = y.into_iter().filter(|v| rail.reaches(*v)).collect();
         let heights: Vec<f64> = y.iter().map(|v| rail.height(*v)[0]).collect();
-        if y.len() < ROWS / 2 {
+        if y.len() < rows / 2 {
             return Err(format!(
                 "the patch at y = {:.2} mm on the rail bends too much for a plane of contact",
                 geometry.on_rail(frame.rail)[0]
@@ -190,16 +208,24 @@ impl WheelInFrame<'_> {
     fn heights(&self, x: &[f64], y: &[f64]) -> Vec<Vec<f64>> {
         let nearest = |axis: &[f64]| axis.partition_point(|at| *at < 0.0).min(axis.len() - 1);
         let middle = [nearest(x), nearest(y)];
-        // With an odd number of columns over a symmetric window the middle one is x = 0, and both halves are alike.
+        // With an odd number of columns over a symmetric window the middle one is x = 0, and both halves are alike; without
+        // yaw they are mirror images.
+        let images = x.iter().zip(x.iter().rev()).all(|(a, b)| *a == -b);
+        let mirrored = images && self.geometry.axle()[0] == 0.0 && self.frame.origin[0] == 0.0;
         let mut rows = vec![vec![f64::NAN; x.len()]; y.len()];
         let mut fill = |j: usize, start: Guess| -> Guess {
             let first = self.height(x[middle[0]], y[j], start);
             rows[j][middle[0]] = first.height;
-            for columns in [outward(middle[0], x.len()).0, outward(middle[0], x.len()).1] {
+            let (right, left) = outward(middle[0], x.len());
+            let sides = [right, if mirrored { Vec::new() } else { left }];
+            for columns in sides {
                 let (mut before, mut guess) = (first, first);
                 for i in columns {
                     let found = self.height(x[i], y[j], guess);
                     rows[j][i] = found.height;
+                    if mirrored {
+                        rows[j][x.len() - 1 - i] = found.height;
+                    }
                     // The surface goes on as it came.
                     (before, guess) = (found, found.beyond(before));
                 }

@@ -78,12 +78,8 @@ impl Cubic {
         let pieces = [(0.0, first), (first, second), (second, 1.0)];
         pieces.into_iter().filter_map(move |(low, high)| {
             let (at_low, at_high) = (cubic.value(low) > 0.0, cubic.value(high) > 0.0);
-            (at_low != at_high).then(|| {
-                (
-                    cubic.start + cubic.length * cubic.bisect(low, high),
-                    at_high,
-                )
-            })
+            (at_low != at_high)
+                .then(|| (cubic.start + cubic.length * cubic.root(low, high), at_high))
         })
     }
 
@@ -114,19 +110,34 @@ impl Cubic {
         }
     }
 
-    /// The root in a monotone piece with a change of sign, by halving: 60 steps are exact, and cannot be misled.
-    fn bisect(&self, mut low: f64, mut high: f64) -> f64 {
+    /// The root in a monotone piece with a change of sign: Newton's steps, and halving where they leave the bracket, so
+    /// that it cannot be misled.
+    fn root(&self, mut low: f64, mut high: f64) -> f64 {
         const STEPS: usize = 60;
+        const CLOSE: f64 = 4.0 * f64::EPSILON;
+        let [_, c1, c2, c3] = self.coefficients;
         let positive_at_high = self.value(high) > 0.0;
+        let mut at = 0.5 * (low + high);
         for _ in 0..STEPS {
-            let middle = 0.5 * (low + high);
-            if (self.value(middle) > 0.0) == positive_at_high {
-                high = middle;
+            let value = self.value(at);
+            if (value > 0.0) == positive_at_high {
+                high = at;
             } else {
-                low = middle;
+                low = at;
+            }
+            let next = at - value / (c1 + at * (2.0 * c2 + 3.0 * at * c3));
+            let next = if next > low && next < high {
+                next
+            } else {
+                0.5 * (low + high)
+            };
+            let step = (next - at).abs();
+            at = next;
+            if step <= CLOSE || high - low <= CLOSE {
+                break;
             }
         }
-        0.5 * (low + high)
+        at
     }
 }
 
@@ -241,6 +252,22 @@ mod tests {
         assert_eq!(cubic(1, parabola).sign_changes().count(), 0);
         assert_eq!(cubic(3, |x| x - 0.75).sign_changes().count(), 1);
         assert_eq!(cubic(3, |_| 0.0).sign_changes().count(), 0);
+    }
+
+    #[test]
+    fn roots_are_exact_where_the_curve_is_flat_too() {
+        for root in [0.25 + 1e-6, 0.3, 0.9, 1.5 - 1e-6] {
+            let curve = |x: f64| (x - root).powi(3) + 1e-3 * (x - root);
+            let slope = |x: f64| 3.0 * (x - root).powi(2) + 1e-3;
+            let ends = [0.25, 1.5];
+            let cubic = Cubic::with_slopes(&AXIS, 3, ends.map(curve), ends.map(slope));
+            let changes: Vec<(f64, bool)> = cubic.sign_changes().collect();
+            assert_eq!(changes.len(), 1, "{root}");
+            assert!(
+                (changes[0].0 - root).abs() < 1e-11 && changes[0].1,
+                "{changes:?}"
+            );
+        }
     }
 
     #[test]

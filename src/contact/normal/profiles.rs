@@ -2,12 +2,13 @@
 //!
 //! At one height every patch has a gap of its own, in its own frame, and is pressed by the overlap there. The height is
 //! sought by secant steps in `N^(2/3)`, which for Hertz's contacts is proportional to the lowering; the first slope comes
-//! from the stiffness of flat punches of the same areas, `dN/dδ = 2 E* √(A/π)`.
+//! from the stiffness of flat punches of the same areas, `dN/dδ = 2 E* √(A/π)`. Until the height is nearly found, gaps are sampled
+//! and solved coarsely.
 
 use std::f64::consts::PI;
 
 use crate::contact::geometry::contact_search::{Frame, Search};
-use crate::contact::geometry::local_gap::LocalGap;
+use crate::contact::geometry::local_gap::{Detail, LocalGap};
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::hertz::Pressing;
@@ -17,9 +18,11 @@ use crate::contact::normal::prescribed::PressureField;
 
 /// Heights looked at before giving up.
 const HEIGHTS_MAX: u32 = 40;
-/// The force found may differ from the one wanted by this part; pressures and approaches are then corrected to first order.
-/// What is left are two thirds of this part in the pressures, a third in the semi-axes.
-const FORCE_TOLERANCE: f64 = 1e-3;
+/// The force found may differ from the one wanted by this part; the contact is then grown to the force as Hertz's would be. What
+/// is left is of second order for Hertz's contacts, about a third of this part in pressures and lengths at worst.
+const FORCE_TOLERANCE: f64 = 5e-3;
+/// A coarse look that misses the force by no more than this is followed by a fine one.
+const NEAR: f64 = 0.02;
 /// A bracket narrower than this part of the lowering holds a jump of the force, where patches merge.
 const BRACKET_MIN: f64 = 2e-4;
 /// Steps in a row that may leave the bracket more than half as wide.
@@ -108,6 +111,7 @@ pub struct Wanted {
 impl PressedWheel {
     /// Forces times a factor near 1, and the wheel lower by so much in mm.
     fn correct(&mut self, factor: f64, lower: f64) {
+        self.found[0] *= factor;
         self.lowering += lower;
         self.centre -= lower;
         for gap in &mut self.patches {
@@ -139,15 +143,25 @@ impl ProfileContact {
         let target = match self.loading {
             Loading::Vertical(force) => force / (1.0 + wanted.friction_share),
             Loading::Normal(force) => force,
-            Loading::Lowering(lowering) => return self.lowered(search, lowering, monitor),
+            Loading::Lowering(lowering) => {
+                return self.lowered(search, lowering, Detail::Fine, monitor);
+            }
         };
+        let near = |force: f64| (force / target - 1.0).abs() <= NEAR;
         let mut bracket = Bracket::default();
+        let mut detail = Detail::Coarse;
         let mut lowering = match before {
-            Some(before) => bracket.next(before.lowering, before.found[0], target, before.found[1]),
+            Some(before) => {
+                if near(before.found[0]) && wanted.tolerance < NEAR {
+                    detail = Detail::Fine;
+                }
+                bracket.next(before.lowering, before.found[0], target, before.found[1])
+            }
             None => search.estimated_lowering(target / self.contact_modulus),
         };
+        let mut closed = false;
         for heights in 1..=HEIGHTS_MAX {
-            let mut found = match self.lowered(search, lowering, monitor) {
+            let mut found = match self.looked_at(search, lowering, detail, monitor) {
                 Ok(found) => found,
                 Err(Failure::NoAnswer(reason)) => {
                     // Too deep, perhaps; the load may be carried higher up.
@@ -157,10 +171,13 @@ impl ProfileContact {
                 Err(stopped) => return Err(stopped),
             };
             let [carried, slope] = found.found;
+            let known = bracket.slope;
             let next = bracket.next(lowering, carried, target, slope);
-            found.found[1] = bracket.slope.unwrap_or(slope);
+            found.found[1] = bracket.slope.or(known).unwrap_or(slope);
             found.heights = heights;
-            if (carried / target - 1.0).abs() <= wanted.tolerance.max(FORCE_TOLERANCE) {
+            if (carried / target - 1.0).abs() <= wanted.tolerance.max(FORCE_TOLERANCE)
+                && (detail == Detail::Fine || wanted.tolerance > FORCE_TOLERANCE)
+            {
                 // A coarse rest is not corrected: it is a place to go on from.
                 if wanted.tolerance <= FORCE_TOLERANCE {
                     found.correct(target / carried, (target - carried) / found.found[1]);
@@ -170,19 +187,41 @@ impl ProfileContact {
             if let Some(reason) = bracket.closed_on_refusal(lowering) {
                 return Err(Failure::NoAnswer(reason));
             }
-            if bracket.width() < BRACKET_MIN * lowering {
+            closed |= bracket.width() < BRACKET_MIN * lowering;
+            if closed && detail == Detail::Fine {
                 found.warnings.push(format!(
-                    "the force jumps at this height of the wheel, where patches merge; pressures were scaled by {:.4}",
+                    "the force jumps at this height of the wheel, where patches merge; forces were scaled by {:.4}",
                     target / carried
                 ));
                 found.correct(target / carried, 0.0);
                 return Ok(found);
             }
-            lowering = next;
+            if detail == Detail::Coarse && (closed || near(carried)) {
+                // What coarse looks said of the forces on either side is not sharp enough to go on from, the slope is.
+                detail = Detail::Fine;
+                bracket = bracket.opened(found.found[1]);
+            }
+            lowering = if closed { lowering } else { next };
         }
         Err(Failure::NoAnswer(format!(
             "no height of the wheel carries the load after {HEIGHTS_MAX} tries"
         )))
+    }
+
+    /// The wheel at one height; where a coarse look has no answer, a fine one may.
+    fn looked_at(
+        &self,
+        search: &Search,
+        lowering: f64,
+        detail: Detail,
+        monitor: &dyn Monitor,
+    ) -> Result<PressedWheel, Failure> {
+        match self.lowered(search, lowering, detail, monitor) {
+            Err(Failure::NoAnswer(_)) if detail == Detail::Coarse => {
+                self.lowered(search, lowering, Detail::Fine, monitor)
+            }
+            found => found,
+        }
     }
 
     /// The wheel at one height.
@@ -190,15 +229,16 @@ impl ProfileContact {
         &self,
         search: &Search,
         lowering: f64,
+        detail: Detail,
         monitor: &dyn Monitor,
     ) -> Result<PressedWheel, Failure> {
         let centre = search.touch - lowering;
-        let gaps = search.gaps(lowering).map_err(Failure::NoAnswer)?;
+        let gaps = search.gaps(lowering, detail).map_err(Failure::NoAnswer)?;
         let depths: Vec<f64> = gaps.iter().map(depth).collect();
         let least = DEPTH_SHARE_MIN * depths.iter().copied().fold(0.0, f64::max);
         let touching = gaps.iter().zip(&depths).filter(|(_, d)| **d > least);
         let patches = touching
-            .map(|(gap, depth)| self.pressed(gap, *depth, centre, monitor))
+            .map(|(gap, depth)| self.pressed(gap, *depth, centre, detail, monitor))
             .collect::<Result<Vec<_>, _>>()?;
         if patches.is_empty() {
             return Err(Failure::NoAnswer(
@@ -224,6 +264,7 @@ impl ProfileContact {
         gap: &LocalGap,
         depth: f64,
         centre: f64,
+        detail: Detail,
         monitor: &dyn Monitor,
     ) -> Result<PressedGap, Failure> {
         let above: Vec<Vec<f64>> = gap
@@ -231,12 +272,15 @@ impl ProfileContact {
             .iter()
             .map(|row| row.iter().map(|height| height + depth).collect())
             .collect();
-        let found = GapContact {
+        let contact = GapContact {
             gap: Gap::grid(&gap.x, &gap.y, &above),
             pressing: Pressing::Approach(depth),
             contact_modulus: self.contact_modulus,
-        }
-        .solve(monitor)?;
+        };
+        let found = match detail {
+            Detail::Coarse => contact.estimate(monitor)?,
+            Detail::Fine => contact.solve(monitor)?,
+        };
         let middle = found.field.load_centre(None);
         Ok(PressedGap {
             frame: self.geometry.moved(&gap.frame, middle, centre),
@@ -297,6 +341,8 @@ struct Bracket {
     slow: u32,
     /// Derivative of the force by the lowering between the last two heights, where it can be trusted.
     slope: Option<f64>,
+    /// The same from elsewhere, for the next step.
+    known: Option<f64>,
 }
 
 impl Bracket {
@@ -314,7 +360,7 @@ impl Bracket {
             self.high = Some(lowering);
             self.refused = None;
         }
-        let estimate = POWER * here / carried * slope;
+        let estimate = POWER * here / carried * self.known.take().unwrap_or(slope);
         let secant = self
             .before
             .map(|[at, value]| (here - value) / (lowering - at))
@@ -335,6 +381,17 @@ impl Bracket {
         }
         self.refused = Some(reason);
         Ok(0.5 * (self.low + lowering))
+    }
+
+    /// The same without its sides, except for what could not be solved, and with a derivative that is known.
+    fn opened(self, slope: f64) -> Bracket {
+        Bracket {
+            high: self.high.filter(|_| self.refused.is_some()),
+            refused: self.refused,
+            slope: Some(slope),
+            known: Some(slope),
+            ..Bracket::default()
+        }
     }
 
     /// Why nothing deeper could be solved, once the bracket has closed on it from below.

@@ -3,7 +3,7 @@
 use crate::contact::case::{MeshSize, Method};
 use crate::contact::error::Fault;
 use crate::contact::normal::Region;
-use crate::contact::problem::{Cost, Limits, Problem, Resolution};
+use crate::contact::problem::{Cost, Limits, Prescribed, Problem, Resolution};
 
 /// Cells of the finest mesh that a target may lead to, and of that of the dense method.
 const TARGET_CELLS_MAX: f64 = 2048.0;
@@ -23,6 +23,8 @@ const TARGET_GROWTH: f64 = 0.65;
 const LIU_HSU_CELLS_MAX: f64 = 1000.0;
 /// Memory beside the influence coefficients, relative to them.
 const BYTES_BESIDE: f64 = 1.3;
+/// Solves that the search for a prescribed force takes beside the last, on average.
+const TRIALS: f64 = 6.0;
 /// Dense square matrices the method of Liu and Hsu holds at once.
 const LIU_HSU_MATRICES: f64 = 4.0;
 /// Vectors per cell a solve holds, and doubles per cell and motion in the answer.
@@ -37,6 +39,8 @@ pub(super) struct Size {
     /// Segments per strip, for each patch.
     pub(super) segments: Vec<f64>,
     pub(super) motions: usize,
+    /// Forces prescribed in place of creepages, motion by motion.
+    pub(super) forces: Vec<Prescribed>,
     /// Time to find region and pressure, in s.
     pub(super) normal_seconds: f64,
 }
@@ -60,6 +64,7 @@ impl Problem {
             resolution: self.resolution,
             segments: self.region.segments_per_strip(),
             motions: self.motions.len(),
+            forces: self.forces.clone(),
             normal_seconds: normal_seconds(&self.region),
         }
         .cost()
@@ -71,17 +76,23 @@ impl Size {
         let (cells, segments) = self.finest();
         let motions = self.motions as f64;
         let fields = cells * (VECTORS_PER_CELL + FIELDS_PER_CELL * motions) * 8.0;
+        let prescribed = self
+            .forces
+            .iter()
+            .filter(|forces| **forces != [None; 2])
+            .count();
+        let solves = motions + TRIALS * prescribed as f64;
         let influence = 3.0 * cells * (cells + 2.0 * segments) * 8.0 * BYTES_BESIDE;
         let (bytes, seconds) = match self.method {
             Method::Auto | Method::BoundaryElement => {
                 let usual = self.usual_cells(cells);
-                (influence, 1e-9 * usual * usual * (10.0 + 50.0 * motions))
+                (influence, 1e-9 * usual * usual * (10.0 + 50.0 * solves))
             }
             Method::LiuHsu => (
                 influence + (2.0 * cells).powi(2) * 8.0 * LIU_HSU_MATRICES,
-                4e-8 * cells * cells + 3e-11 * (2.0 * cells).powi(3) * 30.0 * motions,
+                4e-8 * cells * cells + 3e-11 * (2.0 * cells).powi(3) * 30.0 * solves,
             ),
-            Method::Fastsim => (0.0, 1e-7 * cells * (1.0 + 0.2 * motions)),
+            Method::Fastsim => (0.0, 1e-7 * cells * (1.0 + 0.2 * solves)),
         };
         Cost {
             bytes: (bytes + fields) as u64,

@@ -249,6 +249,7 @@ impl Parts {
                     .as_ref()
                     .map_or_else(|| vec![1.0], |(region, _)| region.segments_per_strip()),
                 motions: motions.as_ref().map_or(1, |m| m.motions.len()),
+                forces: motions.as_ref().map_or_else(Vec::new, |m| m.forces.clone()),
                 normal_seconds: region
                     .as_ref()
                     .map_or(0.0, |(region, _)| cost::normal_seconds(region)),

@@ -72,3 +72,38 @@ fn displacement(distance: f64) -> f64 {
     let ((x0, y0), (x1, y1)) = (DISPLACEMENT[next - 1], DISPLACEMENT[next]);
     y0 + (y1 - y0) * (distance - x0) / (x1 - x0)
 }
+
+/// The squares with values below 0 in the cells next to the contact: the mean of what two cells inside in a row say, in
+/// all eight directions; of one alone the opposite.
+pub(super) fn continued(nx: usize, squares: Vec<f64>) -> Vec<f64> {
+    let (nx, ny) = (nx as isize, (squares.len() / nx) as isize);
+    let value = |i: isize, j: isize| {
+        let inside = (0..nx).contains(&i) && (0..ny).contains(&j);
+        let value = if inside {
+            squares[(j * nx + i) as usize]
+        } else {
+            0.0
+        };
+        (value > 0.0).then_some(value)
+    };
+    let beyond = |i: isize, j: isize| {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (di, dj) in (-1..=1).flat_map(|dj| (-1..=1).map(move |di| (di, dj))) {
+            if let Some(near) = value(i + di, j + dj) {
+                let far = value(i + 2 * di, j + 2 * dj);
+                sum += far.map_or(-near, |far| 2.0 * near - far).min(0.0);
+                count += 1.0;
+            }
+        }
+        if count > 0.0 { sum / count } else { 0.0 }
+    };
+    let each = squares.iter().enumerate();
+    each.map(|(k, square)| {
+        if *square == 0.0 {
+            beyond(k as isize % nx, k as isize / nx)
+        } else {
+            *square
+        }
+    })
+    .collect()
+}

@@ -137,19 +137,20 @@ impl Gap {
         }
     }
 
-    /// Is the gap its own mirror image about y = 0, sample by sample?
+    /// Is the gap its own mirror image about x = 0 and about y = 0, sample by sample?
     #[must_use]
-    pub fn is_mirrored(&self) -> bool {
+    pub fn is_mirrored(&self) -> [bool; 2] {
         let mirrored = |axis: &[f64]| axis.iter().zip(axis.iter().rev()).all(|(a, b)| *a == -b);
+        let alike = |values: &[f64]| values.iter().zip(values.iter().rev()).all(|(a, b)| a == b);
         match self {
-            Gap::Profile { across, .. } => {
-                let values = &across.values;
-                mirrored(&across.axis)
-                    && values.iter().zip(values.iter().rev()).all(|(a, b)| a == b)
-            }
+            Gap::Profile { across, .. } => [true, mirrored(&across.axis) && alike(&across.values)],
             Gap::Grid(surface) => {
-                let rows = surface.values.chunks_exact(surface.x.len());
-                mirrored(&surface.y) && rows.clone().zip(rows.rev()).all(|(a, b)| a == b)
+                let mut rows = surface.values.chunks_exact(surface.x.len());
+                let images = rows.clone().zip(rows.clone().rev());
+                [
+                    mirrored(&surface.x) && rows.all(alike),
+                    mirrored(&surface.y) && images.into_iter().all(|(a, b)| a == b),
+                ]
             }
         }
     }
@@ -289,12 +290,18 @@ mod tests {
     #[test]
     fn mirror_images_are_recognised_sample_by_sample() {
         let y = [-2.0, -0.5, 0.5, 2.0];
-        assert!(Gap::profile(1.0, &y, &[1.0, 0.0, 0.0, 1.0]).is_mirrored());
-        assert!(!Gap::profile(1.0, &y, &[1.0, 0.0, 1e-9, 1.0]).is_mirrored());
-        assert!(!Gap::profile(1.0, &[-2.0, -0.5, 0.6, 2.0], &[1.0, 0.0, 0.0, 1.0]).is_mirrored());
+        let profile = |y: &[f64], gap: &[f64]| Gap::profile(1.0, y, gap).is_mirrored();
+        assert_eq!(profile(&y, &[1.0, 0.0, 0.0, 1.0]), [true, true]);
+        assert_eq!(profile(&y, &[1.0, 0.0, 1e-9, 1.0]), [true, false]);
+        let askew = [-2.0, -0.5, 0.6, 2.0];
+        assert_eq!(profile(&askew, &[1.0, 0.0, 0.0, 1.0]), [true, false]);
         let x = [0.0, 1.0];
         let rows = |last: f64| vec![vec![3.0, 1.0], vec![0.0, 0.5], vec![3.0, last]];
-        assert!(Gap::grid(&x, &[-1.0, 0.0, 1.0], &rows(1.0)).is_mirrored());
-        assert!(!Gap::grid(&x, &[-1.0, 0.0, 1.0], &rows(1.1)).is_mirrored());
+        let grid =
+            |x: &[f64], rows: &[Vec<f64>]| Gap::grid(x, &[-1.0, 0.0, 1.0], rows).is_mirrored();
+        assert_eq!(grid(&x, &rows(1.0)), [false, true]);
+        assert_eq!(grid(&x, &rows(1.1)), [false, false]);
+        let even = vec![vec![2.0, 2.0], vec![0.0, 0.0], vec![3.0, 3.0]];
+        assert_eq!(grid(&[-1.0, 1.0], &even), [true, false]);
     }
 }

@@ -3,12 +3,14 @@
 //! Sought are `p ≥ 0` and `g = u(p) + h − δ ≥ 0` with `p g = 0` at every cell, and either the sum of p or the approach
 //! δ prescribed (Polonsky and Keer 1999).
 
-use crate::contact::influence::fft::Convolution;
+use crate::contact::influence::fft::{Convolution, Width};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::hertz::Pressing;
 
 /// Iterations after which something is wrong: smooth gaps take 10 to 30, rough ones up to about 100.
 const ITERATIONS_MAX: u32 = 500;
+/// Up to so many changed pressures are added to the displacement one by one, for less than a whole product costs.
+const CHANGES_MAX: usize = 12;
 
 /// How far the two bodies are from touching where they should, and what they press.
 #[derive(Debug, Clone)]
@@ -38,8 +40,8 @@ pub(super) enum Failure {
 /// Solves for the pressure under which surfaces with the gap `gap` touch; `cell` is the area of a cell in mm².
 ///
 /// `start` is any pressure that is not 0 everywhere; it decides the number of iterations only.
-pub(super) fn press(
-    influence: &mut Convolution,
+pub(super) fn press<T: Width>(
+    influence: &mut Convolution<T>,
     gap: &[f64],
     cell: f64,
     pressing: Pressing,
@@ -49,129 +51,119 @@ pub(super) fn press(
 ) -> Result<Pressed, Failure> {
     let least = gap.iter().copied().fold(f64::INFINITY, f64::min);
     let n = gap.len();
-    let mut p = start;
     let mut work = Work {
+        p: start,
         u: vec![0.0; n],
         g: vec![0.0; n],
         t: vec![0.0; n],
         r: vec![0.0; n],
+        changes: Vec::new(),
     };
-    scale_to(&mut p, pressing, cell);
-    let mut follow = false;
-    let mut fresh = false;
-    let mut last = 1.0;
+    work.scale_to(pressing, cell);
+    influence.apply(&work.p, &mut work.u);
+    let (mut follow, mut last) = (false, 1.0);
     let mut residual = f64::INFINITY;
     for iterations in 0..ITERATIONS_MAX {
         if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.0) {
             return Err(Failure::Stopped(stop));
         }
-        if !fresh {
-            influence.apply(&p, &mut work.u);
-        }
-        let approach = work.distances(&p, gap, pressing);
-        residual = work.violation(&p) / (approach - least);
+        let approach = work.distances(gap, pressing);
+        let (violation, square) = work.part_from(approach);
+        residual = violation / (approach - least);
         if residual <= tolerance && approach > least {
             return Ok(Pressed {
-                pressure: p,
+                pressure: work.p,
                 distance: work.g,
                 approach,
                 iterations,
                 residual,
             });
         }
-        let square = work.square(&p);
         let factor = if follow { square / last } else { 0.0 };
         last = square;
-        work.direction(&p, factor);
+        work.direction(factor);
         influence.apply(&work.t, &mut work.r);
-        let step = work.step(&p, pressing, influence.own());
-        (follow, fresh) = work.advance(&mut p, step);
-        let scale = scale_to(&mut p, pressing, cell);
-        if fresh {
+        let step = work.step(pressing, influence.own());
+        follow = work.advance(step);
+        if work.changes.len() <= CHANGES_MAX {
+            for (k, change) in work.changes.drain(..) {
+                influence.add(k, change, &mut work.u);
+            }
+            let scale = work.scale_to(pressing, cell);
             work.u.iter_mut().for_each(|u| *u *= scale);
+        } else {
+            work.scale_to(pressing, cell);
+            influence.apply(&work.p, &mut work.u);
         }
     }
     Err(Failure::NotConverged(residual))
 }
 
-/// Scales the pressures to the prescribed force; returns the factor.
-fn scale_to(p: &mut [f64], pressing: Pressing, cell: f64) -> f64 {
-    let Pressing::Force(force) = pressing else {
-        return 1.0;
-    };
-    let scale = force / (cell * p.iter().sum::<f64>());
-    p.iter_mut().for_each(|p| *p *= scale);
-    scale
-}
-
 struct Work {
-    /// Displacement.
+    /// Pressure and displacement.
+    p: Vec<f64>,
     u: Vec<f64>,
     /// Distance of the deformed surfaces.
     g: Vec<f64>,
-    /// Direction of the step, and its displacement.
+    /// Direction of the step, 0 outside the contact, and its displacement.
     t: Vec<f64>,
     r: Vec<f64>,
+    /// Cells whose pressure is not where the step leads to, and by how much it is more.
+    changes: Vec<(usize, f64)>,
 }
 
 impl Work {
-    /// Puts `u + h − δ` into the distances and returns δ; with a force it makes the mean over the contact 0.
-    fn distances(&mut self, p: &[f64], gap: &[f64], pressing: Pressing) -> f64 {
-        let (mut sum, mut count) = (0.0, 0.0);
-        for (k, p) in p.iter().enumerate() {
-            self.g[k] = self.u[k] + gap[k];
-            if *p > 0.0 {
-                sum += self.g[k];
-                count += 1.0;
-            }
-        }
-        let approach = match pressing {
-            Pressing::Force(_) => sum / count,
-            Pressing::Approach(approach) => approach,
+    /// Scales the pressures to the prescribed force; returns the factor.
+    fn scale_to(&mut self, pressing: Pressing, cell: f64) -> f64 {
+        let Pressing::Force(force) = pressing else {
+            return 1.0;
         };
-        self.g.iter_mut().for_each(|g| *g -= approach);
-        approach
+        let [sum] = sums(self.p.len(), |k| [self.p[k]]);
+        let scale = force / (cell * sum);
+        self.p.iter_mut().for_each(|p| *p *= scale);
+        scale
     }
 
-    fn violation(&self, p: &[f64]) -> f64 {
-        let each = self.g.iter().zip(p);
-        each.map(|(g, p)| if *p > 0.0 { g.abs() } else { -g })
-            .fold(0.0, f64::max)
+    /// Puts `u + h` into the distances and returns the approach δ; with a force it makes the mean over the contact 0.
+    fn distances(&mut self, gap: &[f64], pressing: Pressing) -> f64 {
+        for ((g, u), h) in self.g.iter_mut().zip(&self.u).zip(gap) {
+            *g = u + h;
+        }
+        match pressing {
+            Pressing::Force(_) => {
+                let [sum, count] = self.inside(|k| [self.g[k], 1.0]);
+                sum / count
+            }
+            Pressing::Approach(approach) => approach,
+        }
     }
 
-    fn square(&self, p: &[f64]) -> f64 {
-        let each = self.g.iter().zip(p);
-        each.filter(|(_, p)| **p > 0.0).map(|(g, _)| g * g).sum()
+    /// Takes the approach from the distances; their largest violation, and the sum of their squares in the contact.
+    fn part_from(&mut self, approach: f64) -> (f64, f64) {
+        let mut violation = 0.0_f64;
+        for (g, p) in self.g.iter_mut().zip(&self.p) {
+            *g -= approach;
+            violation = violation.max(if *p > 0.0 { g.abs() } else { -*g });
+        }
+        let [square] = self.inside(|k| [self.g[k] * self.g[k]]);
+        (violation, square)
     }
 
-    fn direction(&mut self, p: &[f64], factor: f64) {
-        for (k, p) in p.iter().enumerate() {
-            self.t[k] = if *p > 0.0 {
-                self.g[k] + factor * self.t[k]
-            } else {
-                0.0
-            };
+    fn direction(&mut self, factor: f64) {
+        for ((t, g), p) in self.t.iter_mut().zip(&self.g).zip(&self.p) {
+            *t = if *p > 0.0 { g + factor * *t } else { 0.0 };
         }
     }
 
     /// Length of the step that leaves no distance along the direction; `own` is what a cell's pressure displaces itself.
-    fn step(&self, p: &[f64], pressing: Pressing, own: f64) -> f64 {
-        let mean = match pressing {
-            Pressing::Force(_) => {
-                let (mut sum, mut count) = (0.0, 0.0);
-                for (r, _) in self.r.iter().zip(p).filter(|(_, p)| **p > 0.0) {
-                    sum += r;
-                    count += 1.0;
-                }
-                sum / count
-            }
-            Pressing::Approach(_) => 0.0,
+    fn step(&self, pressing: Pressing, own: f64) -> f64 {
+        let (g, t, r) = (&self.g, &self.t, &self.r);
+        let [above, product, along, sum, count] =
+            self.inside(|k| [g[k] * t[k], r[k] * t[k], t[k], r[k], 1.0]);
+        let below = match pressing {
+            Pressing::Force(_) => product - sum / count * along,
+            Pressing::Approach(_) => product,
         };
-        let (mut above, mut below) = (0.0, 0.0);
-        for (k, _) in p.iter().enumerate().filter(|(_, p)| **p > 0.0) {
-            above += self.g[k] * self.t[k];
-            below += (self.r[k] - mean) * self.t[k];
-        }
         // A single cell under a force leaves nothing to minimise; its own stiffness lets others in.
         if below > 0.0 && above > 0.0 {
             above / below
@@ -180,30 +172,61 @@ impl Work {
         }
     }
 
-    /// Takes the step. Says whether the next direction may build on this one (no cell came into contact) and whether the
-    /// displacement is up to date (no pressure had to be cut either).
-    fn advance(&mut self, p: &mut [f64], step: f64) -> (bool, bool) {
-        let (mut follow, mut fresh) = (true, true);
-        for (k, p) in p.iter_mut().enumerate() {
-            if *p > 0.0 {
-                *p -= step * self.t[k];
-                if *p <= 0.0 {
-                    (*p, fresh) = (0.0, false);
-                }
+    /// Takes the step, and notes where the pressures had to be changed beside it. Says whether the next direction may
+    /// build on this one: no cell came into contact.
+    fn advance(&mut self, step: f64) -> bool {
+        let mut follow = true;
+        self.changes.clear();
+        for (k, p) in self.p.iter_mut().enumerate() {
+            let stepped = *p - step * self.t[k];
+            if *p > 0.0 && stepped > 0.0 {
+                *p = stepped;
+                continue;
             }
             // Outside, and what has just left the contact although the bodies overlap there.
-            if *p == 0.0 && self.g[k] < 0.0 {
-                *p = -step * self.g[k];
-                (follow, fresh) = (false, false);
+            *p = if self.g[k] < 0.0 {
+                follow = false;
+                -step * self.g[k]
+            } else {
+                0.0
+            };
+            if *p != stepped {
+                self.changes.push((k, *p - stepped));
             }
         }
-        if fresh {
-            for (u, r) in self.u.iter_mut().zip(&self.r) {
-                *u -= step * r;
-            }
+        for (u, r) in self.u.iter_mut().zip(&self.r) {
+            *u -= step * r;
         }
-        (follow, fresh)
+        follow
     }
+
+    /// Sums over the cells in contact.
+    fn inside<const N: usize>(&self, term: impl Fn(usize) -> [f64; N]) -> [f64; N] {
+        sums(self.p.len(), |k| {
+            let inside = f64::from(u8::from(self.p[k] > 0.0));
+            term(k).map(|value| inside * value)
+        })
+    }
+}
+
+/// Sums of several terms over `0..n`, in four chains: one would wait for each addition.
+fn sums<const N: usize>(n: usize, term: impl Fn(usize) -> [f64; N]) -> [f64; N] {
+    let mut chains = [[0.0; N]; 4];
+    let mut add = |chain: usize, k: usize| {
+        for (sum, value) in chains[chain].iter_mut().zip(term(k)) {
+            *sum += value;
+        }
+    };
+    let whole = n - n % 4;
+    for k in (0..whole).step_by(4) {
+        for chain in 0..4 {
+            add(chain, k + chain);
+        }
+    }
+    for k in whole..n {
+        add(0, k);
+    }
+    std::array::from_fn(|m| chains.iter().map(|chain| chain[m]).sum())
 }
 
 #[cfg(test)]
@@ -223,7 +246,7 @@ mod tests {
     }
 
     fn solved(pressing: Pressing, start: Vec<f64>) -> Pressed {
-        let mut influence = Convolution::new(CELLS, CELLS, STEP, STEP, MODULUS);
+        let mut influence = Convolution::<f64>::new(CELLS, CELLS, STEP, STEP, MODULUS);
         let gap = paraboloid();
         press(
             &mut influence,

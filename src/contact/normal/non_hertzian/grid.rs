@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::contact::influence::fft::Convolution;
+use crate::contact::normal::non_hertzian::edges;
 use crate::contact::normal::non_hertzian::gap::{Gap, Window};
 use crate::contact::normal::non_hertzian::gradients::Pressed;
 use crate::contact::normal::non_hertzian::window::Reach;
@@ -21,8 +22,8 @@ pub(super) struct Grid {
     pub(super) step: [f64; 2],
     /// Number of cells along x and y.
     pub(super) cells: [usize; 2],
-    /// The gap is its own mirror image about y = 0, and so is the grid.
-    pub(super) mirrored: bool,
+    /// The gap is its own mirror image about x = 0 or y = 0, and so is the grid.
+    pub(super) mirrored: [bool; 2],
 }
 
 /// One of the four sides of a box.
@@ -60,14 +61,15 @@ impl Side {
 }
 
 impl Grid {
-    /// The grid of so many cells (at most 200 along either axis) over a window; made symmetric about y = 0 if `mirrored`.
-    pub(super) fn new(window: Window, cells: [usize; 2], mirrored: bool) -> Grid {
+    /// The grid of so many cells (at most 200 along either axis) over a window; made symmetric about
+    /// x = 0 and y = 0 where `mirrored`.
+    pub(super) fn new(window: Window, cells: [usize; 2], mirrored: [bool; 2]) -> Grid {
         let cells = cells.map(|n| n.clamp(4, CELLS_MAX));
         let mut middle = window.map(|[low, high]| 0.5 * (low + high));
         let mut length = window.map(|[low, high]| high - low);
-        if mirrored {
-            let [low, high] = window[1];
-            (middle[1], length[1]) = (0.0, 2.0 * high.max(-low));
+        for k in (0..2).filter(|k| mirrored[*k]) {
+            let [low, high] = window[k];
+            (middle[k], length[k]) = (0.0, 2.0 * high.max(-low));
         }
         Grid {
             middle,
@@ -91,7 +93,8 @@ impl Grid {
         [self.middle[axis] - half, self.middle[axis] + half]
     }
 
-    pub(super) fn influence(&self, contact_modulus: f64) -> Convolution {
+    /// Single precision does for the violations of the contact conditions that are asked for.
+    pub(super) fn influence(&self, contact_modulus: f64) -> Convolution<f32> {
         let ([nx, ny], [dx, dy]) = (self.cells, self.step);
         Convolution::new(nx, ny, dx, dy, contact_modulus)
     }
@@ -99,30 +102,31 @@ impl Grid {
     /// The gap at the centres.
     pub(super) fn gap(&self, gap: &Gap) -> Vec<f64> {
         let mut values = gap.on(&self.centres(0), &self.centres(1));
-        if self.mirrored {
-            let width = self.cells[0];
-            let (low, high) = values.split_at_mut(self.cells[1].div_ceil(2) * width);
-            for (image, row) in high
-                .chunks_exact_mut(width)
-                .rev()
-                .zip(low.chunks_exact(width))
-            {
-                image.copy_from_slice(row);
-            }
+        for [image, cell] in self.images() {
+            values[image] = values[cell];
         }
         values
     }
 
     /// Replaces a value and its mirror image by their mean.
     pub(super) fn symmetrise(&self, values: &mut [f64]) {
-        let [width, rows] = self.cells;
-        for j in 0..rows / 2 {
-            for i in 0..width {
-                let (here, there) = (j * width + i, (rows - 1 - j) * width + i);
-                let mean = 0.5 * (values[here] + values[there]);
-                (values[here], values[there]) = (mean, mean);
-            }
+        for [image, cell] in self.images() {
+            let mean = 0.5 * (values[image] + values[cell]);
+            (values[image], values[cell]) = (mean, mean);
         }
+    }
+
+    /// Cells with their mirror images: first those about x = 0, then those about y = 0.
+    fn images(&self) -> impl Iterator<Item = [usize; 2]> + use<> {
+        let ([width, rows], [along, across]) = (self.cells, self.mirrored);
+        let half = if along { width / 2 } else { 0 };
+        let about_x = (0..rows)
+            .flat_map(move |j| (0..half).map(move |i| [j * width + width - 1 - i, j * width + i]));
+        let half = if across { rows / 2 } else { 0 };
+        let about_y = (0..half).flat_map(move |j| {
+            (0..width).map(move |i| [(rows - 1 - j) * width + i, j * width + i])
+        });
+        about_x.chain(about_y)
     }
 
     /// A pressure to start from: Hertz's law over the region that overlaps by more than half of the approach.
@@ -136,8 +140,10 @@ impl Grid {
         gap.iter().map(|h| largest * part(h).sqrt()).collect()
     }
 
-    /// Pressures of another grid at the centres of this one, bilinear, 0 beyond it.
+    /// Pressures of another grid at the centres of this one: the root of their squares, which fall linearly to 0 at the
+    /// edge and are continued beyond it, interpolated bilinearly.
     pub(super) fn interpolate(&self, other: &Grid, pressure: &[f64], gap: &[f64]) -> Vec<f64> {
+        let squares = edges::continued(other.cells[0], edges::squares(other.cells[0], pressure));
         let places = [0, 1].map(|axis| -> Vec<(isize, f64)> {
             let first = other.range(axis)[0] + 0.5 * other.step[axis];
             self.centres(axis)
@@ -151,7 +157,7 @@ impl Grid {
         let value = |i: isize, j: isize| {
             let inside = |k: isize, axis: usize| (0..other.cells[axis] as isize).contains(&k);
             if inside(i, 0) && inside(j, 1) {
-                pressure[j as usize * other.cells[0] + i as usize]
+                squares[j as usize * other.cells[0] + i as usize]
             } else {
                 0.0
             }
@@ -160,7 +166,8 @@ impl Grid {
         for &(j, v) in &places[1] {
             for &(i, u) in &places[0] {
                 let row = |j: isize| (1.0 - u) * value(i, j) + u * value(i + 1, j);
-                out.push((1.0 - v) * row(j) + v * row(j + 1));
+                let square = (1.0 - v) * row(j) + v * row(j + 1);
+                out.push(square.max(0.0).sqrt());
             }
         }
         if out.iter().all(|p| *p == 0.0) {

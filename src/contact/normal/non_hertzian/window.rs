@@ -116,17 +116,30 @@ impl Look {
                 )
             })
             .collect();
-        cells.sort_by(|a, b| a.0.total_cmp(&b.0));
         let carried =
             |area: f64, depth: f64| 4.0 / 3.0 * (area / std::f64::consts::PI).sqrt() * depth;
-        let mut area = 0.0;
-        for (height, share) in cells {
-            area += share;
-            if carried(area, 2.0 * height) >= force {
-                return 2.0 * height;
+        // The least height at which the force is carried, by halves: lower ones to the front, as a sort would, but only
+        // in the half that holds the answer.
+        let (mut area, mut rest) = (0.0, &mut cells[..]);
+        while rest.len() > 1 {
+            let middle = rest.len() / 2;
+            rest.select_nth_unstable_by(middle, |a, b| a.0.total_cmp(&b.0));
+            let (lower, upper) = rest.split_at_mut(middle);
+            let highest = lower.iter().map(|cell| cell.0).fold(0.0, f64::max);
+            let whole = area + lower.iter().map(|cell| cell.1).sum::<f64>();
+            if carried(whole, 2.0 * highest) >= force {
+                rest = lower;
+            } else {
+                (area, rest) = (whole, upper);
             }
         }
-        force / carried(area, 1.0)
+        let (height, share) = rest[0];
+        area += share;
+        if carried(area, 2.0 * height) >= force {
+            2.0 * height
+        } else {
+            force / carried(area, 1.0)
+        }
     }
 
     /// The box around all points with a gap below a level, one point wider on every side; around the deepest point if

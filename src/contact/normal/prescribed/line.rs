@@ -44,49 +44,49 @@ impl Line<'_> {
                 }
             };
             let (from, to) = (part(*from, low), part(*to, high));
-            for (left, right) in self.positive_parts(k) {
+            self.positive_parts(k, |left, right| {
                 let (left, right) = (left.max(from), right.min(to));
                 match segments.last_mut() {
                     _ if left >= right => {}
                     Some(last) if last.1 == left => last.1 = right,
                     _ => segments.push((left, right)),
                 }
-            }
+            });
         }
         segments
     }
 
-    /// Where the curve is positive in one interval.
-    fn positive_parts(&self, k: usize) -> Vec<(f64, f64)> {
+    /// Tells where the curve is positive in one interval, part by part.
+    fn positive_parts(&self, k: usize, mut tell: impl FnMut(f64, f64)) {
         let node = self.first + 1 + k;
         let (low, high) = (self.axis[node], self.axis[node + 1]);
         let values = [0, 1, 2, 3].map(|m| self.values[k + m]);
         let [_, here, next, _] = values;
         // Between two positive nodes the contact is whole: a gap there is not in the data.
         if here > 0.0 && next > 0.0 {
-            return vec![(low, high)];
+            tell(low, high);
+            return;
         }
         // Between two others a bulge is believed where it continues a smooth edge.
         if here <= 0.0 && next <= 0.0 && !self.smooth[k] {
-            return Vec::new();
+            return;
         }
-        let mut parts = Vec::new();
         let mut start = (here > 0.0).then_some(low);
         for (at, positive) in Cubic::between(self.axis, node, values).sign_changes() {
             if positive {
                 start = Some(at);
             } else if let Some(start) = start.take() {
-                parts.push((start, at));
+                tell(start, at);
             }
         }
-        parts.extend(start.map(|start| (start, high)));
-        parts
+        if let Some(start) = start {
+            tell(start, high);
+        }
     }
 }
 
-/// The curve between nodes `i` and `i + 1` of the axis.
-pub(super) fn cubic(axis: &[f64], i: usize, value: impl Fn(usize) -> f64) -> Bounded {
-    let values: [f64; 4] = std::array::from_fn(|k| value(i - 1 + k));
+/// The curve between nodes `i` and `i + 1` of the axis; `values` belong to the nodes `i − 1` to `i + 2`.
+pub(super) fn cubic(axis: &[f64], i: usize, values: [f64; 4]) -> Bounded {
     Bounded {
         cubic: Cubic::between(axis, i, values),
         bounds: bounds(values[1], values[2], true),

@@ -21,6 +21,8 @@ use shape::Shape;
 
 /// Patches of one grid.
 pub(super) const PATCHES_MAX: usize = 64;
+/// Of so many intervals on a chord, three points of quadrature in each do.
+const INTERVALS_MANY: f64 = 24.0;
 /// Grid lines added on each side: the contact may reach half a spacing beyond the grid, the interpolation needs more.
 const PADDING: usize = 4;
 
@@ -168,8 +170,8 @@ impl PressureField {
     /// Mean of the interpolated pressure in MPa over `x0 < x < x1` on the line of a chord; 0 outside the chord. For
     /// `x0 = x1` the pressure there.
     ///
-    /// Gauss–Legendre quadrature of order 10 per grid interval in θ, with `x = c − h cos θ` on the chord, which
-    /// takes the roots at its ends into account; exact to about 1e-9 for Hertz's pressure.
+    /// Gauss–Legendre quadrature of order 10 per grid interval (6 where intervals are many) in the root of the distance from the nearer end of the
+    /// chord, in which the pressure is smooth; exact to about 1e-9 for Hertz's pressure.
     #[must_use]
     pub fn mean_pressure(&self, chord: &Chord, x0: f64, x1: f64) -> f64 {
         let (low, high) = (x0.max(chord.left), x1.min(chord.right));
@@ -185,26 +187,33 @@ impl PressureField {
         let j = self.row_interval(y);
         let weights = weights(&self.grid.y, j, y);
         let (first, last) = (self.column_interval(low), self.column_interval(high));
-        let cubic = |i: usize| line::cubic(x, i, |i| self.value_on_column(i, j, weights));
+        let value = |i: usize| self.value_on_column(i, j, weights);
+        let mut values: [f64; 4] = std::array::from_fn(|k| value(first - 1 + k));
         if x0 == x1 {
-            return self.pressure_max * cubic(first).at(low).sqrt();
+            let cubic = line::cubic(x, first, values);
+            return self.pressure_max * cubic.at(low).sqrt();
         }
-        let half = 0.5 * (chord.right - chord.left);
         let centre = 0.5 * (chord.right + chord.left);
-        let angle = |x: f64| {
-            let from_ends = ((x - chord.left).max(0.0), (chord.right - x).max(0.0));
-            (from_ends.0 * from_ends.1)
-                .sqrt()
-                .atan2(0.5 * (from_ends.1 - from_ends.0))
-        };
+        let three = |from: f64, to: f64| (to - from) * INTERVALS_MANY < chord.right - chord.left;
         let mut integral = 0.0;
         for i in first..=last {
-            let cubic = cubic(i);
-            let (from, to) = (angle(low.max(x[i])), angle(high.min(x[i + 1])));
-            if to > from {
-                let pressure =
-                    |theta: f64| cubic.at(centre - half * theta.cos()).sqrt() * theta.sin();
-                integral += half * gauss(from, to, pressure);
+            if i > first {
+                values = [values[1], values[2], values[3], value(i + 2)];
+            }
+            let cubic = line::cubic(x, i, values);
+            let (from, to) = (low.max(x[i]), high.min(x[i + 1]));
+            let pressure = |x: f64| cubic.at(x).sqrt();
+            if from < centre.min(to) {
+                let s = [from, centre.min(to)].map(|x| (x - chord.left).max(0.0).sqrt());
+                integral += gauss(s, three(from, to), |s| {
+                    2.0 * s * pressure(chord.left + s * s)
+                });
+            }
+            if to > centre.max(from) {
+                let s = [to, centre.max(from)].map(|x| (chord.right - x).max(0.0).sqrt());
+                integral += gauss(s, three(from, to), |s| {
+                    2.0 * s * pressure(chord.right - s * s)
+                });
             }
         }
         self.pressure_max * integral / (x1 - x0)
@@ -312,14 +321,20 @@ fn padded(axis: &[f64]) -> Vec<f64> {
     before.chain(axis.iter().copied()).chain(after).collect()
 }
 
-/// Gauss–Legendre quadrature with five points (Abramowitz and Stegun 1964, table 25.4).
-fn gauss(from: f64, to: f64, f: impl Fn(f64) -> f64) -> f64 {
-    const POINTS: [(f64, f64); 3] = [
+/// Gauss–Legendre quadrature with five points, or three where they do (Abramowitz and Stegun 1964, table 25.4).
+fn gauss([from, to]: [f64; 2], three: bool, f: impl Fn(f64) -> f64) -> f64 {
+    const THREE: [(f64, f64); 2] = [
+        (0.0, 0.888_888_888_888_889),
+        (0.774_596_669_241_483_4, 0.555_555_555_555_555_6),
+    ];
+    const FIVE: [(f64, f64); 3] = [
         (0.0, 0.568_888_888_888_888_9),
         (0.538_469_310_105_683_1, 0.478_628_670_499_366_47),
         (0.906_179_845_938_664, 0.236_926_885_056_189_08),
     ];
     let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
-    let pair = |(at, weight): (f64, f64)| weight * (f(middle - half * at) + f(middle + half * at));
-    half * (0.5 * pair(POINTS[0]) + pair(POINTS[1]) + pair(POINTS[2]))
+    let points = if three { &THREE[..] } else { &FIVE[..] };
+    let pair = |(at, weight): &(f64, f64)| weight * (f(middle - half * at) + f(middle + half * at));
+    let outer: f64 = points[1..].iter().map(pair).sum();
+    half * (points[0].1 * f(middle) + outer)
 }

@@ -42,14 +42,21 @@ impl PressureField {
         self
     }
 
-    /// The same region with all pressures times a factor near 1, and the approaches larger by so much in mm.
+    /// The same contact under a force times a factor near 1, with approaches larger by so much in mm: lengths from the origin
+    /// and pressures grow with the cube root of the force, as in Hertz's contacts.
     #[must_use]
     pub fn corrected(mut self, factor: f64, approach: f64) -> PressureField {
-        self.pressure_max *= factor;
+        let root = factor.cbrt();
+        self.pressure_max *= root;
+        let axes = [&mut self.grid.x, &mut self.grid.y];
+        axes.into_iter().flatten().for_each(|at| *at *= root);
         for shape in &mut self.shapes {
-            shape.patch.normal_force *= factor;
-            shape.patch.pressure_max *= factor;
-            shape.patch.approach = shape.patch.approach.map(|before| before + approach);
+            let patch = &mut shape.patch;
+            patch.normal_force *= factor;
+            patch.pressure_max *= root;
+            patch.area *= root * root;
+            patch.extent = patch.extent.map(|at| root * at);
+            patch.approach = patch.approach.map(|before| before + approach);
         }
         self
     }
@@ -99,16 +106,16 @@ mod tests {
     }
 
     #[test]
-    fn moving_and_correcting_change_coordinates_and_forces_only() {
+    fn moving_changes_coordinates_only() {
         let field = two_bumps();
-        let moved = field.clone().from_origin([0.3, -5.0]).corrected(1.01, 0.0);
+        let moved = field.clone().from_origin([0.3, -5.0]);
         let centre = moved.load_centre(Some(0));
         assert!(
             centre[0].abs() < 5e-3 && centre[1].abs() < 5e-3,
             "{centre:?}"
         );
         for (before, after) in field.patches().iter().zip(moved.patches()) {
-            assert!((after.normal_force / before.normal_force - 1.01).abs() < 1e-12);
+            assert!((after.normal_force / before.normal_force - 1.0).abs() < 1e-12);
             assert!((after.extent[0] - before.extent[0] + 0.3).abs() < 1e-12);
             assert!((after.extent[3] - before.extent[3] - 5.0).abs() < 1e-12);
             assert_eq!(after.area, before.area);
@@ -116,10 +123,29 @@ mod tests {
         let chord = |field: &PressureField, y: f64| field.chords(0, &[(y, 0.1)])[0];
         let (here, there) = (chord(&field, -4.2), chord(&moved, 0.8));
         assert!((here.left - there.left - 0.3).abs() < 1e-12);
-        let pressures = [
-            field.mean_pressure(&here, here.left, here.right),
-            moved.mean_pressure(&there, there.left, there.right),
-        ];
-        assert!((pressures[1] / pressures[0] - 1.01).abs() < 1e-9);
+    }
+
+    #[test]
+    fn correcting_grows_the_contact_as_hertz_does() {
+        let field = two_bumps();
+        let corrected = field.clone().corrected(1.03, 0.002);
+        let root = 1.03_f64.cbrt();
+        for (before, after) in field.patches().iter().zip(corrected.patches()) {
+            assert!((after.normal_force / before.normal_force - 1.03).abs() < 1e-12);
+            assert!((after.pressure_max / before.pressure_max - root).abs() < 1e-12);
+            assert!((after.area / before.area - root * root).abs() < 1e-12);
+        }
+        // The pressures on the cells carry just that force: a line's load times its width grows with the third power.
+        let load = |field: &PressureField, y: f64| {
+            let chord = field.chords(0, &[(y, 0.1)])[0];
+            let length = chord.right - chord.left;
+            (
+                length,
+                length * field.mean_pressure(&chord, chord.left, chord.right),
+            )
+        };
+        let (before, after) = (load(&field, -4.2), load(&corrected, -4.2 * root));
+        assert!((after.0 / before.0 - root).abs() < 1e-9);
+        assert!((after.1 / before.1 - root * root).abs() < 1e-9);
     }
 }

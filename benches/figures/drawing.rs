@@ -1,0 +1,194 @@
+//! Outlines and curves on linear axes, as SVG.
+
+use std::fmt::Write as _;
+
+/// Inks that differ in lightness too, with the dashes of their lines.
+const INKS: [(&str, &str); 6] = [
+    ("#08306b", "none"),
+    ("#d95f02", "9 3"),
+    ("#238b45", "none"),
+    ("#7b3294", "4 3"),
+    ("#8c510a", "none"),
+    ("#666666", "2 3"),
+];
+
+/// How something is drawn.
+#[derive(Clone, Copy)]
+pub enum Curve {
+    /// The edge of a patch.
+    Border,
+    /// The n-th of several lines.
+    Line(usize),
+    /// A filled zone.
+    Slip,
+    Stick,
+}
+
+impl Curve {
+    fn style(self) -> String {
+        match self {
+            Curve::Border => "fill=\"none\" stroke=\"black\" stroke-width=\"1.5\"".to_owned(),
+            Curve::Line(k) => {
+                let (ink, dashes) = INKS[k % INKS.len()];
+                format!(
+                    "fill=\"none\" stroke=\"{ink}\" stroke-width=\"1.8\" stroke-dasharray=\"{dashes}\""
+                )
+            }
+            Curve::Slip => "fill=\"#e8e8e8\"".to_owned(),
+            Curve::Stick => {
+                "fill=\"#2b5d8a\" fill-rule=\"evenodd\" stroke=\"#2b5d8a\" stroke-width=\"1.5\""
+                    .to_owned()
+            }
+        }
+    }
+}
+
+/// A rectangle of the picture and the values at its sides.
+#[derive(Clone, Copy)]
+pub struct Frame {
+    pub x: [f64; 2],
+    pub y: [f64; 2],
+    pub left: f64,
+    pub right: f64,
+    pub bottom: f64,
+    pub top: f64,
+}
+
+impl Frame {
+    fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let share = |value: f64, [low, high]: [f64; 2]| (value - low) / (high - low);
+        [
+            self.left + share(x, self.x) * (self.right - self.left),
+            self.bottom + share(y, self.y) * (self.top - self.bottom),
+        ]
+    }
+
+    fn path(&self, points: &[[f64; 2]]) -> String {
+        let mut data = String::new();
+        for (k, point) in points.iter().enumerate() {
+            let [x, y] = self.place(*point);
+            let _ = write!(data, "{}{x:.1} {y:.1}", if k == 0 { 'M' } else { 'L' });
+        }
+        data
+    }
+}
+
+/// Round values in a range, about five.
+fn ticks([low, high]: [f64; 2]) -> Vec<f64> {
+    let rough = (high - low) / 5.0;
+    let power = 10.0_f64.powf(rough.log10().floor());
+    let factors = [1.0, 2.0, 5.0, 10.0];
+    let step = factors.map(|factor| factor * power);
+    let step = step
+        .into_iter()
+        .find(|step| *step >= rough)
+        .unwrap_or(rough);
+    let first = (low / step - 1e-9).ceil() as i64;
+    let last = (high / step + 1e-9).floor() as i64;
+    (first..=last).map(|k| k as f64 * step).collect()
+}
+
+fn label(value: f64) -> String {
+    let text = format!("{value:.3}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+/// A picture that grows.
+pub struct Picture {
+    body: String,
+}
+
+impl Picture {
+    pub fn new(width: f64, height: f64, title: &str) -> Picture {
+        let body = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" font-size=\"12\">\n\
+             <rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n\
+             <text x=\"20\" y=\"24\" font-size=\"14\">{title}</text>\n"
+        );
+        Picture { body }
+    }
+
+    pub fn svg(self) -> String {
+        self.body + "</svg>\n"
+    }
+
+    fn add(&mut self, element: &str) {
+        self.body.push_str(element);
+        self.body.push('\n');
+    }
+
+    pub fn text(&mut self, [x, y]: [f64; 2], text: &str) {
+        self.add(&format!(
+            "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"middle\">{text}</text>"
+        ));
+    }
+
+    /// Closed loops.
+    pub fn loops(&mut self, frame: &Frame, loops: &[Vec<[f64; 2]>], curve: Curve) {
+        let data: String = loops.iter().map(|l| frame.path(l) + "Z").collect();
+        self.add(&format!("<path d=\"{data}\" {}/>", curve.style()));
+    }
+
+    pub fn line(&mut self, frame: &Frame, points: &[[f64; 2]], curve: Curve) {
+        self.add(&format!(
+            "<path d=\"{}\" {}/>",
+            frame.path(points),
+            curve.style()
+        ));
+    }
+
+    pub fn key(&mut self, x: f64, y: f64, curve: Curve, name: &str) {
+        self.add(&format!(
+            "<path d=\"M{x} {y}h34\" {}/><text x=\"{}\" y=\"{}\">{name}</text>",
+            curve.style(),
+            x + 42.0,
+            y + 4.0
+        ));
+    }
+
+    /// Ticks with values below and at the left, and the names of the axes.
+    pub fn axes(&mut self, frame: &Frame, x: &str, y: &str) {
+        for value in ticks(frame.x) {
+            let [at, _] = frame.place([value, frame.y[0]]);
+            self.add(&format!(
+                "<path d=\"M{at:.1} {}V{}\" stroke=\"#ddd\"/>",
+                frame.top, frame.bottom
+            ));
+            self.text([at, frame.bottom + 16.0], &label(value));
+        }
+        for value in ticks(frame.y) {
+            let [_, at] = frame.place([frame.x[0], value]);
+            self.add(&format!(
+                "<path d=\"M{} {at:.1}H{}\" stroke=\"#ddd\"/><text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
+                frame.left,
+                frame.right,
+                frame.left - 6.0,
+                at + 4.0,
+                label(value)
+            ));
+        }
+        self.text([0.5 * (frame.left + frame.right), frame.bottom + 36.0], x);
+        self.upright(18.0, frame, y);
+    }
+
+    /// Ticks with values at the right, and the axis's name.
+    pub fn right_axis(&mut self, frame: &Frame, y: &str) {
+        for value in ticks(frame.y) {
+            let [_, at] = frame.place([frame.x[0], value]);
+            self.add(&format!(
+                "<text x=\"{}\" y=\"{:.1}\">{}</text>",
+                frame.right + 6.0,
+                at + 4.0,
+                label(value)
+            ));
+        }
+        self.upright(frame.right + 60.0, frame, y);
+    }
+
+    fn upright(&mut self, x: f64, frame: &Frame, text: &str) {
+        let y = 0.5 * (frame.top + frame.bottom);
+        self.add(&format!(
+            "<text transform=\"translate({x} {y:.1}) rotate(-90)\" text-anchor=\"middle\">{text}</text>"
+        ));
+    }
+}

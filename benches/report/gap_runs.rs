@@ -1,0 +1,85 @@
+//! Error against run time for contacts from gaps, with CONTACT's own runs beside ours.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+use crate::gaps::{CLASSES, error, question};
+use crate::machine::median;
+use crate::plot::{Plot, Series};
+use crate::questions::{number, problem, stored, timed};
+
+const REPEATS: usize = 3;
+const TARGETS: [f64; 5] = [0.05, 0.02, 0.005, 0.002, 0.001];
+/// CONTACT's runs of every case, from coarse to fine.
+const RUNS: usize = 3;
+
+pub fn section(lu: f64, pictures: &Path) -> String {
+    let mut text = "### Error against run time\n\nMedians over each class, region and pressure included on both sides; our points are the targets 0.05, 0.02, \
+                    0.005, 0.002 and 0.001.\n\n| cases | ours: error (LU) | fastsim | CONTACT |\n|---|---|---|---|\n"
+        .to_owned();
+    let mut shown = String::new();
+    let cases = [stored("gap_grids"), stored("gap_profiles")].concat();
+    for (name, _, start) in CLASSES {
+        let of_class = |case: &&Value| case["id"].as_str().is_some_and(|id| id.starts_with(start));
+        let cases: Vec<&Value> = cases.iter().filter(of_class).collect();
+        let ours = TARGETS.map(|target| run(&cases, &json!({ "target_error": target }), lu));
+        let fastsim = [run(&cases, &json!({ "method": "fastsim" }), lu)];
+        let theirs: Vec<(f64, f64)> = (0..RUNS).map(|k| of_contact(&cases, k, lu)).collect();
+        let list = |points: &[(f64, f64)]| {
+            let points = points
+                .iter()
+                .map(|(time, error)| format!("{error:.4} ({time:.2})"));
+            points.collect::<Vec<_>>().join(", ")
+        };
+        let _ = writeln!(
+            text,
+            "| {name} | {} | {} | {} |",
+            list(&ours),
+            list(&fastsim),
+            list(&theirs)
+        );
+        let series = |name: &str, points: &[(f64, f64)]| Series {
+            name: name.to_owned(),
+            points: points.to_vec(),
+        };
+        let plot = Plot {
+            title: format!("{name}: error against run time"),
+            x: "time, LU".to_owned(),
+            y: "error".to_owned(),
+            series: vec![
+                series("target_error", &ours),
+                series("fastsim", &fastsim),
+                series("CONTACT", &theirs),
+            ],
+        };
+        let file = format!("gap_{}.svg", start.trim_end_matches('_'));
+        std::fs::write(pictures.join(&file), plot.svg()).expect("a picture can be written");
+        let _ = writeln!(shown, "![{name}](accuracy-and-speed/{file})\n");
+    }
+    format!("{text}\n{shown}")
+}
+
+/// Median time in LU and median error.
+fn run(cases: &[&Value], solver: &Value, lu: f64) -> (f64, f64) {
+    let (mut times, mut errors) = (Vec::new(), Vec::new());
+    for case in cases {
+        let mut question = question(case);
+        question["solver"] = solver.clone();
+        let (solution, seconds) = timed(&problem(&question), REPEATS);
+        let solution = solution.expect("an answer");
+        let area = solution.patches.iter().map(|p| p.area_mm2).sum();
+        times.push(seconds / lu);
+        errors.push(error(case, &solution, area).0);
+    }
+    (median(times), median(errors))
+}
+
+fn of_contact(cases: &[&Value], run: usize, lu: f64) -> (f64, f64) {
+    let runs = cases
+        .iter()
+        .filter_map(|case| case["contact_runs"].get(run));
+    let of = |name: &str| median(runs.clone().map(|run| number(run, name)).collect());
+    (of("cpu_s") / lu, of("error"))
+}
