@@ -18,6 +18,8 @@ const POLE_MESH: MeshSize = MeshSize {
     strips: 5,
     cells: 5,
 };
+/// Error on a mesh made for the tractions over that on one of as many cells that was not, as far as the climb counts on it.
+const MADE_FOR: f64 = 0.8;
 /// A mesh of so many cells is worth a start on a coarser one, whose sides are no shorter than this.
 const CELLS_NESTED: u64 = 1000;
 const SIDE_HALVED: u32 = 8;
@@ -201,7 +203,7 @@ fn ascend(
 ) -> Result<Point, SolveError> {
     while let Some(error) = point.error().filter(|e| *e > target) {
         half_octaves = if half_octaves == 0 {
-            first_steps(target)
+            first_steps(target).min(steps_made_for(error / target))
         } else {
             half_octaves + steps(error / target)
         };
@@ -224,7 +226,13 @@ fn ascend(
     Ok(point)
 }
 
-/// By how many half octaves the second level has more cells than the first: what most cases need.
+/// By how many half octaves a mesh made for the tractions should be larger than the first one, when the error there is so many
+/// times the target.
+fn steps_made_for(excess: f64) -> i32 {
+    ((2.0 * (MADE_FOR * excess).log2()).ceil() as i32).clamp(1, 4)
+}
+
+/// By how many half octaves the second level has more cells than the first at most: what most cases need.
 fn first_steps(target: f64) -> i32 {
     ((0.04 / target).log2().round() as i32).clamp(1, 4)
 }
