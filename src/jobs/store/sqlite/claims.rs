@@ -207,7 +207,7 @@ mod tests {
             .await
             .unwrap();
         for (statement, seek) in [
-            (NEXT_TENANT, "jobs_queued (tenant>?"),
+            (NEXT_TENANT, "jobs_by_state (state=? AND tenant>?"),
             (PEEK, "jobs_queued (tenant=?"),
             (REAP, "jobs_by_state (state=?"),
         ] {
