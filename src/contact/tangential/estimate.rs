@@ -16,13 +16,14 @@ const RULES_UNKNOWING: f64 = 2.3;
 /// The same on a mesh made for them.
 const RULES_ALONE: f64 = 1.4;
 /// Factor on these two where region and pressure are not known in closed form: strips may miss what the rules share.
-const RULES_SAMPLED: f64 = 1.8;
+const RULES_SAMPLED: f64 = 1.5;
 /// The same where a coarser level of the same kind has its say.
 const RULES_BESIDE: f64 = 0.5;
-/// Factor on the step of the extrapolation.
+/// Factor on the step of the extrapolation, and where the levels are so near each other that the step is more than
+/// `SHARE_LARGE` times the change between them.
 const LEVELS: f64 = 1.25;
-/// Factor on the step where nothing is extrapolated.
-const LEVELS_ALONE: f64 = 1.25;
+const LEVELS_NEAR: f64 = 1.9;
+const SHARE_LARGE: f64 = 1.5;
 /// The factors grow as this power of the slenderness of a patch, whose strips or cells are few for what they have to tell.
 const CAUTION: f64 = 0.4;
 /// With the load on fewer strips than these, counted by `(Σ load)² / Σ load²`, the factors grow as the square of what is missing;
@@ -71,9 +72,9 @@ pub struct Circumstances<'a> {
 /// single ones cross zero.
 ///
 /// `found` are the resultants of `answer` on `level`, not extrapolated. The estimate is
-/// - `1.4 |trapezoid − mirror|` on a mesh made for the regime, 2.5 times the difference on one that was not, both 1.8 times
+/// - `1.4 |trapezoid − mirror|` on a mesh made for the regime, 2.3 times the difference on one that was not, both 1.5 times
 ///   that where region and pressure come from samples;
-/// - `max(1.25 s |change|, 0.5 |trapezoid − mirror|)` for resultants extrapolated by the share s of the change from a coarser
+/// - `max(1.25 s |change|, 0.5 |trapezoid − mirror|)`, with 1.9 for 1.25 where s > 1.5, for resultants extrapolated by the share s of the change from a coarser
 ///   level of the same kind;
 /// - both more in slender patches, and where few strips carry the load;
 /// - never less than the error of the sums over cells where everything slips;
@@ -129,7 +130,12 @@ pub fn errors(
         Opinion::Alone => None,
         Opinion::Coarser(coarser, share) => {
             let mut change = distances(problem, &patches, found, coarser);
-            change.iter_mut().for_each(|d| *d *= share);
+            let factor = if share > SHARE_LARGE {
+                LEVELS_NEAR
+            } else {
+                LEVELS
+            };
+            change.iter_mut().for_each(|d| *d *= factor * share);
             Some(change)
         }
     };
@@ -152,10 +158,10 @@ pub fn errors(
     (0..=patches.len())
         .map(|k| {
             let error = match (&of_rules, &of_levels) {
-                (Some(rules), Some(levels)) => (rules_factor * rules[k]).max(LEVELS * levels[k]),
+                (Some(rules), Some(levels)) => (rules_factor * rules[k]).max(levels[k]),
                 (Some(rules), None) => rules_factor * rules[k],
                 // The dense method has one rule; the change between its levels is all there is.
-                (None, Some(levels)) => LEVELS_ALONE * levels[k],
+                (None, Some(levels)) => levels[k],
                 (None, None) => return None,
             };
             Some((caution * error).max(of_sums[k]).max(pole).max(tolerance))

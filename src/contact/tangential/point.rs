@@ -20,6 +20,8 @@ const POLE_MESH: MeshSize = MeshSize {
 };
 /// Error on a mesh made for the tractions over that on one of as many cells that was not, as far as the climb counts on it.
 const MADE_FOR: f64 = 0.8;
+/// Half octaves from which on steps of less than two times the cells do not pay.
+const SMALL_STEPS_BELOW: i32 = 4;
 /// A mesh of so many cells is worth a start on a coarser one, whose sides are no shorter than this.
 const CELLS_NESTED: u64 = 1000;
 const SIDE_HALVED: u32 = 8;
@@ -202,10 +204,13 @@ fn ascend(
     monitor: &dyn Monitor,
 ) -> Result<Point, SolveError> {
     while let Some(error) = point.error().filter(|e| *e > target) {
-        half_octaves = if half_octaves == 0 {
-            first_steps(target).min(steps_made_for(error / target))
-        } else {
-            half_octaves + steps(error / target)
+        // Motions of a sweep share their levels: what each would like best is not what is cheapest for all.
+        let alone = problem.motions.len() == 1;
+        half_octaves += match (half_octaves == 0, alone) {
+            (true, true) => first_steps(target).min(steps_made_for(error / target)),
+            (true, false) => first_steps(target),
+            (false, true) if half_octaves < SMALL_STEPS_BELOW => steps(error / target),
+            (false, _) => steps(error / target).max(2),
         };
         let cells = ladder.cells_first() * 2.0_f64.powf(0.5 * f64::from(half_octaves));
         if cells > f64::from(CELLS_MAX) {
@@ -238,10 +243,10 @@ fn first_steps(target: f64) -> i32 {
 }
 
 /// By how many half octaves the number of cells should grow when the error is so many times the target: errors fall
-/// about as 1/N and the next level can be extrapolated; steps of less than two or more than four times pay less. Coarse
-/// steps let the motions of a sweep share their levels.
+/// about as 1/N and the next level can be extrapolated; steps of less than two times pay on coarse levels only, more than four
+/// times nowhere. Coarse steps let the motions of a sweep share their levels.
 fn steps(excess: f64) -> i32 {
-    ((2.0 * (EXTRAPOLATED * excess).log2()).ceil() as i32).clamp(2, 4)
+    ((2.0 * (EXTRAPOLATED * excess).log2()).ceil() as i32).clamp(1, 4)
 }
 
 /// Solves a motion on the level of one size, from the point of a coarser one if there is one.
