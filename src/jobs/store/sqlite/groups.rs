@@ -16,7 +16,8 @@ use crate::jobs::store::sqlite::rows::{read_count, read_id, read_reuse_key, read
 use crate::jobs::store::{Claim, Ending};
 
 /// The tenant with queued jobs that comes next in the alphabet.
-pub(super) const NEXT_TENANT: &str = "SELECT tenant FROM jobs INDEXED BY jobs_queued WHERE state = 'queued' AND tenant > $1 ORDER BY tenant LIMIT 1";
+pub(super) const NEXT_TENANT: &str =
+    "SELECT tenant FROM jobs WHERE state = 'queued' AND tenant > $1 ORDER BY tenant LIMIT 1";
 /// The queued jobs of a tenant that come first: by priority, the oldest of each first. Jobs whose deadline has passed are
 /// left to whoever ends them.
 pub(super) const PEEK: &str = "SELECT id, alone, cost_us FROM jobs \
