@@ -10,6 +10,9 @@ const ROUNDING: f64 = 1e-9;
 /// What the sums over cells in single precision may lose.
 const SUMS: f64 = 1e-6;
 
+/// Fewer cells cannot tell where power goes: one alone takes a moment for none.
+const CELLS_FOR_POWER: usize = 9;
+
 /// Scales of one patch.
 struct Scales {
     /// Largest friction bound in MPa.
@@ -38,7 +41,35 @@ pub fn broken(case: &Value, solution: &Solution, fields: &Fields) -> Vec<String>
     {
         broken.push(format!("the patches carry {load} of {given} N"));
     }
+    power(friction, solution, fields, &mut broken);
     broken
+}
+
+/// Friction takes power, all patches together, as far as their estimated errors tell; one patch may get some from another.
+fn power(friction: f64, solution: &Solution, fields: &Fields, broken: &mut Vec<String>) {
+    let cells: usize = fields.patches.iter().map(|cells| cells.x_mm.len()).sum();
+    let (mut power, mut uncertain) = (0.0, 0.0);
+    for patch in &solution.patches {
+        let point = &patch.points[0];
+        power += point.friction_power_n;
+        let force = point.error_estimate.map_or(0.0, |e| e.force_x_n);
+        uncertain += (force + SUMS * friction * patch.normal_force_n) * slip_size(patch);
+    }
+    if cells >= CELLS_FOR_POWER && power < -uncertain {
+        broken.push(format!("friction gains {power} N"));
+    }
+}
+
+/// Largest distance of the patch from the origin.
+fn reach(patch: &PatchSolution) -> f64 {
+    let corners = patch.extent_mm;
+    corners.iter().fold(0.0_f64, |m, c| m.max(c.abs()))
+}
+
+/// Size of the rigid slip.
+fn slip_size(patch: &PatchSolution) -> f64 {
+    let motion = &patch.points[0].motion;
+    motion.creepage_x.hypot(motion.creepage_y) + motion.spin_per_mm.abs() * reach(patch)
 }
 
 fn normal(patch: &PatchSolution, cells: &PatchFields, broken: &mut Vec<String>) {
@@ -69,14 +100,11 @@ fn tangential(
     let (Some(tx), Some(ty)) = (&fields.traction_x_mpa, &fields.traction_y_mpa) else {
         return broken.push("there are no tractions".to_owned());
     };
-    let motion = &point.motion;
-    let corners = patch.extent_mm;
-    let arm = corners.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
     let scales = Scales {
         bound: friction * patch.pressure_max_mpa,
         force: friction * patch.normal_force_n,
-        arm,
-        slip: motion.creepage_x.hypot(motion.creepage_y) + motion.spin_per_mm.abs() * arm,
+        arm: reach(patch),
+        slip: slip_size(patch),
     };
     let found = [point.force_x_n, point.force_y_n, point.moment_z_n_mm];
     if found.iter().chain(tx).chain(ty).any(|v| !v.is_finite()) {
@@ -84,11 +112,6 @@ fn tangential(
     }
     if point.force_x_n.hypot(point.force_y_n) > scales.force * (1.0 + ROUNDING) {
         broken.push(format!("{found:?} is more than {} N", scales.force));
-    }
-    // Few cells gain as much as their error allows.
-    let uncertain = point.error_estimate.map_or(0.0, |e| e.force_x_n) + SUMS * scales.force;
-    if point.friction_power_n < -uncertain * scales.slip {
-        broken.push(format!("friction gains {} N", point.friction_power_n));
     }
     if !paraboloid {
         coulomb(friction, &scales, cells, fields, broken);

@@ -19,7 +19,7 @@ const HANGS_AFTER: Duration = Duration::from_secs(60);
 /// Forces of twins on one mesh differ by no more: what converged iterations leave.
 const TWINS: f64 = 2e-5;
 /// The same where region and pressure are found first, as exactly as a mesh needs them.
-const TWINS_OF_GAPS: f64 = 1e-3;
+const TWINS_OF_GAPS: f64 = 3e-3;
 /// Cells up to which the method of Liu and Hsu is tried as well.
 const DENSE_CELLS_MAX: u64 = 120;
 /// How many times smaller the target of the finer answer is.
