@@ -24,6 +24,7 @@ use crate::telemetry::{self, Traces};
 
 /// How long open requests may take to end once the service stops.
 const REQUESTS_END_WITHIN: Duration = Duration::from_secs(5);
+const REQUEST_THREADS_MIN: usize = 4;
 /// Exit code of a process that was told to stop twice, as shells count a SIGINT.
 const STOPPED_AT_ONCE: i32 = 130;
 
@@ -31,12 +32,19 @@ const STOPPED_AT_ONCE: i32 = 130;
 pub(super) fn run(args: &ServeArgs) -> anyhow::Result<ExitCode> {
     telemetry::start(args.log.log_format, &args.log.log)?;
     tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(request_threads())
         .enable_all()
         .thread_name("railhead-async")
         .build()
         .context("the async runtime could not be started")?
         .block_on(serve(args))?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Threads for requests: one per core, but not so few that one which writes a log line keeps the others waiting.
+fn request_threads() -> usize {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    cores.max(REQUEST_THREADS_MIN)
 }
 
 async fn serve(args: &ServeArgs) -> anyhow::Result<()> {
