@@ -6,6 +6,7 @@ mod healthcheck;
 mod keys;
 mod serve;
 mod solve;
+mod stop;
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -95,6 +96,15 @@ pub struct ServeArgs {
         value_name = "SECONDS"
     )]
     pub shutdown_grace_s: u32,
+    /// Seconds between SIGTERM, when `/readyz` turns 503, and the closing of the port; connections are accepted
+    /// meanwhile. None after SIGINT.
+    #[arg(
+        long,
+        env = "RAILHEAD_DRAIN_DELAY_S",
+        default_value_t = 2,
+        value_name = "SECONDS"
+    )]
+    pub drain_delay_s: u32,
     /// Queued jobs of one tenant beyond which its new ones are turned away.
     #[arg(long, env = "RAILHEAD_TENANT_QUEUE_MAX", default_value_t = 250_000, value_name = "N",
           value_parser = clap::value_parser!(u64).range(1..))]
@@ -311,6 +321,15 @@ impl ServeArgs {
 
     fn shutdown_grace(&self) -> Duration {
         Duration::from_secs(u64::from(self.shutdown_grace_s))
+    }
+
+    /// How long connections are still accepted after a signal: whoever stops a service at a terminal does not want to
+    /// wait for a load balancer.
+    fn drain_delay(&self, signal: &str) -> Duration {
+        match signal {
+            "SIGTERM" => Duration::from_secs(u64::from(self.drain_delay_s)),
+            _ => Duration::ZERO,
+        }
     }
 }
 

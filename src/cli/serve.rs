@@ -3,41 +3,41 @@
 //! Start: logs, data folder (locked, migrated, jobs of a dead process taken back), workers, listener. The event
 //! `listening` with the bound address says that requests are answered.
 //!
-//! Stop, on SIGTERM or SIGINT: not ready and nobody waits any more; no new connections; open requests end; running jobs
-//! get their grace period, then go back to the queue uncounted; the data folder is closed; the last spans are sent. A
-//! second signal ends the process at once, which loses nothing either: the next start takes the running jobs back.
+//! Stop, on SIGTERM or SIGINT: not ready and nobody waits any more, connections are still accepted for
+//! `--drain-delay-s` (SIGTERM only); no new connections; open requests end; running jobs get their grace period, then go
+//! back to the queue uncounted; the data folder is closed; the last spans are sent. A second signal ends the process at
+//! once, which loses nothing either: the next start takes the running jobs back.
 
 use std::process::ExitCode;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
 use tokio::net::TcpListener;
-use tokio::signal::unix::{Signal, SignalKind, signal};
-use tokio::time::{Instant, timeout};
+use tokio::time::{Instant, sleep_until, timeout_at};
 use tokio_util::sync::CancellationToken;
 
+use crate::cli::stop::{Schedule, Signals};
 use crate::cli::{Anonymous, ServeArgs};
 use crate::http::{self, HttpOptions};
 use crate::jobs::trace::Tracer;
 use crate::jobs::{Jobs, Options};
 use crate::telemetry::{self, Traces};
 
-/// How long open requests may take to end once the service stops.
-const REQUESTS_END_WITHIN: Duration = Duration::from_secs(5);
 const REQUEST_THREADS_MIN: usize = 4;
-/// Exit code of a process that was told to stop twice, as shells count a SIGINT.
-const STOPPED_AT_ONCE: i32 = 130;
 
 /// Serves until a signal says stop.
 pub(super) fn run(args: &ServeArgs) -> anyhow::Result<ExitCode> {
     telemetry::start(args.log.log_format, &args.log.log)?;
-    tokio::runtime::Builder::new_multi_thread()
+    let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(request_threads())
         .enable_all()
         .thread_name("railhead-async")
         .build()
-        .context("the async runtime could not be started")?
-        .block_on(serve(args))?;
+        .context("the async runtime could not be started")?;
+    let served = runtime.block_on(serve(args));
+    // The data folder is closed. Arithmetic that still goes on works for clients that have been cut off.
+    runtime.shutdown_background();
+    served?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -107,49 +107,32 @@ async fn serve(args: &ServeArgs) -> anyhow::Result<()> {
         }
     };
     tracing::info!(signal = name, "stopping");
-    tokio::spawn(async move {
-        let name = signals.next().await;
-        tracing::warn!(signal = name, "stopping at once");
-        std::process::exit(STOPPED_AT_ONCE);
-    });
-    let start = Instant::now();
+    let schedule = Schedule::new(args.drain_delay(name), args.shutdown_grace());
+    schedule.enforce();
+    signals.end_at_next();
     jobs.drain();
+    sleep_until(schedule.port_closes).await;
     stop.cancel();
     // Requests first, for they need the job table; running jobs go on meanwhile.
-    match timeout(REQUESTS_END_WITHIN, &mut server).await {
+    match timeout_at(schedule.requests_end, &mut server).await {
         Ok(ended) => ended.context("the listener failed")?,
         Err(_) => {
             tracing::warn!("some requests did not end and are cut off");
             server.abort();
         }
     }
-    jobs.shutdown(args.shutdown_grace().saturating_sub(start.elapsed()))
-        .await;
+    let grace = schedule
+        .grace_ends
+        .saturating_duration_since(Instant::now());
+    let closed = timeout_at(schedule.folder_closed, jobs.shutdown(grace)).await;
+    if closed.is_err() {
+        tracing::warn!(
+            "the data folder could not be closed in time; the next start takes the running jobs back"
+        );
+    }
     if let Some(traces) = traces {
         traces.stop().await;
     }
     tracing::info!("stopped");
     Ok(())
-}
-
-/// The signals that stop a service.
-struct Signals {
-    terminate: Signal,
-    interrupt: Signal,
-}
-
-impl Signals {
-    fn listen() -> anyhow::Result<Signals> {
-        Ok(Signals {
-            terminate: signal(SignalKind::terminate()).context("SIGTERM cannot be received")?,
-            interrupt: signal(SignalKind::interrupt()).context("SIGINT cannot be received")?,
-        })
-    }
-
-    async fn next(&mut self) -> &'static str {
-        tokio::select! {
-            _ = self.terminate.recv() => "SIGTERM",
-            _ = self.interrupt.recv() => "SIGINT",
-        }
-    }
 }

@@ -3,6 +3,8 @@
 //! A column is named by a JSON pointer into the case (`/load/normal_force_n`), by a short name (`normal_force_n`), or as
 //! `label:KEY` for a label. An empty field leaves what the template says.
 
+use std::collections::HashSet;
+
 use serde_json::{Map, Value};
 
 use crate::http::error::{ApiError, Kind};
@@ -23,6 +25,9 @@ const SHORT_NAMES: [(&str, &str); 13] = [
     ("a_mm", "/contact/a_mm"),
     ("b_mm", "/contact/b_mm"),
 ];
+
+/// Most columns of a table. A case has far fewer members that differ from line to line.
+const COLUMNS_MAX: usize = 1000;
 
 /// A table under way.
 #[derive(Debug)]
@@ -69,13 +74,17 @@ impl TableBody {
 
 fn read_header(line: &[u8]) -> Result<Vec<Column>, String> {
     let titles = fields(line)?;
+    if titles.len() > COLUMNS_MAX {
+        return Err(format!(
+            "the table has {} columns; allowed: at most {COLUMNS_MAX}",
+            titles.len()
+        ));
+    }
+    let mut seen = HashSet::new();
     let mut columns = Vec::with_capacity(titles.len());
     for title in titles {
         let column = column(title.trim())?;
-        if columns
-            .iter()
-            .any(|other: &Column| other.path == column.path)
-        {
+        if !seen.insert(column.path.clone()) {
             return Err(format!("the column `{}` is there twice", column.title));
         }
         columns.push(column);
@@ -237,7 +246,15 @@ mod tests {
             let fault = filled(header, line).unwrap_err();
             assert!(fault.contains(word), "{fault}");
         }
-        for header in ["speed", "name,name", "a_mm;b_mm", "label:", "/"] {
+        let many: Vec<String> = (0..=COLUMNS_MAX).map(|k| format!("label:k{k}")).collect();
+        for header in [
+            "speed",
+            "name,name",
+            "a_mm;b_mm",
+            "label:",
+            "/",
+            &many.join(","),
+        ] {
             let table = &mut TableBody::new(json!({}));
             assert!(table.take(header.as_bytes()).is_err(), "{header}");
         }

@@ -9,6 +9,7 @@ use railhead::contact::solve;
 use railhead::jobs::store::sqlite::SqliteStore;
 use railhead::jobs::{FailureKind, Jobs, JobsError, Options, State};
 use reqwest::Method;
+use sqlx::Connection;
 use tokio::sync::mpsc::unbounded_channel;
 
 use crate::support::{Service, case, endless_case, jobs_with, long_case, pause};
@@ -189,4 +190,60 @@ async fn a_second_signal_ends_the_service_at_once() {
     }
     service.signal("INT");
     assert_eq!(service.wait().code(), Some(130));
+}
+
+#[tokio::test]
+async fn a_service_says_that_it_is_not_ready_before_its_port_closes() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &["--drain-delay-s", "2"]);
+    // Each look is a connection of its own, as that of a load balancer may be.
+    let look = async || {
+        let url = format!("http://{}/readyz", service.address());
+        let client = reqwest::Client::builder().pool_max_idle_per_host(0);
+        let answer = client.build().unwrap().get(url).send().await;
+        answer.map(|answer| answer.status().as_u16())
+    };
+    assert_eq!(look().await.unwrap(), 200);
+    service.signal("TERM");
+    while service.logged("stopping") == 0 {
+        pause().await;
+    }
+    let mut refusals = 0;
+    while let Ok(status) = look().await {
+        assert!(
+            status == 503 || (status == 200 && refusals == 0),
+            "{status}"
+        );
+        refusals += u32::from(status == 503);
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+    assert!(refusals >= 5, "503 was seen {refusals} times in 2 s");
+    assert_eq!(service.wait().code(), Some(0));
+}
+
+#[tokio::test]
+async fn a_service_whose_table_hangs_is_gone_within_five_seconds_after_the_grace_period() {
+    let folder = tempfile::tempdir().unwrap();
+    let flags = ["--shutdown-grace-s", "0", "--drain-delay-s", "0"];
+    let service = Service::start(folder.path(), &flags);
+    let id = service.submit(&endless_case("long")).await;
+    service.until(&id, "running").await;
+    // Another process holds the only place for writers, so the running job cannot be handed back.
+    let table = folder.path().join("jobs.db");
+    let options = sqlx::sqlite::SqliteConnectOptions::new().filename(table);
+    let mut other = sqlx::SqliteConnection::connect_with(&options)
+        .await
+        .unwrap();
+    sqlx::query("BEGIN IMMEDIATE")
+        .execute(&mut other)
+        .await
+        .unwrap();
+    let start = std::time::Instant::now();
+    service.signal("TERM");
+    let status = tokio::task::spawn_blocking(|| service.wait())
+        .await
+        .unwrap();
+    let took = start.elapsed();
+    assert!(took < Duration::from_secs(9), "{took:?}");
+    assert_eq!(status.code(), Some(0));
 }
