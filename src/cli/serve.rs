@@ -1,6 +1,6 @@
 //! The HTTP API with local workers: start and stop order.
 //!
-//! Start: logs, data folder (locked, migrated, jobs of a dead process taken back), workers, listener. The event
+//! Start: logs, data folder (locked, jobs of a dead process taken back), workers, listener. The event
 //! `listening` with the bound address says that requests are answered.
 //!
 //! Stop, on SIGTERM or SIGINT: not ready and nobody waits any more, connections are still accepted for

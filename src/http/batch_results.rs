@@ -15,14 +15,14 @@ use crate::contact::solution::Solution;
 use crate::http::accept::{Format, choose, named_format};
 use crate::http::access::Caller;
 use crate::http::coding::AsItComes;
-use crate::http::error::ApiError;
+use crate::http::error::{ApiError, Kind};
 use crate::http::job::BatchId;
 use crate::http::problem::Problem;
 use crate::http::problems::problems;
 use crate::http::query::{Query, whole};
 use crate::http::results::JobResult;
 use crate::jobs::Jobs;
-use crate::jobs::batch::Line;
+use crate::jobs::batch::{Line, LineResult};
 use crate::jobs::error::JobsError;
 use crate::jobs::job::State as JobState;
 
@@ -49,7 +49,7 @@ pub struct BatchLine {
     /// The result, as `/v1/jobs/{id}/result` answers it; only of a succeeded job.
     #[serde(skip_serializing_if = "Option::is_none")]
     result: Option<JobResult>,
-    /// Why the job failed; only of a failed one.
+    /// Why there is no result: why the job failed, or that its result was removed while the lines were read or cannot be read.
     #[serde(skip_serializing_if = "Option::is_none")]
     error: Option<Problem>,
 }
@@ -171,17 +171,16 @@ fn write_ndjson(lines: &[Line]) -> Result<Vec<u8>, JobsError> {
     let mut out = Vec::with_capacity(lines.len() * 2048);
     for line in lines {
         let job = &line.job;
-        let failure = job.failure.as_ref();
         let front = Front {
             index: line.index,
             id: job.id.to_string(),
             name: job.name.as_deref(),
             labels: &job.labels,
             state: job.state,
-            error: failure.map(|failure| Problem::of_job(job, failure)),
+            error: error_of(line),
         };
         write_json(&mut out, &front)?;
-        if let Some(solution) = &line.solution {
+        if let Some(LineResult::Solution(solution)) = &line.result {
             // Both are objects that are continued: the closing brace makes way.
             out.pop();
             out.extend_from_slice(b",\"result\":");
@@ -204,11 +203,28 @@ fn write_json<T: Serialize>(out: &mut Vec<u8>, value: &T) -> Result<(), JobsErro
     serde_json::to_writer(out, value).map_err(|error| JobsError::Damaged(error.to_string()))
 }
 
+const UNREADABLE: &str = "the stored result cannot be read";
+
+/// Why a line has no result although its job has ended.
+fn error_of(line: &Line) -> Option<Problem> {
+    let job = &line.job;
+    let mut problem = match &line.result {
+        None | Some(LineResult::Solution(_)) => {
+            let failure = job.failure.as_ref()?;
+            return Some(Problem::of_job(job, failure));
+        }
+        Some(LineResult::Gone) => Problem::new(
+            Kind::Expired,
+            "the job was removed with its result while the results were read",
+        ),
+        Some(LineResult::Unreadable) => Problem::new(Kind::Internal, UNREADABLE),
+    };
+    problem.instance = Some(format!("/v1/jobs/{}", job.id));
+    Some(problem)
+}
+
 fn outputs(line: &Line) -> Vec<String> {
-    let outputs = line.outputs.as_deref();
-    outputs
-        .and_then(|text| serde_json::from_str(text).ok())
-        .unwrap_or_default()
+    serde_json::from_str(&line.outputs).unwrap_or_default()
 }
 
 const CSV_COLUMNS: [&str; 17] = [
@@ -247,18 +263,21 @@ fn write_csv(lines: &[Line]) -> Result<Vec<u8>, JobsError> {
             job.name.clone().unwrap_or_default(),
             job.state.name().to_owned(),
         ];
-        let Some(text) = &line.solution else {
-            let failure = job.failure.as_ref();
-            let error = failure.map(|failure| failure.detail.clone());
+        let solution = match &line.result {
+            Some(LineResult::Solution(text)) => serde_json::from_slice::<Solution>(text).ok(),
+            _ => None,
+        };
+        let Some(solution) = solution else {
+            let error = error_of(line).map(|problem| problem.detail);
+            let unread = || line.result.as_ref().map(|_| UNREADABLE.to_owned());
             let empty = vec![String::new(); CSV_COLUMNS.len() - front.len() - 1];
             let row = front
                 .into_iter()
                 .chain(empty)
-                .chain([error.unwrap_or_default()]);
+                .chain([error.or_else(unread).unwrap_or_default()]);
             out.write_record(row).map_err(|error| damaged(&error))?;
             continue;
         };
-        let solution: Solution = serde_json::from_slice(text).map_err(|error| damaged(&error))?;
         for numbers in csv_numbers(&solution) {
             let row = front.iter().cloned().chain(numbers).chain([String::new()]);
             out.write_record(row).map_err(|error| damaged(&error))?;

@@ -1,9 +1,12 @@
 //! A copy of a data folder that a service may be using at the same time.
 
+use std::fs::DirBuilder;
 use std::io;
+use std::os::unix::fs::DirBuilderExt;
 use std::path::Path;
 
 use crate::jobs::error::JobsError;
+use crate::jobs::lifecycle::make_private_folder;
 use crate::jobs::store::sqlite::SqliteStore;
 
 /// Copies the jobs and their results into a new folder, from which a service can be started.
@@ -19,10 +22,9 @@ pub async fn backup(data_dir: &Path, to: &Path) -> Result<(), JobsError> {
         source,
     };
     let table = data_dir.join("jobs.db");
-    // Opening it would make an empty one.
-    std::fs::metadata(&table).map_err(|source| failed(&table, source))?;
-    std::fs::create_dir(to).map_err(|source| failed(to, source))?;
-    let store = SqliteStore::open(&table).await?;
+    let store = SqliteStore::open_existing(&table).await?;
+    let made = DirBuilder::new().mode(0o700).create(to);
+    made.map_err(|source| failed(to, source))?;
     let copied = store.copy_into(&to.join("jobs.db")).await;
     store.close().await;
     copied?;
@@ -42,7 +44,7 @@ pub async fn backup(data_dir: &Path, to: &Path) -> Result<(), JobsError> {
 
 /// Copies what is there; what goes away meanwhile is left out.
 fn copy_folder(from: &Path, to: &Path) -> io::Result<()> {
-    std::fs::create_dir_all(to)?;
+    make_private_folder(to)?;
     let entries = match std::fs::read_dir(from) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
         entries => entries?,

@@ -28,7 +28,7 @@ const FAULTY_KEPT: usize = 1000;
 /// Solutions read at once: once they are this large together, the rest is left for the next page.
 const PAGE_BYTES: usize = 1 << 20;
 /// Jobs removed in one transaction.
-const DELETED_AT_ONCE: u32 = 500;
+pub(super) const DELETED_AT_ONCE: u32 = 500;
 /// Pause between two looks at a batch that another request is filling.
 const FILLING_PAUSE: Duration = Duration::from_millis(50);
 /// Pause between two looks at a job that a reader of results waits for.
@@ -77,10 +77,31 @@ pub struct Line {
     /// The job.
     pub job: Job,
     /// The outputs the case asks for, as the JSON list of their names.
-    pub outputs: Option<String>,
-    /// The solution as JSON text; `None` until the job has succeeded.
-    pub solution: Option<Bytes>,
-    pub(super) folder: Option<String>,
+    pub outputs: String,
+    /// What there is to show; `None` until the job has succeeded.
+    pub result: Option<LineResult>,
+    pub(super) key: Option<String>,
+}
+
+/// The result of one job of a batch.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum LineResult {
+    /// The solution as JSON text.
+    Solution(Bytes),
+    /// It was removed while the lines were read: the job has expired or was deleted.
+    Gone,
+    /// It cannot be read.
+    Unreadable,
+}
+
+impl LineResult {
+    /// Size in bytes of what is there.
+    fn bytes(&self) -> usize {
+        match self {
+            LineResult::Solution(text) => text.len(),
+            LineResult::Gone | LineResult::Unreadable => 0,
+        }
+    }
 }
 
 /// A faulty case of a batch.
@@ -241,7 +262,7 @@ impl Jobs {
                 .fill(&new, draft.spool, draft.wishes, traceparent)
                 .await;
             if filled.is_err()
-                && let Err(error) = jobs.shared.store.drop_batch(new.id).await
+                && let Err(error) = jobs.drop_batch(new.id).await
             {
                 tracing::warn!(%error, "an incomplete batch is left until the next start");
             }
@@ -300,6 +321,12 @@ impl Jobs {
         Ok(())
     }
 
+    async fn drop_batch(&self, id: Uuid) -> Result<(), JobsError> {
+        while !self.shared.store.drop_batch(id, DELETED_AT_ONCE).await? {}
+        self.shared.collect_blobs().await;
+        Ok(())
+    }
+
     /// Looks at a batch.
     ///
     /// # Errors
@@ -347,15 +374,9 @@ impl Jobs {
         }
         loop {
             let gone = self.shared.store.delete_ended(id, DELETED_AT_ONCE).await?;
-            if gone.is_empty() {
+            self.shared.collect_blobs().await;
+            if gone < u64::from(DELETED_AT_ONCE) {
                 break;
-            }
-            for (job, folder) in gone {
-                if folder.is_some()
-                    && let Err(error) = self.shared.results.remove(job, None).await
-                {
-                    tracing::warn!(%job, %error, "results of a deleted job left behind until the next start");
-                }
             }
         }
         self.shared.store.delete_empty_batch(id).await?;
@@ -368,7 +389,7 @@ impl Jobs {
     /// least one is waited for. Empty at the end of the batch.
     ///
     /// # Errors
-    /// A failed database, or a result that cannot be read.
+    /// A failed database.
     pub async fn batch_lines(
         &self,
         id: Uuid,
@@ -411,10 +432,10 @@ impl Jobs {
             let mut bytes = 0;
             for place in 0..lines.len() {
                 let line = &mut lines[place];
-                if let Some(folder) = &line.folder {
-                    line.solution = Some(self.shared.results.solution(folder).await?);
+                if let Some(key) = &line.key {
+                    line.result = Some(self.line_result(line.job.id, key).await?);
                 }
-                bytes += line.solution.as_ref().map_or(0, Bytes::len);
+                bytes += line.result.as_ref().map_or(0, LineResult::bytes);
                 if bytes >= PAGE_BYTES {
                     lines.truncate(place + 1);
                     break;
@@ -422,6 +443,20 @@ impl Jobs {
             }
             return Ok(lines);
         }
+    }
+
+    /// The result of a line that lies outside the table. What cannot be read costs its own line and no other.
+    async fn line_result(&self, id: Uuid, key: &str) -> Result<LineResult, JobsError> {
+        Ok(match self.shared.results.solution(key).await {
+            Ok(solution) => LineResult::Solution(solution),
+            Err(error) => match self.gone_meanwhile(id, error).await {
+                JobsError::Expired => LineResult::Gone,
+                error => {
+                    tracing::error!(job = %id, %error, "a stored result cannot be read");
+                    LineResult::Unreadable
+                }
+            },
+        })
     }
 
     fn new_job(

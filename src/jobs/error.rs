@@ -91,9 +91,12 @@ pub enum JobsError {
     /// Jobs that were to be stored together could not be; nothing of them was stored.
     #[error(transparent)]
     Together(Arc<JobsError>),
-    /// The job table cannot be brought to the form this version needs.
-    #[error("the job table cannot be migrated: {0}")]
-    Migration(#[from] sqlx::migrate::MigrateError),
+    /// The data folder was written by another version.
+    #[error(
+        "the job table was written by another version of railhead, and data folders are not carried over between versions; \
+         use a new data folder, or the version that wrote this one"
+    )]
+    OtherForm,
     /// Reading or writing a stored result failed.
     #[error("the stored results failed: {0}")]
     Results(#[from] object_store::Error),

@@ -1,7 +1,6 @@
 //! What is kept of a job besides its row: the case, the solution, the fields.
 
 use bytes::Bytes;
-use serde_json::Value;
 use uuid::Uuid;
 
 use crate::contact::case::Output;
@@ -52,8 +51,11 @@ impl Jobs {
     /// As [`Jobs::solution`].
     pub async fn answer(&self, id: Uuid) -> Result<Answer, JobsError> {
         let (job, stored) = self.stored(id).await?;
-        let text = match &stored.folder {
-            Some(folder) => self.shared.results.solution(folder).await?,
+        let text = match &stored.key {
+            Some(key) => match self.shared.results.solution(key).await {
+                Ok(text) => text,
+                Err(error) => return Err(self.gone_meanwhile(id, error).await),
+            },
             None => self.small(&stored).await?.solution,
         };
         let damaged = |error| JobsError::Damaged(format!("solution of job {id}: {error}"));
@@ -61,7 +63,7 @@ impl Jobs {
         Ok(Answer {
             solution,
             cached: job.cached,
-            outputs: self.outputs_of(id, stored).await?,
+            outputs: outputs_of(id, &stored)?,
         })
     }
 
@@ -71,23 +73,7 @@ impl Jobs {
     /// As [`Jobs::solution`].
     pub async fn outputs(&self, id: Uuid) -> Result<Vec<Output>, JobsError> {
         let (_, stored) = self.stored(id).await?;
-        self.outputs_of(id, stored).await
-    }
-
-    async fn outputs_of(&self, id: Uuid, stored: StoredResult) -> Result<Vec<Output>, JobsError> {
-        let damaged = |error: &dyn std::fmt::Display| {
-            JobsError::Damaged(format!("outputs of job {id}: {error}"))
-        };
-        if let Some(text) = stored.outputs {
-            return serde_json::from_str(&text).map_err(|error| damaged(&error));
-        }
-        // The table of an early version did not have them: the case says it.
-        let case: Value =
-            serde_json::from_slice(&self.case(id).await?).map_err(|error| damaged(&error))?;
-        let jobs = self.clone();
-        let problem = tokio::task::spawn_blocking(move || jobs.check(&case)).await;
-        let problem = problem.map_err(|error| damaged(&error))?;
-        Ok(problem.map_err(|error| damaged(&error))?.outputs)
+        outputs_of(id, &stored)
     }
 
     /// The cells of one patch with the values of every motion; reads no other patch.
@@ -123,16 +109,35 @@ impl Jobs {
                 patches: stored.field_patches,
             });
         }
-        match &stored.folder {
-            Some(folder) => self.shared.results.patch_fields(folder, patch, point).await,
+        match &stored.key {
+            Some(key) => match self.shared.results.patch_fields(key, patch, point).await {
+                Err(error) => Err(self.gone_meanwhile(id, error).await),
+                read => read,
+            },
             None => self.small(&stored).await?.patch_fields(patch, point),
+        }
+    }
+
+    /// Why the result of a job that was just there cannot be read: it went in between, or `error`.
+    pub(super) async fn gone_meanwhile(&self, id: Uuid, error: JobsError) -> JobsError {
+        if !matches!(
+            error,
+            JobsError::Results(object_store::Error::NotFound { .. })
+        ) {
+            return error;
+        }
+        match self.get(id).await {
+            Ok(_) => error,
+            Err(JobsError::NotFound | JobsError::Expired) => JobsError::Expired,
+            Err(failed) => failed,
         }
     }
 
     /// A result that lies in the database.
     async fn small(&self, stored: &StoredResult) -> Result<Encoded, JobsError> {
         let result = self.shared.store.small_result(stored.job).await?;
-        result.ok_or(JobsError::NotFound)
+        // It was there a moment ago.
+        result.ok_or(JobsError::Expired)
     }
 
     /// Where the result of a job lies.
@@ -148,4 +153,9 @@ impl Jobs {
             None => Err(JobsError::NotReady(job.state)),
         }
     }
+}
+
+fn outputs_of(id: Uuid, stored: &StoredResult) -> Result<Vec<Output>, JobsError> {
+    serde_json::from_str(&stored.outputs)
+        .map_err(|error| JobsError::Damaged(format!("outputs of job {id}: {error}")))
 }

@@ -305,9 +305,6 @@ impl Worker {
                     traced.stored(from, ending.state().name());
                 }
                 self.shared.metrics.ending(ending);
-                if claim.lease_number > 1 {
-                    self.remove_earlier(claim.id, ending).await;
-                }
                 self.shared.announce(claim.id);
             }
         }

@@ -9,6 +9,8 @@ use crate::jobs::worker::heartbeat;
 
 /// Jobs looked up in one statement by the sweep.
 const SWEEP_CHUNK: usize = 500;
+/// Results taken from the outbox at once.
+const COLLECT_CHUNK: u32 = 500;
 
 /// Takes jobs whose lease has run out from their workers, three times per lease, until the service drains.
 pub(super) async fn reap_expired(shared: Arc<Shared>) {
@@ -48,10 +50,39 @@ fn count_taken(shared: &Shared, state: State) {
     }
 }
 
-/// Removes the results of jobs that no longer exist: what a process left behind that was killed between the removal
-/// of the row and of the results. Runs once, beside everything else.
+impl Shared {
+    /// Removes large results that nobody refers to any more; what cannot be removed now is tried again later.
+    pub(super) async fn collect_blobs(&self) {
+        let mut done = Vec::new();
+        loop {
+            let released = match self.store.released_blobs(&done, COLLECT_CHUNK).await {
+                Ok(released) => released,
+                Err(error) => {
+                    tracing::warn!(%error, "results without a job could not be looked for");
+                    return;
+                }
+            };
+            done.clear();
+            for key in released {
+                match self.results.remove(&key).await {
+                    Ok(()) => done.push(key),
+                    Err(error) => {
+                        tracing::warn!(key, %error, "a result without a job could not be removed yet");
+                    }
+                }
+            }
+            if done.is_empty() {
+                return;
+            }
+        }
+    }
+}
+
+/// Removes results that no job refers to and that are not on their way to one: what a process left behind that was
+/// killed between the two. Runs once, beside everything else.
 pub(super) async fn sweep_orphans(shared: Arc<Shared>) {
-    match shared.draining.run_until_cancelled(sweep(&shared)).await {
+    let draining = &shared.draining;
+    match draining.run_until_cancelled(sweep(&shared)).await {
         Some(Ok(0)) | None => {}
         Some(Ok(removed)) => tracing::info!(removed, "orphaned results removed"),
         Some(Err(error)) => tracing::warn!(%error, "orphaned results could not be swept"),
@@ -59,13 +90,19 @@ pub(super) async fn sweep_orphans(shared: Arc<Shared>) {
 }
 
 async fn sweep(shared: &Shared) -> Result<usize, JobsError> {
+    shared.collect_blobs().await;
     let mut removed = 0;
-    for ids in shared.results.jobs_by_month().await? {
-        for chunk in ids.chunks(SWEEP_CHUNK) {
-            let existing = shared.store.existing(chunk).await?;
-            for orphan in chunk.iter().filter(|id| !existing.contains(id)) {
-                shared.results.remove(*orphan, None).await?;
-                removed += 1;
+    for month in shared.results.months().await? {
+        for some in shared.results.keys(&month).await?.chunks(SWEEP_CHUNK) {
+            let (ids, keys): (Vec<_>, Vec<_>) = some.iter().cloned().unzip();
+            // In this order: what a running job has written is known by its key before the job no longer runs.
+            let running = shared.store.running(&ids).await?;
+            let known = shared.store.known_blobs(&keys).await?;
+            for (id, key) in some {
+                if !running.contains(id) && !known.contains(key) {
+                    shared.results.remove(key).await?;
+                    removed += 1;
+                }
             }
         }
     }

@@ -50,12 +50,12 @@ pub struct Keyring {
 }
 
 impl Keyring {
-    /// Opens the keys of a data folder, which is created if it is not there.
+    /// Opens the keys of a data folder. The folder must be there; a new one gets its job table.
     ///
     /// # Errors
-    /// The folder cannot be used.
+    /// There is no such folder, or it cannot be used.
     pub async fn open(data_dir: &Path) -> Result<Keyring, JobsError> {
-        std::fs::create_dir_all(data_dir).map_err(|source| JobsError::DataDir {
+        std::fs::read_dir(data_dir).map_err(|source| JobsError::DataDir {
             path: data_dir.to_owned(),
             source,
         })?;

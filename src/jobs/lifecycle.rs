@@ -1,6 +1,7 @@
 //! How the jobs room is opened, started and stopped.
 
-use std::fs::{File, TryLockError};
+use std::fs::{DirBuilder, File, TryLockError};
+use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -13,6 +14,7 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
 use crate::contact::problem::Limits;
+use crate::jobs::batch::DELETED_AT_ONCE;
 use crate::jobs::clock::Clock;
 use crate::jobs::error::JobsError;
 use crate::jobs::keys::ANONYMOUS;
@@ -84,7 +86,7 @@ impl Options {
 }
 
 impl Jobs {
-    /// Opens a data folder: locks it, brings the job table to the newest form, and puts the `running` jobs of a dead
+    /// Opens a data folder: locks it, makes the job table or asks for its form, and puts the `running` jobs of a dead
     /// process back into the queue (or ends them, if their attempts are used up). Nothing is solved before
     /// [`Jobs::start`].
     ///
@@ -102,9 +104,15 @@ impl Jobs {
         let lock = lock(&options.data_dir)?;
         let store = SqliteStore::open(&options.data_dir.join("jobs.db")).await?;
         let results = Results::open(&options.data_dir)?;
-        let incomplete = store.drop_incomplete_batches().await?;
-        if incomplete > 0 {
-            tracing::info!(incomplete, "batches that were never acknowledged removed");
+        let incomplete = store.incomplete_batches().await?;
+        for batch in &incomplete {
+            while !store.drop_batch(*batch, DELETED_AT_ONCE).await? {}
+        }
+        if !incomplete.is_empty() {
+            tracing::info!(
+                incomplete = incomplete.len(),
+                "batches that were never acknowledged removed"
+            );
         }
         let taken_back = store
             .reap(i64::MAX, options.clock.now_ms(), options.attempts_max)
@@ -204,6 +212,11 @@ impl Jobs {
     }
 }
 
+/// Makes a folder that nobody else may read, if there is none, whatever the umask.
+pub(super) fn make_private_folder(path: &Path) -> std::io::Result<()> {
+    DirBuilder::new().recursive(true).mode(0o700).create(path)
+}
+
 /// Creates the data folder if needed and takes it for this process alone. The system frees the lock when the process
 /// ends, however it ends.
 fn lock(data_dir: &Path) -> Result<File, JobsError> {
@@ -211,12 +224,13 @@ fn lock(data_dir: &Path) -> Result<File, JobsError> {
         path: path.to_owned(),
         source,
     };
-    std::fs::create_dir_all(data_dir).map_err(|source| failed(data_dir, source))?;
+    make_private_folder(data_dir).map_err(|source| failed(data_dir, source))?;
     let path = data_dir.join("lock");
     let file = File::options()
         .create(true)
         .truncate(false)
         .write(true)
+        .mode(0o600)
         .open(&path)
         .map_err(|source| failed(&path, source))?;
     match file.try_lock() {

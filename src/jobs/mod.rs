@@ -320,12 +320,8 @@ impl Jobs {
         match self.shared.store.delete(id).await? {
             Deleted::NotEnded(state) => Err(JobsError::NotEnded(state)),
             Deleted::NotFound => Err(JobsError::NotFound),
-            Deleted::Done { orphan } => {
-                if let Some(orphan) = orphan
-                    && let Err(error) = self.shared.results.remove(orphan, None).await
-                {
-                    tracing::warn!(job = %id, %error, "results of a deleted job left behind until the next start");
-                }
+            Deleted::Done => {
+                self.shared.collect_blobs().await;
                 Ok(())
             }
         }

@@ -4,6 +4,8 @@
 //! lease number in the key makes a late write of a worker that lost its lease harmless. Blobs are written, and
 //! synced to the disk, before the job is called succeeded.
 
+use std::fs::Permissions;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path as FilePath, PathBuf};
 use std::sync::Arc;
 
@@ -18,6 +20,8 @@ use crate::jobs::error::JobsError;
 use crate::jobs::fields::{Header, PREFIX_BYTES, header_length};
 use crate::jobs::store::Claim;
 
+/// The folder of the data folder in which results lie.
+pub(super) const ROOT: &str = "results";
 const SOLUTION: &str = "solution.json";
 const FIELDS: &str = "fields.bin";
 
@@ -92,7 +96,7 @@ impl Results {
         })
     }
 
-    /// Stores a result and returns the folder it lies in; durable once it returns.
+    /// Stores a result and returns its key; durable once it returns.
     ///
     /// # Errors
     /// The result could not be written.
@@ -109,6 +113,7 @@ impl Results {
                 PutPayload::from_bytes(result.solution),
             )
             .await?;
+        self.make_private(&folder).await?;
         Ok(folder.to_string())
     }
 
@@ -161,75 +166,88 @@ impl Results {
             .map_err(damaged)
     }
 
-    /// Removes what is stored for a job, except the folder `keep`.
+    /// Removes the result under a key; one that is gone already is no error.
     ///
     /// # Errors
-    /// Something could not be removed; the next sweep will try again.
-    pub async fn remove(&self, job: Uuid, keep: Option<&str>) -> Result<(), JobsError> {
-        let folder = job_folder(job);
-        let attempts = self.blobs.list_with_delimiter(Some(&folder)).await?;
-        for attempt in attempts.common_prefixes {
-            if keep == Some(attempt.as_ref()) {
-                continue;
+    /// Something could not be removed.
+    pub async fn remove(&self, key: &str) -> Result<(), JobsError> {
+        let folder = Path::from(key);
+        for name in [SOLUTION, FIELDS] {
+            match self.blobs.delete(&folder.clone().join(name)).await {
+                Ok(()) | Err(object_store::Error::NotFound { .. }) => {}
+                Err(error) => return Err(error.into()),
             }
-            for blob in self
-                .blobs
-                .list_with_delimiter(Some(&attempt))
-                .await?
-                .objects
-            {
-                self.blobs.delete(&blob.location).await?;
-            }
-            self.scrub(&attempt).await?;
         }
-        if keep.is_none() {
-            self.scrub(&folder).await?;
-        }
-        Ok(())
+        self.scrub(&folder).await
     }
 
-    /// The jobs for which something is stored, month by month.
+    /// The keys of everything that is stored, job by job, month by month.
     ///
     /// # Errors
     /// The store cannot be listed.
-    pub async fn jobs_by_month(&self) -> Result<Vec<Vec<Uuid>>, JobsError> {
+    pub async fn keys(&self, month: &Path) -> Result<Vec<(Uuid, String)>, JobsError> {
+        let mut keys = Vec::new();
+        for job in self.below(month).await? {
+            let Some(id) = job.filename().and_then(|id| Uuid::try_parse(id).ok()) else {
+                continue;
+            };
+            let attempts = self.below(&job).await?;
+            keys.extend(attempts.into_iter().map(|key| (id, key.to_string())));
+        }
+        Ok(keys)
+    }
+
+    /// The months in which something is stored.
+    ///
+    /// # Errors
+    /// The store cannot be listed.
+    pub async fn months(&self) -> Result<Vec<Path>, JobsError> {
         let mut months = Vec::new();
-        for year in self
-            .blobs
-            .list_with_delimiter(Some(&Path::from("results")))
-            .await?
-            .common_prefixes
-        {
-            for month in self
-                .blobs
-                .list_with_delimiter(Some(&year))
-                .await?
-                .common_prefixes
-            {
-                let jobs = self
-                    .blobs
-                    .list_with_delimiter(Some(&month))
-                    .await?
-                    .common_prefixes;
-                let ids = jobs
-                    .iter()
-                    .filter_map(|job| Uuid::try_parse(job.filename()?).ok());
-                months.push(ids.collect());
-            }
+        for year in self.below(&Path::from(ROOT)).await? {
+            months.extend(self.below(&year).await?);
         }
         Ok(months)
     }
 
+    async fn below(&self, folder: &Path) -> Result<Vec<Path>, JobsError> {
+        let listed = self.blobs.list_with_delimiter(Some(folder)).await?;
+        Ok(listed.common_prefixes)
+    }
+
     /// Removes an emptied local folder with what a killed process may have left half-written in it, which the blob
-    /// store does not show.
+    /// store does not show, and the folder of its job once that is empty.
     async fn scrub(&self, folder: &Path) -> Result<(), JobsError> {
         let path = self.root.join(folder.as_ref());
         match tokio::fs::remove_dir_all(&path).await {
             Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
-                Err(JobsError::DataDir { path, source })
+                return Err(JobsError::DataDir { path, source });
             }
-            _ => Ok(()),
+            _ => {}
         }
+        if let Some(job) = path.parent() {
+            // It stays as long as another attempt lies in it.
+            let _ = tokio::fs::remove_dir(job).await;
+        }
+        Ok(())
+    }
+
+    /// Keeps what was just written from everybody else on this machine.
+    async fn make_private(&self, folder: &Path) -> Result<(), JobsError> {
+        let path = self.root.join(folder.as_ref());
+        let failed = |source| JobsError::DataDir {
+            path: path.clone(),
+            source,
+        };
+        for name in [SOLUTION, FIELDS] {
+            let mode = Permissions::from_mode(0o600);
+            match tokio::fs::set_permissions(path.join(name), mode).await {
+                Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
+                    return Err(failed(source));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
     }
 }
 
@@ -244,7 +262,7 @@ fn job_folder(id: Uuid) -> Path {
         .to_zoned(jiff::tz::TimeZone::UTC)
         .date();
     Path::from(format!(
-        "results/{:04}/{:02}/{id}",
+        "{ROOT}/{:04}/{:02}/{id}",
         date.year(),
         date.month()
     ))
@@ -290,16 +308,28 @@ mod tests {
         // What a process killed in the middle of a write leaves behind.
         std::fs::write(folder.path().join(&first).join("fields.bin#1"), b"half").unwrap();
 
-        results.remove(id, Some(&second)).await.unwrap();
+        results.remove(&first).await.unwrap();
         assert!(!folder.path().join(&first).exists());
         assert!(folder.path().join(&second).join(SOLUTION).exists());
-        assert_eq!(results.jobs_by_month().await.unwrap(), vec![vec![id]]);
+        let months = results.months().await.unwrap();
+        let keys = results.keys(&months[0]).await.unwrap();
+        assert_eq!((months.len(), keys), (1, vec![(id, second.clone())]));
 
-        results.remove(id, None).await.unwrap();
-        assert_eq!(
-            results.jobs_by_month().await.unwrap().concat(),
-            Vec::<Uuid>::new()
-        );
-        results.remove(id, None).await.unwrap();
+        results.remove(&second).await.unwrap();
+        assert_eq!(results.keys(&months[0]).await.unwrap(), []);
+        results.remove(&second).await.unwrap();
+    }
+
+    #[tokio::test]
+    async fn what_is_stored_is_for_nobody_else_to_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let results = Results::open(folder.path()).unwrap();
+        let claim = claim(Uuid::now_v7(), 1);
+        let key = results.put(&claim, encoded("1")).await.unwrap();
+        let key = folder.path().join(key);
+        for name in [SOLUTION, FIELDS] {
+            let about = std::fs::metadata(key.join(name)).unwrap();
+            assert_eq!(about.permissions().mode() & 0o777, 0o600, "{name}");
+        }
     }
 }

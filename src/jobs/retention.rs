@@ -80,16 +80,14 @@ impl Shared {
             };
             loop {
                 let expired = self.store.expire(expiry).await?;
-                for orphan in expired.orphans {
-                    self.results.remove(orphan, None).await?;
-                }
-                removed += expired.jobs;
-                if expired.jobs < u64::from(SWEEP_JOBS) {
+                removed += expired;
+                if expired < u64::from(SWEEP_JOBS) {
                     break;
                 }
                 tokio::time::sleep(BREATH).await;
             }
         }
+        self.collect_blobs().await;
         while self.store.shrink(SPARE_PAGES, SHRINK_PAGES).await? {
             tokio::time::sleep(BREATH).await;
         }

@@ -245,9 +245,6 @@ impl Worker {
         let Some(job) = self.finish(claim, &ending).await? else {
             return Ok(Step::Lost(claim.id));
         };
-        if claim.lease_number > 1 {
-            self.remove_earlier(claim.id, &ending).await;
-        }
         if let Some((traced, from)) = traced {
             traced.stored(from, job.state.name());
         }
@@ -311,20 +308,6 @@ impl Worker {
                 None => Step::Lost(claim.id),
             },
         )
-    }
-
-    /// Removes what earlier attempts stored before they were lost.
-    pub(super) async fn remove_earlier(&self, id: Uuid, ending: &Ending) {
-        let keep = match ending {
-            Ending::Succeeded {
-                result: Placed::Folder(folder, _),
-                ..
-            } => Some(folder.as_str()),
-            _ => None,
-        };
-        if let Err(error) = self.shared.results.remove(id, keep).await {
-            tracing::warn!(%error, "results of an earlier attempt left behind");
-        }
     }
 }
 

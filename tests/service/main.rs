@@ -21,6 +21,7 @@ mod keys;
 mod malformed;
 mod metrics;
 mod order;
+mod ownership;
 mod pictures;
 mod profiles;
 mod requests;

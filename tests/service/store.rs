@@ -411,14 +411,7 @@ async fn only_an_ended_job_can_be_deleted_and_all_that_hung_on_it_goes() {
         Deleted::NotEnded(State::Running)
     );
     table.store.finish(&claim, &success(), 1).await.unwrap();
-    assert_eq!(
-        table.store.existing(&[Uuid::now_v7(), id]).await.unwrap(),
-        [id]
-    );
-    assert_eq!(
-        table.store.delete(id).await.unwrap(),
-        Deleted::Done { orphan: Some(id) }
-    );
+    assert_eq!(table.store.delete(id).await.unwrap(), Deleted::Done);
     assert_eq!(table.store.delete(id).await.unwrap(), Deleted::NotFound);
 
     assert_eq!(table.store.case(id).await.unwrap(), None);
@@ -443,7 +436,10 @@ async fn only_an_ended_job_can_be_deleted_and_all_that_hung_on_it_goes() {
             .jobs,
         []
     );
-    assert!(table.store.existing(&[id]).await.unwrap().is_empty());
+    let released = table.store.released_blobs(&[], 10).await.unwrap();
+    assert_eq!(released, ["results/1"], "its result is left to be removed");
+    let released = table.store.released_blobs(&released, 10).await.unwrap();
+    assert!(released.is_empty(), "what was removed is forgotten");
 }
 
 #[tokio::test]

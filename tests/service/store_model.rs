@@ -229,11 +229,11 @@ impl Pair {
     async fn delete(&mut self, id: Uuid) {
         let expected = match self.rows.get(&id) {
             None => Deleted::NotFound,
-            Some(row) if row.state.ended() => Deleted::Done { orphan: Some(id) },
+            Some(row) if row.state.ended() => Deleted::Done,
             Some(row) => Deleted::NotEnded(row.state),
         };
         assert_eq!(self.store.delete(id).await.unwrap(), expected);
-        if expected == (Deleted::Done { orphan: Some(id) }) {
+        if expected == (Deleted::Done) {
             self.rows.remove(&id);
         }
     }

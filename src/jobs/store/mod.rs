@@ -165,10 +165,21 @@ impl Ending {
 /// Where a result is kept once its job has ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Placed {
-    /// In this folder, where it already lies, with its size in bytes.
+    /// Under this key, where it already lies, with its size in bytes.
     Folder(String, u64),
     /// In the database, written together with the end of the job: a small one.
     Table(Encoded),
+}
+
+impl Placed {
+    /// Size in bytes.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        match self {
+            Placed::Folder(_, bytes) => *bytes,
+            Placed::Table(result) => result.bytes() as u64,
+        }
+    }
 }
 
 /// Where a result lies.
@@ -176,22 +187,19 @@ pub enum Placed {
 pub struct StoredResult {
     /// The job.
     pub job: Uuid,
-    /// Folder of the stored result; `None` if it lies in the database.
-    pub folder: Option<String>,
+    /// Key of a large result; `None` if it lies in the database.
+    pub key: Option<String>,
     /// Patches with stored fields; 0 if there is no fields object.
     pub field_patches: usize,
-    /// The outputs the case asks for, as the JSON list of their names; `None` for a job of an early version.
-    pub outputs: Option<String>,
+    /// The outputs the case asks for, as the JSON list of their names.
+    pub outputs: String,
 }
 
 /// What became of a wish to delete a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Deleted {
     /// The row and all that hung on it are gone.
-    Done {
-        /// The job whose stored results nobody needs any more.
-        orphan: Option<Uuid>,
-    },
+    Done,
     /// It has not ended.
     NotEnded(State),
     /// There was none.

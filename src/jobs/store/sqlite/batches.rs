@@ -8,13 +8,18 @@ use std::collections::BTreeMap;
 use sqlx::Row;
 use uuid::Uuid;
 
-use crate::jobs::batch::{Batch, Line};
+use crate::jobs::batch::{Batch, Line, LineResult};
 use crate::jobs::error::JobsError;
 use crate::jobs::job::State;
 use crate::jobs::store::sqlite::SqliteStore;
+use crate::jobs::store::sqlite::blobs::release_blobs;
 use crate::jobs::store::sqlite::insert::insert_jobs;
-use crate::jobs::store::sqlite::rows::{job_columns, read_count, read_id, read_job, read_state};
+use crate::jobs::store::sqlite::rows::{
+    job_columns, read_blob_ids, read_count, read_id, read_job, read_state,
+};
 use crate::jobs::store::{Begun, NewBatch, NewJob};
+
+const INCOMPLETE: &str = "SELECT id FROM batches WHERE complete = 0";
 
 impl SqliteStore {
     /// Begins a batch, or finds the one its idempotency key stands for.
@@ -100,27 +105,40 @@ impl SqliteStore {
         Ok(())
     }
 
-    /// Removes a batch that could not be completed, with its jobs.
+    /// Removes at most `limit` jobs of a batch that could not be completed, and the batch after its last job; `true` once
+    /// nothing is left.
     ///
     /// # Errors
-    /// The database failed; the next start will try again.
-    pub async fn drop_batch(&self, id: Uuid) -> Result<(), JobsError> {
-        sqlx::query("DELETE FROM batches WHERE id = $1 AND complete = 0")
-            .bind(id.to_string())
-            .execute(&self.writer)
-            .await?;
-        Ok(())
+    /// The database failed; nothing changed.
+    pub async fn drop_batch(&self, id: Uuid, limit: u32) -> Result<bool, JobsError> {
+        let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
+        let gone = sqlx::query(
+            "DELETE FROM jobs WHERE id IN (SELECT id FROM jobs WHERE batch_id = $1 ORDER BY id LIMIT $2) \
+             AND EXISTS (SELECT 1 FROM batches WHERE id = $1 AND complete = 0) RETURNING blob_id",
+        )
+        .bind(id.to_string())
+        .bind(limit)
+        .fetch_all(&mut *transaction)
+        .await?;
+        release_blobs(&mut transaction, read_blob_ids(&gone)?).await?;
+        let last = gone.len() < limit as usize;
+        if last {
+            sqlx::query("DELETE FROM batches WHERE id = $1 AND complete = 0")
+                .bind(id.to_string())
+                .execute(&mut *transaction)
+                .await?;
+        }
+        transaction.commit().await?;
+        Ok(last)
     }
 
-    /// Removes every incomplete batch with its jobs; returns how many there were.
+    /// The batches that are not complete.
     ///
     /// # Errors
     /// The database failed.
-    pub async fn drop_incomplete_batches(&self) -> Result<u64, JobsError> {
-        let gone = sqlx::query("DELETE FROM batches WHERE complete = 0")
-            .execute(&self.writer)
-            .await?;
-        Ok(gone.rows_affected())
+    pub async fn incomplete_batches(&self) -> Result<Vec<Uuid>, JobsError> {
+        let rows = sqlx::query(INCOMPLETE).fetch_all(&self.readers).await?;
+        rows.iter().map(read_id).collect()
     }
 
     /// Looks at a complete batch.
@@ -177,26 +195,23 @@ impl SqliteStore {
             .collect()
     }
 
-    /// Removes up to `limit` ended jobs of a batch; returns them with the folders of their results.
+    /// Removes up to `limit` ended jobs of a batch; returns how many.
     ///
     /// # Errors
     /// The database failed; nothing changed.
-    pub async fn delete_ended(
-        &self,
-        id: Uuid,
-        limit: u32,
-    ) -> Result<Vec<(Uuid, Option<String>)>, JobsError> {
-        let rows = sqlx::query(
+    pub async fn delete_ended(&self, id: Uuid, limit: u32) -> Result<u64, JobsError> {
+        let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
+        let gone = sqlx::query(
             "DELETE FROM jobs WHERE id IN (SELECT id FROM jobs WHERE batch_id = $1 AND \
-             state IN ('succeeded', 'failed', 'cancelled') ORDER BY id LIMIT $2) RETURNING id, result_key",
+             state IN ('succeeded', 'failed', 'cancelled') ORDER BY id LIMIT $2) RETURNING blob_id",
         )
         .bind(id.to_string())
         .bind(limit)
-        .fetch_all(&self.writer)
+        .fetch_all(&mut *transaction)
         .await?;
-        rows.iter()
-            .map(|row| Ok((read_id(row)?, row.try_get("result_key")?)))
-            .collect()
+        release_blobs(&mut transaction, read_blob_ids(&gone)?).await?;
+        transaction.commit().await?;
+        Ok(gone.len() as u64)
     }
 
     /// Removes a complete batch that has no job left; says whether it did.
@@ -226,8 +241,8 @@ impl SqliteStore {
         let rows = sqlx::query(concat!(
             "SELECT ",
             job_columns!(),
-            ", batch_index, outputs, result_key, field_patches, solution FROM jobs \
-             LEFT JOIN results ON results.job_id = jobs.id \
+            ", batch_index, outputs, blob_key, solution FROM jobs \
+             LEFT JOIN (SELECT id AS blob, key AS blob_key, solution FROM blobs) ON blob = blob_id \
              WHERE batch_id = $1 AND id > $2 ORDER BY id LIMIT $3"
         ))
         .bind(id.to_string())
@@ -242,8 +257,8 @@ impl SqliteStore {
                     index: row.try_get("batch_index")?,
                     job: read_job(row)?,
                     outputs: row.try_get("outputs")?,
-                    folder: row.try_get("result_key")?,
-                    solution: solution.map(Into::into),
+                    key: row.try_get("blob_key")?,
+                    result: solution.map(|solution| LineResult::Solution(solution.into())),
                 })
             })
             .collect()

@@ -1,13 +1,15 @@
 //! What workers ask of the embedded job table: claim, renew, finish, hand back, and take from the dead.
 
-use sqlx::Row;
+use std::collections::HashSet;
+
+use sqlx::{QueryBuilder, Row, Sqlite};
 use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
 use crate::jobs::job::{Failure, Job, State};
-use crate::jobs::results::Encoded;
 use crate::jobs::store::sqlite::SqliteStore;
-use crate::jobs::store::sqlite::rows::{job_columns, read_id, read_job, read_state, to_json};
+use crate::jobs::store::sqlite::groups::push_list;
+use crate::jobs::store::sqlite::rows::{read_id, read_state, to_json};
 use crate::jobs::store::{Claim, Ending, Placed, Renewal};
 
 const REAP: &str = "UPDATE jobs SET \
@@ -62,37 +64,13 @@ impl SqliteStore {
         ending: &Ending,
         now: i64,
     ) -> Result<Option<Job>, JobsError> {
-        let end = EndRow::of(ending)?;
-        let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
-        let row = sqlx::query(concat!(
-            "UPDATE jobs SET state = $1, ended_at = $2, warnings = $3, failure = $4, result_key = $5, \
-             result_bytes = $9, field_patches = $6, progress = CASE WHEN $1 = 'succeeded' THEN 1.0 ELSE progress END, \
-             lease_until = NULL, worker = NULL, version = version + 1 \
-             WHERE id = $7 AND lease_number = $8 AND state = 'running' RETURNING ",
-            job_columns!()
-        ))
-        .bind(end.state.name())
-        .bind(now)
-        .bind(end.warnings)
-        .bind(end.failure)
-        .bind(end.folder)
-        .bind(end.field_patches)
-        .bind(claim.id.to_string())
-        .bind(fence(claim))
-        .bind(end.result_bytes)
-        .fetch_optional(&mut *transaction)
-        .await?;
-        let Some(row) = row else { return Ok(None) };
-        if let Some(result) = end.inside {
-            sqlx::query("INSERT INTO results (job_id, solution, fields) VALUES ($1, $2, $3)")
-                .bind(claim.id.to_string())
-                .bind(result.solution.as_ref())
-                .bind(result.fields.as_deref())
-                .execute(&mut *transaction)
-                .await?;
+        let ended = self
+            .finish_group(&[(claim.clone(), ending.clone())], now)
+            .await?;
+        if ended.is_empty() {
+            return Ok(None);
         }
-        transaction.commit().await?;
-        read_job(&row).map(Some)
+        self.get(claim.id).await
     }
 
     /// Hands a running job back to the queue without counting the attempt; a job whose cancellation was asked for
@@ -114,6 +92,19 @@ impl SqliteStore {
         .fetch_optional(&self.writer)
         .await?;
         row.as_ref().map(read_state).transpose()
+    }
+
+    /// Those of these jobs that are running.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn running(&self, ids: &[Uuid]) -> Result<HashSet<Uuid>, JobsError> {
+        let mut query =
+            QueryBuilder::<Sqlite>::new("SELECT id FROM jobs WHERE state = 'running' AND id IN (");
+        push_list(&mut query, ids);
+        query.push(")");
+        let rows = query.build().fetch_all(&self.readers).await?;
+        rows.iter().map(read_id).collect()
     }
 
     /// Takes running jobs whose lease ended at or before `lease_until` from their workers: to `cancelled` if that was
@@ -145,10 +136,8 @@ pub(super) struct EndRow<'a> {
     pub(super) state: State,
     pub(super) warnings: String,
     pub(super) failure: Option<String>,
-    pub(super) folder: Option<&'a str>,
-    pub(super) result_bytes: Option<i64>,
     pub(super) field_patches: u32,
-    pub(super) inside: Option<&'a Encoded>,
+    pub(super) result: Option<&'a Placed>,
 }
 
 impl EndRow<'_> {
@@ -157,10 +146,8 @@ impl EndRow<'_> {
             state: State::Cancelled,
             warnings: "[]".to_owned(),
             failure: None,
-            folder: None,
-            result_bytes: None,
             field_patches: 0,
-            inside: None,
+            result: None,
         };
         match ending {
             Ending::Succeeded {
@@ -171,13 +158,7 @@ impl EndRow<'_> {
                 row.state = State::Succeeded;
                 row.warnings = to_json(warnings)?;
                 row.field_patches = *field_patches;
-                match result {
-                    Placed::Folder(folder, bytes) => {
-                        row.folder = Some(folder);
-                        row.result_bytes = i64::try_from(*bytes).ok();
-                    }
-                    Placed::Table(result) => row.inside = Some(result),
-                }
+                row.result = Some(result);
             }
             Ending::Failed(failure) => {
                 row.state = State::Failed;

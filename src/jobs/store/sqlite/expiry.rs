@@ -1,15 +1,17 @@
 //! Removal of what has expired, and of the space it took, in the embedded job table.
 
-use sqlx::{QueryBuilder, Row, Sqlite};
+use sqlx::{QueryBuilder, Sqlite};
 use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
 use crate::jobs::store::list::first_id_at;
 use crate::jobs::store::sqlite::SqliteStore;
-use crate::jobs::store::sqlite::rows::read_id;
+use crate::jobs::store::sqlite::blobs::release_blobs;
+use crate::jobs::store::sqlite::groups::push_list;
+use crate::jobs::store::sqlite::rows::{read_blob_ids, read_id};
 
 /// Ids grow with the time of submission, so the oldest rows are looked at and no others.
-const EXPIRED: &str = "SELECT id, COALESCE(result_owner, id) AS owner FROM jobs \
+const EXPIRED: &str = "SELECT id, blob_id FROM jobs \
      WHERE id < $1 AND ended_at <= $2 ORDER BY id LIMIT $3";
 
 /// What is to be removed. Times are epoch milliseconds.
@@ -25,21 +27,13 @@ pub struct Expiry {
     pub jobs: u32,
 }
 
-/// What was removed.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Expired {
-    /// Number of jobs.
-    pub jobs: u64,
-    /// Jobs whose stored results nobody needs any more.
-    pub orphans: Vec<Uuid>,
-}
-
 impl SqliteStore {
-    /// Removes expired jobs, complete batches of that age without jobs, and ids remembered long enough.
+    /// Removes expired jobs, complete batches of that age without jobs, and ids remembered long enough. Returns the number
+    /// of jobs removed.
     ///
     /// # Errors
     /// The database failed; nothing changed.
-    pub async fn expire(&self, expiry: Expiry) -> Result<Expired, JobsError> {
+    pub async fn expire(&self, expiry: Expiry) -> Result<u64, JobsError> {
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         let young = first_id_at(expiry.ended_before.saturating_add(1)).to_string();
         let rows = sqlx::query(EXPIRED)
@@ -48,36 +42,24 @@ impl SqliteStore {
             .bind(expiry.jobs)
             .fetch_all(&mut *transaction)
             .await?;
-        let mut owners = Vec::with_capacity(rows.len());
+        let mut blobs = Vec::with_capacity(rows.len());
         for some in rows.chunks(250) {
             let ids = some.iter().map(read_id).collect::<Result<Vec<_>, _>>()?;
-            for row in some {
-                let owner: &str = row.try_get("owner")?;
-                owners.extend(Uuid::try_parse(owner));
-            }
+            blobs.extend(read_blob_ids(some)?);
             let mut bury = QueryBuilder::<Sqlite>::new(
                 "INSERT OR REPLACE INTO tombstones (id, tenant, gone_at) SELECT id, tenant, ",
             );
             bury.push_bind(expiry.now);
             bury.push(" FROM jobs WHERE id IN (");
-            push_ids(&mut bury, &ids);
+            push_list(&mut bury, &ids);
+            bury.push(")");
             bury.build().execute(&mut *transaction).await?;
             let mut delete = QueryBuilder::<Sqlite>::new("DELETE FROM jobs WHERE id IN (");
-            push_ids(&mut delete, &ids);
+            push_list(&mut delete, &ids);
+            delete.push(")");
             delete.build().execute(&mut *transaction).await?;
         }
-        let mut orphans = Vec::new();
-        for owner in owners {
-            let needed: bool = sqlx::query_scalar(
-                "SELECT EXISTS (SELECT 1 FROM jobs WHERE id = $1) OR EXISTS (SELECT 1 FROM jobs WHERE result_owner = $1)",
-            )
-            .bind(owner.to_string())
-            .fetch_one(&mut *transaction)
-            .await?;
-            if !needed {
-                orphans.push(owner);
-            }
-        }
+        release_blobs(&mut transaction, blobs).await?;
         sqlx::query(
             "INSERT OR REPLACE INTO tombstones (id, tenant, gone_at) SELECT id, tenant, $1 FROM batches \
              WHERE id < $2 AND complete = 1 AND NOT EXISTS (SELECT 1 FROM jobs WHERE batch_id = batches.id)",
@@ -99,10 +81,7 @@ impl SqliteStore {
             .execute(&mut *transaction)
             .await?;
         transaction.commit().await?;
-        Ok(Expired {
-            jobs: rows.len() as u64,
-            orphans,
-        })
+        Ok(rows.len() as u64)
     }
 
     /// Was there a job or a batch of this tenant with this id that has expired?
@@ -140,14 +119,6 @@ impl SqliteStore {
             .await?;
         Ok(left < free)
     }
-}
-
-fn push_ids(query: &mut QueryBuilder<Sqlite>, ids: &[Uuid]) {
-    let mut list = query.separated(", ");
-    for id in ids {
-        list.push_bind(id.to_string());
-    }
-    query.push(")");
 }
 
 #[cfg(test)]

@@ -11,8 +11,7 @@ use crate::jobs::store::sqlite::rows::{read_count, read_state};
 
 /// Counts by index alone, without touching a row.
 const COUNT: &str = "SELECT state, COUNT(*) AS jobs FROM jobs GROUP BY state";
-const RESULT_BYTES: &str =
-    "SELECT COALESCE(SUM(result_bytes), 0) FROM jobs WHERE result_bytes IS NOT NULL";
+const RESULT_BYTES: &str = "SELECT COALESCE(SUM(bytes), 0) FROM blobs WHERE key IS NOT NULL";
 
 /// Figures of a job table.
 #[derive(Debug, Clone, PartialEq, Eq)]

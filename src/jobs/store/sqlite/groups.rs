@@ -11,6 +11,7 @@ use uuid::Uuid;
 use crate::jobs::error::JobsError;
 use crate::jobs::job::State;
 use crate::jobs::store::sqlite::SqliteStore;
+use crate::jobs::store::sqlite::blobs::{insert_blobs, release_blobs};
 use crate::jobs::store::sqlite::claims::{EndRow, fence};
 use crate::jobs::store::sqlite::rows::{read_count, read_id, read_reuse_key, read_state};
 use crate::jobs::store::{Claim, Ending};
@@ -239,24 +240,28 @@ impl SqliteStore {
             .map(|(claim, ending)| Ok((claim, EndRow::of(ending)?)))
             .collect::<Result<Vec<_>, JobsError>>()?;
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
+        let results: Vec<_> = rows.iter().filter_map(|(_, end)| end.result).collect();
+        let mut blobs = insert_blobs(&mut transaction, &results).await?.into_iter();
         let mut update = QueryBuilder::<Sqlite>::new(
-            "WITH done (id, lease_number, state, warnings, failure, folder, bytes, patches) AS (",
+            "WITH done (id, lease_number, state, warnings, failure, blob, patches) AS (",
         );
+        let mut inserted = Vec::with_capacity(results.len());
         update.push_values(&rows, |mut row, (claim, end)| {
+            let blob = end.result.and_then(|_| blobs.next());
+            inserted.extend(blob);
             row.push_bind(claim.id.to_string())
                 .push_bind(fence(claim))
                 .push_bind(end.state.name())
                 .push_bind(&end.warnings)
                 .push_bind(&end.failure)
-                .push_bind(end.folder)
-                .push_bind(end.result_bytes)
+                .push_bind(blob)
                 .push_bind(end.field_patches);
         });
         update.push(") UPDATE jobs SET state = done.state, ended_at = ");
         update.push_bind(now);
         update.push(
-            ", warnings = done.warnings, failure = done.failure, result_key = done.folder, \
-             result_bytes = done.bytes, field_patches = done.patches, \
+            ", warnings = done.warnings, failure = done.failure, blob_id = done.blob, \
+             field_patches = done.patches, \
              progress = CASE WHEN done.state = 'succeeded' THEN 1.0 ELSE progress END, \
              lease_until = NULL, worker = NULL, version = version + 1 \
              FROM done WHERE jobs.id = done.id AND jobs.lease_number = done.lease_number \
@@ -267,20 +272,9 @@ impl SqliteStore {
             .iter()
             .map(read_id)
             .collect::<Result<HashSet<_>, _>>()?;
-        let inside: Vec<_> = rows
-            .iter()
-            .filter(|(claim, _)| ended.contains(&claim.id))
-            .filter_map(|(claim, end)| Some((claim.id, end.inside?)))
-            .collect();
-        if !inside.is_empty() {
-            let mut insert =
-                QueryBuilder::<Sqlite>::new("INSERT INTO results (job_id, solution, fields) ");
-            insert.push_values(inside, |mut row, (id, result)| {
-                row.push_bind(id.to_string())
-                    .push_bind(result.solution.as_ref())
-                    .push_bind(result.fields.as_deref());
-            });
-            insert.build().execute(&mut *transaction).await?;
+        if ended.len() < rows.len() {
+            // The results of those whose lease was lost have no owner.
+            release_blobs(&mut transaction, inserted).await?;
         }
         transaction.commit().await?;
         Ok(ended)
@@ -322,7 +316,7 @@ fn with_held(claims: &[Claim]) -> QueryBuilder<Sqlite> {
     query
 }
 
-fn push_list(query: &mut QueryBuilder<Sqlite>, ids: &[Uuid]) {
+pub(super) fn push_list(query: &mut QueryBuilder<Sqlite>, ids: &[Uuid]) {
     let mut list = query.separated(", ");
     for id in ids {
         list.push_bind(id.to_string());

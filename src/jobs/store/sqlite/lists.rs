@@ -6,7 +6,7 @@ use uuid::Uuid;
 use crate::jobs::error::JobsError;
 use crate::jobs::store::list::{Filter, Page};
 use crate::jobs::store::sqlite::SqliteStore;
-use crate::jobs::store::sqlite::rows::{job_columns, read_id, read_job};
+use crate::jobs::store::sqlite::rows::{job_columns, read_job};
 
 impl SqliteStore {
     /// One page of the list of a tenant, newest first, at most `limit` jobs.
@@ -35,23 +35,6 @@ impl SqliteStore {
             .filter(|_| more)
             .map(|job| filter.cursor_after(job.id));
         Ok(Page { jobs, next_cursor })
-    }
-
-    /// Which of these jobs exist, or have a folder that a result of another job lies in.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub async fn existing(&self, ids: &[Uuid]) -> Result<Vec<Uuid>, JobsError> {
-        let mut query = QueryBuilder::<Sqlite>::new("SELECT id FROM jobs WHERE id IN (");
-        let mut list = query.separated(", ");
-        for id in ids {
-            list.push_bind(id.to_string());
-        }
-        query.push(")");
-        let rows = query.build().fetch_all(&self.readers).await?;
-        let mut existing = rows.iter().map(read_id).collect::<Result<Vec<_>, _>>()?;
-        existing.extend(self.lenders(ids).await?);
-        Ok(existing)
     }
 }
 

@@ -9,11 +9,11 @@
 //! for, [`lists`] the lists.
 
 pub mod batches;
+pub mod blobs;
 pub mod claims;
 pub mod deadlines;
 pub mod expiry;
 pub mod figures;
-mod forms;
 pub mod groups;
 mod insert;
 pub mod intake;
@@ -21,7 +21,9 @@ pub mod keys;
 pub mod lists;
 pub mod reuse;
 mod rows;
+mod schema;
 
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -37,9 +39,10 @@ use uuid::Uuid;
 use crate::jobs::error::JobsError;
 use crate::jobs::job::Job;
 use crate::jobs::results::Encoded;
-use crate::jobs::store::sqlite::forms::{allow_shrinking, migrations};
+use crate::jobs::store::sqlite::blobs::release_blobs;
 use crate::jobs::store::sqlite::intake::Intake;
-use crate::jobs::store::sqlite::rows::{job_columns, read_job};
+use crate::jobs::store::sqlite::rows::{job_columns, read_blob_id, read_job};
+use crate::jobs::store::sqlite::schema::{make_or_require, require};
 use crate::jobs::store::{Deleted, Enqueued, StoredResult};
 
 const GET: &str = concat!("SELECT ", job_columns!(), " FROM jobs WHERE id = $1");
@@ -60,14 +63,34 @@ pub struct SqliteStore {
 }
 
 impl SqliteStore {
-    /// Opens the database file, creates it if there is none, and brings it to the newest form.
+    /// Opens the database file; makes it if there is none.
     ///
     /// # Errors
-    /// The file cannot be opened, or was written by a newer version.
+    /// The file cannot be opened, or [`JobsError::OtherForm`].
     pub async fn open(file: &Path) -> Result<SqliteStore, JobsError> {
+        make_private(file)?;
+        let store = SqliteStore::connect(file).await?;
+        make_or_require(&store.writer).await?;
+        Ok(store)
+    }
+
+    /// Opens the database file beside a service that may be using it; makes and changes nothing.
+    ///
+    /// # Errors
+    /// There is no such file, it cannot be opened, or [`JobsError::OtherForm`].
+    pub async fn open_existing(file: &Path) -> Result<SqliteStore, JobsError> {
+        std::fs::metadata(file).map_err(|source| JobsError::DataDir {
+            path: file.to_owned(),
+            source,
+        })?;
+        let store = SqliteStore::connect(file).await?;
+        require(&store.readers).await?;
+        Ok(store)
+    }
+
+    async fn connect(file: &Path) -> Result<SqliteStore, JobsError> {
         let options = SqliteConnectOptions::new()
             .filename(file)
-            .create_if_missing(true)
             .journal_mode(SqliteJournalMode::Wal)
             .synchronous(SqliteSynchronous::Full)
             .pragma("journal_size_limit", LOG_BYTES)
@@ -85,8 +108,6 @@ impl SqliteStore {
             .before_acquire(|connection, _| Box::pin(is_free(connection)))
             .connect_with(writing)
             .await?;
-        migrations().run(&writer).await?;
-        allow_shrinking(&writer).await?;
         let readers = pool(READERS).connect_with(options.read_only(true)).await?;
         Ok(SqliteStore {
             file: file.to_owned(),
@@ -114,11 +135,12 @@ impl SqliteStore {
         Ok(())
     }
 
-    /// Writes a copy of the database, as it is at one moment, to a new file.
+    /// Writes a copy of the database, as it is at one moment, to a new file that nobody else may read.
     ///
     /// # Errors
     /// The file is there already or cannot be written.
     pub async fn copy_into(&self, file: &Path) -> Result<(), JobsError> {
+        make_private(file)?;
         sqlx::query("VACUUM INTO $1")
             .bind(file.to_string_lossy().into_owned())
             .execute(&self.writer)
@@ -131,10 +153,7 @@ impl SqliteStore {
     /// # Errors
     /// The database cannot be written.
     pub async fn touch(&self) -> Result<(), JobsError> {
-        sqlx::query("PRAGMA user_version = 1")
-            .execute(&self.writer)
-            .await?;
-        Ok(())
+        schema::mark(&self.writer).await
     }
 
     /// What an idempotency key of a tenant stands for, if it was used.
@@ -210,23 +229,15 @@ impl SqliteStore {
     pub async fn delete(&self, id: Uuid) -> Result<Deleted, JobsError> {
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         let gone = sqlx::query(
-            "DELETE FROM jobs WHERE id = $1 AND state IN ('succeeded', 'failed', 'cancelled') RETURNING result_owner",
+            "DELETE FROM jobs WHERE id = $1 AND state IN ('succeeded', 'failed', 'cancelled') RETURNING blob_id",
         )
         .bind(id.to_string())
         .fetch_optional(&mut *transaction)
         .await?;
         if let Some(row) = gone {
-            let owner: Option<String> = row.try_get("result_owner")?;
-            let owner = owner.unwrap_or_else(|| id.to_string());
-            let needed: bool = sqlx::query_scalar(
-                "SELECT EXISTS (SELECT 1 FROM jobs WHERE id = $1) OR EXISTS (SELECT 1 FROM jobs WHERE result_owner = $1)",
-            )
-            .bind(&owner)
-            .fetch_one(&mut *transaction)
-            .await?;
+            release_blobs(&mut transaction, read_blob_id(&row)?.into_iter().collect()).await?;
             transaction.commit().await?;
-            let orphan = Uuid::try_parse(&owner).ok().filter(|_| !needed);
-            return Ok(Deleted::Done { orphan });
+            return Ok(Deleted::Done);
         }
         drop(transaction);
         let job = self.get(id).await?;
@@ -266,10 +277,13 @@ impl SqliteStore {
     /// # Errors
     /// The database failed.
     pub async fn small_result(&self, id: Uuid) -> Result<Option<Encoded>, JobsError> {
-        let row = sqlx::query("SELECT solution, fields FROM results WHERE job_id = $1")
-            .bind(id.to_string())
-            .fetch_optional(&self.readers)
-            .await?;
+        let row = sqlx::query(
+            "SELECT solution, fields FROM jobs JOIN blobs ON blobs.id = jobs.blob_id \
+             WHERE jobs.id = $1 AND key IS NULL",
+        )
+        .bind(id.to_string())
+        .fetch_optional(&self.readers)
+        .await?;
         let Some(row) = row else { return Ok(None) };
         let solution: Vec<u8> = row.try_get("solution")?;
         let fields: Option<Vec<u8>> = row.try_get("fields")?;
@@ -287,7 +301,7 @@ impl SqliteStore {
         let row = sqlx::query(concat!(
             "SELECT ",
             job_columns!(),
-            ", result_key, field_patches, outputs, EXISTS (SELECT 1 FROM results WHERE job_id = id) AS inside \
+            ", blob_id, field_patches, outputs, (SELECT key FROM blobs WHERE blobs.id = blob_id) AS key \
              FROM jobs WHERE id = $1"
         ))
         .bind(id.to_string())
@@ -295,16 +309,34 @@ impl SqliteStore {
         .await?;
         let Some(row) = row else { return Ok(None) };
         let patches: u32 = row.try_get("field_patches")?;
-        let folder: Option<String> = row.try_get("result_key")?;
-        let inside: bool = row.try_get("inside")?;
-        let outputs = row.try_get("outputs")?;
-        let stored = (inside || folder.is_some()).then_some(StoredResult {
-            job: id,
-            folder,
-            field_patches: patches as usize,
-            outputs,
-        });
+        let stored = match read_blob_id(&row)? {
+            None => None,
+            Some(_) => Some(StoredResult {
+                job: id,
+                key: row.try_get("key")?,
+                field_patches: patches as usize,
+                outputs: row.try_get("outputs")?,
+            }),
+        };
         Ok(Some((read_job(&row)?, stored)))
+    }
+}
+
+/// Makes an empty file that nobody else may read, if there is none; what SQLite puts beside it gets the same mode.
+fn make_private(file: &Path) -> Result<(), JobsError> {
+    let made = std::fs::OpenOptions::new()
+        .create_new(true)
+        .write(true)
+        .mode(0o600)
+        .open(file);
+    match made {
+        Err(source) if source.kind() != std::io::ErrorKind::AlreadyExists => {
+            Err(JobsError::DataDir {
+                path: file.to_owned(),
+                source,
+            })
+        }
+        _ => Ok(()),
     }
 }
 

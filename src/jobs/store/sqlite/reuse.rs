@@ -1,7 +1,6 @@
 //! Results that are used again: finding the job that has one, and ending another job with it.
 //!
-//! A small result is copied. A large one stays in the folder of the job that computed it, which is kept for as long as
-//! any job needs it.
+//! A result is lent: the other job refers to the same blob, which is kept for as long as any job refers to it.
 
 use std::collections::{HashMap, HashSet};
 
@@ -69,23 +68,6 @@ impl SqliteStore {
         transaction.commit().await?;
         Ok(ended.into_iter().collect())
     }
-
-    /// The folders of these jobs that another job's result lies in.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(super) async fn lenders(&self, ids: &[Uuid]) -> Result<Vec<Uuid>, JobsError> {
-        let mut query = QueryBuilder::<Sqlite>::new(
-            "SELECT DISTINCT result_owner AS id FROM jobs WHERE result_owner IN (",
-        );
-        let mut list = query.separated(", ");
-        for id in ids {
-            list.push_bind(id.to_string());
-        }
-        query.push(")");
-        let rows = query.build().fetch_all(&self.readers).await?;
-        rows.iter().map(read_id).collect()
-    }
 }
 
 /// Ends those of the jobs just queued that have a source, with its result. A job whose source is gone meanwhile stays
@@ -128,8 +110,7 @@ async fn end_pairs(
     let mut update = with_pairs(pairs);
     update.push(
         " UPDATE jobs SET state = 'succeeded', started_at = pairs.at, ended_at = pairs.at, progress = 1.0, cached = 1, \
-         warnings = source.warnings, result_key = source.result_key, field_patches = source.field_patches, \
-         result_owner = CASE WHEN source.result_key IS NULL THEN NULL ELSE COALESCE(source.result_owner, source.id) END, \
+         warnings = source.warnings, blob_id = source.blob_id, field_patches = source.field_patches, \
          reuse_key = NULL, lease_until = NULL, worker = NULL, version = jobs.version + 1, \
          attempt = jobs.attempt - (pairs.lease_number IS NOT NULL) \
          FROM pairs JOIN jobs AS source ON source.id = pairs.source AND source.state = 'succeeded' \
@@ -137,21 +118,7 @@ async fn end_pairs(
          OR jobs.state = 'running' AND jobs.lease_number = pairs.lease_number) RETURNING id",
     );
     let rows = update.build().fetch_all(&mut *connection).await?;
-    let ended = rows.iter().map(read_id).collect::<Result<Vec<_>, _>>()?;
-    let done: HashSet<_> = ended.iter().collect();
-    let copied: Vec<_> = pairs
-        .iter()
-        .filter(|pair| done.contains(&pair.job))
-        .collect();
-    if !copied.is_empty() {
-        let mut copy = with_pairs(copied);
-        copy.push(
-            " INSERT INTO results (job_id, solution, fields) SELECT pairs.job, solution, fields \
-             FROM pairs JOIN results ON results.job_id = pairs.source",
-        );
-        copy.build().execute(&mut *connection).await?;
-    }
-    Ok(ended)
+    rows.iter().map(read_id).collect()
 }
 
 fn with_pairs<'a>(pairs: impl IntoIterator<Item = &'a Pair>) -> QueryBuilder<Sqlite> {

@@ -63,6 +63,20 @@ pub(super) fn read_reuse_key(row: &SqliteRow) -> Result<Option<ReuseKey>, JobsEr
         .map_err(|_| JobsError::Damaged("a reuse key has a wrong length".to_owned()))
 }
 
+/// The blob a row refers to.
+pub(super) fn read_blob_id(row: &SqliteRow) -> Result<Option<i64>, JobsError> {
+    Ok(row.try_get("blob_id")?)
+}
+
+/// The blobs that rows refer to.
+pub(super) fn read_blob_ids(rows: &[SqliteRow]) -> Result<Vec<i64>, JobsError> {
+    let ids = rows
+        .iter()
+        .map(read_blob_id)
+        .collect::<Result<Vec<_>, _>>()?;
+    Ok(ids.into_iter().flatten().collect())
+}
+
 pub(super) fn read_state(row: &SqliteRow) -> Result<State, JobsError> {
     let name: &str = row.try_get("state")?;
     State::from_name(name).ok_or_else(|| JobsError::Damaged(format!("job state {name:?}")))

@@ -1,10 +1,20 @@
 -- The job table and what hangs on it. Times are epoch milliseconds, ids UUIDv7 in text form (they sort by time).
 CREATE TABLE jobs (
     id               TEXT    NOT NULL PRIMARY KEY,
+    tenant           TEXT    NOT NULL,
     state            TEXT    NOT NULL CHECK (state IN ('queued', 'running', 'succeeded', 'failed', 'cancelled')),
     name             TEXT,
     labels           TEXT    NOT NULL,           -- JSON object, as shown to clients; job_labels is for finding
     method           TEXT    NOT NULL,
+    outputs          TEXT    NOT NULL,           -- JSON list of the outputs asked for
+    cost_us          INTEGER NOT NULL,           -- expected solve time in µs
+    reuse_key        BLOB,                       -- equal for cases that have the same answer; NULL: never a source
+    fresh            INTEGER NOT NULL,           -- 1: solved even if an identical case was solved before
+    rank             INTEGER NOT NULL,           -- 0: high priority, 1: normal, 2: low
+    deadline         INTEGER,                    -- a job that has not ended by then fails
+    traceparent      TEXT,                       -- W3C trace context of the span that submitted it; NULL: nobody collects it
+    batch_id         TEXT REFERENCES batches (id) ON DELETE CASCADE,
+    batch_index      INTEGER,                    -- place of the case in what was sent, from 0
     created_at       INTEGER NOT NULL,
     started_at       INTEGER,
     ended_at         INTEGER,
@@ -12,17 +22,29 @@ CREATE TABLE jobs (
     lease_number     INTEGER NOT NULL DEFAULT 0, -- claims ever made: the fencing token, never lowered
     lease_until      INTEGER,
     worker           TEXT,
+    group_size       INTEGER NOT NULL DEFAULT 1, -- jobs claimed together with this one
+    alone            INTEGER NOT NULL DEFAULT 0, -- 1: its group died, it is claimed alone
     cancel_requested INTEGER NOT NULL DEFAULT 0,
     progress         REAL    NOT NULL DEFAULT 0,
     warnings         TEXT    NOT NULL DEFAULT '[]',
     failure          TEXT,
-    result_key       TEXT,                       -- folder of the stored result
-    field_patches    INTEGER NOT NULL DEFAULT 0, -- patches with stored fields; 0: there is no fields object
+    blob_id          INTEGER REFERENCES blobs (id), -- the result; several jobs may refer to one
+    field_patches    INTEGER NOT NULL DEFAULT 0, -- patches with stored fields; 0: there are none
+    cached           INTEGER NOT NULL DEFAULT 0, -- 1: the result was computed for another job
     version          INTEGER NOT NULL DEFAULT 1
 ) STRICT, WITHOUT ROWID;
 
--- Lists by state, the claim (oldest queued) and the reaper (running). Lists without state use the primary key.
-CREATE INDEX jobs_by_state ON jobs (state, id);
+-- Lists of a tenant, the next tenant with queued jobs, and the reaper (running).
+CREATE INDEX jobs_by_state ON jobs (state, tenant, id);
+CREATE INDEX jobs_by_tenant ON jobs (tenant, id);
+-- The claim: the next job of the tenant whose turn it is. Jobs leave it when they are claimed.
+CREATE INDEX jobs_queued ON jobs (tenant, rank, id) WHERE state = 'queued';
+CREATE INDEX jobs_by_deadline ON jobs (deadline) WHERE deadline IS NOT NULL AND ended_at IS NULL;
+-- Ids within a batch grow with the place in it. The state is there for counting.
+CREATE INDEX jobs_by_batch ON jobs (batch_id, id, state) WHERE batch_id IS NOT NULL;
+CREATE INDEX jobs_by_reuse_key ON jobs (reuse_key) WHERE state = 'succeeded';
+-- Who still refers to a blob.
+CREATE INDEX jobs_by_blob ON jobs (blob_id) WHERE blob_id IS NOT NULL;
 
 CREATE TABLE cases (
     job_id TEXT NOT NULL PRIMARY KEY REFERENCES jobs (id) ON DELETE CASCADE,
@@ -30,17 +52,74 @@ CREATE TABLE cases (
 ) STRICT;
 
 CREATE TABLE job_labels (
-    key    TEXT NOT NULL,
-    value  TEXT NOT NULL,
-    job_id TEXT NOT NULL REFERENCES jobs (id) ON DELETE CASCADE,
-    PRIMARY KEY (key, value, job_id)
+    of_tenant TEXT NOT NULL,
+    key       TEXT NOT NULL,
+    value     TEXT NOT NULL,
+    job_id    TEXT NOT NULL REFERENCES jobs (id) ON DELETE CASCADE,
+    PRIMARY KEY (of_tenant, key, value, job_id)
 ) STRICT, WITHOUT ROWID;
 CREATE INDEX job_labels_by_job ON job_labels (job_id);
 
+-- Results. A small one lies here, a large one in the folder of results under its key. A blob that no job refers to is
+-- removed in the transaction that drops the last reference; the key of a large one is then left to the collector.
+CREATE TABLE blobs (
+    id       INTEGER NOT NULL PRIMARY KEY AUTOINCREMENT,
+    key      TEXT,             -- of a large result
+    bytes    INTEGER NOT NULL, -- solution and fields
+    solution BLOB,             -- of a small result
+    fields   BLOB
+) STRICT;
+CREATE INDEX blobs_by_key ON blobs (key, bytes) WHERE key IS NOT NULL;
+
+-- Keys of large results that nobody refers to and that are still to be removed.
+CREATE TABLE blob_outbox (
+    key TEXT NOT NULL PRIMARY KEY
+) STRICT, WITHOUT ROWID;
+
+CREATE TABLE batches (
+    id         TEXT    NOT NULL PRIMARY KEY,
+    tenant     TEXT    NOT NULL,
+    created_at INTEGER NOT NULL,
+    count      INTEGER NOT NULL,           -- jobs
+    rejected   INTEGER NOT NULL,           -- faulty cases that were left out
+    complete   INTEGER NOT NULL DEFAULT 0  -- 0: still being filled, and not acknowledged
+) STRICT, WITHOUT ROWID;
+
+CREATE INDEX batches_incomplete ON batches (id) WHERE complete = 0;
+
+-- A key lives as long as its batch.
+CREATE TABLE batch_keys (
+    of_tenant TEXT NOT NULL,
+    key       TEXT NOT NULL,
+    digest    BLOB NOT NULL,
+    batch_id  TEXT NOT NULL REFERENCES batches (id) ON DELETE CASCADE,
+    PRIMARY KEY (of_tenant, key)
+) STRICT, WITHOUT ROWID;
+CREATE INDEX batch_keys_by_batch ON batch_keys (batch_id);
+
 -- A key lives as long as its job.
 CREATE TABLE idempotency_keys (
-    key    TEXT NOT NULL PRIMARY KEY,
-    digest BLOB NOT NULL,
-    job_id TEXT NOT NULL REFERENCES jobs (id) ON DELETE CASCADE
+    of_tenant TEXT NOT NULL,
+    key       TEXT NOT NULL,
+    digest    BLOB NOT NULL,
+    job_id    TEXT NOT NULL REFERENCES jobs (id) ON DELETE CASCADE,
+    PRIMARY KEY (of_tenant, key)
 ) STRICT, WITHOUT ROWID;
 CREATE INDEX idempotency_keys_by_job ON idempotency_keys (job_id);
+
+-- Ids of jobs and batches that have expired.
+CREATE TABLE tombstones (
+    id      TEXT    NOT NULL PRIMARY KEY,
+    tenant  TEXT    NOT NULL,
+    gone_at INTEGER NOT NULL
+) STRICT, WITHOUT ROWID;
+
+-- Keys are how a tenant proves who it is.
+CREATE TABLE api_keys (
+    id         TEXT    NOT NULL PRIMARY KEY,
+    hash       BLOB    NOT NULL,             -- BLAKE3 of the whole key, which is kept nowhere
+    tenant     TEXT    NOT NULL,
+    name       TEXT,
+    created_at INTEGER NOT NULL,
+    revoked_at INTEGER
+) STRICT, WITHOUT ROWID;

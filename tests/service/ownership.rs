@@ -1,0 +1,171 @@
+//! Does a stored result live for as long as any job refers to it, and no longer?
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, Ordering};
+use std::time::Duration;
+
+use railhead::jobs::clock::Clock;
+use serde_json::{Value, json};
+
+use crate::batches::results;
+use crate::errors::assert_problem;
+use crate::results::path_of;
+use crate::server::{Server, Setup};
+use crate::support::case;
+
+const DAY_MS: i64 = 24 * 3600 * 1000;
+
+/// A service that keeps every result in a folder, ended jobs for 30 days, and the clock that it uses.
+async fn in_folders() -> (Server, PathBuf, Arc<AtomicI64>) {
+    let mut setup = Setup::new();
+    setup.options.small_result_max_bytes = 0;
+    setup.options.retention = Some(Duration::from_secs(30 * 24 * 3600));
+    let ahead = Arc::new(AtomicI64::new(0));
+    let (turned, system) = (ahead.clone(), Clock::system());
+    setup.options.clock = Clock::new(move || system.now_ms() + turned.load(Ordering::SeqCst));
+    let folder = setup.options.data_dir.join("results");
+    (setup.start().await, folder, ahead)
+}
+
+fn files_below(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten();
+    let paths = entries.map(|entry| entry.unwrap().path());
+    paths
+        .flat_map(|path| {
+            if path.is_dir() {
+                files_below(&path)
+            } else {
+                vec![path]
+            }
+        })
+        .collect()
+}
+
+async fn solved_batch(server: &Server, cases: &[Value]) -> Value {
+    let batch = server.post("/v1/batches", &json!(cases)).await.json;
+    for line in results(server, &batch, "?wait=60").await {
+        assert_eq!(line["state"], "succeeded", "{line}");
+    }
+    batch
+}
+
+async fn assert_readable(server: &Server, job: &str) {
+    for part in ["result", "tractions", "resultants"] {
+        let answer = server.get(&format!("{job}/{part}")).await;
+        assert_eq!(answer.status, 200, "{part}: {}", answer.text);
+    }
+}
+
+fn own_path(batch: &Value) -> String {
+    batch["links"]["self"].as_str().expect("a link").to_owned()
+}
+
+#[tokio::test]
+async fn deleting_a_batch_leaves_the_results_that_its_jobs_lent() {
+    let (server, folder, _) = in_folders().await;
+    let lender = solved_batch(&server, &[case("first"), case("first")]).await;
+    let borrower = server.solve(&case("second")).await;
+    assert_eq!(borrower["cached"], true);
+    let other = solved_batch(&server, &[case("third")]).await;
+    assert_eq!(server.delete(&own_path(&lender)).await.status, 204);
+    assert_readable(&server, &path_of(&borrower)).await;
+    let lines = results(&server, &other, "").await;
+    assert_eq!(lines[0]["result"]["cached"], true, "{}", lines[0]);
+
+    // The last reference goes with a batch, and the result with it.
+    assert_eq!(server.delete(&path_of(&borrower)).await.status, 204);
+    assert!(!files_below(&folder).is_empty());
+    assert_eq!(server.delete(&own_path(&other)).await.status, 204);
+    assert_eq!(files_below(&folder), Vec::<PathBuf>::new());
+}
+
+#[tokio::test]
+async fn deleting_a_borrowing_batch_leaves_the_lender() {
+    let (server, folder, _) = in_folders().await;
+    let lender = server.solve(&case("first")).await;
+    let borrower = solved_batch(&server, &[case("second"), case("third")]).await;
+    assert_eq!(server.delete(&own_path(&borrower)).await.status, 204);
+    assert_readable(&server, &path_of(&lender)).await;
+    assert_eq!(server.delete(&path_of(&lender)).await.status, 204);
+    assert_eq!(files_below(&folder), Vec::<PathBuf>::new());
+}
+
+#[tokio::test]
+async fn an_expiring_lender_leaves_its_result_to_the_borrower() {
+    let (server, folder, ahead) = in_folders().await;
+    let lender = server.solve(&case("first")).await;
+    let batch = solved_batch(&server, &[case("second")]).await;
+    ahead.store(20 * DAY_MS, Ordering::SeqCst);
+    let borrower = server.solve(&case("third")).await;
+    assert_eq!(borrower["cached"], true);
+    ahead.store(31 * DAY_MS, Ordering::SeqCst);
+    server.jobs.sweep_expired().await.unwrap();
+    for gone in [path_of(&lender), own_path(&batch)] {
+        assert_problem(&server.get(&gone).await, 410, "expired", "");
+    }
+    assert_readable(&server, &path_of(&borrower)).await;
+    ahead.store(62 * DAY_MS, Ordering::SeqCst);
+    server.jobs.sweep_expired().await.unwrap();
+    assert_eq!(files_below(&folder), Vec::<PathBuf>::new());
+}
+
+#[tokio::test]
+async fn reads_that_race_with_removal_are_answered_410_and_never_500() {
+    let (server, _, _) = in_folders().await;
+    for round in 0..6 {
+        let mut fresh = case("read while it is removed");
+        fresh["load"]["normal_force_n"] = json!(50_000 + round);
+        let path = path_of(&server.solve(&fresh).await);
+        let reads = ["tractions", "result"].map(|part| format!("{path}/{part}"));
+        let read = async |path: &str| {
+            let mut seen = Vec::new();
+            for _ in 0..20 {
+                seen.push(server.get(path).await.status);
+            }
+            seen
+        };
+        let delete = async {
+            tokio::time::sleep(Duration::from_millis(3 * round)).await;
+            server.delete(&path).await.status
+        };
+        let (fields, result, deleted) = tokio::join!(read(&reads[0]), read(&reads[1]), delete);
+        assert_eq!(deleted, 204);
+        for status in fields.into_iter().chain(result) {
+            assert!([200, 404, 410].contains(&status), "{status}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_result_whose_file_is_gone_costs_one_line_of_a_batch() {
+    let (server, folder, _) = in_folders().await;
+    let cases: Vec<Value> = (0..3)
+        .map(|number| {
+            let mut case = case("one of three");
+            case["load"]["normal_force_n"] = json!(60_000 + number);
+            case
+        })
+        .collect();
+    let batch = solved_batch(&server, &cases).await;
+    let lines = results(&server, &batch, "").await;
+    let lost = lines[1]["id"].as_str().expect("an id");
+    for file in files_below(&folder) {
+        if file.to_string_lossy().contains(lost) {
+            std::fs::remove_file(file).unwrap();
+        }
+    }
+    let lines = results(&server, &batch, "").await;
+    assert_eq!(lines.len(), 3);
+    assert_eq!(
+        lines[1]["error"]["type"], "/problems/internal",
+        "{}",
+        lines[1]
+    );
+    assert!(lines[0]["result"].is_object() && lines[2]["result"].is_object());
+    let results = batch["links"]["results"].as_str().expect("a link");
+    let table = server.get(&format!("{results}?format=csv")).await;
+    let rows: Vec<_> = table.text.lines().skip(1).collect();
+    assert_eq!(rows.len(), 3, "{}", table.text);
+    assert!(rows[1].ends_with("cannot be read"), "{}", rows[1]);
+}
