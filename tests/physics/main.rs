@@ -38,6 +38,7 @@ mod profile_reference_files;
 mod profile_robustness;
 mod profile_shapes;
 mod profile_solutions;
+mod profile_worn;
 #[path = "../../benches/stress/random.rs"]
 mod random;
 mod reference;

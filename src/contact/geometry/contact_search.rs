@@ -233,38 +233,50 @@ impl<'g> Search<'g> {
                 .map_or(0.0, |point| point[0] - frame.origin[0]);
             along = [along[0].min(middle - half), along[1].max(middle + half)];
         }
+        let limits = self
+            .limits(overlap, lowering)
+            .map(|line| line.map(|line| frame.across(self.geometry, line.rail)[0]));
         let widen = |[low, high]: [f64; 2]| {
             let margin = MARGIN * (high - low) + MARGIN_MM;
             [low - margin, high + margin]
         };
-        let mut gap = LocalGap::new(
-            self.geometry,
-            frame,
-            self.touch - lowering,
-            [widen(along), widen(across)],
-            detail,
-        )?;
-        // With yaw a hollow flange root follows the rail farther than a circle would.
+        let sampled = |along: [f64; 2], across: [f64; 2]| {
+            let window = [widen(along), widen(across)];
+            let centre = self.touch - lowering;
+            let gap = LocalGap::new(self.geometry, frame, centre, window, detail)?;
+            Ok::<_, String>(apart(gap, limits))
+        };
+        let mut gap = sampled(along, across)?;
+        // With yaw a hollow flange root follows the rail farther than a circle would, and seen along the normal an overlap may
+        // be wider than along the vertical.
         for _ in 0..WIDENINGS_MAX {
-            if !gap.overlaps_at_ends() {
+            let overlaps = gap.overlaps_at_ends();
+            if overlaps == [false; 2] {
                 break;
             }
-            along = along.map(|end| WIDENING * end);
-            let window = [widen(along), widen(across)];
-            gap = LocalGap::new(self.geometry, frame, self.touch - lowering, window, detail)?;
-        }
-        // Beyond a cut lies another patch, which keeps the surfaces apart between the two.
-        let ends = self
-            .thin_ends(overlap, lowering)
-            .map(|line| gap.frame.across(self.geometry, line.rail)[0]);
-        for (v, row) in gap.y.iter().zip(&mut gap.gap) {
-            let below = if overlap.cut[0] { ends[0] - v } else { 0.0 };
-            let above = if overlap.cut[1] { v - ends[1] } else { 0.0 };
-            let beyond = below.max(above).max(0.0);
-            row.iter_mut().for_each(|height| *height += APART * beyond);
+            if overlaps[0] {
+                along = along.map(|end| WIDENING * end);
+            }
+            if overlaps[1] {
+                let grown = 0.5 * (WIDENING - 1.0) * (across[1] - across[0]);
+                across = [across[0] - grown, across[1] + grown];
+            }
+            gap = sampled(along, across)?;
         }
         Ok(gap)
     }
+}
+
+/// The gap with its surfaces bent apart beyond the limits toward other gaps, `[lower, upper]` across in mm: what touches there
+/// belongs to those, in frames of their own.
+fn apart(mut gap: LocalGap, [lower, upper]: [Option<f64>; 2]) -> LocalGap {
+    for (v, row) in gap.y.iter().zip(&mut gap.gap) {
+        let below = lower.map_or(0.0, |end| end - v);
+        let above = upper.map_or(0.0, |end| v - end);
+        let beyond = below.max(above).max(0.0);
+        row.iter_mut().for_each(|height| *height += APART * beyond);
+    }
+    gap
 }
 
 /// Upper edge of a curve on the lines `k STEP`: height and parameter.

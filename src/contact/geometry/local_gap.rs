@@ -85,10 +85,14 @@ impl LocalGap {
         Ok(LocalGap { frame, x, y, gap })
     }
 
-    /// Do the bodies still overlap at the first or the last x?
-    pub(super) fn overlaps_at_ends(&self) -> bool {
-        let last = self.x.len() - 1;
-        self.gap.iter().any(|row| row[0] < 0.0 || row[last] < 0.0)
+    /// Do the bodies still overlap at the ends of the window along x, and at those across?
+    pub(super) fn overlaps_at_ends(&self) -> [bool; 2] {
+        let [last_x, last_y] = [self.x.len() - 1, self.y.len() - 1];
+        let overlaps = |row: &Vec<f64>| row.iter().any(|height| *height < 0.0);
+        [
+            self.gap.iter().any(|row| row[0] < 0.0 || row[last_x] < 0.0),
+            overlaps(&self.gap[0]) || overlaps(&self.gap[last_y]),
+        ]
     }
 }
 

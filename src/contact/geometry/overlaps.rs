@@ -12,11 +12,14 @@ const TOGETHER_ANGLE: f64 = 0.5;
 const VALLEY: f64 = 0.35;
 const THIN: f64 = 0.4;
 
-/// Lines that overlap: the first and the last one, and whether the overlap goes on beyond.
+/// Lines that overlap: the first and the last one, and what lies beyond either end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Overlap {
     pub(super) ends: [usize; 2],
+    /// The overlap goes on beyond this end, in another gap.
     pub(super) cut: [bool; 2],
+    /// Another gap lies on this side, next to this one or farther away.
+    pub(super) near: [bool; 2],
 }
 
 impl Search<'_> {
@@ -36,6 +39,7 @@ impl Search<'_> {
             let whole = Overlap {
                 ends: [first, last],
                 cut: [false; 2],
+                near: [false; 2],
             };
             for overlap in self.lobes(whole, lowering) {
                 match found.last_mut() {
@@ -46,6 +50,10 @@ impl Search<'_> {
                     _ => found.push(overlap),
                 }
             }
+        }
+        for k in 1..found.len() {
+            found[k - 1].near[1] = true;
+            found[k].near[0] = true;
         }
         Ok(found)
     }
@@ -81,10 +89,12 @@ impl Search<'_> {
         let low = Overlap {
             ends: [first, valley],
             cut: [whole.cut[0], true],
+            ..whole
         };
         let high = Overlap {
             ends: [valley, last],
             cut: [true, whole.cut[1]],
+            ..whole
         };
         [self.lobes(low, lowering), self.lobes(high, lowering)].concat()
     }
@@ -111,13 +121,20 @@ impl Search<'_> {
         (depths, main)
     }
 
-    /// The lines on which a cut overlap gets thin, before its ends: beyond them it touches nothing.
-    pub(super) fn thin_ends(&self, overlap: Overlap, lowering: f64) -> [Line; 2] {
+    /// The lines beyond which an overlap touches nothing that belongs to its gap, toward another gap; none where there is no
+    /// other gap. A cut overlap gets thin before its end, a whole one ends where the bodies do not overlap any more.
+    pub(super) fn limits(&self, overlap: Overlap, lowering: f64) -> [Option<Line>; 2] {
         let (depths, main) = self.depths(overlap, lowering);
         let thin = |k: &usize| depths[*k] <= THIN * depths[main];
-        let before = (0..=main).rev().find(thin).unwrap_or(0);
-        let after = (main..depths.len()).find(thin).unwrap_or(depths.len() - 1);
-        [before, after].map(|k| self.lines[overlap.ends[0] + k])
+        let thin_ends = [
+            (0..=main).rev().find(thin).unwrap_or(0),
+            (main..depths.len()).find(thin).unwrap_or(depths.len() - 1),
+        ];
+        [0, 1].map(|side| match (overlap.cut[side], overlap.near[side]) {
+            (true, _) => Some(self.lines[overlap.ends[0] + thin_ends[side]]),
+            (false, true) => Some(self.lines[overlap.ends[side]]),
+            (false, false) => None,
+        })
     }
 
     fn share_a_gap(&self, one: Overlap, other: Overlap, lowering: f64) -> bool {
