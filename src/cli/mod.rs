@@ -3,6 +3,7 @@
 mod backup;
 mod config;
 mod healthcheck;
+mod http_args;
 mod keys;
 mod serve;
 mod solve;
@@ -16,6 +17,7 @@ use std::time::Duration;
 
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
+use crate::cli::http_args::HttpArgs;
 use crate::contact::problem::Limits;
 use crate::http;
 use crate::telemetry::{Endpoint, LogFormat};
@@ -135,6 +137,8 @@ pub struct ServeArgs {
     #[arg(long, env = "RAILHEAD_OTLP_ENDPOINT", value_name = "URL")]
     pub otlp_endpoint: Option<Endpoint>,
     #[command(flatten)]
+    pub http: HttpArgs,
+    #[command(flatten)]
     pub log: LogArgs,
 }
 
@@ -170,6 +174,17 @@ pub enum Anonymous {
     Always,
     /// Not at all.
     Never,
+}
+
+impl Anonymous {
+    /// Are requests without a key answered on this address?
+    fn on(self, address: SocketAddr) -> bool {
+        match self {
+            Anonymous::Loopback => address.ip().is_loopback(),
+            Anonymous::Always => true,
+            Anonymous::Never => false,
+        }
+    }
 }
 
 /// Settings of `backup`.

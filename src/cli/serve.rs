@@ -12,6 +12,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
+use axum::http::HeaderValue;
 use tokio::net::TcpListener;
 use tokio::time::{Instant, sleep_until, timeout_at};
 use tokio_util::sync::CancellationToken;
@@ -24,6 +25,10 @@ use crate::jobs::{Jobs, Options};
 use crate::telemetry::{self, Traces};
 
 const REQUEST_THREADS_MIN: usize = 4;
+/// Files that the process opens besides connections: the table, results, logs.
+const OTHER_FILES: u64 = 256;
+/// Connections of the listener for probes.
+const PROBE_CONNECTIONS: usize = 64;
 
 /// Serves until a signal says stop.
 pub(super) fn run(args: &ServeArgs) -> anyhow::Result<ExitCode> {
@@ -67,11 +72,7 @@ async fn serve(args: &ServeArgs) -> anyhow::Result<()> {
         .await
         .with_context(|| format!("cannot listen on {}", args.listen))?;
     let address = listener.local_addr()?;
-    let anonymous = match args.anonymous {
-        Anonymous::Loopback => address.ip().is_loopback(),
-        Anonymous::Always => true,
-        Anonymous::Never => false,
-    };
+    let anonymous = args.anonymous.on(address);
     if !anonymous && !jobs.any_key().await? {
         jobs.shutdown(Duration::ZERO).await;
         bail!(
@@ -82,21 +83,37 @@ async fn serve(args: &ServeArgs) -> anyhow::Result<()> {
         );
     }
     jobs.start()?;
+
+    let stop = CancellationToken::new();
+    let (options, origins) = http_options(args, anonymous)?;
+    let probe_listener = match args.http.probe_listen {
+        Some(address) => Some(
+            TcpListener::bind(address)
+                .await
+                .with_context(|| format!("cannot listen on {address}"))?,
+        ),
+        None => None,
+    };
+    let probe_address = probe_listener.as_ref().map(TcpListener::local_addr);
+    let probe_address = probe_address.transpose()?;
+    let probes_anonymous = probe_address.is_some_and(|address| args.anonymous.on(address));
+    let [router, probes] = http::routers(jobs.clone(), options.clone(), probes_anonymous);
+    let router = http::allow_origins(router, origins);
+    if let (Some(listener), Some(address)) = (probe_listener, probe_address) {
+        tracing::info!(%address, "listening for probes");
+        let few = HttpOptions {
+            connections_max: PROBE_CONNECTIONS,
+            address_connections_max: PROBE_CONNECTIONS,
+            ..options.clone()
+        };
+        // Probes are answered until the process ends.
+        tokio::spawn(http::serve(listener, probes, few, CancellationToken::new()));
+    }
+    let mut server = tokio::spawn(http::serve(listener, router, options, stop.clone()));
     tracing::info!(%address, workers, data_dir = %args.data_dir.display(), "listening");
     if anonymous && !address.ip().is_loopback() {
         tracing::warn!(%address, "whoever reaches this address may use the service without a key");
     }
-
-    let stop = CancellationToken::new();
-    let options = HttpOptions {
-        anonymous,
-        requests_per_second: args.rate_limit,
-        ..HttpOptions::default()
-    };
-    let origins = args.cors_origin.iter().map(|origin| origin.parse());
-    let origins = origins.collect::<Result<_, _>>().context("--cors-origin")?;
-    let router = http::allow_origins(http::router(jobs.clone(), options), origins);
-    let mut server = tokio::spawn(http::serve(listener, router, options, stop.clone()));
 
     let name = tokio::select! {
         name = signals.next() => name,
@@ -135,4 +152,37 @@ async fn serve(args: &ServeArgs) -> anyhow::Result<()> {
     }
     tracing::info!("stopped");
     Ok(())
+}
+
+/// The limits of requests and the origins of other pages.
+fn http_options(
+    args: &ServeArgs,
+    anonymous: bool,
+) -> anyhow::Result<(HttpOptions, Vec<HeaderValue>)> {
+    let origins = args.cors_origin.iter().map(|origin| origin.parse());
+    let origins = origins.collect::<Result<_, _>>().context("--cors-origin")?;
+    let mut options = HttpOptions {
+        anonymous,
+        anonymous_proxied: args.anonymous == Anonymous::Always,
+        origins: args.cors_origin.as_slice().into(),
+        requests_per_second: args.rate_limit,
+        ..args.http.options()
+    };
+    // A connection is a file. Many systems allow few at first and more to those who ask.
+    match rlimit::increase_nofile_limit(u64::MAX) {
+        Ok(files) => {
+            let most =
+                usize::try_from(files.saturating_sub(OTHER_FILES).max(1)).unwrap_or(usize::MAX);
+            if most < options.connections_max {
+                tracing::warn!(
+                    files,
+                    connections = most,
+                    "the process may open few files, so fewer connections than asked for"
+                );
+                options.connections_max = most;
+            }
+        }
+        Err(error) => tracing::warn!(%error, "the number of files that may be open is not known"),
+    }
+    Ok((options, origins))
 }

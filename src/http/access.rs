@@ -1,8 +1,10 @@
 //! Who asks? API keys, tenants, requests per second.
 
-use std::net::{IpAddr, Ipv6Addr};
+use std::collections::HashMap;
+use std::net::IpAddr;
 use std::num::NonZeroU32;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use axum::extract::FromRequestParts;
 use axum::http::header;
@@ -12,7 +14,10 @@ use governor::state::keyed::HashMapStateStore;
 use governor::{Quota, RateLimiter};
 use tracing::field::display;
 
+use crate::http::carrying::Held;
 use crate::http::error::{ApiError, Kind};
+use crate::http::guard::Guard;
+use crate::http::places::network;
 use crate::http::{HttpOptions, Shared};
 use crate::jobs::Jobs;
 use crate::jobs::keys::{ANONYMOUS, OPERATOR};
@@ -22,6 +27,12 @@ const BURST_SECONDS: u32 = 2;
 
 /// Senders beyond which those that have not asked for a while are forgotten.
 const SENDERS_KEPT: usize = 10_000;
+/// How often that is done at most: it looks at all of them.
+const FORGET_EVERY: Duration = Duration::from_secs(10);
+
+/// Wrong keys that one address may send in [`FAILURES_WITHIN`]; each costs a look into the table.
+const FAILURES_MAX: u32 = 20;
+const FAILURES_WITHIN: Duration = Duration::from_secs(10);
 
 /// The address that a request comes from; in its extensions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,16 +47,10 @@ enum Sender {
 
 impl Sender {
     /// The sender of a request without a key. Loopback is this machine itself, perhaps a proxy that speaks for many: not
-    /// counted. One customer has a whole IPv6 network of 64 bits.
+    /// counted.
     fn at(peer: Peer) -> Option<Sender> {
-        match peer.0.to_canonical() {
-            address if address.is_loopback() => None,
-            IpAddr::V6(address) => {
-                let network = address.to_bits() >> 64 << 64;
-                Some(Sender::Address(Ipv6Addr::from_bits(network).into()))
-            }
-            address => Some(Sender::Address(address)),
-        }
+        let address = network(peer.0);
+        (!address.is_loopback()).then_some(Sender::Address(address))
     }
 }
 
@@ -66,13 +71,24 @@ pub struct Unscoped(pub Jobs);
 pub struct Access {
     jobs: Jobs,
     anonymous: bool,
+    guard: Guard,
+    per_second: u32,
     limiter: Option<Arc<RateLimiter<Sender, HashMapStateStore<Sender>, DefaultClock>>>,
+    forgotten: Arc<Mutex<Instant>>,
+    failures: Arc<Mutex<HashMap<IpAddr, Failures>>>,
+}
+
+/// Wrong keys from one address.
+#[derive(Debug, Clone, Copy)]
+struct Failures {
+    since: Instant,
+    count: u32,
 }
 
 impl Access {
     /// The rules of these options.
     #[must_use]
-    pub fn new(jobs: &Jobs, options: HttpOptions) -> Access {
+    pub fn new(jobs: &Jobs, options: &HttpOptions) -> Access {
         let per_second = NonZeroU32::new(options.requests_per_second);
         let limiter = per_second.map(|rate| {
             let burst = rate.saturating_mul(BURST_SECONDS.try_into().unwrap_or(NonZeroU32::MIN));
@@ -83,16 +99,21 @@ impl Access {
         Access {
             jobs: jobs.clone(),
             anonymous: options.anonymous,
+            guard: Guard::new(options),
+            per_second: options.requests_per_second,
             limiter,
+            forgotten: Arc::new(Mutex::new(Instant::now())),
+            failures: Arc::default(),
         }
     }
 
     /// The tenant that a request belongs to; `None` for a request without a key where that is allowed.
     async fn tenant(&self, parts: &Parts) -> Result<Option<Arc<str>>, ApiError> {
         let mut given = parts.headers.get_all(header::AUTHORIZATION).iter();
+        let peer = parts.extensions.get::<Peer>().copied();
         let text = match (given.next(), given.next()) {
             (None, _) if self.anonymous => {
-                let peer = parts.extensions.get::<Peer>().copied();
+                self.guard.require_direct(parts)?;
                 if let Some(sender) = peer.and_then(Sender::at) {
                     self.require_turn(sender, "this address")?;
                 }
@@ -109,8 +130,15 @@ impl Access {
         let text = text.ok_or_else(|| {
             unauthorized("the header `Authorization` is not `Bearer` followed by one key")
         })?;
-        let key = self.jobs.key(text).await?;
-        let key = key.ok_or_else(|| unauthorized("the key is not known, or was revoked"))?;
+        let address = peer.and_then(|peer| match Sender::at(peer) {
+            Some(Sender::Address(address)) => Some(address),
+            _ => None,
+        });
+        self.require_few_failures(address)?;
+        let Some(key) = self.jobs.key(text).await? else {
+            self.count_failure(address);
+            return Err(unauthorized("the key is not known, or was revoked"));
+        };
         let span = tracing::Span::current();
         span.record("tenant", display(&key.tenant));
         span.record("key", display(&key.id));
@@ -123,7 +151,7 @@ impl Access {
         let Some(limiter) = &self.limiter else {
             return Ok(());
         };
-        if limiter.len() > SENDERS_KEPT {
+        if limiter.len() > SENDERS_KEPT && self.may_forget() {
             limiter.retain_recent();
         }
         let Err(early) = limiter.check_key(&sender) else {
@@ -133,9 +161,69 @@ impl Access {
         let seconds = u32::try_from(wait.as_secs_f64().ceil() as u64).unwrap_or(u32::MAX);
         Err(ApiError::new(
             Kind::TooManyRequests,
-            format!("{who} sends more requests per second than it may"),
+            format!(
+                "{who} sends more requests than it may: {} per second, and {} at once",
+                self.per_second,
+                self.per_second.saturating_mul(BURST_SECONDS)
+            ),
         )
         .after(seconds.max(1)))
+    }
+
+    /// Is it time again to look for senders to forget?
+    fn may_forget(&self) -> bool {
+        let mut last = self
+            .forgotten
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        let due = last.elapsed() > FORGET_EVERY;
+        if due {
+            *last = Instant::now();
+        }
+        due
+    }
+
+    fn require_few_failures(&self, address: Option<IpAddr>) -> Result<(), ApiError> {
+        let failures = self.failures.lock().unwrap_or_else(PoisonError::into_inner);
+        let of_address = address.and_then(|address| failures.get(&address));
+        let left = of_address
+            .filter(|failures| failures.count >= FAILURES_MAX)
+            .and_then(|failures| FAILURES_WITHIN.checked_sub(failures.since.elapsed()));
+        match left {
+            Some(left) => Err(ApiError::new(
+                Kind::TooManyRequests,
+                format!(
+                    "this address sent {FAILURES_MAX} wrong keys within {} s",
+                    FAILURES_WITHIN.as_secs()
+                ),
+            )
+            .after(
+                u32::try_from(left.as_secs())
+                    .unwrap_or(u32::MAX)
+                    .saturating_add(1),
+            )),
+            None => Ok(()),
+        }
+    }
+
+    fn count_failure(&self, address: Option<IpAddr>) {
+        let Some(address) = address else { return };
+        let mut failures = self.failures.lock().unwrap_or_else(PoisonError::into_inner);
+        if failures.len() > SENDERS_KEPT {
+            failures.retain(|_, failures| failures.since.elapsed() < FAILURES_WITHIN);
+        }
+        let now = Instant::now();
+        let own = failures.entry(address).or_insert(Failures {
+            since: now,
+            count: 0,
+        });
+        if own.since.elapsed() >= FAILURES_WITHIN {
+            *own = Failures {
+                since: now,
+                count: 0,
+            };
+        }
+        own.count += 1;
     }
 }
 
@@ -146,6 +234,9 @@ impl FromRequestParts<Shared> for Caller {
         let access = &shared.access;
         let tenant = access.tenant(parts).await?;
         let tenant = tenant.unwrap_or_else(|| ANONYMOUS.into());
+        if let Some(held) = parts.extensions.get::<Held>() {
+            held.add(shared.crowds.request(&tenant)?);
+        }
         Ok(Caller(access.jobs.of(tenant)))
     }
 }

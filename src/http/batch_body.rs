@@ -88,7 +88,7 @@ pub async fn form(
 /// The body is too large, too slow, broken, or not of its form; faults of single cases are kept in the draft.
 pub async fn read_draft(
     jobs: &Jobs,
-    options: HttpOptions,
+    options: &HttpOptions,
     mut form: Form,
     request: Request<Body>,
 ) -> Result<Draft, ApiError> {
@@ -159,7 +159,7 @@ pub async fn read_draft(
     Ok(draft)
 }
 
-fn require_count(draft: &Draft, options: HttpOptions) -> Result<(), ApiError> {
+fn require_count(draft: &Draft, options: &HttpOptions) -> Result<(), ApiError> {
     if draft.cases <= options.batch_max_cases {
         return Ok(());
     }

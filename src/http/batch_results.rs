@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
+use axum::Extension;
 use axum::body::{Body, Bytes};
+use axum::extract::State;
 use axum::http::{HeaderMap, Uri, header};
 use axum::response::{IntoResponse, Response};
 use futures_util::stream::try_unfold;
@@ -14,7 +16,9 @@ use uuid::Uuid;
 use crate::contact::solution::Solution;
 use crate::http::accept::{Format, choose, named_format};
 use crate::http::access::Caller;
+use crate::http::carrying::{Held, carrying};
 use crate::http::coding::AsItComes;
+use crate::http::crowds::Crowds;
 use crate::http::error::{ApiError, Kind};
 use crate::http::job::BatchId;
 use crate::http::problem::Problem;
@@ -79,6 +83,8 @@ pub async fn results(
     Caller(jobs): Caller,
     BatchId(id): BatchId,
     uri: Uri,
+    State(crowds): State<Crowds>,
+    Extension(held): Extension<Held>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let mut query = Query::read(&uri, &["wait", "format"]);
@@ -91,12 +97,19 @@ pub async fn results(
     let format = choose(&headers, named, &offered)?;
     // Unknown batches are answered before the stream begins.
     jobs.batch(id).await?;
+    let place = match wait {
+        Some(_) => Some(crowds.require_wait(jobs.tenant())?),
+        None => None,
+    };
+    if place.is_some() {
+        held.release();
+    }
     let until = wait.map(|seconds| Instant::now() + Duration::from_secs(seconds.into()));
     let head = match format {
         Format::Csv => Some(Bytes::from(csv_head())),
         _ => None,
     };
-    let place = Place {
+    let start = Place {
         jobs,
         batch: id,
         format,
@@ -105,7 +118,7 @@ pub async fn results(
         page: FIRST_PAGE_JOBS,
         head,
     };
-    let body = Body::from_stream(try_unfold(place, next_piece));
+    let body = Body::from_stream(try_unfold(start, next_piece));
     let headers = [
         (header::CONTENT_TYPE, format.media_type()),
         (header::VARY, "Accept"),
@@ -114,7 +127,7 @@ pub async fn results(
     if wait.is_some() {
         response.extensions_mut().insert(AsItComes);
     }
-    Ok(response)
+    Ok(carrying(response, place))
 }
 
 /// Where a stream of results stands.

@@ -170,7 +170,7 @@ pub async fn submit(
     let key = idempotency_key(request.headers())?;
     let (asked, wishes) = read_query(&request)?;
     let form = form(&jobs, request.headers(), asked.template).await?;
-    let mut draft = read_draft(&jobs, options, form, request).await?;
+    let mut draft = read_draft(&jobs, &options, form, request).await?;
     draft.wishes = wishes;
     if draft.cases == draft.rejected || (draft.rejected > 0 && !asked.valid_only) {
         return Err(refusal(&draft));

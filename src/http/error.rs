@@ -56,6 +56,8 @@ kinds! {
     UnreadableBody 400 "unreadable-body" "The body could not be read" "The connection ended or broke before the whole body had arrived."
     Unauthorized 401 "unauthorized" "A key is needed" "The service is asked with `Authorization: Bearer` and an API key; there was none, or it is unknown or revoked. Keys come from the operator of the service."
     Forbidden 403 "forbidden" "This key may not do that" "The key is good, but belongs to a tenant that has no business here."
+    CrossSite 403 "cross-site" "A foreign page may not change anything" "Without a key nothing is changed on behalf of a web page of another origin; the operator names origins that may with `--cors-origin`."
+    HostNotAllowed 403 "host-not-allowed" "The service has another name" "Without a key the service is asked by an address, as `localhost`, or by a name that its operator gave with `--allowed-host`; `Host` was another."
     UnknownRoute 404 "unknown-route" "There is nothing at this address" "The path names no resource of this service; `/openapi.json` lists all of them."
     JobNotFound 404 "job-not-found" "There is no such job" "No job has this id; it was never made here, or it was deleted."
     BatchNotFound 404 "batch-not-found" "There is no such batch" "No batch has this id; it was never made here, or it was deleted."
@@ -75,7 +77,7 @@ kinds! {
     FaultyCase 422 "faulty-case" "The case has faults" "The body is JSON but not a case that can be solved; `errors` names every fault by its JSON pointer, with the value given and what is allowed."
     FaultyBatch 422 "faulty-batch" "The batch has faults" "The body holds no cases, or some of them have faults: `errors` names every fault by a JSON pointer that begins with the place of its case (counted from 0), and by its line in NDJSON. Nothing was stored; with `?accept=valid` the good cases are taken."
     FaultyTable 422 "faulty-table" "The header of the table has faults" "The first line of a table names its columns by JSON pointers such as `/load/normal_force_n` or by short names; the detail names the column and what is allowed."
-    TooManyRequests 429 "too-many-requests" "Too many requests" "The key, or without one the address, sends more requests per second than it may; try again after `Retry-After` seconds."
+    TooManyRequests 429 "too-many-requests" "Too many requests" "The key, or without one the address, sends more requests per second than it may, or the tenant has as many requests, streams or waits under way as it may; the detail says which. Try again after `Retry-After` seconds."
     QuotaExceeded 429 "quota-exceeded" "Too many jobs are waiting" "The tenant has as many queued jobs as it may; nothing was stored, try again after `Retry-After` seconds."
     IdempotencyConflict 422 "idempotency-conflict" "The idempotency key belongs to another case" "The `Idempotency-Key` was used before with a different body; use a new key for a new case."
     Internal 500 "internal" "The service failed" "Something went wrong inside the service; its log has the reason under the request id in the header `x-request-id`."
@@ -83,6 +85,7 @@ kinds! {
     StorageUnwritable 503 "storage-unwritable" "The disk cannot be written" "The disk of the service is read-only or fails, or its job table is locked by another process; nothing was stored, jobs already accepted are kept. Try again after `Retry-After` seconds."
     StorageFull 507 "storage-full" "The disk is full" "The disk of the service has no room for another job; nothing was stored, jobs already accepted are kept. Try again after `Retry-After` seconds."
     Draining 503 "draining" "The service is shutting down" "The service takes no new jobs because it is shutting down; jobs already accepted are kept. Try again after `Retry-After` seconds."
+    Overloaded 503 "overloaded" "The service has too much to do" "The memory or the turns for requests of this kind are taken, or every connection has a request under way; nothing was done. Try again after `Retry-After` seconds."
     NotReady 503 "not-ready" "The service is not ready" "The job store cannot be reached at the moment."
     NotConverged 422 "not-converged" "The solver did not converge" "Only inside a job: the iteration ended without meeting its tolerance; `residual` and `iterations` belong to the best iterate, `detail` says what to try."
     Unsolvable 422 "unsolvable" "The contact has no answer" "Only inside a job: the region cannot be meshed or the contact does not exist; the detail says why."
@@ -105,6 +108,7 @@ impl Kind {
                 | Kind::StorageUnwritable
                 | Kind::StorageFull
                 | Kind::Draining
+                | Kind::Overloaded
                 | Kind::NotReady
         )
     }

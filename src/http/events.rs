@@ -6,6 +6,8 @@
 use std::convert::Infallible;
 use std::time::Duration;
 
+use axum::Extension;
+use axum::extract::State;
 use axum::http::{HeaderMap, HeaderName, StatusCode};
 use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
@@ -22,6 +24,8 @@ use uuid::Uuid;
 use crate::http::accept::{Format, choose};
 use crate::http::access::Caller;
 use crate::http::batches::{BatchAnswer, LookBatchProblems};
+use crate::http::carrying::{Held, carrying};
+use crate::http::crowds::Crowds;
 use crate::http::error::ApiError;
 use crate::http::job::{BatchId, JobId};
 use crate::http::jobs::LookProblems;
@@ -134,6 +138,8 @@ impl JobEvent {
 pub async fn job(
     Caller(jobs): Caller,
     JobId(id): JobId,
+    State(crowds): State<Crowds>,
+    Extension(held): Extension<Held>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     choose(&headers, None, &[Format::Events])?;
@@ -142,10 +148,13 @@ pub async fn job(
     if job.state.ended() && seen == Some(job.version) {
         return Ok(StatusCode::NO_CONTENT.into_response());
     }
-    Ok(answer(unfold(Some(seen), move |seen| {
+    let place = crowds.stream(jobs.tenant())?;
+    held.release();
+    let events = answer(unfold(Some(seen), move |seen| {
         let jobs = jobs.clone();
         async move { next_of_job(&jobs, id, seen?).await }
-    })))
+    }));
+    Ok(carrying(events, place))
 }
 
 /// The next event of a job and what has then been seen; nothing after the final one.
@@ -182,6 +191,8 @@ async fn next_of_job(
 pub async fn batch(
     Caller(jobs): Caller,
     BatchId(id): BatchId,
+    State(crowds): State<Crowds>,
+    Extension(held): Extension<Held>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     choose(&headers, None, &[Format::Events])?;
@@ -191,10 +202,13 @@ pub async fn batch(
     if ended == all && seen.as_deref() == Some(&batch.mark()) {
         return Ok(StatusCode::NO_CONTENT.into_response());
     }
-    Ok(answer(unfold(Some(seen), move |seen| {
+    let place = crowds.stream(jobs.tenant())?;
+    held.release();
+    let events = answer(unfold(Some(seen), move |seen| {
         let jobs = jobs.clone();
         async move { next_of_batch(&jobs, id, seen?).await }
-    })))
+    }));
+    Ok(carrying(events, place))
 }
 
 async fn next_of_batch(

@@ -2,9 +2,10 @@
 
 use std::time::Duration;
 
-use axum::Json;
+use axum::extract::State;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
+use axum::{Extension, Json};
 use serde::Serialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
@@ -12,6 +13,8 @@ use uuid::Uuid;
 use crate::contact::case::Case;
 use crate::http::access::Caller;
 use crate::http::body::JsonBody;
+use crate::http::carrying::Held;
+use crate::http::crowds::Crowds;
 use crate::http::error::ApiError;
 use crate::http::job::{JobAnswer, JobId};
 use crate::http::problems::problems;
@@ -85,11 +88,15 @@ problems! {
 pub async fn submit(
     Caller(jobs): Caller,
     uri: Uri,
+    State(crowds): State<Crowds>,
+    Extension(held): Extension<Held>,
     headers: HeaderMap,
     JsonBody(case): JsonBody,
 ) -> Result<Response, ApiError> {
     let key = idempotency_key(&headers)?;
-    let wait = preferred_wait(&headers);
+    let place =
+        preferred_wait(&headers).and_then(|seconds| Some((seconds, crowds.wait(jobs.tenant())?)));
+    let wait = place.as_ref().map(|(seconds, _)| *seconds);
     let mut query = Query::read(&uri, &PARAMETERS);
     let wishes = take_wishes(&mut query, &headers);
     query.finish()?;
@@ -97,13 +104,19 @@ pub async fn submit(
     let location = format!("/v1/jobs/{}", job.id);
     let mut result = None;
     if let Some(seconds) = wait {
+        // From here on the request only waits, which is counted apart.
+        held.release();
         // The job is stored: whatever ends the wait early, the client must learn its id.
         match jobs.wait(job.id, Duration::from_secs(seconds.into())).await {
             Ok(later) => job = later,
             Err(reason) => tracing::debug!(%reason, job = %job.id, "the wait ended early"),
         }
         if job.state == JobState::Succeeded {
-            result = Some(result_of(&jobs, job.id).await?);
+            // The same holds for a result that cannot be read.
+            match result_of(&jobs, job.id).await {
+                Ok(found) => result = Some(found),
+                Err(error) => tracing::error!(?error, job = %job.id, "a result cannot be read"),
+            }
         }
     }
     let in_time = wait.is_some() && job.state.ended();

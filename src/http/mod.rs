@@ -9,15 +9,18 @@ mod batch_results;
 mod batches;
 pub mod body;
 mod caching;
+mod carrying;
 mod cases;
 mod cells;
 mod coding;
 mod connections;
+mod crowds;
 pub mod elements;
 mod error;
 mod events;
 mod fields;
 mod formats;
+mod guard;
 mod headers;
 mod health;
 mod job;
@@ -25,13 +28,16 @@ mod jobs;
 mod methods;
 mod metrics;
 mod openapi;
+mod options;
 mod picture;
+mod places;
 mod plot;
 mod problem;
 mod problems;
 mod query;
 mod resultants;
 mod results;
+mod shares;
 mod spans;
 pub mod table_body;
 mod trace;
@@ -39,8 +45,6 @@ mod unread;
 mod wishes;
 mod write_limit;
 mod zones;
-
-use std::time::Duration;
 
 use axum::Router;
 use axum::extract::{DefaultBodyLimit, FromRef};
@@ -55,54 +59,16 @@ use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
 use crate::http::access::{Access, Unscoped};
+use crate::http::crowds::Crowds;
 use crate::http::error::{ApiError, Kind};
+use crate::http::metrics::Metrics;
 use crate::jobs::Jobs;
 
 pub use crate::http::access::Peer;
 pub use crate::http::connections::serve;
 pub use crate::http::headers::allow_origins;
 pub use crate::http::openapi::openapi_json;
-
-/// What one request may cost.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct HttpOptions {
-    /// Largest body of one case in bytes.
-    pub body_max_bytes: usize,
-    /// Time for the next request's head to arrive on a connection, idle time included.
-    pub head_timeout: Duration,
-    /// Time for a body to arrive whole; for a batch, time between two pieces, and the head start over its lowest rate.
-    pub body_timeout: Duration,
-    /// How long a client may take nothing of its answer.
-    pub write_timeout: Duration,
-    /// Most open connections; further ones wait until others end.
-    pub connections_max: usize,
-    /// Largest body of a batch in bytes.
-    pub batch_max_bytes: u64,
-    /// Most cases of a batch.
-    pub batch_max_cases: u32,
-    /// Requests without a key are answered, as those of a tenant of their own.
-    pub anonymous: bool,
-    /// Requests per second of one key, or of one address without a key; 0 for any number.
-    pub requests_per_second: u32,
-}
-
-impl Default for HttpOptions {
-    fn default() -> Self {
-        HttpOptions {
-            body_max_bytes: 8 << 20,
-            // Longer than the usual proxies keep an idle connection, so that they close it first.
-            head_timeout: Duration::from_secs(75),
-            body_timeout: Duration::from_secs(60),
-            write_timeout: Duration::from_secs(60),
-            // Files of the job table and of results need descriptors too; a process often has 1024.
-            connections_max: 800,
-            batch_max_bytes: 1 << 30,
-            batch_max_cases: 200_000,
-            anonymous: true,
-            requests_per_second: 0,
-        }
-    }
-}
+pub use crate::http::options::HttpOptions;
 
 /// What every handler can reach.
 #[derive(Clone, FromRef)]
@@ -110,20 +76,38 @@ struct Shared {
     unscoped: Unscoped,
     access: Access,
     options: HttpOptions,
-    metrics: metrics::Metrics,
+    crowds: Crowds,
+    metrics: Metrics,
 }
 
 /// The whole API, ready to be served.
 pub fn router(jobs: Jobs, options: HttpOptions) -> Router {
+    let metrics = Metrics::new(&jobs);
+    api(jobs, options, metrics)
+}
+
+/// The whole API, and the probes and metrics alone for a port of their own, on which requests without a key are answered
+/// if `probes_anonymous` says so.
+pub fn routers(jobs: Jobs, options: HttpOptions, probes_anonymous: bool) -> [Router; 2] {
+    let metrics = Metrics::new(&jobs);
+    let mut alone = options.clone();
+    alone.anonymous = probes_anonymous;
+    let (probes, _) = probes().split_for_parts();
+    let probes = probes
+        .fallback(|uri: Uri| async move { error::unknown_route(uri.path()) })
+        .layer(from_fn(error::name_instance))
+        .with_state(Shared::new(jobs.clone(), alone, metrics.clone()));
+    [api(jobs, options, metrics), headers::secure(probes)]
+}
+
+fn api(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> Router {
     let (resources, _) = resources().split_for_parts();
-    let metrics = metrics::Metrics::new(&jobs);
     let contract = SwaggerUi::new("/docs").config(
         // The validator badge would ask a server on the internet.
         Config::from("/openapi.json")
             .validator_url("none")
             .try_it_out_enabled(true),
     );
-    let access = Access::new(&jobs, options);
     let router = resources
         .merge(contract)
         .route("/", get(|| async { Redirect::temporary("/docs/") }))
@@ -131,8 +115,10 @@ pub fn router(jobs: Jobs, options: HttpOptions) -> Router {
         .method_not_allowed_fallback(method_not_allowed)
         .layer(DefaultBodyLimit::max(options.body_max_bytes))
         .layer(RequestDecompressionLayer::new().gzip(true).zstd(true))
-        .layer(from_fn_with_state(options, coding::limit_packed))
+        .layer(from_fn_with_state(options.clone(), coding::limit_packed))
         .layer(CatchPanicLayer::custom(trace::answer_panic))
+        .layer(from_fn(carrying::hold))
+        .layer(from_fn(guard::admit))
         .layer(from_fn(error::name_instance))
         .layer(coding::packing())
         .layer(from_fn(caching::complete))
@@ -141,13 +127,20 @@ pub fn router(jobs: Jobs, options: HttpOptions) -> Router {
         .layer(trace::span_layer())
         .layer(from_fn(trace::carry_request_id))
         .layer(from_fn(unread::read_away))
-        .with_state(Shared {
+        .with_state(Shared::new(jobs, options, metrics));
+    headers::secure(router)
+}
+
+impl Shared {
+    fn new(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> Shared {
+        Shared {
+            access: Access::new(&jobs, &options),
+            crowds: Crowds::new(&options),
             unscoped: Unscoped(jobs),
-            access,
             options,
             metrics,
-        });
-    headers::secure(router)
+        }
+    }
 }
 
 /// Every documented route, in the order of the contract.
@@ -192,10 +185,16 @@ fn resources() -> OpenApiRouter<Shared> {
         .routes(routes!(batch_results::results))
         .routes(routes!(events::job))
         .routes(routes!(events::batch))
+        .merge(probes())
+        .merge(contract)
+}
+
+/// What is asked every few seconds, of a port of its own if there is one.
+fn probes() -> OpenApiRouter<Shared> {
+    OpenApiRouter::new()
         .routes(routes!(health::alive))
         .routes(routes!(health::ready))
         .routes(routes!(metrics::metrics))
-        .merge(contract)
 }
 
 async fn method_not_allowed(method: axum::http::Method, uri: Uri) -> ApiError {

@@ -169,6 +169,9 @@ fn require_keys(document: &mut utoipa::openapi::OpenApi) {
     for (path, item) in &mut document.paths.paths {
         let operations = [&mut item.get, &mut item.post, &mut item.delete];
         for operation in operations.into_iter().filter_map(Option::as_mut) {
+            if !matches!(path.as_str(), "/healthz" | "/readyz" | "/metrics") {
+                describe_also(&mut operation.responses.responses, &[Kind::Overloaded]);
+            }
             let tags = operation.tags.as_deref().unwrap_or_default();
             let open = tags.iter().any(|tag| tag == "service");
             let metrics = operation.operation_id.as_deref() == Some("get_metrics");
@@ -180,7 +183,8 @@ fn require_keys(document: &mut utoipa::openapi::OpenApi) {
                 SecurityRequirement::new("key", Vec::<String>::new()),
                 SecurityRequirement::default(),
             ]);
-            let mut kinds = vec![Kind::Unauthorized, Kind::TooManyRequests];
+            let mut kinds = vec![Kind::Unauthorized, Kind::TooManyRequests, Kind::BadHeader];
+            kinds.extend([Kind::HostNotAllowed, Kind::CrossSite]);
             if path.contains("{id}") {
                 kinds.push(Kind::Expired);
             }

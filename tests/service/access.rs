@@ -299,6 +299,7 @@ async fn an_address_without_a_key_may_ask_so_often_and_no_more() {
     let router = railhead::http::router(jobs, options);
     let ask = async |address: &str| {
         let mut request = axum::http::Request::get("/v1/jobs")
+            .header("host", "localhost")
             .body(axum::body::Body::empty())
             .unwrap();
         let peer = Peer(address.parse().unwrap());
@@ -315,6 +316,30 @@ async fn an_address_without_a_key_may_ask_so_often_and_no_more() {
     for _ in 0..9 {
         assert_eq!(ask("127.0.0.1").await, (200, false), "this machine");
     }
+}
+
+#[tokio::test]
+async fn an_address_may_try_so_many_wrong_keys_and_no_more() {
+    let folder = tempfile::tempdir().unwrap();
+    let jobs = Jobs::open(Options::new(folder.path())).await.unwrap();
+    let router = railhead::http::router(jobs, HttpOptions::default());
+    let ask = async |address: &str| {
+        let mut request = axum::http::Request::get("/v1/jobs")
+            .header("host", "localhost")
+            .header("authorization", "Bearer rh_0123456789ab_0")
+            .body(axum::body::Body::empty())
+            .unwrap();
+        let peer = Peer(address.parse().unwrap());
+        request.extensions_mut().insert(peer);
+        let answer = router.clone().oneshot(request).await.unwrap();
+        answer.status().as_u16()
+    };
+    let mut statuses = Vec::new();
+    for _ in 0..30 {
+        statuses.push(ask("192.0.2.1").await);
+    }
+    assert_eq!((statuses[0], statuses[29]), (401, 429), "{statuses:?}");
+    assert_eq!(ask("192.0.2.2").await, 401, "somebody else");
 }
 
 /// Every path of the contract with a parameter belongs to a job or a batch, whose operations are all tried below, or

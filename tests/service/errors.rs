@@ -356,6 +356,7 @@ async fn every_kind_of_problem_explains_itself() {
         include_str!("access.rs"),
         include_str!("batches.rs"),
         include_str!("caching.rs"),
+        include_str!("crowds.rs"),
         include_str!("errors.rs"),
         include_str!("order.rs"),
         include_str!("requests.rs"),

@@ -10,6 +10,7 @@ mod caching;
 mod cli;
 mod contract;
 mod crash;
+mod crowds;
 mod documents;
 mod errors;
 mod events;

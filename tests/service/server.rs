@@ -85,7 +85,7 @@ impl Setup {
             .await
             .expect("a free port");
         let address = listener.local_addr().expect("an address");
-        let service = router(jobs.clone(), self.http);
+        let service = router(jobs.clone(), self.http.clone());
         let never = CancellationToken::new();
         tokio::spawn(railhead::http::serve(listener, service, self.http, never));
         Server {

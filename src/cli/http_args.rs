@@ -1,0 +1,160 @@
+//! The flags that limit what requests and connections may cost.
+
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use clap::Args;
+
+use crate::http::HttpOptions;
+
+/// Limits of requests and connections.
+#[derive(Debug, Clone, Args)]
+pub struct HttpArgs {
+    /// Address and port of a second listener that answers `/healthz`, `/readyz` and `/metrics` only; without it they are
+    /// answered on the first one alone, where a few places are kept for them.
+    #[arg(long, env = "RAILHEAD_PROBE_LISTEN", value_name = "ADDRESS:PORT")]
+    pub probe_listen: Option<SocketAddr>,
+    /// Open connections beyond which the one that has waited longest without a request is closed for the new one; fewer if
+    /// the process may not open so many files.
+    #[arg(long, env = "RAILHEAD_CONNECTIONS_MAX", default_value_t = 4096, value_name = "N",
+          value_parser = clap::value_parser!(u32).range(1..))]
+    pub connections_max: u32,
+    /// The same for the connections of one address (IPv6: of one network of 64 bits), loopback included.
+    #[arg(long, env = "RAILHEAD_ADDRESS_CONNECTIONS_MAX", default_value_t = 1024, value_name = "N",
+          value_parser = clap::value_parser!(u32).range(1..))]
+    pub address_connections_max: u32,
+    /// Requests of one tenant under way, streams of events and waits aside; beyond: 429.
+    #[arg(long, env = "RAILHEAD_TENANT_REQUESTS_MAX", default_value_t = 512, value_name = "N",
+          value_parser = clap::value_parser!(u32).range(1..))]
+    pub tenant_requests_max: u32,
+    /// Streams of events open in all; beyond: 429.
+    #[arg(
+        long,
+        env = "RAILHEAD_STREAMS_MAX",
+        default_value_t = 1024,
+        value_name = "N"
+    )]
+    pub streams_max: u32,
+    /// Streams of events of one tenant; beyond: 429.
+    #[arg(
+        long,
+        env = "RAILHEAD_TENANT_STREAMS_MAX",
+        default_value_t = 256,
+        value_name = "N"
+    )]
+    pub tenant_streams_max: u32,
+    /// Requests that wait for the end of a job or a batch; beyond, a job is answered without waiting, a batch by 429.
+    #[arg(
+        long,
+        env = "RAILHEAD_WAITS_MAX",
+        default_value_t = 1024,
+        value_name = "N"
+    )]
+    pub waits_max: u32,
+    /// The same of one tenant.
+    #[arg(
+        long,
+        env = "RAILHEAD_TENANT_WAITS_MAX",
+        default_value_t = 256,
+        value_name = "N"
+    )]
+    pub tenant_waits_max: u32,
+    /// Seconds for the head of the first request on a connection.
+    #[arg(long, env = "RAILHEAD_FIRST_HEAD_TIMEOUT_S", default_value_t = 10, value_name = "SECONDS",
+          value_parser = clap::value_parser!(u32).range(1..))]
+    pub first_head_timeout_s: u32,
+    /// Seconds for the head of each further request, idle time included.
+    #[arg(long, env = "RAILHEAD_HEAD_TIMEOUT_S", default_value_t = 75, value_name = "SECONDS",
+          value_parser = clap::value_parser!(u32).range(1..))]
+    pub head_timeout_s: u32,
+    /// Seconds for the body of a case, or between two pieces of that of a batch.
+    #[arg(long, env = "RAILHEAD_BODY_TIMEOUT_S", default_value_t = 60, value_name = "SECONDS",
+          value_parser = clap::value_parser!(u32).range(1..))]
+    pub body_timeout_s: u32,
+    /// Seconds that a client may take nothing of its answer.
+    #[arg(long, env = "RAILHEAD_WRITE_TIMEOUT_S", default_value_t = 60, value_name = "SECONDS",
+          value_parser = clap::value_parser!(u32).range(1..))]
+    pub write_timeout_s: u32,
+    /// Memory in MiB that bodies, parsed cases and answers of all requests may take; further ones wait or get 503.
+    #[arg(long, env = "RAILHEAD_REQUEST_MEMORY_MB", default_value_t = 512, value_name = "MIB",
+          value_parser = clap::value_parser!(u32).range(64..=1 << 20))]
+    pub request_memory_mb: u32,
+    /// The part of it that one tenant may take.
+    #[arg(long, env = "RAILHEAD_TENANT_REQUEST_MEMORY_MB", default_value_t = 256, value_name = "MIB",
+          value_parser = clap::value_parser!(u32).range(64..=1 << 20))]
+    pub tenant_request_memory_mb: u32,
+    /// Memory in MiB that one case may take once it is parsed; beyond: 413.
+    #[arg(long, env = "RAILHEAD_PARSED_CASE_MAX_MB", default_value_t = 96, value_name = "MIB",
+          value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    pub parsed_case_max_mb: u32,
+    /// Pictures, grids and tables made at the same time [default: half of the cores, at least 1].
+    #[arg(long, env = "RAILHEAD_RENDERINGS", value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub renderings: Option<u16>,
+    /// Requests that wait for their turn at that, half as many of one tenant; beyond: 503.
+    #[arg(long, env = "RAILHEAD_RENDERINGS_WAITING_MAX", default_value_t = 64, value_name = "N",
+          value_parser = clap::value_parser!(u32).range(2..))]
+    pub renderings_waiting_max: u32,
+    /// Samples of a regular grid (`?grid=NXxNY`); beyond: 400.
+    #[arg(long, env = "RAILHEAD_GRID_MAX_SAMPLES", default_value_t = 250_000, value_name = "N",
+          value_parser = clap::value_parser!(u32).range(4..=1_000_000))]
+    pub grid_max_samples: u32,
+    /// Names of the service, separated by commas, by which it may be asked without a key; addresses and `localhost` always
+    /// may. Others are refused, as a web page could make its own name lead here.
+    #[arg(
+        long,
+        env = "RAILHEAD_ALLOWED_HOST",
+        value_delimiter = ',',
+        value_name = "NAME"
+    )]
+    pub allowed_host: Vec<String>,
+}
+
+impl HttpArgs {
+    /// The options that these flags stand for; what concerns access is left at its default.
+    pub(super) fn options(&self) -> HttpOptions {
+        let count = |number: u32| number as usize;
+        let bytes = |mib: u32| (mib as usize) << 20;
+        let seconds = |number: u32| Duration::from_secs(number.into());
+        let default = HttpOptions::default();
+        HttpOptions {
+            first_head_timeout: seconds(self.first_head_timeout_s),
+            head_timeout: seconds(self.head_timeout_s),
+            body_timeout: seconds(self.body_timeout_s),
+            write_timeout: seconds(self.write_timeout_s),
+            connections_max: count(self.connections_max),
+            address_connections_max: count(self.address_connections_max),
+            tenant_requests_max: count(self.tenant_requests_max),
+            streams_max: count(self.streams_max),
+            tenant_streams_max: count(self.tenant_streams_max),
+            waits_max: count(self.waits_max),
+            tenant_waits_max: count(self.tenant_waits_max),
+            memory_max_bytes: bytes(self.request_memory_mb),
+            tenant_memory_max_bytes: bytes(self.tenant_request_memory_mb),
+            parsed_max_bytes: bytes(self.parsed_case_max_mb),
+            renderings: self.renderings.map_or(default.renderings, usize::from),
+            renderings_waiting_max: count(self.renderings_waiting_max),
+            grid_max_samples: count(self.grid_max_samples),
+            allowed_hosts: self.allowed_host.as_slice().into(),
+            ..default
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Debug, Parser)]
+    struct Only {
+        #[command(flatten)]
+        http: HttpArgs,
+    }
+
+    #[test]
+    fn the_defaults_of_the_flags_are_those_of_the_options() {
+        let given = Only::try_parse_from(["x"]).unwrap();
+        assert_eq!(given.http.options(), HttpOptions::default());
+    }
+}

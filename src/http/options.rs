@@ -1,0 +1,93 @@
+//! What requests and connections may cost, and who may send them.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+/// The limits of a service; every one is a flag of `serve`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct HttpOptions {
+    /// Largest body of one case in bytes.
+    pub body_max_bytes: usize,
+    /// Time for the first head on a new connection to arrive.
+    pub first_head_timeout: Duration,
+    /// Time for the next request's head to arrive on a connection, idle time included.
+    pub head_timeout: Duration,
+    /// Time for a body to arrive whole; for a batch, time between two pieces, and the head start over its lowest rate.
+    pub body_timeout: Duration,
+    /// How long a client may take nothing of its answer.
+    pub write_timeout: Duration,
+    /// Most open connections; for further ones the oldest without a request makes way.
+    pub connections_max: usize,
+    /// Most open connections of one address (IPv6: of one network of 64 bits), loopback included.
+    pub address_connections_max: usize,
+    /// Most requests of one tenant under way, streams of events and waits aside.
+    pub tenant_requests_max: usize,
+    /// Most streams of events.
+    pub streams_max: usize,
+    /// Most streams of events of one tenant.
+    pub tenant_streams_max: usize,
+    /// Most requests that wait for the end of a job or a batch.
+    pub waits_max: usize,
+    /// The same of one tenant.
+    pub tenant_waits_max: usize,
+    /// Memory in bytes that bodies, parsed cases and answers of all requests may take.
+    pub memory_max_bytes: usize,
+    /// The same for one tenant.
+    pub tenant_memory_max_bytes: usize,
+    /// Estimated memory of one parsed case in bytes.
+    pub parsed_max_bytes: usize,
+    /// Pictures, grids and tables that are made at the same time.
+    pub renderings: usize,
+    /// Requests that wait for one of these; of one tenant half as many.
+    pub renderings_waiting_max: usize,
+    /// Most samples of a regular grid.
+    pub grid_max_samples: usize,
+    /// Largest body of a batch in bytes.
+    pub batch_max_bytes: u64,
+    /// Most cases of a batch.
+    pub batch_max_cases: u32,
+    /// Requests without a key are answered, as those of a tenant of their own.
+    pub anonymous: bool,
+    /// The same for those that came through a proxy.
+    pub anonymous_proxied: bool,
+    /// Names of the service for requests without a key, besides addresses and `localhost`.
+    pub allowed_hosts: Arc<[String]>,
+    /// Origins of web pages that may read answers and change things.
+    pub origins: Arc<[String]>,
+    /// Requests per second of one key, or of one address without a key; 0 for any number.
+    pub requests_per_second: u32,
+}
+
+impl Default for HttpOptions {
+    fn default() -> Self {
+        HttpOptions {
+            body_max_bytes: 8 << 20,
+            first_head_timeout: Duration::from_secs(10),
+            // Longer than the usual proxies keep an idle connection, so that they close it first.
+            head_timeout: Duration::from_secs(75),
+            body_timeout: Duration::from_secs(60),
+            write_timeout: Duration::from_secs(60),
+            connections_max: 4096,
+            address_connections_max: 1024,
+            tenant_requests_max: 512,
+            streams_max: 1024,
+            tenant_streams_max: 256,
+            waits_max: 1024,
+            tenant_waits_max: 256,
+            memory_max_bytes: 512 << 20,
+            tenant_memory_max_bytes: 256 << 20,
+            parsed_max_bytes: 96 << 20,
+            renderings: std::thread::available_parallelism()
+                .map_or(1, |cores| (cores.get() / 2).max(1)),
+            renderings_waiting_max: 64,
+            grid_max_samples: 250_000,
+            batch_max_bytes: 1 << 30,
+            batch_max_cases: 200_000,
+            anonymous: true,
+            anonymous_proxied: false,
+            allowed_hosts: Arc::default(),
+            origins: Arc::default(),
+            requests_per_second: 0,
+        }
+    }
+}

@@ -1,0 +1,249 @@
+//! Many clients at once: silent ones make way, followers and waits have their own limits, probes are always answered.
+
+use std::time::Duration;
+
+use reqwest::Method;
+use serde_json::json;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
+
+use crate::errors::assert_problem;
+use crate::server::{Server, Setup, example};
+use crate::support::{Service, endless_case};
+
+/// A request on a connection of its own, of which nothing is read.
+async fn send(address: std::net::SocketAddr, request: &str) -> TcpStream {
+    let mut stream = TcpStream::connect(address).await.expect("a connection");
+    stream.write_all(request.as_bytes()).await.expect("sent");
+    stream
+}
+
+/// The whole answer to a request on a connection of its own.
+async fn ask(address: std::net::SocketAddr, path: &str) -> String {
+    let request = format!("GET {path} HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n");
+    let mut stream = send(address, &request).await;
+    let mut answer = String::new();
+    let read = tokio::time::timeout(Duration::from_secs(20), stream.read_to_string(&mut answer));
+    // A connection that was reset after its answer has been answered.
+    let _ = read.await.expect("an answer in time");
+    answer
+}
+
+fn followed(job: &str) -> String {
+    format!("GET {job}/events HTTP/1.1\r\nhost: localhost\r\n\r\n")
+}
+
+#[tokio::test]
+async fn silent_connections_and_followers_do_not_shut_the_port() {
+    let folder = tempfile::tempdir().unwrap();
+    let flags = [
+        "--connections-max",
+        "150",
+        "--address-connections-max",
+        "120",
+        "--tenant-streams-max",
+        "50",
+    ];
+    let service = Service::start(folder.path(), &flags);
+    let job = format!("/v1/jobs/{}", service.submit(&endless_case("long")).await);
+    let mut held = Vec::new();
+    for _ in 0..150 {
+        held.push(send(service.address(), &followed(&job)).await);
+    }
+    for _ in 0..400 {
+        held.push(TcpStream::connect(service.address()).await.unwrap());
+    }
+    for path in ["/healthz", "/readyz", "/metrics", "/v1/jobs", &job] {
+        let answer = ask(service.address(), path).await;
+        assert!(answer.starts_with("HTTP/1.1 200"), "{path}: {answer}");
+    }
+    service.submit(&example("spin.case.json")).await;
+    drop(held);
+}
+
+#[tokio::test]
+async fn the_oldest_silent_connection_makes_way_for_a_new_one() {
+    let mut setup = Setup::new();
+    setup.http.connections_max = 3;
+    let server = setup.start().await;
+    let mut silent = Vec::new();
+    for _ in 0..3 {
+        silent.push(TcpStream::connect(server.address).await.unwrap());
+    }
+    let answer = ask(server.address, "/healthz").await;
+    assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
+    let mut end = [0];
+    let closed = tokio::time::timeout(Duration::from_secs(5), silent[0].read(&mut end));
+    assert!(matches!(closed.await.expect("the end"), Ok(0) | Err(_)));
+    let open = tokio::time::timeout(Duration::from_millis(200), silent[2].read(&mut end));
+    assert!(open.await.is_err(), "the youngest one was closed too");
+}
+
+#[tokio::test]
+async fn probes_are_answered_while_every_connection_is_busy() {
+    let mut setup = Setup::new();
+    setup.http.connections_max = 3;
+    setup.working = false;
+    let server = setup.start().await;
+    let job = server.submit(&example("spin.case.json")).await;
+    let mut busy = Vec::new();
+    for _ in 0..3 {
+        let mut stream = send(server.address, &followed(&job)).await;
+        let mut begun = [0; 8];
+        stream.read_exact(&mut begun).await.unwrap();
+        busy.push(stream);
+    }
+    for (path, status) in [
+        ("/healthz", 200),
+        ("/readyz", 200),
+        ("/metrics", 200),
+        ("/v1/jobs", 503),
+    ] {
+        let answer = ask(server.address, path).await;
+        assert!(
+            answer.starts_with(&format!("HTTP/1.1 {status}")),
+            "{path}: {answer}"
+        );
+        assert_eq!(
+            answer.contains("/problems/overloaded"),
+            status == 503,
+            "{answer}"
+        );
+    }
+}
+
+#[tokio::test]
+async fn a_tenant_may_follow_and_wait_so_often_and_no_more() {
+    let mut setup = Setup::new();
+    setup.working = false;
+    setup.http.tenant_streams_max = 2;
+    setup.http.tenant_waits_max = 0;
+    let server = setup.start().await;
+    let job = server.submit(&example("spin.case.json")).await;
+    let mut streams = Vec::new();
+    for _ in 0..2 {
+        let mut stream = send(server.address, &followed(&job)).await;
+        let mut begun = [0; 12];
+        stream.read_exact(&mut begun).await.unwrap();
+        assert_eq!(&begun, b"HTTP/1.1 200");
+        streams.push(stream);
+    }
+    let answer = ask(server.address, &format!("{job}/events")).await;
+    assert!(answer.contains("/problems/too-many-requests"), "{answer}");
+    // A wait is a wish only: the job is made, and its id told at once.
+    let waiting = |request: reqwest::RequestBuilder| {
+        let request = request.header("prefer", "wait=60");
+        request.json(&example("hertz-steel.case.json"))
+    };
+    let answer = server.send(Method::POST, "/v1/jobs", waiting).await;
+    assert_eq!(
+        (answer.status, answer.header("preference-applied")),
+        (202, None)
+    );
+    // Its place is free again when a follower has gone.
+    streams.pop();
+    loop {
+        let mut stream = send(server.address, &followed(&job)).await;
+        let mut begun = [0; 12];
+        stream.read_exact(&mut begun).await.unwrap();
+        if &begun == b"HTTP/1.1 200" {
+            break;
+        }
+    }
+}
+
+#[tokio::test]
+async fn probes_can_have_a_port_of_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &["--probe-listen", "127.0.0.1:0"]);
+    let log = service.log_text();
+    let event = log
+        .lines()
+        .find(|line| line.contains("listening for probes"));
+    let event: serde_json::Value = serde_json::from_str(event.expect("its address")).unwrap();
+    let address = event["address"].as_str().unwrap();
+    let address = address.parse().unwrap();
+    for (path, status) in [
+        ("/healthz", 200),
+        ("/readyz", 200),
+        ("/metrics", 200),
+        ("/v1/jobs", 404),
+    ] {
+        let answer = ask(address, path).await;
+        assert!(
+            answer.starts_with(&format!("HTTP/1.1 {status}")),
+            "{path}: {answer}"
+        );
+    }
+    service.signal("INT");
+    // The other port is closed at once; this one answers for as long as the process lives.
+    assert_eq!(service.wait().code(), Some(0));
+}
+
+#[tokio::test]
+async fn without_a_key_foreign_names_pages_and_proxies_are_refused() {
+    let server = Server::idle().await;
+    let job = server.submit(&example("spin.case.json")).await;
+    let cancel = format!("{job}/cancel");
+    for (method, path, header, status, slug) in [
+        (
+            Method::GET,
+            "/v1/jobs",
+            ("host", "evil.example"),
+            403,
+            "host-not-allowed",
+        ),
+        (
+            Method::GET,
+            &job,
+            ("x-forwarded-for", "192.0.2.1"),
+            401,
+            "unauthorized",
+        ),
+        (
+            Method::GET,
+            "/metrics",
+            ("forwarded", "for=192.0.2.1"),
+            401,
+            "unauthorized",
+        ),
+        (
+            Method::POST,
+            &cancel,
+            ("origin", "http://evil.example"),
+            403,
+            "cross-site",
+        ),
+        (
+            Method::POST,
+            &cancel,
+            ("sec-fetch-site", "cross-site"),
+            403,
+            "cross-site",
+        ),
+        (
+            Method::DELETE,
+            &job,
+            ("sec-fetch-site", "same-site"),
+            403,
+            "cross-site",
+        ),
+    ] {
+        let (name, value) = header;
+        let shape = |request: reqwest::RequestBuilder| request.header(name, value);
+        let answer = server.send(method, path, shape).await;
+        assert_problem(&answer, status, slug, "");
+    }
+    assert_eq!(server.get(&job).await.json["state"], json!("queued"));
+    let mut stream = send(
+        server.address,
+        "GET /healthz HTTP/1.1\r\nconnection: close\r\n\r\n",
+    )
+    .await;
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).await.unwrap();
+    assert!(
+        answer.starts_with("HTTP/1.1 400") && answer.contains("Host"),
+        "{answer}"
+    );
+}
