@@ -13,6 +13,7 @@ pub mod outputs;
 pub mod problem;
 mod profiles;
 mod read;
+pub mod remark;
 pub mod solution;
 pub mod tangential;
 pub mod zones;

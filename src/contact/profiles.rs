@@ -14,6 +14,7 @@ use crate::contact::normal::Region;
 use crate::contact::normal::profiles::{Loading, PressedGap, PressedWheel, ProfileContact, Wanted};
 use crate::contact::outputs::track::merge;
 use crate::contact::problem::{Problem, Resolution};
+use crate::contact::remark::Remark;
 use crate::contact::solution::{Fields, Solution};
 use crate::contact::tangential::prepared::Cache;
 
@@ -60,11 +61,8 @@ pub(super) fn solve(
         let mut at_rest = rest(exactly(0.0), None)?;
         let answers = at_rest.answers(cache, problem, contact, monitor)?;
         if vertical {
-            at_rest.wheel.warnings.push(
-                "normal forces alone balance the vertical force, because several motions share their patches; the total of a motion \
-                 has its friction on top"
-                    .to_owned(),
-            );
+            let remark = Remark::NormalForcesAloneBalance {};
+            at_rest.wheel.remarks.push(remark.into());
         }
         return Ok(merge(problem, &contact.geometry, &at_rest.wheel, answers));
     }

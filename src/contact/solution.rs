@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::contact::case::{Method, Motion};
+use crate::contact::remark::RemarkEntry;
 use crate::contact::zones::Zone;
 
 /// The answer to one case, without fields.
@@ -17,7 +18,8 @@ pub struct Solution {
     /// One entry per motion: plain sums over the patches.
     pub total: Vec<Total>,
     /// What the client should know before using the numbers.
-    pub warnings: Vec<String>,
+    #[serde(default)]
+    pub remarks: Vec<RemarkEntry>,
     /// How region and pressure were found; absent where they were known beforehand.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub normal: Option<NormalReport>,

@@ -13,6 +13,7 @@ use tokio::time::Instant;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
+use crate::contact::remark::RemarkEntry;
 use crate::contact::solution::Solution;
 use crate::http::accept::{Format, choose, named_format};
 use crate::http::access::Caller;
@@ -240,7 +241,7 @@ fn outputs(line: &Line) -> Vec<String> {
     serde_json::from_str(&line.outputs).unwrap_or_default()
 }
 
-const CSV_COLUMNS: [&str; 17] = [
+const CSV_COLUMNS: [&str; 18] = [
     "index",
     "id",
     "name",
@@ -257,6 +258,7 @@ const CSV_COLUMNS: [&str; 17] = [
     "error_force_y_n",
     "error_moment_z_n_mm",
     "friction_power_n",
+    "remarks",
     "error",
 ];
 
@@ -299,6 +301,17 @@ fn write_csv(lines: &[Line]) -> Result<Vec<u8>, JobsError> {
     out.into_inner().map_err(|error| damaged(&error))
 }
 
+/// The codes of the remarks that hold for a motion, each once.
+fn codes(remarks: &[RemarkEntry], point: usize) -> String {
+    let mut codes: Vec<&str> = Vec::new();
+    for remark in remarks.iter().filter(|remark| remark.holds_at(point)) {
+        if !codes.contains(&&*remark.code) {
+            codes.push(&remark.code);
+        }
+    }
+    codes.join(" ")
+}
+
 /// The numbers of each motion: sums over all patches.
 fn csv_numbers(solution: &Solution) -> impl Iterator<Item = Vec<String>> {
     let normal: f64 = solution
@@ -333,6 +346,7 @@ fn csv_numbers(solution: &Solution) -> impl Iterator<Item = Vec<String>> {
                 text(estimate.map(|estimate| estimate.force_y_n)),
                 text(estimate.map(|estimate| estimate.moment_z_n_mm)),
                 power.to_string(),
+                codes(&solution.remarks, point),
             ]
         })
 }

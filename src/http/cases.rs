@@ -5,6 +5,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::contact::case::{Case, Method, Output};
+use crate::contact::remark::RemarkEntry;
 use crate::http::access::Caller;
 use crate::http::body::JsonBody;
 use crate::http::error::ApiError;
@@ -24,7 +25,7 @@ pub struct CheckedCase {
     /// Expected cost.
     estimate: Estimate,
     /// What the client should know before using the numbers.
-    warnings: Vec<String>,
+    remarks: Vec<RemarkEntry>,
 }
 
 /// Expected cost of a case, rough.
@@ -67,7 +68,7 @@ pub async fn check(
                     bytes: cost.bytes,
                     seconds: cost.seconds,
                 },
-                warnings: problem.warnings,
+                remarks: problem.remarks,
             }
         })
     });

@@ -8,6 +8,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
+use crate::contact::remark::RemarkEntry;
 use crate::http::error::{ApiError, Kind};
 use crate::http::problem::Problem;
 use crate::http::results::JobResult;
@@ -55,7 +56,7 @@ pub struct JobAnswer {
     #[schema(minimum = 0.0, maximum = 1.0)]
     progress: f64,
     /// What the client should know before using the numbers.
-    warnings: Vec<String>,
+    remarks: Vec<RemarkEntry>,
     /// Why the job failed; null unless it did.
     error: Option<Problem>,
     /// Where to go from here.
@@ -89,7 +90,7 @@ impl JobAnswer {
             attempt: job.attempt,
             cached: job.cached,
             progress: job.progress,
-            warnings: job.warnings,
+            remarks: job.remarks,
             error,
             result,
         }

@@ -35,6 +35,7 @@ mod plot;
 mod problem;
 mod problems;
 mod query;
+mod remarks;
 mod resultants;
 mod results;
 mod shares;
@@ -149,6 +150,7 @@ fn resources() -> OpenApiRouter<Shared> {
         .routes(routes!(jobs::look, jobs::delete))
         .routes(routes!(batches::look, batches::delete))
         .routes(routes!(methods::methods))
+        .routes(routes!(remarks::remarks))
         .route_layer(from_fn(caching::changing));
     let changing = openapi::conditional(changing);
     let finished = OpenApiRouter::new()

@@ -175,8 +175,8 @@ fn require_keys(document: &mut utoipa::openapi::OpenApi) {
             let tags = operation.tags.as_deref().unwrap_or_default();
             let open = tags.iter().any(|tag| tag == "service");
             let metrics = operation.operation_id.as_deref() == Some("get_metrics");
-            let methods = operation.operation_id.as_deref() == Some("list_methods");
-            if (open && !metrics) || methods {
+            let lists = ["list_methods", "list_remarks"].map(Some);
+            if (open && !metrics) || lists.contains(&operation.operation_id.as_deref()) {
                 continue;
             }
             operation.security = Some(vec![

@@ -281,11 +281,11 @@ impl Worker {
                 Verdict::End(ending) => ending,
                 Verdict::Keep {
                     result,
-                    warnings,
+                    remarks,
                     field_patches,
                 } => match self.place(&member.claim, &member.watch, result).await {
                     Ok(result) => Ending::Succeeded {
-                        warnings,
+                        remarks,
                         result,
                         field_patches,
                     },

@@ -7,6 +7,7 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use crate::contact::error::SolveError;
+use crate::contact::remark::RemarkEntry;
 use crate::jobs::wishes::Priority;
 
 /// What is known of one job. Times are epoch milliseconds (UTC).
@@ -41,7 +42,7 @@ pub struct Job {
     /// 0 to 1, rough; written at most with each heartbeat.
     pub progress: f64,
     /// What the client should know before using the numbers; filled on success.
-    pub warnings: Vec<String>,
+    pub remarks: Vec<RemarkEntry>,
     /// Why there is no answer; present exactly when the state is `failed`.
     pub failure: Option<Failure>,
     /// The result was computed for an identical case before, not for this job.

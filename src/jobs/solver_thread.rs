@@ -8,6 +8,7 @@ use bytes::Bytes;
 
 use crate::contact::error::{CaseError, SolveError};
 use crate::contact::monitor::Monitor;
+use crate::contact::remark::RemarkEntry;
 use crate::jobs::Shared;
 use crate::jobs::error::JobsError;
 use crate::jobs::fields;
@@ -24,7 +25,7 @@ pub(super) enum Outcome {
     /// The answer in its stored form.
     Solved {
         result: Encoded,
-        warnings: Vec<String>,
+        remarks: Vec<RemarkEntry>,
         field_patches: u32,
     },
     /// The solver gave up or was stopped.
@@ -104,7 +105,7 @@ fn solve_case(shared: &Shared, watch: &Watch, body: &[u8]) -> Outcome {
                 solution: Bytes::from(json),
                 fields,
             },
-            warnings: solution.warnings,
+            remarks: solution.remarks,
             field_patches,
         },
         (Err(error), _) => internal(format!("the solution cannot be written as JSON: {error}")),

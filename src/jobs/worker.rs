@@ -17,6 +17,7 @@ use uuid::Uuid;
 
 use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
+use crate::contact::remark::RemarkEntry;
 use crate::jobs::Shared;
 use crate::jobs::error::JobsError;
 use crate::jobs::job::{Failure, FailureKind, Job, State};
@@ -229,11 +230,11 @@ impl Worker {
             Verdict::End(ending) => ending,
             Verdict::Keep {
                 result,
-                warnings,
+                remarks,
                 field_patches,
             } => match self.place(claim, watch, result).await {
                 Ok(result) => Ending::Succeeded {
-                    warnings,
+                    remarks,
                     result,
                     field_patches,
                 },
@@ -316,7 +317,7 @@ pub(super) enum Verdict {
     /// There is an answer to keep.
     Keep {
         result: Encoded,
-        warnings: Vec<String>,
+        remarks: Vec<RemarkEntry>,
         field_patches: u32,
     },
     /// The job ends without one.
@@ -334,11 +335,11 @@ pub(super) fn judge(outcome: Outcome, watch: &Watch) -> Verdict {
         Outcome::Solved { .. } if watch.reason() == Some(Reason::Lost) => Verdict::Lost,
         Outcome::Solved {
             result,
-            warnings,
+            remarks,
             field_patches,
         } => Verdict::Keep {
             result,
-            warnings,
+            remarks,
             field_patches,
         },
         Outcome::Unsolved(SolveError::Cancelled) | Outcome::Abandoned => match watch.reason() {

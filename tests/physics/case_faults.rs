@@ -10,7 +10,7 @@ use crate::cases::{assert_fault, faults, good, good_with, problem, with};
 fn the_good_case_is_good() {
     let problem = problem(&good());
     assert_eq!(problem.motions.len(), 1);
-    assert!(problem.warnings.is_empty(), "{:?}", problem.warnings);
+    assert!(problem.remarks.is_empty(), "{:?}", problem.remarks);
     assert!(problem.wants(Output::Tractions) && !problem.wants(Output::Slip));
 }
 

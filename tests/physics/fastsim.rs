@@ -222,10 +222,10 @@ fn a_target_below_the_class_is_answered_and_said_to_be_missed() {
         let (solution, _) = solve(&case);
         assert_eq!(solution.patches[0].points[0].target_met, Some(met));
         let warned = solution
-            .warnings
+            .remarks
             .iter()
-            .any(|w| w.contains("the target was"));
-        assert_eq!(warned, !met, "{:?}", solution.warnings);
+            .any(|remark| remark.code == "target-missed");
+        assert_eq!(warned, !met, "{:?}", solution.remarks);
     }
 }
 

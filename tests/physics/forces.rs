@@ -193,11 +193,11 @@ fn all_of_friction_is_reached_without_spin_and_not_with_it() {
         );
         assert!(
             solution
-                .warnings
+                .remarks
                 .iter()
-                .any(|w| w.contains("no creepage gives")),
+                .any(|remark| remark.code == "force-unreachable"),
             "{:?}",
-            solution.warnings
+            solution.remarks
         );
     }
 }

@@ -198,7 +198,7 @@ fn a_contact_just_inside_the_data_is_solved() {
 }
 
 #[test]
-fn nearly_conformal_and_overloaded_contacts_carry_a_warning() {
+fn nearly_conformal_and_overloaded_contacts_carry_a_remark() {
     let y = spread(-40.0, 40.0, 81);
     let warned = |rolling: f64, lateral: f64, force: f64| {
         let contact = profile(rolling, &y, |y| 0.5 * y * y / lateral);
@@ -208,23 +208,23 @@ fn nearly_conformal_and_overloaded_contacts_carry_a_warning() {
             Some(json!({ "normal_force_n": force })),
         );
         let problem = check(&case, &Limits::default()).unwrap();
-        contact::solve(&problem, &Unwatched).unwrap().0.warnings
+        contact::solve(&problem, &Unwatched).unwrap().0.remarks
     };
     assert!(
         warned(20.0, 20.0, 2e6)
             .iter()
-            .any(|w| w.contains("nearly conformal"))
+            .any(|remark| remark.code == "nearly-conformal")
     );
     assert!(
         warned(460.0, 5.0, 1e6)
             .iter()
-            .any(|w| w.contains("strains are too large"))
+            .any(|remark| remark.code == "strains-too-large")
     );
     let usual = warned(460.0, 300.0, 1e5);
     assert!(
         !usual
             .iter()
-            .any(|w| w.contains("conformal") || w.contains("strains")),
+            .any(|w| w.code == "nearly-conformal" || w.code == "strains-too-large"),
         "{usual:?}"
     );
 }

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use railhead::contact::mesh::Chord;
 use railhead::contact::normal::prescribed::PressureField;
+use railhead::contact::remark::RemarkEntry;
 use serde_json::{Value, json};
 
 /// Samples `n` by `n` of a pressure over `[x_min, x_max, y_min, y_max]`, ends included.
@@ -39,7 +40,7 @@ impl Samples {
         self.field_with_remarks().0
     }
 
-    pub fn field_with_remarks(&self) -> (PressureField, Vec<String>) {
+    pub fn field_with_remarks(&self) -> (PressureField, Vec<RemarkEntry>) {
         PressureField::new(&self.x, &self.y, &self.pressure).unwrap()
     }
 

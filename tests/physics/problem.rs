@@ -15,10 +15,12 @@ fn different_bodies_are_combined_with_a_remark_or_refused() {
             }),
         )
     };
-    let remarks = problem(&pair(79_000.0, 0.29)).warnings;
+    let remarks = problem(&pair(79_000.0, 0.29)).remarks;
     assert_eq!(remarks.len(), 1);
-    assert!(remarks[0].contains("K = "), "{remarks:?}");
-    assert!(problem(&pair(82_000.0, 0.28)).warnings.is_empty());
+    assert_eq!(remarks[0].code, "coupling-neglected");
+    assert_eq!(remarks[0].pointer.as_deref(), Some("/material"));
+    assert!(remarks[0].detail.contains("K = "), "{remarks:?}");
+    assert!(problem(&pair(82_000.0, 0.28)).remarks.is_empty());
     assert_fault(&pair(23_000.0, 0.31), "/material", &["K = 0.1", "0.05"]);
     assert_fault(
         &good_with(
@@ -34,10 +36,14 @@ fn different_bodies_are_combined_with_a_remark_or_refused() {
 fn high_friction_is_solved_with_a_remark() {
     assert!(
         problem(&good_with("/friction/coefficient", json!(1.0)))
-            .warnings
+            .remarks
             .is_empty()
     );
-    assert!(problem(&good_with("/friction/coefficient", json!(1.5))).warnings[0].contains("1.5"));
+    assert!(
+        problem(&good_with("/friction/coefficient", json!(1.5))).remarks[0]
+            .detail
+            .contains("1.5")
+    );
 }
 
 #[test]

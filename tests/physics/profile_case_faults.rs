@@ -306,11 +306,12 @@ fn remarks_on_profiles_are_in_the_answer() {
     let (solution, _) = solve(&problem, &Unwatched).unwrap();
     assert!(
         solution
-            .warnings
+            .remarks
             .iter()
-            .any(|w| w.starts_with("rail: ") && w.contains("zig-zag")),
+            .any(|remark| remark.code == "profile-points-dropped"
+                && remark.pointer.as_deref() == Some("/contact/rail")),
         "{:?}",
-        solution.warnings
+        solution.remarks
     );
 }
 

@@ -3,6 +3,7 @@
 use railhead::contact::geometry::contact_search::Search;
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
 use railhead::contact::geometry::wheel_rail::WheelRail;
+use railhead::contact::remark::Remark;
 
 use crate::profile_geometry::placement;
 use crate::profile_shapes::{rail_60e1, s1002};
@@ -78,17 +79,20 @@ fn loops_are_refused() {
 fn single_points_that_run_back_are_dropped_with_a_remark() {
     let mut points = rail_60e1();
     let clean = rail(&points).unwrap();
-    assert_eq!(clean.warnings, Vec::<String>::new());
+    assert_eq!(clean.remarks, Vec::new());
     points.swap(100, 101);
     points.insert(200, points[198]);
     let found = rail(&points).unwrap();
     assert!(
-        found
-            .warnings
-            .iter()
-            .any(|warning| warning.contains("zig-zag")),
+        matches!(
+            found.remarks[..],
+            [Remark::ProfilePointsDropped {
+                profile: "rail",
+                count: 2
+            }]
+        ),
         "{:?}",
-        found.warnings
+        found.remarks
     );
     let [first, last] = clean.range();
     for k in 0..100 {
@@ -130,7 +134,7 @@ fn order_and_senses_are_found_or_taken_from_the_statement() {
                 smoothing: 0.0,
             };
             let stated = Profile::new(Body::Wheel, &points, stated).unwrap();
-            assert_eq!(found.warnings.is_empty(), y > 0.0 && z > 0.0);
+            assert_eq!(found.remarks.is_empty(), y > 0.0 && z > 0.0);
             for s in [0.0, 20.0, 60.0, 100.0] {
                 for part in 0..2 {
                     let value = expected.at(s).at[part];

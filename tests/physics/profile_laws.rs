@@ -215,11 +215,11 @@ fn several_motions_share_their_patches_and_a_remark_says_what_balances() {
     assert_eq!(solution.total.len(), 2);
     assert!(
         solution
-            .warnings
+            .remarks
             .iter()
-            .any(|w| w.contains("normal forces alone")),
+            .any(|remark| remark.code == "normal-forces-alone-balance"),
         "{:?}",
-        solution.warnings
+        solution.remarks
     );
     let vertical = |k: usize| -solution.total[k].force_z_n.expect("a force");
     assert!((vertical(0) / 75e3 - 1.0).abs() < 1e-3 && vertical(1) > 1.05 * 75e3);

@@ -73,7 +73,7 @@ fn five_hundred_random_motions_are_solved_in_few_iterations() {
         let point = &solution.patches[0].points[0];
         let forces = contact.relative(point);
         let largest_arm = contact.a_mm.max(contact.b_mm) / contact.c();
-        fallbacks += usize::from(!solution.warnings.is_empty());
+        fallbacks += usize::from(!solution.remarks.is_empty());
         iterations.push(point.solver.iterations);
         if !forces.iter().all(|f| f.is_finite())
             || forces[0].hypot(forces[1]) > 1.0 + 1e-6
@@ -93,7 +93,7 @@ fn five_hundred_random_motions_are_solved_in_few_iterations() {
                 point.friction_power_n
             ));
         }
-        if point.solver.iterations > 2 * ITERATIONS_PER_RULE && solution.warnings.is_empty() {
+        if point.solver.iterations > 2 * ITERATIONS_PER_RULE && solution.remarks.is_empty() {
             failures.push(format!(
                 "{}: {} iterations",
                 describe(contact),
@@ -108,7 +108,7 @@ fn five_hundred_random_motions_are_solved_in_few_iterations() {
     let most = iterations.iter().max().copied().unwrap_or(0);
     let mean = f64::from(iterations.iter().sum::<u32>()) / iterations.len().max(1) as f64;
     println!(
-        "{} solved, {mean:.1} iterations on average, {most} at most, {fallbacks} with a warning",
+        "{} solved, {mean:.1} iterations on average, {most} at most, {fallbacks} with a remark",
         iterations.len()
     );
     assert_none("of 500 random motions", &failures);

@@ -1,5 +1,6 @@
 //! A target is met, and the estimate of the error is honest.
 
+use railhead::contact::remark::Figure;
 use serde_json::json;
 
 use crate::reference::{HERTZ_CLASSES, ReferenceCase, cases, median, solve};
@@ -95,11 +96,12 @@ fn a_target_out_of_reach_is_said_and_not_hidden() {
     assert_eq!(solution.patches[0].points[0].target_met, Some(false));
     assert!(
         solution
-            .warnings
+            .remarks
             .iter()
-            .any(|w| w.contains("the target was 0.0001")),
+            .any(|remark| remark.code == "target-missed"
+                && remark.figures["target"] == Figure::Number(1e-4)),
         "{:?}",
-        solution.warnings
+        solution.remarks
     );
 }
 

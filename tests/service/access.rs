@@ -126,6 +126,7 @@ async fn without_a_good_key_there_is_no_answer() {
         "/openapi.json",
         "/problems",
         "/v1/methods",
+        "/v1/remarks",
     ] {
         assert_eq!(server.get(open).await.status, 200, "{open}");
     }

@@ -229,6 +229,7 @@ async fn cancelling_a_batch_ends_its_queued_jobs_and_no_other() {
 async fn results_as_csv_have_a_header_and_a_line_per_motion() {
     let server = Server::start().await;
     let mut sweep = small("two, motions");
+    sweep["friction"]["coefficient"] = json!(1.5);
     let motion = sweep["motion"].clone();
     sweep["motion"] = json!([motion, motion]);
     let batch = send(
@@ -248,6 +249,12 @@ async fn results_as_csv_have_a_header_and_a_line_per_motion() {
         "{}",
         rows[3]
     );
+    let codes = |row: &str| row.rsplit(',').nth(1).unwrap_or_default().to_owned();
+    assert_eq!(codes(rows[0]), "remarks");
+    assert!(!codes(rows[1]).contains("friction-unusual"), "{}", rows[1]);
+    for row in &rows[2..] {
+        assert!(codes(row).contains("friction-unusual"), "{row}");
+    }
     let by_accept = server
         .send(Method::GET, path, |request| {
             request.header("accept", "text/csv")

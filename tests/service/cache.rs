@@ -73,7 +73,7 @@ async fn an_identical_case_is_answered_at_once_with_the_first_result() {
         (&second["attempt"], &second["progress"]),
         (&json!(0), &json!(1.0))
     );
-    assert_eq!(second["warnings"], first["warnings"]);
+    assert_eq!(second["remarks"], first["remarks"]);
     let result = server
         .get(&format!("{}/result", path_of(&second)))
         .await

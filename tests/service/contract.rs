@@ -104,6 +104,7 @@ fn every_route_of_the_outline_is_in_the_contract() {
         "POST /v1/batches/{id}/cancel",
         "POST /v1/cases/check",
         "GET /v1/methods",
+        "GET /v1/remarks",
         "GET /healthz",
         "GET /readyz",
         "GET /openapi.json",

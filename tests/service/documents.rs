@@ -180,3 +180,24 @@ async fn tour_uses_existing_examples_and_routes() {
     }
     assert!(called >= 5, "the tour calls {called} routes only");
 }
+
+#[tokio::test]
+async fn remarks_are_explained_and_those_of_an_answer_are_among_them() {
+    let server = Server::idle().await;
+    let kinds = server.get("/v1/remarks").await.json;
+    let kinds = kinds.as_array().expect("a list");
+    assert!(kinds.len() > 10);
+    for kind in kinds {
+        for member in ["code", "severity", "meaning", "advice", "example"] {
+            assert!(kind[member].is_string(), "{kind}");
+        }
+    }
+    let mut case = example("hertz-steel.case.json");
+    case["friction"]["coefficient"] = json!(1.5);
+    let checked = server.post("/v1/cases/check", &case).await.json;
+    let remark = &checked["remarks"][0];
+    assert_eq!(remark["pointer"], "/friction/coefficient");
+    assert_eq!(remark["coefficient"], 1.5);
+    let listed = kinds.iter().find(|kind| kind["code"] == remark["code"]);
+    assert_eq!(listed.expect("its kind")["severity"], remark["severity"]);
+}

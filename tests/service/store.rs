@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use bytes::Bytes;
+use railhead::contact::remark::{Remark, RemarkEntry};
 use railhead::jobs::store::list::Filter;
 use railhead::jobs::store::sqlite::SqliteStore;
 use railhead::jobs::store::{Claim, Deleted, Ending, Enqueued, NewJob, Placed, Renewal};
@@ -77,9 +78,13 @@ fn keyed(key: &str, digest: u8) -> NewJob {
     }
 }
 
+fn remark() -> RemarkEntry {
+    Remark::GapRough {}.at_patch(0)
+}
+
 pub fn success() -> Ending {
     Ending::Succeeded {
-        warnings: vec!["mind the gap".to_owned()],
+        remarks: vec![remark()],
         result: Placed::Folder("results/1".to_owned(), 10),
         field_patches: 2,
     }
@@ -173,7 +178,7 @@ async fn a_job_ends_once_and_says_how() {
         let (_, stored) = table.store.result(claim.id).await.unwrap().unwrap();
         assert_eq!(stored.is_some(), state == State::Succeeded);
         if state == State::Succeeded {
-            assert_eq!(job.warnings, ["mind the gap"]);
+            assert_eq!(job.remarks, [remark()]);
             assert!((job.progress - 1.0).abs() < f64::EPSILON);
             assert_eq!(stored.unwrap().field_patches, 2);
         }

@@ -181,7 +181,7 @@ impl Pair {
     async fn finish(&mut self, claim: Claim, well: bool) {
         let ending = if well {
             Ending::Succeeded {
-                warnings: Vec::new(),
+                remarks: Vec::new(),
                 result: Placed::Folder("k".to_owned(), 1),
                 field_patches: 0,
             }

@@ -54,11 +54,11 @@ async fn keeps_its_answer(small_result_max_bytes: usize) {
     );
 
     let (solution, fields) = answers.recv().unwrap();
-    assert!(!solution.warnings.is_empty());
+    assert!(!solution.remarks.is_empty());
     assert!(fields.patches[0].points[0].traction_x_mpa.is_some());
     let job = jobs.get(id).await.unwrap();
     assert_eq!((job.state, job.attempt), (State::Succeeded, 1));
-    assert_eq!(job.warnings, solution.warnings);
+    assert_eq!(job.remarks, solution.remarks);
     assert_eq!(jobs.solution(id).await.unwrap(), solution);
     assert_eq!(jobs.patch_fields(id, 0).await.unwrap(), fields.patches[0]);
     assert_eq!(

@@ -4,6 +4,7 @@
 //! up. The curve runs from the track centre to the field side, with the rail below and the wheel above it.
 
 use crate::contact::geometry::smoothing::Spline;
+use crate::contact::remark::Remark;
 
 /// Length of the whole curve in mm that a profile may have; anything else is in another unit.
 pub const ARC_LENGTH: [f64; 2] = [5.0, 500.0];
@@ -27,6 +28,17 @@ pub enum Body {
     Wheel,
 }
 
+impl Body {
+    /// The word for it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Body::Rail => "rail",
+            Body::Wheel => "wheel",
+        }
+    }
+}
+
 /// What is said about a profile beside its points.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Reading {
@@ -44,7 +56,7 @@ pub struct Profile {
     y: Spline,
     z: Spline,
     /// What was found and changed on the way.
-    pub warnings: Vec<String>,
+    pub remarks: Vec<Remark>,
 }
 
 /// The curve at one place: y to the field side, z up, in mm; derivatives to the parameter.
@@ -84,7 +96,7 @@ impl Profile {
     /// A sentence: too few or too many points, numbers that are not finite, a total arc length outside 5 to 500 mm, loops, more than 5 %
     /// of the points running back, or a shape that does not tell what is up and was not stated.
     pub fn new(body: Body, points: &[[f64; 2]], reading: Reading) -> Result<Profile, String> {
-        let mut warnings = Vec::new();
+        let mut remarks = Vec::new();
         let mut points = checked(points)?;
         let length = arc_length(&points);
         let [shortest, longest] = ARC_LENGTH;
@@ -94,15 +106,16 @@ impl Profile {
                  used, or are the points not in order?)"
             ));
         }
-        orient(body, &mut points, reading, &mut warnings)?;
-        straighten(&mut points, &mut warnings)?;
+        orient(body, &mut points, reading, &mut remarks)?;
+        straighten(body, &mut points, &mut remarks)?;
         let given = points.len();
         points.dedup_by(|after, before| distance(*after, *before) < NEAR);
         if points.len() < given {
-            warnings.push(format!(
-                "{} points nearer than {NEAR} mm to another one were merged",
-                given - points.len()
-            ));
+            remarks.push(Remark::ProfilePointsMerged {
+                profile: body.name(),
+                count: given - points.len(),
+                nearer_than_mm: NEAR,
+            });
         }
         if points.len() < POINTS_MIN {
             return Err(format!(
@@ -127,7 +140,7 @@ impl Profile {
         Ok(Profile {
             y: part(0),
             z: part(1),
-            warnings,
+            remarks,
         })
     }
 
@@ -162,7 +175,7 @@ impl Profile {
         Profile {
             y: part(&|p| cos * p[0] - sin * p[1]),
             z: part(&|p| sin * p[0] + cos * p[1]),
-            warnings: self.warnings.clone(),
+            remarks: self.remarks.clone(),
         }
     }
 
@@ -209,7 +222,7 @@ fn orient(
     body: Body,
     points: &mut [[f64; 2]],
     reading: Reading,
-    warnings: &mut Vec<String>,
+    remarks: &mut Vec<Remark>,
 ) -> Result<(), String> {
     let up = match reading.mirror_z {
         Some(up) => up,
@@ -219,7 +232,8 @@ fn orient(
                     .to_owned()
             })?;
             if up {
-                warnings.push("z was found to be positive up and has been mirrored".to_owned());
+                let profile = body.name();
+                remarks.push(Remark::ProfileZMirrored { profile });
             }
             up
         }
@@ -233,9 +247,8 @@ fn orient(
         (None, Body::Wheel) => {
             let mirrored = flange(points)[0] > middle(points);
             if mirrored {
-                warnings.push(
-                    "the flange was found at positive y, so that y has been mirrored".to_owned(),
-                );
+                let profile = body.name();
+                remarks.push(Remark::ProfileYMirrored { profile });
             }
             mirrored
         }
@@ -281,7 +294,11 @@ fn points_up(body: Body, points: &[[f64; 2]]) -> Option<bool> {
 }
 
 /// Drops points that run back between their neighbours, as stitched measurements have them.
-fn straighten(points: &mut Vec<[f64; 2]>, warnings: &mut Vec<String>) -> Result<(), String> {
+fn straighten(
+    body: Body,
+    points: &mut Vec<[f64; 2]>,
+    remarks: &mut Vec<Remark>,
+) -> Result<(), String> {
     let given = points.len();
     let allowed = (ZIGZAG_SHARE_MAX * given as f64).ceil() as usize;
     loop {
@@ -299,10 +316,10 @@ fn straighten(points: &mut Vec<[f64; 2]>, warnings: &mut Vec<String>) -> Result<
         }
     }
     if points.len() < given {
-        warnings.push(format!(
-            "{} points that ran back (zig-zag) were dropped",
-            given - points.len()
-        ));
+        remarks.push(Remark::ProfilePointsDropped {
+            profile: body.name(),
+            count: given - points.len(),
+        });
     }
     Ok(())
 }

@@ -10,6 +10,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::contact::geometry::profile::{Place, Profile};
+use crate::contact::remark::RemarkEntry;
 
 /// Left or right rail, seen along rolling.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
@@ -216,15 +217,14 @@ impl WheelRail {
 
     /// Remarks on the two profiles.
     #[must_use]
-    pub fn warnings(&self) -> Vec<String> {
-        let named = |name: &str, profile: &Profile| -> Vec<String> {
-            profile
-                .warnings
-                .iter()
-                .map(|warning| format!("{name}: {warning}"))
-                .collect()
+    pub fn remarks(&self) -> Vec<RemarkEntry> {
+        let placed = |pointer: &'static str, profile: &Profile| {
+            let remarks = profile.remarks.clone().into_iter();
+            remarks.map(move |remark| remark.at_pointer(pointer))
         };
-        [named("rail", &self.rail_given), named("wheel", &self.wheel)].concat()
+        placed("/contact/rail", &self.rail_given)
+            .chain(placed("/contact/wheel", &self.wheel))
+            .collect()
     }
 }
 

@@ -17,6 +17,7 @@ use crate::contact::normal::non_hertzian::GapContact;
 use crate::contact::normal::non_hertzian::gap::Gap;
 use crate::contact::normal::prescribed::PressureField;
 use crate::contact::normal::profiles::ProfileContact;
+use crate::contact::remark::RemarkEntry;
 
 /// Pressures in MPa, lengths in mm and ratios of semi-axes beyond which a patch is a mistake rather than a contact.
 const PRESSURE_MAX: f64 = 1e12;
@@ -100,7 +101,7 @@ impl Region {
         y: &[f64],
         pressure: &[Vec<f64>],
         samples_max: usize,
-    ) -> Result<(Region, Vec<String>), Fault> {
+    ) -> Result<(Region, Vec<RemarkEntry>), Fault> {
         let samples = x.len().saturating_mul(y.len());
         if samples > samples_max {
             return Err(fault(
@@ -108,12 +109,12 @@ impl Region {
                 format!("{samples} samples given; at most {samples_max} are allowed"),
             ));
         }
-        let (field, warnings) = PressureField::new(x, y, pressure)
+        let (field, remarks) = PressureField::new(x, y, pressure)
             .map_err(|detail| fault("/contact/pressure_mpa", detail))?;
         for patch in field.patches() {
             plausible(&patch, "/contact/pressure_mpa")?;
         }
-        Ok((Region::Grid(field), warnings))
+        Ok((Region::Grid(field), remarks))
     }
 
     /// The region of a gap, yet to be found, with the contact modulus `E*` in MPa.

@@ -15,6 +15,7 @@ use crate::contact::normal::hertz::Pressing;
 use crate::contact::normal::non_hertzian::gap::Gap;
 use crate::contact::normal::non_hertzian::{Failure, GapContact, Report};
 use crate::contact::normal::prescribed::PressureField;
+use crate::contact::remark::{Remark, RemarkEntry};
 
 /// Heights looked at before giving up.
 const HEIGHTS_MAX: u32 = 40;
@@ -68,7 +69,7 @@ pub struct PressedWheel {
     /// What presses, from smaller to larger y of the track; never empty.
     pub patches: Vec<PressedGap>,
     /// Remarks for the answer.
-    pub warnings: Vec<String>,
+    pub remarks: Vec<RemarkEntry>,
 }
 
 /// The contact in one gap: usually one patch, several where they lie near each other.
@@ -81,7 +82,7 @@ pub struct PressedGap {
     /// How it was found.
     pub report: Report,
     /// Remarks for the answer.
-    pub warnings: Vec<String>,
+    pub remarks: Vec<RemarkEntry>,
 }
 
 impl PressedGap {
@@ -189,10 +190,8 @@ impl ProfileContact {
             }
             closed |= bracket.width() < BRACKET_MIN * lowering;
             if closed && detail == Detail::Fine {
-                found.warnings.push(format!(
-                    "the force jumps at this height of the wheel, where patches merge; forces were scaled by {:.4}",
-                    target / carried
-                ));
+                let factor = target / carried;
+                found.remarks.push(Remark::ForceJumps { factor }.into());
                 found.correct(target / carried, 0.0);
                 return Ok(found);
             }
@@ -251,7 +250,7 @@ impl ProfileContact {
             centre,
             heights: 1,
             patches,
-            warnings: Vec::new(),
+            remarks: Vec::new(),
         };
         let carried = self.carried(&wheel);
         wheel.found = [carried, self.slope(&wheel, carried)];
@@ -286,7 +285,7 @@ impl ProfileContact {
             frame: self.geometry.moved(&gap.frame, middle, centre),
             field: found.field.from_origin(middle),
             report: found.report,
-            warnings: found.warnings,
+            remarks: found.remarks,
         })
     }
 

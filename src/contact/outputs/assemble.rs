@@ -4,6 +4,7 @@ use crate::contact::case::{Motion, Output};
 use crate::contact::normal::{Patch, Region};
 use crate::contact::outputs::resultants::Resultants;
 use crate::contact::problem::Problem;
+use crate::contact::remark::{Remark, RemarkEntry, merged};
 use crate::contact::solution::{
     CombinedMaterial, ErrorEstimate, Fields, MeshReport, NormalisedMotion, Origin, PatchFields,
     PatchSolution, PointFields, PointSolution, Solution, SolverReport, Total,
@@ -31,7 +32,7 @@ pub fn assemble(problem: &Problem, ladder: &Ladder, points: &[Point]) -> (Soluti
             .iter()
             .map(|point| total(problem, &patches, point))
             .collect(),
-        warnings: warnings(problem, points),
+        remarks: remarks(problem, points),
         normal: problem.normal,
         wheel_lowering_mm: None,
         origin: Origin {
@@ -253,41 +254,35 @@ fn total(problem: &Problem, patches: &[Patch], point: &Point) -> Total {
     }
 }
 
-fn warnings(problem: &Problem, points: &[Point]) -> Vec<String> {
-    let mut warnings = problem.warnings.clone();
-    for (k, point) in points.iter().enumerate() {
-        warnings.extend(
-            point
-                .tangential
-                .warnings
-                .iter()
-                .map(|w| format!("motion {k}: {w}")),
-        );
-        if point.saturated {
-            let [x, y] = problem.forces[k]
-                .map(|force| force.map_or("free".to_owned(), |force| format!("{force} N")));
-            let found = point
-                .resultants
-                .iter()
-                .fold(Resultants::default(), |sum, r| sum.plus(*r));
-            warnings.push(format!(
-                "motion {k}: no creepage gives the force asked for (x: {x}, y: {y}); the nearest found is {:.6e} N, {:.6e} N",
-                found.force_x, found.force_y
-            ));
-        }
-        if let (Resolution::Target(target), Some(false)) =
-            (problem.resolution, target_met(problem, point))
-        {
-            let estimate = point.error();
-            let reached = estimate.map_or("is unknown".to_owned(), |e| {
-                format!("is estimated at {e:.2e}")
-            });
-            warnings.push(format!(
-                "motion {k}: the error relative to μN {reached}, the target was {target}"
-            ));
-        }
-    }
-    warnings
+fn remarks(problem: &Problem, points: &[Point]) -> Vec<RemarkEntry> {
+    let of_points = points.iter().enumerate().flat_map(|(k, point)| {
+        let own = point.tangential.remarks.iter().cloned();
+        let missed = target_missed(problem, point);
+        own.chain(unreachable(problem, k, point))
+            .chain(missed)
+            .map(move |remark| remark.at_point(k))
+    });
+    merged(problem.remarks.iter().cloned().chain(of_points))
+}
+
+fn unreachable(problem: &Problem, index: usize, point: &Point) -> Option<Remark> {
+    let [wanted_x_n, wanted_y_n] = problem.forces[index];
+    let sum = Resultants::default();
+    let found = point.resultants.iter().fold(sum, |sum, r| sum.plus(*r));
+    point.saturated.then_some(Remark::ForceUnreachable {
+        wanted_x_n,
+        wanted_y_n,
+        found_x_n: found.force_x,
+        found_y_n: found.force_y,
+    })
+}
+
+fn target_missed(problem: &Problem, point: &Point) -> Option<Remark> {
+    let Resolution::Target(target) = problem.resolution else {
+        return None;
+    };
+    let estimate = point.error();
+    (target_met(problem, point) == Some(false)).then_some(Remark::TargetMissed { estimate, target })
 }
 
 fn patch_fields(problem: &Problem, level: &Level, patch: usize, points: &[Point]) -> PatchFields {

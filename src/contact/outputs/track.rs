@@ -4,6 +4,7 @@ use crate::contact::geometry::contact_search::Frame;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::profiles::{PressedGap, PressedWheel};
 use crate::contact::problem::Problem;
+use crate::contact::remark::{Remark, RemarkEntry, merged};
 use crate::contact::solution::{
     ErrorEstimate, Fields, NormalReport, Origin, Position, Solution, Total,
 };
@@ -41,31 +42,22 @@ pub fn merge(
         })
         .collect::<Option<Vec<Total>>>()
         .unwrap_or_default();
-    let mut warnings = problem.warnings.clone();
-    warnings.extend_from_slice(&wheel.warnings);
+    let mut remarks = problem.remarks.clone();
+    remarks.extend_from_slice(&wheel.remarks);
     let alone = answers.len() == 1;
     let mut whole: Option<(Solution, Fields)> = None;
     for (gap, (mut solution, fields)) in wheel.patches.iter().zip(answers) {
         let before = whole.as_ref().map_or(0, |(whole, _)| whole.patches.len());
-        let remarks = gap.warnings.iter().chain(&solution.warnings);
-        warnings.extend(remarks.map(|remark| {
-            if alone {
-                remark.clone()
-            } else {
-                format!("patch {before}: {remark}")
-            }
-        }));
+        let own = gap.remarks.iter().chain(&solution.remarks);
+        remarks.extend(own.map(|remark| in_wheel(remark, before, alone)));
         for (k, patch) in solution.patches.iter_mut().enumerate() {
             let place = geometry.moved(&gap.frame, gap.field.load_centre(Some(k)), wheel.centre);
             patch.position = Some(position(geometry, &place, &gap.frame));
             let [.., y_min, y_max] = patch.extent_mm;
             let turn = turn(geometry, gap, wheel.centre, [y_min, y_max]);
             if turn > TURN_USUAL_MAX {
-                warnings.push(format!(
-                    "patch {}: the rail turns by {turn:.2} rad over the contact, which a plane of contact and half-spaces describe \
-                     roughly",
-                    before + k
-                ));
+                let remark = Remark::ContactTurns { turn_rad: turn };
+                remarks.push(remark.at_patch(before + k));
             }
         }
         match &mut whole {
@@ -82,7 +74,7 @@ pub fn merge(
     };
     let solution = Solution {
         total,
-        warnings,
+        remarks: merged(remarks),
         wheel_lowering_mm: Some(wheel.lowering),
         origin: Origin {
             x_mm: origin[0],
@@ -94,6 +86,19 @@ pub fn merge(
         ..solution
     };
     (solution, fields)
+}
+
+/// A remark on a part of the contact whose first patch has this number in the whole; one on the part as such is given to that
+/// patch, unless the part is the whole.
+fn in_wheel(remark: &RemarkEntry, first: usize, alone: bool) -> RemarkEntry {
+    let patch = match remark.patch {
+        Some(own) => Some(first + own),
+        None => (!alone).then_some(first),
+    };
+    RemarkEntry {
+        patch,
+        ..remark.clone()
+    }
 }
 
 /// By how much the rail's inclination changes over a patch, in rad.

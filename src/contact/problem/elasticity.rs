@@ -3,6 +3,7 @@
 use crate::contact::case::{Elastic, Material};
 use crate::contact::error::Fault;
 use crate::contact::problem::Elasticity;
+use crate::contact::remark::Remark;
 
 /// Largest |K| for which the tangential and the normal problem may be solved one after the other.
 const DIFFERENCE_MAX: f64 = 0.05;
@@ -57,12 +58,10 @@ impl Elasticity {
     }
 
     /// The remark an answer carries if the bodies differ.
-    pub(super) fn warning(&self) -> Option<String> {
-        (self.difference != 0.0).then(|| {
-            format!(
-                "the two bodies differ (K = {:.4}); the coupling of pressure and traction is neglected",
-                self.difference
-            )
+    pub(super) fn remark(&self) -> Option<Remark> {
+        let difference_parameter = self.difference;
+        (difference_parameter != 0.0).then_some(Remark::CouplingNeglected {
+            difference_parameter,
         })
     }
 }
@@ -133,7 +132,7 @@ mod tests {
         let e = pair(young, body(82_000.0, 0.28)).unwrap();
         assert_eq!(e.difference, 0.0);
         assert!((e.shear_modulus - 82_000.0).abs() < 1e-9);
-        assert_eq!(e.warning(), None);
+        assert_eq!(e.remark(), None);
     }
 
     #[test]

@@ -20,6 +20,7 @@ use crate::contact::case::{
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::normal::Region;
+use crate::contact::remark::{Remark, RemarkEntry, merged};
 use crate::contact::solution::NormalReport;
 use cost::Size;
 use motions::Expanded;
@@ -102,7 +103,7 @@ pub struct Problem {
     /// What to compute, sorted, without repetition.
     pub outputs: Vec<Output>,
     /// Remarks that go into the answer.
-    pub warnings: Vec<String>,
+    pub remarks: Vec<RemarkEntry>,
     /// How region and pressure were found, where they were not known beforehand.
     pub normal: Option<NormalReport>,
     /// Memory the solve may use, in bytes.
@@ -146,14 +147,10 @@ impl Problem {
         ) else {
             return Err(CaseError(faults));
         };
-        let mut warnings = Vec::from_iter(elasticity.warning());
-        if case.friction.coefficient > FRICTION_USUAL_MAX {
-            warnings.push(format!(
-                "the friction coefficient {} is more than {FRICTION_USUAL_MAX}",
-                case.friction.coefficient
-            ));
-        }
-        warnings.extend(remarks);
+        let of_material = elasticity.remark().map(|r| r.at_pointer("/material"));
+        let of_friction = unusual_friction(case.friction.coefficient);
+        let of_case = of_material.into_iter().chain(of_friction);
+        let remarks = merged(of_case.chain(remarks));
         let Expanded { motions, forces } = motions;
         let digest = digest(case, &elasticity, &motions, &forces);
         Ok(Problem {
@@ -170,7 +167,7 @@ impl Problem {
             resolution: resolution(&case.solver),
             time_limit: case.solver.time_limit_s.map(Duration::from_secs_f64),
             outputs: case.outputs.clone(),
-            warnings,
+            remarks,
             normal: None,
             memory_bytes: limits.memory_bytes,
             digest,
@@ -212,7 +209,7 @@ pub(super) fn faults_of(given: Given, limits: &Limits) -> Vec<Fault> {
 #[derive(Debug)]
 struct Parts {
     elasticity: Option<Elasticity>,
-    region: Option<(Region, Vec<String>)>,
+    region: Option<(Region, Vec<RemarkEntry>)>,
     motions: Option<Expanded>,
 }
 
@@ -265,6 +262,14 @@ impl Parts {
     }
 }
 
+fn unusual_friction(coefficient: f64) -> Option<RemarkEntry> {
+    let remark = Remark::FrictionUnusual {
+        coefficient,
+        usual_max: FRICTION_USUAL_MAX,
+    };
+    (coefficient > FRICTION_USUAL_MAX).then(|| remark.at_pointer("/friction/coefficient"))
+}
+
 fn keep<T>(result: Result<T, Fault>, faults: &mut Vec<Fault>) -> Option<T> {
     result.map_err(|fault| faults.push(fault)).ok()
 }
@@ -275,7 +280,7 @@ fn region(
     load: Option<&Load>,
     elasticity: Option<&Elasticity>,
     limits: &Limits,
-) -> Option<Result<(Region, Vec<String>), Fault>> {
+) -> Option<Result<(Region, Vec<RemarkEntry>), Fault>> {
     let contact = contact.filter(|contact| !matches!(contact, Contact::Profiles { .. }))?;
     if let Contact::PressureGrid {
         x_mm,

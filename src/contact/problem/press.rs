@@ -23,7 +23,7 @@ impl Problem {
         let found = contact.solve(monitor)?;
         let mut problem = self.clone();
         problem.region = Region::Grid(found.field);
-        problem.warnings.extend(found.warnings);
+        problem.remarks.extend(found.remarks);
         let seconds = (monitor.elapsed() - began).as_secs_f64();
         problem.normal = Some(found.report.with_time(seconds));
         problem.fits()?;
@@ -44,7 +44,7 @@ impl Problem {
             region,
             motions,
             wheelset: None,
-            warnings: Vec::new(),
+            remarks: Vec::new(),
             normal: Some(normal),
             ..self.clone()
         };

@@ -11,6 +11,7 @@ use crate::contact::geometry::wheel_rail::{Placement, WheelRail};
 use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::normal::Region;
 use crate::contact::normal::profiles::{Loading, ProfileContact};
+use crate::contact::remark::RemarkEntry;
 
 /// The region of a wheel on a rail, yet to be found, with its remarks; `None` without faults where the load or the contact
 /// modulus in MPa is not known.
@@ -21,12 +22,12 @@ pub(super) fn region(
     contact: &Contact,
     load: Option<&Load>,
     contact_modulus: Option<f64>,
-) -> Result<Option<(Region, Vec<String>)>, Vec<Fault>> {
+) -> Result<Option<(Region, Vec<RemarkEntry>)>, Vec<Fault>> {
     let geometry = wheel_rail(contact)?;
     if let Err(detail) = Search::new(&geometry) {
         return Err(vec![fault("/contact".to_owned(), detail)]);
     }
-    let warnings = geometry.warnings();
+    let remarks = geometry.remarks();
     let loading = load.and_then(loading);
     let (Some(loading), Some(contact_modulus)) = (loading, contact_modulus) else {
         return Ok(None);
@@ -36,7 +37,7 @@ pub(super) fn region(
         loading,
         contact_modulus,
     };
-    Ok(Some((Region::Profiles(Arc::new(contact)), warnings)))
+    Ok(Some((Region::Profiles(Arc::new(contact)), remarks)))
 }
 
 /// The motion of the wheelset, if the case gives it instead of creepages.
@@ -116,10 +117,7 @@ fn wheel_rail(contact: &Contact) -> Result<WheelRail, Vec<Fault>> {
 }
 
 fn profile(body: Body, section: &CrossSection) -> Result<Profile, Fault> {
-    let name = match body {
-        Body::Rail => "rail",
-        Body::Wheel => "wheel",
-    };
+    let name = body.name();
     let mut reading = Reading {
         mirror_y: section.mirror_y,
         mirror_z: section.mirror_z,

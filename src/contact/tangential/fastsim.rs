@@ -59,7 +59,7 @@ pub fn solve(problem: &Problem, level: &Level, motion: &Motion) -> Tangential {
             ..Work::default()
         },
         skipped: Vec::new(),
-        warnings: Vec::new(),
+        remarks: Vec::new(),
     };
     let mut bound = level.bound.clone();
     for (p, patch) in problem.region.patches().iter().enumerate() {

@@ -77,7 +77,7 @@ pub fn rigid_answer(level: &Level, motion: &Motion) -> Option<Tangential> {
         slip,
         work: Work::default(),
         skipped: vec![reason.to_owned()],
-        warnings: Vec::new(),
+        remarks: Vec::new(),
     })
 }
 
@@ -104,7 +104,7 @@ pub fn frictionless_answer(level: &Level, motion: &Motion) -> Tangential {
         slips: vec![!still; cells],
         work: Work::default(),
         skipped: vec!["no friction: no tractions".to_owned()],
-        warnings: Vec::new(),
+        remarks: Vec::new(),
     }
 }
 

@@ -18,6 +18,7 @@ pub mod rules;
 pub mod trail;
 
 use crate::contact::monitor::Stop;
+use crate::contact::remark::Remark;
 
 /// The tangential answer on one level for one motion, dimensionless, one value per cell.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,7 +36,7 @@ pub struct Tangential {
     /// Work that was recognised as unnecessary.
     pub skipped: Vec<String>,
     /// Remarks for the client.
-    pub warnings: Vec<String>,
+    pub remarks: Vec<Remark>,
 }
 
 /// Counted work of a solve.

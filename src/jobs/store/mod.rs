@@ -13,6 +13,7 @@ use std::sync::Arc;
 use bytes::Bytes;
 use uuid::Uuid;
 
+use crate::contact::remark::RemarkEntry;
 use crate::jobs::job::{Failure, Job, State};
 use crate::jobs::results::Encoded;
 use crate::jobs::wishes::Wishes;
@@ -138,7 +139,7 @@ pub enum Ending {
     /// The result is stored.
     Succeeded {
         /// Remarks of the solution.
-        warnings: Vec<String>,
+        remarks: Vec<RemarkEntry>,
         /// Where the result is kept.
         result: Placed,
         /// Patches with stored fields.

@@ -17,6 +17,7 @@ use crate::contact::normal::non_hertzian::gradients::{Pressed, press};
 use crate::contact::normal::non_hertzian::grid::{Grid, Resolution, Side};
 use crate::contact::normal::non_hertzian::window::{Reach, reach, reach_of_level};
 use crate::contact::normal::prescribed::PressureField;
+use crate::contact::remark::{Remark, RemarkEntry};
 
 /// Cells of the first grid along either axis.
 const CELLS_FIRST: usize = 32;
@@ -71,7 +72,7 @@ pub struct Found {
     /// How it was found.
     pub report: Report,
     /// Remarks for the answer.
-    pub warnings: Vec<String>,
+    pub remarks: Vec<RemarkEntry>,
 }
 
 /// How a normal problem was solved.
@@ -191,11 +192,9 @@ impl GapContact {
         let Some((grid, pressed)) = solved else {
             unreachable!("at least one grid is tried")
         };
-        let mut warnings = Vec::new();
+        let mut remarks = Vec::new();
         if !settled {
-            warnings.push(
-                "the gap is rough: pressure and region still change with the grid of the normal problem".to_owned(),
-            );
+            remarks.push(Remark::GapRough {}.into());
         }
         let report = Report {
             cells: grid.cells,
@@ -203,11 +202,11 @@ impl GapContact {
             residual: pressed.residual,
         };
         let field = field(&grid, &pressed).map_err(Failure::NoAnswer)?;
-        warnings.extend(self.remarks(&field, pressed.approach - reach.least));
+        remarks.extend(self.remarks(&field, pressed.approach - reach.least));
         Ok(Found {
             field,
             report,
-            warnings,
+            remarks,
         })
     }
 
@@ -291,31 +290,33 @@ impl GapContact {
     }
 
     /// Remarks on contacts for which a half-space is a poor likeness of the bodies; the patch that carries most decides.
-    fn remarks(&self, field: &PressureField, depth: f64) -> Vec<String> {
+    fn remarks(&self, field: &PressureField, depth: f64) -> Vec<RemarkEntry> {
         let patches = field.patches();
         let heaviest = patches
             .iter()
-            .max_by(|a, b| a.normal_force.total_cmp(&b.normal_force));
-        let Some([x_min, x_max, y_min, y_max]) = heaviest.map(|patch| patch.extent) else {
+            .enumerate()
+            .max_by(|(_, a), (_, b)| a.normal_force.total_cmp(&b.normal_force));
+        let Some((patch, extent)) = heaviest.map(|(k, patch)| (k, patch.extent)) else {
             return Vec::new();
         };
+        let [x_min, x_max, y_min, y_max] = extent;
         let (a, b) = (0.5 * (x_max - x_min), 0.5 * (y_max - y_min));
         let mut remarks = Vec::new();
         if let Gap::Profile { rolling, .. } = self.gap
             && a > HALF_LENGTH_USUAL_MAX * rolling
         {
-            remarks.push(format!(
-                "the contact is {:.3} mm long, against a rolling radius of {rolling} mm: the bodies are nearly conformal, which \
-                 half-spaces do not describe",
-                2.0 * a
-            ));
+            let remark = Remark::NearlyConformal {
+                length_mm: 2.0 * a,
+                rolling_radius_mm: rolling,
+            };
+            remarks.push(remark.at_patch(patch));
         }
         if depth > APPROACH_USUAL_MAX * a.min(b) {
-            remarks.push(format!(
-                "the bodies overlap by {depth:.3e} mm, against a half width of {:.3e} mm of the contact: strains are too large \
-                 for linear elasticity",
-                a.min(b)
-            ));
+            let remark = Remark::StrainsTooLarge {
+                overlap_mm: depth,
+                half_width_mm: a.min(b),
+            };
+            remarks.push(remark.at_patch(patch));
         }
         remarks
     }

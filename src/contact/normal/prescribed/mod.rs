@@ -15,6 +15,7 @@ mod shape;
 use crate::contact::mesh::Chord;
 use crate::contact::normal::Patch;
 use crate::contact::normal::interpolation::{interval, weights};
+use crate::contact::remark::RemarkEntry;
 use level_set::State;
 use line::Line;
 use shape::Shape;
@@ -63,7 +64,7 @@ impl PressureField {
         x: &[f64],
         y: &[f64],
         pressure: &[Vec<f64>],
-    ) -> Result<(PressureField, Vec<String>), String> {
+    ) -> Result<(PressureField, Vec<RemarkEntry>), String> {
         let pressure_max = pressure.iter().flatten().copied().fold(0.0, f64::max);
         let grid = Grid {
             x: padded(x),
@@ -81,9 +82,9 @@ impl PressureField {
             );
         }
         let (mut field, samples) = PressureField::from_squares(grid, q, pressure_max)?;
-        let warnings = field.warnings(&samples, &field.shapes);
+        let remarks = field.remarks(&samples, &field.shapes);
         field.find_edges();
-        Ok((field, warnings))
+        Ok((field, remarks))
     }
 
     /// A field whose patches have no region yet, and the patch of every sample; `q` is as in [`PressureField::q`] with 0

@@ -6,6 +6,7 @@ use std::ops::RangeInclusive;
 use crate::contact::normal::Patch;
 use crate::contact::normal::prescribed::components::NOWHERE;
 use crate::contact::normal::prescribed::{PADDING, PressureField};
+use crate::contact::remark::{Remark, RemarkEntry};
 
 /// A patch with fewer samples along or across has an uncertain edge, and a force off by more than about 2 %: measured
 /// on Hertz's pressure, the sum of the samples is off by up to 2 % with 9 of them, 0.5 % with 18.
@@ -127,16 +128,13 @@ impl PressureField {
         })
     }
 
-    pub(super) fn warnings(&self, samples: &[u8], shapes: &[Shape]) -> Vec<String> {
+    pub(super) fn remarks(&self, samples: &[u8], shapes: &[Shape]) -> Vec<RemarkEntry> {
         let (nx, ny) = (self.grid.x.len(), self.grid.y.len());
         let at_edge = |k: usize, n: usize| k == PADDING || k + PADDING + 1 == n;
-        let mut warnings = Vec::new();
+        let mut remarks = Vec::new();
         let cut = |k: usize| samples[k] != NOWHERE && (at_edge(k % nx, nx) || at_edge(k / nx, ny));
         if (0..nx * ny).any(cut) {
-            warnings.push(
-                "the pressure does not fall to 0 at the edge of the grid; the contact is taken to end within the next spacing"
-                    .to_owned(),
-            );
+            remarks.push(Remark::PressureCutAtEdge {}.into());
         }
         for (label, shape) in shapes.iter().enumerate() {
             let (along, across) = (
@@ -144,12 +142,14 @@ impl PressureField {
                 shape.rows.clone().count() - 3,
             );
             if along.min(across) < SAMPLES_ACROSS_MIN {
-                warnings.push(format!(
-                    "patch {label} has only {along} by {across} samples of pressure; its force and its edge are uncertain by some per cent"
-                ));
+                let remark = Remark::PressureCoarse {
+                    samples_x: along,
+                    samples_y: across,
+                };
+                remarks.push(remark.at_patch(label));
             }
         }
-        warnings
+        remarks
     }
 }
 

@@ -12,6 +12,7 @@ pub mod strip_blocks;
 use crate::contact::case::Motion;
 use crate::contact::influence::strips::Parity;
 use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::remark::Remark;
 use crate::contact::tangential::boundary_element::newton::{Convergence, FrictionLaw, Newton};
 use crate::contact::tangential::boundary_element::strip_blocks::OwnBlocks;
 use crate::contact::tangential::equations::Equations;
@@ -29,7 +30,7 @@ pub const TOLERANCE: f64 = 1e-6;
 ///
 /// # Errors
 /// [`Failure::NotConverged`] if no start leads to a solution of the three-point rule; [`Failure::Stopped`] if the
-/// monitor stops the work. If only the trapezoid rule fails, the three-point tractions serve and a warning says so.
+/// monitor stops the work. If only the trapezoid rule fails, the three-point tractions serve and a remark says so.
 pub fn solve(
     level: &Level,
     motion: &Motion,
@@ -55,16 +56,13 @@ pub fn solve(
         skipped.push("everything slips: fixed point instead of Newton".to_owned());
     }
     let by_mirror = solve.expand(&t);
-    let mut warnings = Vec::new();
+    let mut remarks = Vec::new();
     let warm = start.and_then(|start| start.trapezoid.as_ref());
     let warm = warm.map(|warm| solve.start(Some(warm)));
     let (slips, second) = match solve.trapezoid(&mut t, warm)? {
         Some(slips) => (slips, Some(by_mirror)),
         None => {
-            warnings.push(
-                "the trapezoid rule did not converge; forces come from the three-point rule and their error is larger"
-                    .to_owned(),
-            );
+            remarks.push(Remark::SecondRuleFailed {});
             (mirror.slips, None)
         }
     };
@@ -77,7 +75,7 @@ pub fn solve(
         slips,
         work: solve.work,
         skipped,
-        warnings,
+        remarks,
     })
 }
 

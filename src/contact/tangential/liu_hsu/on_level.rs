@@ -68,7 +68,7 @@ pub fn solve(
         slips: outcome.slips,
         work,
         skipped: Vec::new(),
-        warnings: Vec::new(),
+        remarks: Vec::new(),
     })
 }
 

@@ -134,7 +134,7 @@ impl SqliteStore {
 /// The end of a job in the form the database takes.
 pub(super) struct EndRow<'a> {
     pub(super) state: State,
-    pub(super) warnings: String,
+    pub(super) remarks: String,
     pub(super) failure: Option<String>,
     pub(super) field_patches: u32,
     pub(super) result: Option<&'a Placed>,
@@ -144,19 +144,19 @@ impl EndRow<'_> {
     pub(super) fn of(ending: &Ending) -> Result<EndRow<'_>, JobsError> {
         let mut row = EndRow {
             state: State::Cancelled,
-            warnings: "[]".to_owned(),
+            remarks: "[]".to_owned(),
             failure: None,
             field_patches: 0,
             result: None,
         };
         match ending {
             Ending::Succeeded {
-                warnings,
+                remarks,
                 result,
                 field_patches,
             } => {
                 row.state = State::Succeeded;
-                row.warnings = to_json(warnings)?;
+                row.remarks = to_json(remarks)?;
                 row.field_patches = *field_patches;
                 row.result = Some(result);
             }

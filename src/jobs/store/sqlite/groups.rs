@@ -243,7 +243,7 @@ impl SqliteStore {
         let results: Vec<_> = rows.iter().filter_map(|(_, end)| end.result).collect();
         let mut blobs = insert_blobs(&mut transaction, &results).await?.into_iter();
         let mut update = QueryBuilder::<Sqlite>::new(
-            "WITH done (id, lease_number, state, warnings, failure, blob, patches) AS (",
+            "WITH done (id, lease_number, state, remarks, failure, blob, patches) AS (",
         );
         let mut inserted = Vec::with_capacity(results.len());
         update.push_values(&rows, |mut row, (claim, end)| {
@@ -252,7 +252,7 @@ impl SqliteStore {
             row.push_bind(claim.id.to_string())
                 .push_bind(fence(claim))
                 .push_bind(end.state.name())
-                .push_bind(&end.warnings)
+                .push_bind(&end.remarks)
                 .push_bind(&end.failure)
                 .push_bind(blob)
                 .push_bind(end.field_patches);
@@ -260,7 +260,7 @@ impl SqliteStore {
         update.push(") UPDATE jobs SET state = done.state, ended_at = ");
         update.push_bind(now);
         update.push(
-            ", warnings = done.warnings, failure = done.failure, blob_id = done.blob, \
+            ", remarks = done.remarks, failure = done.failure, blob_id = done.blob, \
              field_patches = done.patches, \
              progress = CASE WHEN done.state = 'succeeded' THEN 1.0 ELSE progress END, \
              lease_until = NULL, worker = NULL, version = version + 1 \

@@ -208,7 +208,7 @@ fn queued(new: &NewJob) -> Job {
         expires_at: None,
         attempt: 0,
         progress: 0.0,
-        warnings: Vec::new(),
+        remarks: Vec::new(),
         failure: None,
         cached: false,
         version: 1,

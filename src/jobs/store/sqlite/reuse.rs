@@ -110,7 +110,7 @@ async fn end_pairs(
     let mut update = with_pairs(pairs);
     update.push(
         " UPDATE jobs SET state = 'succeeded', started_at = pairs.at, ended_at = pairs.at, progress = 1.0, cached = 1, \
-         warnings = source.warnings, blob_id = source.blob_id, field_patches = source.field_patches, \
+         remarks = source.remarks, blob_id = source.blob_id, field_patches = source.field_patches, \
          reuse_key = NULL, lease_until = NULL, worker = NULL, version = jobs.version + 1, \
          attempt = jobs.attempt - (pairs.lease_number IS NOT NULL) \
          FROM pairs JOIN jobs AS source ON source.id = pairs.source AND source.state = 'succeeded' \

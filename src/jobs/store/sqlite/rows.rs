@@ -14,7 +14,7 @@ use crate::jobs::wishes::Priority;
 /// The columns a [`Job`] is read from.
 macro_rules! job_columns {
     () => {
-        "id, tenant, state, name, labels, batch_id, created_at, started_at, ended_at, attempt, progress, warnings, failure, cached, version, rank, deadline"
+        "id, tenant, state, name, labels, batch_id, created_at, started_at, ended_at, attempt, progress, remarks, failure, cached, version, rank, deadline"
     };
 }
 pub(super) use job_columns;
@@ -43,7 +43,7 @@ pub(super) fn read_job(row: &SqliteRow) -> Result<Job, JobsError> {
         expires_at: None,
         attempt: row.try_get("attempt")?,
         progress: row.try_get("progress")?,
-        warnings: from_json(row.try_get("warnings")?)?,
+        remarks: from_json(row.try_get("remarks")?)?,
         failure: failure.as_deref().map(from_json).transpose()?,
         cached: row.try_get("cached")?,
         version: read_count(row, "version")?,

@@ -26,7 +26,7 @@ CREATE TABLE jobs (
     alone            INTEGER NOT NULL DEFAULT 0, -- 1: its group died, it is claimed alone
     cancel_requested INTEGER NOT NULL DEFAULT 0,
     progress         REAL    NOT NULL DEFAULT 0,
-    warnings         TEXT    NOT NULL DEFAULT '[]',
+    remarks          TEXT    NOT NULL DEFAULT '[]',
     failure          TEXT,
     blob_id          INTEGER REFERENCES blobs (id), -- the result; several jobs may refer to one
     field_patches    INTEGER NOT NULL DEFAULT 0, -- patches with stored fields; 0: there are none

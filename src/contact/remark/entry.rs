@@ -1,0 +1,258 @@
+//! A remark in the words of the answer, with its place; and how the remarks of one answer are merged.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::contact::remark::{Remark, Severity};
+
+/// Motions with the same remark of which the figures are kept; the others are only numbered.
+const KEPT_MAX: usize = 4;
+
+/// Something the client should know about an answer: its code, its place, a sentence, and the figures in it by name.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct RemarkEntry {
+    /// The kind of remark; `/v1/remarks` lists them all.
+    #[schema(example = "friction-unusual")]
+    pub code: String,
+    /// How much it asks of the client.
+    pub severity: Severity,
+    /// The patch it belongs to, counted from 0; absent if it belongs to all.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub patch: Option<usize>,
+    /// The motion it belongs to, counted from 0; absent if it belongs to all.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub point: Option<usize>,
+    /// Further motions with the same remark and figures of their own, as ranges `[first, last]`.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    #[schema(required = false)]
+    pub also_at_points: Vec<[usize; 2]>,
+    /// JSON pointer (RFC 6901) to the part of the case it belongs to, where it belongs to one.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub pointer: Option<String>,
+    /// One sentence.
+    pub detail: String,
+    /// The figures in the sentence by name, with the unit in the name.
+    #[serde(flatten)]
+    pub figures: BTreeMap<String, Figure>,
+}
+
+/// A number or a word in a remark.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(untagged)]
+pub enum Figure {
+    /// A finite number.
+    Number(f64),
+    /// Several numbers.
+    Numbers(Vec<f64>),
+    /// A word.
+    Word(String),
+}
+
+/// What can stand in a remark as a figure.
+pub(super) trait AsFigure {
+    /// The figure; nothing for a number that is not finite or not there.
+    fn figure(&self) -> Option<Figure>;
+}
+
+impl AsFigure for f64 {
+    fn figure(&self) -> Option<Figure> {
+        self.is_finite().then_some(Figure::Number(*self))
+    }
+}
+
+impl AsFigure for usize {
+    fn figure(&self) -> Option<Figure> {
+        Some(Figure::Number(*self as f64))
+    }
+}
+
+impl AsFigure for [f64; 2] {
+    fn figure(&self) -> Option<Figure> {
+        let finite = self.iter().all(|part| part.is_finite());
+        finite.then(|| Figure::Numbers(self.to_vec()))
+    }
+}
+
+impl AsFigure for &'static str {
+    fn figure(&self) -> Option<Figure> {
+        Some(Figure::Word((*self).to_owned()))
+    }
+}
+
+impl AsFigure for String {
+    fn figure(&self) -> Option<Figure> {
+        Some(Figure::Word(self.clone()))
+    }
+}
+
+impl<T: AsFigure> AsFigure for Option<T> {
+    fn figure(&self) -> Option<Figure> {
+        self.as_ref().and_then(AsFigure::figure)
+    }
+}
+
+impl From<Remark> for RemarkEntry {
+    fn from(remark: Remark) -> RemarkEntry {
+        RemarkEntry {
+            code: remark.code().to_owned(),
+            severity: remark.severity(),
+            patch: None,
+            point: None,
+            also_at_points: Vec::new(),
+            pointer: None,
+            detail: remark.detail(),
+            figures: remark.figures(),
+        }
+    }
+}
+
+impl Remark {
+    /// The remark on one patch.
+    #[must_use]
+    pub fn at_patch(self, patch: usize) -> RemarkEntry {
+        RemarkEntry {
+            patch: Some(patch),
+            ..self.into()
+        }
+    }
+
+    /// The remark on one motion.
+    #[must_use]
+    pub fn at_point(self, point: usize) -> RemarkEntry {
+        RemarkEntry {
+            point: Some(point),
+            ..self.into()
+        }
+    }
+
+    /// The remark on a part of the case.
+    #[must_use]
+    pub fn at_pointer(self, pointer: &str) -> RemarkEntry {
+        RemarkEntry {
+            pointer: Some(pointer.to_owned()),
+            ..self.into()
+        }
+    }
+}
+
+impl RemarkEntry {
+    /// Does it hold for this motion, or for all?
+    #[must_use]
+    pub fn holds_at(&self, point: usize) -> bool {
+        let among = |range: &[usize; 2]| (range[0]..=range[1]).contains(&point);
+        self.point.is_none_or(|own| own == point) || self.also_at_points.iter().any(among)
+    }
+
+    fn is_like(&self, other: &RemarkEntry) -> bool {
+        self.code == other.code && self.patch == other.patch && self.pointer == other.pointer
+    }
+}
+
+/// The remarks of an answer without repetitions: of those that differ in motion and figures only, the first few are
+/// kept, and the first of them numbers the motions of the others.
+#[must_use]
+pub fn merged(remarks: impl IntoIterator<Item = RemarkEntry>) -> Vec<RemarkEntry> {
+    let mut kept: Vec<RemarkEntry> = Vec::new();
+    // Where the remarks of one kind and place stand in `kept`: the first, and how many.
+    let mut groups: Vec<(usize, usize)> = Vec::new();
+    for remark in remarks {
+        let of_kind = |(first, _): &&mut (usize, usize)| kept[*first].is_like(&remark);
+        let Some((first, count)) = groups.iter_mut().find(of_kind) else {
+            groups.push((kept.len(), 1));
+            kept.push(remark);
+            continue;
+        };
+        match remark.point {
+            Some(point) if *count >= KEPT_MAX => {
+                if !kept
+                    .iter()
+                    .any(|known| known.is_like(&remark) && known.holds_at(point))
+                {
+                    add(&mut kept[*first].also_at_points, point);
+                }
+            }
+            _ if kept.contains(&remark) => {}
+            _ => {
+                *count += 1;
+                kept.push(remark);
+            }
+        }
+    }
+    kept
+}
+
+/// Adds a motion to ranges; motions come in their order.
+fn add(ranges: &mut Vec<[usize; 2]>, point: usize) {
+    match ranges.last_mut() {
+        Some(last) if last[1] + 1 == point => last[1] = point,
+        _ => ranges.push([point, point]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn missed(point: usize, estimate: f64) -> RemarkEntry {
+        let target = 0.001;
+        let estimate = Some(estimate);
+        Remark::TargetMissed { estimate, target }.at_point(point)
+    }
+
+    #[test]
+    fn every_remark_comes_back_from_json_as_it_was() {
+        for remark in Remark::examples() {
+            for entry in [
+                remark.clone().at_patch(3),
+                remark.clone().at_pointer("/contact"),
+                remark.at_point(0),
+            ] {
+                let text = serde_json::to_string(&entry).unwrap();
+                assert_eq!(serde_json::from_str::<RemarkEntry>(&text).unwrap(), entry);
+            }
+        }
+    }
+
+    #[test]
+    fn figures_stand_beside_the_code_by_name() {
+        let json = serde_json::to_value(missed(2, 0.01)).unwrap();
+        assert_eq!(json["code"], "target-missed");
+        assert_eq!(json["severity"], "warning");
+        assert_eq!(
+            (&json["point"], &json["estimate"], &json["target"]),
+            (&2.into(), &0.01.into(), &0.001.into())
+        );
+        assert!(json.get("patch").is_none() && json.get("pointer").is_none());
+    }
+
+    #[test]
+    fn a_figure_that_is_no_number_is_left_out() {
+        let entry = missed(0, f64::NAN);
+        assert!(!entry.figures.contains_key("estimate"), "{entry:?}");
+        let text = serde_json::to_string(&entry).unwrap();
+        assert_eq!(serde_json::from_str::<RemarkEntry>(&text).unwrap(), entry);
+    }
+
+    #[test]
+    fn repetitions_are_merged_and_no_motion_is_lost() {
+        let twice = Remark::GapRough {}.at_patch(0);
+        let many = (0..1000).filter(|k| *k != 500).map(|k| missed(k, k as f64));
+        let found = merged([twice.clone(), twice.clone()].into_iter().chain(many));
+        assert_eq!(found.len(), 1 + KEPT_MAX);
+        assert_eq!(found[0], twice);
+        assert_eq!(found[1].also_at_points, [[4, 499], [501, 999]]);
+        for point in 0..1001 {
+            let said = found[1..].iter().any(|remark| remark.holds_at(point));
+            assert_eq!(said, point < 1000 && point != 500, "{point}");
+        }
+        assert!(serde_json::to_string(&found).unwrap().len() < 2000);
+    }
+
+    #[test]
+    fn remarks_of_different_places_stay_apart() {
+        let all: Vec<_> = (0..20).map(|k| Remark::GapRough {}.at_patch(k)).collect();
+        assert_eq!(merged(all.clone()), all);
+    }
+}

@@ -1,0 +1,313 @@
+//! The list of all remarks. To add one, add it here and nowhere else: code, severity, figures and sentence, and what the client
+//! reads about it at `/v1/remarks`.
+//!
+//! Codes never change. Figures have their unit in their name and must not be named as a member of
+//! [`RemarkEntry`](crate::contact::remark::RemarkEntry). A figure may be a number, a count, a pair, a word or optional.
+
+use std::collections::BTreeMap;
+
+use crate::contact::remark::entry::AsFigure;
+use crate::contact::remark::table::remarks;
+use crate::contact::remark::{Figure, RemarkKind, Severity};
+
+remarks! {
+    // The case.
+
+    /// The friction coefficient is larger than is usual.
+    FrictionUnusual {
+        /// The coefficient given.
+        coefficient: f64 = 1.5,
+        /// The largest that passes without a remark.
+        usual_max: f64 = 1.0,
+    }
+    code: "friction-unusual",
+    severity: Warning,
+    advice: "Check `friction.coefficient`: dry steel has about 0.3 to 0.6.",
+    detail: format!("the friction coefficient {coefficient} is more than {usual_max}"),
+
+    /// The two bodies differ. Their materials are combined, but pressure and traction are solved one after the other.
+    CouplingNeglected {
+        /// Difference parameter K (Kalker 1990, eq. 1.44).
+        difference_parameter: f64 = 0.021,
+    }
+    code: "coupling-neglected",
+    severity: Warning,
+    advice: "Expect errors of the order of K in tractions; above 0.05 cases are refused.",
+    detail: format!(
+        "the two bodies differ (K = {difference_parameter:.4}); the coupling of pressure and traction is neglected"
+    ),
+
+    // Profiles.
+
+    /// The shape of a profile says that its z is positive up; it was mirrored.
+    ProfileZMirrored {
+        /// Whose.
+        profile: &'static str = "rail",
+    }
+    code: "profile-z-mirrored",
+    severity: Info,
+    advice: "State `mirror_z` to say so yourself.",
+    detail: format!("{profile}: z was found to be positive up and has been mirrored"),
+
+    /// The flange of a wheel was found at positive y; y was mirrored.
+    ProfileYMirrored {
+        /// Whose.
+        profile: &'static str = "wheel",
+    }
+    code: "profile-y-mirrored",
+    severity: Info,
+    advice: "State `mirror_y` to say so yourself.",
+    detail: format!("{profile}: the flange was found at positive y, so that y has been mirrored"),
+
+    /// Points of a profile that lie nearly at the same place were merged.
+    ProfilePointsMerged {
+        /// Whose.
+        profile: &'static str = "rail",
+        /// Points left out.
+        count: usize = 11,
+        /// Points nearer than this are one.
+        nearer_than_mm: f64 = 0.001,
+    }
+    code: "profile-points-merged",
+    severity: Info,
+    advice: "Nothing: files that repeat points at the joints of arcs are common.",
+    detail: format!("{profile}: {count} points nearer than {nearer_than_mm} mm to another one were merged"),
+
+    /// Points of a profile that ran back between their neighbours were dropped.
+    ProfilePointsDropped {
+        /// Whose.
+        profile: &'static str = "rail",
+        /// Points left out.
+        count: usize = 2,
+    }
+    code: "profile-points-dropped",
+    severity: Warning,
+    advice: "Check the measurement where pieces are joined.",
+    detail: format!("{profile}: {count} points that ran back (zig-zag) were dropped"),
+
+    /// The rail turns over the contact by so much that a plane of contact and half-spaces describe it roughly.
+    ContactTurns {
+        /// Change of the rail's inclination over the patch.
+        turn_rad: f64 = 0.5,
+    }
+    code: "contact-turns",
+    severity: Warning,
+    advice: "Take pressures and the direction of forces as approximate: conformal contact is not modelled.",
+    detail: format!(
+        "the rail turns by {turn_rad:.2} rad over the contact, which a plane of contact and half-spaces describe roughly"
+    ),
+
+    /// The force jumps at the height of the wheel that carries the load, where patches merge; forces were scaled to the load.
+    ForceJumps {
+        /// Load over force found.
+        factor: f64 = 1.004,
+    }
+    code: "force-jumps",
+    severity: Warning,
+    advice: "Vary the lateral place of the wheel a little to see how far the answer depends on it.",
+    detail: format!(
+        "the force jumps at this height of the wheel, where patches merge; forces were scaled by {factor:.4}"
+    ),
+
+    /// Several motions share their patches, so that the vertical load is balanced by normal forces alone.
+    NormalForcesAloneBalance {}
+    code: "normal-forces-alone-balance",
+    severity: Warning,
+    advice: "Ask for the motions in cases of their own if friction is to carry its share of the load.",
+    detail: "normal forces alone balance the vertical force, because several motions share their patches; the total of a motion has its \
+             friction on top".to_owned(),
+
+    // The normal problem.
+
+    /// Pressure and region still change with the grid of the normal problem.
+    GapRough {}
+    code: "gap-rough",
+    severity: Warning,
+    advice: "Smooth the gap, or give it on a finer grid if it is as rough as that.",
+    detail: "the gap is rough: pressure and region still change with the grid of the normal problem".to_owned(),
+
+    /// A given pressure does not fall to 0 at the edge of its grid.
+    PressureCutAtEdge {}
+    code: "pressure-cut-at-edge",
+    severity: Warning,
+    advice: "Give the pressure as far out as it is more than 0, and one row of zeros around it.",
+    detail: "the pressure does not fall to 0 at the edge of the grid; the contact is taken to end within the next spacing".to_owned(),
+
+    /// A patch of a given pressure has few samples.
+    PressureCoarse {
+        /// Samples along rolling.
+        samples_x: usize = 4,
+        /// Samples across.
+        samples_y: usize = 7,
+    }
+    code: "pressure-coarse",
+    severity: Warning,
+    advice: "Give the pressure on a finer grid.",
+    detail: format!(
+        "the patch has only {samples_x} by {samples_y} samples of pressure; its force and its edge are uncertain by some per cent"
+    ),
+
+    /// The contact is long against the rolling radius: the bodies are nearly conformal.
+    NearlyConformal {
+        /// Length of the contact along rolling.
+        length_mm: f64 = 14.2,
+        /// Rolling radius.
+        rolling_radius_mm: f64 = 20.0,
+    }
+    code: "nearly-conformal",
+    severity: Warning,
+    advice: "Half-spaces do not describe such bodies: take the answer as a rough one.",
+    detail: format!(
+        "the contact is {length_mm:.3} mm long, against a rolling radius of {rolling_radius_mm} mm: the bodies are nearly \
+         conformal, which half-spaces do not describe"
+    ),
+
+    /// The bodies overlap so deeply that strains are too large for linear elasticity.
+    StrainsTooLarge {
+        /// Approach from first touch.
+        overlap_mm: f64 = 1.1,
+        /// Smaller half width of the contact.
+        half_width_mm: f64 = 3.4,
+    }
+    code: "strains-too-large",
+    severity: Warning,
+    advice: "Check units and load. If they are right, the bodies yield and pressures are lower than the answer says.",
+    detail: format!(
+        "the bodies overlap by {overlap_mm:.3e} mm, against a half width of {half_width_mm:.3e} mm of the contact: strains are too \
+         large for linear elasticity"
+    ),
+
+    // Motions.
+
+    /// The second discretisation rule did not converge; forces come from the first alone.
+    SecondRuleFailed {}
+    code: "second-rule-failed",
+    severity: Warning,
+    advice: "Use the forces with their larger error estimate, or try another mesh.",
+    detail: "the trapezoid rule did not converge; forces come from the three-point rule and their error is larger".to_owned(),
+
+    /// The error is not known to be below the target.
+    TargetMissed {
+        /// Estimated error relative to μN; absent if it is unknown.
+        estimate: Option<f64> = Some(2.3e-3),
+        /// The target.
+        target: f64 = 1e-3,
+    }
+    code: "target-missed",
+    severity: Warning,
+    advice: "Use the numbers with the error estimate beside them, or ask for a larger target.",
+    detail: match estimate {
+        Some(estimate) => format!(
+            "the error relative to μN is estimated at {estimate:.2e}, the target was {target}"
+        ),
+        None => format!("the error relative to μN is unknown, the target was {target}"),
+    },
+
+    /// No creepage gives the prescribed force; the nearest force found is answered.
+    ForceUnreachable {
+        /// Force asked for along rolling; absent if it was free.
+        wanted_x_n: Option<f64> = Some(29_000.0),
+        /// Force asked for across; absent if it was free.
+        wanted_y_n: Option<f64> = None,
+        /// Force found along rolling.
+        found_x_n: f64 = 28_100.0,
+        /// Force found across.
+        found_y_n: f64 = -350.0,
+    }
+    code: "force-unreachable",
+    severity: Warning,
+    advice: "Ask for less: spin takes its share of μN. The motion has `saturated: true`.",
+    detail: {
+        let wanted = |force: &Option<f64>| {
+            force.map_or_else(|| "free".to_owned(), |force| format!("{force} N"))
+        };
+        format!(
+            "no creepage gives the force asked for (x: {}, y: {}); the nearest found is {found_x_n:.6e} N, {found_y_n:.6e} N",
+            wanted(wanted_x_n), wanted(wanted_y_n)
+        )
+    },
+
+    /// An iteration ended before it met its tolerance, and its result was used all the same.
+    IterationInexact {
+        /// Which iteration.
+        iteration: &'static str = "force control",
+        /// How it ended, as a clause.
+        reason: &'static str = "the trials were used up",
+        /// Its last residual, in the measure of the iteration.
+        residual: f64 = 3e-5,
+        /// The residual that was wanted.
+        tolerance: f64 = 2e-6,
+    }
+    code: "iteration-inexact",
+    severity: Warning,
+    advice: "Judge by `residual` against `tolerance` whether the answer is still good enough; it is not part of the error estimate.",
+    detail: format!(
+        "{iteration} ended before its tolerance was met: {reason}; the residual is {residual:.2e}, {tolerance:.2e} was wanted"
+    ),
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+    use crate::contact::remark::RemarkEntry;
+
+    #[test]
+    fn every_code_is_listed_once_and_documented() {
+        let kinds = Remark::kinds();
+        assert_eq!(kinds.len(), Remark::examples().len());
+        let codes: BTreeSet<_> = kinds.iter().map(|kind| kind.code).collect();
+        assert_eq!(codes.len(), kinds.len(), "a code stands twice");
+        for kind in kinds {
+            let words = kind.code.split('-');
+            let kebab =
+                |word: &str| !word.is_empty() && word.chars().all(|c| c.is_ascii_lowercase());
+            assert!(
+                words.into_iter().all(kebab),
+                "{} is no kebab-case",
+                kind.code
+            );
+            for text in [kind.meaning, kind.advice] {
+                assert!(
+                    text.len() > 15 && text.ends_with('.'),
+                    "{}: {text}",
+                    kind.code
+                );
+            }
+            assert!(
+                kind.example.len() > 15 && !kind.example.ends_with('.'),
+                "{}: {}",
+                kind.code,
+                kind.example
+            );
+        }
+    }
+
+    #[test]
+    fn figures_have_names_of_their_own() {
+        let members = serde_json::to_value(RemarkEntry {
+            patch: Some(0),
+            point: Some(0),
+            also_at_points: vec![[1, 2]],
+            pointer: Some(String::new()),
+            ..Remark::GapRough {}.into()
+        });
+        let members = members.unwrap();
+        for (kind, example) in Remark::kinds().iter().zip(Remark::examples()) {
+            assert!(
+                kind.figures.iter().all(|name| members.get(name).is_none()),
+                "{} has a figure named as a member of every remark",
+                kind.code
+            );
+            let given = example.figures();
+            let left_out = kind.figures.len() - given.len();
+            // Of optional figures at least one is shown.
+            assert!(
+                left_out == 0 || !given.is_empty(),
+                "{}: {given:?}",
+                kind.code
+            );
+        }
+    }
+}
