@@ -75,7 +75,7 @@ pub fn bare_rate(threads: usize, time: Duration, case: impl Fn(usize) -> Value +
     next.into_inner() as f64 / start.elapsed().as_secs_f64()
 }
 
-/// As a worker does it, matrices kept by its thread included.
+/// As a worker does it, operators kept by the process included.
 fn solve_one(recipe: &Recipe, case: &Value) {
     let problem = (recipe.check)(case, &Limits::default()).expect("a case");
     (recipe.solve)(&problem, &Unwatched).expect("a solution");

@@ -2,11 +2,11 @@
 
 use std::fmt::Write as _;
 use std::hint::black_box;
-use std::rc::Rc;
+use std::sync::Arc;
 
 use railhead::contact::monitor::Unwatched;
 use railhead::contact::problem::Problem;
-use railhead::contact::tangential::prepared::Cache;
+use railhead::contact::tangential::operator_store::OperatorStore;
 use railhead::contact::{solve, solve_with};
 use serde_json::{Value, json};
 
@@ -96,7 +96,7 @@ fn one_shape(lu: f64) -> String {
             problem(&question(&motion, &json!(["resultants"]), 0.3, load))
         })
         .collect();
-    let cache = Rc::new(Cache::new(64 << 20));
+    let store = Arc::new(OperatorStore::default());
     let (alone, _) = seconds_of(|| {
         for problem in &problems {
             let _ = black_box(solve(problem, &Unwatched));
@@ -104,7 +104,7 @@ fn one_shape(lu: f64) -> String {
     });
     let (kept, _) = seconds_of(|| {
         for problem in &problems {
-            let _ = black_box(solve_with(&cache, problem, &Unwatched));
+            let _ = black_box(solve_with(&store, problem, &Unwatched));
         }
     });
     let each = |seconds: f64| seconds / lu / f64::from(CASES_OF_A_SHAPE);
@@ -113,7 +113,7 @@ fn one_shape(lu: f64) -> String {
          influence of earlier ones kept ({:.1} MB of matrices), as a worker of the service does.\n\n",
         each(alone),
         each(kept),
-        cache.bytes() as f64 / 1e6
+        store.bytes() as f64 / 1e6
     )
 }
 

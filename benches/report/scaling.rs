@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 use std::path::Path;
-use std::rc::Rc;
+use std::sync::Arc;
 
-use railhead::contact::influence::strips;
+use railhead::contact::influence::strips::{self, Precision};
 use railhead::contact::monitor::Unwatched;
 use railhead::contact::tangential::ladder::Ladder;
 use railhead::contact::tangential::point::{self, Asked};
@@ -42,10 +42,10 @@ pub fn section(lu: f64, pictures: &Path) -> String {
             index: 0,
             motion: problem.motions[0],
         };
-        let mut ladder = Ladder::new(&problem, &Rc::default());
+        let mut ladder = Ladder::new(&problem, &Arc::default());
         let point = point::solve(&problem, &mut ladder, asked, &Unwatched).expect("an answer");
         let cells = (side * side) as usize;
-        let bytes = strips::bytes(cells, side as usize, true) as f64;
+        let bytes = strips::bytes(cells, side as usize, true, Precision::Double) as f64;
         let size = Size {
             cells: cells as f64,
             work: bytes / 8.0 + point.work.entries as f64,

@@ -24,8 +24,8 @@ fn condition(a_over_b: f64, strips: u32, cells: u32, rule: Rule) -> f64 {
     });
     let problem = check(&case, &Limits::default()).expect("a valid case");
     let level = Level::new(&problem, MeshSize { strips, cells }).expect("a mesh");
-    let influence = level.influence(&Unwatched).expect("never stopped");
-    let equations = Equations::new(rule, &level.normalised, influence, None);
+    let operator = level.operator(&Unwatched).expect("never stopped");
+    let equations = Equations::new(rule, &level.normalised, &operator.influence, None);
     let values = equations.dense(&Unwatched).expect("never stopped");
     let n = 2 * equations.cells();
     let matrix = Mat::from_fn(n, n, |i, j| values[j * n + i]);

@@ -19,6 +19,7 @@ use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::cli::http_args::HttpArgs;
 use crate::contact::problem::Limits;
+use crate::contact::tangential::operator_store::{BYTES_DEFAULT, OperatorStore};
 use crate::http;
 use crate::telemetry::{Endpoint, LogFormat};
 
@@ -294,6 +295,10 @@ pub struct CaseArgs {
     #[arg(long, env = "RAILHEAD_MEMORY_LIMIT_MB", default_value_t = 2048, value_name = "MIB",
           value_parser = clap::value_parser!(u64).range(1..=1 << 30))]
     pub memory_limit_mb: u64,
+    /// Memory for operators of meshes, in MiB, kept for the next cases of the same shape and shared by all workers; 0: none are kept.
+    #[arg(long, env = "RAILHEAD_OPERATOR_STORE_MB", default_value_t = BYTES_DEFAULT >> 20, value_name = "MIB",
+          value_parser = clap::value_parser!(u64).range(..=1 << 30))]
+    pub operator_store_mb: u64,
 }
 
 /// Settings of `healthcheck`.
@@ -354,6 +359,10 @@ impl CaseArgs {
             memory_bytes: self.memory_limit_mb << 20,
             ..Limits::default()
         }
+    }
+
+    fn operators(self) -> OperatorStore {
+        OperatorStore::new(self.operator_store_mb << 20)
     }
 }
 

@@ -20,6 +20,7 @@ use tokio_util::sync::CancellationToken;
 use crate::cli::stop::{Schedule, Signals};
 use crate::cli::{Anonymous, ServeArgs};
 use crate::http::{self, HttpOptions};
+use crate::jobs::recipe::Recipe;
 use crate::jobs::trace::Tracer;
 use crate::jobs::{Jobs, Options};
 use crate::telemetry::{self, Traces};
@@ -56,7 +57,7 @@ async fn serve(args: &ServeArgs) -> anyhow::Result<()> {
     let mut signals = Signals::listen()?;
     let workers = args.worker_count();
     let traces = args.otlp_endpoint.as_ref().map(Traces::start).transpose()?;
-    let jobs = Jobs::open(Options {
+    let options = Options {
         workers,
         limits: args.case.limits(),
         attempts_max: args.attempts_max,
@@ -66,8 +67,9 @@ async fn serve(args: &ServeArgs) -> anyhow::Result<()> {
         tenant_queue_max: args.tenant_queue_max,
         tracer: traces.as_ref().map(|traces| Tracer::new(traces.tracer())),
         ..Options::new(&args.data_dir)
-    })
-    .await?;
+    };
+    let recipe = Recipe::with_operators(args.case.operators());
+    let jobs = Jobs::open_with(options, recipe).await?;
     let listener = TcpListener::bind(args.listen)
         .await
         .with_context(|| format!("cannot listen on {}", args.listen))?;

@@ -4,6 +4,7 @@ use std::io::Read;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
@@ -13,7 +14,7 @@ use serde_json::{Map, Value, json};
 use crate::cli::{SolveArgs, complain, print};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::solution::{Fields, PatchFields, PointFields, Solution};
-use crate::contact::{check, solve};
+use crate::contact::{check, solve_with};
 
 /// Exit code for a case that is faulty.
 const FAULTY_CASE: u8 = 2;
@@ -65,7 +66,8 @@ pub(super) fn run(args: &SolveArgs) -> anyhow::Result<ExitCode> {
             return Ok(ExitCode::from(FAULTY_CASE));
         }
     };
-    let (solution, fields) = solve(&problem, &Clock(Instant::now()))?;
+    let operators = Arc::new(args.case.operators());
+    let (solution, fields) = solve_with(&operators, &problem, &Clock(Instant::now()))?;
     let result = Printed {
         solution: &solution,
         fields: (!fields.patches.is_empty()).then(|| fields_json(&fields)),

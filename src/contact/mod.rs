@@ -18,20 +18,20 @@ pub mod solution;
 pub mod tangential;
 pub mod zones;
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use serde_json::Value;
 
 use crate::contact::error::{CaseError, SolveError};
 use crate::contact::monitor::{Monitor, Watch};
 use crate::contact::normal::Region;
-use crate::contact::outputs::assemble::{assemble, wants_fields};
+use crate::contact::outputs::assemble::{Assembly, wants_fields};
 use crate::contact::problem::{Limits, Problem};
 use crate::contact::solution::{Fields, Solution};
 use crate::contact::tangential::forces;
 use crate::contact::tangential::ladder::{Ladder, Plan, Regime};
+use crate::contact::tangential::operator_store::OperatorStore;
 use crate::contact::tangential::point::Point;
-use crate::contact::tangential::prepared::Cache;
 
 /// Reads and checks a case.
 ///
@@ -52,46 +52,56 @@ pub fn check(case: &Value, limits: &Limits) -> Result<Problem, CaseError> {
 /// # Errors
 /// A named reason why there is no answer.
 pub fn solve(problem: &Problem, monitor: &dyn Monitor) -> Result<(Solution, Fields), SolveError> {
-    solve_with(&Rc::default(), problem, monitor)
+    solve_with(&Arc::default(), problem, monitor)
 }
 
-/// The same for one of many problems: what patches of the same shape have in common is kept for the next.
+/// The same for one of many problems: operators of patches of the same shape are kept in the store for the next.
 ///
 /// # Errors
 /// The same.
 pub fn solve_with(
-    cache: &Rc<Cache>,
+    operators: &Arc<OperatorStore>,
     problem: &Problem,
     monitor: &dyn Monitor,
 ) -> Result<(Solution, Fields), SolveError> {
     if let Region::Profiles(contact) = &problem.region {
-        return profiles::solve(cache, problem, contact, monitor);
+        return profiles::solve(operators, problem, contact, monitor);
     }
     let watch = Watch::new(monitor, problem.time_limit, problem.motions.len());
-    answer(cache, problem.pressed(&watch)?.as_ref(), &watch)
+    answer(operators, problem.pressed(&watch)?.as_ref(), &watch)
 }
 
 /// Solves every motion of a problem whose region and pressure are known.
 fn answer(
-    cache: &Rc<Cache>,
+    operators: &Arc<OperatorStore>,
     problem: &Problem,
     watch: &Watch,
 ) -> Result<(Solution, Fields), SolveError> {
-    let mut ladder = Ladder::new(problem, cache);
-    let mut points = Vec::with_capacity(problem.motions.len());
+    let mut ladder = Ladder::new(problem, operators);
+    let mut assembly = Assembly::new(problem);
+    let mut points: Vec<Point> = Vec::new();
+    let fields = wants_fields(problem);
     for index in 0..problem.motions.len() {
-        let point = forces::solve(problem, &mut ladder, index, points.last(), watch)?;
+        let mut point = forces::solve(problem, &mut ladder, index, points.last(), watch)?;
+        if index == 0 {
+            // What all motions share is charged to the first.
+            point.seconds += problem.normal.map_or(0.0, |normal| normal.seconds);
+        }
+        if !fields {
+            // Of this motion only its small numbers are needed from here on.
+            assembly.add(&ladder, &point);
+            points.clear();
+            ladder.trim();
+        }
         points.push(point);
         watch.advance();
     }
-    if wants_fields(problem) {
-        points = on_one_level(problem, &mut ladder, points, watch)?;
+    if fields {
+        for point in on_one_level(problem, &mut ladder, points, watch)? {
+            assembly.add(&ladder, &point);
+        }
     }
-    if let (Some(first), Some(normal)) = (points.first_mut(), problem.normal) {
-        // What all motions share is charged to the first.
-        first.seconds += normal.seconds;
-    }
-    Ok(assemble(problem, &ladder, &points))
+    Ok(assembly.finish())
 }
 
 /// Brings every point to one level as fine as the finest that any of them needed, gathered about none of their poles: the

@@ -1,7 +1,7 @@
 //! Solves a wheel on a rail: brings the wheel to rest, solves the patches one after the other, and lets friction share
 //! in the vertical load.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use crate::contact::answer;
 use crate::contact::case::{Motion, Output};
@@ -16,7 +16,7 @@ use crate::contact::outputs::track::merge;
 use crate::contact::problem::{Problem, Resolution};
 use crate::contact::remark::Remark;
 use crate::contact::solution::{Fields, Solution};
-use crate::contact::tangential::prepared::Cache;
+use crate::contact::tangential::operator_store::OperatorStore;
 
 /// The vertical force may be missed by this part of it; the bound for a change of friction's share in one round.
 const BALANCE: f64 = 5e-4;
@@ -38,7 +38,7 @@ const TOLERANCE_FIRST: f64 = 0.1;
 /// # Errors
 /// A named reason why there is no answer.
 pub(super) fn solve(
-    cache: &Rc<Cache>,
+    operators: &Arc<OperatorStore>,
     problem: &Problem,
     contact: &ProfileContact,
     monitor: &dyn Monitor,
@@ -59,7 +59,7 @@ pub(super) fn solve(
     let vertical = matches!(contact.loading, Loading::Vertical(_)) && problem.friction > 0.0;
     if !vertical || problem.motions.len() > 1 {
         let mut at_rest = rest(exactly(0.0), None)?;
-        let answers = at_rest.answers(cache, problem, contact, monitor)?;
+        let answers = at_rest.answers(operators, problem, contact, monitor)?;
         if vertical {
             let remark = Remark::NormalForcesAloneBalance {};
             at_rest.wheel.remarks.push(remark.into());
@@ -79,7 +79,7 @@ pub(super) fn solve(
         tolerance: TOLERANCE_FIRST,
     };
     let mut at_rest = rest(about, None)?;
-    let answers = at_rest.answers(cache, &coarse, contact, monitor)?;
+    let answers = at_rest.answers(operators, &coarse, contact, monitor)?;
     let mut share = friction_share(&at_rest.wheel, &answers);
     for _ in 0..ROUNDS_MAX {
         let counted = share;
@@ -87,7 +87,7 @@ pub(super) fn solve(
             break;
         }
         at_rest = at_rest.again(rest(exactly(counted), Some(&at_rest.wheel))?);
-        let answers = at_rest.answers(cache, problem, contact, monitor)?;
+        let answers = at_rest.answers(operators, problem, contact, monitor)?;
         share = friction_share(&at_rest.wheel, &answers);
         if ((1.0 + share) / (1.0 + counted) - 1.0).abs() <= BALANCE {
             return Ok(merge(problem, &contact.geometry, &at_rest.wheel, answers));
@@ -130,7 +130,7 @@ impl Rest {
     /// Solves every motion on every part.
     fn answers(
         &self,
-        cache: &Rc<Cache>,
+        operators: &Arc<OperatorStore>,
         problem: &Problem,
         contact: &ProfileContact,
         monitor: &dyn Monitor,
@@ -149,7 +149,7 @@ impl Rest {
             };
             let region = Region::Grid(gap.field.clone());
             let part = problem.of_part(region, motions, normal)?;
-            answers.push(answer(cache, &part, &watch)?);
+            answers.push(answer(operators, &part, &watch)?);
         }
         Ok(answers)
     }

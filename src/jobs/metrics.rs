@@ -45,6 +45,7 @@ pub(super) struct Metrics {
     oldest_queued_seconds: Gauge<f64, std::sync::atomic::AtomicU64>,
     database_bytes: Gauge,
     result_bytes: Gauge,
+    operator_bytes: Gauge,
     solve_seconds: Family<MethodLabel, Histogram>,
     iterations: Family<MethodLabel, Histogram>,
     ended: Family<StateLabel, Counter>,
@@ -61,6 +62,7 @@ impl Metrics {
             oldest_queued_seconds: Gauge::default(),
             database_bytes: Gauge::default(),
             result_bytes: Gauge::default(),
+            operator_bytes: Gauge::default(),
             solve_seconds: Family::new_with_constructor(|| Histogram::new(SOLVE_SECONDS)),
             iterations: Family::new_with_constructor(|| Histogram::new(ITERATIONS)),
             ended: Family::default(),
@@ -151,6 +153,11 @@ impl Metrics {
             self.result_bytes.clone(),
         );
         registry.register(
+            "operator_store_bytes",
+            "Size of the operators of meshes that are kept in memory for the next cases",
+            self.operator_bytes.clone(),
+        );
+        registry.register(
             "storage_failing",
             "1 while the disk is full or cannot be written",
             self.storage_failing.clone(),
@@ -213,6 +220,8 @@ impl Jobs {
         let bytes = |bytes: u64| i64::try_from(bytes).unwrap_or(i64::MAX);
         metrics.database_bytes.set(bytes(figures.database_bytes));
         metrics.result_bytes.set(bytes(figures.result_bytes));
+        let operators = self.shared.recipe.operators.bytes();
+        metrics.operator_bytes.set(bytes(operators));
         Ok(())
     }
 }

@@ -1,7 +1,6 @@
 //! What the workers do with a case: check it, solve it. Production uses `contact`; tests may put in their own.
 
 use std::fmt;
-use std::rc::Rc;
 use std::sync::Arc;
 
 use serde_json::Value;
@@ -11,14 +10,7 @@ use crate::contact::error::{CaseError, SolveError};
 use crate::contact::monitor::Monitor;
 use crate::contact::problem::{Limits, Problem};
 use crate::contact::solution::{Fields, Solution};
-use crate::contact::tangential::prepared::Cache;
-
-/// Bytes of influence matrices that each solver thread keeps for the next patches of the same shape.
-const PREPARED_BYTES: usize = 64 << 20;
-
-thread_local! {
-    static PREPARED: Rc<Cache> = Rc::new(Cache::new(PREPARED_BYTES));
-}
+use crate::contact::tangential::operator_store::OperatorStore;
 
 /// Checks a case against limits.
 pub type Check = dyn Fn(&Value, &Limits) -> Result<Problem, CaseError> + Send + Sync;
@@ -33,17 +25,26 @@ pub struct Recipe {
     pub check: Arc<Check>,
     /// The second step, done on a solver thread.
     pub solve: Arc<Solve>,
+    /// What all solver threads share.
+    pub operators: Arc<OperatorStore>,
 }
 
 impl Recipe {
-    /// The real physics.
+    /// The real physics, with operators kept in a store of the usual size.
     #[must_use]
     pub fn contact() -> Recipe {
+        Recipe::with_operators(OperatorStore::default())
+    }
+
+    /// The real physics with this store.
+    #[must_use]
+    pub fn with_operators(operators: OperatorStore) -> Recipe {
+        let operators = Arc::new(operators);
+        let store = Arc::clone(&operators);
         Recipe {
             check: Arc::new(contact::check),
-            solve: Arc::new(|problem, monitor| {
-                PREPARED.with(|cache| contact::solve_with(cache, problem, monitor))
-            }),
+            solve: Arc::new(move |problem, monitor| contact::solve_with(&store, problem, monitor)),
+            operators,
         }
     }
 }

@@ -53,8 +53,8 @@ fn one_rule(contact: &Ellipse, rule: Rule) -> Cells {
     };
     let level = Level::new(&problem, size).expect("a mesh");
     let motion: Motion = level.scale.motion(&problem.motions[0]);
-    let influence = level.influence(&Unwatched).expect("never stopped");
-    let equations = Equations::new(rule, &level.normalised, influence, None);
+    let operator = level.operator(&Unwatched).expect("never stopped");
+    let equations = Equations::new(rule, &level.normalised, &operator.influence, None);
     let padded = equations.padded();
     let resized = |values: &[f64]| {
         let mut values = values.to_vec();

@@ -20,6 +20,7 @@ mod kalker_table;
 mod laws;
 mod liu_hsu;
 mod liu_hsu_newton;
+mod memory;
 mod paper_figures;
 mod pressure_grid;
 mod pressure_grid_faults;

@@ -20,6 +20,8 @@ mod fuzzed;
 mod guides;
 mod keys;
 mod malformed;
+#[cfg(target_os = "linux")]
+mod memory;
 mod metrics;
 mod order;
 mod ownership;

@@ -3,7 +3,7 @@
 use crate::contact::case::{Motion, Output};
 use crate::contact::normal::{Patch, Region};
 use crate::contact::outputs::resultants::Resultants;
-use crate::contact::problem::Problem;
+use crate::contact::problem::{Problem, Resolution};
 use crate::contact::remark::{Remark, RemarkEntry, merged};
 use crate::contact::solution::{
     CombinedMaterial, ErrorEstimate, Fields, MeshReport, NormalisedMotion, Origin, PatchFields,
@@ -14,60 +14,99 @@ use crate::contact::tangential::level::Level;
 use crate::contact::tangential::point::Point;
 use crate::contact::zones::Zone;
 
-use crate::contact::problem::Resolution;
-
+/// Remarks that are gathered before repetitions are dropped.
+const REMARKS_AT_ONCE: usize = 1000;
 /// Axes, origin and signs in one sentence.
 const FRAME: &str = "x along rolling (leading edge at larger x), y to the left, z up out of the lower body; forces, moments \
                      and tractions act on the lower body, slip is that of the upper body relative to the lower one";
 
-/// Puts the answer together; `points` has one entry per motion, all of one level if fields are wanted.
-#[must_use]
-pub fn assemble(problem: &Problem, ladder: &Ladder, points: &[Point]) -> (Solution, Fields) {
-    let patches = problem.region.patches();
-    let solution = Solution {
-        patches: (0..patches.len())
-            .map(|p| patch_solution(problem, ladder, &patches[p], p, points))
-            .collect(),
-        total: points
-            .iter()
-            .map(|point| total(problem, &patches, point))
-            .collect(),
-        remarks: remarks(problem, points),
-        normal: problem.normal,
-        wheel_lowering_mm: None,
-        origin: Origin {
-            x_mm: 0.0,
-            y_mm: 0.0,
-            meaning: match problem.region {
-                Region::Ellipse(_) => "centre of the contact ellipse",
-                Region::Gap(_) | Region::Profiles(_) | Region::Grid(_) => {
-                    "origin of the given coordinates, for all patches"
-                }
-            }
-            .to_owned(),
-        },
-        frame: FRAME.to_owned(),
-        material: CombinedMaterial {
-            shear_modulus_mpa: problem.elasticity.shear_modulus,
-            poisson_ratio: problem.elasticity.poisson_ratio,
-            difference_parameter: problem.elasticity.difference,
-        },
-        solver_version: env!("CARGO_PKG_VERSION").to_owned(),
-        case_digest: problem.digest.clone(),
-    };
-    let fields = Fields {
-        patches: (0..patches.len())
-            .map(|p| patch_fields(problem, ladder.get(points[0].level), p, points))
-            .collect(),
-    };
-    (
-        solution,
-        if wants_fields(problem) {
+/// The answer of a problem, motion by motion; of each only what the answer holds is kept.
+#[derive(Debug)]
+pub struct Assembly<'a> {
+    problem: &'a Problem,
+    patches: Vec<Patch>,
+    /// Motion by motion, for every patch.
+    points: Vec<Vec<PointSolution>>,
+    total: Vec<Total>,
+    remarks: Vec<RemarkEntry>,
+    fields: Fields,
+}
+
+impl<'a> Assembly<'a> {
+    /// No motion yet.
+    #[must_use]
+    pub fn new(problem: &'a Problem) -> Assembly<'a> {
+        let patches = problem.region.patches();
+        Assembly {
+            problem,
+            points: vec![Vec::new(); patches.len()],
+            patches,
+            total: Vec::new(),
+            remarks: problem.remarks.clone(),
+            fields: Fields::default(),
+        }
+    }
+
+    /// Adds the next motion; all are of one level if fields are wanted.
+    pub fn add(&mut self, ladder: &Ladder, point: &Point) {
+        let (problem, level) = (self.problem, ladder.get(point.level));
+        self.remarks
+            .extend(remarks(problem, self.total.len(), point));
+        if self.remarks.len() > REMARKS_AT_ONCE {
+            self.remarks = merged(std::mem::take(&mut self.remarks));
+        }
+        for (index, patch) in self.patches.iter().enumerate() {
+            self.points[index].push(point_solution(problem, level, patch, index, point));
+        }
+        self.total.push(total(problem, &self.patches, point));
+        if !wants_fields(problem) {
+            return;
+        }
+        if self.fields.patches.is_empty() {
+            let cells = |patch| patch_fields(problem, level, patch);
+            self.fields.patches = (0..self.patches.len()).map(cells).collect();
+        }
+        for (index, fields) in self.fields.patches.iter_mut().enumerate() {
+            let cells = level.patch_cells(index);
             fields
-        } else {
-            Fields::default()
-        },
-    )
+                .points
+                .push(point_fields(problem, level, cells, point));
+        }
+    }
+
+    /// The answer.
+    #[must_use]
+    pub fn finish(self) -> (Solution, Fields) {
+        let problem = self.problem;
+        let patches = self.patches.iter().zip(self.points);
+        let solution = Solution {
+            patches: patches.map(patch_solution).collect(),
+            total: self.total,
+            remarks: merged(self.remarks),
+            normal: problem.normal,
+            wheel_lowering_mm: None,
+            origin: Origin {
+                x_mm: 0.0,
+                y_mm: 0.0,
+                meaning: match problem.region {
+                    Region::Ellipse(_) => "centre of the contact ellipse",
+                    Region::Gap(_) | Region::Profiles(_) | Region::Grid(_) => {
+                        "origin of the given coordinates, for all patches"
+                    }
+                }
+                .to_owned(),
+            },
+            frame: FRAME.to_owned(),
+            material: CombinedMaterial {
+                shear_modulus_mpa: problem.elasticity.shear_modulus,
+                poisson_ratio: problem.elasticity.poisson_ratio,
+                difference_parameter: problem.elasticity.difference,
+            },
+            solver_version: env!("CARGO_PKG_VERSION").to_owned(),
+            case_digest: problem.digest.clone(),
+        };
+        (solution, self.fields)
+    }
 }
 
 /// Is anything asked for that has a value per cell?
@@ -76,13 +115,7 @@ pub fn wants_fields(problem: &Problem) -> bool {
     problem.outputs.iter().any(|o| *o != Output::Resultants)
 }
 
-fn patch_solution(
-    problem: &Problem,
-    ladder: &Ladder,
-    patch: &Patch,
-    index: usize,
-    points: &[Point],
-) -> PatchSolution {
+fn patch_solution((patch, points): (&Patch, Vec<PointSolution>)) -> PatchSolution {
     PatchSolution {
         normal_force_n: patch.normal_force,
         approach_mm: patch.approach,
@@ -91,10 +124,7 @@ fn patch_solution(
         semi_axes_mm: patch.semi_axes,
         extent_mm: patch.extent,
         position: None,
-        points: points
-            .iter()
-            .map(|point| point_solution(problem, ladder.get(point.level), patch, index, point))
-            .collect(),
+        points,
     }
 }
 
@@ -254,15 +284,13 @@ fn total(problem: &Problem, patches: &[Patch], point: &Point) -> Total {
     }
 }
 
-fn remarks(problem: &Problem, points: &[Point]) -> Vec<RemarkEntry> {
-    let of_points = points.iter().enumerate().flat_map(|(k, point)| {
-        let own = point.tangential.remarks.iter().cloned();
-        let missed = target_missed(problem, point);
-        own.chain(unreachable(problem, k, point))
-            .chain(missed)
-            .map(move |remark| remark.at_point(k))
-    });
-    merged(problem.remarks.iter().cloned().chain(of_points))
+/// Remarks on motion `k`.
+fn remarks(problem: &Problem, k: usize, point: &Point) -> impl Iterator<Item = RemarkEntry> {
+    let own = point.tangential.remarks.iter().cloned();
+    let missed = target_missed(problem, point);
+    own.chain(unreachable(problem, k, point))
+        .chain(missed)
+        .map(move |remark| remark.at_point(k))
 }
 
 fn unreachable(problem: &Problem, index: usize, point: &Point) -> Option<Remark> {
@@ -285,10 +313,7 @@ fn target_missed(problem: &Problem, point: &Point) -> Option<Remark> {
     (target_met(problem, point) == Some(false)).then_some(Remark::TargetMissed { estimate, target })
 }
 
-fn patch_fields(problem: &Problem, level: &Level, patch: usize, points: &[Point]) -> PatchFields {
-    if !wants_fields(problem) {
-        return PatchFields::default();
-    }
+fn patch_fields(problem: &Problem, level: &Level, patch: usize) -> PatchFields {
     let cells = level.patch_cells(patch);
     let mesh = &level.mesh;
     let mut fields = PatchFields::default();
@@ -305,11 +330,7 @@ fn patch_fields(problem: &Problem, level: &Level, patch: usize, points: &[Point]
     }
     fields.pressure_mpa = problem
         .wants(Output::Pressure)
-        .then(|| level.pressure[cells.clone()].to_vec());
-    fields.points = points
-        .iter()
-        .map(|point| point_fields(problem, level, cells.clone(), point))
-        .collect();
+        .then(|| level.pressure[cells].to_vec());
     fields
 }
 

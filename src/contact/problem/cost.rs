@@ -1,35 +1,32 @@
 //! What a case will cost, estimated from its finest mesh before it is queued.
 
-use crate::contact::case::{MeshSize, Method};
+use crate::contact::case::{Method, Output};
 use crate::contact::error::Fault;
 use crate::contact::normal::Region;
 use crate::contact::problem::{Cost, Limits, Prescribed, Problem, Resolution};
+use crate::contact::tangential::ladder::{CELLS_MAX, LEVELS_KEPT, Ladder};
+use crate::contact::tangential::level::precision_of;
+use crate::contact::tangential::operator_store::OperatorKind;
 
-/// Cells of the finest mesh that a target may lead to, and of that of the dense method.
-const TARGET_CELLS_MAX: f64 = 2048.0;
-const TARGET_DENSE: MeshSize = MeshSize {
-    strips: 12,
-    cells: 24,
-};
-/// The mesh of the simplified theory, whatever the target.
-const FASTSIM_MESH: MeshSize = MeshSize {
-    strips: 10,
-    cells: 16,
-};
 /// Cells that a target of 0.02 costs on average, all levels added, and how they grow as it falls.
 const TARGET_CELLS: f64 = 160.0;
 const TARGET_GROWTH: f64 = 0.65;
 /// Cells the dense method may use.
 const LIU_HSU_CELLS_MAX: f64 = 1000.0;
-/// Memory beside the influence coefficients, relative to them.
-const BYTES_BESIDE: f64 = 1.3;
 /// Solves that the search for a prescribed force takes beside the last, on average.
 const TRIALS: f64 = 6.0;
 /// Dense square matrices the method of Liu and Hsu holds at once.
 const LIU_HSU_MATRICES: f64 = 4.0;
-/// Vectors per cell a solve holds, and doubles per cell and motion in the answer.
+/// Doubles per cell of the finest mesh that an iteration holds: the Krylov space, iterates and buffers.
 const VECTORS_PER_CELL: f64 = 64.0;
-const FIELDS_PER_CELL: f64 = 6.0;
+/// Bytes per cell of a level that is kept: two meshes, pressure, area and bound, and what two motions left on it.
+const LEVEL_BYTES_PER_CELL: f64 = 200.0;
+/// Levels that a motion climbs at most.
+const LEVELS_PER_MOTION: f64 = 4.0;
+/// Bytes of a motion in the answer, for each patch, and of its text.
+const MOTION_BYTES: f64 = 2000.0;
+/// Bytes per cell and motion of fields, in the answer and in their stored form.
+const FIELDS_BYTES_PER_CELL: f64 = 160.0;
 
 /// What decides how much a solve costs.
 #[derive(Debug, Clone)]
@@ -39,8 +36,12 @@ pub(super) struct Size {
     /// Segments per strip, for each patch.
     pub(super) segments: Vec<f64>,
     pub(super) motions: usize,
+    /// Values per cell are kept motion by motion.
+    pub(super) fields: bool,
     /// Forces prescribed in place of creepages, motion by motion.
     pub(super) forces: Vec<Prescribed>,
+    /// Region and pressure are mirror-symmetric for sure.
+    pub(super) ellipse: bool,
     /// Time to find region and pressure, in s.
     pub(super) normal_seconds: f64,
 }
@@ -55,8 +56,8 @@ pub(super) fn normal_seconds(region: &Region) -> f64 {
 }
 
 impl Problem {
-    /// Estimated cost of solving this: the influence coefficients of the finest mesh and what stands beside them,
-    /// the matrices of the dense method, the fields of the answer. Seconds are rough.
+    /// Estimated cost of solving this: the operator of the finest mesh and what stands beside it, the matrices of the dense method,
+    /// the answer. What the process keeps for all cases, the operator store, comes on top. Seconds are rough.
     #[must_use]
     pub fn cost(&self) -> Cost {
         Size {
@@ -64,7 +65,12 @@ impl Problem {
             resolution: self.resolution,
             segments: self.region.segments_per_strip(),
             motions: self.motions.len(),
+            fields: self
+                .outputs
+                .iter()
+                .any(|output| *output != Output::Resultants),
             forces: self.forces.clone(),
+            ellipse: self.region.is_ellipse(),
             normal_seconds: normal_seconds(&self.region),
         }
         .cost()
@@ -75,29 +81,60 @@ impl Size {
     fn cost(&self) -> Cost {
         let (cells, segments) = self.finest();
         let motions = self.motions as f64;
-        let fields = cells * (VECTORS_PER_CELL + FIELDS_PER_CELL * motions) * 8.0;
         let prescribed = self
             .forces
             .iter()
             .filter(|forces| **forces != [None; 2])
             .count();
         let solves = motions + TRIALS * prescribed as f64;
-        let influence = 3.0 * cells * (cells + 2.0 * segments) * 8.0 * BYTES_BESIDE;
-        let (bytes, seconds) = match self.method {
+        let seconds = match self.method {
             Method::Auto | Method::BoundaryElement => {
                 let usual = self.usual_cells(cells);
-                (influence, 1e-9 * usual * usual * (10.0 + 50.0 * solves))
+                1e-9 * usual * usual * (10.0 + 50.0 * solves)
             }
-            Method::LiuHsu => (
-                influence + (2.0 * cells).powi(2) * 8.0 * LIU_HSU_MATRICES,
-                4e-8 * cells * cells + 3e-11 * (2.0 * cells).powi(3) * 30.0 * solves,
-            ),
-            Method::Fastsim => (0.0, 1e-7 * cells * (1.0 + 0.2 * solves)),
+            Method::LiuHsu => 4e-8 * cells * cells + 3e-11 * (2.0 * cells).powi(3) * 30.0 * solves,
+            Method::Fastsim => 1e-7 * cells * (1.0 + 0.2 * solves),
         };
         Cost {
-            bytes: (bytes + fields) as u64,
+            bytes: self.bytes(cells, segments) as u64,
             seconds: seconds + self.normal_seconds,
         }
+    }
+
+    /// Peak memory in bytes.
+    fn bytes(&self, cells: f64, segments: f64) -> f64 {
+        let motions = self.motions as f64;
+        let operator = match self.method {
+            Method::Fastsim => 0.0,
+            Method::Auto | Method::BoundaryElement | Method::LiuHsu => {
+                let kind = OperatorKind {
+                    poisson_ratio: 0.0,
+                    // Cells that gather about a pole are not.
+                    folded: self.ellipse && matches!(self.resolution, Resolution::Mesh(_)),
+                    precision: precision_of(self.resolution),
+                };
+                let each = (cells / segments.max(1.0)).ceil();
+                kind.bytes(segments.ceil() as usize, each as usize) as f64
+            }
+        };
+        let solve = match self.method {
+            // Factored blocks of two unknowns per cell.
+            Method::Auto | Method::BoundaryElement => 32.0 * cells * cells / segments.max(1.0),
+            Method::LiuHsu => (2.0 * cells).powi(2) * 8.0 * LIU_HSU_MATRICES,
+            Method::Fastsim => 0.0,
+        };
+        let levels = (LEVELS_PER_MOTION * motions).min(LEVELS_KEPT as f64);
+        let patches = self.segments.len() as f64;
+        let fields = if self.fields {
+            motions * cells * FIELDS_BYTES_PER_CELL
+        } else {
+            0.0
+        };
+        operator
+            + solve
+            + cells * (8.0 * VECTORS_PER_CELL + levels * LEVEL_BYTES_PER_CELL)
+            + motions * patches * MOTION_BYTES
+            + fields
     }
 
     /// Faults of a case that is too large for the limits or for its method.
@@ -137,13 +174,13 @@ impl Size {
     /// Cells and segments of the finest mesh over all patches.
     fn finest(&self) -> (f64, f64) {
         let per_strip: f64 = self.segments.iter().sum();
-        let size = match (self.resolution, self.method) {
-            (Resolution::Mesh(size), _) => size,
-            (Resolution::Target(_), Method::LiuHsu) => TARGET_DENSE,
-            (Resolution::Target(_), Method::Fastsim) => FASTSIM_MESH,
-            (Resolution::Target(_), _) => {
+        let fixed = Ladder::fixed_sizes(self.resolution, self.method);
+        let size = match (self.resolution, fixed.as_deref().and_then(<[_]>::last)) {
+            (_, Some(size)) => *size,
+            (Resolution::Mesh(size), None) => size,
+            (Resolution::Target(_), None) => {
                 // The cells are shared out among the patches; hollow ones have several segments in a strip.
-                let share = TARGET_CELLS_MAX / self.segments.len() as f64;
+                let share = f64::from(CELLS_MAX) / self.segments.len() as f64;
                 return (share * per_strip, share.sqrt() * per_strip);
             }
         };

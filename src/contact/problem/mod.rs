@@ -134,6 +134,7 @@ impl Problem {
             load: case.load.as_ref(),
             motion: Some(&case.motion),
             solver: Some(&case.solver),
+            outputs: &case.outputs,
         };
         let (parts, mut faults) = Parts::check(given, limits);
         if faults.is_empty() && parts.region.is_none() {
@@ -190,6 +191,7 @@ pub(super) struct Given<'a> {
     pub(super) load: Option<&'a Load>,
     pub(super) motion: Option<&'a Motions>,
     pub(super) solver: Option<&'a Solver>,
+    pub(super) outputs: &'a [Output],
 }
 
 /// Faults of the parts of a case that can be checked although others are faulty.
@@ -247,6 +249,13 @@ impl Parts {
                     .map_or_else(|| vec![1.0], |(region, _)| region.segments_per_strip()),
                 motions: motions.as_ref().map_or(1, |m| m.motions.len()),
                 forces: motions.as_ref().map_or_else(Vec::new, |m| m.forces.clone()),
+                fields: given
+                    .outputs
+                    .iter()
+                    .any(|output| *output != Output::Resultants),
+                ellipse: region
+                    .as_ref()
+                    .is_some_and(|(region, _)| region.is_ellipse()),
                 normal_seconds: region
                     .as_ref()
                     .map_or(0.0, |(region, _)| cost::normal_seconds(region)),

@@ -77,6 +77,7 @@ impl Draft {
             load: self.load.as_ref(),
             motion: self.motion.as_ref(),
             solver: self.solver.as_ref(),
+            outputs: self.outputs.as_deref().unwrap_or_default(),
         };
         problem::faults_of(given, limits)
     }

@@ -3,10 +3,11 @@
 //! Everything is dimensionless: lengths by the scale of the patch, tractions by a reference traction P, slips by P/G.
 //! Vectors hold all x components, then all y components, each padded with zeros to the operator's length.
 
+use std::cell::RefCell;
 use std::ops::ControlFlow;
 
 use crate::contact::case::Motion;
-use crate::contact::influence::strips::{Differences, Parity};
+use crate::contact::influence::strips::{Differences, Parity, Scratch};
 use crate::contact::mesh::Mesh;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::tangential::rules::{Rule, Stencil};
@@ -26,6 +27,8 @@ pub struct Equations<'a> {
     row_count: usize,
     /// y of every segment, for the rigid slip.
     y: Vec<f64>,
+    /// Of the products.
+    scratch: RefCell<Scratch>,
 }
 
 impl<'a> Equations<'a> {
@@ -58,6 +61,7 @@ impl<'a> Equations<'a> {
             padded: differences.padded(parity),
             row_count: 0,
             y: Vec::with_capacity(count),
+            scratch: RefCell::default(),
         };
         for (segment, y) in mesh.segments[..count].iter().zip(&mesh.arm) {
             let stencil = Stencil::new(rule, mesh, segment);
@@ -107,7 +111,9 @@ impl<'a> Equations<'a> {
         let (tx, ty) = t.split_at(self.padded);
         let (sx, sy) = slip.split_at_mut(self.padded);
         let (dx, dy) = scratch.split_at_mut(self.row_count);
-        self.differences.apply(self.parity, tx, ty, dx, dy);
+        let mut of_product = self.scratch.borrow_mut();
+        self.differences
+            .apply(self.parity, tx, ty, dx, dy, &mut of_product);
         for ((stencil, cells), rows) in self.stencils.iter().zip(&self.cells).zip(&self.rows) {
             stencil.elastic(&dx[rows.clone()], &mut sx[cells.clone()]);
             stencil.elastic(&dy[rows.clone()], &mut sy[cells.clone()]);

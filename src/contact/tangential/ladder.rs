@@ -1,14 +1,14 @@
 //! Which meshes a case climbs: sizes from the number of cells and the shape of the patch, made once and shared by all
 //! motions.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use crate::contact::case::{MeshSize, Method};
 use crate::contact::error::SolveError;
 use crate::contact::problem::{Problem, Resolution};
 use crate::contact::tangential::fastsim;
 use crate::contact::tangential::level::Level;
-use crate::contact::tangential::prepared::Cache;
+use crate::contact::tangential::operator_store::{CaseOperators, OperatorStore};
 use crate::contact::tangential::trail::Trail;
 
 /// Cells of the first level of a patch that is not slender.
@@ -99,12 +99,18 @@ impl From<MeshSize> for Plan {
     }
 }
 
-/// The levels of a case that exist so far.
+/// Levels that are kept from one motion to the next: a few paths of about four levels. Sweeps come back to levels of the last few
+/// motions only; of a creep map of 900 motions at fixed spin, half as many make no difference.
+pub const LEVELS_KEPT: usize = 32;
+
+/// The levels of a case that exist; the least recently used are dropped between motions.
 #[derive(Debug)]
 pub struct Ladder<'a> {
     problem: &'a Problem,
-    cache: Rc<Cache>,
-    levels: Vec<Level>,
+    operators: Arc<CaseOperators>,
+    /// With their numbers, which are never given twice, in the order of their last use.
+    levels: Vec<(usize, Level)>,
+    made: usize,
     /// What the motions solved so far left on the levels.
     pub trail: Trail,
     /// The levels that the last motion climbed.
@@ -115,9 +121,9 @@ pub struct Ladder<'a> {
 }
 
 impl<'a> Ladder<'a> {
-    /// No levels yet; their influence may come from the cache.
+    /// No levels yet; their operators come from a store.
     #[must_use]
-    pub fn new(problem: &'a Problem, cache: &Rc<Cache>) -> Ladder<'a> {
+    pub fn new(problem: &'a Problem, store: &Arc<OperatorStore>) -> Ladder<'a> {
         let patches = problem.region.patches();
         let heaviest = patches
             .iter()
@@ -127,8 +133,9 @@ impl<'a> Ladder<'a> {
         });
         Ladder {
             problem,
-            cache: Rc::clone(cache),
+            operators: CaseOperators::new(store),
             levels: Vec::new(),
+            made: 0,
             trail: Trail::default(),
             path: Vec::new(),
             a_over_b,
@@ -151,9 +158,9 @@ impl<'a> Ladder<'a> {
     /// The sizes that a method always takes: the mesh of the client, else the two levels of the dense method or the one of
     /// the simplified theory.
     #[must_use]
-    pub fn fixed_sizes(problem: &Problem) -> Option<Vec<MeshSize>> {
+    pub fn fixed_sizes(resolution: Resolution, method: Method) -> Option<Vec<MeshSize>> {
         let size = |strips, cells| MeshSize { strips, cells };
-        match (problem.resolution, problem.method) {
+        match (resolution, method) {
             (Resolution::Mesh(size), Method::LiuHsu | Method::Fastsim) => Some(vec![size]),
             (Resolution::Mesh(_), _) => None,
             (Resolution::Target(_), Method::LiuHsu) => Some(vec![size(6, 12), size(12, 24)]),
@@ -197,18 +204,40 @@ impl<'a> Ladder<'a> {
     /// # Errors
     /// If no strip meets a patch.
     pub fn level(&mut self, plan: Plan) -> Result<usize, SolveError> {
-        if let Some(found) = self.levels.iter().position(|level| level.plan == plan) {
-            return Ok(found);
+        if let Some(place) = self.levels.iter().position(|(_, level)| level.plan == plan) {
+            // The last used stand last.
+            self.levels[place..].rotate_left(1);
+            return Ok(self.levels[self.levels.len() - 1].0);
         }
-        let cache = Rc::clone(&self.cache);
-        self.levels
-            .push(Level::with_cache(self.problem, plan, cache)?);
-        Ok(self.levels.len() - 1)
+        let operators = Arc::clone(&self.operators);
+        let level = Level::with_operators(self.problem, plan, operators)?;
+        self.levels.push((self.made, level));
+        self.made += 1;
+        Ok(self.made - 1)
     }
 
-    /// A level by its number.
+    /// A level by its number; it must have been used since the last [`Ladder::trim`], or lie on the path.
     #[must_use]
     pub fn get(&self, level: usize) -> &Level {
-        &self.levels[level]
+        let found = self
+            .levels
+            .iter()
+            .rev()
+            .find(|(number, _)| *number == level);
+        let Some((_, level)) = found else {
+            unreachable!("level {level} was dropped while it was in use")
+        };
+        level
+    }
+
+    /// Drops the least recently used levels beyond [`LEVELS_KEPT`], and what motions left on them. Called between motions: no answer
+    /// may refer to a level by its number after that.
+    pub fn trim(&mut self) {
+        let surplus = self.levels.len().saturating_sub(LEVELS_KEPT);
+        let dropped = self.levels.drain(..surplus).map(|(number, _)| number);
+        for number in dropped {
+            self.trail.forget(number);
+            self.path.retain(|on_path| *on_path != number);
+        }
     }
 }

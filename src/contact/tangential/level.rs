@@ -1,19 +1,20 @@
-//! One mesh level of a contact: cells, pressures and influence, shared by all motions and methods.
+//! One mesh level of a contact: cells and pressures, shared by all motions and methods, and where its operator comes from.
 
-use std::cell::OnceCell;
 use std::f64::consts::PI;
-use std::rc::Rc;
+use std::sync::Arc;
 
 use crate::contact::case::Motion;
 use crate::contact::error::SolveError;
-use crate::contact::influence::strips::{Differences, Parity, Precision};
+use crate::contact::influence::strips::{Parity, Precision};
 use crate::contact::mesh::{Chord, Grading, Mesh, equal_strips, strips_about};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::Region;
 use crate::contact::normal::fitted::{self, Fitted};
 use crate::contact::problem::{Elasticity, Problem, Resolution};
 use crate::contact::tangential::ladder::Plan;
-use crate::contact::tangential::prepared::{Cache, Kind, Prepared};
+use crate::contact::tangential::operator_store::{
+    CaseOperators, LevelOperator, OperatorKind, OperatorStore,
+};
 
 /// Targets from here on are met with a matrix in single precision.
 const SINGLE_PRECISION_FROM: f64 = 5e-4;
@@ -58,7 +59,7 @@ impl Scale {
     }
 }
 
-/// A mesh with its pressures, and the influence once somebody needs it.
+/// A mesh with its pressures; its operator lies in the store of the process.
 #[derive(Debug)]
 pub struct Level {
     /// What it was made from.
@@ -78,8 +79,7 @@ pub struct Level {
     poisson_ratio: f64,
     precision: Precision,
     mirrored: bool,
-    cache: Rc<Cache>,
-    prepared: OnceCell<Rc<Prepared>>,
+    operators: Arc<CaseOperators>,
 }
 
 impl Level {
@@ -89,17 +89,18 @@ impl Level {
     /// # Errors
     /// [`SolveError::Unmeshable`] if no strip meets a patch.
     pub fn new(problem: &Problem, plan: impl Into<Plan>) -> Result<Level, SolveError> {
-        Level::with_cache(problem, plan, Rc::default())
+        let store = Arc::new(OperatorStore::new(0));
+        Level::with_operators(problem, plan, CaseOperators::new(&store))
     }
 
-    /// The same, with a cache to take the influence from.
+    /// The same, with the operators of a case to take its own from.
     ///
     /// # Errors
     /// The same.
-    pub fn with_cache(
+    pub fn with_operators(
         problem: &Problem,
         plan: impl Into<Plan>,
-        cache: Rc<Cache>,
+        operators: Arc<CaseOperators>,
     ) -> Result<Level, SolveError> {
         let plan: Plan = plan.into();
         let size = plan.size;
@@ -149,7 +150,7 @@ impl Level {
             shear_modulus,
             origin: [x, mirror.unwrap_or(y)],
         };
-        let precision = precision(problem);
+        let precision = precision_of(problem.resolution);
         let mut normalised = mesh.normalised(scale.origin, 1.0 / scale.length);
         if precision == Precision::Single {
             normalised.round(COORDINATE_STEP);
@@ -166,35 +167,21 @@ impl Level {
             poisson_ratio,
             precision,
             mirrored: mirror.is_some(),
-            cache,
-            prepared: OnceCell::new(),
+            operators,
         })
     }
 
-    /// The influence of the dimensionless mesh and what else all motions share; taken from the cache or computed at the
-    /// first call.
+    /// The operator of the dimensionless mesh; from the store, or computed.
     ///
     /// # Errors
     /// The monitor may stop the work.
-    pub fn prepared(&self, monitor: &dyn Monitor) -> Result<&Prepared, Stop> {
-        if let Some(prepared) = self.prepared.get() {
-            return Ok(prepared);
-        }
-        let kind = Kind {
+    pub fn operator(&self, monitor: &dyn Monitor) -> Result<Arc<LevelOperator>, Stop> {
+        let kind = OperatorKind {
             poisson_ratio: self.poisson_ratio,
             folded: self.mirrored,
             precision: self.precision,
         };
-        let prepared = self.cache.get(&self.normalised, kind, monitor)?;
-        Ok(self.prepared.get_or_init(|| prepared))
-    }
-
-    /// The influence of the dimensionless mesh.
-    ///
-    /// # Errors
-    /// The same.
-    pub fn influence(&self, monitor: &dyn Monitor) -> Result<&Differences, Stop> {
-        Ok(&self.prepared(monitor)?.influence)
+        self.operators.get(&self.normalised, kind, monitor)
     }
 
     /// Which half of the unknowns a dimensionless motion moves, if the level has a mirror line and the motion only
@@ -250,8 +237,9 @@ impl Level {
 }
 
 /// Single precision serves any target that the residuals of single precision can meet.
-fn precision(problem: &Problem) -> Precision {
-    match problem.resolution {
+#[must_use]
+pub fn precision_of(resolution: Resolution) -> Precision {
+    match resolution {
         Resolution::Target(target) if target >= SINGLE_PRECISION_FROM => Precision::Single,
         _ => Precision::Double,
     }

@@ -83,7 +83,7 @@ pub fn solve(
     asked: Asked,
     monitor: &dyn Monitor,
 ) -> Result<Point, SolveError> {
-    let sizes = Ladder::fixed_sizes(problem);
+    let sizes = Ladder::fixed_sizes(problem.resolution, problem.method);
     let last_path = std::mem::take(&mut ladder.path);
     match (sizes, problem.resolution) {
         (Some(sizes), _) => {

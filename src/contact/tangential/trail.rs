@@ -54,6 +54,11 @@ impl Trail {
         });
     }
 
+    /// Forgets a level.
+    pub fn forget(&mut self, number: usize) {
+        self.steps.retain(|step| step.level != number);
+    }
+
     /// A start for a motion on a level: the line through the last two answers continued, or the last answer itself if the
     /// motion is near.
     #[must_use]

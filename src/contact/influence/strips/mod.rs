@@ -10,8 +10,6 @@
 mod assembly;
 mod product;
 
-use std::cell::RefCell;
-
 use pulp::Arch;
 
 use crate::contact::influence::strips::assembly::Assembly;
@@ -40,6 +38,17 @@ pub enum Precision {
     Double,
 }
 
+impl Precision {
+    /// Bytes of one number.
+    #[must_use]
+    pub fn bytes(self) -> u64 {
+        match self {
+            Precision::Single => 4,
+            Precision::Double => 8,
+        }
+    }
+}
+
 /// How the matrix is laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Layout {
@@ -63,16 +72,16 @@ pub struct Differences {
     /// First cell of each stored segment, and one more.
     first_cell: Vec<usize>,
     matrix: Matrix,
-    buffers: Buffers,
 }
 
-/// What products need beside their arguments; kept, so that a product allocates nothing.
+/// What a product needs beside its arguments; the caller keeps it, so that a product allocates nothing and the matrix can be
+/// shared by threads.
 #[derive(Debug, Clone, Default)]
-struct Buffers {
+pub struct Scratch {
     /// Tractions in single precision.
-    narrow: RefCell<[Vec<f32>; 2]>,
+    narrow: [Vec<f32>; 2],
     /// Tractions, then displacement differences of the two parities.
-    halves: RefCell<[Vec<f64>; 2]>,
+    halves: [Vec<f64>; 2],
 }
 
 /// Number of difference rows of a segment with `cells` cells.
@@ -83,13 +92,15 @@ pub fn rows_of(cells: usize) -> usize {
 
 /// Bytes of the matrix of a mesh.
 #[must_use]
-pub fn bytes(cells: usize, segments: usize, folded: bool) -> u64 {
-    let (rows, cells) = (
-        (cells + 2 * segments) as u64,
-        (cells as u64).next_multiple_of(LANES as u64),
-    );
-    let full = 8 * 3 * rows * cells;
-    if folded { full / 2 } else { full }
+pub fn bytes(cells: usize, segments: usize, folded: bool, precision: Precision) -> u64 {
+    let rows = (cells + 2 * segments) as u64;
+    let stride = |cells: usize| cells.next_multiple_of(LANES) as u64;
+    let numbers = if folded {
+        6 * (rows / 2) * stride(cells / 2)
+    } else {
+        3 * rows * stride(cells)
+    };
+    precision.bytes() * numbers
 }
 
 /// The observation points of a segment, see the module's text.
@@ -159,7 +170,6 @@ impl Differences {
             first_row,
             first_cell,
             matrix,
-            buffers: Buffers::default(),
         })
     }
 
@@ -290,12 +300,13 @@ impl Differences {
         ty: &[f64],
         out_x: &mut [f64],
         out_y: &mut [f64],
+        scratch: &mut Scratch,
     ) {
         if self.is_folded() && parity.is_none() {
-            self.apply_both(tx, ty, out_x, out_y);
+            self.apply_both(tx, ty, out_x, out_y, scratch);
         } else {
             let roles = self.roles(parity);
-            self.product(roles, tx, ty, out_x, out_y);
+            self.product(roles, tx, ty, out_x, out_y, &mut scratch.narrow);
         }
     }
 
@@ -307,18 +318,18 @@ impl Differences {
         ty: &[f64],
         out_x: &mut [f64],
         out_y: &mut [f64],
+        narrow: &mut [Vec<f32>; 2],
     ) {
         let (tx, ty) = (&tx[..self.stride], &ty[..self.stride]);
         let blocks = if self.is_folded() { 6 } else { 3 };
         let (stride, arch) = (self.stride, Arch::new());
         match &self.matrix {
             Matrix::Single(matrix) => {
-                let mut narrow = self.buffers.narrow.borrow_mut();
                 for (narrow, values) in narrow.iter_mut().zip([tx, ty]) {
                     narrow.clear();
                     narrow.extend(values.iter().map(|v| *v as f32));
                 }
-                let [tx, ty] = &*narrow;
+                let [tx, ty] = narrow;
                 arch.dispatch(Product {
                     matrix,
                     blocks,
@@ -346,10 +357,17 @@ impl Differences {
     }
 
     /// Splits the tractions into their two parities, applies each part, and puts the halves together again.
-    fn apply_both(&self, tx: &[f64], ty: &[f64], out_x: &mut [f64], out_y: &mut [f64]) {
+    fn apply_both(
+        &self,
+        tx: &[f64],
+        ty: &[f64],
+        out_x: &mut [f64],
+        out_y: &mut [f64],
+        scratch: &mut Scratch,
+    ) {
         let (stride, rows) = (self.stride, self.row_count());
-        let mut halves = self.buffers.halves.borrow_mut();
-        let [parts, sums] = &mut *halves;
+        let Scratch { narrow, halves } = scratch;
+        let [parts, sums] = halves;
         parts.resize(4 * stride, 0.0);
         sums.resize(4 * rows, 0.0);
         let (x_parts, y_parts) = parts.split_at_mut(2 * stride);
@@ -377,7 +395,7 @@ impl Differences {
             ),
         ] {
             let roles = self.roles(Some(parity));
-            self.product(roles, tx, ty, out_x, out_y);
+            self.product(roles, tx, ty, out_x, out_y, narrow);
         }
         self.join(ux_same, ux_opposite, out_x);
         self.join(uy_same, uy_opposite, out_y);

@@ -107,7 +107,7 @@ fn applied(differences: &Differences, mesh: &Mesh) -> (Vec<f64>, Vec<f64>) {
     let (tx, ty) = tractions(mesh, differences.padded(None));
     let rows: usize = mesh.segments.iter().map(|s| rows_of(s.cells.len())).sum();
     let (mut ux, mut uy) = (vec![0.0; rows], vec![0.0; rows]);
-    differences.apply(None, &tx, &ty, &mut ux, &mut uy);
+    differences.apply(None, &tx, &ty, &mut ux, &mut uy, &mut Scratch::default());
     (ux, uy)
 }
 
@@ -183,13 +183,27 @@ fn one_parity_needs_half_the_cells_only() {
         }
         let rows = folded.row_count();
         let (mut all_x, mut all_y) = (vec![0.0; 2 * rows], vec![0.0; 2 * rows]);
-        folded.apply(None, &tx, &ty, &mut all_x, &mut all_y);
+        folded.apply(
+            None,
+            &tx,
+            &ty,
+            &mut all_x,
+            &mut all_y,
+            &mut Scratch::default(),
+        );
         let (mut ux, mut uy) = (vec![0.0; rows], vec![0.0; rows]);
         tx.truncate(half);
         ty.truncate(half);
         tx.resize(folded.padded(Some(parity)), 0.0);
         ty.resize(folded.padded(Some(parity)), 0.0);
-        folded.apply(Some(parity), &tx, &ty, &mut ux, &mut uy);
+        folded.apply(
+            Some(parity),
+            &tx,
+            &ty,
+            &mut ux,
+            &mut uy,
+            &mut Scratch::default(),
+        );
         assert!(
             largest_gap(&ux, &all_x[..rows]) < 1e-13 && largest_gap(&uy, &all_y[..rows]) < 1e-13
         );

@@ -18,7 +18,7 @@ use crate::contact::tangential::boundary_element::strip_blocks::OwnBlocks;
 use crate::contact::tangential::equations::Equations;
 use crate::contact::tangential::full_slip;
 use crate::contact::tangential::level::Level;
-use crate::contact::tangential::prepared::Prepared;
+use crate::contact::tangential::operator_store::LevelOperator;
 use crate::contact::tangential::rules::Rule;
 use crate::contact::tangential::trail::Start;
 use crate::contact::tangential::{Failure, Tangential, Work, obey_coulomb};
@@ -41,9 +41,9 @@ pub fn solve(
     if let Some(answer) = full_slip::rigid_answer(level, motion) {
         return Ok(answer);
     }
-    let prepared = level.prepared(monitor)?;
+    let operator = level.operator(monitor)?;
     let parity = level.parity(motion);
-    let mut solve = Solve::new(level, motion, prepared, parity, tolerance, monitor);
+    let mut solve = Solve::new(level, motion, &operator, parity, tolerance, monitor);
     let mut skipped = Vec::new();
     if parity.is_some() {
         skipped.push("mirror symmetry of patch and motion: half the cells".to_owned());
@@ -90,7 +90,7 @@ struct MirrorAnswer {
 struct Solve<'a> {
     level: &'a Level,
     motion: &'a Motion,
-    prepared: &'a Prepared,
+    operator: &'a LevelOperator,
     parity: Option<Parity>,
     bound: Vec<f64>,
     area: Vec<f64>,
@@ -103,12 +103,12 @@ impl<'a> Solve<'a> {
     fn new(
         level: &'a Level,
         motion: &'a Motion,
-        prepared: &'a Prepared,
+        operator: &'a LevelOperator,
         parity: Option<Parity>,
         tolerance: f64,
         monitor: &'a dyn Monitor,
     ) -> Solve<'a> {
-        let padded = prepared.influence.padded(parity);
+        let padded = operator.influence.padded(parity);
         let resized = |values: &[f64]| {
             let mut values = values.to_vec();
             values.resize(padded.max(values.len()), 0.0);
@@ -117,7 +117,7 @@ impl<'a> Solve<'a> {
         Solve {
             level,
             motion,
-            prepared,
+            operator,
             parity,
             bound: resized(&level.bound),
             area: resized(&level.normalised.areas()),
@@ -131,7 +131,7 @@ impl<'a> Solve<'a> {
         Equations::new(
             rule,
             &self.level.normalised,
-            &self.prepared.influence,
+            &self.operator.influence,
             self.parity,
         )
     }
@@ -139,7 +139,7 @@ impl<'a> Solve<'a> {
     /// A solver that shares its own blocks with the other motions of the level.
     fn newton<'e>(&self, equations: &'e Equations<'e>) -> Newton<'e> {
         let own = self
-            .prepared
+            .operator
             .own_blocks
             .get(equations.rule, self.parity, || OwnBlocks::new(equations));
         Newton::with_blocks(equations, own)
@@ -147,7 +147,7 @@ impl<'a> Solve<'a> {
 
     /// The start brought onto the unknowns, or zero tractions.
     fn start(&self, start: Option<&[Vec<f64>; 2]>) -> Vec<f64> {
-        let padded = self.prepared.influence.padded(self.parity);
+        let padded = self.operator.influence.padded(self.parity);
         let mut t = vec![0.0; 2 * padded];
         if let Some([x, y]) = start {
             let unknowns = self.equations(Rule::Upwind).cells();

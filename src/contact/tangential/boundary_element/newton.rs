@@ -6,7 +6,7 @@
 //! projection form; `r = 0.3/M_ii` because larger values can cycle on fine meshes).
 
 use std::ops::ControlFlow;
-use std::rc::Rc;
+use std::sync::Arc;
 
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::tangential::boundary_element::gmres::{Gmres, LinearSystem};
@@ -88,7 +88,7 @@ impl Linearisation {
 /// Solver for one rule on one mesh; keeps its factors and buffers between solves.
 pub struct Newton<'a> {
     equations: &'a Equations<'a>,
-    own: Rc<OwnBlocks>,
+    own: Arc<OwnBlocks>,
     /// Projection parameter r of every cell.
     parameter: Vec<f64>,
     blocks: StripBlocks,
@@ -116,12 +116,12 @@ impl<'a> Newton<'a> {
     /// Prepares the own blocks and the buffers.
     #[must_use]
     pub fn new(equations: &'a Equations<'a>) -> Newton<'a> {
-        Newton::with_blocks(equations, Rc::new(OwnBlocks::new(equations)))
+        Newton::with_blocks(equations, Arc::new(OwnBlocks::new(equations)))
     }
 
     /// Prepares the buffers; the own blocks are those of the equations.
     #[must_use]
-    pub fn with_blocks(equations: &'a Equations<'a>, own: Rc<OwnBlocks>) -> Newton<'a> {
+    pub fn with_blocks(equations: &'a Equations<'a>, own: Arc<OwnBlocks>) -> Newton<'a> {
         let diagonal = own.diagonal(equations);
         let length = 2 * equations.padded();
         Newton {

@@ -1,7 +1,6 @@
 //! The preconditioner: every segment's own block of the Newton matrix, factored on its own.
 
-use std::cell::RefCell;
-use std::rc::Rc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::lu::partial_pivoting::factor;
@@ -31,6 +30,13 @@ impl OwnBlocks {
         }
     }
 
+    /// Bytes of the blocks.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let numbers = self.blocks.iter().map(|(xx, yy)| xx.len() + yy.len());
+        8 * numbers.sum::<usize>() as u64
+    }
+
     /// `−(M_xx + M_yy)/2` on the diagonal, cell by cell.
     #[must_use]
     pub fn diagonal(&self, equations: &Equations) -> Vec<f64> {
@@ -45,13 +51,22 @@ impl OwnBlocks {
     }
 }
 
+/// Bytes of all own blocks that an operator may get, of segments with these numbers of cells: three rules, and if half of the
+/// influence is enough, two parities of one half each beside both together.
+#[must_use]
+pub fn bytes_max(lengths: impl Iterator<Item = usize>, folded: bool) -> u64 {
+    let one: usize = lengths.map(|n| 2 * n * n).sum();
+    let parities = if folded { 2 } else { 1 };
+    8 * 3 * parities * one as u64
+}
+
 /// The own blocks of one rule and parity.
-type Made = (Rule, Option<Parity>, Rc<OwnBlocks>);
+type Made = (Rule, Option<Parity>, Arc<OwnBlocks>);
 
 /// The own blocks of a level, made once for each rule and parity.
 #[derive(Debug, Default)]
 pub struct SharedBlocks {
-    made: RefCell<Vec<Made>>,
+    made: Mutex<Vec<Made>>,
 }
 
 impl SharedBlocks {
@@ -61,13 +76,13 @@ impl SharedBlocks {
         rule: Rule,
         parity: Option<Parity>,
         make: impl FnOnce() -> OwnBlocks,
-    ) -> Rc<OwnBlocks> {
-        let mut made = self.made.borrow_mut();
+    ) -> Arc<OwnBlocks> {
+        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, _, blocks)) = made.iter().find(|m| (m.0, m.1) == (rule, parity)) {
-            return Rc::clone(blocks);
+            return Arc::clone(blocks);
         }
-        let blocks = Rc::new(make());
-        made.push((rule, parity, Rc::clone(&blocks)));
+        let blocks = Arc::new(make());
+        made.push((rule, parity, Arc::clone(&blocks)));
         blocks
     }
 }

@@ -7,6 +7,7 @@ use crate::contact::tangential::equations::Equations;
 use crate::contact::tangential::full_slip;
 use crate::contact::tangential::level::Level;
 use crate::contact::tangential::liu_hsu::{Outcome, Stage, solve_by_upwind};
+use crate::contact::tangential::operator_store::LevelOperator;
 use crate::contact::tangential::rules::Rule;
 use crate::contact::tangential::{Failure, Tangential, Work, obey_coulomb};
 
@@ -26,15 +27,15 @@ pub fn solve(
     if let Some(answer) = full_slip::rigid_answer(level, &here) {
         return Ok(answer);
     }
-    let fine = Prepared::new(level, Rule::Trapezoid, &here, monitor)?;
-    let upwind = Prepared::new(level, Rule::Upwind, &here, monitor)?;
-    let coarse = match coarse {
-        Some(level) => {
-            let motion = level.scale.motion(motion);
-            Some(Prepared::new(level, Rule::Trapezoid, &motion, monitor)?)
-        }
-        None => None,
-    };
+    let operator = level.operator(monitor)?;
+    let coarse = coarse.map(|coarse| Ok::<_, Stop>((coarse, coarse.operator(monitor)?)));
+    let coarse = coarse.transpose()?;
+    let fine = Prepared::new(level, &operator, Rule::Trapezoid, &here);
+    let upwind = Prepared::new(level, &operator, Rule::Upwind, &here);
+    let coarse = coarse.as_ref().map(|(level, operator)| {
+        let motion = level.scale.motion(motion);
+        Prepared::new(level, operator, Rule::Trapezoid, &motion)
+    });
     let mut t = vec![0.0; 2 * fine.equations.padded()];
     let outcome = solve_by_upwind(
         &fine.stage(tolerance),
@@ -96,11 +97,11 @@ struct Prepared<'a> {
 impl<'a> Prepared<'a> {
     fn new(
         level: &'a Level,
+        operator: &'a LevelOperator,
         rule: Rule,
         motion: &Motion,
-        monitor: &dyn Monitor,
-    ) -> Result<Prepared<'a>, Stop> {
-        let equations = Equations::new(rule, &level.normalised, level.influence(monitor)?, None);
+    ) -> Prepared<'a> {
+        let equations = Equations::new(rule, &level.normalised, &operator.influence, None);
         let padded = equations.padded();
         let resized = |mut values: Vec<f64>| {
             values.resize(padded, 0.0);
@@ -109,7 +110,7 @@ impl<'a> Prepared<'a> {
         let rigid = equations.rigid(motion);
         let largest = rigid.iter().fold(0.0_f64, |m, w| m.max(w.abs()));
         let compliance = Newton::new(&equations).compliance();
-        Ok(Prepared {
+        Prepared {
             bound: resized(level.bound.clone()),
             area: resized(level.normalised.areas()),
             y: level.normalised.rows(),
@@ -118,7 +119,7 @@ impl<'a> Prepared<'a> {
             level,
             equations,
             rigid,
-        })
+        }
     }
 
     fn stage(&self, tolerance: f64) -> Stage<'_> {

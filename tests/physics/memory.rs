@@ -1,0 +1,100 @@
+//! Is what a case keeps in memory bounded, and does what is kept never show in an answer?
+
+use std::sync::Arc;
+
+use railhead::contact::monitor::Unwatched;
+use railhead::contact::problem::{Limits, Problem};
+use railhead::contact::solution::Solution;
+use railhead::contact::tangential::operator_store::OperatorStore;
+use railhead::contact::{check, solve_with};
+use serde_json::{Value, json};
+
+/// Creepages whose spin pole lies on a grid of `side × side` places inside the patch, at fixed spin: every motion would like a mesh of
+/// its own.
+pub fn creep_map(side: u32, target: f64) -> Value {
+    let spin = 0.003;
+    let at = |k: u32| f64::from(k) / f64::from((side - 1).max(1)) - 0.5;
+    let mut motions = Vec::new();
+    for row in 0..side {
+        for column in 0..side {
+            motions.push(json!({
+                "creepage_x": spin * 8.0 * at(row),
+                "creepage_y": -spin * 11.0 * at(column),
+                "spin_per_mm": spin,
+            }));
+        }
+    }
+    json!({
+        "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
+        "friction": { "coefficient": 0.3 },
+        "contact": { "type": "radii", "rolling_mm": 460, "lateral_mm": 300 },
+        "load": { "normal_force_n": 100_000 },
+        "motion": motions,
+        "solver": { "target_error": target },
+        "outputs": ["resultants"],
+    })
+}
+
+fn problem(case: &Value) -> Problem {
+    check(case, &Limits::default()).expect("a valid case")
+}
+
+/// The answer without its times.
+fn answer(store: &Arc<OperatorStore>, problem: &Problem) -> Solution {
+    let (mut solution, _) = solve_with(store, problem, &Unwatched).expect("an answer");
+    for point in solution.patches.iter_mut().flat_map(|p| &mut p.points) {
+        point.solver.seconds = 0.0;
+    }
+    if let Some(normal) = &mut solution.normal {
+        normal.seconds = 0.0;
+    }
+    solution
+}
+
+#[test]
+fn answers_do_not_depend_on_what_the_operator_store_keeps() {
+    let gap = json!({
+        "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
+        "friction": { "coefficient": 0.3 },
+        "contact": { "type": "gap_profile", "rolling_mm": 460,
+                     "y_mm": (-20..=20).map(|k| 0.5 * f64::from(k)).collect::<Vec<_>>(),
+                     "gap_mm": (-20..=20).map(|k| f64::from(k * k) * 0.25 / 600.0).collect::<Vec<_>>() },
+        "load": { "normal_force_n": 60_000 },
+        "motion": [{ "creepage_x": 0.001 }, { "creepage_x": 0.001, "spin_per_mm": 0.0005 },
+                   { "creepage_x": 0.0012, "spin_per_mm": 0.0005 }],
+    });
+    for case in [creep_map(4, 0.005), gap] {
+        let problem = problem(&case);
+        let roomy = Arc::new(OperatorStore::new(1 << 30));
+        let first = answer(&roomy, &problem);
+        assert!(roomy.bytes() > 0);
+        assert_eq!(
+            first,
+            answer(&roomy, &problem),
+            "all operators from the store"
+        );
+        for bytes in [0, 1 << 20] {
+            let store = Arc::new(OperatorStore::new(bytes));
+            assert_eq!(first, answer(&store, &problem), "a store of {bytes} bytes");
+            assert!(store.bytes() <= bytes);
+        }
+    }
+}
+
+#[test]
+fn a_creep_map_stays_within_the_bound_of_the_store() {
+    let bytes = 4 << 20;
+    let store = Arc::new(OperatorStore::new(bytes));
+    let solution = answer(&store, &problem(&creep_map(9, 0.005)));
+    assert_eq!(solution.total.len(), 81);
+    assert!(store.bytes() <= bytes, "{}", store.bytes());
+    assert!(store.bytes() > bytes / 2, "the map fills the store");
+}
+
+#[test]
+fn the_memory_of_a_long_sweep_of_resultants_is_some_kilobytes_a_motion() {
+    let bytes = |side: u32| problem(&creep_map(side, 0.005)).cost().bytes as f64;
+    let (few, many) = (bytes(10), bytes(100));
+    assert!(many - few < 9900.0 * 4e3, "{few} and {many}");
+    assert!(many < 300e6, "{many}");
+}
