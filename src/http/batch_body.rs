@@ -6,7 +6,6 @@ use axum::body::Body;
 use axum::extract::Request;
 use axum::http::{HeaderMap, header};
 use futures_util::StreamExt;
-use serde_json::Value;
 use tokio::time::{Instant, timeout_at};
 use uuid::Uuid;
 
@@ -17,7 +16,7 @@ use crate::http::elements::{Element, Layout, Splitter};
 use crate::http::error::{ApiError, Kind};
 use crate::http::table_body::TableBody;
 use crate::jobs::Jobs;
-use crate::jobs::batch::Draft;
+use crate::jobs::draft::Draft;
 
 /// Bytes per second of a batch at least, on average and after a head start of the time that a piece may take: otherwise
 /// one byte at a time could keep a connection and a file open for ever.
@@ -108,6 +107,9 @@ pub async fn read_draft(
     }
     let packed = request.extensions().get::<Packed>().cloned();
     let mut draft = jobs.draft()?;
+    if let Form::Table(table) = &form {
+        draft.set_template(table.text());
+    }
     let mut splitter = Splitter::new(form.layout(), options.body_max_bytes);
     let mut pieces = request.into_body().into_data_stream();
     let mut portion = Vec::new();
@@ -149,12 +151,12 @@ pub async fn read_draft(
         splitter.feed(&piece, &mut portion)?;
         if held >= PORTION_BYTES {
             held = 0;
-            (draft, form) = check(jobs, draft, form, std::mem::take(&mut portion)).await?;
+            (draft, form) = check(draft, form, std::mem::take(&mut portion)).await?;
             require_count(&draft, options)?;
         }
     }
     splitter.end(&mut portion)?;
-    (draft, _) = check(jobs, draft, form, portion).await?;
+    (draft, _) = check(draft, form, portion).await?;
     require_count(&draft, options)?;
     Ok(draft)
 }
@@ -174,32 +176,28 @@ fn require_count(draft: &Draft, options: &HttpOptions) -> Result<(), ApiError> {
 
 /// Checks some cases off the threads that answer requests.
 async fn check(
-    jobs: &Jobs,
     mut draft: Draft,
     mut form: Form,
     portion: Vec<Element>,
 ) -> Result<(Draft, Form), ApiError> {
-    let jobs = jobs.clone();
     let checked = tokio::task::spawn_blocking(move || {
         for element in portion {
             match &mut form {
                 Form::Array => {
                     let case = read_strict(&element.text)
                         .map_err(|error| ApiError::malformed_element(draft.cases, &error))?;
-                    draft.add(&jobs, element.line, &element.text, Ok(case))?;
+                    draft.add(element.line, &element.text, Ok(case))?;
                 }
                 Form::Lines => {
                     let case = read_strict(&element.text)
                         .map_err(|error| format!("the line is not JSON: {error}"));
-                    draft.add(&jobs, element.line, &element.text, case)?;
+                    draft.add(element.line, &element.text, case)?;
                 }
                 Form::Table(table) => {
-                    let Some(case) = table.take(&element.text)? else {
+                    let Some(row) = table.take(&element.text)? else {
                         continue;
                     };
-                    let text = case.as_ref().map(Value::to_string);
-                    let text = text.map_or(element.text, String::into_bytes);
-                    draft.add(&jobs, element.line, &text, case)?;
+                    draft.add_row(element.line, &element.text, row)?;
                 }
             }
         }

@@ -16,12 +16,13 @@ use crate::http::access::Caller;
 use crate::http::batch_body::{form, read_draft};
 use crate::http::error::{ApiError, Kind};
 use crate::http::job::{BatchId, rfc3339};
-use crate::http::jobs::idempotency_key;
+use crate::http::jobs::{idempotency_key, mark_replay};
 use crate::http::problem::Fault;
 use crate::http::problems::problems;
 use crate::http::query::Query;
 use crate::http::wishes::{PARAMETERS, take_wishes};
-use crate::jobs::batch::{Batch, Draft};
+use crate::jobs::batch::Batch;
+use crate::jobs::draft::Draft;
 use crate::jobs::job::State as JobState;
 use crate::jobs::wishes::{Priority, Wishes};
 
@@ -146,7 +147,7 @@ problems! {
         ("template" = Option<String>, Query, description = "With `text/csv`, and needed there: the job whose case is the template", format = "uuid"),
         ("priority" = Option<Priority>, Query, description = "Which of the queued jobs of the tenant are solved first: `high` before `normal` (when left out) before `low`. Tenants take turns whatever the priorities of their jobs", example = "high"),
         ("deadline_s" = Option<u32>, Query, minimum = 1, maximum = 2_592_000, description = "Seconds from now within which a job must have ended. One that has not, queued or running, fails as `deadline-passed`", example = 600),
-        ("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[!-~]+$", description = "1 to 255 visible ASCII characters. Repeating a request with the same key and the same cases answers the first batch instead of making another"),
+        ("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[!-~]+$", description = "1 to 255 visible ASCII characters. Repeating a request with the same key, the same cases and the same options answers the first batch instead of making another"),
         ("Cache-Control" = Option<String>, Header, description = "`no-cache`: solve all cases, also those that are identical to cases solved before", example = "no-cache"),
         ("traceparent" = Option<String>, Header, description = "W3C trace context: where the service sends traces, that of the jobs goes on with the client's. What cannot be read is passed over", example = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01")
     ),
@@ -157,7 +158,8 @@ problems! {
     ), description = "Cases, at most 200 000, each of at most 8 MiB and together at most 1 GiB"),
     responses(
         (status = 202, description = "The jobs are stored and will be solved", body = BatchReceipt, headers(
-            ("Location" = String, description = "Path of the batch")
+            ("Location" = String, description = "Path of the batch"),
+            ("Idempotency-Replayed" = String, description = "`true` if this is the batch of an earlier request with the same `Idempotency-Key`; absent otherwise")
         )),
         BatchProblems
     )
@@ -176,7 +178,7 @@ pub async fn submit(
         return Err(refusal(&draft));
     }
     let errors = faults(&draft);
-    let batch = jobs.submit_batch(draft, key).await?;
+    let (batch, replayed) = jobs.submit_batch(draft, key).await?;
     let location = [(header::LOCATION, format!("/v1/batches/{}", batch.id))];
     let receipt = BatchReceipt {
         id: batch.id.to_string(),
@@ -185,7 +187,9 @@ pub async fn submit(
         errors,
         links: links(&batch),
     };
-    Ok((StatusCode::ACCEPTED, location, Json(receipt)).into_response())
+    let mut response = (StatusCode::ACCEPTED, location, Json(receipt)).into_response();
+    mark_replay(&mut response, replayed);
+    Ok(response)
 }
 
 /// What the query says about the batch itself.

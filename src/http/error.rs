@@ -79,7 +79,7 @@ kinds! {
     FaultyTable 422 "faulty-table" "The header of the table has faults" "The first line of a table names its columns by JSON pointers such as `/load/normal_force_n` or by short names; the detail names the column and what is allowed."
     TooManyRequests 429 "too-many-requests" "Too many requests" "The key, or without one the address, sends more requests per second than it may, or the tenant has as many requests, streams or waits under way as it may; the detail says which. Try again after `Retry-After` seconds."
     QuotaExceeded 429 "quota-exceeded" "Too many jobs are waiting" "The tenant has as many queued jobs as it may; nothing was stored, try again after `Retry-After` seconds."
-    IdempotencyConflict 422 "idempotency-conflict" "The idempotency key belongs to another case" "The `Idempotency-Key` was used before with a different body; use a new key for a new case."
+    IdempotencyConflict 422 "idempotency-conflict" "The idempotency key belongs to another case" "The `Idempotency-Key` was used before with a different body, priority, deadline or `no-cache`; use a new key for a new case."
     Internal 500 "internal" "The service failed" "Something went wrong inside the service; its log has the reason under the request id in the header `x-request-id`."
     QueueFull 503 "queue-full" "The queue is full" "The service holds as many unfinished jobs as it may; nothing was stored, try again after `Retry-After` seconds."
     StorageUnwritable 503 "storage-unwritable" "The disk cannot be written" "The disk of the service is read-only or fails, or its job table is locked by another process; nothing was stored, jobs already accepted are kept. Try again after `Retry-After` seconds."
@@ -284,6 +284,10 @@ impl From<JobsError> for ApiError {
                     "{queue_max} jobs of this tenant are waiting, which is its limit; nothing was stored"
                 ),
             ),
+            JobsError::StagingQuotaExceeded { .. } => {
+                ApiError::new(Kind::QuotaExceeded, error.to_string())
+            }
+            JobsError::StagingFull { .. } => ApiError::new(Kind::QueueFull, error.to_string()),
             JobsError::BadCursor => ApiError::bad_parameter(
                 "cursor",
                 "`cursor` is not one that this service gave out for the same filters; start again without it",

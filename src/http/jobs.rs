@@ -36,6 +36,7 @@ const IDEMPOTENCY_KEY_MAX_CHARS: usize = 255;
 
 const PREFER: HeaderName = HeaderName::from_static("prefer");
 const PREFERENCE_APPLIED: HeaderName = HeaderName::from_static("preference-applied");
+const IDEMPOTENCY_REPLAYED: HeaderName = HeaderName::from_static("idempotency-replayed");
 const IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");
 
 /// A page of jobs, newest first.
@@ -67,7 +68,7 @@ problems! {
         ("priority" = Option<Priority>, Query, description = "Which of the queued jobs of the tenant are solved first: `high` before `normal` (when left out) before `low`. Tenants take turns whatever the priorities of their jobs", example = "high"),
         ("deadline_s" = Option<u32>, Query, minimum = 1, maximum = 2_592_000, description = "Seconds from now within which a job must have ended. One that has not, queued or running, fails as `deadline-passed`", example = 600),
         ("Prefer" = Option<String>, Header, description = "`wait=N`: answer when the job has ended, at most N seconds (60 at most) later (RFC 7240)", example = "wait=10"),
-        ("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[!-~]+$", description = "1 to 255 visible ASCII characters. Repeating a request with the same key and the same case answers the first job instead of making another"),
+        ("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[!-~]+$", description = "1 to 255 visible ASCII characters. Repeating a request with the same key, the same case and the same options answers the first job instead of making another"),
         ("Cache-Control" = Option<String>, Header, description = "`no-cache`: solve the case even if an identical one was solved before", example = "no-cache"),
         ("traceparent" = Option<String>, Header, description = "W3C trace context: where the service sends traces, that of the job goes on with the client's. What cannot be read is passed over", example = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01")
     ),
@@ -76,11 +77,13 @@ problems! {
         (status = 202, description = "The job is stored and will be solved", body = JobAnswer, headers(
             ("Location" = String, description = "Path of the job"),
             ("Retry-After" = u32, description = "Seconds after which to look again"),
-            ("Preference-Applied" = String, description = "The wait that was applied, if one was asked for")
+            ("Preference-Applied" = String, description = "The wait that was applied, if one was asked for"),
+            ("Idempotency-Replayed" = String, description = "`true` if this is the job of an earlier request with the same `Idempotency-Key`; absent otherwise")
         )),
         (status = 200, description = "The job ended within the time given by `Prefer: wait`", body = JobAnswer, headers(
             ("Location" = String, description = "Path of the job"),
-            ("Preference-Applied" = String, description = "The wait that was applied")
+            ("Preference-Applied" = String, description = "The wait that was applied"),
+            ("Idempotency-Replayed" = String, description = "`true` if this is the job of an earlier request with the same `Idempotency-Key`; absent otherwise")
         )),
         SubmitProblems
     )
@@ -100,7 +103,7 @@ pub async fn submit(
     let mut query = Query::read(&uri, &PARAMETERS);
     let wishes = take_wishes(&mut query, &headers);
     query.finish()?;
-    let mut job = jobs.submit_with(case, key, wishes).await?;
+    let (mut job, replayed) = jobs.submit_with(case, key, wishes).await?;
     let location = format!("/v1/jobs/{}", job.id);
     let mut result = None;
     if let Some(seconds) = wait {
@@ -141,7 +144,17 @@ pub async fn submit(
     {
         response.headers_mut().insert(PREFERENCE_APPLIED, applied);
     }
+    mark_replay(&mut response, replayed);
     Ok(response)
+}
+
+/// Says that a response is about what an earlier request with the same idempotency key made.
+pub fn mark_replay(response: &mut Response, replayed: bool) {
+    if replayed {
+        response
+            .headers_mut()
+            .insert(IDEMPOTENCY_REPLAYED, HeaderValue::from_static("true"));
+    }
 }
 
 /// The wait that the client prefers, in s, capped. Preferences that are not understood are ignored (RFC 7240,

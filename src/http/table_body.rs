@@ -5,9 +5,11 @@
 
 use std::collections::HashSet;
 
-use serde_json::{Map, Value};
+use axum::body::Bytes;
+use serde_json::Value;
 
 use crate::http::error::{ApiError, Kind};
+use crate::jobs::template::{self, Cell};
 
 /// Short names of columns and what they stand for.
 const SHORT_NAMES: [(&str, &str); 13] = [
@@ -33,8 +35,13 @@ const COLUMNS_MAX: usize = 1000;
 #[derive(Debug)]
 pub struct TableBody {
     template: Value,
+    /// The template as it is stored.
+    text: Bytes,
     columns: Option<Vec<Column>>,
 }
+
+/// The case of a line with what it puts into the template, or why it stands for none.
+pub type Row = Result<(Value, Vec<Cell>), String>;
 
 #[derive(Debug, PartialEq, Eq)]
 struct Column {
@@ -51,16 +58,24 @@ impl TableBody {
     #[must_use]
     pub fn new(template: Value) -> Self {
         TableBody {
+            text: Bytes::from(template.to_string()),
             template,
             columns: None,
         }
     }
 
-    /// Takes the next line; the case that it stands for, or why it stands for none. Nothing for the header.
+    /// The text of the template.
+    #[must_use]
+    pub fn text(&self) -> Bytes {
+        self.text.clone()
+    }
+
+    /// Takes the next line; the case that it stands for with what it puts into the template, or why it stands for none.
+    /// Nothing for the header.
     ///
     /// # Errors
     /// `faulty-table`: the header cannot be understood.
-    pub fn take(&mut self, line: &[u8]) -> Result<Option<Result<Value, String>>, ApiError> {
+    pub fn take(&mut self, line: &[u8]) -> Result<Option<Row>, ApiError> {
         let Some(columns) = &self.columns else {
             let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
             let columns = read_header(line)
@@ -126,7 +141,7 @@ fn pointed(pointer: &str) -> Vec<String> {
         .collect()
 }
 
-fn fill(template: &Value, columns: &[Column], line: &[u8]) -> Result<Value, String> {
+fn fill(template: &Value, columns: &[Column], line: &[u8]) -> Row {
     let fields = fields(line)?;
     if fields.len() != columns.len() {
         return Err(format!(
@@ -135,7 +150,7 @@ fn fill(template: &Value, columns: &[Column], line: &[u8]) -> Result<Value, Stri
             columns.len()
         ));
     }
-    let mut case = template.clone();
+    let (mut cells, mut titles) = (Vec::new(), Vec::new());
     for (column, field) in columns.iter().zip(&fields) {
         let field = field.trim();
         if field.is_empty() {
@@ -146,10 +161,12 @@ fn fill(template: &Value, columns: &[Column], line: &[u8]) -> Result<Value, Stri
         } else {
             read_value(field)
         };
-        set(&mut case, &column.path, value)
-            .map_err(|reason| format!("the column `{}` {reason}", column.title))?;
+        cells.push(Cell(column.path.clone(), value));
+        titles.push(&column.title);
     }
-    Ok(case)
+    let case = template::fill(template, &cells)
+        .map_err(|(number, reason)| format!("the column `{}` {reason}", titles[number]))?;
+    Ok((case, cells))
 }
 
 /// A number, `true`, `false` or `null` as JSON has them; everything else is text, and the case says whether it may be.
@@ -157,37 +174,6 @@ fn read_value(field: &str) -> Value {
     match serde_json::from_str(field) {
         Ok(value @ (Value::Number(_) | Value::Bool(_) | Value::Null)) => value,
         _ => Value::from(field),
-    }
-}
-
-/// Puts a value where the members lead; objects on the way are made.
-fn set(case: &mut Value, path: &[String], value: Value) -> Result<(), String> {
-    let Some((last, way)) = path.split_last() else {
-        return Ok(());
-    };
-    let mut place = case;
-    for member in way {
-        place = step(place, member)?;
-    }
-    *step(place, last)? = value;
-    Ok(())
-}
-
-fn step<'a>(place: &'a mut Value, member: &str) -> Result<&'a mut Value, String> {
-    if place.is_null() {
-        *place = Value::Object(Map::new());
-    }
-    match place {
-        Value::Object(members) => Ok(members.entry(member).or_insert(Value::Null)),
-        Value::Array(items) => {
-            let count = items.len();
-            let index = member.parse::<usize>().ok();
-            let item = index.and_then(|index| items.get_mut(index));
-            item.ok_or_else(|| format!("leads to `{member}` of an array with {count} entries"))
-        }
-        _ => Err(format!(
-            "leads to `{member}` of what is neither an object nor an array in the template"
-        )),
     }
 }
 
@@ -214,10 +200,8 @@ mod tests {
         let template = json!({ "motion": { "creepage_x": 0.001 }, "contact": { "y_mm": [0, 1] }, "solver": "x" });
         let mut table = TableBody::new(template);
         assert!(table.take(header.as_bytes()).expect("a header").is_none());
-        table
-            .take(line.as_bytes())
-            .expect("a line")
-            .expect("a case")
+        let row = table.take(line.as_bytes()).expect("a line");
+        row.expect("a case").map(|(case, _)| case)
     }
 
     #[test]

@@ -1,36 +1,23 @@
-//! Batches: many cases checked one by one, queued together, followed and cancelled as one.
+//! Batches: many jobs queued together, followed, read and cancelled as one.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 use std::time::Duration;
 
 use bytes::Bytes;
-use opentelemetry::KeyValue;
-use serde_json::Value;
 use tokio::time::{Instant, timeout_at};
 use uuid::Uuid;
 
-use crate::contact::error::Fault;
 use crate::jobs::error::JobsError;
 use crate::jobs::job::{Job, State};
-use crate::jobs::spool::{Card, Spool};
-use crate::jobs::store::{Begun, NewBatch, NewJob};
 use crate::jobs::watch::Reason;
-use crate::jobs::wishes::Wishes;
-use crate::jobs::{Jobs, LOOK_AGAIN, cost_us, created_at, idempotency, outputs_text};
+use crate::jobs::{Jobs, LOOK_AGAIN};
 
-/// Jobs queued in one transaction.
-const CHUNK_JOBS: usize = 1000;
-/// Bytes of cases queued in one transaction, the last case beyond them included.
-const CHUNK_BYTES: usize = 4 << 20;
-/// Faulty cases whose faults are kept; further ones are only counted.
-const FAULTY_KEPT: usize = 1000;
 /// Solutions read at once: once they are this large together, the rest is left for the next page.
 const PAGE_BYTES: usize = 1 << 20;
 /// Jobs removed in one transaction.
 pub(super) const DELETED_AT_ONCE: u32 = 500;
-/// Pause between two looks at a batch that another request is filling.
-const FILLING_PAUSE: Duration = Duration::from_millis(50);
+/// Jobs cancelled in one transaction.
+const CANCELLED_AT_ONCE: u32 = 2000;
 /// Pause between two looks at a job that a reader of results waits for.
 const LOOK_PAUSE: Duration = Duration::from_millis(10);
 
@@ -104,229 +91,7 @@ impl LineResult {
     }
 }
 
-/// A faulty case of a batch.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct FaultyCase {
-    /// Place of the case in what was sent, counted from 0.
-    pub index: u32,
-    /// Line of the text on which it stands, counted from 1, if cases are lines.
-    pub line: Option<u64>,
-    /// Every fault of the case.
-    pub faults: Vec<Fault>,
-}
-
-/// A batch in the making: checked cases wait in a file of the data folder.
-#[derive(Debug)]
-pub struct Draft {
-    spool: Spool,
-    digest: blake3::Hasher,
-    /// Cases seen so far.
-    pub cases: u32,
-    /// Faulty ones among them.
-    pub rejected: u32,
-    /// The first faulty ones.
-    pub faulty: Vec<FaultyCase>,
-    /// What is wished for all jobs.
-    pub wishes: Wishes,
-}
-
-impl Draft {
-    /// Checks one more case and keeps it if it has no fault. `case` is what `text` says, or why it says nothing.
-    ///
-    /// # Errors
-    /// The file could not be written.
-    pub fn add(
-        &mut self,
-        jobs: &Jobs,
-        line: Option<u64>,
-        text: &[u8],
-        case: Result<Value, String>,
-    ) -> Result<(), JobsError> {
-        let index = self.cases;
-        self.cases += 1;
-        let checked = match &case {
-            Ok(case) => {
-                self.digest.update(&idempotency::digest(case));
-                jobs.check(case).map_err(|error| error.0)
-            }
-            Err(reason) => {
-                self.digest.update(text);
-                Err(vec![Fault {
-                    pointer: String::new(),
-                    detail: reason.clone(),
-                }])
-            }
-        };
-        match checked {
-            Ok(problem) => {
-                let card = Card {
-                    index,
-                    method: problem.method.name().to_owned(),
-                    outputs: outputs_text(&problem.outputs),
-                    cost_us: cost_us(&problem),
-                    digest: problem.digest,
-                    name: problem.name,
-                    labels: problem.labels,
-                };
-                self.spool
-                    .push(&card, text)
-                    .map_err(|source| jobs.spool_failed(source))
-            }
-            Err(faults) => {
-                self.rejected += 1;
-                if self.faulty.len() < FAULTY_KEPT {
-                    self.faulty.push(FaultyCase {
-                        index,
-                        line,
-                        faults,
-                    });
-                }
-                Ok(())
-            }
-        }
-    }
-}
-
 impl Jobs {
-    /// An empty batch.
-    ///
-    /// # Errors
-    /// [`JobsError::Draining`], or the data folder cannot be written.
-    pub fn draft(&self) -> Result<Draft, JobsError> {
-        if self.shared.draining.is_cancelled() {
-            return Err(JobsError::Draining);
-        }
-        let spool = Spool::new(&self.shared.options.data_dir);
-        Ok(Draft {
-            spool: spool.map_err(|source| self.spool_failed(source))?,
-            digest: blake3::Hasher::new(),
-            cases: 0,
-            rejected: 0,
-            faulty: Vec::new(),
-            wishes: Wishes::default(),
-        })
-    }
-
-    /// Queues the good cases of a draft. Once this returns all of them survive the death of the process; if it fails,
-    /// none of them will be there. Workers may begin before it returns.
-    ///
-    /// # Errors
-    /// [`JobsError::QueueFull`], [`JobsError::IdempotencyConflict`], [`JobsError::Draining`], or a failed database.
-    pub async fn submit_batch(
-        &self,
-        draft: Draft,
-        idempotency_key: Option<String>,
-    ) -> Result<Batch, JobsError> {
-        let span = self.submitting();
-        let traceparent = span.traceparent();
-        let submitted = self.store_batch(draft, idempotency_key, traceparent);
-        span.end(submitted.await, |batch| {
-            vec![
-                KeyValue::new("railhead.batch.id", batch.id.to_string()),
-                KeyValue::new("railhead.batch.jobs", i64::from(batch.count)),
-            ]
-        })
-    }
-
-    async fn store_batch(
-        &self,
-        draft: Draft,
-        idempotency_key: Option<String>,
-        traceparent: Option<Arc<str>>,
-    ) -> Result<Batch, JobsError> {
-        let id = Uuid::now_v7();
-        let digest = *draft.digest.finalize().as_bytes();
-        let new = NewBatch {
-            id,
-            tenant: self.tenant.clone(),
-            created_at: created_at(id),
-            count: draft.cases - draft.rejected,
-            rejected: draft.rejected,
-            idempotency: idempotency_key.map(|key| (key, digest)),
-        };
-        loop {
-            if self.shared.draining.is_cancelled() {
-                return Err(JobsError::Draining);
-            }
-            match self.noted(self.shared.store.begin_batch(&new).await)? {
-                Begun::Created => break,
-                Begun::Existing(id) => return self.batch(id).await,
-                Begun::Conflict => return Err(JobsError::IdempotencyConflict),
-                Begun::Unfinished => tokio::time::sleep(FILLING_PAUSE).await,
-            }
-        }
-        // A client that hangs up must not leave a batch half filled, so the filling goes on without it.
-        let jobs = self.clone();
-        let filled = tokio::spawn(async move {
-            let filled = jobs
-                .fill(&new, draft.spool, draft.wishes, traceparent)
-                .await;
-            if filled.is_err()
-                && let Err(error) = jobs.drop_batch(new.id).await
-            {
-                tracing::warn!(%error, "an incomplete batch is left until the next start");
-            }
-            filled
-        });
-        let filled = filled
-            .await
-            .map_err(|error| JobsError::Damaged(error.to_string()))?;
-        self.noted(filled)?;
-        self.batch(id).await
-    }
-
-    async fn fill(
-        &self,
-        new: &NewBatch,
-        spool: Spool,
-        wishes: Wishes,
-        traceparent: Option<Arc<str>>,
-    ) -> Result<(), JobsError> {
-        self.admit(u64::from(new.count)).await?;
-        let mut reader = spool
-            .into_reader()
-            .map_err(|source| self.spool_failed(source))?;
-        loop {
-            let taken = tokio::task::spawn_blocking(move || {
-                let cases = reader.take(CHUNK_JOBS, CHUNK_BYTES);
-                (reader, cases)
-            });
-            let (back, cases) = taken
-                .await
-                .map_err(|error| JobsError::Damaged(error.to_string()))?;
-            reader = back;
-            let cases = cases.map_err(|source| self.spool_failed(source))?;
-            if cases.is_empty() {
-                break;
-            }
-            let mut some: Vec<_> = cases
-                .into_iter()
-                .map(|(card, case)| {
-                    let traceparent = traceparent.clone();
-                    (card.index, self.new_job(card, case, wishes, traceparent))
-                })
-                .collect();
-            if !wishes.fresh {
-                self.find_sources(some.iter_mut().map(|(_, job)| job))
-                    .await?;
-            }
-            let ended = self.shared.store.enqueue_many(new.id, &some).await?;
-            self.shared.ended_cached(&ended);
-            for _ in 0..self.shared.options.workers {
-                self.shared.wake.notify_one();
-            }
-        }
-        self.shared.store.complete_batch(new.id).await?;
-        tracing::info!(batch = %new.id, jobs = new.count, rejected = new.rejected, "batch queued");
-        Ok(())
-    }
-
-    async fn drop_batch(&self, id: Uuid) -> Result<(), JobsError> {
-        while !self.shared.store.drop_batch(id, DELETED_AT_ONCE).await? {}
-        self.shared.collect_blobs().await;
-        Ok(())
-    }
-
     /// Looks at a batch.
     ///
     /// # Errors
@@ -346,17 +111,20 @@ impl Jobs {
     /// [`JobsError::BatchNotFound`], or a failed database.
     pub async fn cancel_batch(&self, id: Uuid) -> Result<Batch, JobsError> {
         self.batch(id).await?;
-        for (job, state) in self
-            .shared
-            .store
-            .cancel_batch(id, self.shared.now_ms())
-            .await?
-        {
-            if state.ended() {
-                self.shared.metrics.ended(state, 1);
-                self.shared.announce(job);
-            } else if let Some(watch) = self.shared.running().get(&job) {
-                watch.stop(Reason::Cancel);
+        loop {
+            let now = self.shared.now_ms();
+            let store = &self.shared.store;
+            let changed = store.cancel_batch(id, CANCELLED_AT_ONCE, now).await?;
+            for (job, state) in &changed {
+                if state.ended() {
+                    self.shared.metrics.ended(*state, 1);
+                    self.shared.announce(*job);
+                } else if let Some(watch) = self.shared.running().get(job) {
+                    watch.stop(Reason::Cancel);
+                }
+            }
+            if changed.len() < CANCELLED_AT_ONCE as usize {
+                break;
             }
         }
         self.batch(id).await
@@ -457,38 +225,5 @@ impl Jobs {
                 }
             },
         })
-    }
-
-    fn new_job(
-        &self,
-        card: Card,
-        case: Vec<u8>,
-        wishes: Wishes,
-        traceparent: Option<Arc<str>>,
-    ) -> NewJob {
-        let id = Uuid::now_v7();
-        NewJob {
-            id,
-            tenant: self.tenant.clone(),
-            created_at: created_at(id),
-            name: card.name,
-            labels: card.labels,
-            method: card.method,
-            outputs: card.outputs,
-            cost_us: card.cost_us,
-            body: Bytes::from(case),
-            reuse_key: self.reuse_key(&card.digest),
-            source: None,
-            idempotency: None,
-            traceparent,
-            wishes,
-        }
-    }
-
-    fn spool_failed(&self, source: std::io::Error) -> JobsError {
-        JobsError::DataDir {
-            path: self.shared.options.data_dir.clone(),
-            source,
-        }
     }
 }

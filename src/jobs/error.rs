@@ -26,11 +26,29 @@ pub enum JobsError {
         /// Bound of queued jobs of one tenant.
         queue_max: u64,
     },
+    /// The batches of the tenant that are being received are as large as they may be together.
+    #[error(
+        "batches of this tenant that are being received stand for {bytes_max} bytes, which is the limit; try again later, or send fewer cases at once"
+    )]
+    StagingQuotaExceeded {
+        /// Bound of staged bytes of one tenant.
+        bytes_max: u64,
+    },
+    /// The batches that are being received are as large as they may be together.
+    #[error(
+        "the batches that are being received stand for {bytes_max} bytes, which is the limit of the service; try again later"
+    )]
+    StagingFull {
+        /// Bound of all staged bytes.
+        bytes_max: u64,
+    },
     /// The name cannot be that of a tenant.
     #[error("a tenant is named by 1 to 64 letters, digits, dots, dashes and underscores")]
     BadTenant,
-    /// The idempotency key was used before with another case.
-    #[error("this idempotency key was used before with another case")]
+    /// The idempotency key was used before with another case, or with other options.
+    #[error(
+        "this idempotency key was used before with another case, or with another priority, deadline or `no-cache`"
+    )]
     IdempotencyConflict,
     /// There is no such job.
     #[error("there is no such job")]

@@ -28,13 +28,17 @@ impl Jobs {
     /// [`JobsError::NotFound`], or a failed database.
     pub async fn case(&self, id: Uuid) -> Result<Bytes, JobsError> {
         self.get(id).await?;
-        let (body, _) = self
-            .shared
-            .store
-            .case(id)
-            .await?
-            .ok_or(JobsError::NotFound)?;
-        Ok(body)
+        let cases = self.shared.store.cases(&[id]).await?;
+        // It was there a moment ago.
+        let (case, _) = cases.into_values().next().ok_or(JobsError::Expired)?;
+        if case.template.is_none() {
+            return Ok(case.body);
+        }
+        let filled = tokio::task::spawn_blocking(move || case.value());
+        let filled = filled
+            .await
+            .map_err(|error| JobsError::Damaged(error.to_string()))??;
+        Ok(Bytes::from(filled.to_string()))
     }
 
     /// The answer of a succeeded job, without fields.

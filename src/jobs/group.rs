@@ -11,7 +11,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
-use bytes::Bytes;
 use tokio::sync::oneshot;
 use tokio::time::{MissedTickBehavior, interval, sleep};
 use tracing::Instrument;
@@ -21,7 +20,7 @@ use crate::jobs::error::JobsError;
 use crate::jobs::job::State;
 use crate::jobs::solver_thread::{Outcome, SolverThread, solve_guarded};
 use crate::jobs::store::sqlite::groups::GroupBounds;
-use crate::jobs::store::{Claim, Ending};
+use crate::jobs::store::{Claim, Ending, StoredCase};
 use crate::jobs::trace::Traced;
 use crate::jobs::watch::{Reason, Watch};
 use crate::jobs::worker::{
@@ -37,7 +36,7 @@ const GROUP_TIME: Duration = Duration::from_millis(400);
 struct Member {
     claim: Claim,
     watch: Arc<Watch>,
-    body: Bytes,
+    case: StoredCase,
     _registered: Registered,
 }
 
@@ -53,11 +52,11 @@ impl Worker {
             cost_us: GROUP_COST_US,
             workers: options.workers,
         };
-        let lease = lease_ms(&self.shared);
-        let mut claims = self
-            .shared
+        let (shared, lease) = (&self.shared, lease_ms(&self.shared));
+        let skip = shared.underway().abandoned.clone();
+        let mut claims = shared
             .store
-            .claim_group(&self.name, self.shared.now_ms(), lease, bounds)
+            .claim_group(&self.name, shared.now_ms(), lease, bounds, &skip)
             .await?;
         if claims.is_empty() {
             return Ok(false);
@@ -142,14 +141,14 @@ impl Worker {
         let members = registered
             .into_iter()
             .filter_map(|(claim, watch, registered)| {
-                let (body, cancel_requested) = cases.remove(&claim.id)?;
+                let (case, cancel_requested) = cases.remove(&claim.id)?;
                 if cancel_requested {
                     watch.stop(Reason::Cancel);
                 }
                 Some(Member {
                     claim,
                     watch,
-                    body,
+                    case,
                     _registered: registered,
                 })
             });
@@ -179,18 +178,18 @@ impl Worker {
                 .iter()
                 .map(|member| {
                     let traced = shared.traced(&member.claim);
-                    (member.watch.clone(), member.body.clone(), traced)
+                    (member.watch.clone(), member.case.clone(), traced)
                 })
                 .collect();
             Box::new(move || {
                 let start = Instant::now();
                 let mut outcomes = Vec::with_capacity(work.len());
-                for (watch, body, traced) in work {
+                for (watch, case, traced) in work {
                     if start.elapsed() > GROUP_TIME || shared.stopping.is_cancelled() {
                         break;
                     }
                     begun.fetch_add(1, Ordering::AcqRel);
-                    let solve = || solve_guarded(&shared, &watch, &body);
+                    let solve = || solve_guarded(&shared, &watch, &case);
                     outcomes.push(Traced::solving(traced.as_ref(), solve));
                 }
                 // An abandoned group has nobody listening.

@@ -1,6 +1,7 @@
 //! What has to be done besides solving: taking jobs from silent workers, and removing results nobody owns.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use crate::jobs::Shared;
 use crate::jobs::error::JobsError;
@@ -9,6 +10,8 @@ use crate::jobs::worker::heartbeat;
 
 /// Jobs looked up in one statement by the sweep.
 const SWEEP_CHUNK: usize = 500;
+/// Time between two tries to do what a full disk did not allow.
+const RECOVER_EVERY: Duration = Duration::from_secs(1);
 /// Results taken from the outbox at once.
 const COLLECT_CHUNK: u32 = 500;
 
@@ -40,6 +43,48 @@ pub(super) async fn reap_expired(shared: Arc<Shared>) {
             }
             Err(error) => tracing::warn!(%error, "expired leases could not be looked for"),
         }
+    }
+}
+
+/// Takes back what a dead process left, and removes what is left of batches that were given up, again and again for as
+/// long as the disk does not allow it.
+pub(super) async fn recover(shared: Arc<Shared>) {
+    let mut beat = tokio::time::interval(RECOVER_EVERY);
+    while shared
+        .draining
+        .run_until_cancelled(beat.tick())
+        .await
+        .is_some()
+    {
+        if shared.recovered.get().is_none()
+            && let Err(error) = shared.recover().await
+        {
+            tracing::warn!(%error, "jobs of a dead process cannot be taken back yet");
+        }
+        if !shared.underway().abandoned.is_empty() {
+            shared.drop_abandoned().await;
+        }
+    }
+}
+
+impl Shared {
+    /// Takes back the jobs that a dead process was running.
+    pub(super) async fn recover(&self) -> Result<(), JobsError> {
+        if self.recovered.get().is_some() {
+            return Ok(());
+        }
+        let attempts_max = self.options.attempts_max;
+        let taken = self.store.reap(i64::MAX, self.now_ms(), attempts_max).await;
+        self.note(&taken);
+        for (id, state) in taken? {
+            tracing::info!(job = %id, state = state.name(), "job of a dead process taken back");
+        }
+        // Set once; whoever was first is right.
+        let _ = self.recovered.set(());
+        if !self.underway().abandoned.is_empty() {
+            self.drop_abandoned().await;
+        }
+        Ok(())
     }
 }
 

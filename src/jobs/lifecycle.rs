@@ -8,23 +8,24 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::available_parallelism;
 use std::time::Duration;
 
-use tokio::sync::{Notify, Semaphore, broadcast};
+use tokio::sync::{Notify, Semaphore, SetOnce, broadcast};
 use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
 use crate::contact::problem::Limits;
-use crate::jobs::batch::DELETED_AT_ONCE;
 use crate::jobs::clock::Clock;
+use crate::jobs::draft::Underway;
 use crate::jobs::error::JobsError;
 use crate::jobs::keys::ANONYMOUS;
 use crate::jobs::metrics::Metrics;
 use crate::jobs::recipe::Recipe;
 use crate::jobs::results::Results;
+use crate::jobs::staging::{Staged, StagingBounds};
 use crate::jobs::store::sqlite::SqliteStore;
 use crate::jobs::trace::Tracer;
 use crate::jobs::worker::Worker;
-use crate::jobs::{Admitted, Jobs, Shared, housekeeping, retention, wishes};
+use crate::jobs::{Jobs, Shared, housekeeping, retention, wishes};
 
 /// How long a shutdown waits for workers that were told to stop, beyond their own patience.
 const STOPPED_WITHIN: Duration = Duration::from_secs(10);
@@ -46,6 +47,8 @@ pub struct Options {
     pub queue_max: u64,
     /// Bound of queued jobs of one tenant.
     pub tenant_queue_max: u64,
+    /// Bounds of what batches that are being received stand for.
+    pub staging: StagingBounds,
     /// Most jobs a worker claims together, if they are small; 1 means no groups.
     pub group_max: usize,
     /// Results up to this size in bytes are kept in the database, larger ones in folders.
@@ -62,7 +65,7 @@ pub struct Options {
 
 impl Options {
     /// The defaults for a data folder: one worker, a lease of 30 s, 5 attempts, 300 000 queued jobs of which
-    /// 250 000 of one tenant,
+    /// 250 000 of one tenant, 16 GiB of batches being received of which 4 GiB of one tenant,
     /// groups of 256, results up to 32 KiB in the database, results used again,
     /// ended jobs kept for ever, the system's clock, no spans.
     #[must_use]
@@ -75,6 +78,10 @@ impl Options {
             attempts_max: 5,
             queue_max: 300_000,
             tenant_queue_max: 250_000,
+            staging: StagingBounds {
+                all: 16 << 30,
+                tenant: 4 << 30,
+            },
             group_max: 256,
             small_result_max_bytes: 32 << 10,
             cache: true,
@@ -104,25 +111,12 @@ impl Jobs {
         let lock = lock(&options.data_dir)?;
         let store = SqliteStore::open(&options.data_dir.join("jobs.db")).await?;
         let results = Results::open(&options.data_dir)?;
-        let incomplete = store.incomplete_batches().await?;
-        for batch in &incomplete {
-            while !store.drop_batch(*batch, DELETED_AT_ONCE).await? {}
-        }
-        if !incomplete.is_empty() {
-            tracing::info!(
-                incomplete = incomplete.len(),
-                "batches that were never acknowledged removed"
-            );
-        }
-        let taken_back = store
-            .reap(i64::MAX, options.clock.now_ms(), options.attempts_max)
-            .await?;
-        for (id, state) in taken_back {
-            tracing::info!(job = %id, state = state.name(), "job of a dead process taken back");
-        }
-        let queued = store.queued(options.queue_max).await?;
+        let underway = Underway {
+            abandoned: store.incomplete_batches().await?.into_iter().collect(),
+            ..Underway::default()
+        };
         let (ended, _) = broadcast::channel(1024);
-        Ok(Jobs {
+        let jobs = Jobs {
             tenant: ANONYMOUS.into(),
             shared: Arc::new(Shared {
                 options,
@@ -139,13 +133,20 @@ impl Jobs {
                 storage_failing: AtomicBool::new(false),
                 trusted: Mutex::default(),
                 checks: Semaphore::new(available_parallelism().map_or(1, usize::from)),
-                queued_at_most: tokio::sync::Mutex::new(Admitted {
-                    all: queued,
-                    ..Admitted::default()
-                }),
+                staged: Staged::default(),
+                batches: Mutex::new(underway),
+                recovered: SetOnce::new(),
                 lock: Mutex::new(Some(lock)),
             }),
-        })
+        };
+        match jobs.shared.recover().await {
+            // What can be read is served; the rest is done once the disk takes data again.
+            Err(error) if error.trouble().is_some() => {
+                tracing::error!(%error, "the disk takes nothing; the service starts for reading");
+            }
+            recovered => recovered?,
+        }
+        Ok(jobs)
     }
 
     /// Starts the workers, the reaper of expired leases, the sweeps of orphaned results and of expired jobs, and the
@@ -164,6 +165,9 @@ impl Jobs {
         self.shared
             .tasks
             .spawn(housekeeping::sweep_orphans(self.shared.clone()));
+        self.shared
+            .tasks
+            .spawn(housekeeping::recover(self.shared.clone()));
         self.shared
             .tasks
             .spawn(retention::sweep(self.shared.clone()));

@@ -9,6 +9,7 @@
 pub mod backup;
 pub mod batch;
 pub mod clock;
+pub mod draft;
 pub mod error;
 pub mod fetch;
 pub mod fields;
@@ -26,8 +27,10 @@ pub mod retention;
 mod reuse;
 mod solver_thread;
 mod spool;
+pub mod staging;
 mod storage;
 pub mod store;
+pub mod template;
 pub mod trace;
 pub mod watch;
 pub mod wishes;
@@ -42,7 +45,7 @@ use std::time::Duration;
 use bytes::Bytes;
 use opentelemetry::KeyValue;
 use serde_json::Value;
-use tokio::sync::{Notify, Semaphore, broadcast};
+use tokio::sync::{Notify, Semaphore, SetOnce, broadcast};
 use tokio::time::{Instant, timeout, timeout_at};
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
@@ -51,6 +54,7 @@ use uuid::Uuid;
 use crate::contact::case::Output;
 use crate::contact::error::CaseError;
 use crate::contact::problem::Problem;
+use crate::jobs::draft::Underway;
 pub use crate::jobs::error::JobsError;
 pub use crate::jobs::job::{Failure, FailureKind, Job, State};
 use crate::jobs::keys::Trusted;
@@ -58,10 +62,11 @@ pub use crate::jobs::lifecycle::Options;
 use crate::jobs::metrics::Metrics;
 use crate::jobs::recipe::Recipe;
 use crate::jobs::results::Results;
+use crate::jobs::staging::Staged;
 pub use crate::jobs::storage::Trouble;
 pub use crate::jobs::store::list::{Filter, Page};
 use crate::jobs::store::sqlite::SqliteStore;
-use crate::jobs::store::{Deleted, Enqueued, NewJob};
+use crate::jobs::store::{Deleted, Enqueued, NewJob, QueueBounds, Refusal};
 use crate::jobs::watch::{Reason, Watch};
 use crate::jobs::wishes::Wishes;
 
@@ -104,17 +109,14 @@ struct Shared {
     trusted: Mutex<Trusted>,
     /// Cases of single jobs that may be checked at the same time.
     checks: Semaphore,
-    /// Upper bounds of the number of queued jobs, recounted when they reach their limits.
-    queued_at_most: tokio::sync::Mutex<Admitted>,
+    /// Bytes of batches that are being received.
+    staged: Staged,
+    /// Batches that are being received or filled, and those of which only remains are left.
+    batches: Mutex<Underway>,
+    /// What a dead process left is taken back; nothing is claimed before.
+    recovered: SetOnce<()>,
     /// Held as long as this process uses the data folder.
     lock: Mutex<Option<File>>,
-}
-
-/// Upper bounds of the number of queued jobs.
-#[derive(Debug, Default)]
-struct Admitted {
-    all: u64,
-    of_tenants: HashMap<Arc<str>, u64>,
 }
 
 impl Jobs {
@@ -140,11 +142,12 @@ impl Jobs {
         case: Value,
         idempotency_key: Option<String>,
     ) -> Result<Job, JobsError> {
-        self.submit_with(case, idempotency_key, Wishes::default())
-            .await
+        let submitted = self.submit_with(case, idempotency_key, Wishes::default());
+        submitted.await.map(|(job, _)| job)
     }
 
-    /// As [`Jobs::submit`], with wishes. A repeated idempotency key answers the job as it was first wished for.
+    /// As [`Jobs::submit`], with wishes; also says whether the job is that of an earlier submission with the same
+    /// idempotency key.
     ///
     /// # Errors
     /// As [`Jobs::submit`].
@@ -153,11 +156,11 @@ impl Jobs {
         case: Value,
         idempotency_key: Option<String>,
         wishes: Wishes,
-    ) -> Result<Job, JobsError> {
+    ) -> Result<(Job, bool), JobsError> {
         let span = self.submitting();
         let traceparent = span.traceparent();
         let submitted = self.store_case(case, idempotency_key, wishes, traceparent);
-        span.end(submitted.await, |job| {
+        span.end(submitted.await, |(job, _)| {
             vec![
                 KeyValue::new("railhead.job.id", job.id.to_string()),
                 KeyValue::new("railhead.job.cached", job.cached),
@@ -171,7 +174,7 @@ impl Jobs {
         idempotency_key: Option<String>,
         wishes: Wishes,
         traceparent: Option<Arc<str>>,
-    ) -> Result<Job, JobsError> {
+    ) -> Result<(Job, bool), JobsError> {
         if self.shared.draining.is_cancelled() {
             return Err(JobsError::Draining);
         }
@@ -180,7 +183,11 @@ impl Jobs {
         // not take the cores from them either.
         let turn = self.shared.checks.acquire().await;
         let read = tokio::task::spawn_blocking(move || {
-            let idempotency = idempotency_key.map(|key| (key, idempotency::digest(&case)));
+            let digest = |_: &String| wishes.digest(&idempotency::digest(&case));
+            let idempotency = idempotency_key.map(|key| {
+                let digest = digest(&key);
+                (key, digest)
+            });
             (jobs.check(&case), serde_json::to_vec(&case), idempotency)
         });
         let (problem, body, idempotency) = read
@@ -190,7 +197,11 @@ impl Jobs {
         if let Some((key, digest)) = &idempotency
             && let Some(enqueued) = self.shared.store.by_key(&self.tenant, key, digest).await?
         {
-            return replayed(enqueued).map(|job| self.dated(job));
+            match self.of_enqueued(enqueued) {
+                // The job is over and only waits for its removal: the key is free.
+                Err(JobsError::Expired) => self.shared.store.forget_key(&self.tenant, key).await?,
+                answer => return answer,
+            }
         }
         let problem = problem?;
         let (outputs, cost_us) = (problem.outputs.clone(), cost_us(&problem));
@@ -207,6 +218,7 @@ impl Jobs {
             reuse_key: self.reuse_key(&problem.digest),
             source: None,
             body: Bytes::from(body.map_err(|error| JobsError::Damaged(error.to_string()))?),
+            row: false,
             idempotency,
             traceparent,
             wishes,
@@ -214,18 +226,47 @@ impl Jobs {
         if !wishes.fresh {
             self.find_sources(std::iter::once(&mut new)).await?;
         }
-        if new.source.is_none() {
-            self.admit(1).await?;
-        }
-        let job = replayed(self.noted(self.shared.store.enqueue(&new).await)?)?;
+        let stored = self.shared.store.enqueue(&new, self.queue_bounds()).await;
+        let (job, replayed) = self.of_enqueued(self.noted(stored)?)?;
         if job.id == id && job.cached {
             self.shared.ended_cached(&[id]);
             tracing::info!(job = %id, method = new.method, "job answered from an earlier result");
-            return Ok(self.dated(job));
+            return Ok((job, false));
         }
         self.shared.wake.notify_one();
         tracing::info!(job = %job.id, method = new.method, "job queued");
-        Ok(self.dated(job))
+        Ok((job, replayed))
+    }
+
+    /// The bounds of the queue.
+    fn queue_bounds(&self) -> QueueBounds {
+        QueueBounds {
+            all: self.shared.options.queue_max,
+            tenant: self.shared.options.tenant_queue_max,
+        }
+    }
+
+    /// Why there is no room.
+    fn refused(&self, refusal: Refusal) -> JobsError {
+        let bounds = self.queue_bounds();
+        match refusal {
+            Refusal::Quota => JobsError::QuotaExceeded {
+                queue_max: bounds.tenant,
+            },
+            Refusal::Queue => JobsError::QueueFull {
+                queue_max: bounds.all,
+            },
+        }
+    }
+
+    /// The job that was made, or that the idempotency key stands for, and whether it is the latter.
+    fn of_enqueued(&self, enqueued: Enqueued) -> Result<(Job, bool), JobsError> {
+        match enqueued {
+            Enqueued::Created(job) => Ok((self.dated(job), false)),
+            Enqueued::Existing(job) => Ok((self.unexpired(job)?, true)),
+            Enqueued::Conflict => Err(JobsError::IdempotencyConflict),
+            Enqueued::Refused(refusal) => Err(self.refused(refusal)),
+        }
     }
 
     /// Looks at a job.
@@ -340,35 +381,6 @@ impl Jobs {
             .unwrap_or(Err(JobsError::Database(sqlx::Error::PoolTimedOut)))?;
         self.shared.require_storage().await
     }
-
-    /// Takes places in the queue. The bound is exact: the figure kept here is never below the true one, and the queue
-    /// is counted before anybody is turned away.
-    async fn admit(&self, jobs: u64) -> Result<(), JobsError> {
-        let (store, options) = (&self.shared.store, &self.shared.options);
-        let mut at_most = self.shared.queued_at_most.lock().await;
-        let queue_max = options.tenant_queue_max;
-        // Nothing is known yet of a tenant that comes for the first time: it is counted.
-        let known = at_most.of_tenants.get(&self.tenant).copied();
-        let mut of_tenant = known.unwrap_or(queue_max);
-        if of_tenant + jobs > queue_max {
-            of_tenant = store.queued_of(&self.tenant, queue_max).await?;
-        }
-        if of_tenant + jobs > queue_max {
-            return Err(JobsError::QuotaExceeded { queue_max });
-        }
-        let queue_max = options.queue_max;
-        if at_most.all + jobs > queue_max {
-            at_most.all = store.queued(queue_max).await?;
-        }
-        if at_most.all + jobs > queue_max {
-            return Err(JobsError::QueueFull { queue_max });
-        }
-        at_most.all += jobs;
-        at_most
-            .of_tenants
-            .insert(self.tenant.clone(), of_tenant + jobs);
-        Ok(())
-    }
 }
 
 impl Shared {
@@ -386,14 +398,6 @@ impl Shared {
     fn announce(&self, id: Uuid) {
         // Nobody listening is no error.
         let _ = self.ended.send(id);
-    }
-}
-
-/// The job an idempotency key stands for, or the new one.
-fn replayed(enqueued: Enqueued) -> Result<Job, JobsError> {
-    match enqueued {
-        Enqueued::Created(job) | Enqueued::Existing(job) => Ok(job),
-        Enqueued::Conflict => Err(JobsError::IdempotencyConflict),
     }
 }
 

@@ -43,9 +43,14 @@ impl Jobs {
         job
     }
 
-    /// The job with that time, unless it is over.
+    /// The job with that time, unless it is over, or belongs to a batch that was never acknowledged.
     pub(super) fn unexpired(&self, job: Job) -> Result<Job, JobsError> {
         let job = self.dated(job);
+        if let Some(batch) = &job.batch_id
+            && self.shared.underway().abandoned.contains(batch)
+        {
+            return Err(JobsError::NotFound);
+        }
         match job.expires_at {
             Some(time) if time <= self.shared.now_ms() => Err(JobsError::Expired),
             _ => Ok(job),

@@ -14,6 +14,7 @@ use crate::jobs::error::JobsError;
 use crate::jobs::fields;
 use crate::jobs::job::{Failure, FailureKind};
 use crate::jobs::results::Encoded;
+use crate::jobs::store::StoredCase;
 use crate::jobs::watch::Watch;
 
 /// Stack of a solver thread.
@@ -70,18 +71,18 @@ impl SolverThread {
 }
 
 /// Solves a case; a panic becomes a failure and the thread stays usable.
-pub(super) fn solve_guarded(shared: &Shared, watch: &Watch, body: &[u8]) -> Outcome {
-    catch_unwind(AssertUnwindSafe(|| solve_case(shared, watch, body))).unwrap_or_else(|payload| {
+pub(super) fn solve_guarded(shared: &Shared, watch: &Watch, stored: &StoredCase) -> Outcome {
+    catch_unwind(AssertUnwindSafe(|| solve_case(shared, watch, stored))).unwrap_or_else(|payload| {
         let detail = format!("the solver panicked: {}", panic_text(payload.as_ref()));
         Outcome::Broken(Failure::new(FailureKind::Panic, detail))
     })
 }
 
-fn solve_case(shared: &Shared, watch: &Watch, body: &[u8]) -> Outcome {
+fn solve_case(shared: &Shared, watch: &Watch, stored: &StoredCase) -> Outcome {
     let internal = |detail: String| Outcome::Broken(Failure::new(FailureKind::Internal, detail));
-    let case = match serde_json::from_slice(body) {
+    let case = match stored.value() {
         Ok(case) => case,
-        Err(error) => return internal(format!("the stored case is damaged: {error}")),
+        Err(error) => return internal(error.to_string()),
     };
     let problem = match (shared.recipe.check)(&case, &shared.options.limits) {
         Ok(problem) => problem,

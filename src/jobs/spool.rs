@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Read, Result, Seek, SeekFrom, Write};
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -12,6 +13,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Card {
     pub(super) index: u32,
+    /// The text is what a row of a table puts into the template.
+    pub(super) row: bool,
     pub(super) name: Option<String>,
     pub(super) labels: BTreeMap<String, String>,
     pub(super) method: String,
@@ -32,6 +35,7 @@ impl Spool {
             .read(true)
             .write(true)
             .create_new(true)
+            .mode(0o600)
             .open(&path)?;
         std::fs::remove_file(&path)?;
         Ok(Spool(BufWriter::with_capacity(1 << 18, file)))
@@ -95,6 +99,7 @@ mod tests {
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
         let card = |index| Card {
             index,
+            row: false,
             name: Some("a\nb".to_owned()),
             labels: BTreeMap::new(),
             method: "auto".to_owned(),

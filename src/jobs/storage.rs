@@ -88,7 +88,7 @@ impl Jobs {
 
 impl Shared {
     /// Remembers whether the disk takes what is written.
-    fn note<T>(&self, written: &Result<T, JobsError>) {
+    pub(super) fn note<T>(&self, written: &Result<T, JobsError>) {
         let trouble = match written {
             Ok(_) => None,
             Err(error) => match error.trouble() {

@@ -74,6 +74,19 @@ pub struct Wishes {
     pub fresh: bool,
 }
 
+impl Wishes {
+    /// The digest of a submission, for its idempotency key: of what is asked and of the wishes that come with it.
+    pub(super) fn digest(&self, asked: &[u8; 32]) -> [u8; 32] {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(asked);
+        hasher.update(&self.priority.rank().to_le_bytes());
+        let within = self.ends_within.map_or(u128::MAX, |time| time.as_millis());
+        hasher.update(&within.to_le_bytes());
+        hasher.update(&[u8::from(self.fresh)]);
+        *hasher.finalize().as_bytes()
+    }
+}
+
 /// Why a job that came too late has no answer.
 pub(super) fn too_late() -> Failure {
     Failure::new(

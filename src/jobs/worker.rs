@@ -9,7 +9,6 @@ use std::pin::pin;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
-use bytes::Bytes;
 use tokio::sync::oneshot;
 use tokio::time::{MissedTickBehavior, interval, sleep};
 use tracing::{Instrument, Span};
@@ -23,7 +22,7 @@ use crate::jobs::error::JobsError;
 use crate::jobs::job::{Failure, FailureKind, Job, State};
 use crate::jobs::results::Encoded;
 use crate::jobs::solver_thread::{Outcome, SolverThread, solve_guarded};
-use crate::jobs::store::{Claim, Ending, Placed, Renewal};
+use crate::jobs::store::{Claim, Ending, Placed, Renewal, StoredCase};
 use crate::jobs::trace::Traced;
 use crate::jobs::watch::{Reason, Watch};
 use crate::jobs::wishes::too_late;
@@ -65,6 +64,8 @@ impl Worker {
     /// Steps until the service drains.
     pub(super) async fn run(mut self) {
         let shared = self.shared.clone();
+        let recovered = shared.recovered.wait();
+        let _ = shared.draining.run_until_cancelled(recovered).await;
         while !shared.draining.is_cancelled() {
             match self.group_step().await {
                 Ok(false) => {}
@@ -103,13 +104,14 @@ impl Worker {
         let watch = Arc::new(Watch::default());
         let _registered = Registered::new(&self.shared, claim.id, &watch);
         // Read after registering: a cancellation is either seen here or finds the watch.
-        let Some((body, cancel_requested)) = self.shared.store.case(claim.id).await? else {
+        let mut cases = self.shared.store.cases(&[claim.id]).await?;
+        let Some((case, cancel_requested)) = cases.remove(&claim.id) else {
             return Ok(Step::Lost(claim.id));
         };
         if cancel_requested {
             watch.stop(Reason::Cancel);
         }
-        let outcome = self.solve(claim, &watch, body).await?;
+        let outcome = self.solve(claim, &watch, case).await?;
         let step = self.record(claim, &watch, outcome).await?;
         let seconds = start.elapsed().as_secs_f64();
         match step {
@@ -127,14 +129,14 @@ impl Worker {
         &mut self,
         claim: &Claim,
         watch: &Arc<Watch>,
-        body: Bytes,
+        case: StoredCase,
     ) -> Result<Outcome, JobsError> {
         let (reply, outcome) = oneshot::channel();
         let task = {
             let (shared, watch, span) = (self.shared.clone(), watch.clone(), Span::current());
             let traced = shared.traced(claim);
             Box::new(move || {
-                let solve = || solve_guarded(&shared, &watch, &body);
+                let solve = || solve_guarded(&shared, &watch, &case);
                 let outcome = span.in_scope(|| Traced::solving(traced.as_ref(), solve));
                 // An abandoned attempt has nobody listening.
                 let _ = reply.send(outcome);

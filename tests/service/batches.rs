@@ -1,5 +1,6 @@
 //! Batches: taken whole or not at all, solved in groups, read in order.
 
+use std::collections::HashSet;
 use std::time::Duration;
 
 use railhead::contact::solve;
@@ -7,11 +8,13 @@ use railhead::jobs::Options;
 use reqwest::Method;
 use serde_json::{Value, json};
 
+use railhead::jobs::store::QueueBounds;
+
 use crate::errors::assert_problem;
 use crate::server::{Answer, Server, Setup};
 use crate::support::{Service, case, endless_case, open, pause, tick_forever};
 
-fn lines(cases: &[Value]) -> String {
+pub fn lines(cases: &[Value]) -> String {
     let lines: Vec<String> = cases.iter().map(Value::to_string).collect();
     lines.join("\n")
 }
@@ -370,14 +373,20 @@ async fn jobs_of_a_group_that_died_are_retried_alone_and_uncounted() {
         .await
         .unwrap();
     for _ in 0..3 {
-        store.enqueue(&crate::store::new_job()).await.unwrap();
+        store
+            .enqueue(&crate::store::new_job(), QueueBounds::NONE)
+            .await
+            .unwrap();
     }
     let bounds = GroupBounds {
         jobs: 8,
         cost_us: 1_000_000,
         workers: 1,
     };
-    let group = store.claim_group("w", 0, 10, bounds).await.unwrap();
+    let group = store
+        .claim_group("w", 0, 10, bounds, &HashSet::new())
+        .await
+        .unwrap();
     assert_eq!(group.len(), 3);
     assert_eq!(store.reap(10, 10, 1).await.unwrap().len(), 3);
     let ends: Vec<_> = group
@@ -389,7 +398,10 @@ async fn jobs_of_a_group_that_died_are_retried_alone_and_uncounted() {
         "fenced"
     );
     for claim in &group {
-        let alone = store.claim_group("w", 20, 10, bounds).await.unwrap();
+        let alone = store
+            .claim_group("w", 20, 10, bounds, &HashSet::new())
+            .await
+            .unwrap();
         assert_eq!(alone.len(), 1);
         assert_eq!((alone[0].id, alone[0].attempt), (claim.id, 1));
         assert_eq!(alone[0].lease_number, 2);
@@ -404,8 +416,8 @@ async fn jobs_of_a_group_that_died_are_retried_alone_and_uncounted() {
 
 #[tokio::test]
 async fn an_incomplete_batch_is_gone_after_a_restart() {
-    use railhead::jobs::store::NewBatch;
     use railhead::jobs::store::sqlite::SqliteStore;
+    use railhead::jobs::store::{Begun, NewBatch};
     let folder = tempfile::tempdir().unwrap();
     let store = SqliteStore::open(&folder.path().join("jobs.db"))
         .await
@@ -416,9 +428,12 @@ async fn an_incomplete_batch_is_gone_after_a_restart() {
         created_at: 0,
         count: 2,
         rejected: 0,
+        template: None,
         idempotency: Some(("k".to_owned(), [1; 32])),
     };
-    store.begin_batch(&new).await.unwrap();
+    let living = HashSet::new();
+    let begun = store.begin_batch(&new, &living, QueueBounds::NONE).await;
+    assert_eq!(begun.unwrap(), Begun::Created);
     let job = crate::store::new_job();
     let id = job.id;
     store.enqueue_many(new.id, &[(0, job)]).await.unwrap();

@@ -1,6 +1,7 @@
 //! Does the service behave?
 
 mod access;
+mod admission;
 mod api;
 mod batch_deletion;
 mod batch_tables;

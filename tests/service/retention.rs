@@ -12,6 +12,8 @@ use railhead::jobs::store::sqlite::SqliteStore;
 use railhead::jobs::{Jobs, JobsError, Options};
 use serde_json::{Value, json};
 
+use railhead::jobs::store::QueueBounds;
+
 use crate::errors::assert_problem;
 use crate::results::path_of;
 use crate::server::{Server, Setup};
@@ -200,7 +202,7 @@ async fn the_database_shrinks_when_its_jobs_go() {
     for _ in 0..JOBS {
         let body = Bytes::from(vec![b' '; CASE_BYTES]);
         let new = NewJob { body, ..new_job() };
-        store.enqueue(&new).await.unwrap();
+        store.enqueue(&new, QueueBounds::NONE).await.unwrap();
         let claim = store.claim("w", 0, 1000).await.unwrap().unwrap();
         let now = Clock::system().now_ms();
         store.finish(&claim, &success(), now).await.unwrap();

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use bytes::Bytes;
 use railhead::contact::remark::{Remark, RemarkEntry};
+use railhead::jobs::store::QueueBounds;
 use railhead::jobs::store::list::Filter;
 use railhead::jobs::store::sqlite::SqliteStore;
 use railhead::jobs::store::{Claim, Deleted, Ending, Enqueued, NewJob, Placed, Renewal};
@@ -29,7 +30,7 @@ impl Table {
     }
 
     pub async fn add(&self, new: NewJob) -> Job {
-        match self.store.enqueue(&new).await.unwrap() {
+        match self.store.enqueue(&new, QueueBounds::NONE).await.unwrap() {
             Enqueued::Created(job) => job,
             other => panic!("{other:?}"),
         }
@@ -37,6 +38,13 @@ impl Table {
 
     pub async fn claim(&self, now: i64) -> Option<Claim> {
         self.store.claim("w", now, LEASE).await.unwrap()
+    }
+
+    /// The case of a job, and whether its cancellation was asked for.
+    async fn case(&self, id: Uuid) -> Option<(Bytes, bool)> {
+        let (case, cancelled) = self.store.cases(&[id]).await.unwrap().remove(&id)?;
+        assert_eq!(case.template, None);
+        Some((case.body, cancelled))
     }
 
     async fn state(&self, id: Uuid) -> State {
@@ -54,6 +62,7 @@ pub fn new_job() -> NewJob {
         labels: BTreeMap::new(),
         method: "auto".to_owned(),
         body: Bytes::from_static(b"{}"),
+        row: false,
         outputs: "[]".to_owned(),
         cost_us: 1000,
         reuse_key: None,
@@ -110,12 +119,9 @@ async fn a_job_comes_back_as_it_was_queued() {
         (new.created_at, None, None)
     );
     assert_eq!((job.attempt, job.failure), (0, None));
-    assert_eq!(
-        table.store.case(new.id).await.unwrap(),
-        Some((new.body, false))
-    );
+    assert_eq!(table.case(new.id).await, Some((new.body, false)));
     assert_eq!(table.store.get(Uuid::now_v7()).await.unwrap(), None);
-    assert_eq!(table.store.case(Uuid::now_v7()).await.unwrap(), None);
+    assert_eq!(table.case(Uuid::now_v7()).await, None);
 }
 
 #[tokio::test]
@@ -310,7 +316,7 @@ async fn cancelling_ends_a_queued_job_asks_a_running_one_and_leaves_an_ended_one
     let asked = table.store.cancel(running, 6).await.unwrap().unwrap();
     assert_eq!((asked.state, asked.ended_at), (State::Running, None));
     assert_eq!(table.store.cancel(running, 7).await.unwrap(), Some(asked));
-    assert!(table.store.case(running).await.unwrap().unwrap().1);
+    assert!(table.case(running).await.unwrap().1);
     let renewed = table.store.renew(&claim, 0.5, 8, LEASE).await.unwrap();
     assert_eq!(
         renewed,
@@ -353,7 +359,12 @@ async fn one_idempotency_key_makes_one_job() {
     let table = Table::new().await;
     let tries = (0..16).map(|_| {
         let store = table.store.clone();
-        tokio::spawn(async move { store.enqueue(&keyed("k", 1)).await.unwrap() })
+        tokio::spawn(async move {
+            store
+                .enqueue(&keyed("k", 1), QueueBounds::NONE)
+                .await
+                .unwrap()
+        })
     });
     let mut ids = BTreeSet::new();
     let mut created = 0;
@@ -366,14 +377,18 @@ async fn one_idempotency_key_makes_one_job() {
             Enqueued::Existing(job) => {
                 ids.insert(job.id);
             }
-            Enqueued::Conflict => panic!("the cases are the same"),
+            other => panic!("the cases are the same: {other:?}"),
         }
     }
     assert_eq!((created, ids.len()), (1, 1));
-    assert_eq!(table.store.queued(100).await.unwrap(), 1);
+    assert_eq!(table.store.queued(None).await.unwrap(), 1);
 
     assert_eq!(
-        table.store.enqueue(&keyed("k", 2)).await.unwrap(),
+        table
+            .store
+            .enqueue(&keyed("k", 2), QueueBounds::NONE)
+            .await
+            .unwrap(),
         Enqueued::Conflict
     );
     assert_eq!(
@@ -393,7 +408,11 @@ async fn one_idempotency_key_makes_one_job() {
         None
     );
     assert!(matches!(
-        table.store.enqueue(&keyed("other", 2)).await.unwrap(),
+        table
+            .store
+            .enqueue(&keyed("other", 2), QueueBounds::NONE)
+            .await
+            .unwrap(),
         Enqueued::Created(_)
     ));
 }
@@ -419,7 +438,7 @@ async fn only_an_ended_job_can_be_deleted_and_all_that_hung_on_it_goes() {
     assert_eq!(table.store.delete(id).await.unwrap(), Deleted::Done);
     assert_eq!(table.store.delete(id).await.unwrap(), Deleted::NotFound);
 
-    assert_eq!(table.store.case(id).await.unwrap(), None);
+    assert_eq!(table.case(id).await, None);
     assert_eq!(
         table
             .store
@@ -459,7 +478,7 @@ async fn the_table_outlives_its_process() {
         .unwrap();
     assert_eq!(again.get(id).await.unwrap(), before);
     assert!(
-        matches!(again.enqueue(&keyed("k", 1)).await.unwrap(), Enqueued::Existing(job) if job.id == id)
+        matches!(again.enqueue(&keyed("k", 1), QueueBounds::NONE).await.unwrap(), Enqueued::Existing(job) if job.id == id)
     );
     assert!(again.finish(&claim, &success(), 1).await.unwrap().is_some());
 }

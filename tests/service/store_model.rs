@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use bytes::Bytes;
 use proptest::prelude::*;
 use railhead::jobs::State;
+use railhead::jobs::store::QueueBounds;
 use railhead::jobs::store::sqlite::SqliteStore;
 use railhead::jobs::store::{Claim, Deleted, Ending, NewJob, Placed, Renewal};
 use railhead::jobs::wishes::Wishes;
@@ -98,6 +99,7 @@ impl Pair {
             labels: BTreeMap::new(),
             method: "auto".to_owned(),
             body: Bytes::from_static(b"{}"),
+            row: false,
             outputs: "[]".to_owned(),
             cost_us: 1000,
             reuse_key: None,
@@ -106,7 +108,7 @@ impl Pair {
             traceparent: None,
             wishes: Wishes::default(),
         };
-        self.store.enqueue(&new).await.unwrap();
+        self.store.enqueue(&new, QueueBounds::NONE).await.unwrap();
         self.ids.push(id);
         let row = Row {
             state: State::Queued,

@@ -36,8 +36,10 @@ pub struct NewJob {
     pub labels: BTreeMap<String, String>,
     /// The method asked for, for the logs.
     pub method: String,
-    /// The case as submitted, as JSON text.
+    /// The case as submitted, as JSON text; of a row of a table what it puts into the template of its batch.
     pub body: Bytes,
+    /// It is such a row.
+    pub row: bool,
     /// The outputs the case asks for, as the JSON list of their names.
     pub outputs: String,
     /// Expected solve time in µs; small jobs are claimed in groups.
@@ -46,7 +48,7 @@ pub struct NewJob {
     pub reuse_key: Option<ReuseKey>,
     /// A succeeded job whose result this one gets, instead of being queued, and the time at which it ends so.
     pub source: Option<(Uuid, i64)>,
-    /// The client's idempotency key with the digest of the case; not used inside a batch.
+    /// The client's idempotency key with the digest of case and options; not used inside a batch.
     pub idempotency: Option<(String, [u8; 32])>,
     /// W3C trace context of its submission, if its trace is collected.
     pub traceparent: Option<Arc<str>>,
@@ -63,10 +65,36 @@ impl NewJob {
     }
 }
 
+/// Bounds of the queue: of queued jobs together with the places reserved for batches under way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct QueueBounds {
+    /// Of all tenants.
+    pub all: u64,
+    /// Of one tenant.
+    pub tenant: u64,
+}
+
+impl QueueBounds {
+    /// No bound.
+    pub const NONE: QueueBounds = QueueBounds {
+        all: u64::MAX,
+        tenant: u64::MAX,
+    };
+}
+
+/// Which bound has no place left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Refusal {
+    /// That of the tenant.
+    Quota,
+    /// That of the queue.
+    Queue,
+}
+
 /// A batch about to be filled.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NewBatch {
-    /// UUIDv7.
+    /// UUIDv7; that of its reservation, if it has one.
     pub id: Uuid,
     /// Whose it is.
     pub tenant: Arc<str>,
@@ -76,7 +104,9 @@ pub struct NewBatch {
     pub count: u32,
     /// Number of cases that were refused.
     pub rejected: u32,
-    /// The client's idempotency key with the digest of all cases.
+    /// The case that its rows fill, if it is a table.
+    pub template: Option<Bytes>,
+    /// The client's idempotency key with the digest of all cases and options.
     pub idempotency: Option<(String, [u8; 32])>,
 }
 
@@ -89,8 +119,10 @@ pub enum Begun {
     Existing(Uuid),
     /// The idempotency key stands for a batch that is being filled at this moment.
     Unfinished,
-    /// The idempotency key already stands for other cases.
+    /// The idempotency key already stands for other cases or options.
     Conflict,
+    /// There is no room; nothing was stored.
+    Refused(Refusal),
 }
 
 /// What became of an attempt to queue a job.
@@ -100,8 +132,19 @@ pub enum Enqueued {
     Created(Job),
     /// The idempotency key already stands for this job, with the same case.
     Existing(Job),
-    /// The idempotency key already stands for another case.
+    /// The idempotency key already stands for another case, or for other options.
     Conflict,
+    /// There is no room; nothing was stored.
+    Refused(Refusal),
+}
+
+/// A case as it is stored.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StoredCase {
+    /// The case that the body fills; none if the body is the case.
+    pub template: Option<Bytes>,
+    /// JSON text.
+    pub body: Bytes,
 }
 
 /// The right to work on a job, until the lease runs out.

@@ -3,53 +3,110 @@
 //! The jobs of a batch may be claimed while it is being filled. A batch that a dead process left incomplete was never
 //! acknowledged and is removed with its jobs.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
-use sqlx::Row;
+use sqlx::{Row, SqliteConnection};
 use uuid::Uuid;
 
 use crate::jobs::batch::{Batch, Line, LineResult};
+use crate::jobs::created_at;
 use crate::jobs::error::JobsError;
 use crate::jobs::job::State;
 use crate::jobs::store::sqlite::SqliteStore;
 use crate::jobs::store::sqlite::blobs::release_blobs;
 use crate::jobs::store::sqlite::insert::insert_jobs;
+use crate::jobs::store::sqlite::quota::Places;
 use crate::jobs::store::sqlite::rows::{
     job_columns, read_blob_ids, read_count, read_id, read_job, read_state,
 };
-use crate::jobs::store::{Begun, NewBatch, NewJob};
+use crate::jobs::store::{Begun, NewBatch, NewJob, QueueBounds, Refusal};
 
-const INCOMPLETE: &str = "SELECT id FROM batches WHERE complete = 0";
+const CANCEL: &str = "UPDATE jobs SET state = CASE WHEN state = 'queued' THEN 'cancelled' ELSE state END, \
+     ended_at = CASE WHEN state = 'queued' THEN $1 ELSE NULL END, \
+     cancel_requested = 1, version = version + 1 \
+     WHERE id IN (SELECT id FROM jobs WHERE batch_id = $2 AND ended_at IS NULL AND cancel_requested = 0 LIMIT $3) \
+     RETURNING id, state";
 
 impl SqliteStore {
-    /// Begins a batch, or finds the one its idempotency key stands for.
+    /// Reserves places in the queue for a batch that is being staged, at most `most`, beside those that it has; returns how
+    /// many.
     ///
     /// # Errors
     /// The database failed; nothing was stored.
-    pub async fn begin_batch(&self, new: &NewBatch) -> Result<Begun, JobsError> {
+    pub async fn reserve(
+        &self,
+        id: Uuid,
+        tenant: &str,
+        most: u32,
+        bounds: QueueBounds,
+    ) -> Result<Result<u32, Refusal>, JobsError> {
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
-        if let Some((key, digest)) = &new.idempotency {
-            let row = sqlx::query(
-                "SELECT digest, id, complete FROM batch_keys JOIN batches ON batches.id = batch_keys.batch_id \
-                 WHERE of_tenant = $1 AND key = $2",
-            )
-            .bind(&*new.tenant)
-            .bind(key)
+        let mut places = Places::new(&mut transaction, bounds);
+        let places = match places.take(tenant, u64::from(most)).await? {
+            Ok(places) => u32::try_from(places).unwrap_or(most),
+            Err(refusal) => return Ok(Err(refusal)),
+        };
+        sqlx::query(
+            "INSERT INTO batches (id, tenant, created_at, reserved) VALUES ($1, $2, $3, $4) \
+             ON CONFLICT (id) DO UPDATE SET reserved = reserved + $4",
+        )
+        .bind(id.to_string())
+        .bind(tenant)
+        .bind(created_at(id))
+        .bind(places)
+        .execute(&mut *transaction)
+        .await?;
+        transaction.commit().await?;
+        Ok(Ok(places))
+    }
+
+    /// What the idempotency key of a batch stands for, if it was used by another batch. `living` are the batches that are
+    /// being filled; what is left of others is no hindrance.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn batch_by_key(
+        &self,
+        new: &NewBatch,
+        living: &HashSet<Uuid>,
+    ) -> Result<Option<Begun>, JobsError> {
+        let mut connection = self.readers.acquire().await?;
+        by_key(&mut connection, new, living).await
+    }
+
+    /// Begins to fill a batch, or finds the one its idempotency key stands for. Afterwards exactly the places of its jobs
+    /// are reserved.
+    ///
+    /// # Errors
+    /// The database failed; nothing was stored.
+    pub async fn begin_batch(
+        &self,
+        new: &NewBatch,
+        living: &HashSet<Uuid>,
+        bounds: QueueBounds,
+    ) -> Result<Begun, JobsError> {
+        let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
+        if let Some(begun) = by_key(&mut transaction, new, living).await? {
+            return Ok(begun);
+        }
+        let reserved = sqlx::query("SELECT reserved FROM batches WHERE id = $1")
+            .bind(new.id.to_string())
             .fetch_optional(&mut *transaction)
             .await?;
-            if let Some(row) = row {
-                let stored: Vec<u8> = row.try_get("digest")?;
-                return Ok(if stored != digest {
-                    Begun::Conflict
-                } else if row.try_get("complete")? {
-                    Begun::Existing(read_id(&row)?)
-                } else {
-                    Begun::Unfinished
-                });
-            }
+        let reserved = match &reserved {
+            Some(row) => read_count(row, "reserved")?,
+            None => 0,
+        };
+        let lacking = u64::from(new.count).saturating_sub(reserved);
+        let mut places = Places::new(&mut transaction, bounds);
+        match places.take(&new.tenant, lacking).await? {
+            Ok(taken) if taken == lacking => {}
+            Ok(_) => return Ok(Begun::Refused(places.refusal_of(&new.tenant))),
+            Err(refusal) => return Ok(Begun::Refused(refusal)),
         }
         sqlx::query(
-            "INSERT INTO batches (id, tenant, created_at, count, rejected) VALUES ($1, $2, $3, $4, $5)",
+            "INSERT INTO batches (id, tenant, created_at, count, rejected, reserved) VALUES ($1, $2, $3, $4, $5, $4) \
+             ON CONFLICT (id) DO UPDATE SET count = $4, rejected = $5, reserved = $4",
         )
         .bind(new.id.to_string())
         .bind(&*new.tenant)
@@ -58,9 +115,18 @@ impl SqliteStore {
         .bind(new.rejected)
         .execute(&mut *transaction)
         .await?;
+        if let Some(template) = &new.template {
+            sqlx::query("INSERT INTO batch_templates (batch_id, body) VALUES ($1, $2)")
+                .bind(new.id.to_string())
+                .bind(template.as_ref())
+                .execute(&mut *transaction)
+                .await?;
+        }
         if let Some((key, digest)) = &new.idempotency {
+            // A key that is still there belongs to what was left of a batch that failed.
             sqlx::query(
-                "INSERT INTO batch_keys (of_tenant, key, digest, batch_id) VALUES ($1, $2, $3, $4)",
+                "INSERT INTO batch_keys (of_tenant, key, digest, batch_id) VALUES ($1, $2, $3, $4) \
+                 ON CONFLICT (of_tenant, key) DO UPDATE SET digest = $3, batch_id = $4",
             )
             .bind(&*new.tenant)
             .bind(key)
@@ -73,8 +139,8 @@ impl SqliteStore {
         Ok(Begun::Created)
     }
 
-    /// Queues jobs of a batch with their places in it, all or none. Returns those that ended at once with the result of
-    /// their source.
+    /// Queues jobs of a batch with their places in it, all or none, on the places reserved for them. Returns those that
+    /// ended at once with the result of their source.
     ///
     /// # Errors
     /// The database failed; nothing was stored.
@@ -89,6 +155,11 @@ impl SqliteStore {
             .collect();
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         let ended = insert_jobs(&mut transaction, Some(batch), &jobs).await?;
+        sqlx::query("UPDATE batches SET reserved = MAX(reserved - $1, 0) WHERE id = $2")
+            .bind(i64::try_from(jobs.len()).unwrap_or(i64::MAX))
+            .bind(batch.to_string())
+            .execute(&mut *transaction)
+            .await?;
         transaction.commit().await?;
         Ok(ended)
     }
@@ -98,7 +169,7 @@ impl SqliteStore {
     /// # Errors
     /// The database failed.
     pub async fn complete_batch(&self, id: Uuid) -> Result<(), JobsError> {
-        sqlx::query("UPDATE batches SET complete = 1 WHERE id = $1")
+        sqlx::query("UPDATE batches SET complete = 1, reserved = 0 WHERE id = $1")
             .bind(id.to_string())
             .execute(&self.writer)
             .await?;
@@ -106,12 +177,22 @@ impl SqliteStore {
     }
 
     /// Removes at most `limit` jobs of a batch that could not be completed, and the batch after its last job; `true` once
-    /// nothing is left.
+    /// nothing is left. Its reservation and its key go first.
     ///
     /// # Errors
     /// The database failed; nothing changed.
     pub async fn drop_batch(&self, id: Uuid, limit: u32) -> Result<bool, JobsError> {
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
+        for statement in [
+            "UPDATE batches SET reserved = 0 WHERE id = $1 AND complete = 0 AND reserved > 0",
+            "DELETE FROM batch_keys WHERE batch_id = $1 \
+             AND EXISTS (SELECT 1 FROM batches WHERE id = $1 AND complete = 0)",
+        ] {
+            sqlx::query(statement)
+                .bind(id.to_string())
+                .execute(&mut *transaction)
+                .await?;
+        }
         let gone = sqlx::query(
             "DELETE FROM jobs WHERE id IN (SELECT id FROM jobs WHERE batch_id = $1 ORDER BY id LIMIT $2) \
              AND EXISTS (SELECT 1 FROM batches WHERE id = $1 AND complete = 0) RETURNING blob_id",
@@ -137,7 +218,9 @@ impl SqliteStore {
     /// # Errors
     /// The database failed.
     pub async fn incomplete_batches(&self) -> Result<Vec<Uuid>, JobsError> {
-        let rows = sqlx::query(INCOMPLETE).fetch_all(&self.readers).await?;
+        let rows = sqlx::query("SELECT id FROM batches WHERE complete = 0")
+            .fetch_all(&self.readers)
+            .await?;
         rows.iter().map(read_id).collect()
     }
 
@@ -174,22 +257,23 @@ impl SqliteStore {
         }))
     }
 
-    /// Cancels the queued jobs of a batch and asks the workers of the running ones to stop; returns both with their
-    /// states.
+    /// Cancels the queued ones among the next `limit` jobs of a batch that were not cancelled yet, and asks the workers of
+    /// the running ones to stop; returns both with their states.
     ///
     /// # Errors
     /// The database failed; nothing changed.
-    pub async fn cancel_batch(&self, id: Uuid, now: i64) -> Result<Vec<(Uuid, State)>, JobsError> {
-        let rows = sqlx::query(
-            "UPDATE jobs SET state = CASE WHEN state = 'queued' THEN 'cancelled' ELSE state END, \
-             ended_at = CASE WHEN state = 'queued' THEN $1 ELSE NULL END, \
-             cancel_requested = 1, version = version + 1 \
-             WHERE batch_id = $2 AND cancel_requested = 0 AND state IN ('queued', 'running') RETURNING id, state",
-        )
-        .bind(now)
-        .bind(id.to_string())
-        .fetch_all(&self.writer)
-        .await?;
+    pub async fn cancel_batch(
+        &self,
+        id: Uuid,
+        limit: u32,
+        now: i64,
+    ) -> Result<Vec<(Uuid, State)>, JobsError> {
+        let rows = sqlx::query(CANCEL)
+            .bind(now)
+            .bind(id.to_string())
+            .bind(limit)
+            .fetch_all(&self.writer)
+            .await?;
         rows.iter()
             .map(|row| Ok((read_id(row)?, read_state(row)?)))
             .collect()
@@ -263,4 +347,32 @@ impl SqliteStore {
             })
             .collect()
     }
+}
+
+async fn by_key(
+    connection: &mut SqliteConnection,
+    new: &NewBatch,
+    living: &HashSet<Uuid>,
+) -> Result<Option<Begun>, JobsError> {
+    let Some((key, digest)) = &new.idempotency else {
+        return Ok(None);
+    };
+    let row = sqlx::query(
+        "SELECT digest, id, complete FROM batch_keys JOIN batches ON batches.id = batch_keys.batch_id \
+         WHERE of_tenant = $1 AND key = $2",
+    )
+    .bind(&*new.tenant)
+    .bind(key)
+    .fetch_optional(connection)
+    .await?;
+    let Some(row) = row else { return Ok(None) };
+    let stored: Vec<u8> = row.try_get("digest")?;
+    let (id, complete): (_, bool) = (read_id(&row)?, row.try_get("complete")?);
+    Ok(match (stored == digest, complete) {
+        // Nobody fills it any more, and it was never acknowledged.
+        (_, false) if !living.contains(&id) => None,
+        (false, _) => Some(Begun::Conflict),
+        (true, true) => Some(Begun::Existing(id)),
+        (true, false) => Some(Begun::Unfinished),
+    })
 }

@@ -9,8 +9,7 @@ use crate::jobs::job::State;
 use crate::jobs::store::sqlite::SqliteStore;
 use crate::jobs::store::sqlite::rows::{read_count, read_state};
 
-/// Counts by index alone, without touching a row.
-const COUNT: &str = "SELECT state, COUNT(*) AS jobs FROM jobs GROUP BY state";
+const COUNT: &str = "SELECT state, SUM(number) AS jobs FROM job_counts GROUP BY state";
 const RESULT_BYTES: &str = "SELECT COALESCE(SUM(bytes), 0) FROM blobs WHERE key IS NOT NULL";
 
 /// Figures of a job table.
@@ -74,9 +73,9 @@ mod tests {
         let store = SqliteStore::open(&folder.path().join("jobs.db"))
             .await
             .unwrap();
-        for statement in [COUNT, RESULT_BYTES] {
-            let steps = plan(&store, statement).await;
-            assert!(steps[0].contains("COVERING INDEX"), "{steps:?}");
-        }
+        let steps = plan(&store, RESULT_BYTES).await;
+        assert!(steps[0].contains("COVERING INDEX"), "{steps:?}");
+        let steps = plan(&store, COUNT).await;
+        assert_eq!(steps, ["SCAN job_counts"], "a row per state and tenant");
     }
 }

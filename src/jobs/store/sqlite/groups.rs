@@ -5,7 +5,7 @@ use std::sync::PoisonError;
 
 use bytes::Bytes;
 use sqlx::sqlite::SqliteRow;
-use sqlx::{QueryBuilder, Row, Sqlite};
+use sqlx::{AssertSqlSafe, QueryBuilder, Row, Sqlite};
 use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
@@ -14,7 +14,7 @@ use crate::jobs::store::sqlite::SqliteStore;
 use crate::jobs::store::sqlite::blobs::{insert_blobs, release_blobs};
 use crate::jobs::store::sqlite::claims::{EndRow, fence};
 use crate::jobs::store::sqlite::rows::{read_count, read_id, read_reuse_key, read_state};
-use crate::jobs::store::{Claim, Ending};
+use crate::jobs::store::{Claim, Ending, StoredCase};
 
 /// The tenant with queued jobs that comes next in the alphabet.
 pub(super) const NEXT_TENANT: &str =
@@ -51,11 +51,14 @@ impl SqliteStore {
             cost_us: 0,
             workers: 1,
         };
-        Ok(self.claim_group(worker, now, lease_ms, one).await?.pop())
+        Ok(self
+            .claim_group(worker, now, lease_ms, one, &HashSet::new())
+            .await?
+            .pop())
     }
 
     /// Claims the first queued job of the tenant whose turn it is, together with those behind it that are as small, in
-    /// their order: by priority, then by age. A job whose group died comes alone. Tenants take turns, so that a long queue of one holds up no
+    /// their order: by priority, then by age; those of the batches in `skip` are left alone. A job whose group died comes alone. Tenants take turns, so that a long queue of one holds up no
     /// other.
     ///
     /// # Errors
@@ -66,6 +69,7 @@ impl SqliteStore {
         now: i64,
         lease_ms: i64,
         bounds: GroupBounds,
+        skip: &HashSet<Uuid>,
     ) -> Result<Vec<Claim>, JobsError> {
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         let look = bounds.jobs.saturating_mul(bounds.workers.max(1));
@@ -83,7 +87,11 @@ impl SqliteStore {
         let Some(tenant) = tenant else {
             return Ok(Vec::new());
         };
-        let queued = sqlx::query(PEEK)
+        let peek = match skip.is_empty() {
+            true => PEEK.to_owned(),
+            false => PEEK.replace(" ORDER BY", &format!(" AND {} ORDER BY", none_of(skip))),
+        };
+        let queued = sqlx::query(AssertSqlSafe(peek))
             .bind(&tenant)
             .bind(i64::try_from(look).unwrap_or(i64::MAX))
             .bind(now)
@@ -131,24 +139,50 @@ impl SqliteStore {
         self.served.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The cases of jobs, and whether their cancellation was asked for.
+    /// The cases of jobs, and whether their cancellation was asked for. A template is read once, however many rows fill it.
     ///
     /// # Errors
     /// The database failed.
-    pub async fn cases(&self, ids: &[Uuid]) -> Result<HashMap<Uuid, (Bytes, bool)>, JobsError> {
+    pub async fn cases(
+        &self,
+        ids: &[Uuid],
+    ) -> Result<HashMap<Uuid, (StoredCase, bool)>, JobsError> {
         let mut query = QueryBuilder::<Sqlite>::new(
-            "SELECT id, body, cancel_requested FROM cases JOIN jobs ON jobs.id = cases.job_id WHERE job_id IN (",
+            "SELECT id, row, body, batch_id, cancel_requested FROM cases JOIN jobs ON jobs.id = cases.job_id \
+             WHERE job_id IN (",
         );
         push_list(&mut query, ids);
         query.push(")");
         let rows = query.build().fetch_all(&self.readers).await?;
-        rows.iter()
-            .map(|row| {
-                let body: Vec<u8> = row.try_get("body")?;
-                let case = (Bytes::from(body), row.try_get("cancel_requested")?);
-                Ok((read_id(row)?, case))
-            })
-            .collect()
+        let mut templates: HashMap<String, Bytes> = HashMap::new();
+        let mut cases = HashMap::with_capacity(rows.len());
+        for row in &rows {
+            let mut template = None;
+            if row.try_get("row")? {
+                let batch: String = row.try_get("batch_id")?;
+                if !templates.contains_key(&batch) {
+                    templates.insert(batch.clone(), self.template(&batch).await?);
+                }
+                template = templates.get(&batch).cloned();
+            }
+            let body: Vec<u8> = row.try_get("body")?;
+            let case = StoredCase {
+                template,
+                body: body.into(),
+            };
+            cases.insert(read_id(row)?, (case, row.try_get("cancel_requested")?));
+        }
+        Ok(cases)
+    }
+
+    async fn template(&self, batch: &str) -> Result<Bytes, JobsError> {
+        let body: Option<Vec<u8>> =
+            sqlx::query_scalar("SELECT body FROM batch_templates WHERE batch_id = $1")
+                .bind(batch)
+                .fetch_optional(&self.readers)
+                .await?;
+        // It goes with the last job of its batch.
+        body.map(Bytes::from).ok_or(JobsError::Expired)
     }
 
     /// Extends the leases of a group. Returns the jobs still held, with whether their cancellation was asked for.
@@ -301,6 +335,12 @@ fn choose(queued: &[SqliteRow], bounds: GroupBounds) -> Result<Vec<Uuid>, JobsEr
         }
     }
     Ok(ids)
+}
+
+/// Of no batch among these. Ids are hexadecimal digits and dashes and need no escaping.
+fn none_of(batches: &HashSet<Uuid>) -> String {
+    let ids: Vec<_> = batches.iter().map(|id| format!("'{id}'")).collect();
+    format!("(batch_id IS NULL OR batch_id NOT IN ({}))", ids.join(", "))
 }
 
 /// The end of an update of claimed jobs, as long as their leases are held.

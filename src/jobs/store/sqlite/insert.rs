@@ -51,9 +51,10 @@ pub(super) async fn insert_jobs(
             },
         );
         rows.build().execute(&mut *connection).await?;
-        let mut cases = QueryBuilder::<Sqlite>::new("INSERT INTO cases (job_id, body) ");
+        let mut cases = QueryBuilder::<Sqlite>::new("INSERT INTO cases (job_id, row, body) ");
         cases.push_values(some, |mut row, (_, job)| {
             row.push_bind(job.id.to_string())
+                .push_bind(job.row)
                 .push_bind(job.body.as_ref());
         });
         cases.build().execute(&mut *connection).await?;

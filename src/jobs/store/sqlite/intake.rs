@@ -12,9 +12,10 @@ use uuid::Uuid;
 use crate::jobs::error::JobsError;
 use crate::jobs::job::{Job, State};
 use crate::jobs::store::sqlite::insert::insert_jobs;
+use crate::jobs::store::sqlite::quota::{Places, with_living_source};
 use crate::jobs::store::sqlite::rows::{job_columns, read_job};
 use crate::jobs::store::sqlite::{GET, SqliteStore};
-use crate::jobs::store::{Enqueued, NewJob};
+use crate::jobs::store::{Enqueued, NewJob, QueueBounds};
 
 /// Most jobs stored together.
 const TOGETHER: usize = 256;
@@ -30,6 +31,7 @@ pub(super) const BY_KEY: &str = concat!(
 #[derive(Debug)]
 struct Waiting {
     new: NewJob,
+    bounds: QueueBounds,
     reply: oneshot::Sender<Result<Enqueued, JobsError>>,
 }
 
@@ -47,16 +49,17 @@ impl Intake {
 }
 
 impl SqliteStore {
-    /// Queues a job, or finds the one its idempotency key already stands for. Durable once it returns. Whoever stops
+    /// Queues a job if the bounds leave it a place, or finds the one its idempotency key already stands for. Durable once it returns. Whoever stops
     /// waiting for it does not stop it.
     ///
     /// # Errors
     /// The database failed; nothing was stored.
-    pub async fn enqueue(&self, new: &NewJob) -> Result<Enqueued, JobsError> {
+    pub async fn enqueue(&self, new: &NewJob, bounds: QueueBounds) -> Result<Enqueued, JobsError> {
         let gone = || JobsError::Database(sqlx::Error::WorkerCrashed);
         let (reply, answer) = oneshot::channel();
         let waiting = Waiting {
             new: new.clone(),
+            bounds,
             reply,
         };
         self.intake.0.send(waiting).await.map_err(|_| gone())?;
@@ -90,7 +93,10 @@ fn set_aside_repeated_keys(group: &mut Vec<Waiting>) -> Vec<Waiting> {
 
 async fn store_some(writer: &SqlitePool, group: Vec<Waiting>) {
     let jobs: Vec<&NewJob> = group.iter().map(|waiting| &waiting.new).collect();
-    let stored = store_together(writer, &jobs).await;
+    let Some(bounds) = group.first().map(|waiting| waiting.bounds) else {
+        return;
+    };
+    let stored = store_together(writer, &jobs, bounds).await;
     let alone = group.len() == 1;
     match stored {
         Ok(answers) => {
@@ -108,7 +114,7 @@ async fn store_some(writer: &SqlitePool, group: Vec<Waiting>) {
         }
         Err(_) => {
             for waiting in group {
-                let stored = store_together(writer, &[&waiting.new]).await;
+                let stored = store_together(writer, &[&waiting.new], bounds).await;
                 let answer = stored.and_then(|mut answers| answers.pop().ok_or_else(lost));
                 let _ = waiting.reply.send(answer);
             }
@@ -117,7 +123,11 @@ async fn store_some(writer: &SqlitePool, group: Vec<Waiting>) {
 }
 
 /// Stores jobs in one transaction; the answers are in their order. Idempotency keys must differ.
-async fn store_together(writer: &SqlitePool, jobs: &[&NewJob]) -> Result<Vec<Enqueued>, JobsError> {
+async fn store_together(
+    writer: &SqlitePool,
+    jobs: &[&NewJob],
+    bounds: QueueBounds,
+) -> Result<Vec<Enqueued>, JobsError> {
     let mut transaction = writer.begin_with("BEGIN IMMEDIATE").await?;
     let mut known = HashMap::new();
     for job in jobs {
@@ -127,11 +137,19 @@ async fn store_together(writer: &SqlitePool, jobs: &[&NewJob]) -> Result<Vec<Enq
             known.insert(job.id, found);
         }
     }
-    let added: Vec<_> = jobs
+    let mut added: Vec<_> = jobs
         .iter()
         .filter(|job| !known.contains_key(&job.id))
         .map(|job| (None, *job))
         .collect();
+    let ending = with_living_source(&mut transaction, jobs).await?;
+    let mut places = Places::new(&mut transaction, bounds);
+    for (_, job) in added.iter().filter(|(_, job)| !ending.contains(&job.id)) {
+        if let Err(refusal) = places.take(&job.tenant, 1).await? {
+            known.insert(job.id, Enqueued::Refused(refusal));
+        }
+    }
+    added.retain(|(_, job)| !known.contains_key(&job.id));
     let ended = insert_jobs(&mut transaction, None, &added).await?;
     for (_, job) in added {
         if let Some((key, digest)) = &job.idempotency {
@@ -160,6 +178,21 @@ async fn store_together(writer: &SqlitePool, jobs: &[&NewJob]) -> Result<Vec<Enq
 
 fn lost() -> JobsError {
     JobsError::Damaged("a job was stored and not answered".to_owned())
+}
+
+impl SqliteStore {
+    /// Frees an idempotency key, whatever job it stands for.
+    ///
+    /// # Errors
+    /// The database failed; nothing changed.
+    pub async fn forget_key(&self, tenant: &str, key: &str) -> Result<(), JobsError> {
+        sqlx::query("DELETE FROM idempotency_keys WHERE of_tenant = $1 AND key = $2")
+            .bind(tenant)
+            .bind(key)
+            .execute(&self.writer)
+            .await?;
+        Ok(())
+    }
 }
 
 /// What an idempotency key of a tenant stands for, if it was used.

@@ -19,6 +19,7 @@ mod insert;
 pub mod intake;
 pub mod keys;
 pub mod lists;
+mod quota;
 pub mod reuse;
 mod rows;
 mod schema;
@@ -28,7 +29,6 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use bytes::Bytes;
 use sqlx::sqlite::{
     SqliteAutoVacuum, SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions,
     SqliteSynchronous,
@@ -170,35 +170,6 @@ impl SqliteStore {
         intake::by_key(&mut connection, tenant, key, digest).await
     }
 
-    /// Number of queued jobs, counted no further than `at_most`.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub async fn queued(&self, at_most: u64) -> Result<u64, JobsError> {
-        let count: i64 = sqlx::query_scalar(
-            "SELECT COUNT(*) FROM (SELECT 1 FROM jobs WHERE state = 'queued' LIMIT $1) AS waiting",
-        )
-        .bind(i64::try_from(at_most).unwrap_or(i64::MAX))
-        .fetch_one(&self.readers)
-        .await?;
-        Ok(u64::try_from(count).unwrap_or(0))
-    }
-
-    /// Number of queued jobs of a tenant, counted no further than `at_most`.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub async fn queued_of(&self, tenant: &str, at_most: u64) -> Result<u64, JobsError> {
-        let count: i64 = sqlx::query_scalar(
-            "SELECT COUNT(*) FROM (SELECT 1 FROM jobs WHERE state = 'queued' AND tenant = $1 LIMIT $2) AS waiting",
-        )
-        .bind(tenant)
-        .bind(i64::try_from(at_most).unwrap_or(i64::MAX))
-        .fetch_one(&self.readers)
-        .await?;
-        Ok(u64::try_from(count).unwrap_or(0))
-    }
-
     /// Cancels a queued job at once and asks the worker of a running one to stop; an ended job stays as it is.
     /// Returns the job as it then is, `None` if there is none.
     ///
@@ -254,22 +225,6 @@ impl SqliteStore {
             .fetch_optional(&self.readers)
             .await?;
         row.as_ref().map(read_job).transpose()
-    }
-
-    /// The case of a job as submitted, and whether its cancellation was asked for.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub async fn case(&self, id: Uuid) -> Result<Option<(Bytes, bool)>, JobsError> {
-        let row = sqlx::query(
-            "SELECT body, cancel_requested FROM cases JOIN jobs ON jobs.id = cases.job_id WHERE job_id = $1",
-        )
-        .bind(id.to_string())
-        .fetch_optional(&self.readers)
-        .await?;
-        let Some(row) = row else { return Ok(None) };
-        let body: Vec<u8> = row.try_get("body")?;
-        Ok(Some((Bytes::from(body), row.try_get("cancel_requested")?)))
     }
 
     /// The result of a job that lies in the database: its solution and its fields.

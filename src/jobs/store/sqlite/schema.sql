@@ -42,14 +42,37 @@ CREATE INDEX jobs_queued ON jobs (tenant, rank, id) WHERE state = 'queued';
 CREATE INDEX jobs_by_deadline ON jobs (deadline) WHERE deadline IS NOT NULL AND ended_at IS NULL;
 -- Ids within a batch grow with the place in it. The state is there for counting.
 CREATE INDEX jobs_by_batch ON jobs (batch_id, id, state) WHERE batch_id IS NOT NULL;
+-- Those of a batch that can still be cancelled.
+CREATE INDEX jobs_to_cancel ON jobs (batch_id) WHERE ended_at IS NULL AND cancel_requested = 0;
 CREATE INDEX jobs_by_reuse_key ON jobs (reuse_key) WHERE state = 'succeeded';
 -- Who still refers to a blob.
 CREATE INDEX jobs_by_blob ON jobs (blob_id) WHERE blob_id IS NOT NULL;
 
 CREATE TABLE cases (
-    job_id TEXT NOT NULL PRIMARY KEY REFERENCES jobs (id) ON DELETE CASCADE,
-    body   BLOB NOT NULL
+    job_id TEXT    NOT NULL PRIMARY KEY REFERENCES jobs (id) ON DELETE CASCADE,
+    row    INTEGER NOT NULL, -- 1: the body is what the row puts into the template of its batch
+    body   BLOB    NOT NULL
 ) STRICT;
+
+-- How many jobs a tenant has in each state, kept by the database itself in the transaction of every change.
+CREATE TABLE job_counts (
+    state  TEXT    NOT NULL,
+    tenant TEXT    NOT NULL,
+    number INTEGER NOT NULL,
+    PRIMARY KEY (state, tenant)
+) STRICT, WITHOUT ROWID;
+CREATE TRIGGER job_comes AFTER INSERT ON jobs BEGIN
+    INSERT INTO job_counts (state, tenant, number) VALUES (NEW.state, NEW.tenant, 1)
+        ON CONFLICT (state, tenant) DO UPDATE SET number = number + 1;
+END;
+CREATE TRIGGER job_goes AFTER DELETE ON jobs BEGIN
+    UPDATE job_counts SET number = number - 1 WHERE state = OLD.state AND tenant = OLD.tenant;
+END;
+CREATE TRIGGER job_moves AFTER UPDATE OF state ON jobs WHEN OLD.state <> NEW.state BEGIN
+    UPDATE job_counts SET number = number - 1 WHERE state = OLD.state AND tenant = OLD.tenant;
+    INSERT INTO job_counts (state, tenant, number) VALUES (NEW.state, NEW.tenant, 1)
+        ON CONFLICT (state, tenant) DO UPDATE SET number = number + 1;
+END;
 
 CREATE TABLE job_labels (
     of_tenant TEXT NOT NULL,
@@ -80,12 +103,18 @@ CREATE TABLE batches (
     id         TEXT    NOT NULL PRIMARY KEY,
     tenant     TEXT    NOT NULL,
     created_at INTEGER NOT NULL,
-    count      INTEGER NOT NULL,           -- jobs
-    rejected   INTEGER NOT NULL,           -- faulty cases that were left out
-    complete   INTEGER NOT NULL DEFAULT 0  -- 0: still being filled, and not acknowledged
+    count      INTEGER NOT NULL DEFAULT 0, -- jobs
+    rejected   INTEGER NOT NULL DEFAULT 0, -- faulty cases that were left out
+    reserved   INTEGER NOT NULL DEFAULT 0, -- places in the queue that are kept for jobs still to come
+    complete   INTEGER NOT NULL DEFAULT 0  -- 0: still being staged or filled, and not acknowledged
 ) STRICT, WITHOUT ROWID;
+CREATE INDEX batches_incomplete ON batches (tenant, id, reserved) WHERE complete = 0;
 
-CREATE INDEX batches_incomplete ON batches (id) WHERE complete = 0;
+-- The case that the rows of a table fill.
+CREATE TABLE batch_templates (
+    batch_id TEXT NOT NULL PRIMARY KEY REFERENCES batches (id) ON DELETE CASCADE,
+    body     BLOB NOT NULL
+) STRICT;
 
 -- A key lives as long as its batch.
 CREATE TABLE batch_keys (

@@ -1,0 +1,252 @@
+//! Are the bounds of the queue exact, whoever submits how much at the same time, and is nothing kept that was refused?
+
+use railhead::jobs::State;
+use railhead::jobs::staging::StagingBounds;
+use reqwest::{Method, RequestBuilder};
+use serde_json::{Value, json};
+
+use crate::batches::{lines, results, send, small};
+use crate::errors::assert_problem;
+use crate::results::path_of;
+use crate::server::{Server, Setup};
+use crate::support::{case, pause};
+
+/// A service without workers that queues so many jobs.
+async fn bounded(queue_max: u64, tenant_queue_max: u64) -> Server {
+    let mut setup = Setup::new();
+    setup.working = false;
+    setup.options.queue_max = queue_max;
+    setup.options.tenant_queue_max = tenant_queue_max;
+    setup.start().await
+}
+
+fn many(count: usize) -> Vec<Value> {
+    (0..count)
+        .map(|number| small(&number.to_string()))
+        .collect()
+}
+
+async fn queued(server: &Server) -> usize {
+    let mut count = 0;
+    let mut path = "/v1/jobs?state=queued&limit=1000".to_owned();
+    loop {
+        let page = server.get(&path).await.json;
+        count += page["jobs"].as_array().expect("jobs").len();
+        let Some(cursor) = page["next_cursor"].as_str() else {
+            return count;
+        };
+        path = format!("/v1/jobs?state=queued&limit=1000&cursor={cursor}");
+    }
+}
+
+#[tokio::test]
+async fn batches_at_the_same_time_do_not_pass_the_bound_of_the_queue() {
+    // Below and above the size from which places are reserved while a batch arrives.
+    for (queue_max, of_tenant, size, kind, fit) in [
+        (600, 10_000, 500, "queue-full", 1),
+        (10_000, 1_100, 500, "quota-exceeded", 2),
+        (2_500, 10_000, 2_000, "queue-full", 1),
+    ] {
+        let server = bounded(queue_max, of_tenant).await;
+        let body = lines(&many(size));
+        let one = || send(&server, "", "application/x-ndjson", body.clone());
+        let answers = tokio::join!(one(), one(), one(), one(), one(), one());
+        let answers: [_; 6] = answers.into();
+        let accepted = answers.iter().filter(|answer| answer.status == 202).count();
+        for refused in answers.iter().filter(|answer| answer.status != 202) {
+            let status = if kind == "queue-full" { 503 } else { 429 };
+            assert_problem(refused, status, kind, "");
+        }
+        // Reservations of batches that arrive together may keep each other out, but never let too many in.
+        assert!(accepted <= fit, "{accepted} batches of {size}");
+        assert_eq!(queued(&server).await, accepted * size);
+        // Once nobody reserves any more, there is exactly the room that is left.
+        while server.jobs.ready().await.is_err() {
+            pause().await;
+        }
+        for _ in accepted..fit {
+            let retried = until_accepted(&server, &body).await;
+            assert_eq!(retried.status, 202, "{}", retried.text);
+        }
+        let room = queue_max.min(of_tenant) as usize - fit * size;
+        let rest = send(&server, "", "application/x-ndjson", lines(&many(room))).await;
+        assert_eq!(rest.status, 202, "{}", rest.text);
+        let one_more = server.post("/v1/jobs", &small("one more")).await;
+        assert!([429, 503].contains(&one_more.status), "{}", one_more.text);
+    }
+}
+
+async fn until_accepted(server: &Server, body: &str) -> crate::server::Answer {
+    for _ in 0..200 {
+        let answer = send(server, "", "application/x-ndjson", body.to_owned()).await;
+        if answer.status == 202 {
+            return answer;
+        }
+        pause().await;
+    }
+    send(server, "", "application/x-ndjson", body.to_owned()).await
+}
+
+#[tokio::test]
+async fn places_come_back_when_jobs_leave_the_queue() {
+    let server = bounded(3, 3).await;
+    let mut paths = Vec::new();
+    for number in 0..3 {
+        paths.push(server.submit(&small(&number.to_string())).await);
+    }
+    let full = server.post("/v1/jobs", &small("too many")).await;
+    assert_problem(&full, 429, "quota-exceeded", "");
+    server
+        .post(&format!("{}/cancel", paths[0]), &Value::Null)
+        .await;
+    server.submit(&small("fits again")).await;
+    assert_eq!(server.delete(&paths[0]).await.status, 204);
+    let full = server.post("/v1/jobs", &small("too many")).await;
+    assert_problem(&full, 429, "quota-exceeded", "");
+}
+
+#[tokio::test]
+async fn a_batch_that_is_broken_off_gives_its_places_back() {
+    let server = bounded(3_000, 3_000).await;
+    // 2 000 good cases, then an element that is no JSON: the array is refused after places were reserved.
+    let mut body = Value::from(many(2_000)).to_string();
+    body.pop();
+    body.push_str(", nonsense]");
+    let broken = send(&server, "", "application/json", body).await;
+    assert_eq!(broken.status, 400, "{}", broken.text);
+    let accepted = until_accepted(&server, &lines(&many(3_000))).await;
+    assert_eq!(accepted.status, 202, "{}", accepted.text);
+}
+
+#[tokio::test]
+async fn rows_of_a_table_are_kept_without_their_template() {
+    let mut setup = Setup::new();
+    setup.working = false;
+    let data_dir = setup.options.data_dir.clone();
+    let server = setup.start().await;
+    let y: Vec<f64> = (0..1000)
+        .map(|place| f64::from(place - 500) * 0.04)
+        .collect();
+    let gap: Vec<f64> = y.iter().map(|y| y * y / 600.0).collect();
+    let mut template = small("template");
+    template["contact"] =
+        json!({ "type": "gap_profile", "rolling_mm": 460, "y_mm": y, "gap_mm": gap });
+    let accepted = server.post("/v1/jobs", &template).await;
+    assert_eq!(accepted.status, 202, "{}", accepted.text);
+    let path = path_of(&accepted.json);
+    let id = path.rsplit('/').next().expect("an id");
+    let rows: String = (0..400)
+        .map(|row| format!("{},r{row}\n", 50_000 + row))
+        .collect();
+    let table = format!("normal_force_n,name\n{rows}");
+    let batch = send(&server, &format!("?template={id}"), "text/csv", table).await;
+    assert_eq!(batch.status, 202, "{}", batch.text);
+    let lines = results(&server, &batch.json, "").await;
+    let job = format!("/v1/jobs/{}", lines[7]["id"].as_str().expect("an id"));
+    let filled = server.get(&format!("{job}/case")).await.json;
+    assert_eq!(filled["load"]["normal_force_n"], 50_007);
+    assert_eq!(
+        (&filled["name"], &filled["contact"]),
+        (&json!("r7"), &template["contact"])
+    );
+    let expanded = 400 * template.to_string().len() as u64;
+    let files = ["jobs.db", "jobs.db-wal"].map(|name| data_dir.join(name));
+    let stored = files.iter().filter_map(|file| std::fs::metadata(file).ok());
+    let stored: u64 = stored.map(|about| about.len()).sum();
+    assert!(
+        stored < expanded / 3,
+        "{stored} bytes for {expanded} expanded ones"
+    );
+}
+
+#[tokio::test]
+async fn staged_bytes_are_bounded_as_expanded() {
+    let mut setup = Setup::new();
+    setup.working = false;
+    setup.options.staging = StagingBounds {
+        all: 1 << 20,
+        tenant: 100_000,
+    };
+    let server = setup.start().await;
+    let template = small("template");
+    let id = path_of(&server.post("/v1/jobs", &template).await.json);
+    let id = id.rsplit('/').next().expect("an id");
+    let rows = 100_000 / template.to_string().len() + 1;
+    let rows: String = (0..rows).map(|row| format!("{}\n", 50_000 + row)).collect();
+    let table = format!("normal_force_n\n{rows}");
+    assert!(table.len() < 10_000);
+    let refused = send(&server, &format!("?template={id}"), "text/csv", table).await;
+    assert_problem(&refused, 429, "quota-exceeded", "100000 bytes");
+    // What was counted is given back.
+    let half = lines(&many(150));
+    assert!(half.len() > 50_000, "two of these are too many together");
+    for _ in 0..3 {
+        let answer = send(&server, "", "application/x-ndjson", half.clone()).await;
+        assert_eq!(answer.status, 202, "{}", answer.text);
+    }
+}
+
+#[tokio::test]
+async fn a_replay_is_marked_and_options_belong_to_the_key() {
+    let server = Server::idle().await;
+    for (path, body) in [
+        ("/v1/jobs", small("one")),
+        ("/v1/batches", json!([small("one"), small("two")])),
+    ] {
+        let ask = async |query: &str, key: &str| {
+            let shape =
+                |request: RequestBuilder| request.header("idempotency-key", key).json(&body);
+            server
+                .send(Method::POST, &format!("{path}{query}"), shape)
+                .await
+        };
+        let first = ask("?priority=low", "k").await;
+        assert_eq!(
+            (first.status, first.header("idempotency-replayed")),
+            (202, None)
+        );
+        let again = ask("?priority=low", "k").await;
+        assert_eq!(
+            (again.status, again.header("idempotency-replayed")),
+            (202, Some("true"))
+        );
+        assert_eq!(again.json["id"], first.json["id"]);
+        for other in ["", "?priority=high", "?priority=low&deadline_s=60"] {
+            assert_problem(&ask(other, "k").await, 422, "idempotency-conflict", "");
+        }
+    }
+}
+
+#[tokio::test]
+async fn the_key_of_an_expired_job_makes_a_new_one() {
+    let mut setup = Setup::new();
+    setup.options.retention = Some(std::time::Duration::from_secs(30 * 24 * 3600));
+    let ahead = std::sync::Arc::new(std::sync::atomic::AtomicI64::new(0));
+    let system = railhead::jobs::clock::Clock::system();
+    setup.options.clock = railhead::jobs::clock::Clock::new({
+        let ahead = ahead.clone();
+        move || system.now_ms() + ahead.load(std::sync::atomic::Ordering::SeqCst)
+    });
+    setup.options.cache = false;
+    let server = setup.start().await;
+    let shape = |request: RequestBuilder| {
+        let request = request.header("idempotency-key", "k");
+        request
+            .header("prefer", "wait=60")
+            .json(&case("kept for a while"))
+    };
+    let first = server.send(Method::POST, "/v1/jobs", shape).await;
+    assert_eq!(
+        first.json["state"],
+        State::Succeeded.name(),
+        "{}",
+        first.text
+    );
+    ahead.store(31 * 24 * 3600 * 1000, std::sync::atomic::Ordering::SeqCst);
+    let second = server.send(Method::POST, "/v1/jobs", shape).await;
+    assert_eq!(
+        (second.status, second.header("idempotency-replayed")),
+        (200, None)
+    );
+    assert_ne!(second.json["id"], first.json["id"]);
+}
