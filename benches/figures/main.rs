@@ -11,7 +11,7 @@ use railhead::contact::case::Motion;
 use railhead::contact::monitor::Unwatched;
 use railhead::contact::outputs::outline::{outlines, patch_outline};
 use railhead::contact::problem::Limits;
-use railhead::contact::solution::{Fields, Solution};
+use railhead::contact::solution::{Fields, PatchFields, Solution};
 use railhead::contact::zones::Zone;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
@@ -94,14 +94,17 @@ impl Figure {
     }
 
     fn patch(&self) -> Vec<Vec<[f64; 2]>> {
-        self.fields.patches.iter().flat_map(patch_outline).collect()
+        let patches = self.fields.patches.iter();
+        let outline = |patch: &PatchFields| patch_outline(patch.cells(0));
+        patches.flat_map(outline).collect()
     }
 
     /// Where it sticks; the steps of the cells are cut at the middle of their edges.
     fn stick(&self, point: usize) -> Vec<Vec<[f64; 2]>> {
         let of_patch = |patch: usize| -> Vec<Vec<[f64; 2]>> {
-            let zones = self.fields.patches[patch].points[point].zone.as_deref();
-            outlines(&self.fields.patches[patch], zones, Some(Zone::Stick))
+            let patch = &self.fields.patches[patch];
+            let zones = patch.points[point].zone.as_deref();
+            outlines(patch.cells(point), zones, Some(Zone::Stick))
         };
         let patches = 0..self.fields.patches.len();
         patches.flat_map(of_patch).map(|l| smoothed(&l)).collect()

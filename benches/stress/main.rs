@@ -150,7 +150,7 @@ fn report(count: usize, seed: u64, rows: &BTreeMap<&str, Row>, troubles: &Troubl
          and roughness, pressures with holes, zeros and denormal numbers, patches that nearly touch.\n\n\
          - crashed or hung: {}\n- answers that break a law: {}\n- without convergence: {}\n\n\
          *Laws*: finite numbers; patches and cells carry the load; tractions within μp, slip along them, none where a cell sticks; forces\n\
-         within μN and equal to the sums of the tractions; friction takes power (from nine cells on, within the estimated error); the same forces in other units and, reversed, for the\n\
+         within μN and equal to the sums of the tractions (with a target, within the estimated error); friction takes power (from nine cells on, within the estimated error); the same forces in other units and, reversed, for the\n\
          reversed motion (within 2e-5 on one mesh, 3e-3 where region and pressure are found from a gap).\n\n\
          | cases | number | solved | refused | not converged | iterations: median | 95 % | most | largest residual | energy: median | 95 % | from liu_hsu: median | largest |\n\
          |---|---|---|---|---|---|---|---|---|---|---|---|---|\n",

@@ -13,7 +13,7 @@ use serde_json::{Map, Value, json};
 
 use crate::cli::{SolveArgs, complain, print};
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::solution::{Fields, PatchFields, PointFields, Solution};
+use crate::contact::solution::{Fields, PatchCells, PatchFields, PointFields, Solution};
 use crate::contact::{check, solve_with};
 
 /// Exit code for a case that is faulty.
@@ -84,12 +84,19 @@ fn read(file: &Path) -> std::io::Result<Vec<u8>> {
     std::fs::read(file)
 }
 
-/// One entry per patch, with the names the API uses; what was not computed is absent.
+/// One entry per patch, with the names the API uses: the meshes, and for every motion its mesh and values; what was not computed is
+/// absent.
 fn fields_json(fields: &Fields) -> Value {
     fields.patches.iter().map(patch_json).collect()
 }
 
-fn patch_json(cells: &PatchFields) -> Value {
+fn patch_json(fields: &PatchFields) -> Value {
+    let meshes: Value = fields.meshes.iter().map(cells_json).collect();
+    let points: Value = fields.points.iter().map(point_json).collect();
+    json!({ "meshes": meshes, "points": points })
+}
+
+fn cells_json(cells: &PatchCells) -> Value {
     let mut members = Map::new();
     members.insert("x_mm".to_owned(), json!(cells.x_mm));
     members.insert("y_mm".to_owned(), json!(cells.y_mm));
@@ -99,15 +106,12 @@ fn patch_json(cells: &PatchFields) -> Value {
     if let Some(pressure) = &cells.pressure_mpa {
         members.insert("pressure_mpa".to_owned(), json!(pressure));
     }
-    members.insert(
-        "points".to_owned(),
-        cells.points.iter().map(point_json).collect(),
-    );
     Value::Object(members)
 }
 
 fn point_json(values: &PointFields) -> Value {
     let mut members = Map::new();
+    members.insert("mesh".to_owned(), json!(values.mesh));
     if let Some(zone) = &values.zone {
         members.insert("zone".to_owned(), json!(zone));
     }

@@ -14,6 +14,7 @@ pub mod problem;
 mod profiles;
 mod read;
 pub mod remark;
+pub mod slices;
 pub mod solution;
 pub mod tangential;
 pub mod zones;
@@ -25,11 +26,12 @@ use serde_json::Value;
 use crate::contact::error::{CaseError, SolveError};
 use crate::contact::monitor::{Monitor, Watch};
 use crate::contact::normal::Region;
-use crate::contact::outputs::assemble::{Assembly, wants_fields};
+use crate::contact::outputs::assemble::Assembly;
 use crate::contact::problem::{Limits, Problem};
+use crate::contact::slices::{slices, solve_slice};
 use crate::contact::solution::{Fields, Solution};
 use crate::contact::tangential::forces;
-use crate::contact::tangential::ladder::{Ladder, Plan, Regime};
+use crate::contact::tangential::ladder::Ladder;
 use crate::contact::tangential::operator_store::OperatorStore;
 use crate::contact::tangential::point::Point;
 
@@ -64,6 +66,29 @@ pub fn solve_with(
     problem: &Problem,
     monitor: &dyn Monitor,
 ) -> Result<(Solution, Fields), SolveError> {
+    let mut answer: Option<(Solution, Fields)> = None;
+    for range in slices(problem) {
+        let (more, more_fields) = solve_slice(operators, problem, range, monitor)?;
+        match &mut answer {
+            None => answer = Some((more, more_fields)),
+            Some((solution, fields)) => {
+                solution.append(more);
+                fields.append(more_fields);
+            }
+        }
+    }
+    let Some(answer) = answer else {
+        unreachable!("a case has at least one slice")
+    };
+    Ok(answer)
+}
+
+/// Solves all motions of a problem one after the other, as long as one slice.
+fn solve_whole(
+    operators: &Arc<OperatorStore>,
+    problem: &Problem,
+    monitor: &dyn Monitor,
+) -> Result<(Solution, Fields), SolveError> {
     if let Region::Profiles(contact) = &problem.region {
         return profiles::solve(operators, problem, contact, monitor);
     }
@@ -79,56 +104,17 @@ fn answer(
 ) -> Result<(Solution, Fields), SolveError> {
     let mut ladder = Ladder::new(problem, operators);
     let mut assembly = Assembly::new(problem);
-    let mut points: Vec<Point> = Vec::new();
-    let fields = wants_fields(problem);
+    let mut before: Option<Point> = None;
     for index in 0..problem.motions.len() {
-        let mut point = forces::solve(problem, &mut ladder, index, points.last(), watch)?;
+        let mut point = forces::solve(problem, &mut ladder, index, before.as_ref(), watch)?;
         if index == 0 {
             // What all motions share is charged to the first.
             point.seconds += problem.normal.map_or(0.0, |normal| normal.seconds);
         }
-        if !fields {
-            // Of this motion only its small numbers are needed from here on.
-            assembly.add(&ladder, &point);
-            points.clear();
-            ladder.trim();
-        }
-        points.push(point);
+        assembly.add(&ladder, &point);
+        ladder.trim();
+        before = Some(point);
         watch.advance();
     }
-    if fields {
-        for point in on_one_level(problem, &mut ladder, points, watch)? {
-            assembly.add(&ladder, &point);
-        }
-    }
     Ok(assembly.finish())
-}
-
-/// Brings every point to one level as fine as the finest that any of them needed, gathered about none of their poles: the
-/// fields of a patch share their cells.
-fn on_one_level(
-    problem: &Problem,
-    ladder: &mut Ladder,
-    points: Vec<Point>,
-    monitor: &dyn Monitor,
-) -> Result<Vec<Point>, SolveError> {
-    let cells = |point: &Point| ladder.get(point.level).mesh.cells();
-    let Some(finest) = points.iter().max_by_key(|p| cells(p)).map(|p| p.level) else {
-        return Ok(points);
-    };
-    let size = ladder.get(finest).plan.size;
-    let plan = Plan {
-        size,
-        regime: Regime::Sticking,
-    };
-    if points.iter().all(|point| point.level == finest) {
-        return Ok(points);
-    }
-    let lift = |(index, point): (usize, Point)| {
-        if ladder.get(point.level).plan == plan {
-            return Ok(point);
-        }
-        forces::lift(problem, ladder, index, plan, point, monitor)
-    };
-    points.into_iter().enumerate().map(lift).collect()
 }

@@ -57,7 +57,7 @@ pub(super) fn solve(
         tolerance: 0.0,
     };
     let vertical = matches!(contact.loading, Loading::Vertical(_)) && problem.friction > 0.0;
-    if !vertical || problem.motions.len() > 1 {
+    if !vertical || problem.part.all > 1 {
         let mut at_rest = rest(exactly(0.0), None)?;
         let answers = at_rest.answers(operators, problem, contact, monitor)?;
         if vertical {

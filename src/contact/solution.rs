@@ -236,10 +236,27 @@ pub struct Fields {
     pub patches: Vec<PatchFields>,
 }
 
+/// The values per cell of one patch, motion by motion, each on the mesh that served it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PatchFields {
+    /// The meshes that the motions were solved on; several motions may share one.
+    pub meshes: Vec<PatchCells>,
+    /// One entry per motion.
+    pub points: Vec<PointFields>,
+}
+
+impl PatchFields {
+    /// The cells that the values of a motion belong to.
+    #[must_use]
+    pub fn cells(&self, point: usize) -> &PatchCells {
+        &self.meshes[self.points[point].mesh]
+    }
+}
+
 /// Cells of one patch, strip by strip from smaller to larger y, in each strip from smaller to larger x.
 /// All vectors have one value per cell.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct PatchFields {
+pub struct PatchCells {
     /// Centre of the cell along x in mm.
     pub x_mm: Vec<f64>,
     /// Centre of the cell across in mm.
@@ -252,13 +269,13 @@ pub struct PatchFields {
     pub strip: Vec<u32>,
     /// Pressure in MPa, if asked for.
     pub pressure_mpa: Option<Vec<f64>>,
-    /// One entry per motion.
-    pub points: Vec<PointFields>,
 }
 
 /// Values per cell for one motion; absent where not asked for.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PointFields {
+    /// Which of the patch's meshes they belong to.
+    pub mesh: usize,
     /// Stick or slip.
     pub zone: Option<Vec<Zone>>,
     /// Traction on the lower body along x in MPa.

@@ -5,7 +5,7 @@ use utoipa::ToSchema;
 
 use crate::contact::case::Output;
 use crate::contact::outputs::resample::{resample, resample_zone};
-use crate::contact::solution::{PatchFields, PointFields};
+use crate::contact::solution::{PatchCells, PointFields};
 use crate::contact::zones::Zone;
 
 /// Values per cell, strip by strip from smaller to larger y, in each strip from smaller to larger x. All arrays have
@@ -75,7 +75,7 @@ pub struct GriddedField {
 }
 
 /// The cells with the values of one output.
-pub fn per_cell(fields: PatchFields, point: PointFields, output: Output) -> Cells {
+pub fn per_cell(fields: PatchCells, point: PointFields, output: Output) -> Cells {
     let mut cells = Cells {
         x_mm: fields.x_mm,
         y_mm: fields.y_mm,
@@ -99,7 +99,7 @@ pub fn per_cell(fields: PatchFields, point: PointFields, output: Output) -> Cell
 
 /// The values of one output on a grid of `nx × ny` samples; neither patch nor point are filled in.
 pub fn gridded(
-    fields: &PatchFields,
+    fields: &PatchCells,
     point: &PointFields,
     output: Output,
     nx: usize,

@@ -7,7 +7,7 @@ use utoipa::{IntoParams, ToSchema};
 use uuid::Uuid;
 
 use crate::contact::case::Output;
-use crate::contact::solution::{PatchFields, PointFields};
+use crate::contact::solution::{PatchCells, PointFields};
 use crate::http::accept::{Format, choose, named_format};
 use crate::http::access::Caller;
 use crate::http::cells::{Cells, GriddedField, gridded, per_cell};
@@ -279,17 +279,18 @@ pub async fn stored(
     patch: usize,
     point: usize,
     output: Output,
-) -> Result<(PatchFields, PointFields), ApiError> {
+) -> Result<(PatchCells, PointFields), ApiError> {
     let mut fields = match jobs.point_fields(id, patch, point).await {
         // Nothing is stored per cell when the case asked for no field at all.
         Err(JobsError::NoSuchPatch { patches: 0 }) => return not_asked(jobs, id, output).await,
         fields => fields?,
     };
-    // One motion was asked for, so there is one entry.
+    // One motion was asked for, so there is one entry, and one mesh.
     let values = fields.points.pop().unwrap_or_default();
+    let cells = fields.meshes.pop().unwrap_or_default();
     let has = match output {
         Output::Tractions => values.traction_x_mpa.is_some() && values.traction_y_mpa.is_some(),
-        Output::Pressure => fields.pressure_mpa.is_some(),
+        Output::Pressure => cells.pressure_mpa.is_some(),
         Output::Slip => values.slip_x.is_some() && values.slip_y.is_some(),
         Output::Zones => values.zone.is_some(),
         Output::Resultants => true,
@@ -297,7 +298,7 @@ pub async fn stored(
     if !has {
         return not_asked(jobs, id, output).await;
     }
-    Ok((fields, values))
+    Ok((cells, values))
 }
 
 /// Builds a large answer and writes it in the form that was asked for, off the async threads.

@@ -12,9 +12,10 @@ const STRIPS: u32 = 31;
 /// Σ T_x dx / (μ Σ p dx) of one strip.
 fn strip_force(patch: &PatchFields, strip: u32, friction: f64) -> f64 {
     let traction = patch.points[0].traction_x_mpa.as_ref().unwrap();
-    let pressure = patch.pressure_mpa.as_ref().unwrap();
-    let cells = || (0..patch.strip.len()).filter(|&i| patch.strip[i] == strip);
-    let sum = |values: &[f64]| cells().map(|i| values[i] * patch.dx_mm[i]).sum::<f64>();
+    let mesh = patch.cells(0);
+    let pressure = mesh.pressure_mpa.as_ref().unwrap();
+    let cells = || (0..mesh.strip.len()).filter(|&i| mesh.strip[i] == strip);
+    let sum = |values: &[f64]| cells().map(|i| values[i] * mesh.dx_mm[i]).sum::<f64>();
     sum(traction) / (friction * sum(pressure))
 }
 

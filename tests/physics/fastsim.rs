@@ -160,7 +160,7 @@ fn tractions_obey_their_bound_and_zones_cover_the_patch() {
     for (bound, highest) in BOUNDS.iter().zip([1.0, 4.0 / 3.0]) {
         let (solution, fields) = solve(&question(&contact, bound));
         let (point, patch) = (&solution.patches[0].points[0], &fields.patches[0]);
-        let pressure = patch.pressure_mpa.as_ref().expect("pressure");
+        let pressure = patch.cells(0).pressure_mpa.as_ref().expect("pressure");
         let peak = pressure.iter().copied().fold(0.0, f64::max);
         let values = &patch.points[0];
         let (tx, ty) = (

@@ -299,7 +299,7 @@ fn a_sweep_of_forces_gives_a_creep_curve() {
 }
 
 #[test]
-fn forces_are_kept_where_all_motions_share_one_mesh() {
+fn forces_are_kept_where_fields_are_asked_for() {
     let mut case = Ellipse::steel(2.0, 0.28).case(1, 1);
     case["motion"] = json!([
         { "force_x_n": 0.5 * LIMIT }, { "force_y_n": 0.5 * LIMIT, "spin_per_mm": 0.004 }, { "creepage_x": 0.001, "spin_per_mm": 0.002 }

@@ -100,7 +100,7 @@ fn answered(contact: &Ellipse, n: u32) -> Cells {
     Cells {
         traction: [take(&point.traction_x_mpa), take(&point.traction_y_mpa)],
         slip: [take(&point.slip_x), take(&point.slip_y)],
-        bound: take(&patch.pressure_mpa)
+        bound: take(&patch.cells(0).pressure_mpa)
             .iter()
             .map(|p| contact.friction * p)
             .collect(),

@@ -147,7 +147,7 @@ fn a_symmetric_gap_keeps_its_symmetry_to_the_last_digit() {
         });
         let count = solution.patches.len();
         assert_eq!(count, if half == 0.0 { 1 } else { 2 });
-        let (first, last) = (&fields.patches[0], &fields.patches[count - 1]);
+        let [first, last] = [0, count - 1].map(|patch| fields.patches[patch].cells(0));
         let [low, high] = [&solution.patches[0], &solution.patches[count - 1]].map(|p| p.extent_mm);
         assert_eq!([low[2], low[3]], [-high[3], -high[2]]);
         let cells = first.x_mm.len();

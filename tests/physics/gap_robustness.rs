@@ -130,6 +130,7 @@ fn surface(contact: &Value) -> Gap {
 fn distance_inside(sample: &Sample, solution: &Solution, fields: &Fields) -> f64 {
     let mut cells = Vec::new();
     for (solution, fields) in solution.patches.iter().zip(&fields.patches) {
+        let fields = fields.cells(0);
         let pressure = fields.pressure_mpa.as_ref().expect("pressures");
         for (k, pressure) in pressure.iter().enumerate() {
             let [x, y] = [fields.x_mm[k], fields.y_mm[k]];

@@ -1,7 +1,7 @@
 //! What holds exactly in theory and on every symmetric mesh: symmetry, scaling, friction, power.
 
 use railhead::contact::outputs::outline::outlines;
-use railhead::contact::solution::{Fields, PatchFields};
+use railhead::contact::solution::{Fields, PatchCells};
 use railhead::contact::zones::Zone;
 
 use crate::reference::{Ellipse, assert_none, solve};
@@ -39,11 +39,11 @@ fn close(name: &str, left: [f64; 3], right: [f64; 3], tolerance: f64) {
     }
 }
 
-fn tractions(fields: &Fields) -> (&PatchFields, &[f64], &[f64]) {
+fn tractions(fields: &Fields) -> (&PatchCells, &[f64], &[f64]) {
     let patch = &fields.patches[0];
     let point = &patch.points[0];
     (
-        patch,
+        patch.cells(0),
         point.traction_x_mpa.as_ref().unwrap(),
         point.traction_y_mpa.as_ref().unwrap(),
     )
@@ -212,8 +212,8 @@ fn zones_fill_the_patch_and_stick_touches_the_leading_edge() {
         );
         // The outlines enclose the cells, whose area differs from the patch's by one factor for both zones.
         let zones = patch.points[0].zone.as_deref();
-        let [outlined_stick, outlined_slip] =
-            [Zone::Stick, Zone::Slip].map(|zone| signed_area(&outlines(patch, zones, Some(zone))));
+        let [outlined_stick, outlined_slip] = [Zone::Stick, Zone::Slip]
+            .map(|zone| signed_area(&outlines(patch.cells(0), zones, Some(zone))));
         assert!((outlined_stick / outlined_slip - stick / slip).abs() < 1e-9 * stick / slip);
         let zone = patch.points[0].zone.as_ref().unwrap();
         // In the two middle strips: slip at the trailing end, stick at the leading end.

@@ -14,6 +14,7 @@ mod gap_hertz;
 mod gap_reference;
 mod gap_robustness;
 mod gap_samples;
+mod golden;
 mod hertz;
 mod kalker;
 mod kalker_table;

@@ -33,11 +33,12 @@ fn stick_area(solution: &Solution, point: usize) -> f64 {
 fn stick_centre(fields: &Fields, point: usize) -> [f64; 2] {
     let patch = &fields.patches[0];
     let zones = patch.points[point].zone.as_ref().expect("zones");
+    let cells = patch.cells(point);
     let (mut area, mut sum) = (0.0, [0.0; 2]);
     for k in (0..zones.len()).filter(|k| zones[*k] == Zone::Stick) {
-        let own = patch.dx_mm[k] * patch.dy_mm[k];
+        let own = cells.dx_mm[k] * cells.dy_mm[k];
         area += own;
-        sum = [sum[0] + own * patch.x_mm[k], sum[1] + own * patch.y_mm[k]];
+        sum = [sum[0] + own * cells.x_mm[k], sum[1] + own * cells.y_mm[k]];
     }
     sum.map(|sum| sum / area)
 }
@@ -82,7 +83,7 @@ fn pure_spin_leaves_separate_poles_and_then_one() {
     let [_, leading, ..] = solution.patches[0].extent_mm;
     let poles = |point: usize| -> Vec<f64> {
         let zones = fields.patches[0].points[point].zone.as_deref();
-        let loops = outlines(&fields.patches[0], zones, Some(Zone::Stick));
+        let loops = outlines(fields.patches[0].cells(point), zones, Some(Zone::Stick));
         loops
             .iter()
             .map(|l| l.iter().map(|at| at[0]).sum::<f64>() / l.len() as f64 / leading)

@@ -1,5 +1,13 @@
 //! Do the motions of a sweep help each other, and give what each gives alone?
 
+use std::sync::Arc;
+
+use railhead::contact::monitor::Unwatched;
+use railhead::contact::problem::Limits;
+use railhead::contact::slices::{slices, solve_slice};
+use railhead::contact::solution::{Fields, Solution};
+use railhead::contact::tangential::operator_store::OperatorStore;
+use railhead::contact::{self, check};
 use serde_json::{Value, json};
 
 use crate::reference::solve;
@@ -83,4 +91,147 @@ fn the_order_of_motions_does_not_change_their_answers_beyond_the_estimate() {
         assert!((there.force_x_n - back.force_x_n).abs() <= allowed);
         assert!((there.force_y_n - back.force_y_n).abs() <= allowed);
     }
+}
+
+/// Forces, moments, estimates and verdicts of an answer, to the last bit.
+fn verdicts(question: &Value, outputs: &Value) -> Vec<String> {
+    let mut question = question.clone();
+    question["outputs"] = outputs.clone();
+    let (solution, fields) = solve(&question);
+    let only_resultants = *outputs == json!(["resultants"]);
+    assert_eq!(fields.patches.is_empty(), only_resultants);
+    let totals = solution.total.iter().map(|total| format!("{total:?}"));
+    let points = solution.patches.iter().flat_map(|patch| &patch.points);
+    let points = points.map(|point| {
+        let forces = [point.force_x_n, point.force_y_n, point.moment_z_n_mm];
+        let solver = &point.solver;
+        format!(
+            "{forces:?} {:?} {:?} {:?} {:?} {}",
+            point.error_estimate, point.target_met, point.motion, solver.mesh, solver.products
+        )
+    });
+    totals.chain(points).collect()
+}
+
+#[test]
+fn forces_never_depend_on_outputs() {
+    let spin: Vec<Value> = (0..7)
+        .map(|k| json!({ "creepage_x": 0.001 * f64::from(k), "spin_per_mm": 0.003 }))
+        .collect();
+    let spinning = case(&json!(spin), 0.005);
+    let mut ellipse = case(
+        &json!([{ "creepage_x": 0.001 }, { "creepage_y": 0.002, "spin_per_mm": 0.001 }]),
+        0.01,
+    );
+    ellipse["contact"] = json!({ "type": "ellipse", "a_mm": 6, "b_mm": 3 });
+    let mut force = ellipse.clone();
+    force["motion"] = json!([{ "force_x_n": 9000 }, { "force_y_n": 9000, "spin_per_mm": 0.001 }]);
+    let mut gap = ellipse.clone();
+    let y: Vec<f64> = (-24..=24).map(|k| 0.5 * f64::from(k)).collect();
+    let heights: Vec<f64> = y.iter().map(|y| y * y / 600.0 + 0.001 * y.abs()).collect();
+    gap["contact"] =
+        json!({ "type": "gap_profile", "rolling_mm": 460, "y_mm": y, "gap_mm": heights });
+    let mut paper = ellipse.clone();
+    paper["solver"]["method"] = json!("liu_hsu");
+    let mut simplified = ellipse.clone();
+    simplified["solver"] = json!({ "method": "fastsim" });
+    let mut meshed = ellipse.clone();
+    meshed["solver"] = json!({ "mesh": { "strips": 10, "cells": 14 } });
+    for question in [spinning, ellipse, force, gap, paper, simplified, meshed] {
+        let resultants = verdicts(&question, &json!(["resultants"]));
+        for outputs in [
+            json!(["resultants", "zones"]),
+            json!(["resultants", "tractions"]),
+            json!(["pressure", "slip"]),
+            json!(["resultants", "zones", "tractions", "pressure", "slip"]),
+        ] {
+            assert_eq!(
+                verdicts(&question, &outputs),
+                resultants,
+                "{outputs} of {question}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_default_outputs_of_a_sweep_with_spin_meet_their_target() {
+    let motions: Vec<Value> = (0..7)
+        .map(|k| json!({ "creepage_x": 0.001 * f64::from(k), "spin_per_mm": 0.003 }))
+        .collect();
+    let mut question = case(&json!(motions), 0.005);
+    question["outputs"] = json!(["resultants", "zones", "tractions"]);
+    let (solution, fields) = solve(&question);
+    let patch = &fields.patches[0];
+    assert!(patch.meshes.len() > 1, "motions have meshes of their own");
+    for (k, point) in solution.patches[0].points.iter().enumerate() {
+        assert_eq!(point.target_met, Some(true), "motion {k}");
+        let (cells, values) = (patch.cells(k), &patch.points[k]);
+        let traction = values.traction_x_mpa.as_ref().expect("tractions");
+        let areas = cells.dx_mm.iter().zip(&cells.dy_mm);
+        let sum: f64 = traction
+            .iter()
+            .zip(areas)
+            .map(|(t, (dx, dy))| t * dx * dy)
+            .sum();
+        let estimate = point.error_estimate.expect("an estimate").force_x_n;
+        assert!(
+            (sum - point.force_x_n).abs() <= estimate,
+            "motion {k}: the cells carry {sum}, the force is {}, estimate {estimate}",
+            point.force_x_n
+        );
+    }
+}
+
+/// The answer without its times.
+fn timeless((mut solution, fields): (Solution, Fields)) -> (Solution, Fields) {
+    for point in solution.patches.iter_mut().flat_map(|p| &mut p.points) {
+        point.solver.seconds = 0.0;
+    }
+    if let Some(normal) = &mut solution.normal {
+        normal.seconds = 0.0;
+    }
+    (solution, fields)
+}
+
+#[test]
+fn a_sweep_solved_by_slices_in_any_order_is_the_sweep_solved_at_once() {
+    // Slow by its estimate, fast in truth: most of it slips.
+    let mut question = case(
+        &json!({ "sweep": { "creepage_x": { "from": 0.01, "to": 0.3, "points": 2000 } } }),
+        0.0005,
+    );
+    question["outputs"] = json!(["resultants", "zones"]);
+    question["friction"]["coefficient"] = json!(1.2);
+    let problem = check(&question, &Limits::default()).expect("a valid case");
+    let ranges = slices(&problem);
+    assert!(ranges.len() > 2, "{ranges:?}");
+    assert_eq!((ranges[0].start, ranges[ranges.len() - 1].end), (0, 2000));
+    assert!(ranges.windows(2).all(|pair| pair[0].end == pair[1].start));
+    assert_eq!(ranges, slices(&problem));
+    let mut parts: Vec<(Solution, Fields)> = ranges
+        .iter()
+        .rev()
+        .map(|range| {
+            // Each in a process of its own, so to speak.
+            let store = Arc::new(OperatorStore::new(0));
+            solve_slice(&store, &problem, range.clone(), &Unwatched).expect("an answer")
+        })
+        .collect();
+    let (mut solution, mut fields) = parts.pop().expect("a slice");
+    while let Some((more, more_fields)) = parts.pop() {
+        solution.append(more);
+        fields.append(more_fields);
+    }
+    let whole = timeless(contact::solve(&problem, &Unwatched).expect("an answer"));
+    let joined = timeless((solution, fields));
+    assert_eq!(joined.0, whole.0);
+    assert!(joined.1 == whole.1, "fields differ");
+    assert_eq!(whole.0.remarks.len(), 1, "{:?}", whole.0.remarks);
+}
+
+#[test]
+fn a_short_sweep_is_one_slice() {
+    let problem = check(&case(&json!(lines()[2]), 0.005), &Limits::default()).expect("a case");
+    assert_eq!(slices(&problem), vec![0..25]);
 }

@@ -61,10 +61,13 @@ fn values_per_cell_come_along_only_if_asked_for() {
     let mut asked = case("with fields");
     asked["outputs"] = json!(["zones", "tractions", "slip", "pressure"]);
     let answer: Value = serde_json::from_slice(&solve(&asked.to_string()).stdout).unwrap();
-    let cells = answer["fields"][0]["x_mm"].as_array().unwrap().len();
+    let cells = answer["fields"][0]["meshes"][0]["x_mm"]
+        .as_array()
+        .unwrap()
+        .len();
     assert!(cells > 0);
     assert_eq!(
-        answer["fields"][0]["pressure_mpa"]
+        answer["fields"][0]["meshes"][0]["pressure_mpa"]
             .as_array()
             .unwrap()
             .len(),

@@ -6,8 +6,8 @@ use crate::contact::outputs::resultants::Resultants;
 use crate::contact::problem::{Problem, Resolution};
 use crate::contact::remark::{Remark, RemarkEntry, merged};
 use crate::contact::solution::{
-    CombinedMaterial, ErrorEstimate, Fields, MeshReport, NormalisedMotion, Origin, PatchFields,
-    PatchSolution, PointFields, PointSolution, Solution, SolverReport, Total,
+    CombinedMaterial, ErrorEstimate, Fields, MeshReport, NormalisedMotion, Origin, PatchCells,
+    PatchFields, PatchSolution, PointFields, PointSolution, Solution, SolverReport, Total,
 };
 use crate::contact::tangential::ladder::Ladder;
 use crate::contact::tangential::level::Level;
@@ -30,6 +30,8 @@ pub struct Assembly<'a> {
     total: Vec<Total>,
     remarks: Vec<RemarkEntry>,
     fields: Fields,
+    /// Numbers of the levels whose cells are in the fields.
+    levels: Vec<usize>,
 }
 
 impl<'a> Assembly<'a> {
@@ -44,10 +46,11 @@ impl<'a> Assembly<'a> {
             total: Vec::new(),
             remarks: problem.remarks.clone(),
             fields: Fields::default(),
+            levels: Vec::new(),
         }
     }
 
-    /// Adds the next motion; all are of one level if fields are wanted.
+    /// Adds the next motion.
     pub fn add(&mut self, ladder: &Ladder, point: &Point) {
         let (problem, level) = (self.problem, ladder.get(point.level));
         self.remarks
@@ -59,18 +62,29 @@ impl<'a> Assembly<'a> {
             self.points[index].push(point_solution(problem, level, patch, index, point));
         }
         self.total.push(total(problem, &self.patches, point));
-        if !wants_fields(problem) {
-            return;
+        if wants_fields(problem) {
+            self.add_fields(level, point);
         }
-        if self.fields.patches.is_empty() {
-            let cells = |patch| patch_fields(problem, level, patch);
-            self.fields.patches = (0..self.patches.len()).map(cells).collect();
+    }
+
+    /// Values per cell of the next motion; motions that were solved on one level share its cells.
+    fn add_fields(&mut self, level: &Level, point: &Point) {
+        let problem = self.problem;
+        let patches = self.patches.len();
+        self.fields
+            .patches
+            .resize_with(patches, PatchFields::default);
+        let known = self.levels.iter().rposition(|known| *known == point.level);
+        let mesh = known.unwrap_or(self.levels.len());
+        if known.is_none() {
+            self.levels.push(point.level);
         }
         for (index, fields) in self.fields.patches.iter_mut().enumerate() {
-            let cells = level.patch_cells(index);
-            fields
-                .points
-                .push(point_fields(problem, level, cells, point));
+            if known.is_none() {
+                fields.meshes.push(patch_cells(problem, level, index));
+            }
+            let values = point_fields(problem, level, level.patch_cells(index), point);
+            fields.points.push(PointFields { mesh, ..values });
         }
     }
 
@@ -284,13 +298,14 @@ fn total(problem: &Problem, patches: &[Patch], point: &Point) -> Total {
     }
 }
 
-/// Remarks on motion `k`.
-fn remarks(problem: &Problem, k: usize, point: &Point) -> impl Iterator<Item = RemarkEntry> {
+/// Remarks on motion `index` of the problem, with its number in the case.
+fn remarks(problem: &Problem, index: usize, point: &Point) -> impl Iterator<Item = RemarkEntry> {
     let own = point.tangential.remarks.iter().cloned();
     let missed = target_missed(problem, point);
-    own.chain(unreachable(problem, k, point))
+    let number = problem.part.before + index;
+    own.chain(unreachable(problem, index, point))
         .chain(missed)
-        .map(move |remark| remark.at_point(k))
+        .map(move |remark| remark.at_point(number))
 }
 
 fn unreachable(problem: &Problem, index: usize, point: &Point) -> Option<Remark> {
@@ -313,10 +328,10 @@ fn target_missed(problem: &Problem, point: &Point) -> Option<Remark> {
     (target_met(problem, point) == Some(false)).then_some(Remark::TargetMissed { estimate, target })
 }
 
-fn patch_fields(problem: &Problem, level: &Level, patch: usize) -> PatchFields {
+fn patch_cells(problem: &Problem, level: &Level, patch: usize) -> PatchCells {
     let cells = level.patch_cells(patch);
     let mesh = &level.mesh;
-    let mut fields = PatchFields::default();
+    let mut fields = PatchCells::default();
     for segment in mesh.segments.iter().filter(|s| s.chord.patch == patch) {
         for i in segment.cells.clone() {
             fields.x_mm.push(0.5 * (mesh.left[i] + mesh.right[i]));
@@ -359,6 +374,7 @@ fn point_fields(
     };
     let zone = |slips: &bool| if *slips { Zone::Slip } else { Zone::Stick };
     PointFields {
+        mesh: 0,
         zone: problem
             .wants(Output::Zones)
             .then(|| answer.slips[cells.clone()].iter().map(zone).collect()),

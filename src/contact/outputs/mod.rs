@@ -1,6 +1,6 @@
 //! What is derived from stored cell values: outlines of the zones, fields on a regular grid.
 //!
-//! Pure functions of [`PatchFields`](crate::contact::solution::PatchFields); nothing here solves anything.
+//! Pure functions of [`PatchCells`](crate::contact::solution::PatchCells); nothing here solves anything.
 
 pub mod assemble;
 mod loops;

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use crate::contact::outputs::loops::{Corner, chain, straighten};
 use crate::contact::outputs::segments::{Strips, join_tolerance};
-use crate::contact::solution::PatchFields;
+use crate::contact::solution::PatchCells;
 use crate::contact::zones::Zone;
 
 /// Outlines of the union of the cells of one zone, or of all cells when `which` is `None`, in mm.
@@ -20,7 +20,7 @@ use crate::contact::zones::Zone;
 /// If the vectors differ in length.
 #[must_use]
 pub fn outlines(
-    fields: &PatchFields,
+    fields: &PatchCells,
     zones: Option<&[Zone]>,
     which: Option<Zone>,
 ) -> Vec<Vec<[f64; 2]>> {
@@ -61,7 +61,7 @@ pub fn outlines(
 /// ellipse, where it closes in one point). Second order in the strips' width. Any other patch gets the rectilinear
 /// outline of [`outlines`].
 #[must_use]
-pub fn patch_outline(fields: &PatchFields) -> Vec<Vec<[f64; 2]>> {
+pub fn patch_outline(fields: &PatchCells) -> Vec<Vec<[f64; 2]>> {
     let strips = Strips::new(fields);
     if !strips.is_simple() {
         return outlines(fields, None, None);
@@ -191,8 +191,8 @@ mod tests {
     }
 
     /// Unit cells where the pattern has `#`; the last line is the lowest strip.
-    fn pattern(lines: &[&str]) -> PatchFields {
-        let mut fields = PatchFields::default();
+    fn pattern(lines: &[&str]) -> PatchCells {
+        let mut fields = PatchCells::default();
         for (j, line) in (0u32..).zip(lines.iter().rev()) {
             for (i, _) in line.bytes().enumerate().filter(|&(_, c)| c == b'#') {
                 let x = i as f64;
@@ -231,7 +231,7 @@ mod tests {
 
     #[test]
     fn one_cell_is_its_own_outline() {
-        let mut fields = PatchFields::default();
+        let mut fields = PatchCells::default();
         push_segment(&mut fields, 0, 5.0, 2.0, &[1.0, 4.0]);
         let square = vec![vec![[1.0, 4.0], [4.0, 4.0], [4.0, 6.0], [1.0, 6.0]]];
         assert_eq!(outlines(&fields, None, None), square);
@@ -241,7 +241,7 @@ mod tests {
         );
         assert!(outlines(&fields, Some(&[Zone::Slip]), Some(Zone::Stick)).is_empty());
         assert!(outlines(&fields, None, Some(Zone::Stick)).is_empty());
-        assert!(outlines(&PatchFields::default(), None, None).is_empty());
+        assert!(outlines(&PatchCells::default(), None, None).is_empty());
     }
 
     #[test]
@@ -283,7 +283,7 @@ mod tests {
 
     #[test]
     fn rounding_of_edges_does_not_tear_the_outline() {
-        let mut fields = PatchFields::default();
+        let mut fields = PatchCells::default();
         let edges: Vec<f64> = (0..=10).map(|k| 0.1 + 0.7 * f64::from(k) / 3.0).collect();
         for j in 0..10 {
             push_segment(&mut fields, j, 0.3 * f64::from(j) + 1e3, 0.3, &edges);
@@ -334,7 +334,7 @@ mod tests {
         fn loops_enclose_exactly_the_cells(
             strips in prop::collection::vec((0.1f64..2.0, prop::collection::vec((0.05f64..1.5, 0u8..3), 1..9)), 1..9),
         ) {
-            let mut fields = PatchFields::default();
+            let mut fields = PatchCells::default();
             let mut zones = Vec::new();
             let mut y = -1.0;
             for (j, (dy, cells)) in (0u32..).zip(&strips) {

@@ -1,7 +1,7 @@
 //! Cell values brought onto a regular grid, for pictures and for programs that want arrays.
 
 use crate::contact::outputs::segments::Strips;
-use crate::contact::solution::PatchFields;
+use crate::contact::solution::PatchCells;
 use crate::contact::zones::Zone;
 
 /// Values on a regular grid; `None` outside the patch.
@@ -29,7 +29,7 @@ pub struct Gridded<T = f64> {
 /// # Panics
 /// If `nx` or `ny` is less than 2, or `values` has not one value per cell.
 #[must_use]
-pub fn resample(fields: &PatchFields, values: &[f64], nx: usize, ny: usize) -> Gridded {
+pub fn resample(fields: &PatchCells, values: &[f64], nx: usize, ny: usize) -> Gridded {
     assert_eq!(
         values.len(),
         fields.x_mm.len(),
@@ -50,7 +50,7 @@ pub fn resample(fields: &PatchFields, values: &[f64], nx: usize, ny: usize) -> G
 /// # Panics
 /// If `nx` or `ny` is less than 2, or `zones` has not one zone per cell.
 #[must_use]
-pub fn resample_zone(fields: &PatchFields, zones: &[Zone], nx: usize, ny: usize) -> Gridded<Zone> {
+pub fn resample_zone(fields: &PatchCells, zones: &[Zone], nx: usize, ny: usize) -> Gridded<Zone> {
     assert_eq!(
         zones.len(),
         fields.x_mm.len(),
@@ -80,7 +80,7 @@ struct Spot {
     weight: f64,
 }
 
-fn sample<T>(fields: &PatchFields, nx: usize, ny: usize, value: impl Fn(&Spot) -> T) -> Gridded<T> {
+fn sample<T>(fields: &PatchCells, nx: usize, ny: usize, value: impl Fn(&Spot) -> T) -> Gridded<T> {
     assert!(
         nx >= 2 && ny >= 2,
         "a grid needs at least two points along each axis"
@@ -197,7 +197,7 @@ fn chords(strips: &Strips, y: f64) -> Vec<Cut> {
 }
 
 /// Value of a segment at a place: linear between centres, constant beyond the outermost ones.
-fn along(fields: &PatchFields, values: &[f64], place: &Place) -> f64 {
+fn along(fields: &PatchCells, values: &[f64], place: &Place) -> f64 {
     let cells = place.cells.clone();
     let after =
         cells.start + fields.x_mm[cells.clone()].partition_point(|&centre| centre <= place.x);
@@ -302,7 +302,7 @@ mod tests {
 
     #[test]
     fn segments_that_branch_are_not_blended_across_the_gap() {
-        let mut fields = PatchFields::default();
+        let mut fields = PatchCells::default();
         push_segment(&mut fields, 0, 0.5, 1.0, &[0.0, 1.0, 2.0, 3.0]);
         push_segment(&mut fields, 1, 1.5, 1.0, &[0.0, 1.0]);
         push_segment(&mut fields, 1, 1.5, 1.0, &[2.0, 3.0]);
@@ -346,7 +346,7 @@ mod tests {
 
     #[test]
     fn strips_apart_leave_their_gap_empty() {
-        let mut fields = PatchFields::default();
+        let mut fields = PatchCells::default();
         push_segment(&mut fields, 0, 0.5, 1.0, &[0.0, 1.0]);
         push_segment(&mut fields, 2, 2.5, 1.0, &[0.0, 1.0]);
         let grid = resample(&fields, &[1.0, 2.0], 2, 3);

@@ -1,6 +1,6 @@
 //! Strips and their segments recovered from stored cells, with the neighbours that continue a segment.
 
-use crate::contact::solution::PatchFields;
+use crate::contact::solution::PatchCells;
 
 /// Cells that belong together and gaps between cells are told apart at this fraction of a cell's width.
 pub(super) const JOIN: f64 = 1e-9;
@@ -42,7 +42,7 @@ impl Strips {
     ///
     /// # Panics
     /// If the vectors of the cells differ in length.
-    pub fn new(fields: &PatchFields) -> Strips {
+    pub fn new(fields: &PatchCells) -> Strips {
         let n = fields.x_mm.len();
         assert!(
             [
@@ -196,10 +196,10 @@ fn extrapolate(points: &[(f64, f64)], x: f64) -> f64 {
 pub(super) mod samples {
     use std::f64::consts::PI;
 
-    use crate::contact::solution::PatchFields;
+    use crate::contact::solution::PatchCells;
 
     /// Adds a segment with the given cell edges to a patch.
-    pub fn push_segment(fields: &mut PatchFields, strip: u32, y: f64, dy: f64, edges: &[f64]) {
+    pub fn push_segment(fields: &mut PatchCells, strip: u32, y: f64, dy: f64, edges: &[f64]) {
         for pair in edges.windows(2) {
             fields.x_mm.push(0.5 * (pair[0] + pair[1]));
             fields.dx_mm.push(pair[1] - pair[0]);
@@ -210,8 +210,8 @@ pub(super) mod samples {
     }
 
     /// Strips with cosine-graded cells on an ellipse whose centre line is `x = lean · y`.
-    pub fn ellipse(a: f64, b: f64, lean: f64, strips: u32, cells: u32) -> PatchFields {
-        let mut fields = PatchFields::default();
+    pub fn ellipse(a: f64, b: f64, lean: f64, strips: u32, cells: u32) -> PatchCells {
+        let mut fields = PatchCells::default();
         let dy = 2.0 * b / f64::from(strips);
         for j in 0..strips {
             let y = -b + (f64::from(j) + 0.5) * dy;
@@ -248,7 +248,7 @@ mod tests {
 
     #[test]
     fn a_fork_is_seen_as_a_branch_and_keeps_its_ends() {
-        let mut fields = PatchFields::default();
+        let mut fields = PatchCells::default();
         samples::push_segment(&mut fields, 0, 0.5, 1.0, &[0.0, 1.0, 2.0, 3.0]);
         samples::push_segment(&mut fields, 1, 1.5, 1.0, &[0.0, 1.0]);
         samples::push_segment(&mut fields, 1, 1.5, 1.0, &[2.0, 3.0]);
@@ -262,7 +262,7 @@ mod tests {
 
     #[test]
     fn strips_apart_are_not_linked() {
-        let mut fields = PatchFields::default();
+        let mut fields = PatchCells::default();
         samples::push_segment(&mut fields, 0, 0.5, 1.0, &[0.0, 1.0]);
         samples::push_segment(&mut fields, 2, 2.5, 1.0, &[0.0, 1.0]);
         let strips = Strips::new(&fields);

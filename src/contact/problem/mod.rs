@@ -3,19 +3,18 @@
 //! A [`Problem`] cannot exist unchecked: [`Problem::new`] is the only way to make one.
 
 mod cost;
+mod digest;
 mod elasticity;
 mod motions;
 mod press;
 mod profiles;
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::time::Duration;
 
-use serde::Serialize;
-
 use crate::contact::case::{
-    Case, Contact, Load, Material, MeshSize, Method, Motion, Motions, Output, Solver,
-    TractionBound, Wheelset,
+    Case, Contact, Load, Material, MeshSize, Method, Motion, Motions, Output, Solver, TractionBound,
 };
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::geometry::wheelset::WheelsetMotion;
@@ -23,6 +22,8 @@ use crate::contact::normal::Region;
 use crate::contact::remark::{Remark, RemarkEntry, merged};
 use crate::contact::solution::NormalReport;
 use cost::Size;
+pub use digest::SOLVER_REVISION;
+use digest::digest;
 use motions::Expanded;
 pub use motions::Prescribed;
 
@@ -72,6 +73,15 @@ pub enum Resolution {
     Mesh(MeshSize),
 }
 
+/// Which motions of a case a problem asks about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MotionPart {
+    /// Motions of the case before the first of these.
+    pub before: usize,
+    /// Motions of the whole case.
+    pub all: usize,
+}
+
 /// A checked case, ready to solve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Problem {
@@ -87,6 +97,8 @@ pub struct Problem {
     pub region: Region,
     /// The motions, in the order of the case; never empty.
     pub motions: Vec<Motion>,
+    /// Which motions of the case these are: all of them, unless this is a slice.
+    pub part: MotionPart,
     /// The motion of the wheelset that stands in place of the one motion above, which is then 0: the creepages of the patches
     /// follow from it.
     pub wheelset: Option<WheelsetMotion>,
@@ -160,6 +172,10 @@ impl Problem {
             elasticity,
             friction: case.friction.coefficient,
             region,
+            part: MotionPart {
+                before: 0,
+                all: motions.len(),
+            },
             motions,
             forces,
             wheelset: profiles::wheelset(&case.motion),
@@ -173,6 +189,26 @@ impl Problem {
             memory_bytes: limits.memory_bytes,
             digest,
         })
+    }
+
+    /// The same question about some of its motions.
+    #[must_use]
+    pub fn slice(&self, range: Range<usize>) -> Problem {
+        Problem {
+            part: MotionPart {
+                before: self.part.before + range.start,
+                ..self.part
+            },
+            motions: self.motions[range.clone()].to_vec(),
+            forces: self.forces[range].to_vec(),
+            ..self.clone()
+        }
+    }
+
+    /// Estimated time to find region and pressure, in s.
+    #[must_use]
+    pub fn normal_seconds(&self) -> f64 {
+        cost::normal_seconds(&self.region)
     }
 
     /// Is this output asked for?
@@ -336,71 +372,4 @@ fn resolution(solver: &Solver) -> Resolution {
         (Some(size), _) => Resolution::Mesh(size),
         (None, target) => Resolution::Target(target.unwrap_or(TARGET_ERROR_DEFAULT)),
     }
-}
-
-/// Everything that determines the answer, in a fixed order; name and labels do not.
-#[derive(Serialize)]
-struct Canonical<'a> {
-    solver_version: &'static str,
-    elasticity: [f64; 3],
-    friction: f64,
-    contact: &'a Contact,
-    load: Option<&'a Load>,
-    motions: &'a [Motion],
-    #[serde(skip_serializing_if = "Option::is_none")]
-    forces: Option<&'a [Prescribed]>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    wheelset: Option<&'a Wheelset>,
-    method: Method,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    traction_bound: Option<TractionBound>,
-    target_error: Option<f64>,
-    mesh: Option<MeshSize>,
-    time_limit_s: Option<f64>,
-    outputs: &'a [Output],
-}
-
-/// Hexadecimal BLAKE3 digest of the canonical case.
-fn digest(
-    case: &Case,
-    elasticity: &Elasticity,
-    motions: &[Motion],
-    forces: &[Prescribed],
-) -> String {
-    let target_error = match resolution(&case.solver) {
-        Resolution::Target(target) => Some(target),
-        Resolution::Mesh(_) => None,
-    };
-    let canonical = Canonical {
-        solver_version: env!("CARGO_PKG_VERSION"),
-        elasticity: [
-            elasticity.shear_modulus,
-            elasticity.poisson_ratio,
-            elasticity.difference,
-        ],
-        friction: case.friction.coefficient,
-        contact: &case.contact,
-        load: case.load.as_ref(),
-        motions,
-        forces: Some(forces).filter(|all| all.iter().any(|f| *f != [None; 2])),
-        wheelset: match &case.motion {
-            Motions::Wheelset { wheelset } => Some(wheelset),
-            _ => None,
-        },
-        method: case.solver.method,
-        // What is left out means the same as the default.
-        traction_bound: case
-            .solver
-            .traction_bound
-            .filter(|bound| *bound != TractionBound::default()),
-        target_error,
-        mesh: case.solver.mesh,
-        time_limit_s: case.solver.time_limit_s,
-        outputs: &case.outputs,
-    };
-    let mut hasher = blake3::Hasher::new();
-    // Writing into a hasher cannot fail, and the structure has no map with keys that are not texts.
-    let written = serde_json::to_writer(&mut hasher, &canonical);
-    debug_assert!(written.is_ok());
-    hasher.finalize().to_hex().to_string()
 }

@@ -157,7 +157,7 @@ pub fn merged(remarks: impl IntoIterator<Item = RemarkEntry>) -> Vec<RemarkEntry
     let mut kept: Vec<RemarkEntry> = Vec::new();
     // Where the remarks of one kind and place stand in `kept`: the first, and how many.
     let mut groups: Vec<(usize, usize)> = Vec::new();
-    for remark in remarks {
+    for mut remark in remarks {
         let of_kind = |(first, _): &&mut (usize, usize)| kept[*first].is_like(&remark);
         let Some((first, count)) = groups.iter_mut().find(of_kind) else {
             groups.push((kept.len(), 1));
@@ -170,12 +170,18 @@ pub fn merged(remarks: impl IntoIterator<Item = RemarkEntry>) -> Vec<RemarkEntry
                     .iter()
                     .any(|known| known.is_like(&remark) && known.holds_at(point))
                 {
-                    add(&mut kept[*first].also_at_points, point);
+                    add(&mut kept[*first].also_at_points, [point, point]);
+                }
+                for range in remark.also_at_points {
+                    add(&mut kept[*first].also_at_points, range);
                 }
             }
             _ if kept.contains(&remark) => {}
             _ => {
                 *count += 1;
+                for range in std::mem::take(&mut remark.also_at_points) {
+                    add(&mut kept[*first].also_at_points, range);
+                }
                 kept.push(remark);
             }
         }
@@ -183,11 +189,11 @@ pub fn merged(remarks: impl IntoIterator<Item = RemarkEntry>) -> Vec<RemarkEntry
     kept
 }
 
-/// Adds a motion to ranges; motions come in their order.
-fn add(ranges: &mut Vec<[usize; 2]>, point: usize) {
+/// Adds motions to ranges; they come in their order.
+fn add(ranges: &mut Vec<[usize; 2]>, more: [usize; 2]) {
     match ranges.last_mut() {
-        Some(last) if last[1] + 1 == point => last[1] = point,
-        _ => ranges.push([point, point]),
+        Some(last) if last[1] + 1 == more[0] => last[1] = more[1],
+        _ => ranges.push(more),
     }
 }
 

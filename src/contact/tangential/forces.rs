@@ -68,40 +68,6 @@ pub fn solve(
     search.finish(place, began)
 }
 
-/// Brings the answer to motion `index` to another level; prescribed forces are found anew there.
-///
-/// # Errors
-/// Why there is no answer.
-pub fn lift(
-    problem: &Problem,
-    ladder: &mut Ladder,
-    index: usize,
-    plan: Plan,
-    point: Point,
-    monitor: &dyn Monitor,
-) -> Result<Point, SolveError> {
-    let motion = point.motion;
-    if problem.forces[index] == [None; 2] || problem.friction == 0.0 || point.saturated {
-        let saturated = point.saturated;
-        let asked = Asked { index, motion };
-        let lifted = point::climb(problem, ladder, asked, plan, Some(point), monitor)?;
-        return Ok(Point {
-            saturated,
-            ..lifted
-        });
-    }
-    let began = monitor.elapsed();
-    let below = ladder.get(point.level).plan;
-    let mut search = Search::new(problem, ladder, index, monitor);
-    search.path = vec![below, plan];
-    search.work = point.work;
-    let place = search.law.places(&motion);
-    let place = search.find(place)?;
-    let mut lifted = search.finish(place, began)?;
-    lifted.seconds += point.seconds;
-    Ok(lifted)
-}
-
 /// The cubic law of a problem.
 #[derive(Debug, Clone, Copy)]
 struct Law {

@@ -1,6 +1,6 @@
 //! One motion of a case, from the coarsest level to the finest, with an estimate of its error.
 
-use crate::contact::case::{MeshSize, Method, Motion, Output};
+use crate::contact::case::{MeshSize, Method, Motion};
 use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
 use crate::contact::outputs::resultants::Resultants;
@@ -205,7 +205,7 @@ fn ascend(
 ) -> Result<Point, SolveError> {
     while let Some(error) = point.error().filter(|e| *e > target) {
         // Motions of a sweep share their levels: what each would like best is not what is cheapest for all.
-        let alone = problem.motions.len() == 1;
+        let alone = problem.part.all == 1;
         half_octaves += match (half_octaves == 0, alone) {
             (true, true) => first_steps(target).min(steps_made_for(error / target)),
             (true, false) => first_steps(target),
@@ -271,7 +271,7 @@ pub fn climb(
     let warm = ladder.trail.start(number, level, &motion);
     let start = warm.or_else(|| below.map(|(coarse, answer)| nested_start(coarse, answer, level)));
     let tangential = solve_level(problem, level, &asked.motion, start, monitor)
-        .map_err(|f| named(f, problem, asked.index))?;
+        .map_err(|f| named(f, problem, problem.part.before + asked.index))?;
     let patches = problem.region.patches().len();
     let summed: Vec<Resultants> = (0..patches)
         .map(|p| Resultants::of_patch(level, &tangential.traction, p))
@@ -308,8 +308,7 @@ pub fn climb(
     );
     let resultants = match coarser_like {
         // The rules of the fast solver share one order of convergence; the dense method has no such record.
-        // With tractions asked for, resultants stay what the tractions add up to.
-        Some(point) if problem.method != Method::LiuHsu && !problem.wants(Output::Tractions) => {
+        Some(point) if problem.method != Method::LiuHsu => {
             extrapolated(problem, &summed, point, share)
         }
         _ => summed.clone(),

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use crate::contact::case::Output;
 use crate::contact::outputs::outline::{outlines, patch_outline};
 use crate::contact::outputs::resample::resample;
-use crate::contact::solution::PatchFields;
+use crate::contact::solution::PatchCells;
 use crate::contact::zones::Zone;
 use crate::http::picture::colour::{LEVELS, SLIP, STICK, level, ramp};
 use crate::http::picture::frame::{Frame, exponent, ticks};
@@ -50,7 +50,7 @@ pub(super) fn grid(svg: &mut Svg, frame: &Frame) {
 }
 
 /// Rectangles of the given cells as one path.
-fn rectangles(frame: &Frame, fields: &PatchFields, cells: impl Iterator<Item = usize>) -> String {
+fn rectangles(frame: &Frame, fields: &PatchCells, cells: impl Iterator<Item = usize>) -> String {
     let mut data = String::new();
     for cell in cells {
         let (dx, dy) = (fields.dx_mm[cell], fields.dy_mm[cell]);
@@ -66,7 +66,7 @@ fn rectangles(frame: &Frame, fields: &PatchFields, cells: impl Iterator<Item = u
 pub(super) fn heat_map(
     svg: &mut Svg,
     frame: &Frame,
-    fields: &PatchFields,
+    fields: &PatchCells,
     values: &[f64],
     largest: f64,
 ) {
@@ -86,7 +86,7 @@ pub(super) fn heat_map(
 }
 
 /// One rectangle per cell in the colour of its zone.
-pub(super) fn zone_map(svg: &mut Svg, frame: &Frame, fields: &PatchFields, zones: Option<&[Zone]>) {
+pub(super) fn zone_map(svg: &mut Svg, frame: &Frame, fields: &PatchCells, zones: Option<&[Zone]>) {
     svg.raw("<g shape-rendering=\"crispEdges\">\n");
     for (zone, colour) in [(Zone::Stick, STICK), (Zone::Slip, SLIP)] {
         let of = zones.unwrap_or(&[]).iter().enumerate();
@@ -122,7 +122,7 @@ pub(super) fn outlines_of(svg: &mut Svg, frame: &Frame, scene: &Scene) {
 pub(super) fn arrows(
     svg: &mut Svg,
     frame: &Frame,
-    fields: &PatchFields,
+    fields: &PatchCells,
     along: &[f64],
     across: &[f64],
 ) -> bool {

@@ -7,7 +7,7 @@ pub mod raster;
 mod svg;
 
 use crate::contact::case::Output;
-use crate::contact::solution::{PatchFields, PointFields};
+use crate::contact::solution::{PatchCells, PointFields};
 use crate::contact::zones::Zone;
 use crate::http::picture::frame::{Frame, WIDTH};
 use crate::http::picture::svg::{Anchor, FONTS, Svg, escape, px, shorten};
@@ -25,7 +25,7 @@ pub struct Scene {
     /// The field that is coloured.
     pub shown: Output,
     /// The cells.
-    pub fields: PatchFields,
+    pub fields: PatchCells,
     /// The values of one motion.
     pub values: PointFields,
 }
@@ -131,7 +131,7 @@ fn heat(scene: &Scene) -> Option<Heat> {
 }
 
 /// Box around the cells in mm.
-fn extent(fields: &PatchFields) -> [f64; 4] {
+fn extent(fields: &PatchCells) -> [f64; 4] {
     let mut shape = [
         f64::INFINITY,
         f64::NEG_INFINITY,

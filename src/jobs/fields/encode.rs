@@ -17,40 +17,34 @@ pub fn encode(fields: &Fields) -> Result<Vec<u8>> {
         list: Vec::new(),
         body: Vec::new(),
     };
-    for (patch, cells) in fields.patches.iter().enumerate() {
-        blocks.push_f64(patch, None, "x_mm", Some(&cells.x_mm))?;
-        blocks.push_f64(patch, None, "y_mm", Some(&cells.y_mm))?;
-        blocks.push_f64(patch, None, "dx_mm", Some(&cells.dx_mm))?;
-        blocks.push_f64(patch, None, "dy_mm", Some(&cells.dy_mm))?;
-        let strips = cells
-            .strip
-            .iter()
-            .flat_map(|v| v.to_le_bytes())
-            .collect::<Vec<_>>();
-        blocks.push(patch, None, "strip", Kind::U32, &strips, cells.strip.len())?;
-        blocks.push_f64(patch, None, "pressure_mpa", cells.pressure_mpa.as_ref())?;
-        for (point, values) in cells.points.iter().enumerate() {
+    for (patch, all) in fields.patches.iter().enumerate() {
+        for (mesh, cells) in all.meshes.iter().enumerate() {
+            let at = Place::cells(patch, mesh);
+            blocks.push_f64(at, "x_mm", Some(&cells.x_mm))?;
+            blocks.push_f64(at, "y_mm", Some(&cells.y_mm))?;
+            blocks.push_f64(at, "dx_mm", Some(&cells.dx_mm))?;
+            blocks.push_f64(at, "dy_mm", Some(&cells.dy_mm))?;
+            let strips = cells
+                .strip
+                .iter()
+                .flat_map(|v| v.to_le_bytes())
+                .collect::<Vec<_>>();
+            blocks.push(at, "strip", Kind::U32, &strips, cells.strip.len())?;
+            blocks.push_f64(at, "pressure_mpa", cells.pressure_mpa.as_ref())?;
+        }
+        for (point, values) in all.points.iter().enumerate() {
+            let at = Place::values(patch, point);
             if let Some(zones) = &values.zone {
                 let codes = zones
                     .iter()
                     .map(|zone| zone_code(*zone))
                     .collect::<Vec<_>>();
-                blocks.push(patch, Some(point), "zone", Kind::U8, &codes, codes.len())?;
+                blocks.push(at, "zone", Kind::U8, &codes, codes.len())?;
             }
-            blocks.push_f64(
-                patch,
-                Some(point),
-                "traction_x_mpa",
-                values.traction_x_mpa.as_ref(),
-            )?;
-            blocks.push_f64(
-                patch,
-                Some(point),
-                "traction_y_mpa",
-                values.traction_y_mpa.as_ref(),
-            )?;
-            blocks.push_f64(patch, Some(point), "slip_x", values.slip_x.as_ref())?;
-            blocks.push_f64(patch, Some(point), "slip_y", values.slip_y.as_ref())?;
+            blocks.push_f64(at, "traction_x_mpa", values.traction_x_mpa.as_ref())?;
+            blocks.push_f64(at, "traction_y_mpa", values.traction_y_mpa.as_ref())?;
+            blocks.push_f64(at, "slip_x", values.slip_x.as_ref())?;
+            blocks.push_f64(at, "slip_y", values.slip_y.as_ref())?;
         }
     }
     let header = serde_json::to_vec(&Header {
@@ -58,6 +52,11 @@ pub fn encode(fields: &Fields) -> Result<Vec<u8>> {
             .patches
             .iter()
             .map(|patch| patch.points.len())
+            .collect(),
+        meshes: fields
+            .patches
+            .iter()
+            .map(|patch| patch.points.iter().map(|point| point.mesh).collect())
             .collect(),
         blocks: blocks.list,
     })?;
@@ -70,6 +69,28 @@ pub fn encode(fields: &Fields) -> Result<Vec<u8>> {
     Ok(file)
 }
 
+/// What a block belongs to.
+#[derive(Clone, Copy)]
+struct Place {
+    patch: usize,
+    point: Option<usize>,
+    mesh: usize,
+}
+
+impl Place {
+    /// The cells of a mesh.
+    fn cells(patch: usize, mesh: usize) -> Place {
+        let point = None;
+        Place { patch, point, mesh }
+    }
+
+    /// The values of a motion.
+    fn values(patch: usize, point: usize) -> Place {
+        let (point, mesh) = (Some(point), 0);
+        Place { patch, point, mesh }
+    }
+}
+
 /// Blocks in the making.
 struct Blocks {
     list: Vec<Block>,
@@ -77,25 +98,18 @@ struct Blocks {
 }
 
 impl Blocks {
-    fn push_f64(
-        &mut self,
-        patch: usize,
-        point: Option<usize>,
-        name: &str,
-        v: Option<&Vec<f64>>,
-    ) -> Result<()> {
+    fn push_f64(&mut self, at: Place, name: &str, v: Option<&Vec<f64>>) -> Result<()> {
         let Some(values) = v else { return Ok(()) };
         let bytes = values
             .iter()
             .flat_map(|v| v.to_le_bytes())
             .collect::<Vec<_>>();
-        self.push(patch, point, name, Kind::F64, &bytes, values.len())
+        self.push(at, name, Kind::F64, &bytes, values.len())
     }
 
     fn push(
         &mut self,
-        patch: usize,
-        point: Option<usize>,
+        at: Place,
         name: &str,
         kind: Kind,
         values: &[u8],
@@ -110,8 +124,9 @@ impl Blocks {
         encoder.write_all(values)?;
         encoder.finish()?;
         self.list.push(Block {
-            patch,
-            point,
+            patch: at.patch,
+            point: at.point,
+            mesh: at.mesh,
             name: name.to_owned(),
             kind,
             count,

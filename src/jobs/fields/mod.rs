@@ -1,14 +1,15 @@
 //! The stored form of fields: a JSON header and one compressed block per array, readable piece by piece.
 //!
 //! ```text
-//! bytes 0..8        "RHFIELD1"
+//! bytes 0..8        "RHFIELD2"
 //! bytes 8..12       length H of the header, u32 little-endian
-//! bytes 12..12+H    header: {"points": [motions of each patch], "blocks": [{patch, point, name, kind, count, offset, bytes}]}
+//! bytes 12..12+H    header: {"points": [motions of each patch], "meshes": [mesh of every motion, for each patch],
+//!                   "blocks": [{patch, point, mesh, name, kind, count, offset, bytes}]}
 //! then              the blocks; offsets count from the end of the header
 //! ```
 //!
 //! A block is a zstd frame with checksum; inside are `count` little-endian values of its kind (`f64`, `u32` or `u8`),
-//! in the cell order of [`PatchFields`]. Blocks stand patch by patch, in each patch first the cells themselves
+//! in the cell order of [`PatchCells`]. Blocks stand patch by patch, in each patch first the cells of every mesh
 //! (`point` is null), then motion by motion, so that one patch is one range of bytes. An array that was not computed
 //! has no block. Zones are `u8`: 0 stick, 1 slip.
 
@@ -18,11 +19,11 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use crate::contact::solution::{PatchFields, PointFields};
+use crate::contact::solution::{PatchCells, PatchFields, PointFields};
 use crate::contact::zones::Zone;
 pub use crate::jobs::fields::encode::encode;
 
-const MAGIC: &[u8; 8] = b"RHFIELD1";
+const MAGIC: &[u8; 8] = b"RHFIELD2";
 /// Length of the part before the header.
 pub const PREFIX_BYTES: usize = 12;
 
@@ -30,6 +31,7 @@ pub const PREFIX_BYTES: usize = 12;
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Header {
     points: Vec<usize>,
+    meshes: Vec<Vec<usize>>,
     blocks: Vec<Block>,
 }
 
@@ -37,6 +39,7 @@ pub struct Header {
 struct Block {
     patch: usize,
     point: Option<usize>,
+    mesh: usize,
     name: String,
     kind: Kind,
     count: usize,
@@ -112,14 +115,32 @@ impl Header {
         point: Option<usize>,
         bytes: &[u8],
     ) -> Result<PatchFields, String> {
-        let kept = match point {
-            Some(_) => 1,
-            None => self.points(patch),
+        let mesh_of = |point: usize| {
+            let of_patch = self.meshes.get(patch);
+            of_patch.and_then(|all| all.get(point)).copied()
         };
-        let mut cells = PatchFields {
-            points: vec![PointFields::default(); kept],
-            ..PatchFields::default()
-        };
+        let mut cells = PatchFields::default();
+        match point {
+            // The one mesh of the one motion.
+            Some(_) => {
+                cells.points.push(PointFields::default());
+                cells.meshes.push(PatchCells::default());
+            }
+            None => {
+                for point in 0..self.points(patch) {
+                    let mesh = mesh_of(point).unwrap_or(0);
+                    cells.points.push(PointFields {
+                        mesh,
+                        ..PointFields::default()
+                    });
+                }
+                let meshes = self
+                    .wanted(patch, None)
+                    .filter(|block| block.point.is_none());
+                let meshes = meshes.map(|block| block.mesh + 1).max().unwrap_or(0);
+                cells.meshes.resize_with(meshes, PatchCells::default);
+            }
+        }
         let mut rest = bytes;
         for block in self.wanted(patch, point) {
             let length = usize::try_from(block.bytes).map_err(|error| error.to_string())?;
@@ -128,16 +149,30 @@ impl Header {
                 .ok_or_else(|| format!("block {} is cut short", block.name))?;
             rest = after;
             let values = block.unpack(packed)?;
-            let place = block.point.map(|at| if point.is_some() { 0 } else { at });
-            block.put(&mut cells, place, &values)?;
+            let place = |at: usize| if point.is_some() { 0 } else { at };
+            match block.point {
+                None => block.put_cells(&mut cells.meshes[place(block.mesh)], &values)?,
+                Some(at) => {
+                    let point = cells.points.get_mut(place(at)).ok_or_else(|| {
+                        format!("block {} belongs to a motion that is not there", block.name)
+                    })?;
+                    block.put_values(point, &values)?;
+                }
+            }
         }
         Ok(cells)
     }
 
+    /// The blocks of a patch, or only those of one motion and of its cells.
     fn wanted(&self, patch: usize, point: Option<usize>) -> impl Iterator<Item = &Block> {
+        let all = self.meshes.get(patch);
+        let mesh = point.map(|at| all.and_then(|all| all.get(at)).copied().unwrap_or(0));
         self.blocks.iter().filter(move |block| {
-            block.patch == patch
-                && (point.is_none() || block.point.is_none() || block.point == point)
+            let wanted = match block.point {
+                None => mesh.is_none_or(|mesh| mesh == block.mesh),
+                Some(at) => point.is_none_or(|point| point == at),
+            };
+            block.patch == patch && wanted
         })
     }
 }
@@ -164,29 +199,22 @@ impl Block {
         }
     }
 
-    /// Puts the values where they belong.
-    fn put(
-        &self,
-        cells: &mut PatchFields,
-        place: Option<usize>,
-        values: &[u8],
-    ) -> Result<(), String> {
-        let Some(place) = place else {
-            match self.name.as_str() {
-                "x_mm" => cells.x_mm = read_f64(values),
-                "y_mm" => cells.y_mm = read_f64(values),
-                "dx_mm" => cells.dx_mm = read_f64(values),
-                "dy_mm" => cells.dy_mm = read_f64(values),
-                "strip" => cells.strip = read_u32(values),
-                "pressure_mpa" => cells.pressure_mpa = Some(read_f64(values)),
-                other => return Err(format!("unknown block {other}")),
-            }
-            return Ok(());
-        };
-        let point = cells
-            .points
-            .get_mut(place)
-            .ok_or_else(|| format!("block {} belongs to a motion that is not there", self.name))?;
+    /// Puts a part of a mesh where it belongs.
+    fn put_cells(&self, cells: &mut PatchCells, values: &[u8]) -> Result<(), String> {
+        match self.name.as_str() {
+            "x_mm" => cells.x_mm = read_f64(values),
+            "y_mm" => cells.y_mm = read_f64(values),
+            "dx_mm" => cells.dx_mm = read_f64(values),
+            "dy_mm" => cells.dy_mm = read_f64(values),
+            "strip" => cells.strip = read_u32(values),
+            "pressure_mpa" => cells.pressure_mpa = Some(read_f64(values)),
+            other => return Err(format!("unknown block {other}")),
+        }
+        Ok(())
+    }
+
+    /// Puts values of a motion where they belong.
+    fn put_values(&self, point: &mut PointFields, values: &[u8]) -> Result<(), String> {
         match self.name.as_str() {
             "zone" => {
                 point.zone = Some(
@@ -242,14 +270,34 @@ mod tests {
         prop::collection::vec(any::<u64>().prop_map(f64::from_bits), count)
     }
 
+    fn cells(count: usize) -> impl Strategy<Value = PatchCells> {
+        (
+            prop::array::uniform4(values(count)),
+            prop::collection::vec(any::<u32>(), count),
+            prop::option::of(values(count)),
+        )
+            .prop_map(
+                |([x_mm, y_mm, dx_mm, dy_mm], strip, pressure_mpa)| PatchCells {
+                    x_mm,
+                    y_mm,
+                    dx_mm,
+                    dy_mm,
+                    strip,
+                    pressure_mpa,
+                },
+            )
+    }
+
     fn patch() -> impl Strategy<Value = PatchFields> {
-        (0_usize..40, 0_usize..4).prop_flat_map(|(count, points)| {
+        (0_usize..40, 0_usize..4, 1_usize..3).prop_flat_map(|(count, points, meshes)| {
             let point = (
+                0..meshes,
                 prop::option::of(prop::collection::vec(any::<bool>(), count)),
                 prop::array::uniform4(prop::option::of(values(count))),
             )
                 .prop_map(
-                    |(zone, [traction_x_mpa, traction_y_mpa, slip_x, slip_y])| PointFields {
+                    |(mesh, zone, [traction_x_mpa, traction_y_mpa, slip_x, slip_y])| PointFields {
+                        mesh,
                         zone: zone.map(|z| {
                             z.into_iter()
                                 .map(|slips| if slips { Zone::Slip } else { Zone::Stick })
@@ -262,22 +310,10 @@ mod tests {
                     },
                 );
             (
-                prop::array::uniform4(values(count)),
-                prop::collection::vec(any::<u32>(), count),
-                prop::option::of(values(count)),
+                prop::collection::vec(cells(count), meshes),
                 prop::collection::vec(point, points),
             )
-                .prop_map(
-                    |([x_mm, y_mm, dx_mm, dy_mm], strip, pressure_mpa, points)| PatchFields {
-                        x_mm,
-                        y_mm,
-                        dx_mm,
-                        dy_mm,
-                        strip,
-                        pressure_mpa,
-                        points,
-                    },
-                )
+                .prop_map(|(meshes, points)| PatchFields { meshes, points })
         })
     }
 
@@ -300,6 +336,7 @@ mod tests {
         let points = cells.points.iter().map(|p| {
             let o = |v: &Option<Vec<f64>>| v.as_ref().map(f);
             (
+                p.mesh,
                 p.zone.clone(),
                 o(&p.traction_x_mpa),
                 o(&p.traction_y_mpa),
@@ -308,12 +345,13 @@ mod tests {
             )
         });
         let points = points.collect::<Vec<_>>();
-        let axes = [&cells.x_mm, &cells.y_mm, &cells.dx_mm, &cells.dy_mm].map(f);
-        format!(
-            "{axes:?} {:?} {:?} {points:?}",
-            cells.strip,
-            cells.pressure_mpa.as_ref().map(f)
-        )
+        let meshes = cells.meshes.iter().map(|mesh| {
+            let axes = [&mesh.x_mm, &mesh.y_mm, &mesh.dx_mm, &mesh.dy_mm].map(f);
+            let pressure = mesh.pressure_mpa.as_ref().map(f);
+            (axes, mesh.strip.clone(), pressure)
+        });
+        let meshes = meshes.collect::<Vec<_>>();
+        format!("{meshes:?} {points:?}")
     }
 
     proptest! {
@@ -326,7 +364,10 @@ mod tests {
             for (index, cells) in fields.patches.iter().enumerate() {
                 prop_assert_eq!(bits(&read(&file, index, None)), bits(cells));
                 for (at, point) in cells.points.iter().enumerate() {
-                    let one = PatchFields { points: vec![point.clone()], ..cells.clone() };
+                    let one = PatchFields {
+                        meshes: vec![cells.cells(at).clone()],
+                        points: vec![PointFields { mesh: 0, ..point.clone() }],
+                    };
                     prop_assert_eq!(bits(&read(&file, index, Some(at))), bits(&one));
                 }
             }
@@ -336,7 +377,10 @@ mod tests {
     #[test]
     fn one_patch_is_one_range() {
         let cells = PatchFields {
-            x_mm: vec![1.0, 2.0],
+            meshes: vec![PatchCells {
+                x_mm: vec![1.0, 2.0],
+                ..PatchCells::default()
+            }],
             points: vec![
                 PointFields {
                     slip_x: Some(vec![0.5, 0.25]),
@@ -344,7 +388,6 @@ mod tests {
                 };
                 3
             ],
-            ..PatchFields::default()
         };
         let file = encode(&Fields {
             patches: vec![cells.clone(), cells],
@@ -365,8 +408,11 @@ mod tests {
     #[test]
     fn a_damaged_block_is_noticed() {
         let cells = PatchFields {
-            x_mm: (0..100).map(f64::from).collect(),
-            ..PatchFields::default()
+            meshes: vec![PatchCells {
+                x_mm: (0..100).map(f64::from).collect(),
+                ..PatchCells::default()
+            }],
+            points: vec![PointFields::default()],
         };
         let mut file = encode(&Fields {
             patches: vec![cells],
@@ -378,6 +424,6 @@ mod tests {
         file[body + 40] ^= 1;
         assert!(header.decode(0, None, &file[body..]).is_err());
         assert!(header.decode(0, None, &file[body..body + 20]).is_err());
-        assert!(header_length(b"RHFIELD2....").is_err());
+        assert!(header_length(b"RHFIELD1....").is_err());
     }
 }

@@ -1,0 +1,106 @@
+//! Long sweeps in slices: cut at motions that depend on the case alone, each solved on its own, joined to the whole answer.
+//!
+//! A slice knows nothing of the others: no start, mesh or creepage is carried over a cut. So an answer does not depend on when and where
+//! its slices were solved, or whether a restart came between: [`solve`](crate::contact::solve) takes the same slices one after the other.
+
+use std::ops::{ControlFlow, Range};
+use std::sync::Arc;
+use std::time::Duration;
+
+use crate::contact::error::SolveError;
+use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::problem::Problem;
+use crate::contact::remark::merged;
+use crate::contact::solution::{Fields, Solution};
+use crate::contact::solve_whole;
+use crate::contact::tangential::operator_store::OperatorStore;
+
+/// Estimated time of a slice in s: short for those who wait behind it, long beside what a cut costs (a first motion without a start,
+/// and region and pressure once more).
+const SLICE_SECONDS: f64 = 1.0;
+/// A slice takes at least so many times as long as finding region and pressure.
+const NORMAL_TIMES: f64 = 10.0;
+
+/// Where a case is cut: ranges of motions in order, one after the other, at least one. The same case gives the same slices, whatever the
+/// load, limits and machine.
+#[must_use]
+pub fn slices(problem: &Problem) -> Vec<Range<usize>> {
+    let motions = problem.motions.len();
+    let (whole, normal) = (problem.cost().seconds, problem.normal_seconds());
+    let each = (whole - normal).max(0.0) / motions as f64;
+    let wanted = SLICE_SECONDS.max(NORMAL_TIMES * normal) / each.max(f64::MIN_POSITIVE);
+    // Nearly equal parts, so that no short one is left over.
+    let parts = (motions as f64 / wanted).ceil().clamp(1.0, motions as f64) as usize;
+    let start = |part: usize| part * motions / parts;
+    (0..parts)
+        .map(|part| start(part)..start(part + 1))
+        .collect()
+}
+
+/// Solves one slice of a case: the motions of a range that [`slices`] gives. Motions are numbered as in the case.
+///
+/// # Errors
+/// A named reason why there is no answer.
+pub fn solve_slice(
+    operators: &Arc<OperatorStore>,
+    problem: &Problem,
+    range: Range<usize>,
+    monitor: &dyn Monitor,
+) -> Result<(Solution, Fields), SolveError> {
+    let all = problem.motions.len();
+    if range == (0..all) {
+        return solve_whole(operators, problem, monitor);
+    }
+    let share = Share {
+        inner: monitor,
+        before: range.start as f64 / all as f64,
+        own: range.len() as f64 / all as f64,
+    };
+    solve_whole(operators, &problem.slice(range), &share)
+}
+
+/// The monitor of a part of the work.
+struct Share<'a> {
+    inner: &'a dyn Monitor,
+    before: f64,
+    own: f64,
+}
+
+impl Monitor for Share<'_> {
+    fn tick(&self, progress: f64) -> ControlFlow<Stop> {
+        self.inner.tick(self.before + self.own * progress)
+    }
+
+    fn elapsed(&self) -> Duration {
+        self.inner.elapsed()
+    }
+}
+
+impl Solution {
+    /// Puts the motions of the next slice behind those of this one; both are of one case.
+    pub fn append(&mut self, later: Solution) {
+        debug_assert_eq!(self.patches.len(), later.patches.len());
+        for (patch, more) in self.patches.iter_mut().zip(later.patches) {
+            patch.points.extend(more.points);
+        }
+        self.total.extend(later.total);
+        // What is said of the whole case is said by every slice.
+        let remarks = std::mem::take(&mut self.remarks);
+        self.remarks = merged(remarks.into_iter().chain(later.remarks));
+    }
+}
+
+impl Fields {
+    /// The same for values per cell.
+    pub fn append(&mut self, later: Fields) {
+        debug_assert_eq!(self.patches.len(), later.patches.len());
+        for (patch, mut more) in self.patches.iter_mut().zip(later.patches) {
+            let meshes = patch.meshes.len();
+            more.points
+                .iter_mut()
+                .for_each(|point| point.mesh += meshes);
+            patch.meshes.extend(more.meshes);
+            patch.points.extend(more.points);
+        }
+    }
+}

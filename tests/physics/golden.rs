@@ -1,0 +1,255 @@
+//! Does the solver still give the answers that belong to its revision? Stored results are served to equal cases of the same revision, so
+//! that numbers that change without a new revision would leave stale answers in the cache of every service.
+//!
+//! When numbers were meant to change: raise `SOLVER_REVISION` in `src/contact/problem/digest.rs`, then
+//! `RAILHEAD_GOLDEN=write cargo test --test physics golden`.
+
+use std::path::PathBuf;
+
+use railhead::contact::problem::SOLVER_REVISION;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+use crate::reference::solve;
+
+/// How far answers may be from the recorded ones, relative to the largest of their kind: other processors sum up in another order, and
+/// what a matrix in single precision makes of that. Changes of method, mesh or tolerance are larger.
+const SAME: f64 = 2e-6;
+
+/// The answers that belong to a revision.
+#[derive(Debug, Serialize, Deserialize)]
+struct Golden {
+    revision: u32,
+    /// Numbers of every case, with eight digits.
+    answers: Vec<(String, Vec<f64>)>,
+}
+
+fn path() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/golden.json")
+}
+
+fn case(contact: Value, motion: Value, solver: Value) -> Value {
+    let mut case = json!({
+        "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
+        "friction": { "coefficient": 0.3 },
+        "contact": contact,
+        "motion": motion,
+        "solver": solver,
+        "outputs": ["resultants", "zones", "tractions"],
+    });
+    if case["contact"]["type"] != "pressure_grid" {
+        case["load"] = json!({ "normal_force_n": 80_000 });
+    }
+    case
+}
+
+fn gap(rough: f64) -> Value {
+    let y: Vec<f64> = (-24..=24).map(|k| 0.5 * f64::from(k)).collect();
+    let height = |y: &f64| y * y / 700.0 + rough * (3.0 * y).sin();
+    let heights: Vec<f64> = y.iter().map(height).collect();
+    json!({ "type": "gap_profile", "rolling_mm": 460, "y_mm": y, "gap_mm": heights })
+}
+
+fn gap_grid() -> Value {
+    let axis: Vec<f64> = (-15..=15).map(|k| 0.8 * f64::from(k)).collect();
+    let row = |y: &f64| -> Vec<f64> {
+        let height = |x: &f64| x * x / 900.0 + (y.abs() - 4.0).powi(2) / 500.0;
+        axis.iter().map(height).collect()
+    };
+    let rows: Vec<Vec<f64>> = axis.iter().map(row).collect();
+    json!({ "type": "gap_grid", "x_mm": axis, "y_mm": axis, "gap_mm": rows })
+}
+
+fn pressures() -> Value {
+    let axis: Vec<f64> = (-10..=10).map(|k| 0.7 * f64::from(k)).collect();
+    let row = |y: &f64| -> Vec<f64> {
+        let inside = |x: &f64| (1.0 - (x / 6.5).powi(2) - (y / 5.0).powi(2) + 0.02 * x).max(0.0);
+        axis.iter().map(|x| 900.0 * inside(x).sqrt()).collect()
+    };
+    let rows: Vec<Vec<f64>> = axis.iter().map(row).collect();
+    json!({ "type": "pressure_grid", "x_mm": axis, "y_mm": axis, "pressure_mpa": rows })
+}
+
+/// Every contact type and method, with creepage, spin, forces and sweeps.
+fn cases() -> Vec<(String, Value)> {
+    let radii = || json!({ "type": "radii", "rolling_mm": 460, "lateral_mm": 300 });
+    let ellipse = |a: f64, b: f64| json!({ "type": "ellipse", "a_mm": a, "b_mm": b });
+    let along = || json!({ "creepage_x": 0.001 });
+    let all = || json!({ "creepage_x": 0.001, "creepage_y": -0.0005, "spin_per_mm": 0.0006 });
+    let spin = || json!({ "creepage_x": 0.004, "spin_per_mm": 0.004 });
+    let target = |t: f64| json!({ "target_error": t });
+    let mesh = || json!({ "mesh": { "strips": 12, "cells": 16 } });
+    let with = |method: &str, solver: Value| {
+        let mut solver = solver;
+        solver["method"] = json!(method);
+        solver
+    };
+    let sweep = || json!([{ "creepage_x": 0.0005, "spin_per_mm": 0.003 }, { "creepage_x": 0.001, "spin_per_mm": 0.003 }, { "creepage_x": 0.002, "spin_per_mm": 0.003 }]);
+    let mut cases = vec![
+        ("radii, creepage", case(radii(), along(), target(0.005))),
+        ("radii, all", case(radii(), all(), target(0.005))),
+        ("radii, all, 0.001", case(radii(), all(), target(0.001))),
+        ("radii, all, 0.0003", case(radii(), all(), target(0.0003))),
+        ("radii, spin", case(radii(), spin(), target(0.002))),
+        ("radii, sweep", case(radii(), sweep(), target(0.005))),
+        (
+            "radii, force",
+            case(
+                radii(),
+                json!({ "force_x_n": 9000, "spin_per_mm": 0.0004 }),
+                target(0.005),
+            ),
+        ),
+        (
+            "radii, full slip",
+            case(
+                radii(),
+                json!({ "creepage_x": 0.2, "spin_per_mm": 0.01 }),
+                target(0.005),
+            ),
+        ),
+        ("radii, mesh", case(radii(), all(), mesh())),
+        (
+            "ellipse, long",
+            case(ellipse(9.0, 2.0), all(), target(0.005)),
+        ),
+        (
+            "ellipse, wide",
+            case(ellipse(2.0, 9.0), all(), target(0.005)),
+        ),
+        (
+            "ellipse, slender",
+            case(ellipse(20.0, 1.0), along(), target(0.01)),
+        ),
+        (
+            "ellipse, liu_hsu",
+            case(ellipse(6.0, 4.0), along(), with("liu_hsu", mesh())),
+        ),
+        (
+            "ellipse, liu_hsu, target",
+            case(ellipse(6.0, 4.0), all(), with("liu_hsu", target(0.01))),
+        ),
+        (
+            "ellipse, fastsim",
+            case(ellipse(6.0, 4.0), all(), with("fastsim", json!({}))),
+        ),
+        ("gap profile", case(gap(0.0), all(), target(0.005))),
+        ("gap profile, wavy", case(gap(0.001), all(), target(0.01))),
+        (
+            "gap grid, two patches",
+            case(gap_grid(), all(), target(0.01)),
+        ),
+        ("pressure grid", case(pressures(), all(), target(0.01))),
+        ("pressure grid, mesh", case(pressures(), all(), mesh())),
+    ];
+    for name in ["wheel-rail", "wheel-rail-flange"] {
+        let file = format!(
+            "{}/api/examples/{name}.case.json",
+            env!("CARGO_MANIFEST_DIR")
+        );
+        let text = std::fs::read_to_string(file).expect("an example");
+        cases.push((
+            name,
+            serde_json::from_str(&text).expect("an example is JSON"),
+        ));
+    }
+    let owned = |(name, case): (&str, Value)| (name.to_owned(), case);
+    cases.into_iter().map(owned).collect()
+}
+
+/// Eight digits of a number.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.7e}").parse().expect("a number")
+}
+
+/// What identifies an answer: forces, patches, zones; relative to μN or to themselves, so that they are of one size.
+fn numbers(case: &Value) -> Vec<f64> {
+    let (solution, _) = solve(case);
+    let friction = case["friction"]["coefficient"].as_f64().expect("friction");
+    let mut numbers = Vec::new();
+    for patch in &solution.patches {
+        let bound = friction * patch.normal_force_n;
+        numbers.extend([
+            patch.normal_force_n / 1e4,
+            patch.pressure_max_mpa / 1e3,
+            patch.area_mm2 / 100.0,
+        ]);
+        for point in &patch.points {
+            let arm = (patch.area_mm2 / std::f64::consts::PI).sqrt();
+            numbers.extend([
+                point.force_x_n / bound,
+                point.force_y_n / bound,
+                point.moment_z_n_mm / (bound * arm),
+            ]);
+            numbers.extend(point.error_estimate.map(|error| error.force_x_n / bound));
+            numbers.push(point.traction_max_mpa / (friction * patch.pressure_max_mpa));
+        }
+    }
+    numbers.into_iter().map(rounded).collect()
+}
+
+/// The cases whose numbers are not the recorded ones.
+fn changed(golden: &Golden, answers: &[(String, Vec<f64>)]) -> Vec<String> {
+    let mut changed = Vec::new();
+    for (name, now) in answers {
+        let recorded = golden.answers.iter().find(|(known, _)| known == name);
+        let Some((_, before)) = recorded else {
+            changed.push(format!("{name}: not recorded"));
+            continue;
+        };
+        let apart = before.iter().zip(now).map(|(a, b)| (a - b).abs());
+        let apart = apart.fold(0.0, f64::max);
+        if before.len() != now.len() || apart > SAME {
+            changed.push(format!("{name}: {apart:.1e} apart"));
+        }
+    }
+    changed
+}
+
+#[test]
+fn golden_answers_belong_to_the_revision_of_the_solver() {
+    let answers: Vec<_> = cases()
+        .into_iter()
+        .map(|(name, case)| {
+            let numbers = numbers(&case);
+            (name, numbers)
+        })
+        .collect();
+    let text = std::fs::read_to_string(path());
+    let golden = text
+        .ok()
+        .map(|text| serde_json::from_str::<Golden>(&text).expect("golden.json is JSON"));
+    let changed = golden
+        .as_ref()
+        .map_or_else(Vec::new, |golden| changed(golden, &answers));
+    let recorded = golden.as_ref().map_or(0, |golden| golden.revision);
+    if std::env::var_os("RAILHEAD_GOLDEN").is_some_and(|wish| wish == "write") {
+        assert!(
+            changed.is_empty() || SOLVER_REVISION > recorded,
+            "answers changed; raise SOLVER_REVISION above {recorded} first: {changed:#?}"
+        );
+        let golden = Golden {
+            revision: SOLVER_REVISION,
+            answers,
+        };
+        let lines: Vec<String> = golden
+            .answers
+            .iter()
+            .map(|answer| serde_json::to_string(answer).expect("JSON"))
+            .collect();
+        let text = format!(
+            "{{\"revision\":{SOLVER_REVISION},\"answers\":[\n{}\n]}}\n",
+            lines.join(",\n")
+        );
+        return std::fs::write(path(), text).expect("golden.json can be written");
+    }
+    assert!(
+        golden.is_some(),
+        "record the answers: RAILHEAD_GOLDEN=write cargo test --test physics golden"
+    );
+    assert!(
+        changed.is_empty() && recorded == SOLVER_REVISION,
+        "answers of revision {recorded}, the solver says {SOLVER_REVISION}; changed: {changed:#?}\n\
+         raise SOLVER_REVISION if they were meant to change, then RAILHEAD_GOLDEN=write cargo test --test physics golden"
+    );
+}
