@@ -45,19 +45,25 @@ pub(super) fn solve(
 ) -> Result<(Solution, Fields), SolveError> {
     let search =
         Search::new(&contact.geometry).map_err(|reason| SolveError::NormalProblem { reason })?;
+    let vertical = matches!(contact.loading, Loading::Vertical(_)) && problem.friction > 0.0;
+    let balanced = vertical && problem.part.all == 1;
     let rest = |wanted: Wanted, before: Option<&PressedWheel>| -> Result<Rest, SolveError> {
         let watch = Watch::new(monitor, problem.time_limit, 1);
         let began = monitor.elapsed();
         let wheel = contact.press(&search, wanted, before, &watch)?;
         let seconds = (monitor.elapsed() - began).as_secs_f64();
-        Ok(Rest { wheel, seconds })
+        let unbalanced = if balanced { BALANCE } else { 0.0 };
+        Ok(Rest {
+            wheel,
+            seconds,
+            unbalanced,
+        })
     };
     let exactly = |friction_share: f64| Wanted {
         friction_share,
         tolerance: 0.0,
     };
-    let vertical = matches!(contact.loading, Loading::Vertical(_)) && problem.friction > 0.0;
-    if !vertical || problem.part.all > 1 {
+    if !balanced {
         let mut at_rest = rest(exactly(0.0), None)?;
         let answers = at_rest.answers(operators, problem, contact, monitor)?;
         if vertical {
@@ -114,6 +120,8 @@ fn friction_share(wheel: &PressedWheel, answers: &[(Solution, Fields)]) -> f64 {
 struct Rest {
     wheel: PressedWheel,
     seconds: f64,
+    /// By which part of it friction may leave a vertical force unbalanced.
+    unbalanced: f64,
 }
 
 impl Rest {
@@ -124,6 +132,7 @@ impl Rest {
         Rest {
             wheel,
             seconds: self.seconds + later.seconds,
+            unbalanced: later.unbalanced,
         }
     }
 
@@ -148,7 +157,8 @@ impl Rest {
                 Some(wheelset) => vec![self.motion(gap, &contact.geometry, wheelset)],
             };
             let region = Region::Grid(gap.field.clone());
-            let part = problem.of_part(region, motions, normal)?;
+            let load_error = self.wheel.load_error.hypot(self.unbalanced);
+            let part = problem.of_part(region, motions, normal, load_error)?;
             answers.push(answer(operators, &part, &watch)?);
         }
         Ok(answers)

@@ -22,6 +22,8 @@ const HEIGHTS_MAX: u32 = 40;
 /// The force found may differ from the one wanted by this part; the contact is then grown to the force as Hertz's would be. What
 /// is left is of second order for Hertz's contacts, about a third of this part in pressures and lengths at worst.
 const FORCE_TOLERANCE: f64 = 5e-3;
+/// That third, as an error of the load.
+const CORRECTED: f64 = 1.0 / 3.0;
 /// A coarse look that misses the force by no more than this is followed by a fine one.
 const NEAR: f64 = 0.02;
 /// A bracket narrower than this part of the lowering holds a jump of the force, where patches merge.
@@ -62,6 +64,8 @@ pub struct PressedWheel {
     pub lowering: f64,
     /// The force that is prescribed, in N, as it came out at the last height, and its derivative by the lowering.
     found: [f64; 2],
+    /// By how much, relatively, the load of region and pressure may differ from the one wanted.
+    pub load_error: f64,
     /// Height of the wheel's centre over the top of the rail, in mm.
     pub centre: f64,
     /// Heights looked at.
@@ -181,6 +185,7 @@ impl ProfileContact {
             {
                 // A coarse rest is not corrected: it is a place to go on from.
                 if wanted.tolerance <= FORCE_TOLERANCE {
+                    found.load_error = CORRECTED * (target / carried - 1.0).abs();
                     found.correct(target / carried, (target - carried) / found.found[1]);
                 }
                 return Ok(found);
@@ -192,6 +197,7 @@ impl ProfileContact {
             if closed && detail == Detail::Fine {
                 let factor = target / carried;
                 found.remarks.push(Remark::ForceJumps { factor }.into());
+                found.load_error = (target / carried - 1.0).abs();
                 found.correct(target / carried, 0.0);
                 return Ok(found);
             }
@@ -247,6 +253,7 @@ impl ProfileContact {
         let mut wheel = PressedWheel {
             lowering,
             found: [0.0; 2],
+            load_error: 0.0,
             centre,
             heights: 1,
             patches,

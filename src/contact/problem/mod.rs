@@ -118,6 +118,8 @@ pub struct Problem {
     pub remarks: Vec<RemarkEntry>,
     /// How region and pressure were found, where they were not known beforehand.
     pub normal: Option<NormalReport>,
+    /// By how much, relatively, the load of region and pressure may differ from the one wanted.
+    pub load_error: f64,
     /// Memory the solve may use, in bytes.
     pub memory_bytes: u64,
     /// Hexadecimal digest of everything that determines the answer, the solver version included.
@@ -186,6 +188,7 @@ impl Problem {
             outputs: case.outputs.clone(),
             remarks,
             normal: None,
+            load_error: 0.0,
             memory_bytes: limits.memory_bytes,
             digest,
         })

@@ -39,6 +39,7 @@ impl Problem {
         region: Region,
         motions: Vec<Motion>,
         normal: NormalReport,
+        load_error: f64,
     ) -> Result<Problem, SolveError> {
         let part = Problem {
             region,
@@ -46,6 +47,7 @@ impl Problem {
             wheelset: None,
             remarks: Vec::new(),
             normal: Some(normal),
+            load_error,
             ..self.clone()
         };
         part.fits().map(|()| part)

@@ -147,6 +147,23 @@ remarks! {
         "the patch has only {samples_x} by {samples_y} samples of pressure; its force and its edge are uncertain by some per cent"
     ),
 
+    /// The given pressure jumps from one sample to the next as at no edge of a contact: strips and cells do not follow it, and
+    /// errors may be larger than estimated.
+    PressureJumps {
+        /// Where, halfway between the two samples; the largest jump.
+        x_mm: f64 = 1.5,
+        /// The same across.
+        y_mm: f64 = -0.5,
+        /// The fall over the largest pressure.
+        share_of_largest: f64 = 0.8,
+    }
+    code: "pressure-jumps",
+    severity: Warning,
+    advice: "Give finer samples, or smooth the pressure over two or three of them.",
+    detail: format!(
+        "the pressure jumps by {share_of_largest:.2} of its largest value between samples at ({x_mm:.4}, {y_mm:.4}) mm, which strips and cells do not follow"
+    ),
+
     /// The contact is long against the rolling radius: the bodies are nearly conformal.
     NearlyConformal {
         /// Length of the contact along rolling.

@@ -1,171 +1,339 @@
-//! How wrong are the resultants? From two rules, two levels, and the cell that holds the spin pole.
+//! How wrong are the resultants? From two rules, two companion meshes, the level before, and the cell that holds the spin
+//! pole.
 
 use crate::contact::case::{Method, Motion};
-use crate::contact::mesh::Segment;
-use crate::contact::normal::Patch;
+use crate::contact::normal::{Patch, Region};
 use crate::contact::outputs::resultants::Resultants;
-use crate::contact::problem::Problem;
+use crate::contact::problem::{Problem, Resolution};
 use crate::contact::tangential::Tangential;
-use crate::contact::tangential::ladder::Regime;
+use crate::contact::tangential::companions::Seen;
+use crate::contact::tangential::estimate_constants::{
+    CAUTION, DATA, DECAY, DENSE_LEVELS, DENSE_LEVELS_NEAR, DIFFERENCES, JUMPING, LEVELS_LIKE,
+    LEVELS_UNLIKE, LOAD, POLE_WEIGHT, REGION, REGION_CELLS, RULES_ON_MESH, RULES_ON_MESH_SAMPLED,
+    SHARE_LARGE, STRIPS_FEW, WITHOUT_COMPANION,
+};
+use crate::contact::tangential::ladder::{CELLS_FIRST, Regime};
 use crate::contact::tangential::level::Level;
-use crate::contact::tangential::liu_hsu::spin_pole::vortex_centre;
+use crate::contact::tangential::regime::pole_error;
 use crate::contact::tangential::{fastsim, full_slip};
 
-/// Factor on the difference of the two rules on a mesh that was chosen without knowing the tractions.
-const RULES_UNKNOWING: f64 = 2.3;
-/// The same on a mesh made for them.
-const RULES_ALONE: f64 = 1.4;
-/// Factor on these two where region and pressure are not known in closed form: strips may miss what the rules share.
-const RULES_SAMPLED: f64 = 1.5;
-/// The same where a coarser level of the same kind has its say.
-const RULES_BESIDE: f64 = 0.5;
-/// Factor on the step of the extrapolation, and where the levels are so near each other that the step is more than
-/// `SHARE_LARGE` times the change between them.
-const LEVELS: f64 = 1.25;
-const LEVELS_NEAR: f64 = 1.9;
-const SHARE_LARGE: f64 = 1.5;
-/// The factors grow as this power of the slenderness of a patch, whose strips or cells are few for what they have to tell.
-const CAUTION: f64 = 0.4;
-/// With the load on fewer strips than these, counted by `(Σ load)² / Σ load²`, the factors grow as the square of what is missing;
-/// four strips of an ellipse count as 3.5.
-const STRIPS_FEW: f64 = 3.5;
-/// Error of sampling the vortex of the tractions by one cell, over p h² / N.
-const POLE: f64 = 0.45;
 /// Relative error where everything slips along the rigid slip.
 const RIGID: f64 = 1e-6;
-/// Stick below this share of the cells' area counts as none.
-const STICK_NEGLIGIBLE: f64 = 0.12;
-/// With less stick than this on the first level, a pole in a sticking cell may as well be in a slipping one.
-const STICK_UNCERTAIN: f64 = 0.2;
-/// A pole this far out, relative to the half axes of the box around the patches, is outside.
-const POLE_INSIDE: f64 = 0.9;
-/// Cells gather no farther out than here.
-const POLE_OUTMOST: f64 = 0.95;
-
 /// Relative errors of every patch, then of the sum over them; nothing where there is no second opinion.
 pub type Errors = Vec<Option<f64>>;
 
-/// What else is known besides the two rules on one mesh.
+/// The level before on the climb, as far as it says something.
 #[derive(Debug, Clone, Copy)]
-pub enum Opinion<'a> {
-    /// Nothing.
-    Alone,
-    /// The resultants of a coarser level of the same kind, and the share of the change that is left to go: 1 over (ratio
-    /// of cells − 1).
-    Coarser(&'a [Resultants], f64),
+pub struct Before<'a> {
+    /// Its resultants.
+    pub summed: &'a [Resultants],
+    /// What it was made for.
+    pub regime: Regime,
+    /// 1 over (ratio of cells − 1).
+    pub share: f64,
 }
 
-/// What an estimate depends on beside the answers.
+/// What an estimate depends on beside the answer on its level.
 #[derive(Debug, Clone, Copy)]
 pub struct Circumstances<'a> {
     /// The motion in mm.
     pub motion: &'a Motion,
-    /// A finer level, where everything slips and no coarser one has its say.
+    /// The level before.
+    pub before: Option<Before<'a>>,
+    /// A finer level, where everything slips or the pressure jumps.
     pub finer: Option<&'a Level>,
-    /// How many times more slender the patch is than the factors were found for; at least 1.
+    /// How many times more slender the patch is than the factors of an explicit mesh were found for; at least 1.
     pub slenderness: f64,
     /// Residual of the solve.
     pub tolerance: f64,
 }
 
-/// Estimates the errors of resultants, relative to μN (moment: μN√(A/π)): the largest component for all three, since
-/// single ones cross zero.
-///
-/// `found` are the resultants of `answer` on `level`, not extrapolated. The estimate is
-/// - `1.4 |trapezoid − mirror|` on a mesh made for the regime, 2.3 times the difference on one that was not, both 1.5 times
-///   that where region and pressure come from samples;
-/// - `max(1.25 s |change|, 0.5 |trapezoid − mirror|)`, with 1.9 for 1.25 where s > 1.5, for resultants extrapolated by the share s of the change from a coarser
-///   level of the same kind;
-/// - both more in slender patches, and where few strips carry the load;
-/// - never less than the error of the sums over cells where everything slips;
-/// - never less than the tolerance of the solve, nor, unless extrapolated on cells that gather about the pole, than
-///   `0.45 p h² / N` with the pressure p and longer side h of the cell that holds the centre of the traction vortex:
-///   sampling the vortex at nodes makes an error of that size which two rules on one mesh share.
-#[must_use]
-pub fn errors(
-    problem: &Problem,
-    level: &Level,
-    answer: &Tangential,
-    found: &[Resultants],
-    opinion: Opinion,
-    circumstances: Circumstances,
-) -> Errors {
-    let Circumstances {
-        motion,
-        finer,
-        slenderness,
-        tolerance,
-    } = circumstances;
-    let spinning = motion.spin_per_mm != 0.0;
-    let caution = slenderness.powf(CAUTION) * few_strips(level);
-    let patches = problem.region.patches();
-    let all = |value| vec![value; patches.len() + 1];
-    if problem.friction == 0.0 {
-        return all(Some(0.0));
-    }
-    let of_sums = finer.map_or_else(
-        || vec![0.0; patches.len() + 1],
-        |finer| sum_errors(problem, &patches, [level, finer], motion),
-    );
-    if answer.second.is_none() && answer.work.products == 0 && answer.work.iterations == 0 {
-        if !answer.slips.iter().any(|s| *s) {
+/// What the error of one solved level is judged by, relative to μN (moment: μN√(A/π)): of every patch, then of the sum.
+/// Distances are the largest component, since single ones cross zero.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Indicators {
+    /// Nothing is left to find out.
+    Known(Errors),
+    /// Differences that a factor turns into an error.
+    Measured(Box<Measured>),
+}
+
+/// Differences that stand for the error of a level.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measured {
+    /// Between the two rules; nothing if one of them did not converge.
+    rules: Option<Vec<f64>>,
+    /// To the level before, weighted.
+    before: Option<Vec<f64>>,
+    /// To half the strips and to half the cells.
+    companions: [Option<Vec<f64>>; 2],
+    /// A companion that was tried cannot be had.
+    missing: bool,
+    /// From sampling the vortex of the tractions, weighted.
+    pole: f64,
+    /// Of the sums over cells, where everything slips.
+    sums: Vec<f64>,
+    /// Of region and pressure.
+    normal: Vec<f64>,
+    /// Of the iteration.
+    tolerance: f64,
+    /// The factor.
+    scale: f64,
+}
+
+impl Indicators {
+    /// Reads a solved level; `found` are the resultants of `answer` on it, not extrapolated.
+    #[must_use]
+    pub fn of_level(
+        problem: &Problem,
+        level: &Level,
+        answer: &Tangential,
+        found: &[Resultants],
+        circumstances: Circumstances,
+    ) -> Indicators {
+        let Circumstances { motion, finer, .. } = circumstances;
+        let patches = problem.region.patches();
+        let none = vec![0.0; patches.len() + 1];
+        let all = |value| Indicators::Known(vec![value; patches.len() + 1]);
+        if problem.friction == 0.0 {
             return all(Some(0.0));
         }
-        return of_sums.iter().map(|e| Some(e.max(RIGID))).collect();
-    }
-    if problem.method == Method::Fastsim {
-        // No mesh tells what the theory leaves out.
-        return all(Some(fastsim::error_class(
-            problem.traction_bound,
-            level.plan.size,
-        )));
-    }
-    let of_rules = answer.second.as_ref().map(|second| {
-        let second: Vec<Resultants> = (0..patches.len())
-            .map(|p| Resultants::of_patch(level, second, p))
-            .collect();
-        distances(problem, &patches, found, &second)
-    });
-    let of_levels = match opinion {
-        Opinion::Alone => None,
-        Opinion::Coarser(coarser, share) => {
-            let mut change = distances(problem, &patches, found, coarser);
-            let factor = if share > SHARE_LARGE {
-                LEVELS_NEAR
-            } else {
-                LEVELS
-            };
-            change.iter_mut().for_each(|d| *d *= factor * share);
-            Some(change)
+        let slides = answer.slips.iter().all(|slips| *slips);
+        let sums = finer.filter(|_| slides).map_or_else(
+            || none.clone(),
+            |finer| sum_errors(problem, &patches, [level, finer], motion),
+        );
+        if answer.second.is_none() && answer.work.products == 0 && answer.work.iterations == 0 {
+            if !answer.slips.iter().any(|s| *s) {
+                return all(Some(0.0));
+            }
+            return Indicators::Known(sums.iter().map(|e| Some(e.max(RIGID))).collect());
         }
+        if problem.method == Method::Fastsim {
+            // No mesh tells what the theory leaves out.
+            return all(Some(fastsim::error_class(
+                problem.traction_bound,
+                level.plan.size,
+            )));
+        }
+        if problem.method == Method::LiuHsu {
+            return Indicators::Known(dense_errors(problem, &patches, found, circumstances));
+        }
+        let rules = answer.second.as_ref().map(|second| {
+            let second: Vec<Resultants> = (0..patches.len())
+                .map(|p| Resultants::of_patch(level, second, p))
+                .collect();
+            distances(problem, &patches, found, &second)
+        });
+        let pole = if motion.spin_per_mm == 0.0 {
+            0.0
+        } else {
+            pole_error(problem, level, answer)
+        };
+        if matches!(problem.resolution, Resolution::Mesh(_)) {
+            let errors = mesh_errors(problem, level, rules.as_deref(), &sums, pole, circumstances);
+            return Indicators::Known(errors);
+        }
+        let sticking = matches!(level.plan.regime, Regime::Sticking { .. });
+        Indicators::Measured(Box::new(Measured {
+            rules,
+            before: circumstances
+                .before
+                .map(|before| change(problem, &patches, level, found, before)),
+            companions: [None, None],
+            missing: false,
+            pole: if sticking { 0.0 } else { POLE_WEIGHT * pole },
+            sums,
+            normal: match finer.filter(|_| jumps(problem)) {
+                Some(finer) => data_errors(&patches, [level, finer]),
+                None => normal_errors(problem, &patches),
+            },
+            tolerance: circumstances.tolerance,
+            scale: scale(problem, level, patches.len()),
+        }))
+    }
+
+    /// Takes in what companion `k` (0: half the strips, 1: half the cells) says of the resultants that were `found`.
+    pub fn see(&mut self, problem: &Problem, k: usize, found: &[Resultants], seen: &Seen) {
+        let Indicators::Measured(measured) = self else {
+            return;
+        };
+        match seen {
+            Seen::Untried => {}
+            Seen::Missing => measured.missing = true,
+            Seen::Found(other, reach) => {
+                let patches = problem.region.patches();
+                let mut apart = distances(problem, &patches, found, other);
+                apart.iter_mut().for_each(|d| *d *= reach);
+                measured.companions[k] = Some(apart);
+            }
+        }
+    }
+
+    /// The estimates, see [`Measured::error`].
+    #[must_use]
+    pub fn errors(&self) -> Errors {
+        match self {
+            Indicators::Known(errors) => errors.clone(),
+            Indicators::Measured(measured) => (0..measured.sums.len())
+                .map(|k| measured.error(k))
+                .collect(),
+        }
+    }
+}
+
+impl Measured {
+    /// The estimate for patch `k`, or for the sum: the root of the sum of the squares of all indicators, with one factor for
+    /// all regimes, shapes and motions. Without companions it is a lower bound, by which a mesh can be refused.
+    fn error(&self, k: usize) -> Option<f64> {
+        let rules = DIFFERENCES * self.rules.as_ref()?[k];
+        let rules = if self.missing {
+            WITHOUT_COMPANION * rules
+        } else {
+            rules
+        };
+        let of = |values: &Option<Vec<f64>>| values.as_ref().map_or(0.0, |values| values[k]);
+        let [across, along] = [0, 1].map(|c| DIFFERENCES * of(&self.companions[c]));
+        let parts = [
+            rules,
+            of(&self.before),
+            across,
+            along,
+            self.pole,
+            self.sums[k],
+            self.normal[k],
+            self.tolerance,
+        ];
+        let squares: f64 = parts.iter().map(|part| part * part).sum();
+        Some(self.scale * squares.sqrt())
+    }
+}
+
+/// The factor on the root of the squares.
+fn scale(problem: &Problem, level: &Level, patches: usize) -> f64 {
+    let cells = level.mesh.cells() as f64 / patches.max(1) as f64;
+    let decay = (CELLS_FIRST / cells).min(1.0).powf(DECAY);
+    let samples = if jumps(problem) { JUMPING } else { 1.0 };
+    samples * decay * few_strips(level).sqrt()
+}
+
+/// Is the pressure one that was given with jumps?
+#[must_use]
+pub fn jumps(problem: &Problem) -> bool {
+    matches!(&problem.region, Region::Grid(field) if field.jump().is_some())
+}
+
+/// Errors of region and pressure that were found from a gap, and of the load they carry.
+///
+/// The first falls as the power 3/2 of the cells of the normal problem across a patch.
+fn normal_errors(problem: &Problem, patches: &[Patch]) -> Vec<f64> {
+    let (Region::Grid(field), Some(_)) = (&problem.region, problem.normal) else {
+        return vec![0.0; patches.len() + 1];
     };
-    let sampled = if problem.region.is_ellipse() {
-        1.0
+    let of = |cells: f64| {
+        let region = REGION * (REGION_CELLS / cells.max(1.0)).powf(1.5);
+        region.hypot(LOAD * problem.load_error)
+    };
+    weighted(patches, field.cells_across().into_iter().map(of).collect())
+}
+
+/// Errors of sampling a pressure that jumps: the change of its moments to a level of twice as many strips and cells.
+fn data_errors(patches: &[Patch], levels: [&Level; 2]) -> Vec<f64> {
+    let moments = |level: &Level, k: usize| {
+        let [x0, x1, y0, y1] = patches[k].extent;
+        let (a, b) = (0.5 * (x1 - x0), 0.5 * (y1 - y0));
+        let (x, y) = (0.5 * (x0 + x1), 0.5 * (y0 + y1));
+        let rows = level.mesh.rows();
+        let mut sums = [0.0; 2];
+        for i in level.patch_cells(k) {
+            let load = level.pressure[i] * level.area[i] / patches[k].normal_force;
+            let centre = 0.5 * (level.mesh.left[i] + level.mesh.right[i]);
+            sums[0] += load * (centre - x).abs() / a;
+            sums[1] += load * ((rows[i] - y) / b).powi(2);
+        }
+        sums
+    };
+    let errors = (0..patches.len()).map(|k| {
+        let [here, finer] = levels.map(|level| moments(level, k));
+        DATA * (here[0] - finer[0]).abs().max((here[1] - finer[1]).abs())
+    });
+    weighted(patches, errors.collect())
+}
+
+/// Errors of the patches, and of their sum by their loads.
+fn weighted(patches: &[Patch], mut errors: Vec<f64>) -> Vec<f64> {
+    let load: f64 = patches.iter().map(|patch| patch.normal_force).sum();
+    let pairs = errors.iter().zip(patches);
+    let sum: f64 = pairs
+        .map(|(error, patch)| error * patch.normal_force / load)
+        .sum();
+    errors.push(sum);
+    errors
+}
+
+/// The weighted change from the level before.
+fn change(
+    problem: &Problem,
+    patches: &[Patch],
+    level: &Level,
+    found: &[Resultants],
+    before: Before,
+) -> Vec<f64> {
+    let factor = match (before.regime, level.plan.regime) {
+        (Regime::Sticking { .. }, Regime::Sticking { .. })
+        | (Regime::Spinning(_), Regime::Spinning(_)) => LEVELS_LIKE,
+        (_, Regime::Sticking { .. }) => LEVELS_UNLIKE,
+        _ => 0.0,
+    };
+    let mut change = distances(problem, patches, found, before.summed);
+    change.iter_mut().for_each(|d| *d *= factor * before.share);
+    change
+}
+
+/// The dense method has one rule; the change between its levels is all there is.
+fn dense_errors(
+    problem: &Problem,
+    patches: &[Patch],
+    found: &[Resultants],
+    circumstances: Circumstances,
+) -> Errors {
+    let Some(Before { summed, share, .. }) = circumstances.before else {
+        return vec![None; patches.len() + 1];
+    };
+    let factor = if share > SHARE_LARGE {
+        DENSE_LEVELS_NEAR
     } else {
-        RULES_SAMPLED
+        DENSE_LEVELS
     };
-    let rules_factor = match (&of_levels, level.plan.regime) {
-        (Some(_), _) => RULES_BESIDE,
-        (None, Regime::Unknown) => sampled * RULES_UNKNOWING,
-        (None, _) => sampled * RULES_ALONE,
-    };
-    let gathered = level.plan.pole().is_some();
-    let pole = if !spinning || gathered && of_levels.is_some() {
-        0.0
+    let factor = factor * share * circumstances.slenderness.powf(CAUTION);
+    distances(problem, patches, found, summed)
+        .iter()
+        .map(|d| Some((factor * d).max(circumstances.tolerance)))
+        .collect()
+}
+
+/// Errors on a mesh of the client's, which has no companions: from the difference of the two rules, the sums, and the vortex.
+fn mesh_errors(
+    problem: &Problem,
+    level: &Level,
+    rules: Option<&[f64]>,
+    sums: &[f64],
+    pole: f64,
+    circumstances: Circumstances,
+) -> Errors {
+    let factor = if problem.region.is_ellipse() {
+        RULES_ON_MESH
     } else {
-        pole_error(problem, level, answer)
+        RULES_ON_MESH_SAMPLED
     };
-    (0..=patches.len())
-        .map(|k| {
-            let error = match (&of_rules, &of_levels) {
-                (Some(rules), Some(levels)) => (rules_factor * rules[k]).max(levels[k]),
-                (Some(rules), None) => rules_factor * rules[k],
-                // The dense method has one rule; the change between its levels is all there is.
-                (None, Some(levels)) => levels[k],
-                (None, None) => return None,
-            };
-            Some((caution * error).max(of_sums[k]).max(pole).max(tolerance))
-        })
+    let factor = factor * circumstances.slenderness.powf(CAUTION) * few_strips(level);
+    let Some(rules) = rules else {
+        return vec![None; sums.len()];
+    };
+    let least = pole.max(circumstances.tolerance);
+    let errors = rules.iter().zip(sums);
+    errors
+        .map(|(rule, sum)| Some((factor * rule).max(*sum).max(least)))
         .collect()
 }
 
@@ -214,97 +382,6 @@ fn few_strips(level: &Level) -> f64 {
         .map(counted)
         .fold(STRIPS_FEW, f64::min);
     (STRIPS_FEW / fewest).powi(2)
-}
-
-/// Which mesh the next level should have, seen from this one.
-#[must_use]
-pub fn regime(level: &Level, answer: &Tangential, spinning: bool) -> Regime {
-    if !spinning || stick_share(level, answer) >= STICK_NEGLIGIBLE {
-        return Regime::Sticking;
-    }
-    pole(level, answer)
-        .and_then(|at| place_inside(level, at))
-        .map_or(Regime::Sticking, Regime::Spinning)
-}
-
-/// Share of the cells' area that sticks.
-fn stick_share(level: &Level, answer: &Tangential) -> f64 {
-    let (mut stick, mut total) = (0.0, 0.0);
-    for (slips, area) in answer.slips.iter().zip(&level.area) {
-        total += area;
-        stick += if *slips { 0.0 } else { *area };
-    }
-    stick / total
-}
-
-/// A point inside the box about the patches as a place along the nearest chord and across, each from −1 to 1.
-fn place_inside(level: &Level, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
-    let mesh = &level.normalised;
-    let side = |sign: f64| {
-        let sides = mesh
-            .segments
-            .iter()
-            .map(|s| sign * s.chord.y + 0.5 * s.chord.dy);
-        sign * sides.fold(f64::NEG_INFINITY, f64::max)
-    };
-    let (bottom, top) = (side(-1.0), side(1.0));
-    let across = (2.0 * y - bottom - top) / (top - bottom);
-    let reach = mesh.node.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-    if (x / reach).hypot(across) >= POLE_INSIDE {
-        return None;
-    }
-    let distance = |s: &Segment| (s.chord.y - y).abs();
-    let nearest = mesh
-        .segments
-        .iter()
-        .min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-    let (left, right) = (nearest.chord.left, nearest.chord.right);
-    let along = (2.0 * x - left - right) / (right - left);
-    Some([along.clamp(-POLE_OUTMOST, POLE_OUTMOST), across])
-}
-
-/// Centre of the traction vortex, in the level's dimensionless coordinates.
-fn pole(level: &Level, answer: &Tangential) -> Option<[f64; 2]> {
-    let rows = level.normalised.rows();
-    let load = |i: usize| {
-        if answer.slips[i] {
-            level.pressure[i] * level.area[i]
-        } else {
-            0.0
-        }
-    };
-    let weight: Vec<f64> = (0..rows.len()).map(load).collect();
-    let t: Vec<f64> = answer.traction.concat();
-    vortex_centre(&t, &level.normalised.node, &rows, &weight)
-}
-
-/// Error of sampling the vortex, relative to the whole load; 0 where the cell that holds the centre surely
-/// sticks.
-fn pole_error(problem: &Problem, level: &Level, answer: &Tangential) -> f64 {
-    let Some([x, y]) = pole(level, answer) else {
-        return 0.0;
-    };
-    let load: f64 = problem
-        .region
-        .patches()
-        .iter()
-        .map(|p| p.normal_force)
-        .sum();
-    let uncertain =
-        level.plan.regime == Regime::Unknown && stick_share(level, answer) < STICK_UNCERTAIN;
-    for (segment, here) in level.mesh.segments.iter().zip(&level.normalised.segments) {
-        if (here.chord.y - y).abs() > 0.5 * here.chord.dy {
-            continue;
-        }
-        for i in segment.cells.clone() {
-            let holds = level.normalised.left[i] <= x && x <= level.normalised.right[i];
-            if holds && (answer.slips[i] || uncertain) {
-                let longer = (level.mesh.right[i] - level.mesh.left[i]).max(segment.chord.dy);
-                return POLE * level.pressure[i] * longer * longer / load;
-            }
-        }
-    }
-    0.0
 }
 
 /// Distances of two sets of resultants: every patch relative to its own μN with moments about its middle, then the sums.

@@ -1,8 +1,10 @@
 //! How does it drag? Tractions and slips for given pressure and motion.
 
 pub mod boundary_element;
+pub mod companions;
 pub mod equations;
 pub mod estimate;
+pub mod estimate_constants;
 pub mod fastsim;
 pub mod forces;
 pub mod full_slip;
@@ -13,6 +15,8 @@ pub mod liu_hsu;
 pub mod nested;
 pub mod operator_store;
 pub mod point;
+mod refine;
+pub mod regime;
 mod root;
 pub mod rules;
 pub mod trail;

@@ -5,12 +5,13 @@ use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
 use crate::contact::outputs::resultants::Resultants;
 use crate::contact::problem::{Problem, Resolution};
-use crate::contact::tangential::estimate::{self, Circumstances, Errors, Opinion};
-use crate::contact::tangential::ladder::{CELLS_MAX, Ladder, Plan, Regime};
+use crate::contact::tangential::estimate::{self, Before, Circumstances, Errors, Indicators};
+use crate::contact::tangential::estimate_constants::LEVEL_RATIO_MIN;
+use crate::contact::tangential::ladder::{Ladder, Plan, Regime};
 use crate::contact::tangential::level::Level;
 use crate::contact::tangential::trail::Start;
 use crate::contact::tangential::{
-    Failure, Tangential, Work, boundary_element, fastsim, full_slip, liu_hsu, nested,
+    Failure, Tangential, Work, boundary_element, fastsim, full_slip, liu_hsu, nested, refine,
 };
 
 /// The coarse mesh that gives the method of Liu and Hsu its spin pole: fewer than 30 cells, as they found.
@@ -18,18 +19,9 @@ const POLE_MESH: MeshSize = MeshSize {
     strips: 5,
     cells: 5,
 };
-/// Error on a mesh made for the tractions over that on one of as many cells that was not, as far as the climb counts on it.
-const MADE_FOR: f64 = 0.8;
-/// Half octaves from which on steps of less than two times the cells do not pay.
-const SMALL_STEPS_BELOW: i32 = 4;
 /// A mesh of so many cells is worth a start on a coarser one, whose sides are no shorter than this.
 const CELLS_NESTED: u64 = 1000;
 const SIDE_HALVED: u32 = 8;
-/// Levels of nearly the same size say nothing about each other.
-const RATIO_MIN: f64 = 1.3;
-/// Error of extrapolated resultants over that of the same without, as far as the climb counts on it.
-const EXTRAPOLATED: f64 = 0.6;
-
 /// A motion of a problem, and the creepages it is solved with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Asked {
@@ -54,7 +46,7 @@ pub struct Point {
     pub resultants: Vec<Resultants>,
     /// The same as the tractions give them, without extrapolation.
     pub summed: Vec<Resultants>,
-    /// Estimated errors, see [`estimate::errors`].
+    /// Estimated errors, see [`Indicators::errors`].
     pub errors: Errors,
     /// Work over all levels.
     pub work: Work,
@@ -72,6 +64,15 @@ impl Point {
     }
 }
 
+/// A point with what its error is judged by.
+#[derive(Debug, Clone)]
+pub struct Solved {
+    /// The answer.
+    pub point: Point,
+    /// The indicators of its level.
+    pub indicators: Indicators,
+}
+
 /// Solves a motion, from the coarsest level up to the first that meets the target, each started from
 /// the one before.
 ///
@@ -84,27 +85,19 @@ pub fn solve(
     monitor: &dyn Monitor,
 ) -> Result<Point, SolveError> {
     let sizes = Ladder::fixed_sizes(problem.resolution, problem.method);
-    let last_path = std::mem::take(&mut ladder.path);
+    ladder.path.clear();
     match (sizes, problem.resolution) {
         (Some(sizes), _) => {
-            let mut point = climb(problem, ladder, asked, sizes[0].into(), None, monitor)?;
+            let mut solved = climb(problem, ladder, asked, sizes[0].into(), None, monitor)?;
             for size in &sizes[1..] {
-                point = climb(problem, ladder, asked, (*size).into(), Some(point), monitor)?;
+                let below = Some(solved.point);
+                solved = climb(problem, ladder, asked, (*size).into(), below, monitor)?;
             }
-            Ok(point)
+            Ok(solved.point)
         }
         (None, Resolution::Mesh(size)) => on_mesh(problem, ladder, asked, size, monitor),
         (None, Resolution::Target(target)) => {
-            let again = again(problem, ladder, asked, &last_path, monitor)?;
-            let (begun, half_octaves) = match again {
-                Some(point) => (point, first_steps(target)),
-                None => {
-                    let first = ladder.plan(ladder.cells_first().round() as u32, Regime::Unknown);
-                    let point = climb(problem, ladder, asked, first, None, monitor)?;
-                    (point, 0)
-                }
-            };
-            ascend(problem, ladder, asked, begun, half_octaves, target, monitor)
+            refine::to_target(problem, ladder, asked, target, monitor)
         }
     }
 }
@@ -135,7 +128,7 @@ fn on_mesh(
             Err(error) => return Err(error),
         };
     }
-    climb(problem, ladder, asked, size.into(), coarser, monitor)
+    climb(problem, ladder, asked, size.into(), coarser, monitor).map(|solved| solved.point)
 }
 
 /// Solves a motion on given levels, one after the other, so that the resultants are one function of the motion.
@@ -150,106 +143,19 @@ pub fn along(
     monitor: &dyn Monitor,
 ) -> Result<Option<Point>, SolveError> {
     ladder.path.clear();
-    let mut point = None;
+    let mut solved: Option<Solved> = None;
     for plan in path {
-        point = Some(climb(problem, ladder, asked, *plan, point, monitor)?);
+        let below = solved.map(|solved| solved.point);
+        solved = Some(climb(problem, ladder, asked, *plan, below, monitor)?);
     }
-    Ok(point)
-}
-
-/// Begins a motion of a sweep on the level where the last motion had its first mesh made for its regime, if that serves
-/// this one too.
-fn again(
-    problem: &Problem,
-    ladder: &mut Ladder,
-    asked: Asked,
-    last_path: &[usize],
-    monitor: &dyn Monitor,
-) -> Result<Option<Point>, SolveError> {
-    let fitted = |number: &&usize| ladder.get(**number).plan.regime != Regime::Unknown;
-    let Some(&number) = last_path.iter().find(fitted) else {
-        return Ok(None);
-    };
-    let level = ladder.get(number);
-    let motion = level.scale.motion(&asked.motion);
-    if ladder.trail.start(number, level, &motion).is_none() {
-        return Ok(None);
+    if let Some(solved) = &mut solved {
+        refine::judge(problem, ladder, asked, solved, None, monitor)?;
     }
-    let plan = level.plan;
-    let point = climb(problem, ladder, asked, plan, None, monitor)?;
-    let found = regime_of(ladder, asked, &point);
-    if plan.serves(found) {
-        return Ok(Some(point));
-    }
-    // The tractions are a good start for a mesh that does.
-    ladder.path.clear();
-    let cells = ladder.get(number).mesh.cells() as u32;
-    let plan = ladder.plan(cells, found);
-    climb(problem, ladder, asked, plan, Some(point), monitor).map(Some)
+    Ok(solved.map(|solved| solved.point))
 }
 
-fn regime_of(ladder: &Ladder, asked: Asked, point: &Point) -> Regime {
-    let spinning = asked.motion.spin_per_mm != 0.0;
-    estimate::regime(ladder.get(point.level), &point.tangential, spinning)
-}
-
-/// Climbs from a point on a level until the estimate meets the target or the levels end.
-fn ascend(
-    problem: &Problem,
-    ladder: &mut Ladder,
-    asked: Asked,
-    mut point: Point,
-    mut half_octaves: i32,
-    target: f64,
-    monitor: &dyn Monitor,
-) -> Result<Point, SolveError> {
-    while let Some(error) = point.error().filter(|e| *e > target) {
-        // Motions of a sweep share their levels: what each would like best is not what is cheapest for all.
-        let alone = problem.part.all == 1;
-        half_octaves += match (half_octaves == 0, alone) {
-            (true, true) => first_steps(target).min(steps_made_for(error / target)),
-            (true, false) => first_steps(target),
-            (false, true) if half_octaves < SMALL_STEPS_BELOW => steps(error / target),
-            (false, _) => steps(error / target).max(2),
-        };
-        let cells = ladder.cells_first() * 2.0_f64.powf(0.5 * f64::from(half_octaves));
-        if cells > f64::from(CELLS_MAX) {
-            break;
-        }
-        let regime = regime_of(ladder, asked, &point);
-        let mut plan = ladder.plan(cells.round() as u32, regime);
-        let before = ladder.get(point.level).plan.size.strips;
-        if plan.size.strips == before {
-            // Levels with the same strips say nothing about the strips.
-            plan.size = MeshSize {
-                strips: before + 2,
-                cells: (plan.size.cells * before).div_ceil(before + 2),
-            };
-        }
-        point = climb(problem, ladder, asked, plan, Some(point), monitor)?;
-    }
-    Ok(point)
-}
-
-/// By how many half octaves a mesh made for the tractions should be larger than the first one, when the error there is so many
-/// times the target.
-fn steps_made_for(excess: f64) -> i32 {
-    ((2.0 * (MADE_FOR * excess).log2()).ceil() as i32).clamp(1, 4)
-}
-
-/// By how many half octaves the second level has more cells than the first at most: what most cases need.
-fn first_steps(target: f64) -> i32 {
-    ((0.04 / target).log2().round() as i32).clamp(1, 4)
-}
-
-/// By how many half octaves the number of cells should grow when the error is so many times the target: errors fall
-/// about as 1/N and the next level can be extrapolated; steps of less than two times pay on coarse levels only, more than four
-/// times nowhere. Coarse steps let the motions of a sweep share their levels.
-fn steps(excess: f64) -> i32 {
-    ((2.0 * (EXTRAPOLATED * excess).log2()).ceil() as i32).clamp(1, 4)
-}
-
-/// Solves a motion on the level of one size, from the point of a coarser one if there is one.
+/// Solves a motion on the level of one size, from the point of a coarser one if there is one. Estimates are those before
+/// companions, see [`refine::judge`].
 ///
 /// # Errors
 /// Why there is no answer.
@@ -260,7 +166,7 @@ pub fn climb(
     plan: Plan,
     coarser: Option<Point>,
     monitor: &dyn Monitor,
-) -> Result<Point, SolveError> {
+) -> Result<Solved, SolveError> {
     let began = monitor.elapsed();
     let number = ladder.level(plan)?;
     let level = ladder.get(number);
@@ -276,65 +182,53 @@ pub fn climb(
     let summed: Vec<Resultants> = (0..patches)
         .map(|p| Resultants::of_patch(level, &tangential.traction, p))
         .collect();
-    let coarser_like = coarser.as_ref().filter(|point| {
-        let below = ladder.get(point.level);
-        let alike = problem.method == Method::LiuHsu || level.plan.is_like(&below.plan);
-        alike && level.mesh.cells() as f64 > RATIO_MIN * below.mesh.cells() as f64
-    });
-    let share = coarser_like.map_or(0.0, |point| {
-        let below = ladder.get(point.level).mesh.cells() as f64;
-        below / (level.mesh.cells() as f64 - below)
-    });
-    let opinion = match coarser_like {
-        Some(point) => Opinion::Coarser(&point.summed, share),
-        None => Opinion::Alone,
+    let before = coarser
+        .as_ref()
+        .and_then(|point| before(ladder, level, point));
+    let finer = finer_for_sums(problem, level, asked, &tangential);
+    let circumstances = Circumstances {
+        motion: &asked.motion,
+        before,
+        finer: finer.as_ref(),
+        slenderness: ladder.slenderness(),
+        tolerance: tolerance(problem),
     };
-    let finer = match coarser_like {
-        None => finer_for_sums(problem, level, asked, &tangential),
-        Some(_) => None,
-    };
-    let errors = estimate::errors(
-        problem,
-        level,
-        &tangential,
-        &summed,
-        opinion,
-        Circumstances {
-            motion: &asked.motion,
-            finer: finer.as_ref(),
-            slenderness: ladder.slenderness(),
-            tolerance: tolerance(problem),
-        },
-    );
-    let resultants = match coarser_like {
-        // The rules of the fast solver share one order of convergence; the dense method has no such record.
-        Some(point) if problem.method != Method::LiuHsu => {
-            extrapolated(problem, &summed, point, share)
-        }
-        _ => summed.clone(),
-    };
+    let indicators = Indicators::of_level(problem, level, &tangential, &summed, circumstances);
+    let resultants = extrapolated(problem, level, &summed, before);
     ladder.trail.leave(number, motion, &tangential);
     ladder.path.push(number);
     let mut work = coarser.as_ref().map_or(Work::default(), |point| point.work);
     work.add(tangential.work);
     let seconds =
         (monitor.elapsed() - began).as_secs_f64() + coarser.map_or(0.0, |point| point.seconds);
-    Ok(Point {
+    let point = Point {
         motion: asked.motion,
         saturated: false,
         tangential,
         level: number,
         resultants,
         summed,
-        errors,
+        errors: indicators.errors(),
         work,
         method: method_used(problem),
         seconds,
+    };
+    Ok(Solved { point, indicators })
+}
+
+/// The level before, if it is coarse enough to say something.
+fn before<'a>(ladder: &Ladder, level: &Level, point: &'a Point) -> Option<Before<'a>> {
+    let below = ladder.get(point.level);
+    let ratio = level.mesh.cells() as f64 / below.mesh.cells() as f64;
+    (ratio >= LEVEL_RATIO_MIN).then(|| Before {
+        summed: &point.summed,
+        regime: below.plan.regime,
+        share: 1.0 / (ratio - 1.0),
     })
 }
 
-/// A level of four times as many cells, where everything slips and the tractions turn: how they add up depends on the
-/// cells. Without spin all tractions point the same way, and cells of any size add up to the load.
+/// A level of four times as many cells, where the pressure jumps, or everything slips and the tractions turn: how they add up
+/// depends on the cells. Without spin all tractions point the same way, and cells of any size add up to the load.
 fn finer_for_sums(
     problem: &Problem,
     level: &Level,
@@ -342,7 +236,8 @@ fn finer_for_sums(
     answer: &Tangential,
 ) -> Option<Level> {
     let turns = asked.motion.spin_per_mm != 0.0 && problem.friction > 0.0;
-    if !turns || !answer.slips.iter().all(|slips| *slips) {
+    let slides = turns && answer.slips.iter().all(|slips| *slips);
+    if !slides && !estimate::jumps(problem) {
         return None;
     }
     let [strips, cells] = [level.plan.size.strips, level.plan.size.cells].map(|n| 2 * n);
@@ -350,18 +245,24 @@ fn finer_for_sums(
     Level::new(problem, Plan { size, ..level.plan }).ok()
 }
 
-/// The resultants of every patch where the climb leads to.
+/// The resultants of every patch where the climb leads to: between meshes for stick errors fall as 1/N. The dense method and
+/// meshes gathered about a pole have no such record.
 fn extrapolated(
     problem: &Problem,
+    level: &Level,
     summed: &[Resultants],
-    coarser: &Point,
-    share: f64,
+    before: Option<Before>,
 ) -> Vec<Resultants> {
+    let sticking = |regime| matches!(regime, Regime::Sticking { .. });
+    let like = before.filter(|b| sticking(b.regime) && sticking(level.plan.regime));
+    let Some(before) = like.filter(|_| refine::target(problem).is_some()) else {
+        return summed.to_vec();
+    };
     let patches = problem.region.patches();
-    let pairs = summed.iter().zip(&coarser.summed).zip(&patches);
+    let pairs = summed.iter().zip(before.summed).zip(&patches);
     pairs
         .map(|((fine, coarse), patch)| {
-            fine.beyond(*coarse, share, problem.friction * patch.normal_force)
+            fine.beyond(*coarse, before.share, problem.friction * patch.normal_force)
         })
         .collect()
 }
@@ -376,7 +277,7 @@ fn method_used(problem: &Problem) -> Method {
 }
 
 /// Residual to reach: far below the target, since every iteration below it is for nothing.
-fn tolerance(problem: &Problem) -> f64 {
+pub(super) fn tolerance(problem: &Problem) -> f64 {
     match problem.resolution {
         Resolution::Target(target) => {
             // A force is searched as a function of its creepage: what the iteration leaves is noise to that.
@@ -406,28 +307,33 @@ fn named(failure: Failure, problem: &Problem, point: usize) -> SolveError {
     }
 }
 
-/// Tractions of a coarser level on a finer one; relative to the friction bound they vary less than as they are.
+/// A start from the answer on a coarser level.
 fn nested_start(coarse: &Level, answer: &Tangential, level: &Level) -> Start {
+    let second = answer.second.as_ref().unwrap_or(&answer.traction);
+    Start {
+        mirror: nested_tractions(coarse, second, level),
+        trapezoid: None,
+    }
+}
+
+/// Tractions of one level on another; relative to the friction bound they vary less than as they are.
+pub(super) fn nested_tractions(
+    from: &Level,
+    traction: &[Vec<f64>; 2],
+    to: &Level,
+) -> [Vec<f64>; 2] {
     let relative = |values: &[f64]| -> Vec<f64> {
         values
             .iter()
-            .zip(&coarse.bound)
+            .zip(&from.bound)
             .map(|(t, g)| if *g > 0.0 { t / g } else { 0.0 })
             .collect()
     };
-    let second = answer.second.as_ref().unwrap_or(&answer.traction);
-    let mirror = [0, 1].map(|k| {
-        let mut values = nested::interpolate(&coarse.mesh, &relative(&second[k]), &level.mesh);
+    [0, 1].map(|k| {
+        let mut values = nested::interpolate(&from.mesh, &relative(&traction[k]), &to.mesh);
+        values.iter_mut().zip(&to.bound).for_each(|(t, g)| *t *= g);
         values
-            .iter_mut()
-            .zip(&level.bound)
-            .for_each(|(t, g)| *t *= g);
-        values
-    });
-    Start {
-        mirror,
-        trapezoid: None,
-    }
+    })
 }
 
 fn solve_level(

@@ -7,6 +7,7 @@
 
 mod components;
 mod computed;
+mod jumps;
 mod level_set;
 mod line;
 mod moments;
@@ -15,7 +16,8 @@ mod shape;
 use crate::contact::mesh::Chord;
 use crate::contact::normal::Patch;
 use crate::contact::normal::interpolation::{interval, weights};
-use crate::contact::remark::RemarkEntry;
+use crate::contact::remark::{Remark, RemarkEntry};
+use jumps::Jump;
 use level_set::State;
 use line::Line;
 use shape::Shape;
@@ -50,6 +52,8 @@ pub struct PressureField {
     shapes: Vec<Shape>,
     /// The patch that is the mirror image about y = 0 of each one; empty if the pressure has no such symmetry.
     images: Vec<usize>,
+    /// The largest jump from one given sample to the next.
+    jump: Option<Jump>,
 }
 
 impl PressureField {
@@ -82,7 +86,16 @@ impl PressureField {
             );
         }
         let (mut field, samples) = PressureField::from_squares(grid, q, pressure_max)?;
-        let remarks = field.remarks(&samples, &field.shapes);
+        let mut remarks = field.remarks(&samples, &field.shapes);
+        field.jump = field.find_jump();
+        if let Some(jump) = field.jump {
+            let remark = Remark::PressureJumps {
+                x_mm: jump.at[0],
+                y_mm: jump.at[1],
+                share_of_largest: jump.fall,
+            };
+            remarks.push(remark.into());
+        }
         field.find_edges();
         Ok((field, remarks))
     }
@@ -106,6 +119,7 @@ impl PressureField {
             pressure_max,
             shapes: Vec::new(),
             images: Vec::new(),
+            jump: None,
         };
         field.shapes = field.shapes_from_samples(&samples, count);
         field.images = field.find_images(&samples);

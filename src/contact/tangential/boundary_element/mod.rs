@@ -79,6 +79,38 @@ pub fn solve(
     })
 }
 
+/// Tractions of the trapezoid rule alone, from a start that is near: what a companion of a mesh is asked for.
+///
+/// # Errors
+/// [`Failure::NotConverged`] if neither the start nor the upwind solution leads to a solution; [`Failure::Stopped`] if the
+/// monitor stops the work.
+pub fn trapezoid(
+    level: &Level,
+    motion: &Motion,
+    start: &[Vec<f64>; 2],
+    tolerance: f64,
+    monitor: &dyn Monitor,
+) -> Result<([Vec<f64>; 2], Work), Failure> {
+    if let Some(answer) = full_slip::rigid_answer(level, motion) {
+        return Ok((answer.traction, answer.work));
+    }
+    let operator = level.operator(monitor)?;
+    let parity = level.parity(motion);
+    let mut solve = Solve::new(level, motion, &operator, parity, tolerance, monitor);
+    let mut t = solve.start(Some(start));
+    let Some(slips) = solve.trapezoid(&mut t, None)? else {
+        return Err(Failure::NotConverged {
+            work: solve.work,
+            tolerance,
+            advice: "try another mesh".to_owned(),
+        });
+    };
+    let mut traction = solve.expand(&t);
+    let none = [0, 1].map(|_| vec![0.0; slips.len()]);
+    obey_coulomb(&level.bound, &slips, &mut traction, &none);
+    Ok((traction, solve.work))
+}
+
 /// What the three-point rule gave besides tractions.
 struct MirrorAnswer {
     slip: [Vec<f64>; 2],

@@ -1,0 +1,69 @@
+//! Tuned numbers of the error estimate and of the refinement: what each was fitted on, how to see it again, and how much
+//! it matters.
+//!
+//! Populations are those of `benches/calibrate`: random ellipses (a/b 1/20 … 20, creepages and spin over two decades), gaps,
+//! pressure grids and profiles, each against meshes of several thousand cells. Every table is printed by
+//! `cargo bench --bench calibrate`.
+
+/// Factor on each of the three differences that stand for the error: between the two rules, to half the strips, to half the
+/// cells. The 95 % quantile of error over root of squares, 494 first and 2700 later ellipse meshes: 0.56, and 0.57 to 0.39
+/// with growing size. 0.55 leaves 1 % more uncovered.
+pub const DIFFERENCES: f64 = 0.6;
+/// The factor falls as this power of the cells beyond those of the first mesh, as far as the same quantiles do; flat.
+pub const DECAY: f64 = 0.12;
+/// The difference of the rules counts for more where a companion did not converge, which happens on two to four strips or
+/// cells; one case in a thousand.
+pub const WITHOUT_COMPANION: f64 = 1.5;
+/// Factor on the change from a coarser level, times 1 over (ratio of cells − 1): between levels of one kind, and from the
+/// first mesh to one that is not gathered. It only lets a mesh be refused before its companions are solved; flat.
+pub const LEVELS_LIKE: f64 = 0.3;
+pub const LEVELS_UNLIKE: f64 = 0.15;
+/// A level says something about one with this many times its cells at least.
+pub const LEVEL_RATIO_MIN: f64 = 1.8;
+/// Error of sampling the vortex of the tractions by the cell that holds its centre, over p h² / N (1500 solves on random
+/// meshes with spin: 0.3 median, 0.45 at 90 %), and its weight beside the differences, which see part of it (95 % of error
+/// over estimate on first meshes .87 without, .73 with it).
+pub const POLE: f64 = 0.45;
+pub const POLE_WEIGHT: f64 = 0.3;
+/// With the load on fewer strips than these, counted by `(Σ load)² / Σ load²`, the estimate grows as what is missing; four
+/// strips of an ellipse count as 3.5.
+pub const STRIPS_FEW: f64 = 3.5;
+/// Factor where the pressure jumps from one sample to the next (20 grids of the first half: .95, .85 and 1.0 covered at three
+/// targets; larger factors do not help). Ellipses, gaps and smooth pressures need none: with 1.15 their estimates are 4.2 to 6 times
+/// the error in the median and cover one case in fifty more.
+pub const JUMPING: f64 = 1.5;
+/// Factor on the change of the moments of such a pressure to twice as many strips and cells; .3 to 1 are alike.
+pub const DATA: f64 = 0.5;
+/// Error of the resultants from region and pressure of a gap on so many cells of the normal problem across a patch (216 gaps:
+/// change to three times as many cells .0003 at 75 %, .0006 at 90 %).
+pub const REGION: f64 = 5e-4;
+pub const REGION_CELLS: f64 = 44.0;
+/// Relative error of resultants over that of the load they are found under: 2/3 for small creepages (areas of Hertz's
+/// contacts), 1 in full slip.
+pub const LOAD: f64 = 1.0;
+/// Share of the differences that is added to the resultants: errors of second order in strips and in cells (median of the
+/// error halved on 1900 meshes, its 90 % from .0034 to .0026 at 181 to 256 cells; weights .2 to .4 within 10 %).
+pub const EXTRAPOLATED: f64 = 1.0 / 3.0;
+/// Error the next mesh is expected to have for its cells, over the present error; .65 within 5 % of the time.
+pub const MARGIN: f64 = 0.8;
+/// Smallest mesh for a target below `FINE_TARGET`: on fewer cells three small differences may coincide by accident.
+pub const CELLS_FINE: usize = 128;
+pub const FINE_TARGET: f64 = 0.002;
+/// Stick below this share of the cells' area counts as none (.04 to .15 are alike).
+pub const STICK_NEGLIGIBLE: f64 = 0.12;
+/// With less stick than this on the first level, a pole in a sticking cell may as well be in a slipping one.
+pub const STICK_UNCERTAIN: f64 = 0.2;
+/// A motion of a sweep goes on with coarser meshes when its estimate is smaller than this part of the target: less often
+/// than the estimate's own changes along a sweep would have it.
+pub const SLACK: f64 = 1.0 / 6.0;
+/// Factors of an explicit mesh, where companions are not solved, on the difference of the two rules; the second where region
+/// and pressure come from samples (62 Hertz contacts, 64 to 576 cells).
+pub const RULES_ON_MESH: f64 = 2.3;
+pub const RULES_ON_MESH_SAMPLED: f64 = 3.45;
+/// That estimate grows as this power of the slenderness of a patch.
+pub const CAUTION: f64 = 0.4;
+/// The dense method's change between its two levels, times 1 over (ratio of cells − 1); the second where they are so near each
+/// other that this is more than `SHARE_LARGE`.
+pub const DENSE_LEVELS: f64 = 1.25;
+pub const DENSE_LEVELS_NEAR: f64 = 1.9;
+pub const SHARE_LARGE: f64 = 1.5;
