@@ -15,6 +15,7 @@ mod gap_reference;
 mod gap_robustness;
 mod gap_samples;
 mod golden;
+mod held_out;
 mod hertz;
 mod kalker;
 mod kalker_table;
@@ -23,6 +24,8 @@ mod liu_hsu;
 mod liu_hsu_newton;
 mod memory;
 mod paper_figures;
+#[path = "../../benches/calibrate/population.rs"]
+mod population;
 mod pressure_grid;
 mod pressure_grid_faults;
 mod pressure_grid_shapes;
@@ -51,3 +54,5 @@ mod skips;
 mod stress;
 mod sweeps;
 mod targets;
+#[path = "../../benches/calibrate/truth.rs"]
+mod truth;

@@ -1,0 +1,160 @@
+//! Finds truths: the same contact on meshes much finer than any target asks for.
+
+use std::sync::Arc;
+
+use railhead::contact;
+use railhead::contact::error::SolveError;
+use railhead::contact::monitor::Unwatched;
+use railhead::contact::normal::{Patch, Region};
+use railhead::contact::outputs::resultants::Resultants;
+use railhead::contact::problem::{Limits, Problem, Resolution};
+use railhead::contact::solution::Solution;
+use railhead::contact::tangential::ladder::{Ladder, Regime};
+use railhead::contact::tangential::point::{Asked, climb};
+use railhead::contact::tangential::regime::regime;
+use serde_json::{Value, json};
+
+use crate::population::Class;
+use crate::truth::{Frame, Truth, distance, estimate, print, tangential};
+
+/// Cells of the two meshes that make a truth.
+const CELLS: [u32; 2] = [1024, 2048];
+/// Uncertainty beside half of the extrapolated change.
+const LEAST: f64 = 2e-5;
+/// Targets that stand for region and pressure of a gap much finer than asked for, and for all of a wheel on a rail.
+const TARGET_GAP: f64 = 4e-4;
+const TARGET_PROFILES: f64 = 4e-4;
+
+/// Finds the truth of a case.
+///
+/// # Errors
+/// Why the case has no answer.
+pub fn find(class: Class, case: &Value) -> Result<Truth, String> {
+    if class == Class::Profiles {
+        return of_profiles(case);
+    }
+    let mut fine = case.clone();
+    fine["solver"] = json!({ "target_error": TARGET_GAP });
+    let problem = contact::check(&fine, &Limits::default()).map_err(|e| e.to_string())?;
+    let pressed = problem.pressed(&Unwatched).map_err(|e| e.to_string())?;
+    let (value, change) = two_meshes(&pressed).map_err(|e| e.to_string())?;
+    let frame = frame_of(&pressed);
+    let mut uncertainty = change + LEAST;
+    let value = frame.relative(value);
+    if matches!(problem.region, Region::Gap(_)) {
+        // The change from a coarser normal problem, which errs about three times as much.
+        let mut coarse = case.clone();
+        coarse["solver"] = json!({ "target_error": 0.001 });
+        let problem = contact::check(&coarse, &Limits::default()).map_err(|e| e.to_string())?;
+        let coarse = problem.pressed(&Unwatched).map_err(|e| e.to_string())?;
+        let other = [&pressed, &coarse].map(|problem| {
+            one_mesh(problem, 256)
+                .map(|(sum, _)| frame.relative(sum))
+                .map_err(|e| e.to_string())
+        });
+        let [here, there] = other;
+        uncertainty += 0.4 * distance(here?, there?);
+    }
+    Ok(Truth {
+        print: print(case),
+        value,
+        uncertainty,
+        centre: frame.centre,
+        length: frame.length,
+        limit: frame.limit,
+    })
+}
+
+/// Units and centre of a problem's resultants.
+fn frame_of(problem: &Problem) -> Frame {
+    let patches = problem.region.patches();
+    let load: f64 = patches.iter().map(|p| p.normal_force).sum();
+    let area: f64 = patches.iter().map(|p| p.area).sum();
+    let middle = |k: usize| {
+        let part = |p: &Patch| 0.5 * (p.extent[2 * k] + p.extent[2 * k + 1]) * p.normal_force;
+        patches.iter().map(part).sum::<f64>() / load
+    };
+    Frame {
+        centre: [middle(0), middle(1)],
+        length: (area / std::f64::consts::PI).sqrt(),
+        limit: problem.friction * load,
+    }
+}
+
+/// The sum of the resultants from two fine meshes, and half of what they say is left, relative to μN.
+fn two_meshes(problem: &Problem) -> Result<(Resultants, f64), SolveError> {
+    let frame = frame_of(problem);
+    let (coarse, coarse_cells) = one_mesh(problem, CELLS[0])?;
+    let (fine, fine_cells) = one_mesh(problem, CELLS[1])?;
+    let share = 1.0 / (fine_cells as f64 / coarse_cells as f64 - 1.0);
+    let beyond = fine.beyond(coarse, share, frame.limit);
+    let half = |a: f64, b: f64| 0.5 * (a + b);
+    let value = Resultants {
+        force_x: half(fine.force_x, beyond.force_x),
+        force_y: half(fine.force_y, beyond.force_y),
+        moment_z: half(fine.moment_z, beyond.moment_z),
+    };
+    let change = distance(frame.relative(fine), frame.relative(value));
+    Ok((value, change))
+}
+
+/// The sum of the resultants on a mesh of so many cells, in double precision, and how many there are.
+fn one_mesh(problem: &Problem, cells: u32) -> Result<(Resultants, usize), SolveError> {
+    let mut exact = problem.clone();
+    exact.resolution = Resolution::Mesh(contact::case::MeshSize {
+        strips: 8,
+        cells: 8,
+    });
+    let asked = Asked {
+        index: 0,
+        motion: problem.motions[0],
+    };
+    let mut ladder = Ladder::new(&exact, &Arc::default());
+    let plan = ladder.plan(64, Regime::Unknown);
+    let mut solved = climb(&exact, &mut ladder, asked, plan, None, &Unwatched)?;
+    for cells in [256, cells] {
+        let level = ladder.get(solved.point.level);
+        let spinning = asked.motion.spin_per_mm != 0.0;
+        let found = regime(level, &solved.point.tangential, spinning);
+        let plan = ladder.plan(cells, found);
+        solved = climb(
+            &exact,
+            &mut ladder,
+            asked,
+            plan,
+            Some(solved.point),
+            &Unwatched,
+        )?;
+    }
+    let zero = Resultants::default();
+    let sum = solved.point.summed.iter().fold(zero, |sum, r| sum.plus(*r));
+    Ok((sum, ladder.get(solved.point.level).mesh.cells()))
+}
+
+/// Tangential forces of a wheel on a rail, summed over the frames of its patches, from a fine target.
+fn of_profiles(case: &Value) -> Result<Truth, String> {
+    let mut fine = case.clone();
+    fine["solver"] = json!({ "target_error": TARGET_PROFILES });
+    let problem = contact::check(&fine, &Limits::default()).map_err(|e| e.to_string())?;
+    let (solution, _) = contact::solve(&problem, &Unwatched).map_err(|e| e.to_string())?;
+    let limit = problem.friction * normal_force(&solution);
+    let value = tangential(&solution).map(|force| force / limit);
+    let estimate = estimate(&solution).ok_or("no estimate")? / limit;
+    Ok(Truth {
+        print: print(case),
+        value: [value[0], value[1], 0.0],
+        uncertainty: 0.5 * estimate,
+        centre: [0.0; 2],
+        length: 1.0,
+        limit,
+    })
+}
+
+/// Sum of the normal forces in N.
+fn normal_force(solution: &Solution) -> f64 {
+    solution
+        .patches
+        .iter()
+        .map(|patch| patch.normal_force_n)
+        .sum()
+}

@@ -1,0 +1,179 @@
+//! Is the error estimate right? Solves random contacts for three targets and compares with meshes much finer.
+//!
+//! `cargo bench --bench calibrate` prints the tables for the halves of every class (the first for fitting, the second for
+//! checking); with names of classes (`ellipse smooth jump gap profiles`) those alone. Truths come from
+//! `tests/data/finer_meshes.json`; `-- truths [classes]` finds the missing ones, some seconds each; `-- continuity`
+//! prints how the estimate changes along a sweep.
+
+mod continuity;
+mod finer;
+mod population;
+#[path = "../../tests/physics/profile_shapes.rs"]
+mod profile_shapes;
+#[path = "../stress/random.rs"]
+mod random;
+mod truth;
+
+use cpu_time::ThreadTime;
+use railhead::contact;
+use railhead::contact::monitor::Unwatched;
+use railhead::contact::problem::Limits;
+use serde_json::json;
+
+use population::{Class, case};
+use truth::{Truths, judged};
+
+const CLASSES: [Class; 5] = [
+    Class::Ellipse,
+    Class::Smooth,
+    Class::Jump,
+    Class::Gap,
+    Class::Profiles,
+];
+const TARGETS: [f64; 3] = [0.02, 0.005, 0.001];
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    // Run by `cargo test --benches` as well, where there is nothing to print.
+    if !arguments.iter().any(|argument| argument == "--bench") {
+        return;
+    }
+    let has = |name: &str| arguments.iter().any(|argument| argument == name);
+    if has("continuity") {
+        continuity::table();
+        return;
+    }
+    let named = CLASSES.iter().any(|class| has(class.name()));
+    let classes = CLASSES.iter().filter(|class| !named || has(class.name()));
+    for class in classes {
+        if has("truths") {
+            find_truths(*class);
+        } else {
+            tables(*class, &truth::read(), has("each"));
+        }
+    }
+}
+
+/// Finds what is missing in the file, writing after every case.
+fn find_truths(class: Class) {
+    for number in 0..class.count() {
+        let question = case(class, number);
+        let mut truths = truth::read();
+        let known = truths
+            .get(class.name())
+            .and_then(|known| known.get(&number));
+        if known.is_some_and(|known| known.print == truth::print(&question)) {
+            continue;
+        }
+        match finer::find(class, &question) {
+            Ok(found) => {
+                println!("{} {number}: {found:?}", class.name());
+                truths = truth::read();
+                truths
+                    .entry(class.name().to_owned())
+                    .or_default()
+                    .insert(number, found);
+                let text = serde_json::to_string(&truths).expect("numbers");
+                std::fs::write(truth::file(), text.replace("},\"", "},\n\"")).expect("a file");
+            }
+            Err(reason) => println!("{} {number}: no answer: {reason}", class.name()),
+        }
+    }
+}
+
+/// One answer against its truth.
+struct Outcome {
+    error: f64,
+    uncertainty: f64,
+    estimate: f64,
+    met: bool,
+    seconds: f64,
+}
+
+fn tables(class: Class, truths: &Truths, each: bool) {
+    let Some(known) = truths.get(class.name()) else {
+        println!("{}: no truths", class.name());
+        return;
+    };
+    println!(
+        "\n| {} | target | cases | within target | covered | 2x too small | certified | estimate/error | error median, 90 % | ms mean, median |",
+        class.name()
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|");
+    for target in TARGETS {
+        let mut halves: [Vec<Outcome>; 2] = [Vec::new(), Vec::new()];
+        for (number, truth) in known {
+            let mut question = case(class, *number);
+            assert_eq!(truth.print, truth::print(&question), "another population");
+            question["solver"] = json!({ "target_error": target });
+            let problem = contact::check(&question, &Limits::default()).expect("a sound case");
+            let began = ThreadTime::now();
+            let (solution, _) = match contact::solve(&problem, &Unwatched) {
+                Ok(found) => found,
+                Err(error) => {
+                    println!("{} {number} at {target}: {error}", class.name());
+                    continue;
+                }
+            };
+            let seconds = began.elapsed().as_secs_f64();
+            let [error, estimate] = judged(class, truth, &solution).unwrap_or([f64::NAN; 2]);
+            let outcome = Outcome {
+                error,
+                uncertainty: truth.uncertainty,
+                estimate,
+                met: estimate <= target,
+                seconds,
+            };
+            if each || error - truth.uncertainty > estimate {
+                let mesh = solution.patches[0].points[0].solver.mesh;
+                println!(
+                    "  {} {number} at {target}: error {error:.5} ± {:.5}, estimate {estimate:.5}, {} x {}, {:.1} ms",
+                    class.name(),
+                    truth.uncertainty,
+                    mesh.strips,
+                    mesh.cells,
+                    1e3 * seconds
+                );
+            }
+            halves[usize::from(2 * *number >= class.count())].push(outcome);
+        }
+        for (name, half) in ["fit", "check"].iter().zip(&halves) {
+            row(name, target, half);
+        }
+    }
+}
+
+fn row(name: &str, target: f64, outcomes: &[Outcome]) {
+    let count = |test: &dyn Fn(&Outcome) -> bool| {
+        let part = outcomes.iter().filter(|o| test(o)).count();
+        part as f64 / outcomes.len().max(1) as f64
+    };
+    let sorted = |mut values: Vec<f64>| {
+        values.sort_by(f64::total_cmp);
+        values
+    };
+    let at = |values: &[f64], part: f64| {
+        let last = values.len().saturating_sub(1) as f64;
+        values
+            .get((part * last).round() as usize)
+            .copied()
+            .unwrap_or(f64::NAN)
+    };
+    let clear = outcomes.iter().filter(|o| o.error > o.uncertainty);
+    let ratios = sorted(clear.map(|o| o.estimate / o.error).collect());
+    let errors = sorted(outcomes.iter().map(|o| o.error).collect());
+    let times = sorted(outcomes.iter().map(|o| 1e3 * o.seconds).collect());
+    println!(
+        "| {name} | {target} | {} | {:.3} | {:.3} | {:.3} | {:.2} | {:.1} | {:.5}, {:.5} | {:.1}, {:.1} |",
+        outcomes.len(),
+        count(&|o| o.error <= target + o.uncertainty),
+        count(&|o| o.error <= o.estimate + o.uncertainty),
+        count(&|o| o.error > 2.0 * o.estimate + o.uncertainty),
+        count(&|o| o.met),
+        at(&ratios, 0.5),
+        at(&errors, 0.5),
+        at(&errors, 0.9),
+        times.iter().sum::<f64>() / times.len().max(1) as f64,
+        at(&times, 0.5),
+    );
+}

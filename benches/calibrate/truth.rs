@@ -1,0 +1,123 @@
+//! What the resultants of a case truly are, kept in a file, and how far an answer is from it.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use railhead::contact::outputs::resultants::Resultants;
+use railhead::contact::solution::{PointSolution, Solution};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::population::Class;
+
+/// Resultants relative to μN, about a centre in mm.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub struct Truth {
+    /// Fingerprint of the case.
+    pub print: u64,
+    /// F_x, F_y over μN and M_z over μN times `length`.
+    pub value: [f64; 3],
+    /// What they may be off by.
+    pub uncertainty: f64,
+    /// Where moments are about.
+    pub centre: [f64; 2],
+    /// √(A/π) in mm.
+    pub length: f64,
+    /// μN in N.
+    pub limit: f64,
+}
+
+/// All truths that are known: by class, then by number.
+pub type Truths = BTreeMap<String, BTreeMap<usize, Truth>>;
+
+/// The file of truths.
+pub fn file() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/finer_meshes.json")
+}
+
+/// The truths of the file; none if there is no file.
+pub fn read() -> Truths {
+    std::fs::read_to_string(file())
+        .ok()
+        .map(|text| serde_json::from_str(&text).expect("a table of truths"))
+        .unwrap_or_default()
+}
+
+/// A number that changes with the case (FNV-1a; whole numbers beyond 52 bits do not survive every reader of JSON).
+pub fn print(case: &Value) -> u64 {
+    let step = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
+    case.to_string().bytes().fold(0xcbf2_9ce4_8422_2325, step) >> 12
+}
+
+/// Largest difference of components.
+pub fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max)
+}
+
+/// Units and centre of a problem's resultants.
+pub struct Frame {
+    /// Where moments are about, in mm.
+    pub centre: [f64; 2],
+    /// √(A/π) in mm.
+    pub length: f64,
+    /// μN in N.
+    pub limit: f64,
+}
+
+impl Frame {
+    /// F_x, F_y over μN and M_z over μN times the length.
+    pub fn relative(&self, sum: Resultants) -> [f64; 3] {
+        let about = sum.about(self.centre);
+        [
+            about.force_x / self.limit,
+            about.force_y / self.limit,
+            about.moment_z / (self.limit * self.length),
+        ]
+    }
+}
+
+/// Sums of the tangential forces along and across in the frames of the patches.
+pub fn tangential(solution: &Solution) -> [f64; 2] {
+    let sum = |of: fn(&PointSolution) -> f64| {
+        solution
+            .patches
+            .iter()
+            .map(|patch| of(&patch.points[0]))
+            .sum()
+    };
+    [sum(|p| p.force_x_n), sum(|p| p.force_y_n)]
+}
+
+/// Sum of the estimates of the patches in N.
+pub fn estimate(solution: &Solution) -> Option<f64> {
+    let all = solution
+        .patches
+        .iter()
+        .map(|patch| patch.points[0].error_estimate);
+    all.map(|e| e.map(|e| e.force_x_n)).sum()
+}
+
+/// True and estimated error of an answer, relative to μN.
+pub fn judged(class: Class, truth: &Truth, solution: &Solution) -> Option<[f64; 2]> {
+    if class == Class::Profiles {
+        let [x, y] = tangential(solution).map(|force| force / truth.limit);
+        let error = distance([x, y, 0.0], truth.value);
+        return Some([error, estimate(solution)? / truth.limit]);
+    }
+    let total = &solution.total[0];
+    let sum = Resultants {
+        force_x: total.force_x_n,
+        force_y: total.force_y_n,
+        moment_z: total.moment_z_n_mm,
+    };
+    let frame = Frame {
+        centre: truth.centre,
+        length: truth.length,
+        limit: truth.limit,
+    };
+    let estimate = total.error_estimate?.force_x_n / truth.limit;
+    Some([distance(frame.relative(sum), truth.value), estimate])
+}
