@@ -34,7 +34,7 @@ ENV RAILHEAD_LISTEN=0.0.0.0:8080 \
 USER 65532:65532
 VOLUME ["/data"]
 EXPOSE 8080
-# The image has no shell and no curl: the program asks itself, at RAILHEAD_HEALTHCHECK_URL if that is set.
+# The image has no shell and no curl: the program asks itself, at the address it listens on.
 HEALTHCHECK --interval=30s --timeout=5s --start-period=10s CMD ["/usr/local/bin/railhead", "healthcheck"]
 ENTRYPOINT ["/usr/local/bin/railhead"]
 CMD ["serve"]

@@ -5,6 +5,7 @@ use std::io::stderr;
 use std::panic;
 use std::pin::Pin;
 use std::str::FromStr;
+use std::sync::OnceLock;
 use std::time::Duration;
 
 use anyhow::Context;
@@ -19,6 +20,7 @@ use opentelemetry_sdk::Resource;
 use opentelemetry_sdk::trace::{SdkTracer, SdkTracerProvider};
 use tokio::net::TcpStream;
 use tokio::runtime::Handle;
+use tracing_appender::non_blocking::{ErrorCounter, NonBlockingBuilder, WorkerGuard};
 use tracing_subscriber::EnvFilter;
 use tracing_subscriber::fmt::format::FmtSpan;
 
@@ -38,21 +40,49 @@ pub enum LogFormat {
     Json,
 }
 
-/// Starts logging; panics are logged too, instead of being printed between the lines.
+/// Lines that wait for whoever reads the log; further ones are dropped and counted.
+const LINES_WAITING: usize = 50_000;
+
+/// What knows how many lines were dropped.
+static DROPPED: OnceLock<ErrorCounter> = OnceLock::new();
+
+/// Log lines dropped so far because nobody read them.
+#[must_use]
+pub fn dropped_lines() -> u64 {
+    let dropped = DROPPED.get().map_or(0, ErrorCounter::dropped_lines);
+    u64::try_from(dropped).unwrap_or(u64::MAX)
+}
+
+/// Starts logging; panics are logged too, instead of being printed between the lines. A thread of its own writes the
+/// lines, so that nothing waits for whoever reads them. Lines are written as long as the returned guard is held.
 ///
 /// `filter` is a list such as `info,railhead::jobs=debug`.
 ///
 /// # Errors
 /// The filter cannot be read, or logging was started before.
-pub fn start(format: LogFormat, filter: &str) -> anyhow::Result<()> {
-    let filter = EnvFilter::try_new(filter).with_context(|| format!("log filter {filter:?}"))?;
+pub fn start(format: LogFormat, filter: &str) -> anyhow::Result<WorkerGuard> {
+    let mut targets = EnvFilter::try_new(filter).context("--log")?;
+    // A client's name with signs that the font lacks is no concern of the operator.
+    if !filter.contains("usvg") {
+        targets = targets.add_directive("usvg=error".parse()?);
+    }
+    let (writer, guard) = NonBlockingBuilder::default()
+        .lossy(true)
+        .buffered_lines_limit(LINES_WAITING)
+        .thread_name("railhead-log")
+        .finish(stderr());
+    // Logging is started once, or fails below.
+    let _ = DROPPED.set(writer.error_counter());
     let lines = tracing_subscriber::fmt()
-        .with_env_filter(filter)
+        .with_env_filter(targets)
         .with_span_events(FmtSpan::NONE)
-        .with_writer(stderr);
+        .with_writer(writer);
     match format {
         LogFormat::Text => lines.with_ansi(false).try_init(),
-        LogFormat::Json => lines.json().flatten_event(true).try_init(),
+        LogFormat::Json => {
+            let lines = lines.json().flatten_event(true);
+            lines.with_span_list(false).try_init()
+        }
     }
     .map_err(|error| anyhow::anyhow!("logging could not be started: {error}"))?;
     panic::set_hook(Box::new(|panic| {
@@ -64,7 +94,7 @@ pub fn start(format: LogFormat, filter: &str) -> anyhow::Result<()> {
         let message = panic.payload_as_str().unwrap_or("no message");
         tracing::error!(place, thread = thread.name(), "panicked: {message}");
     }));
-    Ok(())
+    Ok(guard)
 }
 
 /// Where a collector listens, such as `http://127.0.0.1:4318`.

@@ -2,7 +2,8 @@
 //!
 //! `cargo bench --bench load [-- PART … [workers=N] [jobs=N]]` starts the real program on loopback with a data folder of its own and
 //! prints a table. The parts: `mixed` (64 clients for a minute), `soak` (20 000 small jobs, one by one, removed after a
-//! while; `jobs=N` for another number), `batch` (20 000 cases in one request); all of them without a name. The driver runs on one thread of the same
+//! while; `jobs=N` for another number), `batch` (20 000 cases in one request), `crowds` (silent connections, followers, large bodies,
+//! unread answers); all of them without a name. The driver runs on one thread of the same
 //! machine. A broken promise (a wrong answer, a lost or doubled job) ends it with a panic; missed goals are printed.
 
 #[path = "../machine.rs"]
@@ -11,6 +12,7 @@ mod machine;
 mod batch;
 mod cases;
 mod client;
+mod crowds;
 mod mixed;
 mod service;
 mod soak;
@@ -46,7 +48,7 @@ fn main() {
     let workers = number("workers=").unwrap_or((cores - 1).max(1));
     let jobs = number("jobs=").unwrap_or(20_000);
     let wanted = |part: &str| {
-        let names = ["mixed", "soak", "batch"];
+        let names = ["mixed", "soak", "batch", "crowds"];
         !arguments
             .iter()
             .any(|argument| names.contains(&argument.as_str()))
@@ -71,5 +73,8 @@ fn main() {
     }
     if wanted("batch") {
         print(runtime.block_on(batch::run(workers)));
+    }
+    if wanted("crowds") {
+        print(runtime.block_on(crowds::run(workers)));
     }
 }

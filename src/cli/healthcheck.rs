@@ -1,25 +1,41 @@
 //! Is a running service ready? One plain HTTP request, for containers without other tools.
 
 use std::io::{Read, Write};
-use std::net::{TcpStream, ToSocketAddrs};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpStream, ToSocketAddrs};
 use std::process::ExitCode;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
+
+use crate::cli::HealthcheckArgs;
 
 /// How long each step may take.
 const PATIENCE: Duration = Duration::from_secs(3);
 /// Enough for the status line.
 const ANSWER_BYTES: u64 = 1024;
 
-/// Asks `url`; succeeds if the answer is 200.
-pub(super) fn run(url: &str) -> anyhow::Result<ExitCode> {
+/// Asks whether the service is ready; succeeds if the answer is 200.
+pub(super) fn run(args: &HealthcheckArgs) -> anyhow::Result<ExitCode> {
+    let own = || url(args.probe_listen.unwrap_or(args.listen));
+    let url = &args.url.clone().unwrap_or_else(own);
     let (authority, path) = parse(url)?;
     let status = ask(&authority, &path).with_context(|| format!("no answer from {url}"))?;
     if status != 200 {
         bail!("{url} answered {status}");
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Where a service that listens on this address says whether it is ready. One that listens on every address does so on
+/// loopback too.
+fn url(listen: SocketAddr) -> String {
+    let mut address = listen;
+    match listen.ip() {
+        IpAddr::V4(ip) if ip.is_unspecified() => address.set_ip(Ipv4Addr::LOCALHOST.into()),
+        IpAddr::V6(ip) if ip.is_unspecified() => address.set_ip(Ipv6Addr::LOCALHOST.into()),
+        _ => {}
+    }
+    format!("http://{address}/readyz")
 }
 
 /// Splits `http://host[:port][/path]` into `host:port` and path.
@@ -75,6 +91,18 @@ fn status(mut stream: TcpStream, authority: &str, path: &str) -> anyhow::Result<
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_service_is_asked_where_it_listens() {
+        for (listen, asked) in [
+            ("127.0.0.1:18081", "http://127.0.0.1:18081/readyz"),
+            ("0.0.0.0:80", "http://127.0.0.1:80/readyz"),
+            ("[::]:80", "http://[::1]:80/readyz"),
+            ("192.0.2.1:8080", "http://192.0.2.1:8080/readyz"),
+        ] {
+            assert_eq!(url(listen.parse().unwrap()), asked);
+        }
+    }
 
     #[test]
     fn hosts_ports_and_paths_are_told_apart() {

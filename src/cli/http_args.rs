@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use clap::Args;
 
+use crate::cli::address;
 use crate::http::HttpOptions;
 
 /// Limits of requests and connections.
@@ -12,7 +13,7 @@ use crate::http::HttpOptions;
 pub struct HttpArgs {
     /// Address and port of a second listener that answers `/healthz`, `/readyz` and `/metrics` only; without it they are
     /// answered on the first one alone, where a few places are kept for them.
-    #[arg(long, env = "RAILHEAD_PROBE_LISTEN", value_name = "ADDRESS:PORT")]
+    #[arg(long, env = "RAILHEAD_PROBE_LISTEN", value_name = "ADDRESS:PORT", value_parser = address)]
     pub probe_listen: Option<SocketAddr>,
     /// Open connections beyond which the one that has waited longest without a request is closed for the new one; fewer if
     /// the process may not open so many files.
@@ -91,7 +92,7 @@ pub struct HttpArgs {
     #[arg(long, env = "RAILHEAD_RENDERINGS", value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub renderings: Option<u16>,
     /// Requests that wait for their turn at that, half as many of one tenant; beyond: 503.
-    #[arg(long, env = "RAILHEAD_RENDERINGS_WAITING_MAX", default_value_t = 64, value_name = "N",
+    #[arg(long, env = "RAILHEAD_RENDERINGS_WAITING_MAX", default_value_t = 512, value_name = "N",
           value_parser = clap::value_parser!(u32).range(2..))]
     pub renderings_waiting_max: u32,
     /// Samples of a regular grid (`?grid=NXxNY`); beyond: 400.

@@ -20,13 +20,19 @@ async fn act(args: &KeysArgs) -> anyhow::Result<ExitCode> {
     let (KeysAction::Create { data_dir, .. }
     | KeysAction::List { data_dir }
     | KeysAction::Revoke { data_dir, .. }) = &args.action;
+    let creates = matches!(args.action, KeysAction::Create { .. });
+    if !creates && !Keyring::is_there(data_dir) {
+        bail!("{} is no data folder of a service", data_dir.display());
+    }
     let keys = Keyring::open(data_dir).await?;
     let done = match &args.action {
         KeysAction::Create { tenant, name, .. } => {
             let (key, secret) = keys.create(tenant, name.clone()).await?;
             complain(&format!(
-                "key {} of tenant {} follows; it is shown this one time",
-                key.id, key.tenant
+                "key {} of tenant {} in {} follows; it is shown this one time",
+                key.id,
+                key.tenant,
+                data_dir.display()
             ));
             print(&secret)
         }

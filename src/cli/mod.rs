@@ -60,7 +60,8 @@ pub struct ServeArgs {
         long,
         env = "RAILHEAD_LISTEN",
         default_value = "127.0.0.1:8080",
-        value_name = "ADDRESS:PORT"
+        value_name = "ADDRESS:PORT",
+        value_parser = address
     )]
     pub listen: SocketAddr,
     /// Folder of the job table and the results; created if it is not there. One process at a time.
@@ -304,14 +305,22 @@ pub struct CaseArgs {
 /// Settings of `healthcheck`.
 #[derive(Debug, Clone, Args)]
 pub struct HealthcheckArgs {
-    /// What to ask; only plain `http://` is possible.
+    /// What to ask; only plain `http://` is possible [default: `/readyz` at the address that RAILHEAD_PROBE_LISTEN or
+    /// RAILHEAD_LISTEN says, else at 127.0.0.1:8080].
+    #[arg(long, env = "RAILHEAD_HEALTHCHECK_URL", value_name = "URL")]
+    pub url: Option<String>,
+    /// The listener for probes of the service, if it has one.
+    #[arg(long, env = "RAILHEAD_PROBE_LISTEN", value_name = "ADDRESS:PORT", value_parser = address)]
+    pub probe_listen: Option<SocketAddr>,
+    /// Where the service listens.
     #[arg(
         long,
-        env = "RAILHEAD_HEALTHCHECK_URL",
-        default_value = "http://127.0.0.1:8080/readyz",
-        value_name = "URL"
+        env = "RAILHEAD_LISTEN",
+        default_value = "127.0.0.1:8080",
+        value_name = "ADDRESS:PORT",
+        value_parser = address
     )]
-    pub url: String,
+    pub listen: SocketAddr,
 }
 
 /// How to log.
@@ -384,12 +393,36 @@ pub fn run() -> ExitCode {
         },
         Command::Backup(args) => backup::run(&args),
         Command::Keys(args) => keys::run(&args),
-        Command::Healthcheck(args) => healthcheck::run(&args.url),
+        Command::Healthcheck(args) => healthcheck::run(&args),
         Command::Openapi => print(&http::openapi_json()),
     };
     done.unwrap_or_else(|error| {
-        complain(&format!("{error:#}"));
+        complain(&reasons(&error));
         ExitCode::FAILURE
+    })
+}
+
+/// Variables named `RAILHEAD_…` that no command reads: most likely misspelt.
+fn unknown_variables() -> Vec<String> {
+    let command = Cli::command();
+    let mut known = Vec::new();
+    let mut commands = vec![&command];
+    while let Some(command) = commands.pop() {
+        let names = command.get_arguments().filter_map(clap::Arg::get_env);
+        known.extend(names.map(|name| name.to_string_lossy().into_owned()));
+        commands.extend(command.get_subcommands());
+    }
+    let given = std::env::vars_os().map(|(name, _)| name.to_string_lossy().into_owned());
+    let ours =
+        given.filter(|name| name.starts_with("RAILHEAD_") && !name.starts_with("RAILHEAD_TEST_"));
+    ours.filter(|name| !known.contains(name)).collect()
+}
+
+/// Reads an address to listen on.
+fn address(text: &str) -> Result<SocketAddr, String> {
+    text.parse().map_err(|_| {
+        "allowed is an IP address with a port, such as `127.0.0.1:8080`, `0.0.0.0:8080` or `[::1]:8080`; names are not looked up"
+            .to_owned()
     })
 }
 
@@ -401,6 +434,20 @@ fn print(text: &str) -> anyhow::Result<ExitCode> {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error.into()),
         _ => Ok(ExitCode::SUCCESS),
     }
+}
+
+/// An error with its causes; a cause that was told already is not told again.
+fn reasons(error: &anyhow::Error) -> String {
+    let mut text = String::new();
+    for cause in error.chain() {
+        let cause = cause.to_string();
+        if text.is_empty() {
+            text = cause;
+        } else if !text.contains(&cause) {
+            text = format!("{text}: {cause}");
+        }
+    }
+    text
 }
 
 /// Writes one line to standard error.
@@ -417,6 +464,13 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn a_cause_is_told_once() {
+        let inner = anyhow::anyhow!("no such file");
+        let error = inner.context("the folder: no such file").context("backup");
+        assert_eq!(reasons(&error), "backup: the folder: no such file");
     }
 
     #[test]

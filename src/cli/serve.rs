@@ -18,7 +18,7 @@ use tokio::time::{Instant, sleep_until, timeout_at};
 use tokio_util::sync::CancellationToken;
 
 use crate::cli::stop::{Schedule, Signals};
-use crate::cli::{Anonymous, ServeArgs};
+use crate::cli::{Anonymous, ServeArgs, unknown_variables};
 use crate::http::{self, HttpOptions};
 use crate::jobs::recipe::Recipe;
 use crate::jobs::trace::Tracer;
@@ -33,7 +33,13 @@ const PROBE_CONNECTIONS: usize = 64;
 
 /// Serves until a signal says stop.
 pub(super) fn run(args: &ServeArgs) -> anyhow::Result<ExitCode> {
-    telemetry::start(args.log.log_format, &args.log.log)?;
+    let log = telemetry::start(args.log.log_format, &args.log.log)?;
+    for name in unknown_variables() {
+        tracing::warn!(
+            name,
+            "this variable is not known; `railhead config` lists those that are"
+        );
+    }
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(request_threads())
         .enable_all()
@@ -43,6 +49,8 @@ pub(super) fn run(args: &ServeArgs) -> anyhow::Result<ExitCode> {
     let served = runtime.block_on(serve(args));
     // The data folder is closed. Arithmetic that still goes on works for clients that have been cut off.
     runtime.shutdown_background();
+    // The last lines are written.
+    drop(log);
     served?;
     Ok(ExitCode::SUCCESS)
 }
@@ -99,7 +107,12 @@ async fn serve(args: &ServeArgs) -> anyhow::Result<()> {
     let probe_address = probe_listener.as_ref().map(TcpListener::local_addr);
     let probe_address = probe_address.transpose()?;
     let probes_anonymous = probe_address.is_some_and(|address| args.anonymous.on(address));
-    let [router, probes] = http::routers(jobs.clone(), options.clone(), probes_anonymous);
+    let [router, probes] = http::routers(
+        jobs.clone(),
+        options.clone(),
+        probes_anonymous,
+        telemetry::dropped_lines,
+    );
     let router = http::allow_origins(router, origins);
     if let (Some(listener), Some(address)) = (probe_listener, probe_address) {
         tracing::info!(%address, "listening for probes");
@@ -112,10 +125,10 @@ async fn serve(args: &ServeArgs) -> anyhow::Result<()> {
         tokio::spawn(http::serve(listener, probes, few, CancellationToken::new()));
     }
     let mut server = tokio::spawn(http::serve(listener, router, options, stop.clone()));
-    tracing::info!(%address, workers, data_dir = %args.data_dir.display(), "listening");
     if anonymous && !address.ip().is_loopback() {
         tracing::warn!(%address, "whoever reaches this address may use the service without a key");
     }
+    tracing::info!(%address, workers, data_dir = %args.data_dir.display(), "listening");
 
     let name = tokio::select! {
         name = signals.next() => name,

@@ -43,11 +43,12 @@ impl Schedule {
         let now = Instant::now();
         let [least, most] = REQUESTS_END_WITHIN;
         let last_moment = now + (grace + BEYOND_GRACE).max(drain + BEYOND_DRAIN);
+        let folder_closed = last_moment - LAST_STEP;
         Schedule {
             port_closes: now + drain,
-            requests_end: now + drain + grace.clamp(least, most),
+            requests_end: (now + drain + grace.clamp(least, most)).min(folder_closed - LAST_STEP),
             grace_ends: now + grace,
-            folder_closed: last_moment.checked_sub(LAST_STEP).unwrap_or(last_moment),
+            folder_closed,
             last_moment,
         }
     }

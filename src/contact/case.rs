@@ -14,11 +14,11 @@ use crate::contact::geometry::wheel_rail::Side;
 /// One contact case: two bodies, how they are pressed together and how they roll.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Case {
-    /// Free text for people, at most 200 characters.
+    /// Free text for people, at most 200 characters, none of them a control character.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub name: Option<String>,
-    /// Free key–value pairs to find the case again, at most 32 of them.
+    /// Free key–value pairs to find the case again, at most 32 of them, without control characters; no key has a colon.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     #[schema(required = false)]
     pub labels: BTreeMap<String, String>,

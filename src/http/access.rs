@@ -38,6 +38,31 @@ const FAILURES_WITHIN: Duration = Duration::from_secs(10);
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Peer(pub IpAddr);
 
+/// Whose request it is, once that is known; in its extensions.
+#[derive(Debug, Clone)]
+pub struct Tenant(pub Arc<str>);
+
+/// The key that a request came with, to be looked at again while its answer goes on; in its extensions.
+#[derive(Debug, Clone)]
+pub struct Credential(Arc<str>);
+
+/// How often the key of an answer that goes on is looked at.
+const LOOK_AGAIN: Duration = Duration::from_secs(2);
+
+/// Ends when the key that a request came with has been revoked; never without a key.
+pub async fn revoked(jobs: Jobs, credential: Option<Credential>) {
+    let Some(Credential(text)) = credential else {
+        return std::future::pending().await;
+    };
+    loop {
+        tokio::time::sleep(LOOK_AGAIN).await;
+        // A table that does not answer revokes nothing.
+        if matches!(jobs.key(&text).await, Ok(None)) {
+            return;
+        }
+    }
+}
+
 /// Whose requests are counted together.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 enum Sender {
@@ -236,6 +261,12 @@ impl FromRequestParts<Shared> for Caller {
         let tenant = tenant.unwrap_or_else(|| ANONYMOUS.into());
         if let Some(held) = parts.extensions.get::<Held>() {
             held.add(shared.crowds.request(&tenant)?);
+        }
+        parts.extensions.insert(Tenant(tenant.clone()));
+        let key = parts.headers.get(header::AUTHORIZATION);
+        if let Some(key) = key.and_then(|header| bearer(header.to_str().ok()?)) {
+            let credential = Credential(key.into());
+            parts.extensions.insert(credential);
         }
         Ok(Caller(access.jobs.of(tenant)))
     }

@@ -7,13 +7,15 @@ use axum::extract::Request;
 use axum::http::{HeaderMap, header};
 use futures_util::StreamExt;
 use tokio::time::{Instant, timeout_at};
+use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 use crate::http::HttpOptions;
-use crate::http::body::{essence, read_json, read_strict};
+use crate::http::body::{essence, read_json, read_strict, unreadable, weigh_case};
 use crate::http::coding::{Packed, too_long};
 use crate::http::elements::{Element, Layout, Splitter};
 use crate::http::error::{ApiError, Kind};
+use crate::http::memory::{Memory, SMALL_BYTES};
 use crate::http::table_body::TableBody;
 use crate::jobs::Jobs;
 use crate::jobs::draft::Draft;
@@ -65,7 +67,9 @@ pub async fn form(
         ("application/json", _) => Ok(Form::Array),
         ("application/x-ndjson" | "application/ndjson" | "application/jsonl", _) => Ok(Form::Lines),
         ("text/csv", Some(job)) => {
-            let case = read_json(&jobs.case(job).await?)?;
+            let case = jobs.case(job).await;
+            let case = case.map_err(|error| ApiError::from(error).about("template"))?;
+            let case = read_json(&case)?;
             Ok(Form::Table(Box::new(TableBody::new(case))))
         }
         ("text/csv", None) => Err(ApiError::bad_parameter(
@@ -87,6 +91,7 @@ pub async fn form(
 /// The body is too large, too slow, broken, or not of its form; faults of single cases are kept in the draft.
 pub async fn read_draft(
     jobs: &Jobs,
+    memory: &Memory,
     options: &HttpOptions,
     mut form: Form,
     request: Request<Body>,
@@ -115,6 +120,14 @@ pub async fn read_draft(
     let mut portion = Vec::new();
     let (mut total, mut held) = (0_u64, 0);
     let begun = Instant::now();
+    let mut share = None;
+    let checking = Checking {
+        memory,
+        parsed_max_bytes: options.parsed_max_bytes,
+        gone: CancellationToken::new(),
+    };
+    // Dropped with this request when its client goes away.
+    let _gone = checking.gone.clone().drop_guard();
     loop {
         #[expect(clippy::cast_precision_loss, reason = "far fewer bytes than 2^53")]
         let owed = Duration::from_secs_f64(total as f64 / LOWEST_RATE);
@@ -137,7 +150,7 @@ pub async fn read_draft(
             if too_long(&error) {
                 too_large()
             } else {
-                ApiError::new(Kind::UnreadableBody, error.to_string())
+                unreadable(&error)
             }
         })?;
         total += piece.len() as u64;
@@ -148,15 +161,22 @@ pub async fn read_draft(
             return Err(Packed::refusal());
         }
         held += piece.len();
+        // Most cases are small; a large one is held until its end has come.
+        if share.is_none() && splitter.held() + piece.len() > SMALL_BYTES.max(PORTION_BYTES) {
+            share = memory.body(jobs.tenant(), options.body_max_bytes).await?;
+        }
         splitter.feed(&piece, &mut portion)?;
         if held >= PORTION_BYTES {
             held = 0;
-            (draft, form) = check(draft, form, std::mem::take(&mut portion)).await?;
+            (draft, form) = checking
+                .check(draft, form, std::mem::take(&mut portion))
+                .await?;
             require_count(&draft, options)?;
         }
     }
     splitter.end(&mut portion)?;
-    (draft, _) = check(draft, form, portion).await?;
+    (draft, _) = checking.check(draft, form, portion).await?;
+    drop(share);
     require_count(&draft, options)?;
     Ok(draft)
 }
@@ -174,34 +194,65 @@ fn require_count(draft: &Draft, options: &HttpOptions) -> Result<(), ApiError> {
     ))
 }
 
-/// Checks some cases off the threads that answer requests.
-async fn check(
-    mut draft: Draft,
-    mut form: Form,
-    portion: Vec<Element>,
-) -> Result<(Draft, Form), ApiError> {
-    let checked = tokio::task::spawn_blocking(move || {
-        for element in portion {
-            match &mut form {
-                Form::Array => {
-                    let case = read_strict(&element.text)
-                        .map_err(|error| ApiError::malformed_element(draft.cases, &error))?;
-                    draft.add(element.line, &element.text, Ok(case))?;
+/// What it takes to check cases off the threads that answer requests.
+struct Checking<'a> {
+    memory: &'a Memory,
+    parsed_max_bytes: usize,
+    /// Nobody waits for the answer any more.
+    gone: CancellationToken,
+}
+
+impl Checking<'_> {
+    /// Checks some cases, in their turn.
+    async fn check(
+        &self,
+        mut draft: Draft,
+        mut form: Form,
+        portion: Vec<Element>,
+    ) -> Result<(Draft, Form), ApiError> {
+        if portion.is_empty() {
+            return Ok((draft, form));
+        }
+        let turn = self.memory.turn(usize::MAX).await?;
+        let (gone, max_bytes) = (self.gone.clone(), self.parsed_max_bytes);
+        let checked = tokio::task::spawn_blocking(move || {
+            let _turn = turn;
+            for element in portion {
+                if gone.is_cancelled() {
+                    return Err(ApiError::internal(&"the client has gone"));
                 }
-                Form::Lines => {
-                    let case = read_strict(&element.text)
-                        .map_err(|error| format!("the line is not JSON: {error}"));
-                    draft.add(element.line, &element.text, case)?;
-                }
-                Form::Table(table) => {
-                    let Some(row) = table.take(&element.text)? else {
-                        continue;
-                    };
-                    draft.add_row(element.line, &element.text, row)?;
-                }
+                add(&mut draft, &mut form, &element, max_bytes)?;
+            }
+            Ok((draft, form))
+        });
+        checked.await.map_err(|error| ApiError::internal(&error))?
+    }
+}
+
+/// Adds one case to a draft, with its faults if it has any.
+fn add(
+    draft: &mut Draft,
+    form: &mut Form,
+    element: &Element,
+    parsed_max_bytes: usize,
+) -> Result<(), ApiError> {
+    weigh_case(&element.text, parsed_max_bytes)?;
+    match form {
+        Form::Array => {
+            let case = read_strict(&element.text)
+                .map_err(|error| ApiError::malformed_element(draft.cases, &error))?;
+            draft.add(element.line, &element.text, Ok(case))?;
+        }
+        Form::Lines => {
+            let case = read_strict(&element.text)
+                .map_err(|error| format!("the line is not JSON: {error}"));
+            draft.add(element.line, &element.text, case)?;
+        }
+        Form::Table(table) => {
+            if let Some(row) = table.take(&element.text)? {
+                draft.add_row(element.line, &element.text, row)?;
             }
         }
-        Ok((draft, form))
-    });
-    checked.await.map_err(|error| ApiError::internal(&error))?
+    }
+    Ok(())
 }

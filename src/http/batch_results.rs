@@ -1,5 +1,6 @@
 //! `/v1/batches/{id}/results`: one line per case in the order they were sent, written while it is read.
 
+use std::pin::Pin;
 use std::time::Duration;
 
 use axum::Extension;
@@ -16,7 +17,7 @@ use uuid::Uuid;
 use crate::contact::remark::RemarkEntry;
 use crate::contact::solution::Solution;
 use crate::http::accept::{Format, choose, named_format};
-use crate::http::access::Caller;
+use crate::http::access::{Caller, Credential, revoked};
 use crate::http::carrying::{Held, carrying};
 use crate::http::coding::AsItComes;
 use crate::http::crowds::Crowds;
@@ -86,6 +87,7 @@ pub async fn results(
     uri: Uri,
     State(crowds): State<Crowds>,
     Extension(held): Extension<Held>,
+    key: Option<Extension<Credential>>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let mut query = Query::read(&uri, &["wait", "format"]);
@@ -110,7 +112,9 @@ pub async fn results(
         Format::Csv => Some(Bytes::from(csv_head())),
         _ => None,
     };
+    let revoked = Box::pin(revoked(jobs.clone(), key.map(|Extension(key)| key)));
     let start = Place {
+        revoked,
         jobs,
         batch: id,
         format,
@@ -133,6 +137,8 @@ pub async fn results(
 
 /// Where a stream of results stands.
 struct Place {
+    /// The key was revoked; nothing more is sent.
+    revoked: Pin<Box<dyn Future<Output = ()> + Send>>,
     jobs: Jobs,
     batch: Uuid,
     format: Format,
@@ -149,8 +155,12 @@ async fn next_piece(mut place: Place) -> Result<Option<(Bytes, Place)>, JobsErro
     }
     let lines = place
         .jobs
-        .batch_lines(place.batch, place.after, place.page, place.until)
-        .await?;
+        .batch_lines(place.batch, place.after, place.page, place.until);
+    let lines = tokio::select! {
+        lines = lines => lines?,
+        // Broken off, so that what was sent is not taken for all there is.
+        () = &mut place.revoked => return Err(JobsError::BatchNotFound),
+    };
     let read = u32::try_from(lines.len()).unwrap_or(PAGE_JOBS);
     place.page = (2 * read).clamp(4, PAGE_JOBS);
     let Some(last) = lines.last() else {
@@ -275,7 +285,7 @@ fn write_csv(lines: &[Line]) -> Result<Vec<u8>, JobsError> {
         let front = [
             line.index.to_string(),
             job.id.to_string(),
-            job.name.clone().unwrap_or_default(),
+            for_sheets(job.name.as_deref().unwrap_or_default()),
             job.state.name().to_owned(),
         ];
         let solution = match &line.result {
@@ -310,6 +320,16 @@ fn codes(remarks: &[RemarkEntry], point: usize) -> String {
         }
     }
     codes.join(" ")
+}
+
+/// A text of a client as a field of a table. Programs for sheets take what begins like a formula for one; an apostrophe
+/// says that it is none.
+fn for_sheets(text: &str) -> String {
+    if text.starts_with(['=', '+', '-', '@']) {
+        format!("'{text}")
+    } else {
+        text.to_owned()
+    }
 }
 
 /// The numbers of each motion: sums over all patches.

@@ -17,6 +17,7 @@ use crate::http::batch_body::{form, read_draft};
 use crate::http::error::{ApiError, Kind};
 use crate::http::job::{BatchId, rfc3339};
 use crate::http::jobs::{idempotency_key, mark_replay};
+use crate::http::memory::Memory;
 use crate::http::problem::Fault;
 use crate::http::problems::problems;
 use crate::http::query::Query;
@@ -167,12 +168,13 @@ problems! {
 pub async fn submit(
     Caller(jobs): Caller,
     State(options): State<HttpOptions>,
+    State(memory): State<Memory>,
     request: Request,
 ) -> Result<Response, ApiError> {
     let key = idempotency_key(request.headers())?;
     let (asked, wishes) = read_query(&request)?;
     let form = form(&jobs, request.headers(), asked.template).await?;
-    let mut draft = read_draft(&jobs, &options, form, request).await?;
+    let mut draft = read_draft(&jobs, &memory, &options, form, request).await?;
     draft.wishes = wishes;
     if draft.cases == draft.rejected || (draft.rejected > 0 && !asked.valid_only) {
         return Err(refusal(&draft));

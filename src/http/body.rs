@@ -1,36 +1,96 @@
 //! Reads a JSON body: declared as JSON, not too large, well-formed, no member written twice.
 
 use std::fmt;
-use std::time::Duration;
 
-use axum::body::Bytes;
+use axum::body::{Bytes, HttpBody};
 use axum::extract::{FromRef, FromRequest, Request};
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::{HeaderMap, header};
+use http_body_util::{BodyExt, Limited};
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Number, Value};
 
 use crate::http::HttpOptions;
+use crate::http::access::Tenant;
 use crate::http::coding::too_long;
 use crate::http::error::{ApiError, Kind};
+use crate::http::json_weight::{MEMBERS_MAX, weigh};
+use crate::http::memory::{Memory, Room, SMALL_BYTES};
+use crate::http::shares::Share;
 
 /// The JSON body of a request. What it means is for others to judge.
 #[derive(Debug)]
-pub struct JsonBody(pub Value);
+pub struct JsonBody {
+    /// What was sent.
+    pub value: Value,
+    /// The memory that it takes, and the turn of a large one; to be held until it has been checked.
+    pub room: Room,
+}
 
 impl<S> FromRequest<S> for JsonBody
 where
     S: Send + Sync,
     HttpOptions: FromRef<S>,
+    Memory: FromRef<S>,
 {
     type Rejection = ApiError;
 
     async fn from_request(request: Request, state: &S) -> Result<Self, ApiError> {
         let options = HttpOptions::from_ref(state);
+        let memory = Memory::from_ref(state);
         require_json(request.headers())?;
-        let bytes =
-            read_whole(request, state, options.body_timeout, options.body_max_bytes).await?;
-        read_json(&bytes).map(JsonBody)
+        let tenant = request.extensions().get::<Tenant>().cloned();
+        let Tenant(tenant) = tenant.unwrap_or_else(|| Tenant("".into()));
+        let (bytes, held) = read_whole(request, &memory, &tenant, &options).await?;
+        let weight = weigh_case(&bytes, options.parsed_max_bytes)?;
+        let share = memory.parsed(&tenant, weight).await?;
+        if weight <= SMALL_BYTES {
+            let value = read_json(&bytes)?;
+            return Ok(JsonBody {
+                value,
+                room: Room { share, turn: None },
+            });
+        }
+        // Off the threads that answer requests, few at a time.
+        let turn = memory.turn(weight).await?;
+        let room = Room {
+            share,
+            turn: Some(turn),
+        };
+        let read = tokio::task::spawn_blocking(move || {
+            let value = read_json(&bytes);
+            drop((bytes, held));
+            // Kept to the end of the work, also if nobody waits for it any more.
+            value.map(|value| JsonBody { value, room })
+        });
+        read.await.map_err(|error| ApiError::internal(&error))?
     }
+}
+
+/// What the text of a case will take in memory once it is parsed.
+///
+/// # Errors
+/// `body-too-large`: more than one case may take.
+pub fn weigh_case(text: &[u8], max_bytes: usize) -> Result<usize, ApiError> {
+    let weight = weigh(text);
+    if weight.bytes > max_bytes {
+        return Err(ApiError::new(
+            Kind::BodyTooLarge,
+            format!(
+                "the case would take about {} bytes in memory; allowed: {max_bytes}",
+                weight.bytes
+            ),
+        ));
+    }
+    if weight.members > MEMBERS_MAX {
+        return Err(ApiError::new(
+            Kind::BodyTooLarge,
+            format!(
+                "the objects of the case have {} members; allowed: {MEMBERS_MAX}",
+                weight.members
+            ),
+        ));
+    }
+    Ok(weight.bytes)
 }
 
 /// Parses JSON text (RFC 8259) without repairing anything: a member written twice and a number beyond the range of
@@ -39,7 +99,24 @@ where
 /// # Errors
 /// `malformed-json` with its position.
 pub fn read_json(text: &[u8]) -> Result<Value, ApiError> {
-    read_strict(text).map_err(|error| ApiError::malformed(&error))
+    read_strict(text).map_err(|error| {
+        let refusal = ApiError::malformed(&error);
+        match unlike_json(text) {
+            Some(reason) => refusal.saying(format!("the body is not JSON: {reason}")),
+            None => refusal,
+        }
+    })
+}
+
+/// What is wrong with a text that does not even begin like JSON.
+#[must_use]
+pub fn unlike_json(text: &[u8]) -> Option<&'static str> {
+    match text {
+        [0xef, 0xbb, 0xbf, ..] => Some("it begins with a byte order mark; send UTF-8 without one"),
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => Some("it is UTF-16; send UTF-8"),
+        _ if text.iter().all(u8::is_ascii_whitespace) => Some("it is empty"),
+        _ => None,
+    }
 }
 
 /// As [`read_json`], with the parser's own error.
@@ -78,12 +155,15 @@ fn require_json(headers: &HeaderMap) -> Result<(), ApiError> {
     ))
 }
 
-async fn read_whole<S: Send + Sync>(
+/// The whole body, and the share of memory that it takes. Memory is taken before anything is read: the declared length,
+/// or where it is not known, as that of a packed body, as much as a body may have once it turns out not to be small.
+async fn read_whole(
     request: Request,
-    state: &S,
-    timeout: Duration,
-    max_bytes: usize,
-) -> Result<Bytes, ApiError> {
+    memory: &Memory,
+    tenant: &str,
+    options: &HttpOptions,
+) -> Result<(Bytes, Option<Share>), ApiError> {
+    let max_bytes = options.body_max_bytes;
     let too_large = || {
         ApiError::new(
             Kind::BodyTooLarge,
@@ -96,18 +176,58 @@ async fn read_whole<S: Send + Sync>(
     if declared.is_some_and(|length| length > max_bytes as u64) {
         return Err(too_large());
     }
-    match tokio::time::timeout(timeout, Bytes::from_request(request, state)).await {
-        Ok(Ok(bytes)) => Ok(bytes),
-        Ok(Err(rejection)) if rejection.status() == StatusCode::PAYLOAD_TOO_LARGE => {
-            Err(too_large())
+    let exact = request.body().size_hint().exact();
+    let exact = exact.and_then(|bytes| usize::try_from(bytes).ok());
+    let mut share = memory.body(tenant, exact.unwrap_or(0)).await?;
+    let mut body = Limited::new(request.into_body(), max_bytes);
+    let mut held = Vec::with_capacity(exact.unwrap_or(0).min(max_bytes));
+    let read = async {
+        while let Some(frame) = body.frame().await {
+            let frame = frame.map_err(|error| {
+                if too_long(error.as_ref()) {
+                    too_large()
+                } else {
+                    unreadable(error.as_ref())
+                }
+            })?;
+            let Ok(data) = frame.into_data() else {
+                continue;
+            };
+            if share.is_none() && held.len() + data.len() > SMALL_BYTES {
+                share = memory.body(tenant, max_bytes).await?;
+            }
+            held.extend_from_slice(&data);
         }
-        Ok(Err(rejection)) if too_long(&rejection) => Err(too_large()),
-        Ok(Err(rejection)) => Err(ApiError::new(Kind::UnreadableBody, rejection.body_text())),
-        Err(_) => Err(ApiError::new(
-            Kind::BodyTimeout,
-            format!("the body did not arrive within {} s", timeout.as_secs_f64()),
-        )),
+        Ok::<(), ApiError>(())
+    };
+    match tokio::time::timeout(options.body_timeout, read).await {
+        Ok(read) => read?,
+        Err(_) => {
+            return Err(ApiError::new(
+                Kind::BodyTimeout,
+                format!(
+                    "the body did not arrive within {} s",
+                    options.body_timeout.as_secs_f64()
+                ),
+            ));
+        }
     }
+    if let Some(share) = &mut share {
+        share.keep(held.len());
+    }
+    Ok((Bytes::from(held), share))
+}
+
+/// A body that broke off or could not be unpacked.
+pub fn unreadable(error: &(dyn std::error::Error + 'static)) -> ApiError {
+    let mut deepest = error;
+    while let Some(next) = deepest.source() {
+        deepest = next;
+    }
+    ApiError::new(
+        Kind::UnreadableBody,
+        format!("the body broke off or cannot be unpacked: {deepest}"),
+    )
 }
 
 /// A JSON value in which no object names a member twice; `Value` itself would keep the last one silently.

@@ -1,19 +1,24 @@
 //! What a client may keep and for how long: entity tags, conditional requests, `Cache-Control`.
 //!
-//! A tag is a digest of the body, so it is a strong one (RFC 9110, section 8.8.3). Compressed forms of a body have tags of their own:
+//! A tag is a digest of the body, so it is a strong one (RFC 9110, section 8.8.3); that of a result, which never changes, a digest
+//! of what it is asked by. Compressed forms of a body have tags of their own:
 //! the same digest with the coding behind it.
 
-use axum::body::{Body, Bytes};
-use axum::extract::Request;
-use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, header};
+use axum::body::Body;
+use axum::extract::{Query as Pairs, Request};
+use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, Uri, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use http_body_util::BodyExt;
+use uuid::Uuid;
 
+use crate::http::accept::Format;
 use crate::http::error::ApiError;
+use crate::jobs::Jobs;
+use crate::jobs::job::State;
 
-/// Results never change.
-const FINISHED: HeaderValue = HeaderValue::from_static("private, max-age=31536000, immutable");
+/// Results never change, but they can be deleted.
+const FINISHED: HeaderValue = HeaderValue::from_static("private, max-age=3600");
 /// May be kept, but has to be asked for again each time.
 const CHANGING: HeaderValue = HeaderValue::from_static("private, no-cache");
 /// Everything else.
@@ -54,6 +59,61 @@ pub async fn complete(request: Request, next: Next) -> Response {
     response
 }
 
+/// What the result of a job, or a part of it, is known by.
+#[derive(Debug)]
+pub enum Known {
+    /// The client has it: this is the answer.
+    Unchanged(Response),
+    /// It has to be made, and gets this tag.
+    Tag(String),
+}
+
+impl Known {
+    /// Compares what a client has with what an address stands for, before anything is loaded or made. Results never
+    /// change, so the job, the address, the form and the version of the program say all. A tag that stands for anything
+    /// (`*`) is left to [`finished`]: whether there is something only the work itself can say.
+    ///
+    /// # Errors
+    /// There is no such job.
+    pub async fn of(
+        jobs: &Jobs,
+        id: Uuid,
+        uri: &Uri,
+        headers: &HeaderMap,
+        format: Format,
+    ) -> Result<Known, ApiError> {
+        let job = jobs.get(id).await?;
+        let query = Pairs::<Vec<(String, String)>>::try_from_uri(uri);
+        let mut query = query.map_or_else(|_| Vec::new(), |Pairs(pairs)| pairs);
+        query.sort();
+        let parts = (id, job.version, uri.path(), query, format.name());
+        let text = format!("{} {parts:?}", env!("CARGO_PKG_VERSION"));
+        let digest = digest(text.as_bytes());
+        if job.state != State::Succeeded {
+            return Ok(Known::Tag(digest));
+        }
+        let Some(tag) = matching(headers, &digest).filter(|_| !asks_for_any(headers)) else {
+            return Ok(Known::Tag(digest));
+        };
+        let head = [
+            (header::ETAG, tag),
+            (header::CACHE_CONTROL, FINISHED),
+            (header::VARY, HeaderValue::from_static("Accept")),
+        ];
+        Ok(Known::Unchanged(
+            (StatusCode::NOT_MODIFIED, head).into_response(),
+        ))
+    }
+}
+
+/// The answer with its tag.
+pub fn tagged(tag: &str, mut response: Response) -> Response {
+    if let Ok(tag) = HeaderValue::from_str(&format!("\"{tag}\"")) {
+        response.headers_mut().insert(header::ETAG, tag);
+    }
+    response
+}
+
 async fn tag(request: Request, next: Next, lifetime: HeaderValue) -> Response {
     let reading = matches!(*request.method(), Method::GET | Method::HEAD);
     let known = request.headers().clone();
@@ -62,6 +122,16 @@ async fn tag(request: Request, next: Next, lifetime: HeaderValue) -> Response {
         return response;
     }
     let (mut parts, body) = response.into_parts();
+    if parts.headers.contains_key(header::ETAG) {
+        parts.headers.insert(header::CACHE_CONTROL, lifetime);
+        if asks_for_any(&known) {
+            parts.status = StatusCode::NOT_MODIFIED;
+            parts.headers.remove(header::CONTENT_TYPE);
+            parts.headers.remove(header::CONTENT_LENGTH);
+            return Response::from_parts(parts, Body::empty());
+        }
+        return Response::from_parts(parts, body);
+    }
     // The bodies of these resources are in memory already.
     let body = match body.collect().await {
         Ok(body) => body.to_bytes(),
@@ -82,7 +152,13 @@ async fn tag(request: Request, next: Next, lifetime: HeaderValue) -> Response {
     Response::from_parts(parts, Body::from(body))
 }
 
-fn digest(body: &Bytes) -> String {
+/// Does `If-None-Match` stand for whatever there is?
+fn asks_for_any(headers: &HeaderMap) -> bool {
+    let mut values = headers.get_all(header::IF_NONE_MATCH).iter();
+    values.any(|value| value.as_bytes() == b"*")
+}
+
+fn digest(body: &[u8]) -> String {
     // 128 bits are enough where nobody gains by a collision with an own body.
     blake3::hash(body).to_hex()[..32].to_owned()
 }

@@ -1,6 +1,8 @@
 //! `/v1/cases/check`: is this a case, and what would it cost? Makes no job.
 
 use axum::Json;
+use axum::extract::State;
+use axum::http::Uri;
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -9,7 +11,9 @@ use crate::contact::remark::RemarkEntry;
 use crate::http::access::Caller;
 use crate::http::body::JsonBody;
 use crate::http::error::ApiError;
+use crate::http::memory::Memory;
 use crate::http::problems::problems;
+use crate::http::query::Query;
 
 /// A case that can be solved, and its expected cost.
 #[derive(Debug, Serialize, ToSchema)]
@@ -39,7 +43,7 @@ pub struct Estimate {
 
 problems! {
     /// What `POST /v1/cases/check` can fail with.
-    CheckProblems: MalformedJson, UnreadableBody, BodyTimeout, BodyTooLarge, UnsupportedMediaType, UnsupportedEncoding, FaultyCase
+    CheckProblems: BadQuery, MalformedJson, UnreadableBody, BodyTimeout, BodyTooLarge, UnsupportedMediaType, UnsupportedEncoding, FaultyCase
 }
 
 /// Checks a case and estimates its cost, without making a job.
@@ -53,11 +57,19 @@ problems! {
 )]
 pub async fn check(
     Caller(jobs): Caller,
-    JsonBody(case): JsonBody,
+    State(memory): State<Memory>,
+    uri: Uri,
+    JsonBody { value, mut room }: JsonBody,
 ) -> Result<Json<CheckedCase>, ApiError> {
+    Query::read(&uri, &[]).finish()?;
+    if room.turn.is_none() {
+        room.turn = Some(memory.turn(0).await?);
+    }
     // A large grid takes long enough to check that it must not hold up other requests.
     let checked = tokio::task::spawn_blocking(move || {
-        jobs.check(&case).map(|problem| {
+        // Kept to the end of the work, also if nobody waits for it any more.
+        let _room = room;
+        jobs.check(&value).map(|problem| {
             let cost = problem.cost();
             CheckedCase {
                 digest: problem.digest.clone(),

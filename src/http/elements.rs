@@ -65,6 +65,12 @@ impl Splitter {
         }
     }
 
+    /// Bytes of the case under way.
+    #[must_use]
+    pub fn held(&self) -> usize {
+        self.held.len()
+    }
+
     /// Takes a piece of the body and appends the cases that it completes.
     ///
     /// # Errors

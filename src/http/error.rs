@@ -19,6 +19,9 @@ const RETRY_SECONDS: u32 = 1;
 /// The same where somebody has to make room first.
 const DISK_RETRY_SECONDS: u32 = 10;
 
+/// Faults of one case that are listed.
+const FAULTS_LISTED: usize = 1000;
+
 /// Declares the kinds of problems once: name, status, slug, title, meaning.
 macro_rules! kinds {
     ($($kind:ident $status:literal $slug:literal $title:literal $meaning:literal)*) => {
@@ -138,6 +141,23 @@ impl ApiError {
         self
     }
 
+    /// The same, naming the query parameter that it is about.
+    #[must_use]
+    pub fn about(mut self, parameter: &str) -> Self {
+        let detail = self.problem.detail.clone();
+        self.problem
+            .errors
+            .push(Fault::parameter(parameter, detail));
+        self
+    }
+
+    /// The same in other words.
+    #[must_use]
+    pub fn saying(mut self, detail: impl Into<String>) -> Self {
+        self.problem.detail = detail.into();
+        self
+    }
+
     /// A failure of the service itself: the reason goes to the log, not to the client.
     #[must_use]
     pub fn internal(reason: &dyn std::fmt::Display) -> Self {
@@ -226,11 +246,15 @@ impl From<CaseError> for ApiError {
     fn from(CaseError(faults): CaseError) -> Self {
         let detail = match faults.len() {
             1 => "the case has 1 fault".to_owned(),
+            count if count > FAULTS_LISTED => {
+                format!("the case has {count} faults; the first {FAULTS_LISTED} are listed")
+            }
             count => format!("the case has {count} faults"),
         };
         let mut failure = ApiError::new(Kind::FaultyCase, detail);
         failure.problem.errors = faults
             .into_iter()
+            .take(FAULTS_LISTED)
             .map(|fault| Fault {
                 pointer: Some(fault.pointer),
                 parameter: None,
@@ -378,6 +402,12 @@ pub async fn name_instance(request: Request, next: Next) -> Response {
 /// The answer for a path that names nothing.
 #[must_use]
 pub fn unknown_route(path: &str) -> ApiError {
+    if path.len() > 1 && path.ends_with('/') {
+        let detail = format!(
+            "there is nothing at `{path}`; the paths of this service do not end with a slash"
+        );
+        return ApiError::new(Kind::UnknownRoute, detail);
+    }
     ApiError::new(
         Kind::UnknownRoute,
         format!(

@@ -11,8 +11,8 @@ use axum::extract::State;
 use axum::http::{HeaderMap, HeaderName, StatusCode};
 use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
-use futures_util::Stream;
 use futures_util::stream::unfold;
+use futures_util::{Stream, StreamExt};
 use serde::Serialize;
 use serde_json::json;
 use utoipa::openapi::extensions::Extensions;
@@ -22,7 +22,7 @@ use utoipa::{PartialSchema, ToSchema};
 use uuid::Uuid;
 
 use crate::http::accept::{Format, choose};
-use crate::http::access::Caller;
+use crate::http::access::{Caller, Credential, revoked};
 use crate::http::batches::{BatchAnswer, LookBatchProblems};
 use crate::http::carrying::{Held, carrying};
 use crate::http::crowds::Crowds;
@@ -140,6 +140,7 @@ pub async fn job(
     JobId(id): JobId,
     State(crowds): State<Crowds>,
     Extension(held): Extension<Held>,
+    key: Option<Extension<Credential>>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     choose(&headers, None, &[Format::Events])?;
@@ -150,10 +151,12 @@ pub async fn job(
     }
     let place = crowds.stream(jobs.tenant())?;
     held.release();
-    let events = answer(unfold(Some(seen), move |seen| {
+    let revoked = revoked(jobs.clone(), key.map(|Extension(key)| key));
+    let events = unfold(Some(seen), move |seen| {
         let jobs = jobs.clone();
         async move { next_of_job(&jobs, id, seen?).await }
-    }));
+    });
+    let events = answer(events.take_until(revoked));
     Ok(carrying(events, place))
 }
 
@@ -193,6 +196,7 @@ pub async fn batch(
     BatchId(id): BatchId,
     State(crowds): State<Crowds>,
     Extension(held): Extension<Held>,
+    key: Option<Extension<Credential>>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     choose(&headers, None, &[Format::Events])?;
@@ -204,10 +208,12 @@ pub async fn batch(
     }
     let place = crowds.stream(jobs.tenant())?;
     held.release();
-    let events = answer(unfold(Some(seen), move |seen| {
+    let revoked = revoked(jobs.clone(), key.map(|Extension(key)| key));
+    let events = unfold(Some(seen), move |seen| {
         let jobs = jobs.clone();
         async move { next_of_batch(&jobs, id, seen?).await }
-    }));
+    });
+    let events = answer(events.take_until(revoked));
     Ok(carrying(events, place))
 }
 

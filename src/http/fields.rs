@@ -1,5 +1,7 @@
 //! `/v1/jobs/{id}/tractions`, `/pressure` and `/slip`: values per cell, or on a regular grid.
 
+use axum::body::Body;
+use axum::extract::State;
 use axum::http::{HeaderMap, HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
@@ -8,12 +10,17 @@ use uuid::Uuid;
 
 use crate::contact::case::Output;
 use crate::contact::solution::{PatchCells, PointFields};
+use crate::http::Shared;
 use crate::http::accept::{Format, choose, named_format};
 use crate::http::access::Caller;
+use crate::http::caching::{Known, tagged};
+use crate::http::carrying::carrying;
 use crate::http::cells::{Cells, GriddedField, gridded, per_cell};
 use crate::http::error::ApiError;
-use crate::http::formats::{File, Table, csv, npz, vtk};
+use crate::http::formats::pieces::{csv_body, json_body};
+use crate::http::formats::{File, Table, npz, vtk};
 use crate::http::job::JobId;
+use crate::http::memory::{Memory, Rendering};
 use crate::http::plot::{WIDTH_DEFAULT, Wish, picture};
 use crate::http::problems::problems;
 use crate::http::query::{Query, whole};
@@ -23,6 +30,9 @@ use crate::jobs::error::JobsError;
 
 /// Most samples along one axis of a regular grid.
 const GRID_AXIS_MAX: u32 = 1000;
+
+/// What a sample takes until the client has taken it: two components.
+const SAMPLE_BYTES: usize = 2 * size_of::<f64>();
 
 /// The forms that a field comes in.
 const FORMATS: [Format; 6] = [
@@ -72,7 +82,8 @@ pub struct FieldQuery {
     point: Option<u32>,
     /// The patch, counted from 0; 0 when left out
     patch: Option<u32>,
-    /// `NXxNY`: resample on a regular grid over the bounding box of the patch, 2 to 1000 samples along each axis
+    /// `NXxNY`: resample on a regular grid over the bounding box of the patch, 2 to 1000 samples along each axis, and
+    /// 250 000 in all where the operator says nothing else
     #[param(example = "60x40")]
     grid: Option<String>,
     /// `json`, `csv`, `npz`, `vtk`, or `svg` and `png` for a picture; overrides `Accept`
@@ -98,14 +109,14 @@ impl Selection {
     ///
     /// # Errors
     /// `bad-query` with every fault, or `not-acceptable`.
-    pub fn read(uri: &Uri, headers: &HeaderMap) -> Result<Self, ApiError> {
+    pub fn read(uri: &Uri, headers: &HeaderMap, samples_max: usize) -> Result<Self, ApiError> {
         let mut query = Query::read(uri, &["point", "patch", "grid", "format"]);
         let point = query.take("point", INDEX, index);
         let patch = query.take("patch", INDEX, index);
         let grid = query.take(
             "grid",
-            "`NXxNY` such as `60x40`, each from 2 to 1000",
-            grid_size,
+            &format!("`NXxNY` such as `60x40`, each from 2 to 1000, and at most {samples_max} samples in all"),
+            |text| grid_size(text).filter(|(nx, ny)| nx * ny <= samples_max),
         );
         let named = named_format(&mut query, &FORMATS);
         query.finish()?;
@@ -124,6 +135,7 @@ impl Selection {
     pub async fn picture(
         &self,
         jobs: &Jobs,
+        memory: &Memory,
         id: Uuid,
         shown: Output,
     ) -> Result<Option<Response>, ApiError> {
@@ -142,10 +154,17 @@ impl Selection {
             point: self.point,
             width: WIDTH_DEFAULT,
         };
-        let mut response = picture(jobs, id, wish, self.format).await?;
+        let mut response = picture(jobs, memory, id, wish, self.format).await?;
         let vary = HeaderValue::from_static("Accept");
         response.headers_mut().insert(header::VARY, vary);
         Ok(Some(response))
+    }
+
+    /// What the answer takes in memory before it is taken by the client, in bytes.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        let (nx, ny) = self.grid.unwrap_or_default();
+        nx * ny * SAMPLE_BYTES
     }
 }
 
@@ -181,10 +200,11 @@ problems! {
 pub async fn tractions(
     Caller(jobs): Caller,
     JobId(id): JobId,
+    State(shared): State<Shared>,
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    answer(&jobs, id, &uri, &headers, Output::Tractions).await
+    answer(&jobs, &shared, id, &uri, &headers, Output::Tractions).await
 }
 
 /// Pressure of a succeeded job; the same for every motion.
@@ -208,10 +228,11 @@ pub async fn tractions(
 pub async fn pressure(
     Caller(jobs): Caller,
     JobId(id): JobId,
+    State(shared): State<Shared>,
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    answer(&jobs, id, &uri, &headers, Output::Pressure).await
+    answer(&jobs, &shared, id, &uri, &headers, Output::Pressure).await
 }
 
 /// Slip of a succeeded job: the upper body relative to the lower one, divided by rolling speed.
@@ -235,38 +256,51 @@ pub async fn pressure(
 pub async fn slip(
     Caller(jobs): Caller,
     JobId(id): JobId,
+    State(shared): State<Shared>,
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    answer(&jobs, id, &uri, &headers, Output::Slip).await
+    answer(&jobs, &shared, id, &uri, &headers, Output::Slip).await
 }
 
 async fn answer(
     jobs: &Jobs,
+    shared: &Shared,
     id: Uuid,
     uri: &Uri,
     headers: &HeaderMap,
     output: Output,
 ) -> Result<Response, ApiError> {
-    let selection = Selection::read(uri, headers)?;
-    if let Some(picture) = selection.picture(jobs, id, output).await? {
-        return Ok(picture);
+    let selection = Selection::read(uri, headers, shared.options.grid_max_samples)?;
+    let tag = match Known::of(jobs, id, uri, headers, selection.format).await? {
+        Known::Unchanged(answer) => return Ok(answer),
+        Known::Tag(tag) => tag,
+    };
+    if let Some(picture) = selection.picture(jobs, &shared.memory, id, output).await? {
+        return Ok(tagged(&tag, picture));
     }
     let (patch, point) = (selection.patch, selection.point);
+    let rendering = shared.memory.rendering(jobs.tenant(), selection.bytes());
+    let rendering = rendering.await?;
     let (fields, values) = stored(jobs, id, patch, point, output).await?;
-    write_as(selection, name_of(output), move || match selection.grid {
-        None => Field::PerCell {
-            patch,
-            point,
-            cells: per_cell(fields, values, output),
+    let written = write_as(
+        rendering,
+        selection,
+        name_of(output),
+        move || match selection.grid {
+            None => Field::PerCell {
+                patch,
+                point,
+                cells: per_cell(fields, values, output),
+            },
+            Some((nx, ny)) => Field::Gridded(GriddedField {
+                patch,
+                point,
+                ..gridded(&fields, &values, output, nx, ny)
+            }),
         },
-        Some((nx, ny)) => Field::Gridded(GriddedField {
-            patch,
-            point,
-            ..gridded(&fields, &values, output, nx, ny)
-        }),
-    })
-    .await
+    );
+    Ok(tagged(&tag, written.await?))
 }
 
 /// The cells of a patch and the values of one motion, in which the output is present.
@@ -301,14 +335,63 @@ pub async fn stored(
     Ok((cells, values))
 }
 
-/// Builds a large answer and writes it in the form that was asked for, off the async threads.
+/// What an answer is written from.
+pub enum Written {
+    /// A table, whose text is made when the client takes it.
+    Table(Table),
+    /// The whole answer.
+    Whole(Vec<u8>),
+}
+
+/// Builds a field in its turn and writes it in the form that was asked for.
 ///
 /// # Errors
 /// `internal` if that fails.
-pub async fn write_as<T: Serialize + Into<Table>>(
+pub async fn write_as(
+    rendering: Rendering,
     selection: Selection,
     name: &'static str,
-    make: impl FnOnce() -> T + Send + 'static,
+    make: impl FnOnce() -> Field + Send + 'static,
+) -> Result<Response, ApiError> {
+    write(rendering, selection, name, move |format| {
+        let table = make().into();
+        match format {
+            Format::Json | Format::Csv => Ok(Written::Table(table)),
+            _ => write_file(&table, selection, name),
+        }
+    })
+    .await
+}
+
+/// The table as one of the binary files.
+///
+/// # Errors
+/// `internal` if that fails.
+pub fn write_file(
+    table: &Table,
+    selection: Selection,
+    name: &'static str,
+) -> Result<Written, ApiError> {
+    let Selection { patch, point, .. } = selection;
+    let bytes = match selection.format {
+        Format::Npz => npz::write(table).map_err(|error| ApiError::internal(&error))?,
+        _ => vtk::write(
+            table,
+            &format!("{name}, patch {patch}, motion {point}; mm, N, MPa"),
+        ),
+    };
+    Ok(Written::Whole(bytes))
+}
+
+/// Makes an answer in its turn. Its memory is held until the client has taken it.
+///
+/// # Errors
+/// What making it fails with.
+pub async fn write(
+    rendering: Rendering,
+    selection: Selection,
+    name: &'static str,
+    make: impl FnOnce(Format) -> Result<Written, ApiError> + Send + 'static,
 ) -> Result<Response, ApiError> {
     let Selection {
         patch,
@@ -316,20 +399,24 @@ pub async fn write_as<T: Serialize + Into<Table>>(
         format,
         ..
     } = selection;
-    let failed = |error: &dyn std::fmt::Display| ApiError::internal(error);
-    let written = tokio::task::spawn_blocking(move || match format {
-        Format::Csv => csv::write(&make().into()).map_err(|error| failed(&error)),
-        Format::Npz => npz::write(&make().into()).map_err(|error| failed(&error)),
-        Format::Vtk => Ok(vtk::write(
-            &make().into(),
-            &format!("{name}, patch {patch}, motion {point}; mm, N, MPa"),
-        )),
-        _ => serde_json::to_vec(&make()).map_err(|error| failed(&error)),
-    });
-    let body = written.await.map_err(|error| failed(&error))??;
-    let mut response = ([(header::CONTENT_TYPE, format.media_type())], body).into_response();
-    let headers = response.headers_mut();
-    headers.insert(header::VARY, HeaderValue::from_static("Accept"));
+    let size = |written: &Written| match written {
+        Written::Table(table) => table.bytes(),
+        Written::Whole(bytes) => bytes.len(),
+    };
+    let (written, share) = rendering.run(move || make(format), size).await?;
+    let body = match written {
+        Written::Table(table) if format == Format::Csv => csv_body(table),
+        Written::Table(table) => json_body(table, patch, point),
+        Written::Whole(bytes) => Body::from(bytes),
+    };
+    let headers = [
+        (
+            header::CONTENT_TYPE,
+            HeaderValue::from_static(format.media_type()),
+        ),
+        (header::VARY, HeaderValue::from_static("Accept")),
+    ];
+    let mut response = (headers, body).into_response();
     if matches!(format, Format::Npz | Format::Vtk) {
         // Programs that open these files go by the ending of the name.
         let file = format!(
@@ -337,8 +424,10 @@ pub async fn write_as<T: Serialize + Into<Table>>(
             format.name()
         );
         if let Ok(file) = HeaderValue::from_str(&file) {
-            headers.insert(header::CONTENT_DISPOSITION, file);
+            response
+                .headers_mut()
+                .insert(header::CONTENT_DISPOSITION, file);
         }
     }
-    Ok(response)
+    Ok(carrying(response, share))
 }

@@ -43,6 +43,7 @@ pub fn allow_origins(router: Router, origins: Vec<HeaderValue>) -> Router {
                 "accept",
                 "authorization",
                 "cache-control",
+                "content-encoding",
                 "content-type",
                 "idempotency-key",
                 "if-none-match",

@@ -94,7 +94,7 @@ pub async fn submit(
     State(crowds): State<Crowds>,
     Extension(held): Extension<Held>,
     headers: HeaderMap,
-    JsonBody(case): JsonBody,
+    JsonBody { value, room }: JsonBody,
 ) -> Result<Response, ApiError> {
     let key = idempotency_key(&headers)?;
     let place =
@@ -103,7 +103,8 @@ pub async fn submit(
     let mut query = Query::read(&uri, &PARAMETERS);
     let wishes = take_wishes(&mut query, &headers);
     query.finish()?;
-    let (mut job, replayed) = jobs.submit_with(case, key, wishes).await?;
+    let (mut job, replayed) = jobs.submit_with(value, key, wishes).await?;
+    drop(room);
     let location = format!("/v1/jobs/{}", job.id);
     let mut result = None;
     if let Some(seconds) = wait {

@@ -17,6 +17,7 @@ use prometheus_client::registry::Registry;
 use crate::http::access::Operator;
 use crate::http::error::ApiError;
 use crate::http::problems::problems;
+use crate::http::process::Process;
 use crate::jobs::Jobs;
 
 /// The text form that Prometheus asks for first.
@@ -54,7 +55,7 @@ pub struct Metrics {
 impl Metrics {
     /// A registry with the figures of the jobs room and those of requests.
     #[must_use]
-    pub fn new(jobs: &Jobs) -> Metrics {
+    pub fn new(jobs: &Jobs, dropped_lines: fn() -> u64) -> Metrics {
         let mut registry = Registry::with_prefix("railhead");
         jobs.register_metrics(&mut registry);
         let requests = Family::default();
@@ -70,6 +71,7 @@ impl Metrics {
             "Time from a request to the head of its answer, waits that the client asked for included",
             Family::clone(&seconds),
         );
+        registry.register_collector(Box::new(Process { dropped_lines }));
         Metrics {
             requests,
             seconds,

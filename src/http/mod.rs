@@ -25,6 +25,8 @@ mod headers;
 mod health;
 mod job;
 mod jobs;
+mod json_weight;
+mod memory;
 mod methods;
 mod metrics;
 mod openapi;
@@ -34,6 +36,7 @@ mod places;
 mod plot;
 mod problem;
 mod problems;
+mod process;
 mod query;
 mod remarks;
 mod resultants;
@@ -62,6 +65,7 @@ use utoipa_swagger_ui::{Config, SwaggerUi};
 use crate::http::access::{Access, Unscoped};
 use crate::http::crowds::Crowds;
 use crate::http::error::{ApiError, Kind};
+use crate::http::memory::Memory;
 use crate::http::metrics::Metrics;
 use crate::jobs::Jobs;
 
@@ -78,19 +82,25 @@ struct Shared {
     access: Access,
     options: HttpOptions,
     crowds: Crowds,
+    memory: Memory,
     metrics: Metrics,
 }
 
 /// The whole API, ready to be served.
 pub fn router(jobs: Jobs, options: HttpOptions) -> Router {
-    let metrics = Metrics::new(&jobs);
+    let metrics = Metrics::new(&jobs, || 0);
     api(jobs, options, metrics)
 }
 
 /// The whole API, and the probes and metrics alone for a port of their own, on which requests without a key are answered
-/// if `probes_anonymous` says so.
-pub fn routers(jobs: Jobs, options: HttpOptions, probes_anonymous: bool) -> [Router; 2] {
-    let metrics = Metrics::new(&jobs);
+/// if `probes_anonymous` says so. `dropped_lines` says how many lines of the log nobody read.
+pub fn routers(
+    jobs: Jobs,
+    options: HttpOptions,
+    probes_anonymous: bool,
+    dropped_lines: fn() -> u64,
+) -> [Router; 2] {
+    let metrics = Metrics::new(&jobs, dropped_lines);
     let mut alone = options.clone();
     alone.anonymous = probes_anonymous;
     let (probes, _) = probes().split_for_parts();
@@ -137,6 +147,7 @@ impl Shared {
         Shared {
             access: Access::new(&jobs, &options),
             crowds: Crowds::new(&options),
+            memory: Memory::new(&options),
             unscoped: Unscoped(jobs),
             options,
             metrics,
@@ -200,10 +211,14 @@ fn probes() -> OpenApiRouter<Shared> {
 }
 
 async fn method_not_allowed(method: axum::http::Method, uri: Uri) -> ApiError {
+    let hint = match method {
+        axum::http::Method::OPTIONS => "; web pages of other origins need `--cors-origin`",
+        _ => "",
+    };
     ApiError::new(
         Kind::MethodNotAllowed,
         format!(
-            "`{method}` is not possible on `{}`; the header `Allow` lists what is",
+            "`{method}` is not possible on `{}`; the header `Allow` lists what is{hint}",
             uri.path()
         ),
     )

@@ -79,7 +79,7 @@ impl Default for HttpOptions {
             parsed_max_bytes: 96 << 20,
             renderings: std::thread::available_parallelism()
                 .map_or(1, |cores| (cores.get() / 2).max(1)),
-            renderings_waiting_max: 64,
+            renderings_waiting_max: 512,
             grid_max_samples: 250_000,
             batch_max_bytes: 1 << 30,
             batch_max_cases: 200_000,

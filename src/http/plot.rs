@@ -1,6 +1,7 @@
 //! `/v1/jobs/{id}/plot.svg` and `/plot.png`: a picture of one patch for one motion.
 
-use axum::http::{HeaderValue, Uri, header};
+use axum::extract::State;
+use axum::http::{HeaderMap, HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
 use utoipa::IntoParams;
 use uuid::Uuid;
@@ -9,10 +10,13 @@ use crate::contact::case::Output;
 use crate::contact::solution::PointSolution;
 use crate::http::accept::Format;
 use crate::http::access::Caller;
+use crate::http::caching::{Known, tagged};
+use crate::http::carrying::carrying;
 use crate::http::error::ApiError;
 use crate::http::fields::{FieldProblems, stored};
 use crate::http::formats::File;
 use crate::http::job::JobId;
+use crate::http::memory::Memory;
 use crate::http::picture::{Scene, draw, raster};
 use crate::http::query::{Query, whole};
 use crate::http::results::{INDEX, index, require_index};
@@ -98,8 +102,14 @@ impl Wish {
     params(("id" = String, Path, description = "Id of the job", format = "uuid"), PlotQuery),
     responses((status = 200, description = "The picture", content((String = "image/svg+xml"))), FieldProblems)
 )]
-pub async fn svg(Caller(jobs): Caller, JobId(id): JobId, uri: Uri) -> Result<Response, ApiError> {
-    picture(&jobs, id, Wish::read(&uri)?, Format::Svg).await
+pub async fn svg(
+    Caller(jobs): Caller,
+    JobId(id): JobId,
+    State(memory): State<Memory>,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    plot(&jobs, &memory, id, &uri, &headers, Format::Svg).await
 }
 
 /// The same picture as PNG.
@@ -111,8 +121,29 @@ pub async fn svg(Caller(jobs): Caller, JobId(id): JobId, uri: Uri) -> Result<Res
     params(("id" = String, Path, description = "Id of the job", format = "uuid"), PlotQuery),
     responses((status = 200, description = "The picture", content((File = "image/png"))), FieldProblems)
 )]
-pub async fn png(Caller(jobs): Caller, JobId(id): JobId, uri: Uri) -> Result<Response, ApiError> {
-    picture(&jobs, id, Wish::read(&uri)?, Format::Png).await
+pub async fn png(
+    Caller(jobs): Caller,
+    JobId(id): JobId,
+    State(memory): State<Memory>,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    plot(&jobs, &memory, id, &uri, &headers, Format::Png).await
+}
+
+async fn plot(
+    jobs: &Jobs,
+    memory: &Memory,
+    id: Uuid,
+    uri: &Uri,
+    headers: &HeaderMap,
+    format: Format,
+) -> Result<Response, ApiError> {
+    let wish = Wish::read(uri)?;
+    match Known::of(jobs, id, uri, headers, format).await? {
+        Known::Unchanged(answer) => Ok(answer),
+        Known::Tag(tag) => Ok(tagged(&tag, picture(jobs, memory, id, wish, format).await?)),
+    }
 }
 
 /// Draws what was wished for.
@@ -121,10 +152,13 @@ pub async fn png(Caller(jobs): Caller, JobId(id): JobId, uri: Uri) -> Result<Res
 /// The output was not asked for, there is no such patch or motion, or there is no result.
 pub async fn picture(
     jobs: &Jobs,
+    memory: &Memory,
     id: Uuid,
     wish: Wish,
     format: Format,
 ) -> Result<Response, ApiError> {
+    // Its pixels are there during its turn only; what is sent is small.
+    let rendering = memory.rendering(jobs.tenant(), 0).await?;
     let job = jobs.get(id).await?;
     let solution = jobs.solution(id).await?;
     let patches = solution.patches.len();
@@ -142,22 +176,23 @@ pub async fn picture(
         fields,
         values,
     };
-    let drawn = tokio::task::spawn_blocking(move || {
+    let draw = move || {
         let svg = draw(&scene, wish.width);
         match format {
-            Format::Png => raster::png(&svg, wish.width),
+            Format::Png => {
+                raster::png(&svg, wish.width).map_err(|error| ApiError::internal(&error))
+            }
             _ => Ok(svg.into_bytes()),
         }
-    });
-    let body = drawn.await.map_err(|error| ApiError::internal(&error))?;
-    let body = body.map_err(|error| ApiError::internal(&error))?;
+    };
+    let (body, share) = rendering.run(draw, Vec::len).await?;
     let mut response = ([(header::CONTENT_TYPE, format.media_type())], body).into_response();
     // A picture is opened in browsers: whatever a client managed to write into a name, nothing in it may run.
     response.headers_mut().insert(
         header::CONTENT_SECURITY_POLICY,
         HeaderValue::from_static("default-src 'none'; style-src 'unsafe-inline'; sandbox"),
     );
-    Ok(response)
+    Ok(carrying(response, share))
 }
 
 /// Which patch and motion this is, where there are several.

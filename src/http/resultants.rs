@@ -1,5 +1,6 @@
 //! `/v1/jobs/{id}/resultants`: forces and moments, per patch and in sum, as JSON or as a table.
 
+use axum::extract::State;
 use axum::http::{HeaderMap, Uri, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
@@ -9,9 +10,12 @@ use crate::contact::case::Motion;
 use crate::contact::solution::{ErrorEstimate, Origin, Solution, Total};
 use crate::http::accept::{Format, choose, named_format};
 use crate::http::access::Caller;
+use crate::http::caching::{Known, tagged};
+use crate::http::carrying::carrying;
 use crate::http::error::ApiError;
 use crate::http::formats::csv::number;
 use crate::http::job::JobId;
+use crate::http::memory::Memory;
 use crate::http::problems::problems;
 use crate::http::query::Query;
 use crate::http::results::{INDEX, index, require_index};
@@ -83,6 +87,7 @@ problems! {
 pub async fn resultants(
     Caller(jobs): Caller,
     JobId(id): JobId,
+    State(memory): State<Memory>,
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
@@ -93,6 +98,10 @@ pub async fn resultants(
     let named = named_format(&mut query, &offered);
     query.finish()?;
     let format = choose(&headers, named, &offered)?;
+    let tag = match Known::of(&jobs, id, &uri, &headers, format).await? {
+        Known::Unchanged(answer) => return Ok(answer),
+        Known::Tag(tag) => tag,
+    };
     let solution = jobs.solution(id).await?;
     require_index("point", point, solution.total.len())?;
     require_index("patch", patch, solution.patches.len())?;
@@ -106,7 +115,11 @@ pub async fn resultants(
         (header::CONTENT_TYPE, format.media_type()),
         (header::VARY, "Accept"),
     ];
-    Ok((headers, body).into_response())
+    let share = memory.ready_answer(jobs.tenant(), body.len())?;
+    Ok(tagged(
+        &tag,
+        carrying((headers, body).into_response(), share),
+    ))
 }
 
 fn select(solution: Solution, point: Option<usize>, patch: Option<usize>) -> Resultants {

@@ -2,18 +2,24 @@
 
 use std::collections::BTreeMap;
 
-use axum::Json;
+use axum::extract::State;
+use axum::http::{HeaderMap, Uri, header};
+use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
 use crate::contact::case::Output;
 use crate::contact::solution::Solution;
+use crate::http::accept::Format;
 use crate::http::access::Caller;
+use crate::http::caching::{Known, tagged};
+use crate::http::carrying::carrying;
 use crate::http::error::{ApiError, Kind};
 use crate::http::job::JobId;
+use crate::http::memory::Memory;
 use crate::http::problems::problems;
-use crate::http::query::whole;
+use crate::http::query::{Query, whole};
 use crate::jobs::Jobs;
 
 /// The result of a job: the solution without its fields, and where to get those.
@@ -29,7 +35,7 @@ pub struct JobResult {
 
 problems! {
     /// What every part of a result can fail with.
-    ResultProblems: JobNotFound, ResultNotReady, JobFailed, JobCancelled
+    ResultProblems: BadQuery, JobNotFound, ResultNotReady, JobFailed, JobCancelled
 }
 
 /// The result of a succeeded job.
@@ -41,8 +47,24 @@ problems! {
     params(("id" = String, Path, description = "Id of the job", format = "uuid")),
     responses((status = 200, description = "The result", body = JobResult), ResultProblems)
 )]
-pub async fn result(Caller(jobs): Caller, JobId(id): JobId) -> Result<Json<JobResult>, ApiError> {
-    result_of(&jobs, id).await.map(Json)
+pub async fn result(
+    Caller(jobs): Caller,
+    JobId(id): JobId,
+    State(memory): State<Memory>,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    // Its form was looked at before.
+    Query::read(&uri, &["format"]).finish()?;
+    let tag = match Known::of(&jobs, id, &uri, &headers, Format::Json).await? {
+        Known::Unchanged(answer) => return Ok(answer),
+        Known::Tag(tag) => tag,
+    };
+    let result = result_of(&jobs, id).await?;
+    let text = serde_json::to_vec(&result).map_err(|error| ApiError::internal(&error))?;
+    let share = memory.ready_answer(jobs.tenant(), text.len())?;
+    let head = [(header::CONTENT_TYPE, Format::Json.media_type())];
+    Ok(tagged(&tag, carrying((head, text).into_response(), share)))
 }
 
 /// The result of a succeeded job with its links.

@@ -2,8 +2,10 @@
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::time::timeout;
 
 /// A number of places, bytes or turns; clones share it.
 #[derive(Debug, Clone)]
@@ -17,8 +19,8 @@ pub struct Shares {
 /// What one request holds; given back when dropped.
 #[derive(Debug)]
 pub struct Share {
-    _of_tenant: OwnedSemaphorePermit,
-    _of_all: OwnedSemaphorePermit,
+    of_tenant: OwnedSemaphorePermit,
+    of_all: OwnedSemaphorePermit,
 }
 
 impl Shares {
@@ -37,10 +39,20 @@ impl Shares {
     pub fn try_take(&self, tenant: &str, many: u32) -> Option<Share> {
         let of_tenant = self.of(tenant).try_acquire_many_owned(many).ok()?;
         let of_all = self.all.clone().try_acquire_many_owned(many).ok()?;
-        Some(Share {
-            _of_tenant: of_tenant,
-            _of_all: of_all,
-        })
+        Some(Share { of_tenant, of_all })
+    }
+
+    /// Waits for so many, first come, first served; `None` if they are not free in time, or never.
+    pub async fn take(&self, tenant: &str, many: u32, within: Duration) -> Option<Share> {
+        if many as usize > self.of_tenant {
+            return None;
+        }
+        let both = async {
+            let of_tenant = self.of(tenant).acquire_many_owned(many).await.ok()?;
+            let of_all = self.all.clone().acquire_many_owned(many).await.ok()?;
+            Some(Share { of_tenant, of_all })
+        };
+        timeout(within, both).await.ok().flatten()
     }
 
     fn of(&self, tenant: &str) -> Arc<Semaphore> {
@@ -54,6 +66,15 @@ impl Shares {
     }
 }
 
+impl Share {
+    /// Gives back all but so many.
+    pub fn keep_units(&mut self, many: usize) {
+        let surplus = self.of_all.num_permits().saturating_sub(many);
+        drop(self.of_all.split(surplus));
+        drop(self.of_tenant.split(surplus));
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -61,13 +82,27 @@ mod tests {
     #[test]
     fn a_tenant_gets_its_share_and_leaves_the_rest_to_others() {
         let shares = Shares::new(5, 3);
-        let held = shares.try_take("a", 2).unwrap();
-        assert!(shares.try_take("a", 2).is_none());
-        assert!(shares.try_take("b", 4).is_none(), "three are left");
-        let other = shares.try_take("b", 3);
-        assert!(other.is_some() && shares.try_take("a", 1).is_none());
-        drop(other);
-        drop(held);
+        let mut held = shares.try_take("a", 3).unwrap();
+        assert!(shares.try_take("a", 1).is_none());
+        assert!(shares.try_take("b", 3).is_none(), "two are left");
+        let other = shares.try_take("b", 2).unwrap();
+        held.keep_units(1);
+        assert!(shares.try_take("a", 3).is_none());
+        assert!(shares.try_take("a", 2).is_some());
+        drop((held, other));
         assert!(shares.try_take("c", 3).is_some());
+    }
+
+    #[tokio::test]
+    async fn what_is_not_free_in_time_is_not_waited_for_any_longer() {
+        let shares = Shares::new(2, 2);
+        let held = shares.try_take("a", 2).unwrap();
+        let soon = Duration::from_millis(20);
+        assert!(shares.take("b", 1, soon).await.is_none());
+        assert!(shares.take("b", 3, Duration::MAX).await.is_none());
+        let (later, ()) = tokio::join!(shares.take("b", 1, Duration::from_secs(60)), async {
+            drop(held);
+        });
+        assert!(later.is_some());
     }
 }

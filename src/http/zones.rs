@@ -1,5 +1,6 @@
 //! `/v1/jobs/{id}/zones`: where the patch sticks and where it slips.
 
+use axum::extract::State;
 use axum::http::{HeaderMap, Uri};
 use axum::response::Response;
 use serde::Serialize;
@@ -8,11 +9,16 @@ use utoipa::ToSchema;
 use crate::contact::case::Output;
 use crate::contact::outputs::outline::{outlines, patch_outline};
 use crate::contact::zones::Zone;
+use crate::http::Shared;
+use crate::http::accept::Format;
 use crate::http::access::Caller;
+use crate::http::caching::{Known, tagged};
 use crate::http::cells::{Cells, GriddedField, gridded, per_cell};
 use crate::http::error::ApiError;
-use crate::http::fields::{FieldProblems, FieldQuery, Selection, stored, write_as};
-use crate::http::formats::{File, Table};
+use crate::http::fields::{
+    FieldProblems, FieldQuery, Selection, Written, stored, write, write_file,
+};
+use crate::http::formats::File;
 use crate::http::job::JobId;
 use crate::http::results::{not_asked, require_index};
 
@@ -23,16 +29,11 @@ pub enum Zones {
     /// Without `grid`: areas, outlines and the zone of every cell.
     PerCell(ZoneCells),
     /// With `grid`: the zone of the nearest cell, resampled.
+    #[expect(
+        dead_code,
+        reason = "for the contract; its text is written piece by piece"
+    )]
     Gridded(GriddedField),
-}
-
-impl From<Zones> for Table {
-    fn from(zones: Zones) -> Self {
-        match zones {
-            Zones::PerCell(zones) => zones.cells.into(),
-            Zones::Gridded(field) => field.into(),
-        }
-    }
 }
 
 /// Areas, outlines and the zone of every cell.
@@ -90,13 +91,21 @@ pub struct Outlines {
 pub async fn zones(
     Caller(jobs): Caller,
     JobId(id): JobId,
+    State(shared): State<Shared>,
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    let selection = Selection::read(&uri, &headers)?;
-    if let Some(picture) = selection.picture(&jobs, id, Output::Zones).await? {
-        return Ok(picture);
+    let selection = Selection::read(&uri, &headers, shared.options.grid_max_samples)?;
+    let tag = match Known::of(&jobs, id, &uri, &headers, selection.format).await? {
+        Known::Unchanged(answer) => return Ok(answer),
+        Known::Tag(tag) => tag,
+    };
+    let shown = Output::Zones;
+    if let Some(picture) = selection.picture(&jobs, &shared.memory, id, shown).await? {
+        return Ok(tagged(&tag, picture));
     }
+    let rendering = shared.memory.rendering(jobs.tenant(), selection.bytes());
+    let rendering = rendering.await?;
     let solution = jobs.solution(id).await?;
     require_index("patch", Some(selection.patch), solution.patches.len())?;
     let points = &solution.patches[selection.patch].points;
@@ -110,30 +119,44 @@ pub async fn zones(
     );
     let (Some(stick_area_mm2), Some(slip_area_mm2), Some(stick_cells), Some(slip_cells)) = summary
     else {
-        return not_asked(&jobs, id, Output::Zones).await;
+        return not_asked(&jobs, id, shown).await;
     };
+    drop(solution);
     let (patch, point) = (selection.patch, selection.point);
-    let (fields, values) = stored(&jobs, id, patch, point, Output::Zones).await?;
-    write_as(selection, "zones", move || match selection.grid {
-        Some((nx, ny)) => Zones::Gridded(GriddedField {
-            patch,
-            point,
-            ..gridded(&fields, &values, Output::Zones, nx, ny)
-        }),
-        None => Zones::PerCell(ZoneCells {
-            patch,
-            point,
-            stick_area_mm2,
-            slip_area_mm2,
-            stick_cells,
-            slip_cells,
-            outlines: Outlines {
-                patch: patch_outline(&fields),
-                stick: outlines(&fields, values.zone.as_deref(), Some(Zone::Stick)),
-                slip: outlines(&fields, values.zone.as_deref(), Some(Zone::Slip)),
-            },
-            cells: per_cell(fields, values, Output::Zones),
-        }),
-    })
-    .await
+    let (fields, values) = stored(&jobs, id, patch, point, shown).await?;
+    let written = write(rendering, selection, "zones", move |format| {
+        if let Some((nx, ny)) = selection.grid {
+            let table = gridded(&fields, &values, shown, nx, ny).into();
+            return match format {
+                Format::Json | Format::Csv => Ok(Written::Table(table)),
+                _ => write_file(&table, selection, "zones"),
+            };
+        }
+        let outlines = Outlines {
+            patch: patch_outline(&fields),
+            stick: outlines(&fields, values.zone.as_deref(), Some(Zone::Stick)),
+            slip: outlines(&fields, values.zone.as_deref(), Some(Zone::Slip)),
+        };
+        let cells = per_cell(fields, values, shown);
+        match format {
+            Format::Json => {
+                let zones = Zones::PerCell(ZoneCells {
+                    patch,
+                    point,
+                    stick_area_mm2,
+                    slip_area_mm2,
+                    stick_cells,
+                    slip_cells,
+                    outlines,
+                    cells,
+                });
+                let text = serde_json::to_vec(&zones);
+                let text = text.map_err(|error| ApiError::internal(&error))?;
+                Ok(Written::Whole(text))
+            }
+            Format::Csv => Ok(Written::Table(cells.into())),
+            _ => write_file(&cells.into(), selection, "zones"),
+        }
+    });
+    Ok(tagged(&tag, written.await?))
 }

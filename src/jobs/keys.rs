@@ -63,6 +63,12 @@ impl Keyring {
         Ok(Keyring { store })
     }
 
+    /// Is this the data folder of a service?
+    #[must_use]
+    pub fn is_there(data_dir: &Path) -> bool {
+        data_dir.join("jobs.db").is_file()
+    }
+
     /// Makes a key of a tenant. The secret, returned second, is shown this one time and kept nowhere.
     ///
     /// # Errors

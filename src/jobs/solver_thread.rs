@@ -39,6 +39,9 @@ pub(super) enum Outcome {
     Abandoned,
 }
 
+/// What clients are told of a failure of the service itself.
+pub(super) const INTERNAL: &str = "the job could not be solved because of a fault of the service; its log has the reason under the id of the job";
+
 /// Something to compute.
 pub(super) type Task = Box<dyn FnOnce() + Send>;
 
@@ -73,13 +76,18 @@ impl SolverThread {
 /// Solves a case; a panic becomes a failure and the thread stays usable.
 pub(super) fn solve_guarded(shared: &Shared, watch: &Watch, stored: &StoredCase) -> Outcome {
     catch_unwind(AssertUnwindSafe(|| solve_case(shared, watch, stored))).unwrap_or_else(|payload| {
-        let detail = format!("the solver panicked: {}", panic_text(payload.as_ref()));
+        // What a defect says of the program is for the log, not for clients.
+        tracing::error!(reason = panic_text(payload.as_ref()), "the solver panicked");
+        let detail = "the solver stopped on a defect of its own; the service's log has the reason";
         Outcome::Broken(Failure::new(FailureKind::Panic, detail))
     })
 }
 
 fn solve_case(shared: &Shared, watch: &Watch, stored: &StoredCase) -> Outcome {
-    let internal = |detail: String| Outcome::Broken(Failure::new(FailureKind::Internal, detail));
+    let internal = |reason: String| {
+        tracing::error!(reason, "a job fails inside the service");
+        Outcome::Broken(Failure::new(FailureKind::Internal, INTERNAL))
+    };
     let case = match stored.value() {
         Ok(case) => case,
         Err(error) => return internal(error.to_string()),

@@ -21,7 +21,7 @@ use crate::jobs::Shared;
 use crate::jobs::error::JobsError;
 use crate::jobs::job::{Failure, FailureKind, Job, State};
 use crate::jobs::results::Encoded;
-use crate::jobs::solver_thread::{Outcome, SolverThread, solve_guarded};
+use crate::jobs::solver_thread::{INTERNAL, Outcome, SolverThread, solve_guarded};
 use crate::jobs::store::{Claim, Ending, Placed, Renewal, StoredCase};
 use crate::jobs::trace::Traced;
 use crate::jobs::watch::{Reason, Watch};
@@ -332,7 +332,13 @@ pub(super) enum Verdict {
 
 /// What follows from the outcome of an attempt.
 pub(super) fn judge(outcome: Outcome, watch: &Watch) -> Verdict {
-    let failed = |kind, detail: String| Verdict::End(Ending::Failed(Failure::new(kind, detail)));
+    let failed = |reason: String| {
+        tracing::error!(reason, "a job fails inside the service");
+        Verdict::End(Ending::Failed(Failure::new(
+            FailureKind::Internal,
+            INTERNAL,
+        )))
+    };
     match outcome {
         Outcome::Solved { .. } if watch.reason() == Some(Reason::Lost) => Verdict::Lost,
         Outcome::Solved {
@@ -349,19 +355,15 @@ pub(super) fn judge(outcome: Outcome, watch: &Watch) -> Verdict {
             Some(Reason::Shutdown) => Verdict::HandBack,
             Some(Reason::Lost) => Verdict::Lost,
             Some(Reason::Deadline) => Verdict::End(Ending::Failed(too_late())),
-            None => failed(
-                FailureKind::Internal,
-                "the solver stopped although nobody asked it to".to_owned(),
-            ),
+            None => failed("the solver stopped although nobody asked it to".to_owned()),
         },
         Outcome::Unsolved(error) => match Failure::of_solve(&error) {
             Some(failure) => Verdict::End(Ending::Failed(failure)),
-            None => failed(FailureKind::Internal, error.to_string()),
+            None => failed(error.to_string()),
         },
-        Outcome::Refused(error) => failed(
-            FailureKind::Internal,
-            format!("the stored case is no longer accepted: {error}"),
-        ),
+        Outcome::Refused(error) => {
+            failed(format!("the stored case is no longer accepted: {error}"))
+        }
         Outcome::Broken(failure) => Verdict::End(Ending::Failed(failure)),
     }
 }
@@ -369,7 +371,7 @@ pub(super) fn judge(outcome: Outcome, watch: &Watch) -> Verdict {
 /// The end of a job whose result could not be stored.
 pub(super) fn not_stored(error: &JobsError) -> Ending {
     tracing::error!(%error, "result could not be stored");
-    let detail = format!("the result could not be stored: {error}");
+    let detail = "the result could not be stored; the service's log has the reason";
     Ending::Failed(Failure::new(FailureKind::Internal, detail))
 }
 

@@ -17,7 +17,7 @@ async fn table_makes_a_case_of_each_line() {
     let server = Server::start().await;
     let query = template(&server).await;
     let table = "label:km,normal_force_n,/motion/creepage_x,name\r\n\
-                 37.2,80000,0.002,\"a, b\"\r\n\r\n\"37.4\nabove\",,,\r\n37.6,9e4,0,last";
+                 37.2,80000,0.002,\"a, b\"\r\n\r\n\"37.4, above\",,,\r\n37.6,9e4,0,last";
     let batch = send(&server, &query, "text/csv; charset=utf-8", table.to_owned()).await;
     assert_eq!(
         (batch.status, &batch.json["count"]),
@@ -41,7 +41,7 @@ async fn table_makes_a_case_of_each_line() {
         said,
         [
             (&json!("a, b"), &json!("37.2"), line),
-            (&json!("template"), &json!("37.4\nabove"), line),
+            (&json!("template"), &json!("37.4, above"), line),
             (&json!("last"), &json!("37.6"), line),
         ]
     );
@@ -117,4 +117,41 @@ async fn faults_of_a_table_are_named_by_line() {
     }
     let answer = send(&server, &query, "application/json", "[]".to_owned()).await;
     assert_problem(&answer, 400, "bad-query", "text/csv");
+}
+
+#[tokio::test]
+async fn names_that_look_like_formulas_are_texts_in_a_table() {
+    let server = Server::start().await;
+    let names = ["=1+1", "+1", "-1", "@SUM(1)", "plain=1"];
+    let cases: Vec<_> = names.iter().map(|name| small(name)).collect();
+    let batch = server.post("/v1/batches", &json!(cases)).await.json;
+    let path = batch["links"]["results"].as_str().expect("a link");
+    let table = server.get(&format!("{path}?wait=60&format=csv")).await.text;
+    let found: Vec<&str> = table
+        .lines()
+        .skip(1)
+        .filter_map(|line| line.split(',').nth(2))
+        .collect();
+    assert_eq!(found, ["'=1+1", "'+1", "'-1", "'@SUM(1)", "plain=1"]);
+}
+
+#[tokio::test]
+async fn names_and_labels_have_no_control_characters() {
+    let server = Server::idle().await;
+    for (pointer, value) in [
+        ("/name", json!("a\nb")),
+        ("/name", json!("a\u{1b}[2J")),
+        ("/labels", json!({ "a:b": "c" })),
+        ("/labels", json!({ "a": "b\u{0}" })),
+        ("/labels", json!({ "a\t": "b" })),
+    ] {
+        let mut case = small("plain");
+        *case.pointer_mut(pointer).expect("a member") = value;
+        assert_problem(
+            &server.post("/v1/jobs", &case).await,
+            422,
+            "faulty-case",
+            "1 fault",
+        );
+    }
 }

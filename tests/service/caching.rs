@@ -35,7 +35,7 @@ async fn finished_results_are_kept_for_good_and_asked_for_by_tag() {
         let tag = first.header("etag").expect("a tag").to_owned();
         assert!(tag.starts_with('"') && tag.len() == 34, "{part}: {tag}");
         let lifetime = first.header("cache-control").expect("a lifetime");
-        assert_eq!(lifetime, "private, max-age=31536000, immutable", "{part}");
+        assert_eq!(lifetime, "private, max-age=3600", "{part}");
         assert_eq!(
             server.get(&path).await.header("etag"),
             Some(tag.as_str()),

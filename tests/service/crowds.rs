@@ -9,7 +9,7 @@ use tokio::net::TcpStream;
 
 use crate::errors::assert_problem;
 use crate::server::{Server, Setup, example};
-use crate::support::{Service, endless_case};
+use crate::support::{Service, endless_case, railhead};
 
 /// A request on a connection of its own, of which nothing is read.
 async fn send(address: std::net::SocketAddr, request: &str) -> TcpStream {
@@ -245,5 +245,54 @@ async fn without_a_key_foreign_names_pages_and_proxies_are_refused() {
     assert!(
         answer.starts_with("HTTP/1.1 400") && answer.contains("Host"),
         "{answer}"
+    );
+}
+
+#[tokio::test]
+async fn a_log_that_nobody_reads_holds_up_nobody() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut child = railhead()
+        .args([
+            "serve",
+            "--listen",
+            "127.0.0.1:0",
+            "--log-format",
+            "json",
+            "--data-dir",
+        ])
+        .arg(folder.path())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    // Read as far as the address, and no further.
+    let mut log = std::io::BufReader::new(child.stderr.take().unwrap());
+    let address = loop {
+        let mut line = String::new();
+        std::io::BufRead::read_line(&mut log, &mut line).unwrap();
+        let event: serde_json::Value = serde_json::from_str(&line).unwrap();
+        if event["message"] == "listening" {
+            break event["address"].as_str().unwrap().to_owned();
+        }
+    };
+    let client = reqwest::Client::new();
+    for _ in 0..1500 {
+        let answer = client.get(format!("http://{address}/healthz")).send();
+        let answer = tokio::time::timeout(Duration::from_secs(30), answer).await;
+        assert_eq!(answer.expect("an answer in time").unwrap().status(), 200);
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+}
+
+#[tokio::test]
+async fn a_variable_that_is_not_known_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut program = std::process::Command::new("env");
+    program.args(["RAILHEAD_WORKRES=3", "RAILHEAD_WORKERS=1"]);
+    let service = Service::start_by(&mut program, folder.path(), &[]);
+    let log = service.log_text();
+    assert!(
+        log.contains("RAILHEAD_WORKRES") && !log.contains("RAILHEAD_WORKERS"),
+        "{log}"
     );
 }

@@ -207,7 +207,7 @@ async fn client_that_never_reads_blocks_nobody() {
         let mut stream = TcpStream::connect(server.address)
             .await
             .expect("a connection");
-        let request = format!("GET {path}/events HTTP/1.1\r\nhost: x\r\n\r\n");
+        let request = format!("GET {path}/events HTTP/1.1\r\nhost: localhost\r\n\r\n");
         stream.write_all(request.as_bytes()).await.expect("sent");
         silent.push(stream);
     }

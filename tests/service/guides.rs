@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use crate::support::Service;
+use crate::support::{Service, skip};
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
@@ -56,12 +56,6 @@ fn run(program: &Path, arguments: &[&str], folder: &Path) -> Output {
 fn succeeds(program: &Path, arguments: &[&str]) -> bool {
     let output = Command::new(program).args(arguments).output();
     output.is_ok_and(|output| output.status.success())
-}
-
-/// Says why a guide was not run; on a machine of continuous integration that is a failure.
-fn skip(reason: &str) {
-    assert!(std::env::var_os("CI").is_none(), "{reason}");
-    eprintln!("SKIPPED: {reason}");
 }
 
 fn begins_with(file: &Path, mark: &[u8]) {
@@ -156,7 +150,7 @@ fn creep_curve_from_python_runs_as_it_stands() {
 }
 
 /// A Python with the packages of the guide: `RAILHEAD_TEST_PYTHON`, `python3`, or in continuous integration an environment made for this.
-fn python() -> Option<PathBuf> {
+pub fn python() -> Option<PathBuf> {
     let named = std::env::var_os("RAILHEAD_TEST_PYTHON");
     let python = named.map_or_else(|| PathBuf::from("python3"), PathBuf::from);
     let packages = ["-c", "import httpx, numpy, matplotlib"];
@@ -184,7 +178,7 @@ fn python() -> Option<PathBuf> {
         }
     }
     skip(
-        "the guide for Python needs httpx, numpy and matplotlib; name a Python that has them in RAILHEAD_TEST_PYTHON",
+        "the guide for Python and NumPy need httpx, numpy and matplotlib; name a Python that has them in RAILHEAD_TEST_PYTHON",
     );
     None
 }

@@ -5,9 +5,10 @@ use std::process::Output;
 use std::time::{Duration, Instant};
 
 use reqwest::Method;
+use serde_json::Value;
 
 use crate::server::Server;
-use crate::support::{Service, pause, railhead};
+use crate::support::{Service, endless_case, pause, railhead};
 
 fn keys(data_dir: &Path, args: &[&str]) -> Output {
     let mut command = railhead();
@@ -80,6 +81,63 @@ async fn a_key_works_at_once_and_is_refused_seconds_after_it_was_revoked() {
             .any(|part| part == secret.as_bytes());
         assert!(!found, "{}", file.display());
     }
+}
+
+#[tokio::test]
+async fn a_revoked_key_ends_the_streams_that_it_opened() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &[]);
+    let key = make_key(folder.path(), "north");
+    let request = service
+        .request(Method::POST, "/v1/batches")
+        .bearer_auth(&key);
+    let batch: Value = request
+        .json(&[endless_case("long")])
+        .send()
+        .await
+        .unwrap()
+        .json()
+        .await
+        .unwrap();
+    let mut open = Vec::new();
+    for path in ["events", "results"] {
+        let link = batch["links"][path].as_str().unwrap();
+        let request = service.request(
+            Method::GET,
+            &format!("{link}?wait=600").replace("events?wait=600", "events"),
+        );
+        open.push(request.bearer_auth(&key).send().await.unwrap());
+    }
+    let revoked = keys(folder.path(), &["revoke", key.split('_').nth(1).unwrap()]);
+    assert!(revoked.status.success(), "{revoked:?}");
+    for answer in open {
+        assert_eq!(answer.status(), 200);
+        // The stream of events ends, lines of results break off.
+        let ended = tokio::time::timeout(Duration::from_secs(15), answer.bytes());
+        ended.await.expect("the end of the stream").ok();
+    }
+}
+
+#[test]
+fn reading_keys_makes_no_data_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in [".", "mistyped"] {
+        let place = folder.path().join(name);
+        for asked in [&["list"][..], &["revoke", "0123456789ab"]] {
+            let answer = keys(&place, asked);
+            assert_eq!(answer.status.code(), Some(1), "{answer:?}");
+        }
+    }
+    assert_eq!(
+        keys(
+            &folder.path().join("mistyped"),
+            &["create", "--tenant", "a"]
+        )
+        .status
+        .code(),
+        Some(1)
+    );
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
 #[tokio::test]

@@ -10,6 +10,7 @@ mod cache;
 mod caching;
 mod cli;
 mod contract;
+mod cost;
 mod crash;
 mod crowds;
 mod documents;

@@ -14,7 +14,8 @@ async fn malformed_json_is_answered_with_its_position() {
     let server = Server::idle().await;
     let deep = "[".repeat(10_000);
     for (body, line, word) in [
-        ("", 1, "EOF"),
+        ("", 1, "it is empty"),
+        ("\u{feff}{}", 1, "byte order mark"),
         ("{\n  \"name\": \"x\",\n}", 3, "trailing comma"),
         ("{\"friction\": NaN}", 1, "expected value"),
         (
@@ -110,8 +111,7 @@ async fn raw(server: &Server, request: &str) -> String {
     String::from_utf8_lossy(&answer).into_owned()
 }
 
-const RAW_HEAD: &str =
-    "POST /v1/jobs HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Type: application/json\r\n";
+const RAW_HEAD: &str = "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Type: application/json\r\n";
 
 #[tokio::test]
 async fn body_of_unknown_length_is_limited_too() {
@@ -161,7 +161,7 @@ async fn a_refusal_in_the_middle_of_a_body_leaves_the_connection_usable_or_says_
     let server = Server::idle().await;
     let head = |length: usize| {
         format!(
-            "POST /v1/batches HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: {length}\r\n\r\n{{"
+            "POST /v1/batches HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: {length}\r\n\r\n{{"
         )
     };
     let rest = " ".repeat(99_999);
@@ -169,7 +169,7 @@ async fn a_refusal_in_the_middle_of_a_body_leaves_the_connection_usable_or_says_
         .await
         .expect("a connection");
     let mut answer = Vec::new();
-    let again = "GET /healthz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n";
+    let again = "GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
     for (piece, pause) in [
         (head(100_000), 100),
         (rest.clone(), 0),

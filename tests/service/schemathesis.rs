@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use crate::support::Service;
+use crate::support::{Service, skip};
 
 /// The version that the settings are written for.
 const VERSION: &str = "4.32.5";
@@ -39,9 +39,9 @@ fn schemathesis() -> Option<PathBuf> {
         assert!(fits(&own), "{}", own.display());
         return Some(own);
     }
-    eprintln!(
-        "SKIPPED: the contract is not fuzzed; `pip install schemathesis=={VERSION}`, or name its `st` in RAILHEAD_TEST_SCHEMATHESIS"
-    );
+    skip(&format!(
+        "the contract is not fuzzed; `pip install schemathesis=={VERSION}`, or name its `st` in RAILHEAD_TEST_SCHEMATHESIS"
+    ));
     None
 }
 

@@ -10,7 +10,7 @@ use tempfile::TempDir;
 
 use crate::errors::assert_problem;
 use crate::server::Answer;
-use crate::support::{Service, case, long_case, pause, railhead};
+use crate::support::{Service, case, long_case, pause, railhead, skip};
 
 /// A small file system of its own, unmounted when dropped.
 struct Disk {
@@ -113,7 +113,7 @@ async fn all_succeed(service: &Service, accepted: &[String]) {
 #[tokio::test]
 async fn a_full_disk_refuses_what_comes_and_loses_nothing_it_has() {
     let Some(disk) = Disk::mount("size=24m") else {
-        eprintln!("SKIPPED: this process may not mount a file system");
+        skip("this process may not mount a file system");
         return;
     };
     let flags = ["--cache", "false", "--workers", "1"];
@@ -149,7 +149,7 @@ async fn a_full_disk_refuses_what_comes_and_loses_nothing_it_has() {
 #[tokio::test]
 async fn a_full_disk_and_a_kill_lose_nothing_either() {
     let Some(disk) = Disk::mount("size=16m") else {
-        eprintln!("SKIPPED: this process may not mount a file system");
+        skip("this process may not mount a file system");
         return;
     };
     let flags = ["--cache", "false", "--workers", "1"];
@@ -169,7 +169,7 @@ async fn a_full_disk_and_a_kill_lose_nothing_either() {
 #[test]
 fn a_read_only_disk_is_named_at_the_start() {
     let Some(disk) = Disk::mount("size=1m") else {
-        eprintln!("SKIPPED: this process may not mount a file system");
+        skip("this process may not mount a file system");
         return;
     };
     let remounted = Command::new("mount")

@@ -18,7 +18,7 @@ use serde_json::Value;
 use crate::contact::case::{Case, Contact, Friction, Load, Material, Motions, Output, Solver};
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::problem::{self, Given, Limits};
-use object::{Faults, Interval, Object, join, shown};
+use object::{Faults, Interval, Object, has_controls, join, shown};
 
 const NAME_LENGTH_MAX: usize = 200;
 const LABELS_MAX: usize = 32;
@@ -106,7 +106,7 @@ fn read(case: &mut Object) -> Draft {
         ],
         &[],
     );
-    let name = case.text("name", NAME_LENGTH_MAX);
+    let name = case.line("name", NAME_LENGTH_MAX);
     let labels = labels(case);
     let material = material::read(case);
     let friction = friction(case);
@@ -167,15 +167,22 @@ fn labels(case: &mut Object) -> BTreeMap<String, String> {
                     "a key of {length} characters given; 1 to {LABEL_KEY_LENGTH_MAX} are allowed"
                 ),
             );
+        } else if has_controls(key) || key.contains(':') {
+            case.faults().add(
+                join(&pointer, key),
+                format!("the key {key:?} given; a key has neither colons nor control characters"),
+            );
         }
         match value.as_str() {
-            Some(text) if text.chars().count() <= LABEL_VALUE_LENGTH_MAX => {
+            Some(text)
+                if text.chars().count() <= LABEL_VALUE_LENGTH_MAX && !has_controls(text) =>
+            {
                 labels.insert(key.clone(), text.to_owned());
             }
             _ => case.faults().add(
                 join(&pointer, key),
                 format!(
-                    "{} given; a text of at most {LABEL_VALUE_LENGTH_MAX} characters is needed",
+                    "{} given; a text of at most {LABEL_VALUE_LENGTH_MAX} characters without control characters is needed",
                     shown(value)
                 ),
             ),

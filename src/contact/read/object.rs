@@ -231,6 +231,19 @@ impl<'v, 'f> Object<'v, 'f> {
         }
     }
 
+    /// The same without line breaks and other control characters.
+    pub(super) fn line(&mut self, name: &str, length_max: usize) -> Option<String> {
+        let text = self.text(name, length_max)?;
+        if !has_controls(&text) {
+            return Some(text);
+        }
+        self.fault(
+            name,
+            format!("{text:?} given; control characters are not allowed"),
+        );
+        None
+    }
+
     /// A word out of a table that may be left out; `later` lists words that the contract knows but this version
     /// does not offer.
     pub(super) fn word<T: Copy>(
@@ -344,6 +357,11 @@ fn plain(number: f64) -> String {
     } else {
         format!("{number}")
     }
+}
+
+/// Line breaks, tabs and the like: they tear tables and lines of logs apart.
+pub(super) fn has_controls(text: &str) -> bool {
+    text.chars().any(char::is_control)
 }
 
 #[cfg(test)]

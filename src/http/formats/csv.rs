@@ -1,12 +1,14 @@
 //! CSV (RFC 4180): a header with the names, one line per row. Zones are words; what lies outside the patch is empty.
 
+use std::ops::Range;
+
 use crate::http::formats::{Column, Data, PLACES, Rows, Table};
 
-/// Writes a table. Numbers have as many digits as it takes to read the same number back.
+/// The line with the names.
 ///
 /// # Errors
 /// None that memory does not have.
-pub fn write(table: &Table) -> Result<Vec<u8>, csv::Error> {
+pub fn head(table: &Table) -> Result<Vec<u8>, csv::Error> {
     let mut out = csv::Writer::from_writer(Vec::new());
     let places: &[&str] = match table.rows {
         Rows::Cells { .. } => &["strip"],
@@ -18,26 +20,34 @@ pub fn write(table: &Table) -> Result<Vec<u8>, csv::Error> {
     };
     let values = table.values.iter().map(|column| column.name);
     out.write_record(axes.iter().chain(places).copied().chain(values))?;
-    match &table.rows {
-        Rows::Cells { places, strip } => {
-            for (row, strip) in strip.iter().enumerate() {
+    finish(out)
+}
+
+/// Some lines. Numbers have as many digits as it takes to read the same number back.
+///
+/// # Errors
+/// None that memory does not have.
+pub fn lines(table: &Table, rows: Range<usize>) -> Result<Vec<u8>, csv::Error> {
+    let mut out = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        match &table.rows {
+            Rows::Cells { places, strip } => {
                 for place in places {
                     out.write_field(number(place[row]))?;
                 }
-                out.write_field(strip.to_string())?;
-                end_row(&mut out, &table.values, row)?;
+                out.write_field(strip[row].to_string())?;
+            }
+            Rows::Grid { x_mm, y_mm } => {
+                out.write_field(number(x_mm[row % x_mm.len()]))?;
+                out.write_field(number(y_mm[row / x_mm.len()]))?;
             }
         }
-        Rows::Grid { x_mm, y_mm } => {
-            for (iy, y) in y_mm.iter().enumerate() {
-                for (ix, x) in x_mm.iter().enumerate() {
-                    out.write_field(number(*x))?;
-                    out.write_field(number(*y))?;
-                    end_row(&mut out, &table.values, iy * x_mm.len() + ix)?;
-                }
-            }
-        }
+        end_row(&mut out, &table.values, row)?;
     }
+    finish(out)
+}
+
+fn finish(out: csv::Writer<Vec<u8>>) -> Result<Vec<u8>, csv::Error> {
     out.into_inner()
         .map_err(|error| csv::Error::from(error.into_error()))
 }

@@ -2,6 +2,7 @@
 
 pub mod csv;
 pub mod npz;
+pub mod pieces;
 pub mod vtk;
 
 use utoipa::ToSchema;
@@ -22,6 +23,27 @@ pub struct Table {
     pub rows: Rows,
     /// The values of the field.
     pub values: Vec<Column>,
+}
+
+impl Table {
+    /// How many rows it has.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        match &self.rows {
+            Rows::Cells { strip, .. } => strip.len(),
+            Rows::Grid { x_mm, y_mm } => x_mm.len() * y_mm.len(),
+        }
+    }
+
+    /// What it takes in memory, in bytes.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        let columns = match &self.rows {
+            Rows::Cells { .. } => PLACES.len() + 1,
+            Rows::Grid { .. } => 0,
+        };
+        self.len() * (columns + self.values.len()) * size_of::<f64>()
+    }
 }
 
 /// What the rows of a table belong to.
