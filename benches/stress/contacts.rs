@@ -16,8 +16,8 @@ pub struct Sample {
     pub case: Value,
 }
 
-/// Which kinds come how often, out of twenty.
-const KINDS: [&str; 20] = [
+/// Which kinds come how often, out of twenty-one.
+const KINDS: [&str; 21] = [
     "ellipse, mesh",
     "ellipse, target",
     "radii, target",
@@ -38,6 +38,7 @@ const KINDS: [&str; 20] = [
     "ellipse, few cells",
     "ellipse, target",
     "two patches nearly touching",
+    "two unequal patches",
 ];
 /// Beside these, one case in so many has a huge mesh.
 const HUGE_EVERY: usize = 500;
@@ -166,8 +167,15 @@ fn case(kind: &str, random: &mut Random) -> Value {
             let motion = setting.motion(setting.hertz(radius), random);
             setting.case(contact, motion, solver)
         }
-        "gap_profile, target" | "gap_profile, mesh" | "gap_grid, target" => {
-            let contact = gap(kind, random);
+        "gap_profile, target"
+        | "gap_profile, mesh"
+        | "gap_grid, target"
+        | "two unequal patches" => {
+            let contact = if kind == "two unequal patches" {
+                unequal(random)
+            } else {
+                gap(kind, random)
+            };
             // Gaps come in the size of rails; loads and stiffness that make patches of 1 to 15 mm.
             let setting = Setting {
                 force: random.decades(3e2, 3e5),
@@ -202,6 +210,21 @@ fn case(kind: &str, random: &mut Random) -> Value {
             setting.case(contact, motion, solver)
         }
     }
+}
+
+/// Two bumps of very different radii side by side under a wheel.
+fn unequal(random: &mut Random) -> Value {
+    let rolling = random.decades(100.0, 2000.0);
+    let radii = [random.decades(100.0, 600.0), random.decades(1.0, 60.0)];
+    let half = random.between(6.0, 14.0);
+    let offset = random.between(0.0, 0.02);
+    let across = |y: f64| {
+        let large = (y + half).powi(2) / (2.0 * radii[0]);
+        large.min((y - half).powi(2) / (2.0 * radii[1]) + offset)
+    };
+    let y: Vec<f64> = (0..961).map(|k| 0.05 * f64::from(k) - 24.0).collect();
+    let gap: Vec<f64> = y.iter().map(|y| across(*y)).collect();
+    json!({ "type": "gap_profile", "rolling_mm": rolling, "y_mm": y, "gap_mm": gap })
 }
 
 /// Crowns of powers, two bumps, kinks and roughness under a wheel.

@@ -41,13 +41,20 @@ pub struct Solution {
 /// How the normal problem of a gap was solved.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct NormalReport {
-    /// Cells of the finest grid along x and y.
+    /// Cells of the finest grid along x and y; of several grids, of the one that carries most.
     pub cells: [u32; 2],
+    /// Grids: one per gap, or one per patch where patches of a gap differ much in size.
+    pub grids: u32,
     /// Iterations over all grids.
     pub iterations: u32,
     /// Largest violation of the contact conditions on the finest grid (distance in the contact, overlap outside), relative
     /// to the deepest overlap of the undeformed surfaces.
     pub residual: f64,
+    /// Largest pressure on the last grid but one, relative to that on the last, less 1; 0 if there was only one.
+    pub pressure_change: f64,
+    /// For a wheel on a rail: by which part the prescribed force was missed at the last height, before the contact was grown to it
+    /// as Hertz's would be; 0 where no height is sought.
+    pub force_residual: f64,
     /// Wall time in s.
     pub seconds: f64,
 }

@@ -14,6 +14,7 @@ mod gap_hertz;
 mod gap_reference;
 mod gap_robustness;
 mod gap_samples;
+mod gap_two_patches;
 mod golden;
 mod held_out;
 mod hertz;

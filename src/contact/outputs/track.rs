@@ -191,8 +191,15 @@ fn both(one: Option<NormalReport>, other: Option<NormalReport>) -> Option<Normal
         } else {
             other.cells
         },
+        grids: one.grids + other.grids,
         iterations: one.iterations + other.iterations,
         residual: one.residual.max(other.residual),
+        pressure_change: if one.pressure_change.abs() >= other.pressure_change.abs() {
+            one.pressure_change
+        } else {
+            other.pressure_change
+        },
+        force_residual: one.force_residual.max(other.force_residual),
         seconds: one.seconds + other.seconds,
     })
 }

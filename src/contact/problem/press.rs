@@ -7,7 +7,7 @@ use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::Region;
 use crate::contact::normal::non_hertzian::{Failure, Report};
-use crate::contact::problem::Problem;
+use crate::contact::problem::{Problem, Resolution};
 use crate::contact::solution::NormalReport;
 
 impl Problem {
@@ -20,7 +20,7 @@ impl Problem {
             return Ok(Cow::Borrowed(self));
         };
         let began = monitor.elapsed();
-        let found = contact.solve(monitor)?;
+        let found = contact.solve_for(self.target(), monitor)?;
         let mut problem = self.clone();
         problem.region = Region::Grid(found.field);
         problem.remarks.extend(found.remarks);
@@ -28,6 +28,15 @@ impl Problem {
         problem.normal = Some(found.report.with_time(seconds));
         problem.fits()?;
         Ok(Cow::Owned(problem))
+    }
+
+    /// Target of the resultants' error relative to μN; infinite where a mesh is given.
+    #[must_use]
+    pub fn target(&self) -> f64 {
+        match self.resolution {
+            Resolution::Target(target) => target,
+            Resolution::Mesh(_) => f64::INFINITY,
+        }
     }
 
     /// The same question about a part of the contact whose region, pressure and motions are known; without remarks.
@@ -90,6 +99,9 @@ impl Report {
             cells: self.cells.map(|n| u32::try_from(n).unwrap_or(u32::MAX)),
             iterations: self.iterations,
             residual: self.residual,
+            grids: u32::try_from(self.grids).unwrap_or(u32::MAX),
+            pressure_change: self.pressure_change,
+            force_residual: 0.0,
             seconds,
         }
     }

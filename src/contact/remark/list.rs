@@ -126,6 +126,22 @@ remarks! {
     advice: "Smooth the gap, or give it on a finer grid if it is as rough as that.",
     detail: "the gap is rough: pressure and region still change with the grid of the normal problem".to_owned(),
 
+    /// A patch that carries a noticeable part of the load has few cells in the normal problem.
+    PatchCoarse {
+        /// Cells across its narrower side.
+        cells_across: f64 = 4.0,
+        /// Its part of the load.
+        load_share: f64 = 0.059,
+    }
+    code: "patch-coarse",
+    severity: Warning,
+    advice: "Take the width and the pressure of this patch as uncertain by some per cent; solve it in a case of its own if it matters.",
+    detail: format!(
+        "the patch carries {:.1} % of the load and has only {cells_across:.0} cells across: its width and its pressure are uncertain by \
+         some per cent",
+        100.0 * load_share
+    ),
+
     /// A given pressure does not fall to 0 at the edge of its grid.
     PressureCutAtEdge {}
     code: "pressure-cut-at-edge",

@@ -1,16 +1,60 @@
 //! Pressure on a regular grid by conjugate gradients that never leave the contact conditions.
 //!
 //! Sought are `p ≥ 0` and `g = u(p) + h − δ ≥ 0` with `p g = 0` at every cell, and either the sum of p or the approach
-//! δ prescribed (Polonsky and Keer 1999).
+//! δ prescribed (Polonsky and Keer 1999). Cells may differ in size: scalar products are weighted with their areas, and
+//! distances are scaled by what a cell's own pressure displaces, so that small cells take no more iterations than large ones.
 
 use crate::contact::influence::fft::{Convolution, Width};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::hertz::Pressing;
 
+/// Displacements that pressures on cells cause, cells of one size or of several.
+pub(super) trait Influence {
+    /// Up to so many changed pressures are added to the displacement one by one, for less than a whole product costs.
+    const CHANGES_MAX: usize;
+    /// Displacement in mm at every centre for pressures in MPa.
+    fn apply(&mut self, pressure: &[f64], displacement: &mut [f64]);
+    /// Adds the displacement in mm for changed pressures in MPa, cell by cell; never more than `CHANGES_MAX`.
+    fn add(&self, changes: &[(usize, f64)], displacement: &mut [f64]);
+    /// Displacement in mm/MPa of the first cell by its own pressure.
+    fn own(&self) -> f64;
+    /// Area of a cell relative to that of the first one.
+    fn area(&self, cell: usize) -> f64;
+    /// Displacement of the first cell by its own pressure relative to that of this one: distances times this are the direction
+    /// of steepest descent for cells of several sizes.
+    fn yielding(&self, cell: usize) -> f64;
+}
+
+impl<T: Width> Influence for Convolution<T> {
+    const CHANGES_MAX: usize = 12;
+
+    fn apply(&mut self, pressure: &[f64], displacement: &mut [f64]) {
+        Convolution::apply(self, pressure, displacement);
+    }
+
+    fn add(&self, changes: &[(usize, f64)], displacement: &mut [f64]) {
+        for (cell, pressure) in changes {
+            Convolution::add(self, *cell, *pressure, displacement);
+        }
+    }
+
+    fn own(&self) -> f64 {
+        Convolution::own(self)
+    }
+
+    #[inline]
+    fn area(&self, _cell: usize) -> f64 {
+        1.0
+    }
+
+    #[inline]
+    fn yielding(&self, _cell: usize) -> f64 {
+        1.0
+    }
+}
+
 /// Iterations after which something is wrong: smooth gaps take 10 to 30, rough ones up to about 100.
 const ITERATIONS_MAX: u32 = 500;
-/// Up to so many changed pressures are added to the displacement one by one, for less than a whole product costs.
-const CHANGES_MAX: usize = 12;
 
 /// How far the two bodies are from touching where they should, and what they press.
 #[derive(Debug, Clone)]
@@ -28,6 +72,13 @@ pub(super) struct Pressed {
     pub(super) residual: f64,
 }
 
+impl Pressed {
+    /// The largest pressure in MPa.
+    pub(super) fn largest(&self) -> f64 {
+        self.pressure.iter().copied().fold(0.0, f64::max)
+    }
+}
+
 /// Why there is no pressure.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Failure {
@@ -37,11 +88,11 @@ pub(super) enum Failure {
     Stopped(Stop),
 }
 
-/// Solves for the pressure under which surfaces with the gap `gap` touch; `cell` is the area of a cell in mm².
+/// Solves for the pressure under which surfaces with the gap `gap` touch; `cell` is the area of the first cell in mm².
 ///
 /// `start` is any pressure that is not 0 everywhere; it decides the number of iterations only.
-pub(super) fn press<T: Width>(
-    influence: &mut Convolution<T>,
+pub(super) fn press<I: Influence>(
+    influence: &mut I,
     gap: &[f64],
     cell: f64,
     pressing: Pressing,
@@ -59,7 +110,7 @@ pub(super) fn press<T: Width>(
         r: vec![0.0; n],
         changes: Vec::new(),
     };
-    work.scale_to(pressing, cell);
+    work.scale_to(influence, pressing, cell);
     influence.apply(&work.p, &mut work.u);
     let (mut follow, mut last) = (false, 1.0);
     let mut residual = f64::INFINITY;
@@ -67,8 +118,8 @@ pub(super) fn press<T: Width>(
         if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.0) {
             return Err(Failure::Stopped(stop));
         }
-        let approach = work.distances(gap, pressing);
-        let (violation, square) = work.part_from(approach);
+        let approach = work.distances(influence, gap, pressing);
+        let (violation, square) = work.part_from(influence, approach);
         residual = violation / (approach - least);
         if residual <= tolerance && approach > least {
             return Ok(Pressed {
@@ -81,18 +132,16 @@ pub(super) fn press<T: Width>(
         }
         let factor = if follow { square / last } else { 0.0 };
         last = square;
-        work.direction(factor);
+        work.direction(influence, factor);
         influence.apply(&work.t, &mut work.r);
-        let step = work.step(pressing, influence.own());
-        follow = work.advance(step);
-        if work.changes.len() <= CHANGES_MAX {
-            for (k, change) in work.changes.drain(..) {
-                influence.add(k, change, &mut work.u);
-            }
-            let scale = work.scale_to(pressing, cell);
+        let step = work.step(influence, pressing);
+        follow = work.advance(influence, step);
+        if work.changes.len() <= I::CHANGES_MAX {
+            influence.add(&work.changes, &mut work.u);
+            let scale = work.scale_to(influence, pressing, cell);
             work.u.iter_mut().for_each(|u| *u *= scale);
         } else {
-            work.scale_to(pressing, cell);
+            work.scale_to(influence, pressing, cell);
             influence.apply(&work.p, &mut work.u);
         }
     }
@@ -114,24 +163,27 @@ struct Work {
 
 impl Work {
     /// Scales the pressures to the prescribed force; returns the factor.
-    fn scale_to(&mut self, pressing: Pressing, cell: f64) -> f64 {
+    fn scale_to(&mut self, influence: &impl Influence, pressing: Pressing, cell: f64) -> f64 {
         let Pressing::Force(force) = pressing else {
             return 1.0;
         };
-        let [sum] = sums(self.p.len(), |k| [self.p[k]]);
+        let [sum] = sums(self.p.len(), |k| [influence.area(k) * self.p[k]]);
         let scale = force / (cell * sum);
         self.p.iter_mut().for_each(|p| *p *= scale);
         scale
     }
 
     /// Puts `u + h` into the distances and returns the approach δ; with a force it makes the mean over the contact 0.
-    fn distances(&mut self, gap: &[f64], pressing: Pressing) -> f64 {
+    fn distances(&mut self, influence: &impl Influence, gap: &[f64], pressing: Pressing) -> f64 {
         for ((g, u), h) in self.g.iter_mut().zip(&self.u).zip(gap) {
             *g = u + h;
         }
         match pressing {
             Pressing::Force(_) => {
-                let [sum, count] = self.inside(|k| [self.g[k], 1.0]);
+                let [sum, count] = self.inside(|k| {
+                    let weight = influence.area(k) * influence.yielding(k);
+                    [weight * self.g[k], weight]
+                });
                 sum / count
             }
             Pressing::Approach(approach) => approach,
@@ -139,27 +191,41 @@ impl Work {
     }
 
     /// Takes the approach from the distances; their largest violation, and the sum of their squares in the contact.
-    fn part_from(&mut self, approach: f64) -> (f64, f64) {
+    fn part_from(&mut self, influence: &impl Influence, approach: f64) -> (f64, f64) {
         let mut violation = 0.0_f64;
         for (g, p) in self.g.iter_mut().zip(&self.p) {
             *g -= approach;
             violation = violation.max(if *p > 0.0 { g.abs() } else { -*g });
         }
-        let [square] = self.inside(|k| [self.g[k] * self.g[k]]);
+        let [square] =
+            self.inside(|k| [influence.area(k) * influence.yielding(k) * (self.g[k] * self.g[k])]);
         (violation, square)
     }
 
-    fn direction(&mut self, factor: f64) {
-        for ((t, g), p) in self.t.iter_mut().zip(&self.g).zip(&self.p) {
-            *t = if *p > 0.0 { g + factor * *t } else { 0.0 };
+    fn direction(&mut self, influence: &impl Influence, factor: f64) {
+        for (k, ((t, g), p)) in self.t.iter_mut().zip(&self.g).zip(&self.p).enumerate() {
+            *t = if *p > 0.0 {
+                influence.yielding(k) * g + factor * *t
+            } else {
+                0.0
+            };
         }
     }
 
-    /// Length of the step that leaves no distance along the direction; `own` is what a cell's pressure displaces itself.
-    fn step(&self, pressing: Pressing, own: f64) -> f64 {
+    /// Length of the step that leaves no distance along the direction.
+    fn step(&self, influence: &impl Influence, pressing: Pressing) -> f64 {
         let (g, t, r) = (&self.g, &self.t, &self.r);
-        let [above, product, along, sum, count] =
-            self.inside(|k| [g[k] * t[k], r[k] * t[k], t[k], r[k], 1.0]);
+        let [above, product, along, sum, count] = self.inside(|k| {
+            let area = influence.area(k);
+            let weight = area * influence.yielding(k);
+            [
+                area * (g[k] * t[k]),
+                area * (r[k] * t[k]),
+                area * t[k],
+                weight * r[k],
+                weight,
+            ]
+        });
         let below = match pressing {
             Pressing::Force(_) => product - sum / count * along,
             Pressing::Approach(_) => product,
@@ -168,13 +234,13 @@ impl Work {
         if below > 0.0 && above > 0.0 {
             above / below
         } else {
-            1.0 / own
+            1.0 / influence.own()
         }
     }
 
     /// Takes the step, and notes where the pressures had to be changed beside it. Says whether the next direction may
     /// build on this one: no cell came into contact.
-    fn advance(&mut self, step: f64) -> bool {
+    fn advance(&mut self, influence: &impl Influence, step: f64) -> bool {
         let mut follow = true;
         self.changes.clear();
         for (k, p) in self.p.iter_mut().enumerate() {
@@ -186,7 +252,7 @@ impl Work {
             // Outside, and what has just left the contact although the bodies overlap there.
             *p = if self.g[k] < 0.0 {
                 follow = false;
-                -step * self.g[k]
+                -step * influence.yielding(k) * self.g[k]
             } else {
                 0.0
             };

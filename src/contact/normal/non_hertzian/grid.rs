@@ -39,6 +39,8 @@ pub(super) struct Side {
 pub(super) struct Wanted {
     pub(super) window: Window,
     pub(super) cells: [usize; 2],
+    /// So many cells are not allowed: some patch will be too coarse.
+    pub(super) capped: bool,
 }
 
 /// How many cells are wanted across what.
@@ -88,7 +90,8 @@ impl Grid {
             .collect()
     }
 
-    fn range(&self, axis: usize) -> [f64; 2] {
+    /// The ends of the box along an axis.
+    pub(super) fn range(&self, axis: usize) -> [f64; 2] {
         let half = 0.5 * self.cells[axis] as f64 * self.step[axis];
         [self.middle[axis] - half, self.middle[axis] + half]
     }
@@ -143,6 +146,21 @@ impl Grid {
     /// Pressures of another grid at the centres of this one: the root of their squares, which fall linearly to 0 at the
     /// edge and are continued beyond it, interpolated bilinearly.
     pub(super) fn interpolate(&self, other: &Grid, pressure: &[f64], gap: &[f64]) -> Vec<f64> {
+        let largest = pressure.iter().copied().fold(0.0, f64::max);
+        self.never_empty(self.interpolated(other, pressure), largest, gap)
+    }
+
+    /// Pressures, or the largest one at the deepest cell if they are 0 everywhere.
+    pub(super) fn never_empty(&self, mut out: Vec<f64>, largest: f64, gap: &[f64]) -> Vec<f64> {
+        if out.iter().all(|p| *p == 0.0) {
+            let deepest = (0..gap.len()).min_by(|a, b| gap[*a].total_cmp(&gap[*b]));
+            out[deepest.unwrap_or(0)] = largest;
+        }
+        out
+    }
+
+    /// The same, 0 everywhere if the other grid presses nothing here.
+    pub(super) fn interpolated(&self, other: &Grid, pressure: &[f64]) -> Vec<f64> {
         let squares = edges::continued(other.cells[0], edges::squares(other.cells[0], pressure));
         let places = [0, 1].map(|axis| -> Vec<(isize, f64)> {
             let first = other.range(axis)[0] + 0.5 * other.step[axis];
@@ -169,10 +187,6 @@ impl Grid {
                 let square = (1.0 - v) * row(j) + v * row(j + 1);
                 out.push(square.max(0.0).sqrt());
             }
-        }
-        if out.iter().all(|p| *p == 0.0) {
-            let deepest = (0..gap.len()).min_by(|a, b| gap[*a].total_cmp(&gap[*b]));
-            out[deepest.unwrap_or(0)] = pressure.iter().copied().fold(0.0, f64::max);
         }
         out
     }
@@ -233,8 +247,7 @@ impl Grid {
         let total: f64 = pressed.pressure.iter().sum();
         let mut steps = [f64::INFINITY; 2];
         for patch in self.patches(&pressed.pressure) {
-            let mut extent = Extent::default();
-            patch.iter().for_each(|k| extent.add(cell(*k)));
+            let extent = self.extent(&patch);
             patch.iter().for_each(|k| contact.add(cell(*k)));
             let load: f64 = patch.iter().map(|k| pressed.pressure[*k]).sum();
             if load >= resolution.share_min * total {
@@ -254,15 +267,39 @@ impl Grid {
             ]
         });
         let window = within(window, limits);
-        let cells = [0, 1].map(|k| {
-            let [low, high] = window[k];
-            (((high - low) / steps[k]).ceil() as usize).clamp(4, CELLS_MAX)
-        });
-        Wanted { window, cells }
+        let needed = [0, 1].map(|k| ((window[k][1] - window[k][0]) / steps[k]).ceil() as usize);
+        Wanted {
+            window,
+            cells: needed.map(|cells| cells.clamp(4, CELLS_MAX)),
+            capped: needed.iter().any(|cells| *cells > CELLS_MAX),
+        }
+    }
+
+    /// Cells along either axis from the first to the last of some.
+    pub(super) fn extent_of(&self, cells: &[usize]) -> [f64; 2] {
+        let extent = self.extent(cells);
+        [0, 1].map(|k| extent.length(k))
+    }
+
+    /// The box of some cells in mm.
+    pub(super) fn window_of(&self, cells: &[usize]) -> Window {
+        let Extent(ranges) = self.extent(cells);
+        [0, 1].map(|k| {
+            let [first, last] = ranges[k].map(|i| i as f64);
+            [first, last + 1.0].map(|i| self.range(k)[0] + i * self.step[k])
+        })
+    }
+
+    fn extent(&self, cells: &[usize]) -> Extent {
+        let mut extent = Extent::default();
+        for k in cells {
+            extent.add([k % self.cells[0], k / self.cells[0]]);
+        }
+        extent
     }
 
     /// Cells in contact, patch by patch; cells hang together over edges and corners.
-    fn patches(&self, pressure: &[f64]) -> Vec<Vec<usize>> {
+    pub(super) fn patches(&self, pressure: &[f64]) -> Vec<Vec<usize>> {
         let [nx, ny] = self.cells;
         let mut seen = vec![false; nx * ny];
         let mut patches = Vec::new();
@@ -316,7 +353,8 @@ impl Extent {
     }
 }
 
-fn within(window: Window, limits: Window) -> Window {
+/// The part of a window within limits.
+pub(super) fn within(window: Window, limits: Window) -> Window {
     [0, 1].map(|k| {
         [
             window[k][0].max(limits[k][0]),

@@ -1,23 +1,30 @@
 //! Any gap: contact region and pressure under a load or an approach.
 //!
 //! A box that holds the contact is found by looking at the gap, the pressure on ever finer grids of that box by
-//! conjugate gradients, each grid started from the one before and shrunk to the contact. At the end the edges are
-//! placed between the cells.
+//! conjugate gradients, each grid started from the one before and shrunk to the contact. Where one grid cannot resolve all
+//! patches, each gets a grid of its own (see `tiles.rs`). At the end the edges are placed between the cells.
 
+mod coupling;
 mod edges;
 pub mod gap;
 mod gradients;
 mod grid;
+mod outcome;
+mod tiles;
+mod tiles_influence;
 mod window;
 
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::hertz::Pressing;
 use crate::contact::normal::non_hertzian::gap::Gap;
+use crate::contact::normal::non_hertzian::gap::Window;
 use crate::contact::normal::non_hertzian::gradients::{Pressed, press};
 use crate::contact::normal::non_hertzian::grid::{Grid, Resolution, Side};
+use crate::contact::normal::non_hertzian::outcome::Outcome;
+use crate::contact::normal::non_hertzian::tiles::Tile;
 use crate::contact::normal::non_hertzian::window::{Reach, reach, reach_of_level};
 use crate::contact::normal::prescribed::PressureField;
-use crate::contact::remark::{Remark, RemarkEntry};
+use crate::contact::remark::RemarkEntry;
 
 /// Cells of the first grid along either axis.
 const CELLS_FIRST: usize = 32;
@@ -33,6 +40,10 @@ const RESOLUTION_COARSE: Resolution = Resolution {
     patch: 12.0,
     share_min: 0.05,
 };
+/// Below this target of the resultants' error (relative to μN) grids are finer: the error of a normal problem falls with the
+/// power 3/2 of its cells' size.
+const TARGET_USUAL: f64 = 0.002;
+const TARGET_POWER: f64 = -2.0 / 3.0;
 /// A grid with cells larger than wanted by less than this factor (inverse) will do.
 const COARSER_MAX: f64 = 0.8;
 /// A rough gap is looked at more closely until neither the approach nor the largest pressure change by more than this,
@@ -48,11 +59,6 @@ const TOLERANCE: f64 = 2e-4;
 const GRIDS_MAX: usize = 12;
 /// Cells outside the contact that nearly touch, relative to the deepest overlap, belong to the next grid.
 const NEAR: f64 = 0.03;
-/// A patch longer than this part of the rolling radius (half against whole) is no half-space contact.
-const HALF_LENGTH_USUAL_MAX: f64 = 0.3;
-/// So is an approach that is more than this part of the patch's smaller half width.
-const APPROACH_USUAL_MAX: f64 = 0.15;
-
 /// Two bodies with a gap between them, pressed together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GapContact {
@@ -78,13 +84,17 @@ pub struct Found {
 /// How a normal problem was solved.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Report {
-    /// Cells of the last grid along x and y.
+    /// Cells of the last grid along x and y, of the one that carries most if there are several.
     pub cells: [usize; 2],
+    /// Grids: 1, or one per patch where patches differ much in size.
+    pub grids: usize,
     /// Iterations over all grids.
     pub iterations: u32,
     /// Largest violation of the contact conditions on the last grid, relative to the deepest overlap of the undeformed
     /// surfaces: distance in the contact, overlap outside.
     pub residual: f64,
+    /// Largest pressure on the last grid but one, relative to that on the last, less 1; 0 if there was only one grid.
+    pub pressure_change: f64,
 }
 
 /// Why a gap has no contact to show.
@@ -154,6 +164,14 @@ impl GapContact {
         self.solve_on(RESOLUTION_COARSE, monitor)
     }
 
+    /// The same for a target of the resultants' error, relative to μN: finer below 0.002.
+    ///
+    /// # Errors
+    /// As [`GapContact::solve`].
+    pub fn solve_for(&self, target: f64, monitor: &dyn Monitor) -> Result<Found, Failure> {
+        self.solve_on(RESOLUTION.for_target(target), monitor)
+    }
+
     fn solve_on(&self, resolution: Resolution, monitor: &dyn Monitor) -> Result<Found, Failure> {
         let mut reach = reach(&self.gap, self.pressing, self.contact_modulus);
         if let Pressing::Approach(approach) = self.pressing
@@ -165,11 +183,14 @@ impl GapContact {
             |reach: &Reach| Grid::new(reach.window, [CELLS_FIRST; 2], self.gap.is_mirrored());
         let mut grid = first(&reach);
         let mut solved: Option<(Grid, Pressed)> = None;
-        let mut iterations = 0;
-        let mut settled = false;
+        let (mut iterations, mut pressure_change) = (0, 0.0);
+        let mut end = Next::Rough { capped: false };
         for _ in 0..GRIDS_MAX {
             let pressed = self.press(&grid, solved.as_ref(), &reach, monitor)?;
             iterations += pressed.iterations;
+            if let Some((_, before)) = &solved {
+                pressure_change = before.largest() / pressed.largest() - 1.0;
+            }
             let next = if pressed.approach > reach.level {
                 // The estimate was too small: parts of the gap beyond the box may touch as well.
                 let depth = pressed.approach - reach.least;
@@ -182,31 +203,32 @@ impl GapContact {
             solved = Some((grid, pressed));
             match next {
                 Next::Grid(next) => grid = next,
-                Next::Settled => {
-                    settled = true;
+                last => {
+                    end = last;
                     break;
                 }
-                Next::Rough => break,
             }
         }
         let Some((grid, pressed)) = solved else {
             unreachable!("at least one grid is tried")
         };
-        let mut remarks = Vec::new();
-        if !settled {
-            remarks.push(Remark::GapRough {}.into());
+        let whole = Tile { grid, pressed };
+        if end.capped()
+            && let Some(found) =
+                self.solve_on_tiles(whole.clone(), reach.least, resolution, monitor)?
+        {
+            return self.found(Outcome {
+                iterations: iterations + found.iterations,
+                least: reach.least,
+                ..found
+            });
         }
-        let report = Report {
-            cells: grid.cells,
+        self.found(Outcome {
+            tiles: vec![whole],
             iterations,
-            residual: pressed.residual,
-        };
-        let field = field(&grid, &pressed).map_err(Failure::NoAnswer)?;
-        remarks.extend(self.remarks(&field, pressed.approach - reach.least));
-        Ok(Found {
-            field,
-            report,
-            remarks,
+            settled: matches!(end, Next::Settled { .. }),
+            pressure_change,
+            least: reach.least,
         })
     }
 
@@ -265,60 +287,24 @@ impl GapContact {
             return Ok(Next::Grid(finer));
         }
         if let Some(side) = cut.first() {
-            return Err(Failure::NoAnswer(format!(
-                "the contact reaches the edge {} of the given gap, so that the true contact is cut off; give the gap \
-                 farther out",
-                side.place(limits)
-            )));
+            return Err(edge_reached(*side, limits));
         }
-        let Some((coarse, before)) = before.filter(|_| resolution == RESOLUTION) else {
-            return Ok(Next::Settled);
+        let capped = wanted.capped;
+        let Some((coarse, before)) = before.filter(|_| resolution.settles()) else {
+            return Ok(Next::Settled { capped });
         };
         let ratio = (coarse.step[0] / grid.step[0]).max(coarse.step[1] / grid.step[1]);
-        let largest = |pressed: &Pressed| pressed.pressure.iter().copied().fold(0.0, f64::max);
         if (pressed.approach - before.approach).abs() <= APPROACH_CHANGE * ratio * depth
-            && (largest(before) / largest(pressed) - 1.0).abs() <= PRESSURE_CHANGE * ratio
+            && (before.largest() / pressed.largest() - 1.0).abs() <= PRESSURE_CHANGE * ratio
         {
-            return Ok(Next::Settled);
+            return Ok(Next::Settled { capped });
         }
         let cells = grid.cells.map(|n| (n as f64 * REFINEMENT) as usize);
         let finer = Grid::new(wanted.window, cells, grid.mirrored);
         if (0..2).all(|k| finer.step[k] > COARSER_MAX * grid.step[k]) {
-            return Ok(Next::Rough);
+            return Ok(Next::Rough { capped });
         }
         Ok(Next::Grid(finer))
-    }
-
-    /// Remarks on contacts for which a half-space is a poor likeness of the bodies; the patch that carries most decides.
-    fn remarks(&self, field: &PressureField, depth: f64) -> Vec<RemarkEntry> {
-        let patches = field.patches();
-        let heaviest = patches
-            .iter()
-            .enumerate()
-            .max_by(|(_, a), (_, b)| a.normal_force.total_cmp(&b.normal_force));
-        let Some((patch, extent)) = heaviest.map(|(k, patch)| (k, patch.extent)) else {
-            return Vec::new();
-        };
-        let [x_min, x_max, y_min, y_max] = extent;
-        let (a, b) = (0.5 * (x_max - x_min), 0.5 * (y_max - y_min));
-        let mut remarks = Vec::new();
-        if let Gap::Profile { rolling, .. } = self.gap
-            && a > HALF_LENGTH_USUAL_MAX * rolling
-        {
-            let remark = Remark::NearlyConformal {
-                length_mm: 2.0 * a,
-                rolling_radius_mm: rolling,
-            };
-            remarks.push(remark.at_patch(patch));
-        }
-        if depth > APPROACH_USUAL_MAX * a.min(b) {
-            let remark = Remark::StrainsTooLarge {
-                overlap_mm: depth,
-                half_width_mm: a.min(b),
-            };
-            remarks.push(remark.at_patch(patch));
-        }
-        remarks
     }
 }
 
@@ -328,20 +314,48 @@ fn no_touch(approach: f64, least: f64) -> String {
     )
 }
 
-/// The pressures of a grid as a field with edges between its cells.
-fn field(grid: &Grid, pressed: &Pressed) -> Result<PressureField, String> {
-    PressureField::of_solution(
-        &grid.centres(0),
-        &grid.centres(1),
-        &edges::squares(grid.cells[0], &pressed.pressure),
-        &pressed.pressure,
-        pressed.approach,
-    )
+fn edge_reached(side: Side, limits: Window) -> Failure {
+    Failure::NoAnswer(format!(
+        "the contact reaches the edge {} of the given gap, so that the true contact is cut off; give the gap farther out",
+        side.place(limits)
+    ))
 }
 
 /// What follows a grid.
 enum Next {
     Grid(Grid),
-    Settled,
-    Rough,
+    /// Nothing changes any more; `capped` if a patch would want more cells than a grid may have.
+    Settled {
+        capped: bool,
+    },
+    /// Something still changes, and no finer grid is allowed.
+    Rough {
+        capped: bool,
+    },
+}
+
+impl Next {
+    fn capped(&self) -> bool {
+        matches!(
+            self,
+            Next::Settled { capped: true } | Next::Rough { capped: true }
+        )
+    }
+}
+
+impl Resolution {
+    /// The resolution for a target of the resultants' error relative to μN; as it is from [`TARGET_USUAL`] on.
+    fn for_target(self, target: f64) -> Resolution {
+        let finer = (target.min(TARGET_USUAL) / TARGET_USUAL).powf(TARGET_POWER);
+        Resolution {
+            contact: finer * self.contact,
+            patch: finer * self.patch,
+            ..self
+        }
+    }
+
+    /// Is the result compared with that of the grid before?
+    fn settles(self) -> bool {
+        self.contact >= RESOLUTION.contact
+    }
 }

@@ -1,9 +1,9 @@
 //! A pressure computed on equal cells, and mirror symmetry about y = 0.
 
 use crate::contact::normal::prescribed::components::NOWHERE;
-use crate::contact::normal::prescribed::{Grid, PADDING, PressureField, padded};
+use crate::contact::normal::prescribed::{Grid, GridPressure, PADDING, padded};
 
-impl PressureField {
+impl GridPressure {
     /// The field of a pressure computed on equal cells with the centres `(x[i], y[j])` in mm, stored at
     /// `j * x.len() + i`.
     ///
@@ -18,7 +18,7 @@ impl PressureField {
         squares: &[f64],
         pressure: &[f64],
         approach: f64,
-    ) -> Result<PressureField, String> {
+    ) -> Result<GridPressure, String> {
         let grid = Grid {
             x: padded(x),
             y: padded(y),
@@ -33,7 +33,7 @@ impl PressureField {
         for (k, square) in squares.iter().enumerate() {
             q[inner(k)] = (square / largest).max(0.0);
         }
-        let (mut field, samples) = PressureField::from_squares(grid, q, largest.sqrt())?;
+        let (mut field, samples) = GridPressure::from_squares(grid, q, largest.sqrt())?;
         let cell = (x[1] - x[0]) * (y[1] - y[0]);
         let mut forces = vec![0.0; field.shapes.len()];
         let mut peaks = vec![0.0_f64; field.shapes.len()];

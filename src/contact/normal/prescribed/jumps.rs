@@ -1,6 +1,6 @@
 //! How well samples resolve a pressure: cells across a patch, and jumps from one sample to the next.
 
-use crate::contact::normal::prescribed::{PADDING, PressureField};
+use crate::contact::normal::prescribed::{GridPressure, PADDING};
 
 /// A fall of the squared pressure over one interval beyond what the interval before lets expect, relative to the largest
 /// squared pressure, from which on it is a jump. An edge of Hertz's kind expects all of its fall; powers of a lens from 0.5
@@ -16,7 +16,7 @@ pub struct Jump {
     pub fall: f64,
 }
 
-impl PressureField {
+impl GridPressure {
     /// Spacings of the grid across each patch, along the axis that has fewer.
     #[must_use]
     pub fn cells_across(&self) -> Vec<f64> {

@@ -7,6 +7,7 @@
 
 mod components;
 mod computed;
+mod field;
 mod jumps;
 mod level_set;
 mod line;
@@ -17,6 +18,7 @@ use crate::contact::mesh::Chord;
 use crate::contact::normal::Patch;
 use crate::contact::normal::interpolation::{interval, weights};
 use crate::contact::remark::{Remark, RemarkEntry};
+pub use field::PressureField;
 use jumps::Jump;
 use level_set::State;
 use line::Line;
@@ -36,9 +38,9 @@ struct Grid {
     y: Vec<f64>,
 }
 
-/// Pressure samples on a rectangular grid and the patches they form.
+/// Pressure samples on one rectangular grid and the patches they form.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PressureField {
+pub struct GridPressure {
     /// The given grid with [`PADDING`] more lines on each side.
     grid: Grid,
     /// Squared pressure relative to its largest value, continued below 0 outside the contact.
@@ -56,7 +58,7 @@ pub struct PressureField {
     jump: Option<Jump>,
 }
 
-impl PressureField {
+impl GridPressure {
     /// Finds the patches of a pressure; `pressure[j][i]` in MPa belongs to `(x[i], y[j])` in mm.
     ///
     /// Axes increase strictly and have at least 2 points; pressures are finite and not negative. Returns the field and
@@ -68,7 +70,7 @@ impl PressureField {
         x: &[f64],
         y: &[f64],
         pressure: &[Vec<f64>],
-    ) -> Result<(PressureField, Vec<RemarkEntry>), String> {
+    ) -> Result<(GridPressure, Vec<RemarkEntry>), String> {
         let pressure_max = pressure.iter().flatten().copied().fold(0.0, f64::max);
         let grid = Grid {
             x: padded(x),
@@ -85,7 +87,7 @@ impl PressureField {
                 "no pressure more than 0 given; at least one is needed for a contact".to_owned(),
             );
         }
-        let (mut field, samples) = PressureField::from_squares(grid, q, pressure_max)?;
+        let (mut field, samples) = GridPressure::from_squares(grid, q, pressure_max)?;
         let mut remarks = field.remarks(&samples, &field.shapes);
         field.jump = field.find_jump();
         if let Some(jump) = field.jump {
@@ -100,18 +102,18 @@ impl PressureField {
         Ok((field, remarks))
     }
 
-    /// A field whose patches have no region yet, and the patch of every sample; `q` is as in [`PressureField::q`] with 0
+    /// A field whose patches have no region yet, and the patch of every sample; `q` is as in [`GridPressure::q`] with 0
     /// outside the contact.
     fn from_squares(
         grid: Grid,
         q: Vec<f64>,
         pressure_max: f64,
-    ) -> Result<(PressureField, Vec<u8>), String> {
+    ) -> Result<(GridPressure, Vec<u8>), String> {
         let (samples, count) = components::label_samples(&grid, &q).map_err(|count| {
             format!("{count} separate patches found; at most {PATCHES_MAX} are allowed")
         })?;
         let cells = components::label_cells(&grid, &samples);
-        let mut field = PressureField {
+        let mut field = GridPressure {
             grid,
             q,
             smooth: Vec::new(),

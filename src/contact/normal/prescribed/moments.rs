@@ -1,8 +1,8 @@
 //! The load centre of a pressure, and the same pressure moved or corrected.
 
-use crate::contact::normal::prescribed::PressureField;
+use crate::contact::normal::prescribed::GridPressure;
 
-impl PressureField {
+impl GridPressure {
     /// Load centre `[x, y]` in mm of one patch, or of all of them: the mean place weighted with the pressure.
     #[must_use]
     pub fn load_centre(&self, patch: Option<usize>) -> [f64; 2] {
@@ -24,7 +24,7 @@ impl PressureField {
 
     /// The same pressure with its coordinates counted from another origin, in mm.
     #[must_use]
-    pub fn from_origin(mut self, origin: [f64; 2]) -> PressureField {
+    pub fn from_origin(mut self, origin: [f64; 2]) -> GridPressure {
         self.grid.x.iter_mut().for_each(|x| *x -= origin[0]);
         self.grid.y.iter_mut().for_each(|y| *y -= origin[1]);
         for shape in &mut self.shapes {
@@ -45,7 +45,7 @@ impl PressureField {
     /// The same contact under a force times a factor near 1, with approaches larger by so much in mm: lengths from the origin
     /// and pressures grow with the cube root of the force, as in Hertz's contacts.
     #[must_use]
-    pub fn corrected(mut self, factor: f64, approach: f64) -> PressureField {
+    pub fn corrected(mut self, factor: f64, approach: f64) -> GridPressure {
         let root = factor.cbrt();
         self.pressure_max *= root;
         let axes = [&mut self.grid.x, &mut self.grid.y];
@@ -66,7 +66,7 @@ impl PressureField {
 mod tests {
     use super::*;
 
-    fn two_bumps() -> PressureField {
+    fn two_bumps() -> GridPressure {
         let x: Vec<f64> = (-20..=20).map(|k| 0.2 * f64::from(k)).collect();
         let y: Vec<f64> = (-50..=50).map(|k| 0.2 * f64::from(k)).collect();
         let bump = |x: f64, y: f64, y0: f64, size: f64| {
@@ -82,7 +82,7 @@ mod tests {
                     .collect()
             })
             .collect();
-        PressureField::new(&x, &y, &rows).unwrap().0
+        GridPressure::new(&x, &y, &rows).unwrap().0
     }
 
     #[test]
@@ -120,7 +120,7 @@ mod tests {
             assert!((after.extent[3] - before.extent[3] - 5.0).abs() < 1e-12);
             assert_eq!(after.area, before.area);
         }
-        let chord = |field: &PressureField, y: f64| field.chords(0, &[(y, 0.1)])[0];
+        let chord = |field: &GridPressure, y: f64| field.chords(0, &[(y, 0.1)])[0];
         let (here, there) = (chord(&field, -4.2), chord(&moved, 0.8));
         assert!((here.left - there.left - 0.3).abs() < 1e-12);
     }
@@ -136,7 +136,7 @@ mod tests {
             assert!((after.area / before.area - root * root).abs() < 1e-12);
         }
         // The pressures on the cells carry just that force: a line's load times its width grows with the third power.
-        let load = |field: &PressureField, y: f64| {
+        let load = |field: &GridPressure, y: f64| {
             let chord = field.chords(0, &[(y, 0.1)])[0];
             let length = chord.right - chord.left;
             (

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 
 use crate::contact::normal::Patch;
 use crate::contact::normal::prescribed::components::NOWHERE;
-use crate::contact::normal::prescribed::{PADDING, PressureField};
+use crate::contact::normal::prescribed::{GridPressure, PADDING};
 use crate::contact::remark::{Remark, RemarkEntry};
 
 /// A patch with fewer samples along or across has an uncertain edge, and a force off by more than about 2 %: measured
@@ -21,7 +21,7 @@ pub(super) struct Shape {
     pub(super) segments_per_strip: f64,
 }
 
-impl PressureField {
+impl GridPressure {
     /// Patches without their region: force, rows and columns come from the samples.
     pub(super) fn shapes_from_samples(&self, samples: &[u8], count: usize) -> Vec<Shape> {
         let nx = self.grid.x.len();
