@@ -1,6 +1,7 @@
 //! What can be started, and with which settings? Every command, flag and environment variable.
 
 mod backup;
+mod commands;
 mod config;
 mod healthcheck;
 mod http_args;
@@ -17,6 +18,7 @@ use std::time::Duration;
 
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
+use crate::cli::commands::{BackupArgs, HealthcheckArgs, KeysAction, KeysArgs, SolveArgs};
 use crate::cli::http_args::HttpArgs;
 use crate::contact::problem::Limits;
 use crate::contact::tangential::operator_store::{BYTES_DEFAULT, OperatorStore};
@@ -189,76 +191,6 @@ impl Anonymous {
     }
 }
 
-/// Settings of `backup`.
-#[derive(Debug, Clone, Args)]
-pub struct BackupArgs {
-    /// Folder to make; it must not be there yet.
-    #[arg(long, value_name = "FOLDER")]
-    pub to: PathBuf,
-    /// Data folder of the service.
-    #[arg(
-        long,
-        env = "RAILHEAD_DATA_DIR",
-        default_value = "./railhead-data",
-        value_name = "FOLDER"
-    )]
-    pub data_dir: PathBuf,
-}
-
-/// Settings of `keys`.
-#[derive(Debug, Clone, Args)]
-pub struct KeysArgs {
-    #[command(subcommand)]
-    pub action: KeysAction,
-}
-
-/// What can be done with API keys.
-#[derive(Debug, Clone, Subcommand)]
-pub enum KeysAction {
-    /// Make a key and print it, this one time.
-    Create {
-        /// Whose jobs the key opens; keys of the tenant `operator` may also read `/metrics`.
-        #[arg(long, value_name = "TENANT")]
-        tenant: String,
-        /// What the key is for.
-        #[arg(long, value_name = "TEXT")]
-        name: Option<String>,
-        /// Data folder of the service.
-        #[arg(
-            long,
-            env = "RAILHEAD_DATA_DIR",
-            default_value = "./railhead-data",
-            value_name = "FOLDER"
-        )]
-        data_dir: PathBuf,
-    },
-    /// List all keys without their secrets.
-    List {
-        /// Data folder of the service.
-        #[arg(
-            long,
-            env = "RAILHEAD_DATA_DIR",
-            default_value = "./railhead-data",
-            value_name = "FOLDER"
-        )]
-        data_dir: PathBuf,
-    },
-    /// Revoke a key; a running service refuses it within two seconds.
-    Revoke {
-        /// Id of the key, as `list` shows it.
-        #[arg(value_name = "ID")]
-        id: String,
-        /// Data folder of the service.
-        #[arg(
-            long,
-            env = "RAILHEAD_DATA_DIR",
-            default_value = "./railhead-data",
-            value_name = "FOLDER"
-        )]
-        data_dir: PathBuf,
-    },
-}
-
 /// Reads an origin: scheme and authority, nothing else.
 fn origin(text: &str) -> Result<String, String> {
     let rest = text
@@ -279,16 +211,6 @@ fn origin(text: &str) -> Result<String, String> {
     )
 }
 
-/// Settings of `solve`.
-#[derive(Debug, Clone, Args)]
-pub struct SolveArgs {
-    /// File with the case as JSON, or `-` for standard input.
-    #[arg(value_name = "CASE.JSON")]
-    pub file: PathBuf,
-    #[command(flatten)]
-    pub case: CaseArgs,
-}
-
 /// What one case may use.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct CaseArgs {
@@ -300,27 +222,6 @@ pub struct CaseArgs {
     #[arg(long, env = "RAILHEAD_OPERATOR_STORE_MB", default_value_t = BYTES_DEFAULT >> 20, value_name = "MIB",
           value_parser = clap::value_parser!(u64).range(..=1 << 30))]
     pub operator_store_mb: u64,
-}
-
-/// Settings of `healthcheck`.
-#[derive(Debug, Clone, Args)]
-pub struct HealthcheckArgs {
-    /// What to ask; only plain `http://` is possible [default: `/readyz` at the address that RAILHEAD_PROBE_LISTEN or
-    /// RAILHEAD_LISTEN says, else at 127.0.0.1:8080].
-    #[arg(long, env = "RAILHEAD_HEALTHCHECK_URL", value_name = "URL")]
-    pub url: Option<String>,
-    /// The listener for probes of the service, if it has one.
-    #[arg(long, env = "RAILHEAD_PROBE_LISTEN", value_name = "ADDRESS:PORT", value_parser = address)]
-    pub probe_listen: Option<SocketAddr>,
-    /// Where the service listens.
-    #[arg(
-        long,
-        env = "RAILHEAD_LISTEN",
-        default_value = "127.0.0.1:8080",
-        value_name = "ADDRESS:PORT",
-        value_parser = address
-    )]
-    pub listen: SocketAddr,
 }
 
 /// How to log.
@@ -487,6 +388,17 @@ mod tests {
                 arg.get_env().and_then(|name| name.to_str()),
                 Some(variable.as_str())
             );
+        }
+    }
+
+    #[test]
+    fn every_setting_of_a_service_is_in_the_manual() {
+        let manual = include_str!("../../docs/operations.md");
+        let command = Cli::command();
+        let serve = command.find_subcommand("serve").unwrap();
+        for flag in serve.get_arguments().filter_map(clap::Arg::get_long) {
+            let there = flag == "help" || manual.contains(&format!("--{flag}"));
+            assert!(there, "--{flag} is not in docs/operations.md");
         }
     }
 

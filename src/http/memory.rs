@@ -29,7 +29,9 @@ pub struct Memory {
     /// For large cases; half of the cores, so that small ones are not kept waiting.
     large: Arc<Semaphore>,
     small: Arc<Semaphore>,
-    /// For pictures, grids and tables.
+    /// For large grids.
+    grids: Arc<Semaphore>,
+    /// For pictures, small grids and tables, which are not kept waiting by large grids.
     renderings: Arc<Semaphore>,
     waiting: Shares,
 }
@@ -79,6 +81,7 @@ impl Memory {
             answers: part(4),
             large: turns(cores / 2),
             small: turns(cores),
+            grids: turns(options.renderings),
             renderings: turns(options.renderings),
             waiting: Shares::new(waiting, waiting.div_ceil(2)),
         }
@@ -134,7 +137,12 @@ impl Memory {
             overloaded("as many requests wait for pictures, grids and tables as there may be (`--renderings-waiting-max`)")
         })?;
         let share = take(&self.answers, tenant, bytes, ANSWERS).await?;
-        let turn = in_turn(&self.renderings).await?;
+        let turns = if bytes > SMALL_BYTES {
+            &self.grids
+        } else {
+            &self.renderings
+        };
+        let turn = in_turn(turns).await?;
         drop(waiting);
         Ok(Rendering {
             share,

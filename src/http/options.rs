@@ -36,7 +36,7 @@ pub struct HttpOptions {
     pub tenant_memory_max_bytes: usize,
     /// Estimated memory of one parsed case in bytes.
     pub parsed_max_bytes: usize,
-    /// Pictures, grids and tables that are made at the same time.
+    /// Pictures, grids and tables that are made at the same time, large grids apart.
     pub renderings: usize,
     /// Requests that wait for one of these; of one tenant half as many.
     pub renderings_waiting_max: usize,
