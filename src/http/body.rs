@@ -41,7 +41,7 @@ where
         let tenant = request.extensions().get::<Tenant>().cloned();
         let Tenant(tenant) = tenant.unwrap_or_else(|| Tenant("".into()));
         let (bytes, held) = read_whole(request, &memory, &tenant, &options).await?;
-        let weight = weigh_case(&bytes, options.parsed_max_bytes)?;
+        let weight = weigh_in_turn(&memory, &bytes, options.parsed_max_bytes).await?;
         let share = memory.parsed(&tenant, weight).await?;
         if weight <= SMALL_BYTES {
             let value = read_json(&bytes)?;
@@ -64,6 +64,19 @@ where
         });
         read.await.map_err(|error| ApiError::internal(&error))?
     }
+}
+
+/// The weight of a case; counting in a large one takes long enough that it must not hold up other requests.
+async fn weigh_in_turn(memory: &Memory, text: &Bytes, max_bytes: usize) -> Result<usize, ApiError> {
+    if text.len() <= SMALL_BYTES {
+        return weigh_case(text, max_bytes);
+    }
+    let (text, turn) = (text.clone(), memory.turn(text.len()).await?);
+    let weighed = tokio::task::spawn_blocking(move || {
+        let _turn = turn;
+        weigh_case(&text, max_bytes)
+    });
+    weighed.await.map_err(|error| ApiError::internal(&error))?
 }
 
 /// What the text of a case will take in memory once it is parsed.
@@ -195,6 +208,10 @@ async fn read_whole(
             };
             if share.is_none() && held.len() + data.len() > SMALL_BYTES {
                 share = memory.body(tenant, max_bytes).await?;
+            }
+            // A packed body is there at once and unpacks for a while: others get their turn in between.
+            if (held.len() + data.len()) / SMALL_BYTES > held.len() / SMALL_BYTES {
+                tokio::task::yield_now().await;
             }
             held.extend_from_slice(&data);
         }
