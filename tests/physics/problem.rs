@@ -183,3 +183,41 @@ fn limits_are_checked_beside_faults_of_the_text() {
         ]
     );
 }
+
+#[test]
+fn patches_too_long_for_the_fast_solver_are_refused_and_wide_ones_solved() {
+    let ellipse = |a: f64, b: f64, solver: Value| {
+        let contact = json!({ "type": "ellipse", "a_mm": a, "b_mm": b });
+        with(&good_with("/contact", contact), "/solver", Some(solver))
+    };
+    let target = || json!({ "target_error": 0.005 });
+    for (a, b) in [(10.0, 0.1), (10.0, 0.01)] {
+        assert_fault(
+            &ellipse(a, b, target()),
+            "/contact",
+            &["times as long", "60"],
+        );
+        let mesh = json!({ "method": "boundary_element", "mesh": { "strips": 8, "cells": 20 } });
+        assert_fault(&ellipse(a, b, mesh), "/contact", &["times as long", "60"]);
+        assert_eq!(faults(&ellipse(a, b, json!({ "method": "fastsim" }))), []);
+    }
+    assert_eq!(faults(&ellipse(10.0, 0.2, target())), []);
+    for (a, b) in [(0.1, 10.0), (0.01, 10.0)] {
+        let (solution, _) = crate::reference::solve(&ellipse(a, b, target()));
+        let iterations = solution.patches[0].points[0].solver.iterations;
+        assert!(iterations < 200, "b/a {}: {iterations} iterations", b / a);
+    }
+}
+
+#[test]
+fn a_rough_gap_is_expected_to_cost_more_than_a_smooth_one() {
+    let seconds = |amplitude: f64| {
+        let y: Vec<f64> = (0..1000).map(|k| -12.0 + 0.024 * f64::from(k)).collect();
+        let tooth = |(k, y): (usize, &f64)| y * y / 600.0 + amplitude * (k % 2) as f64;
+        let gap: Vec<f64> = y.iter().enumerate().map(tooth).collect();
+        let contact = json!({ "type": "gap_profile", "rolling_mm": 460, "y_mm": y, "gap_mm": gap });
+        problem(&good_with("/contact", contact)).cost().seconds
+    };
+    assert!(seconds(0.01) > 50.0 * seconds(0.0));
+    assert!(seconds(0.0001) < 2.0 * seconds(0.0));
+}

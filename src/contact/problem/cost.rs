@@ -2,15 +2,36 @@
 
 use crate::contact::case::{Method, Output};
 use crate::contact::error::Fault;
+use crate::contact::influence::strips::Precision;
 use crate::contact::normal::Region;
 use crate::contact::problem::{Cost, Limits, Prescribed, Problem, Resolution};
 use crate::contact::tangential::ladder::{CELLS_MAX, LEVELS_KEPT, Ladder};
 use crate::contact::tangential::level::precision_of;
 use crate::contact::tangential::operator_store::OperatorKind;
 
-/// Cells that a target of 0.02 costs on average, all levels added, and how they grow as it falls.
+/// Cells of the finest mesh for a target of 0.02, on average, and how they grow as it falls.
 const TARGET_CELLS: f64 = 160.0;
 const TARGET_GROWTH: f64 = 0.65;
+/// Time of one solve for a target of 0.005 in s, how steeply it grows as the target falls, and the target below which the largest
+/// mesh is the end: medians of 50 Hertz contacts with random motions, which spread by a factor of 3 (`cargo bench --bench stress -- --only
+/// creep-map` prints estimates beside times).
+const TARGET_SECONDS: f64 = 1.6e-3;
+const TARGET_USUAL: f64 = 0.005;
+const TARGET_STEEP: f64 = 1.5;
+const TARGET_LEAST: f64 = 2e-4;
+/// How much longer products in double precision take, and part of a lone solve that one within a sweep takes.
+const DOUBLE_TIMES: f64 = 2.5;
+const SWEEP_SHARE: f64 = 0.4;
+/// Explicit meshes with so many cells have matrices that no cache holds.
+const MESH_CELLS_SLOW: f64 = 1600.0;
+/// Time to gather and pack values per cell, in s.
+const FIELDS_SECONDS_PER_CELL: f64 = 3e-7;
+/// Cells that a patch has at least.
+const PATCH_CELLS_MIN: f64 = 64.0;
+/// Patches of a longer shape are not for the fast solver: its preconditioner knows each strip for itself, and where strips lie closer than
+/// the cells in them are long, linear systems no longer converge. Ellipses up to 70 under 20 loads and motions did, from 100 on
+/// some did not (`cargo bench --bench stress` goes to 50). Wide patches need no bound: b/a 1000 converges in a few steps.
+const LENGTH_OVER_WIDTH_MAX: f64 = 60.0;
 /// Cells the dense method may use.
 const LIU_HSU_CELLS_MAX: f64 = 1000.0;
 /// Solves that the search for a prescribed force takes beside the last, on average.
@@ -40,8 +61,8 @@ pub(super) struct Size {
     pub(super) fields: bool,
     /// Forces prescribed in place of creepages, motion by motion.
     pub(super) forces: Vec<Prescribed>,
-    /// Region and pressure are mirror-symmetric for sure.
-    pub(super) ellipse: bool,
+    /// Length over width of an ellipse; nothing for other regions.
+    pub(super) ellipse: Option<f64>,
     /// Time to find region and pressure, in s.
     pub(super) normal_seconds: f64,
 }
@@ -50,8 +71,24 @@ pub(super) struct Size {
 pub(super) fn normal_seconds(region: &Region) -> f64 {
     match region {
         Region::Ellipse(_) | Region::Grid(_) => 0.0,
-        Region::Gap(_) => 0.005,
+        Region::Gap(contact) => 0.005 * contact.summits() as f64,
         Region::Profiles(_) => 0.04,
+    }
+}
+
+/// Segments per strip of every patch; of a gap, whose patches are not known yet, one for every summit.
+pub(super) fn segments(region: &Region) -> Vec<f64> {
+    match region {
+        Region::Gap(contact) => vec![1.0; contact.summits()],
+        Region::Ellipse(_) | Region::Grid(_) | Region::Profiles(_) => region.segments_per_strip(),
+    }
+}
+
+/// Half-length along rolling over half-width of an ellipse.
+pub(super) fn length_over_width(region: &Region) -> Option<f64> {
+    match region {
+        Region::Ellipse(ellipse) => Some(ellipse.a / ellipse.b),
+        Region::Gap(_) | Region::Grid(_) | Region::Profiles(_) => None,
     }
 }
 
@@ -63,14 +100,14 @@ impl Problem {
         Size {
             method: self.method,
             resolution: self.resolution,
-            segments: self.region.segments_per_strip(),
+            segments: segments(&self.region),
             motions: self.motions.len(),
             fields: self
                 .outputs
                 .iter()
                 .any(|output| *output != Output::Resultants),
             forces: self.forces.clone(),
-            ellipse: self.region.is_ellipse(),
+            ellipse: length_over_width(&self.region),
             normal_seconds: normal_seconds(&self.region),
         }
         .cost()
@@ -87,18 +124,64 @@ impl Size {
             .filter(|forces| **forces != [None; 2])
             .count();
         let solves = motions + TRIALS * prescribed as f64;
-        let seconds = match self.method {
-            Method::Auto | Method::BoundaryElement => {
-                let usual = self.usual_cells(cells);
-                1e-9 * usual * usual * (10.0 + 50.0 * solves)
-            }
-            Method::LiuHsu => 4e-8 * cells * cells + 3e-11 * (2.0 * cells).powi(3) * 30.0 * solves,
-            Method::Fastsim => 1e-7 * cells * (1.0 + 0.2 * solves),
+        let each = self.solve_seconds(cells);
+        let first = self.first_seconds(cells);
+        let fields = if self.fields {
+            FIELDS_SECONDS_PER_CELL * motions * self.usual_cells(cells)
+        } else {
+            0.0
         };
+        let seconds = first + each * solves + fields;
         Cost {
             bytes: self.bytes(cells, segments) as u64,
             seconds: seconds + self.normal_seconds,
         }
+    }
+
+    /// Time of a solve in s that others of the same sweep came before.
+    fn solve_seconds(&self, cells: f64) -> f64 {
+        match (self.method, self.resolution) {
+            (Method::Auto | Method::BoundaryElement, Resolution::Target(target)) => {
+                SWEEP_SHARE * self.target_seconds(target, cells)
+            }
+            (Method::Auto | Method::BoundaryElement, Resolution::Mesh(_)) => {
+                // Large matrices come from slower memory.
+                let cache_misses = (cells / MESH_CELLS_SLOW).min(1.0);
+                1e-9 * cells * cells * (15.0 + 60.0 * cache_misses)
+            }
+            (Method::LiuHsu, _) => 1.5e-9 * (2.0 * cells).powi(3),
+            (Method::Fastsim, _) => 1e-5 + 5e-9 * cells,
+        }
+    }
+
+    /// Time in s that the first solve takes beside what every solve takes.
+    fn first_seconds(&self, cells: f64) -> f64 {
+        match (self.method, self.resolution) {
+            (Method::Auto | Method::BoundaryElement, Resolution::Target(target)) => {
+                (1.0 - SWEEP_SHARE) * self.target_seconds(target, cells)
+            }
+            (Method::Auto | Method::BoundaryElement, Resolution::Mesh(_)) => 1e-8 * cells * cells,
+            (Method::LiuHsu, _) => 4e-8 * cells * cells,
+            (Method::Fastsim, _) => 1e-7 * cells,
+        }
+    }
+
+    /// Time of a solve alone, in s, that climbs to a target.
+    fn target_seconds(&self, target: f64, cells: f64) -> f64 {
+        let precision = match precision_of(self.resolution) {
+            Precision::Single => 1.0,
+            Precision::Double => DOUBLE_TIMES,
+        };
+        let smooth = (TARGET_USUAL / target.max(TARGET_LEAST)).powf(TARGET_STEEP);
+        let climb = TARGET_SECONDS * smooth * precision * self.segments.iter().sum::<f64>();
+        // Many patches have more cells than any target asks for, and need more steps.
+        let crowded = self.segments.len() as f64 * PATCH_CELLS_MIN;
+        let crowd = if crowded > f64::from(CELLS_MAX) / 4.0 {
+            3e-7 * cells.max(crowded).powi(2)
+        } else {
+            0.0
+        };
+        2e-4 + climb.max(crowd)
     }
 
     /// Peak memory in bytes.
@@ -110,7 +193,8 @@ impl Size {
                 let kind = OperatorKind {
                     poisson_ratio: 0.0,
                     // Cells that gather about a pole are not.
-                    folded: self.ellipse && matches!(self.resolution, Resolution::Mesh(_)),
+                    folded: self.ellipse.is_some()
+                        && matches!(self.resolution, Resolution::Mesh(_)),
                     precision: precision_of(self.resolution),
                 };
                 let each = (cells / segments.max(1.0)).ceil();
@@ -126,7 +210,8 @@ impl Size {
         let levels = (LEVELS_PER_MOTION * motions).min(LEVELS_KEPT as f64);
         let patches = self.segments.len() as f64;
         let fields = if self.fields {
-            motions * cells * FIELDS_BYTES_PER_CELL
+            // Many motions need twice the average at most.
+            motions * cells.min(2.0 * self.usual_cells(cells)) * FIELDS_BYTES_PER_CELL
         } else {
             0.0
         };
@@ -151,6 +236,19 @@ impl Size {
                 detail: format!(
                     "{cells:.0} cells over all patches; at most {LIU_HSU_CELLS_MAX} are allowed with liu_hsu, \
                      use boundary_element for more"
+                ),
+            });
+        }
+        let fast = matches!(self.method, Method::Auto | Method::BoundaryElement);
+        if let Some(ratio) = self
+            .ellipse
+            .filter(|ratio| fast && *ratio > LENGTH_OVER_WIDTH_MAX)
+        {
+            faults.push(Fault {
+                pointer: "/contact".to_owned(),
+                detail: format!(
+                    "a patch {ratio:.1} times as long along rolling as wide; boundary_element solves up to \
+                     {LENGTH_OVER_WIDTH_MAX} times, fastsim any"
                 ),
             });
         }
@@ -180,7 +278,8 @@ impl Size {
             (Resolution::Mesh(size), None) => size,
             (Resolution::Target(_), None) => {
                 // The cells are shared out among the patches; hollow ones have several segments in a strip.
-                let share = f64::from(CELLS_MAX) / self.segments.len() as f64;
+                let share =
+                    (f64::from(CELLS_MAX) / self.segments.len() as f64).max(PATCH_CELLS_MIN);
                 return (share * per_strip, share.sqrt() * per_strip);
             }
         };

@@ -285,7 +285,7 @@ impl Parts {
                 // What is not known counts as the least it can be.
                 segments: region
                     .as_ref()
-                    .map_or_else(|| vec![1.0], |(region, _)| region.segments_per_strip()),
+                    .map_or_else(|| vec![1.0], |(region, _)| cost::segments(region)),
                 motions: motions.as_ref().map_or(1, |m| m.motions.len()),
                 forces: motions.as_ref().map_or_else(Vec::new, |m| m.forces.clone()),
                 fields: given
@@ -294,7 +294,7 @@ impl Parts {
                     .any(|output| *output != Output::Resultants),
                 ellipse: region
                     .as_ref()
-                    .is_some_and(|(region, _)| region.is_ellipse()),
+                    .and_then(|(region, _)| cost::length_over_width(region)),
                 normal_seconds: region
                     .as_ref()
                     .map_or(0.0, |(region, _)| cost::normal_seconds(region)),

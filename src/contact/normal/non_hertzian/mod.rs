@@ -10,6 +10,7 @@ pub mod gap;
 mod gradients;
 mod grid;
 mod outcome;
+mod summits;
 mod tiles;
 mod tiles_influence;
 mod window;
