@@ -23,6 +23,11 @@ pub fn section(lu: f64) -> String {
     let long = json!({ "creepage_x": 0.002 });
     let both = json!({ "creepage_x": 0.001, "creepage_y": 0.0005, "spin_per_mm": 0.0004 });
     let curve = json!({ "sweep": { "creepage_x": { "from": 0, "to": 0.005, "points": 51 } } });
+    let spinning = json!({ "sweep": {
+        "creepage_x": { "from": 0, "to": 0.006, "points": 7 },
+        "spin_per_mm": { "from": 0.003, "to": 0.003, "points": 1 },
+        "combine": "grid",
+    } });
     let alone: Vec<Value> = (0..51)
         .map(|k| json!({ "creepage_x": 0.0001 * f64::from(k) }))
         .collect();
@@ -63,6 +68,13 @@ pub fn section(lu: f64) -> String {
             &resultants,
             0.3,
         ),
+        (
+            "sweep of 7 creepages under spin 0.003/mm, resultants only",
+            &spinning,
+            &resultants,
+            0.3,
+        ),
+        ("the same, all outputs", &spinning, &everything, 0.3),
     ] {
         let cost = cost(motion, outputs, friction);
         let _ = writeln!(

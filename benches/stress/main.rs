@@ -1,12 +1,13 @@
 //! Stability: thousands of cases from all over the allowed ground, every answer held against the laws of contact.
 //!
 //! `cargo bench --bench stress [-- cases seed]` prints the table and writes it to `docs/stability.md`; it ends with an error if a
-//! case crashes, hangs or breaks a law.
+//! case crashes, hangs or breaks a law. `-- --only creep-map` and `-- --only sweep-with-zones` print one section.
 
 mod condition;
 mod contacts;
 mod laws;
 mod random;
+mod sweeps;
 mod trial;
 
 use std::collections::BTreeMap;
@@ -47,6 +48,19 @@ struct Troubles {
 }
 
 fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().collect();
+    if let Some(at) = arguments.iter().position(|argument| argument == "--only") {
+        let section = match arguments.get(at + 1).map(String::as_str) {
+            Some("creep-map") => sweeps::creep_maps(),
+            Some("sweep-with-zones") => sweeps::with_zones(),
+            _ => {
+                eprintln!("--only takes creep-map or sweep-with-zones");
+                return ExitCode::FAILURE;
+            }
+        };
+        println!("{section}");
+        return ExitCode::SUCCESS;
+    }
     let mut numbers = std::env::args()
         .skip(1)
         .filter_map(|text| text.parse().ok());
@@ -181,6 +195,8 @@ fn report(count: usize, seed: u64, rows: &BTreeMap<&str, Row>, troubles: &Troubl
          largest difference of F_x/μN, F_y/μN, M_z/(μN√(A/π)) from the paper's method on the same mesh, where both converge.\n\n",
     );
     text.push_str(&accuracy(rows));
+    text.push_str(&sweeps::creep_maps());
+    text.push_str(&sweeps::with_zones());
     text.push_str(&condition::section());
     for (title, list) in [
         ("Crashes and hangs", &troubles.failed),

@@ -3,6 +3,7 @@
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc;
+use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
@@ -17,6 +18,8 @@ use crate::jobs::results::Encoded;
 use crate::jobs::store::StoredCase;
 use crate::jobs::watch::Watch;
 
+/// Tasks from this length on leave enough free memory behind to be worth a look at the whole heap.
+const LONG: Duration = Duration::from_secs(1);
 /// Stack of a solver thread.
 const STACK_BYTES: usize = 16 << 20;
 
@@ -42,6 +45,16 @@ pub(super) enum Outcome {
 /// What clients are told of a failure of the service itself.
 pub(super) const INTERNAL: &str = "the job could not be solved because of a fault of the service; its log has the reason under the id of the job";
 
+/// Gives free pages back to the system. glibc keeps what lies between blocks that are still in use: about 100 MB after 900 motions
+/// of a creep map, whose operators come and go beside those that are kept.
+fn give_memory_back() {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    // SAFETY: the function takes a number, touches free memory only and locks every arena while it does.
+    unsafe {
+        libc::malloc_trim(0);
+    }
+}
+
 /// Something to compute.
 pub(super) type Task = Box<dyn FnOnce() + Send>;
 
@@ -60,7 +73,11 @@ impl SolverThread {
             .stack_size(STACK_BYTES)
             .spawn(move || {
                 while let Ok(task) = todo.recv() {
+                    let began = Instant::now();
                     task();
+                    if began.elapsed() >= LONG {
+                        give_memory_back();
+                    }
                 }
             })
             .map_err(JobsError::Thread)?;
