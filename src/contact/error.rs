@@ -61,17 +61,44 @@ pub enum SolveError {
     #[error("the solve was cancelled")]
     Cancelled,
     /// The time limit of the case was reached.
-    #[error("the solve ran out of time")]
-    OutOfTime,
+    #[error("the solve ran out of time{}", reached(*.limit_s, *.motions))]
+    OutOfTime {
+        /// The limit in s, where it is the case's own.
+        limit_s: Option<f64>,
+        /// Motions done and asked for, where that is known.
+        motions: Option<[usize; 2]>,
+    },
+    /// The answer holds something that is no number; nothing of it is to be used.
+    #[error(
+        "the answer is not finite: {quantity}; check the case for values that are extremely large or small"
+    )]
+    NotFinite {
+        /// Where it stands in the answer.
+        quantity: String,
+    },
 }
 
 impl From<Stop> for SolveError {
     fn from(stop: Stop) -> Self {
         match stop {
             Stop::Cancelled => SolveError::Cancelled,
-            Stop::OutOfTime => SolveError::OutOfTime,
+            Stop::OutOfTime => SolveError::OutOfTime {
+                limit_s: None,
+                motions: None,
+            },
         }
     }
+}
+
+/// Which limit was reached, and how far the solve had come.
+fn reached(limit_s: Option<f64>, motions: Option<[usize; 2]>) -> String {
+    let limit = limit_s.map_or_else(String::new, |limit| {
+        format!(": time_limit_s {limit} was reached")
+    });
+    let far = motions.map_or_else(String::new, |[done, asked]| {
+        format!(" with {done} of {asked} motions done")
+    });
+    limit + &far
 }
 
 impl Method {

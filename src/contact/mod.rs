@@ -27,6 +27,7 @@ use crate::contact::error::{CaseError, SolveError};
 use crate::contact::monitor::{Monitor, Watch};
 use crate::contact::normal::Region;
 use crate::contact::outputs::assemble::Assembly;
+use crate::contact::outputs::finish::{finish, share_seconds};
 use crate::contact::problem::{Limits, Problem};
 use crate::contact::slices::{slices, solve_slice};
 use crate::contact::solution::{Fields, Solution};
@@ -89,15 +90,31 @@ fn solve_whole(
     problem: &Problem,
     monitor: &dyn Monitor,
 ) -> Result<(Solution, Fields), SolveError> {
-    if let Region::Profiles(contact) = &problem.region {
-        return profiles::solve(operators, problem, contact, monitor);
-    }
-    let watch = Watch::new(monitor, problem.time_limit, problem.motions.len());
-    answer(operators, problem.pressed(&watch)?.as_ref(), &watch)
+    let began = monitor.elapsed();
+    let answer = if let Region::Profiles(contact) = &problem.region {
+        profiles::solve(operators, problem, contact, monitor)?
+    } else {
+        let watch = Watch::new(monitor, problem.time_limit, problem.motions.len());
+        let pressed = problem.pressed(&watch);
+        let pressed = pressed.map_err(|error| watch.explained(error, problem.part))?;
+        answer(operators, pressed.as_ref(), &watch)?
+    };
+    finish(problem, answer, monitor.elapsed().saturating_sub(began))
 }
 
 /// Solves every motion of a problem whose region and pressure are known.
 fn answer(
+    operators: &Arc<OperatorStore>,
+    problem: &Problem,
+    watch: &Watch,
+) -> Result<(Solution, Fields), SolveError> {
+    let answer = motions(operators, problem, watch);
+    let (mut solution, fields) = answer.map_err(|error| watch.explained(error, problem.part))?;
+    share_seconds(&mut solution);
+    Ok((solution, fields))
+}
+
+fn motions(
     operators: &Arc<OperatorStore>,
     problem: &Problem,
     watch: &Watch,

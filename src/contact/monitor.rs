@@ -4,6 +4,9 @@ use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
+use crate::contact::error::SolveError;
+use crate::contact::problem::MotionPart;
+
 /// Why a solve was stopped from outside.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stop {
@@ -55,6 +58,21 @@ impl<'a> Watch<'a> {
             time_limit,
             motions,
             done: Cell::new(0),
+        }
+    }
+
+    /// An error of this case; one of time with the limit and how far the solve came, of which this is so much.
+    pub(crate) fn explained(&self, error: SolveError, part: MotionPart) -> SolveError {
+        match error {
+            SolveError::OutOfTime { limit_s: None, .. } => SolveError::OutOfTime {
+                limit_s: self.time_limit.map(|limit| limit.as_secs_f64()),
+                // Of a wheel on a rail every motion is solved in several parts, and done when all are.
+                motions: Some([
+                    part.before + self.done.get().min(part.all - part.before),
+                    part.all,
+                ]),
+            },
+            error => error,
         }
     }
 

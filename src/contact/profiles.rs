@@ -18,8 +18,10 @@ use crate::contact::remark::Remark;
 use crate::contact::solution::{Fields, Solution};
 use crate::contact::tangential::operator_store::OperatorStore;
 
-/// The vertical force may be missed by this part of it; the bound for a change of friction's share in one round.
+/// The vertical force may be missed by this part of it, and by this part of the target error if that is less; the bound for
+/// a change of friction's share in one round.
 const BALANCE: f64 = 5e-4;
+const BALANCE_OF_TARGET: f64 = 0.1;
 /// Rounds of the balance; each leaves about a tenth of the difference before, on steep flanges a third.
 const ROUNDS_MAX: u32 = 8;
 /// Part of its normal forces' vertical part that a wheel carries at least; on a steep flange friction may take away all of it.
@@ -50,7 +52,8 @@ pub(super) fn solve(
     let rest = |wanted: Wanted, before: Option<&PressedWheel>| -> Result<Rest, SolveError> {
         let watch = Watch::new(monitor, problem.time_limit, 1);
         let began = monitor.elapsed();
-        let wheel = contact.press(&search, wanted, before, &watch)?;
+        let wheel = contact.press(&search, wanted, before, &watch);
+        let wheel = wheel.map_err(|failure| watch.explained(failure.into(), problem.part))?;
         let seconds = (monitor.elapsed() - began).as_secs_f64();
         let unbalanced = if balanced { BALANCE } else { 0.0 };
         Ok(Rest {
@@ -95,7 +98,7 @@ pub(super) fn solve(
         at_rest = at_rest.again(rest(exactly(counted), Some(&at_rest.wheel))?);
         let answers = at_rest.answers(operators, problem, contact, monitor)?;
         share = friction_share(&at_rest.wheel, &answers);
-        if ((1.0 + share) / (1.0 + counted) - 1.0).abs() <= BALANCE {
+        if ((1.0 + share) / (1.0 + counted) - 1.0).abs() <= balance(problem.resolution) {
             return Ok(merge(problem, &contact.geometry, &at_rest.wheel, answers));
         }
     }
@@ -105,6 +108,14 @@ pub(super) fn solve(
              {share:+.3} of what the normal forces do. Give a normal_force_n or an approach_mm"
         ),
     })
+}
+
+/// By which part the vertical force may be missed.
+fn balance(resolution: Resolution) -> f64 {
+    match resolution {
+        Resolution::Target(target) => BALANCE.min(BALANCE_OF_TARGET * target),
+        Resolution::Mesh(_) => BALANCE,
+    }
 }
 
 /// Vertical part of the tangential forces on the wheel, relative to that of the normal ones.

@@ -22,6 +22,7 @@ use crate::http::carrying::{Held, carrying};
 use crate::http::coding::AsItComes;
 use crate::http::crowds::Crowds;
 use crate::http::error::{ApiError, Kind};
+use crate::http::formats::csv::number;
 use crate::http::job::BatchId;
 use crate::http::problem::Problem;
 use crate::http::problems::problems;
@@ -351,21 +352,20 @@ fn csv_numbers(solution: &Solution) -> impl Iterator<Item = Vec<String>> {
             let power: f64 = parts.clone().map(|part| part.friction_power_n).sum();
             let motion = parts.clone().next().map(|part| part.motion);
             let estimate = total.error_estimate;
-            let text =
-                |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
+            let text = |value: Option<f64>| value.map_or_else(String::new, number);
             vec![
                 point.to_string(),
                 text(motion.map(|motion| motion.creepage_x)),
                 text(motion.map(|motion| motion.creepage_y)),
                 text(motion.map(|motion| motion.spin_per_mm)),
-                normal.to_string(),
-                total.force_x_n.to_string(),
-                total.force_y_n.to_string(),
-                total.moment_z_n_mm.to_string(),
+                number(normal),
+                number(total.force_x_n),
+                number(total.force_y_n),
+                number(total.moment_z_n_mm),
                 text(estimate.map(|estimate| estimate.force_x_n)),
                 text(estimate.map(|estimate| estimate.force_y_n)),
                 text(estimate.map(|estimate| estimate.moment_z_n_mm)),
-                power.to_string(),
+                number(power),
                 codes(&solution.remarks, point),
             ]
         })

@@ -202,8 +202,12 @@ impl Failure {
     pub fn of_solve(error: &SolveError) -> Option<Failure> {
         match error {
             SolveError::Cancelled => None,
-            SolveError::OutOfTime => Some(Failure::new(FailureKind::OutOfTime, error.to_string())),
-            SolveError::Unmeshable { .. } | SolveError::NormalProblem { .. } => {
+            SolveError::OutOfTime { .. } => {
+                Some(Failure::new(FailureKind::OutOfTime, error.to_string()))
+            }
+            SolveError::Unmeshable { .. }
+            | SolveError::NormalProblem { .. }
+            | SolveError::NotFinite { .. } => {
                 Some(Failure::new(FailureKind::Unsolvable, error.to_string()))
             }
             SolveError::NotConverged {

@@ -246,7 +246,10 @@ fn a_solve_of_a_rough_gap_can_be_stopped() {
     case["solver"] = json!({ "time_limit_s": 1.0 });
     let problem = check(&case, &Limits::default()).expect("a valid case");
     let late = Late(std::cell::Cell::new(0));
-    assert_eq!(contact::solve(&problem, &late), Err(SolveError::OutOfTime));
+    let error = contact::solve(&problem, &late).expect_err("no time");
+    let (limit_s, motions) = (Some(1.0), Some([0, 1]));
+    assert_eq!(error, SolveError::OutOfTime { limit_s, motions });
+    assert!(error.to_string().contains("time_limit_s 1"), "{error}");
     assert!(late.0.get() < 20, "{} looks at the clock", late.0.get());
 }
 

@@ -100,6 +100,7 @@ fn zones(contact: &Contact, rule: Rule, state: [f64; 3], t: &[f64]) -> Vec<bool>
         iterations: 0,
         products: 0,
         residual: 0.0,
+        inexact_steps: 0,
     };
     newton.evaluate(&law, t, &mut unused);
     (0..equations.cells())

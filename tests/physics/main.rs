@@ -1,5 +1,6 @@
 //! Does the physics hold?
 
+mod answers;
 mod carter;
 mod case_faults;
 mod case_mutations;
@@ -47,6 +48,7 @@ mod profile_solutions;
 mod profile_worn;
 #[path = "../../benches/stress/random.rs"]
 mod random;
+mod readme;
 mod reference;
 mod reference_hertz;
 mod regions;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use railhead::contact;
-use railhead::contact::error::SolveError;
+use railhead::contact::monitor::Stop;
 use railhead::jobs::Options;
 use reqwest::{Method, RequestBuilder};
 use serde_json::{Value, json};
@@ -121,7 +121,7 @@ async fn what_changes_the_answer_or_refuses_the_cache_is_solved() {
 #[tokio::test]
 async fn a_failure_is_not_used_again() {
     let server = Setup::new()
-        .solving(|_, _| Err(SolveError::OutOfTime))
+        .solving(|_, _| Err(Stop::OutOfTime.into()))
         .start()
         .await;
     for _ in 0..2 {
@@ -268,7 +268,7 @@ async fn identical_cases_that_fail_all_say_why() {
     let server = Setup::new()
         .solving(move |_, _| {
             counter.fetch_add(1, Ordering::SeqCst);
-            Err(SolveError::OutOfTime)
+            Err(Stop::OutOfTime.into())
         })
         .start()
         .await;

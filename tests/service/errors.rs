@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use railhead::contact::case::Method as SolverMethod;
 use railhead::contact::error::SolveError;
+use railhead::contact::monitor::Stop;
 use reqwest::Method;
 use serde_json::{Value, json};
 
@@ -231,7 +232,7 @@ async fn failed_job_is_answered_with_its_reason_in_time() {
             tolerance: 1e-8,
             advice: "try `boundary_element`".to_owned(),
         }),
-        Some("out of time") => Err(SolveError::OutOfTime),
+        Some("out of time") => Err(Stop::OutOfTime.into()),
         Some("no strips") => Err(SolveError::Unmeshable {
             patch: 0,
             strips: 2,

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use railhead::contact::error::SolveError;
+use railhead::contact::monitor::Stop;
 use reqwest::Method;
 use serde_json::{Value, json};
 
@@ -73,7 +73,7 @@ async fn what_jobs_did_is_counted() {
 
 #[tokio::test]
 async fn waiting_failed_cancelled_and_large_jobs_are_seen() {
-    let mut setup = Setup::new().solving(|_, _| Err(SolveError::OutOfTime));
+    let mut setup = Setup::new().solving(|_, _| Err(Stop::OutOfTime.into()));
     setup.working = false;
     let server = setup.start().await;
     let path = server.submit(&case("waits")).await;

@@ -1,6 +1,7 @@
 //! Where do the bodies touch? Cross-sections of wheel and rail, their placement, and the gaps of their patches.
 
 pub mod contact_search;
+mod crossing;
 pub mod formats;
 pub mod local_gap;
 mod overlaps;

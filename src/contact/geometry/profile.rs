@@ -3,6 +3,7 @@
 //! Input follows the habit of the field: y positive to the field side, z positive down, mm. From here on z is positive
 //! up. The curve runs from the track centre to the field side, with the rail below and the wheel above it.
 
+use crate::contact::geometry::crossing;
 use crate::contact::geometry::smoothing::Spline;
 use crate::contact::remark::Remark;
 
@@ -123,7 +124,7 @@ impl Profile {
                 points.len()
             ));
         }
-        if let Some([first, second]) = crossing(&points) {
+        if let Some([first, second]) = crossing::first(&points) {
             return Err(format!(
                 "the profile runs through itself near [{:.3}, {:.3}] and [{:.3}, {:.3}]; loops are refused",
                 first[0], -first[1], second[0], -second[1]
@@ -326,22 +327,4 @@ fn straighten(
 
 fn step(from: [f64; 2], to: [f64; 2]) -> [f64; 2] {
     [to[0] - from[0], to[1] - from[1]]
-}
-
-/// Two chords that cross, by their first points.
-fn crossing(points: &[[f64; 2]]) -> Option<[[f64; 2]; 2]> {
-    let cross = |a: [f64; 2], b: [f64; 2]| a[0] * b[1] - a[1] * b[0];
-    let side = |p: [f64; 2], q: [f64; 2], r: [f64; 2]| cross(step(p, q), step(p, r)) > 0.0;
-    for j in 2..points.len() - 1 {
-        let (c, d) = (points[j], points[j + 1]);
-        let (low, high) = (c[0].min(d[0]), c[0].max(d[0]));
-        for i in 0..j - 1 {
-            let (a, b) = (points[i], points[i + 1]);
-            let apart = a[0].max(b[0]) < low || a[0].min(b[0]) > high;
-            if !apart && side(a, b, c) != side(a, b, d) && side(c, d, a) != side(c, d, b) {
-                return Some([a, c]);
-            }
-        }
-    }
-    None
 }

@@ -16,6 +16,8 @@ pub struct Ellipse {
     pub pressure_max: f64,
     /// Approach in mm.
     pub approach: f64,
+    /// Normal force in N: as given where it was, so that no digit of it is lost.
+    pub normal_force: f64,
 }
 
 /// How two bodies are pressed together.
@@ -83,17 +85,20 @@ impl Ellipse {
             b,
             pressure_max,
             approach,
+            normal_force: match pressing {
+                Pressing::Force(force) => force,
+                Pressing::Approach(_) => PI * a * b * pressure_max * 2.0 / 3.0,
+            },
         }
     }
 
     /// Force, area and extent.
     #[must_use]
     pub fn patch(&self) -> Patch {
-        let area = PI * self.a * self.b;
         Patch {
-            normal_force: area * self.pressure_max * 2.0 / 3.0,
+            normal_force: self.normal_force,
             approach: Some(self.approach),
-            area,
+            area: PI * self.a * self.b,
             pressure_max: self.pressure_max,
             semi_axes: Some([self.a, self.b]),
             extent: [-self.a, self.a, -self.b, self.b],
@@ -170,6 +175,7 @@ fn axis_ratio(curvature_ratio: f64) -> f64 {
             break;
         }
     }
+    // Four to the power of the steps is beyond the digits of a number: it has converged unless the ratio is none.
     k
 }
 

@@ -3,6 +3,8 @@
 //! Pure functions of [`PatchCells`](crate::contact::solution::PatchCells); nothing here solves anything.
 
 pub mod assemble;
+pub mod finish;
+pub mod finite;
 mod loops;
 pub mod outline;
 pub mod resample;

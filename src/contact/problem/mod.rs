@@ -6,6 +6,7 @@ mod cost;
 mod digest;
 mod elasticity;
 mod motions;
+pub(crate) mod plausible;
 mod press;
 mod profiles;
 
@@ -21,6 +22,7 @@ use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::normal::Region;
 use crate::contact::remark::{Remark, RemarkEntry, merged};
 use crate::contact::solution::NormalReport;
+use crate::contact::tangential::fastsim;
 use cost::Size;
 pub use digest::SOLVER_REVISION;
 use digest::digest;
@@ -165,8 +167,14 @@ impl Problem {
         let of_material = elasticity.remark().map(|r| r.at_pointer("/material"));
         let of_friction = unusual_friction(case.friction.coefficient);
         let of_case = of_material.into_iter().chain(of_friction);
-        let remarks = merged(of_case.chain(remarks));
         let Expanded { motions, forces } = motions;
+        // Creepages that are searched are looked at when they are found.
+        let given: &[Motion] = match forces.iter().all(|forces| *forces == [None; 2]) {
+            true => &motions,
+            false => &[],
+        };
+        let implausible = plausible::of_case(&case.contact, &region.patches(), given);
+        let remarks = merged(of_case.chain(remarks).chain(implausible));
         let digest = digest(case, &elasticity, &motions, &forces);
         Ok(Problem {
             name: case.name.clone(),
@@ -373,6 +381,8 @@ fn missing_load() -> Fault {
 fn resolution(solver: &Solver) -> Resolution {
     match (solver.mesh, solver.target_error) {
         (Some(size), _) => Resolution::Mesh(size),
+        // The simplified theory has one mesh and a stated error, which no target changes: none is taken as given.
+        (None, None) if solver.method == Method::Fastsim => Resolution::Mesh(fastsim::MESH),
         (None, target) => Resolution::Target(target.unwrap_or(TARGET_ERROR_DEFAULT)),
     }
 }

@@ -25,6 +25,8 @@ const LABELS_MAX: usize = 32;
 const LABEL_KEY_LENGTH_MAX: usize = 64;
 const LABEL_VALUE_LENGTH_MAX: usize = 256;
 const FRICTION: Interval = Interval::closed(0.0, 100.0, "");
+/// Less friction than this is none, and dimensionless motions would not be numbers.
+const FRICTION_LEAST: f64 = 1e-12;
 
 /// What could be read of a case: the parts without a fault.
 ///
@@ -132,6 +134,11 @@ fn friction(case: &mut Object) -> Option<Friction> {
     let mut block = case.child("friction")?;
     block.only(&["coefficient"], &[]);
     let coefficient = block.required_number("coefficient", FRICTION)?;
+    if coefficient > 0.0 && coefficient < FRICTION_LEAST {
+        let detail = format!("{coefficient:e} given; 0 or at least {FRICTION_LEAST:e} is needed");
+        block.fault("coefficient", detail);
+        return None;
+    }
     Some(Friction { coefficient })
 }
 

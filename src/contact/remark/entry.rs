@@ -145,6 +145,11 @@ impl RemarkEntry {
         self.point.is_none_or(|own| own == point) || self.also_at_points.iter().any(among)
     }
 
+    /// Is it the same remark, further motions aside?
+    fn says(&self, other: &RemarkEntry) -> bool {
+        self.is_like(other) && self.point == other.point && self.figures == other.figures
+    }
+
     fn is_like(&self, other: &RemarkEntry) -> bool {
         self.code == other.code && self.patch == other.patch && self.pointer == other.pointer
     }
@@ -164,36 +169,36 @@ pub fn merged(remarks: impl IntoIterator<Item = RemarkEntry>) -> Vec<RemarkEntry
             kept.push(remark);
             continue;
         };
-        match remark.point {
-            Some(point) if *count >= KEPT_MAX => {
-                if !kept
-                    .iter()
-                    .any(|known| known.is_like(&remark) && known.holds_at(point))
-                {
-                    add(&mut kept[*first].also_at_points, [point, point]);
-                }
-                for range in remark.also_at_points {
-                    add(&mut kept[*first].also_at_points, range);
+        let ranges = std::mem::take(&mut remark.also_at_points);
+        let numbered = remark.point.filter(|_| *count >= KEPT_MAX);
+        let known = |known: &RemarkEntry| {
+            let among = |point| known.is_like(&remark) && known.holds_at(point);
+            known.says(&remark) || numbered.is_some_and(among)
+        };
+        if !kept.iter().any(known) {
+            match numbered {
+                Some(point) => add(&mut kept[*first].also_at_points, [point, point]),
+                None => {
+                    *count += 1;
+                    kept.push(remark);
                 }
             }
-            _ if kept.contains(&remark) => {}
-            _ => {
-                *count += 1;
-                for range in std::mem::take(&mut remark.also_at_points) {
-                    add(&mut kept[*first].also_at_points, range);
-                }
-                kept.push(remark);
-            }
+        }
+        for range in ranges {
+            add(&mut kept[*first].also_at_points, range);
         }
     }
     kept
 }
 
-/// Adds motions to ranges; they come in their order.
-fn add(ranges: &mut Vec<[usize; 2]>, more: [usize; 2]) {
+/// Adds motions to ranges, unless they are there; they come in their order.
+fn add(ranges: &mut Vec<[usize; 2]>, [first, end]: [usize; 2]) {
+    if ranges.iter().any(|own| own[0] <= first && end <= own[1]) {
+        return;
+    }
     match ranges.last_mut() {
-        Some(last) if last[1] + 1 == more[0] => last[1] = more[1],
-        _ => ranges.push(more),
+        Some(last) if last[1] + 1 == first => last[1] = end,
+        _ => ranges.push([first, end]),
     }
 }
 
@@ -254,6 +259,11 @@ mod tests {
             assert_eq!(said, point < 1000 && point != 500, "{point}");
         }
         assert!(serde_json::to_string(&found).unwrap().len() < 2000);
+        // Merging again, with some of the same, changes nothing.
+        let some = [missed(0, 0.0), missed(3, 3.0), missed(700, 700.0)];
+        let again = merged(found.iter().cloned().chain(some));
+        assert_eq!(again, found);
+        assert_eq!(merged(found.iter().chain(&found).cloned()), found);
     }
 
     #[test]

@@ -210,7 +210,68 @@ remarks! {
          large for linear elasticity"
     ),
 
+    /// The patch is large against the radii of the bodies, which half-spaces do not describe.
+    PatchLarge {
+        /// `rolling` or `lateral`.
+        direction: &'static str = "rolling",
+        /// Half width of the patch in this direction.
+        half_width_mm: f64 = 210.0,
+        /// Relative radius in this direction.
+        radius_mm: f64 = 460.0,
+    }
+    code: "patch-large",
+    severity: Warning,
+    advice: "Check the unit of the load and the radii: contacts of half-spaces are smaller than a third of the radius.",
+    detail: format!(
+        "the patch has a half width of {half_width_mm:.3e} mm along {direction}, against a radius of {radius_mm} mm"
+    ),
+
+    /// The largest pressure is beyond what steel bears by far.
+    PressureImplausible {
+        /// Largest pressure.
+        pressure_max_mpa: f64 = 8100.0,
+        /// The largest that passes without a remark.
+        usual_max_mpa: f64 = 5000.0,
+    }
+    code: "pressure-implausible",
+    severity: Warning,
+    advice: "Check the units of load and geometry. If they are right, the bodies yield and the pressure is lower than the answer says.",
+    detail: format!(
+        "the largest pressure is {pressure_max_mpa:.4e} MPa, more than {usual_max_mpa} MPa: bodies of steel would yield"
+    ),
+
+    /// The load is larger than any wheel bears.
+    LoadImplausible {
+        /// Normal force of all patches.
+        normal_force_n: f64 = 1e12,
+        /// The largest that passes without a remark.
+        usual_max_n: f64 = 1e7,
+    }
+    code: "load-implausible",
+    severity: Warning,
+    advice: "Check its unit: forces are in N.",
+    detail: format!("the normal force is {normal_force_n:.3e} N, more than {usual_max_n:e} N"),
+
     // Motions.
+
+    /// Creepages are so large that they are no small part of the rolling speed any more.
+    CreepageLarge {
+        /// Longitudinal creepage.
+        creepage_x: f64 = 5.0,
+        /// Lateral creepage.
+        creepage_y: f64 = 0.0,
+        /// Spin times √(area/π) of the patch; absent where the patch is not known yet.
+        spin_times_length: Option<f64> = Some(0.002),
+        /// The largest that passes without a remark.
+        usual_max: f64 = 0.2,
+    }
+    code: "creepage-large",
+    severity: Warning,
+    advice: "Check the unit (creepages are ratios, spin is in 1/mm). Forces of sliding like this follow from heat and wear as well.",
+    detail: {
+        let spin = spin_times_length.map_or_else(String::new, |spin| format!(", spin times length of the patch {spin:.3e}"));
+        format!("the creepages are {creepage_x:.3e} and {creepage_y:.3e}{spin}; the theory is for small ones, up to {usual_max}")
+    },
 
     /// The second discretisation rule did not converge; forces come from the first alone.
     SecondRuleFailed {}

@@ -12,9 +12,10 @@ use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
 use crate::contact::outputs::resultants::Resultants;
 use crate::contact::problem::{Prescribed, Problem, Resolution};
+use crate::contact::remark::Remark;
 use crate::contact::tangential::ladder::{Ladder, Plan};
 use crate::contact::tangential::point::{self, Asked, Point};
-use crate::contact::tangential::root::{PLACE_MAX, zero};
+use crate::contact::tangential::root::{PLACE_MAX, RootExit, zero};
 use crate::contact::tangential::{Work, kalker};
 
 /// A prescribed force may be missed by this part of the target error.
@@ -136,6 +137,8 @@ struct Search<'a, 'p> {
     /// Largest force of the first trial, relative to μN.
     first: Option<f64>,
     saturated: bool,
+    /// How the last search ended.
+    exit: RootExit,
     work: Work,
 }
 
@@ -160,6 +163,7 @@ impl<'a, 'p> Search<'a, 'p> {
             best: None,
             first: None,
             saturated: false,
+            exit: RootExit::Found,
             work: Work::default(),
         }
     }
@@ -212,7 +216,7 @@ impl<'a, 'p> Search<'a, 'p> {
                     Ok(off)
                 })?;
                 place[k] = root.place;
-                self.saturated = !root.reached;
+                self.end(root.exit);
                 Ok(place)
             }
         }
@@ -225,6 +229,7 @@ impl<'a, 'p> Search<'a, 'p> {
         let mut worse = 0;
         for _ in 0..TRIALS_AT_ONCE {
             if length(off) <= self.tolerance() {
+                self.end(RootExit::Found);
                 return Ok(Some(place));
             }
             let mut step = times(&inverse, off).map(|s| -s);
@@ -257,7 +262,7 @@ impl<'a, 'p> Search<'a, 'p> {
     /// For every place across, the place along x that gives the force along x: between bounds both, and slow.
     fn one_in_the_other(&mut self, start: [f64; 2]) -> Result<[f64; 2], SolveError> {
         let mut along = start[0];
-        let mut along_reached = true;
+        let mut exit_along = RootExit::Found;
         let root = zero(start[1], |across, tolerance| {
             let mut off = [0.0; 2];
             let inner = zero(along, |at, tolerance| {
@@ -265,12 +270,36 @@ impl<'a, 'p> Search<'a, 'p> {
                 *tolerance = 0.3 * self.tolerance();
                 Ok(off[0])
             })?;
-            (along, along_reached) = (inner.place, inner.reached);
+            (along, exit_along) = (inner.place, inner.exit);
             *tolerance = self.tolerance();
             Ok(off[1])
         })?;
-        self.saturated = !(root.reached && along_reached);
+        // What keeps its sign is out of reach, however the other search ended.
+        let exits = [root.exit, exit_along];
+        let worse = exits.into_iter().find(|exit| *exit == RootExit::SignKept);
+        self.end(worse.unwrap_or(if root.exit.converged() {
+            exit_along
+        } else {
+            root.exit
+        }));
         Ok([along, root.place])
+    }
+
+    fn end(&mut self, exit: RootExit) {
+        self.saturated = exit == RootExit::SignKept;
+        self.exit = exit;
+    }
+
+    /// The remark on forces that are neither met nor out of reach.
+    fn inexact(&self) -> Option<Remark> {
+        let (residual, _) = self.best.as_ref()?;
+        let tolerance = self.tolerance();
+        (!self.saturated && *residual > tolerance).then(|| Remark::IterationInexact {
+            iteration: "the search for the creepages of the prescribed force",
+            reason: self.exit.reason(),
+            residual: *residual,
+            tolerance,
+        })
     }
 
     /// Solves the motion of two places; how far its forces are from those prescribed, relative to μN.
@@ -348,10 +377,12 @@ impl<'a, 'p> Search<'a, 'p> {
             index: self.index,
             motion: self.motion(place),
         };
+        let inexact = self.inexact();
         let mut point = match self.best.take() {
             Some((_, point)) => point,
             None => point::solve(self.problem, self.ladder, asked, self.monitor)?,
         };
+        point.tangential.remarks.extend(inexact);
         point.work = self.work;
         point.saturated = self.saturated;
         point.seconds = (self.monitor.elapsed() - began).as_secs_f64();

@@ -148,6 +148,7 @@ pub fn fixed_point(
         iterations: 0,
         products: 0,
         residual: f64::INFINITY,
+        inexact_steps: 0,
     };
     let follow = |t: &mut [f64], slip: &[f64]| {
         for i in 0..cells {

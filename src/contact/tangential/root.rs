@@ -6,14 +6,46 @@ use crate::contact::error::SolveError;
 pub(crate) const PLACE_MAX: f64 = 65.0;
 /// Places tried.
 const TRIALS_MAX: u32 = 40;
+/// A bracket is closed when its ends differ by this part of themselves.
+const CLOSED: f64 = 1e-13;
+
+/// How a search ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum RootExit {
+    /// The value is below its tolerance.
+    Found,
+    /// The function keeps its sign as far as the farthest place.
+    SignKept,
+    /// The sign changes between two places next to each other, but the values there are above the tolerance.
+    BracketClosed,
+    /// The trials were used up.
+    TrialsUsedUp,
+}
+
+impl RootExit {
+    /// Was the tolerance met?
+    pub(crate) fn converged(self) -> bool {
+        self == RootExit::Found
+    }
+
+    /// The end as a clause for messages.
+    pub(crate) fn reason(self) -> &'static str {
+        match self {
+            RootExit::Found => "the tolerance was met",
+            RootExit::SignKept => "no change of sign was found",
+            RootExit::BracketClosed => "the value jumps where its sign changes",
+            RootExit::TrialsUsedUp => "the trials were used up",
+        }
+    }
+}
 
 /// Where an increasing function is 0.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Root {
     /// The place.
     pub(crate) place: f64,
-    /// False if the function keeps its sign as far as the farthest place.
-    pub(crate) reached: bool,
+    /// How the search ended.
+    pub(crate) exit: RootExit,
 }
 
 /// Goes from `start` until the sign changes, then between the bounds by the Illinois rule (regula falsi that halves the value of
@@ -26,10 +58,11 @@ pub(crate) fn zero(
     let (mut low, mut high): (Option<[f64; 2]>, Option<[f64; 2]>) = (None, None);
     let mut place = start.clamp(-PLACE_MAX, PLACE_MAX);
     let (mut stride, mut last) = (0.0_f64, None::<[f64; 2]>);
+    let ended = |place, exit| Ok(Root { place, exit });
     for _ in 0..TRIALS_MAX {
         let value = f(place, &mut tolerance)?;
         if value.abs() <= tolerance {
-            break;
+            return ended(place, RootExit::Found);
         }
         let below = value < 0.0;
         let (mine, other) = if below {
@@ -45,17 +78,14 @@ pub(crate) fn zero(
         let slope = last.map(|[at, before]| (value - before) / (place - at));
         last = Some([place, value]);
         if let (Some([p, f]), Some([q, g])) = (low, high) {
-            if (q - p).abs() <= 1e-13 * q.abs().max(p.abs()) {
-                break;
+            if (q - p).abs() <= CLOSED * q.abs().max(p.abs()) {
+                return ended(place, RootExit::BracketClosed);
             }
             place = (p * g - q * f) / (g - f);
             continue;
         }
         if place.abs() >= PLACE_MAX && (place < 0.0) != below {
-            return Ok(Root {
-                place,
-                reached: false,
-            });
+            return ended(place, RootExit::SignKept);
         }
         // One bound is known: as far as the line through the last two says, but not much farther than before.
         let needed = match slope.filter(|slope| *slope > 0.0) {
@@ -70,8 +100,44 @@ pub(crate) fn zero(
         let step = if below { stride } else { -stride };
         place = (place + step).clamp(-PLACE_MAX, PLACE_MAX);
     }
-    Ok(Root {
-        place,
-        reached: true,
-    })
+    ended(place, RootExit::TrialsUsedUp)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn search(tolerance: f64, f: impl Fn(f64) -> f64) -> Root {
+        let look = |at: f64, least: &mut f64| {
+            *least = tolerance;
+            Ok(f(at))
+        };
+        zero(0.1, look).unwrap()
+    }
+
+    #[test]
+    fn a_root_is_found_to_its_tolerance() {
+        for goal in [-20.0, -0.3, 0.0, 0.1, 4.0, 60.0] {
+            let root = search(1e-9, |at| (at - goal) * (1.0 + at * at));
+            assert_eq!(root.exit, RootExit::Found, "{goal}");
+            assert!((root.place - goal).abs() < 1e-8, "{goal}: {root:?}");
+        }
+    }
+
+    #[test]
+    fn a_search_without_a_root_says_why_it_ended() {
+        assert_eq!(search(1e-9, |_| -1.0).exit, RootExit::SignKept);
+        assert_eq!(search(1e-9, |_| 1.0).exit, RootExit::SignKept);
+        // A jump has no place where the value is small.
+        let jump = |at: f64| if at < 2.0 { -1.0 } else { 1.0 };
+        let ended = search(1e-9, jump);
+        assert!(!ended.exit.converged(), "{ended:?}");
+        assert!((ended.place - 2.0).abs() < 1e-3, "{ended:?}");
+        // Nothing is exact enough for no tolerance at all, unless the value is 0 to the last digit.
+        let ended = search(0.0, |at| at.exp() - 1.3);
+        assert!(
+            !ended.exit.converged() || ended.place.exp() == 1.3,
+            "{ended:?}"
+        );
+    }
 }

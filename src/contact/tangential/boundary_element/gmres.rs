@@ -30,6 +30,34 @@ pub struct LinearReport {
     pub products: u32,
     /// Norm of the residual divided by that of the right-hand side.
     pub residual: f64,
+    /// How it ended.
+    pub exit: GmresExit,
+}
+
+/// How a linear solve ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GmresExit {
+    /// The residual fell by the tolerance.
+    Converged,
+    /// The restarts were used up before.
+    RestartsUsedUp,
+}
+
+impl GmresExit {
+    /// Was the tolerance met?
+    #[must_use]
+    pub fn converged(self) -> bool {
+        self == GmresExit::Converged
+    }
+
+    /// The end as a clause for messages.
+    #[must_use]
+    pub fn reason(self) -> &'static str {
+        match self {
+            GmresExit::Converged => "the residual fell by the tolerance",
+            GmresExit::RestartsUsedUp => "the restarts of the linear solver were used up",
+        }
+    }
 }
 
 /// A linear system given by its action.
@@ -60,6 +88,7 @@ impl Gmres {
         let mut report = LinearReport {
             products: 0,
             residual: 0.0,
+            exit: GmresExit::Converged,
         };
         if norm_b == 0.0 {
             return Ok(report);
@@ -89,6 +118,9 @@ impl Gmres {
         }
         self.residual = residual;
         report.residual = beta / norm_b;
+        if beta > tolerance * norm_b || beta.is_nan() {
+            report.exit = GmresExit::RestartsUsedUp;
+        }
         Ok(report)
     }
 
@@ -291,6 +323,7 @@ mod tests {
                     error <= 1.1e-10 * norm(&b) && report.residual <= 1e-10,
                     "{n} {error} {report:?}"
                 );
+                assert_eq!(report.exit, GmresExit::Converged);
             }
         }
     }
@@ -306,6 +339,34 @@ mod tests {
                 .products
         };
         assert!(products(true) < products(false));
+    }
+
+    #[test]
+    fn a_linear_solve_that_falls_short_says_so() {
+        // A shift of a long ring: nothing is gained until every vector is in the basis.
+        struct Ring;
+        impl LinearSystem for Ring {
+            fn product(&mut self, x: &[f64], out: &mut [f64]) {
+                for i in 0..x.len() {
+                    out[(i + 1) % x.len()] = x[i];
+                }
+            }
+
+            fn precondition(&mut self, _: &mut [f64]) {}
+
+            fn tick(&mut self) -> ControlFlow<Stop> {
+                ControlFlow::Continue(())
+            }
+        }
+        let mut b = vec![0.0; 2000];
+        b[0] = 1.0;
+        let mut x = vec![0.0; 2000];
+        let report = Gmres::default().solve(&mut Ring, &b, 1e-3, &mut x).unwrap();
+        assert_eq!(report.exit, GmresExit::RestartsUsedUp);
+        assert!(
+            !report.exit.converged() && report.residual > 0.9,
+            "{report:?}"
+        );
     }
 
     #[test]

@@ -13,6 +13,7 @@ use crate::contact::case::Motion;
 use crate::contact::influence::strips::Parity;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::remark::Remark;
+use crate::contact::tangential::boundary_element::gmres::GmresExit;
 use crate::contact::tangential::boundary_element::newton::{Convergence, FrictionLaw, Newton};
 use crate::contact::tangential::boundary_element::strip_blocks::OwnBlocks;
 use crate::contact::tangential::equations::Equations;
@@ -109,6 +110,18 @@ pub fn trapezoid(
     let none = [0, 1].map(|_| vec![0.0; slips.len()]);
     obey_coulomb(&level.bound, &slips, &mut traction, &none);
     Ok((traction, solve.work))
+}
+
+/// Why there is no answer, as far as is known, and what to do, as a clause.
+fn advice(report: &Convergence) -> String {
+    let linear = match report.inexact_steps {
+        0 => String::new(),
+        steps => {
+            let reason = GmresExit::RestartsUsedUp.reason();
+            format!("in {steps} steps {reason}; ")
+        }
+    };
+    format!("{linear}try another mesh, with cells and strips of similar width")
 }
 
 /// What the three-point rule gave besides tractions.
@@ -243,7 +256,7 @@ impl<'a> Solve<'a> {
             return Err(Failure::NotConverged {
                 work: self.work,
                 tolerance: self.tolerance,
-                advice: "try another mesh, with cells and strips of similar width".to_owned(),
+                advice: advice(&report),
             });
         }
         Ok(MirrorAnswer {

@@ -54,6 +54,8 @@ pub struct Convergence {
     pub products: u32,
     /// Area-weighted root mean square of `T − Π(T + r s)`, relative to the scale of the case.
     pub residual: f64,
+    /// Steps whose linear system was not solved to its tolerance; harmless if the residual still came down.
+    pub inexact_steps: u32,
 }
 
 /// The state of one Newton step: which cells slip, and in which direction.
@@ -173,6 +175,7 @@ impl<'a> Newton<'a> {
             iterations: 0,
             products: 0,
             residual: f64::INFINITY,
+            inexact_steps: 0,
         };
         let Steps {
             mut step,
@@ -365,10 +368,9 @@ impl<'a> Newton<'a> {
             slip: &mut self.slip,
             monitor,
         };
-        report.products += self
-            .gmres
-            .solve(&mut system, rhs, tolerance, step)?
-            .products;
+        let linear = self.gmres.solve(&mut system, rhs, tolerance, step)?;
+        report.products += linear.products;
+        report.inexact_steps += u32::from(!linear.exit.converged());
         Ok(())
     }
 

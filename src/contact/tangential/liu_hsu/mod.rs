@@ -286,6 +286,7 @@ impl<'a> Search<'a> {
             iterations: 0,
             products: 0,
             residual: 0.0,
+            inexact_steps: 0,
         };
         self.newton.evaluate(&self.stage.law, &padded, &mut unused)
     }
