@@ -62,13 +62,12 @@ fn implausible_contacts_say_so_whatever_describes_them() {
     let said = |case: &Value, wanted: &[&str], at_check: bool| {
         let checked = check(case, &Limits::default()).expect("a valid case");
         let solved = answer(case);
+        for (k, remark) in solved.remarks.iter().enumerate() {
+            assert!(!solved.remarks[..k].contains(remark), "{remark:?} twice");
+        }
         for code in wanted {
             let solved = codes(&solved.remarks);
-            assert_eq!(
-                solved.iter().filter(|c| *c == code).count(),
-                1,
-                "{code}: {solved:?}"
-            );
+            assert!(solved.contains(code), "{code}: {solved:?}");
             let checked = codes(&checked.remarks);
             assert_eq!(checked.contains(code), at_check, "{code}: {checked:?}");
         }
@@ -154,7 +153,8 @@ fn the_simplified_theory_meets_no_target_that_nobody_asked_for() {
     let asked = case(json!({ "method": "fastsim", "target_error": 0.005 }));
     assert_eq!(asked.patches[0].points[0].target_met, Some(false));
     assert_eq!(codes(&asked.remarks), ["target-missed"]);
-    assert_eq!(asked.patches[0].points[0].force_x_n, point.force_x_n);
+    let ratio = asked.patches[0].points[0].force_x_n / point.force_x_n;
+    assert!((ratio - 1.0).abs() < 1e-9, "{ratio}");
 }
 
 /// The clock, and nothing else.
@@ -225,8 +225,9 @@ fn prescribed_forces_follow_the_target() {
         case["outputs"] = json!(["resultants"]);
         let solution = answer(&case);
         let missed = (solution.total[0].force_x_n - 0.5 * limit).abs() / limit;
-        assert!(missed <= 0.01 * target, "{target}: {missed:e}");
-        assert!(!codes(&solution.remarks).contains(&"iteration-inexact"));
+        let remarks = &solution.remarks;
+        assert!(missed <= 0.01 * target, "{target}: {missed:e}, {remarks:?}");
+        assert!(!codes(remarks).contains(&"iteration-inexact"));
     }
 }
 

@@ -381,7 +381,7 @@ fn missing_load() -> Fault {
 fn resolution(solver: &Solver) -> Resolution {
     match (solver.mesh, solver.target_error) {
         (Some(size), _) => Resolution::Mesh(size),
-        // The simplified theory has one mesh and a stated error, which no target changes: none is taken as given.
+        // As it would solve for any target.
         (None, None) if solver.method == Method::Fastsim => Resolution::Mesh(fastsim::MESH),
         (None, target) => Resolution::Target(target.unwrap_or(TARGET_ERROR_DEFAULT)),
     }

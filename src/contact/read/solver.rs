@@ -82,13 +82,13 @@ pub(super) fn read(case: &mut Object) -> Option<Solver> {
             return None;
         }
     }
+    let method = method.unwrap_or_default();
+    // The simplified theory has one mesh and a stated error, which no target changes: it has none of its own.
+    let wanted = mesh.is_none() && method != Method::Fastsim;
+    let default = wanted.then_some(TARGET_ERROR_DEFAULT);
     Some(Solver {
-        method: method.unwrap_or_default(),
-        target_error: target_error.or(if mesh.is_none() {
-            Some(TARGET_ERROR_DEFAULT)
-        } else {
-            None
-        }),
+        method,
+        target_error: target_error.or(default),
         mesh,
         traction_bound,
         time_limit_s,

@@ -19,8 +19,11 @@ use crate::contact::tangential::root::{PLACE_MAX, RootExit, zero};
 use crate::contact::tangential::{Work, kalker};
 
 /// A prescribed force may be missed by this part of the target error.
-const SHARE_OF_TARGET: f64 = 0.004;
-/// The same relative to μN on an explicit mesh and for the simplified theory.
+const SHARE_OF_TARGET: f64 = 0.02;
+/// The least of this, relative to μN: ten times the residual that tractions are solved to, since a start that meets it is left as it
+/// is.
+const MISSED_FOR_TARGET: f64 = 1e-5;
+/// The same on an explicit mesh and for the simplified theory.
 const MISSED: f64 = 1e-6;
 /// Near μN the creepage hangs on what is left to it: that may be missed by so much more only.
 const NEAR_LIMIT: f64 = 10.0;
@@ -336,7 +339,7 @@ impl<'a, 'p> Search<'a, 'p> {
     fn tolerance(&self) -> f64 {
         let most = match self.problem.resolution {
             Resolution::Target(target) if self.problem.method != Method::Fastsim => {
-                SHARE_OF_TARGET * target
+                (SHARE_OF_TARGET * target).max(MISSED_FOR_TARGET)
             }
             _ => MISSED,
         };
