@@ -96,7 +96,7 @@ fn solve_whole(
     } else {
         let watch = Watch::new(monitor, problem.time_limit, problem.motions.len());
         let pressed = problem.pressed(&watch);
-        let pressed = pressed.map_err(|error| watch.explained(error, problem.part))?;
+        let pressed = pressed.map_err(|error| watch.explained(error, problem))?;
         answer(operators, pressed.as_ref(), &watch)?
     };
     finish(problem, answer, monitor.elapsed().saturating_sub(began))
@@ -109,7 +109,7 @@ fn answer(
     watch: &Watch,
 ) -> Result<(Solution, Fields), SolveError> {
     let answer = motions(operators, problem, watch);
-    let (mut solution, fields) = answer.map_err(|error| watch.explained(error, problem.part))?;
+    let (mut solution, fields) = answer.map_err(|error| watch.explained(error, problem))?;
     share_seconds(&mut solution);
     Ok((solution, fields))
 }

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use crate::contact::error::SolveError;
-use crate::contact::problem::MotionPart;
+use crate::contact::problem::Problem;
 
 /// Why a solve was stopped from outside.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,18 +61,16 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// An error of this case; one of time with the limit and how far the solve came, of which this is so much.
-    pub(crate) fn explained(&self, error: SolveError, part: MotionPart) -> SolveError {
-        match error {
-            SolveError::OutOfTime { limit_s: None, .. } => SolveError::OutOfTime {
-                limit_s: self.time_limit.map(|limit| limit.as_secs_f64()),
-                // Of a wheel on a rail every motion is solved in several parts, and done when all are.
-                motions: Some([
-                    part.before + self.done.get().min(part.all - part.before),
-                    part.all,
-                ]),
-            },
-            error => error,
+    /// An error of this case; one of time with the limit and how far the solve came.
+    pub(crate) fn explained(&self, error: SolveError, problem: &Problem) -> SolveError {
+        let SolveError::OutOfTime { limit_s: None, .. } = error else {
+            return error;
+        };
+        // Of a wheel on a rail every motion is solved patch by patch.
+        let done = self.done.get() * problem.motions.len() / self.motions.max(1);
+        SolveError::OutOfTime {
+            limit_s: self.time_limit.map(|limit| limit.as_secs_f64()),
+            motions: Some([problem.part.before + done, problem.part.all]),
         }
     }
 

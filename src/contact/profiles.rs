@@ -53,7 +53,7 @@ pub(super) fn solve(
         let watch = Watch::new(monitor, problem.time_limit, 1);
         let began = monitor.elapsed();
         let wheel = contact.press(&search, wanted, before, &watch);
-        let wheel = wheel.map_err(|failure| watch.explained(failure.into(), problem.part))?;
+        let wheel = wheel.map_err(|failure| watch.explained(failure.into(), problem))?;
         let seconds = (monitor.elapsed() - began).as_secs_f64();
         let unbalanced = if balanced { BALANCE } else { 0.0 };
         Ok(Rest {

@@ -8,7 +8,7 @@ use serde::ser::{
 };
 
 use crate::contact::error::SolveError;
-use crate::contact::solution::{Fields, PatchFields, PointFields, Solution};
+use crate::contact::solution::{Fields, PatchCells, PatchFields, PointFields, Solution};
 
 /// Refuses an answer that holds a number that is not finite.
 ///
@@ -33,19 +33,26 @@ fn first_in_fields(fields: &Fields) -> Option<String> {
 }
 
 fn first_in_patch(patch: &PatchFields) -> Option<String> {
-    let own = [
-        ("x_mm", Some(&patch.x_mm)),
-        ("y_mm", Some(&patch.y_mm)),
-        ("dx_mm", Some(&patch.dx_mm)),
-        ("dy_mm", Some(&patch.dy_mm)),
-        ("pressure_mpa", patch.pressure_mpa.as_ref()),
-    ];
+    let meshes = patch.meshes.iter().enumerate();
+    let in_meshes = meshes
+        .filter_map(|(k, mesh)| Some(format!("meshes[{k}].{}", first_in_cells(mesh)?)))
+        .next();
     let points = patch.points.iter().enumerate();
-    first_of(&own).or_else(|| {
+    in_meshes.or_else(|| {
         points
             .filter_map(|(k, point)| Some(format!("points[{k}].{}", first_in_point(point)?)))
             .next()
     })
+}
+
+fn first_in_cells(mesh: &PatchCells) -> Option<String> {
+    first_of(&[
+        ("x_mm", Some(&mesh.x_mm)),
+        ("y_mm", Some(&mesh.y_mm)),
+        ("dx_mm", Some(&mesh.dx_mm)),
+        ("dy_mm", Some(&mesh.dy_mm)),
+        ("pressure_mpa", mesh.pressure_mpa.as_ref()),
+    ])
 }
 
 fn first_in_point(point: &PointFields) -> Option<String> {
@@ -343,9 +350,8 @@ mod tests {
     #[test]
     fn cells_are_looked_at_too() {
         let mut patch = PatchFields {
-            x_mm: vec![0.0; 3],
+            meshes: vec![PatchCells::default()],
             points: vec![PointFields::default(); 2],
-            ..PatchFields::default()
         };
         let fields = |patch: &PatchFields| Fields {
             patches: vec![PatchFields::default(), patch.clone()],
