@@ -1,11 +1,18 @@
 //! Stability: thousands of cases from all over the allowed ground, every answer held against the laws of contact.
 //!
 //! `cargo bench --bench stress [-- cases seed]` prints the table and writes it to `docs/stability.md`; it ends with an error if a
-//! case crashes, hangs or breaks a law. `-- --only creep-map` and `-- --only sweep-with-zones` print one section.
+//! case crashes, hangs or breaks a law. `-- --only creep-map`, `-- --only sweep-with-zones` and `-- --only damaged-profile` print one
+//! section.
 
 mod condition;
 mod contacts;
+mod damaged;
+mod damaged_table;
 mod laws;
+#[path = "../../tests/physics/profile_reference_files.rs"]
+mod profile_reference_files;
+#[path = "../../tests/physics/profile_shapes.rs"]
+mod profile_shapes;
 mod random;
 mod sweeps;
 mod trial;
@@ -53,8 +60,9 @@ fn main() -> ExitCode {
         let section = match arguments.get(at + 1).map(String::as_str) {
             Some("creep-map") => sweeps::creep_maps(),
             Some("sweep-with-zones") => sweeps::with_zones(),
+            Some("damaged-profile") => damaged_table::tables(SEED),
             _ => {
-                eprintln!("--only takes creep-map or sweep-with-zones");
+                eprintln!("--only takes creep-map, sweep-with-zones or damaged-profile");
                 return ExitCode::FAILURE;
             }
         };
@@ -76,7 +84,8 @@ fn main() -> ExitCode {
             eprintln!("{} cases", sample.number + 1);
         }
     }
-    let text = report(count, seed, &rows, &troubles);
+    let mut text = report(count, seed, &rows, &troubles);
+    text.push_str(&damaged_table::tables(SEED));
     println!("{text}");
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/stability.md");
     std::fs::write(path, text).expect("docs can be written");

@@ -170,6 +170,11 @@ pub enum Contact {
         /// Roll of the wheelset in rad, positive from y to z; 0 when left out.
         #[schema(required = false)]
         roll_rad: f64,
+        /// Solve also where the points of a profile are so coarse or rough under the contact that an answer would mislead, or where rail and
+        /// wheel seem exchanged; otherwise the job fails and says where. `false` when left out.
+        #[serde(skip_serializing_if = "is_false")]
+        #[schema(required = false)]
+        accept_rough_profiles: bool,
     },
 }
 
@@ -199,9 +204,32 @@ pub struct CrossSection {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub mirror_z: Option<bool>,
-    /// Waves shorter than about this along the cross-section are smoothed away, in mm; 0 (none) when left out.
+    /// Waves shorter than about this along the cross-section are smoothed away, in mm; 0 (none) when left out. `auto`: what suits the noise of
+    /// the points and the pressure, 2 to 8 mm or none; the answer says what was used.
     #[schema(required = false)]
-    pub smoothing_mm: f64,
+    pub smoothing_mm: Smoothing,
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
+}
+
+/// How a cross-section is smoothed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum Smoothing {
+    /// By a cut wavelength in mm; 0 for none.
+    Length(f64),
+    /// By what suits the noise and the pressure.
+    ByNoise(SmoothingWord),
+}
+
+/// A smoothing that the service chooses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SmoothingWord {
+    /// From the noise of the points and the pressure.
+    Auto,
 }
 
 /// How hard the bodies are pressed together; exactly one member is given.

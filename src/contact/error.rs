@@ -57,6 +57,14 @@ pub enum SolveError {
         /// Why, as a clause.
         reason: String,
     },
+    /// The points of a profile allow no answer that can be relied on.
+    #[error("{reason} (at {pointer}). To solve all the same give accept_rough_profiles: true")]
+    RoughProfile {
+        /// JSON pointer to the profile.
+        pointer: String,
+        /// What is wrong with it, and what to do.
+        reason: String,
+    },
     /// The caller stopped the solve.
     #[error("the solve was cancelled")]
     Cancelled,

@@ -11,6 +11,7 @@ pub mod monitor;
 pub mod normal;
 pub mod outputs;
 pub mod problem;
+pub mod profile_trust;
 mod profiles;
 mod read;
 pub mod remark;
@@ -92,7 +93,7 @@ fn solve_whole(
 ) -> Result<(Solution, Fields), SolveError> {
     let began = monitor.elapsed();
     let answer = if let Region::Profiles(contact) = &problem.region {
-        profiles::solve(operators, problem, contact, monitor)?
+        profile_trust::solve(operators, problem, contact, monitor)?
     } else {
         let watch = Watch::new(monitor, problem.time_limit, problem.motions.len());
         let pressed = problem.pressed(&watch);

@@ -44,7 +44,7 @@ pub(super) fn solve(
     problem: &Problem,
     contact: &ProfileContact,
     monitor: &dyn Monitor,
-) -> Result<(Solution, Fields), SolveError> {
+) -> Result<Found, SolveError> {
     let search =
         Search::new(&contact.geometry).map_err(|reason| SolveError::NormalProblem { reason })?;
     let vertical = matches!(contact.loading, Loading::Vertical(_)) && problem.friction > 0.0;
@@ -73,7 +73,7 @@ pub(super) fn solve(
             let remark = Remark::NormalForcesAloneBalance {};
             at_rest.wheel.remarks.push(remark.into());
         }
-        return Ok(merge(problem, &contact.geometry, &at_rest.wheel, answers));
+        return Ok(at_rest.found(problem, contact, answers));
     }
     let coarse = Problem {
         resolution: match problem.resolution {
@@ -99,7 +99,7 @@ pub(super) fn solve(
         let answers = at_rest.answers(operators, problem, contact, monitor)?;
         share = friction_share(&at_rest.wheel, &answers);
         if ((1.0 + share) / (1.0 + counted) - 1.0).abs() <= balance(problem.resolution) {
-            return Ok(merge(problem, &contact.geometry, &at_rest.wheel, answers));
+            return Ok(at_rest.found(problem, contact, answers));
         }
     }
     Err(SolveError::NormalProblem {
@@ -127,6 +127,16 @@ fn friction_share(wheel: &PressedWheel, answers: &[(Solution, Fields)]) -> f64 {
     lifted / wheel.vertical_force()
 }
 
+/// The wheel at rest with the answers for all its patches.
+pub(super) struct Found {
+    /// The wheel.
+    pub(super) wheel: PressedWheel,
+    /// The answer.
+    pub(super) solution: Solution,
+    /// The values per cell.
+    pub(super) fields: Fields,
+}
+
 /// The wheel at rest, and the time that took.
 struct Rest {
     wheel: PressedWheel,
@@ -136,6 +146,20 @@ struct Rest {
 }
 
 impl Rest {
+    fn found(
+        self,
+        problem: &Problem,
+        contact: &ProfileContact,
+        answers: Vec<(Solution, Fields)>,
+    ) -> Found {
+        let (solution, fields) = merge(problem, &contact.geometry, &self.wheel, answers);
+        Found {
+            wheel: self.wheel,
+            solution,
+            fields,
+        }
+    }
+
     /// A later rest, with the work of both.
     fn again(&self, later: Rest) -> Rest {
         let mut wheel = later.wheel;

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::contact::case::{Method, Motion};
+use crate::contact::profile_trust::quality::{PatchQuality, ProfileUncertainty};
 use crate::contact::remark::RemarkEntry;
 use crate::contact::zones::Zone;
 
@@ -101,6 +102,9 @@ pub struct PatchSolution {
     /// Where the patch lies on wheel and rail; only for `profiles`.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub position: Option<Position>,
+    /// How far the points of the profiles can be trusted here; only for `profiles`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub quality: Option<PatchQuality>,
     /// One entry per motion, in the order of the case.
     pub points: Vec<PointSolution>,
 }
@@ -140,6 +144,9 @@ pub struct PointSolution {
     pub moment_z_n_mm: f64,
     /// Estimated absolute errors of the three resultants; null where there is nothing to estimate them from.
     pub error_estimate: Option<ErrorEstimate>,
+    /// What the measurement of the profiles leaves open; only for `profiles`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub profile_uncertainty: Option<ProfileUncertainty>,
     /// Area that sticks in mm²; absent unless zones were asked for.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub stick_area_mm2: Option<f64>,
@@ -234,6 +241,9 @@ pub struct Total {
     pub moment_z_n_mm: f64,
     /// Estimated absolute errors; null where there is nothing to estimate them from.
     pub error_estimate: Option<ErrorEstimate>,
+    /// What the measurement of the profiles leaves open; only for `profiles`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub profile_uncertainty: Option<ProfileUncertainty>,
 }
 
 /// The values per cell of all patches: what was asked for, nothing else.

@@ -7,6 +7,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::contact::case::{Case, Method, Output};
+use crate::contact::profile_trust::quality::PairQuality;
 use crate::contact::remark::RemarkEntry;
 use crate::http::access::Caller;
 use crate::http::body::JsonBody;
@@ -28,6 +29,10 @@ pub struct CheckedCase {
     motions: usize,
     /// Expected cost.
     estimate: Estimate,
+    /// How far the points of the profiles can be trusted, as far as that is known without the contact; only for `profiles`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    quality: Option<PairQuality>,
     /// What the client should know before using the numbers.
     remarks: Vec<RemarkEntry>,
 }
@@ -80,6 +85,7 @@ pub async fn check(
                     bytes: cost.bytes,
                     seconds: cost.seconds,
                 },
+                quality: problem.quality(),
                 remarks: problem.remarks,
             }
         })

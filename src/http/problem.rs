@@ -110,5 +110,14 @@ impl Problem {
         problem.residual = failure.residual;
         problem.iterations = failure.iterations;
         problem
+            .errors
+            .extend(failure.pointer.as_ref().map(|pointer| Fault {
+                pointer: Some(pointer.clone()),
+                parameter: None,
+                header: None,
+                line: None,
+                detail: failure.detail.clone(),
+            }));
+        problem
     }
 }

@@ -7,6 +7,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::contact::case::Motion;
+use crate::contact::profile_trust::quality::ProfileUncertainty;
 use crate::contact::solution::{ErrorEstimate, Origin, Solution, Total};
 use crate::http::accept::{Format, choose, named_format};
 use crate::http::access::Caller;
@@ -57,6 +58,9 @@ pub struct PointResultants {
     moment_z_n_mm: f64,
     /// Estimated absolute errors; null where there is nothing to estimate them from.
     error_estimate: Option<ErrorEstimate>,
+    /// What the measurement of the profiles leaves open; only for `profiles`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    profile_uncertainty: Option<ProfileUncertainty>,
     /// Dissipated power divided by rolling speed, in N.
     friction_power_n: f64,
     /// The same without the part of spin, as |ν_x F_x| + |ν_y F_y|, in N.
@@ -144,6 +148,7 @@ fn select(solution: Solution, point: Option<usize>, patch: Option<usize>) -> Res
                         force_y_n: point.force_y_n,
                         moment_z_n_mm: point.moment_z_n_mm,
                         error_estimate: point.error_estimate,
+                        profile_uncertainty: point.profile_uncertainty,
                         friction_power_n: point.friction_power_n,
                         friction_power_without_spin_n: point.friction_power_without_spin_n,
                         saturated: point.saturated,
@@ -237,6 +242,7 @@ fn write_csv(resultants: &Resultants, sums: &[Sum]) -> Result<Vec<u8>, csv::Erro
                 force_z_n: None,
                 moment_z_n_mm: point.moment_z_n_mm,
                 error_estimate: point.error_estimate,
+                profile_uncertainty: point.profile_uncertainty,
             };
             out.write_record(csv_line(
                 &patch.patch.to_string(),

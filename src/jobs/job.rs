@@ -82,6 +82,9 @@ pub struct Failure {
     /// Iterations done, where a solve did not converge.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub iterations: Option<u32>,
+    /// JSON pointer to the part of the case that allows no answer, where one part does.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub pointer: Option<String>,
 }
 
 /// The kinds of failure a client can meet.
@@ -185,6 +188,7 @@ impl Failure {
             detail: detail.into(),
             residual: None,
             iterations: None,
+            pointer: None,
         }
     }
 
@@ -205,6 +209,10 @@ impl Failure {
             SolveError::OutOfTime { .. } => {
                 Some(Failure::new(FailureKind::OutOfTime, error.to_string()))
             }
+            SolveError::RoughProfile { pointer, .. } => Some(Failure {
+                pointer: Some(pointer.clone()),
+                ..Failure::new(FailureKind::Unsolvable, error.to_string())
+            }),
             SolveError::Unmeshable { .. }
             | SolveError::NormalProblem { .. }
             | SolveError::NotFinite { .. } => {
@@ -219,6 +227,7 @@ impl Failure {
                 detail: error.to_string(),
                 residual: Some(*residual),
                 iterations: Some(u32::try_from(*iterations).unwrap_or(u32::MAX)),
+                pointer: None,
             }),
         }
     }

@@ -6,6 +6,8 @@ mod case_faults;
 mod case_mutations;
 mod cases;
 mod convergence_domain;
+#[path = "../../benches/stress/damaged.rs"]
+mod damaged;
 mod equations;
 mod fastsim;
 mod forces;
@@ -35,6 +37,7 @@ mod pressure_samples;
 mod problem;
 mod profile_case_faults;
 mod profile_cases;
+mod profile_damage;
 mod profile_faults;
 mod profile_formats;
 mod profile_geometry;
@@ -45,6 +48,7 @@ mod profile_reference_files;
 mod profile_robustness;
 mod profile_shapes;
 mod profile_solutions;
+mod profile_trust;
 mod profile_worn;
 #[path = "../../benches/stress/random.rs"]
 mod random;

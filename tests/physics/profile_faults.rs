@@ -86,10 +86,14 @@ fn single_points_that_run_back_are_dropped_with_a_remark() {
     assert!(
         matches!(
             found.remarks[..],
-            [Remark::ProfilePointsDropped {
-                profile: "rail",
-                count: 2
-            }]
+            [
+                Remark::ProfilePointsDropped {
+                    profile: "rail",
+                    count: 2
+                },
+                // What ran back had left its point twice.
+                Remark::ProfilePointsMerged { count: 1, .. }
+            ]
         ),
         "{:?}",
         found.remarks

@@ -211,6 +211,11 @@ impl<'g> Search<'g> {
         }
     }
 
+    /// Clearance on a line along the rail's normal, with the wheel lowered below first touch; in mm.
+    pub(super) fn clearance(&self, line: &Line, lowering: f64) -> f64 {
+        (line.clearance - lowering) * self.inclination(line.rail).cos()
+    }
+
     /// Turn about x that lays the track's y along the rail's surface.
     pub(super) fn inclination(&self, rail: f64) -> f64 {
         let [y, z] = self.geometry.rail_at(rail).tangent();

@@ -6,6 +6,7 @@ pub mod formats;
 pub mod local_gap;
 mod overlaps;
 pub mod profile;
+pub mod profile_quality;
 pub mod smoothing;
 pub mod wheel_rail;
 pub mod wheelset;

@@ -3,7 +3,10 @@
 //! Input follows the habit of the field: y positive to the field side, z positive down, mm. From here on z is positive
 //! up. The curve runs from the track centre to the field side, with the rail below and the wheel above it.
 
+use std::sync::Arc;
+
 use crate::contact::geometry::crossing;
+use crate::contact::geometry::profile_quality::{Points, noise, shape};
 use crate::contact::geometry::smoothing::Spline;
 use crate::contact::remark::Remark;
 
@@ -56,8 +59,22 @@ pub struct Reading {
 pub struct Profile {
     y: Spline,
     z: Spline,
+    measured: Arc<Measured>,
     /// What was found and changed on the way.
     pub remarks: Vec<Remark>,
+}
+
+/// The points that a curve was made from.
+#[derive(Debug, Clone, PartialEq)]
+struct Measured {
+    /// z up, in order from the track centre to the field side.
+    points: Vec<[f64; 2]>,
+    /// Length of the chords up to each point: the knots of the splines.
+    along: Vec<f64>,
+    /// Cut wavelength of the smoothing in mm.
+    smoothing: f64,
+    /// Step of which the given coordinates are multiples, in mm.
+    rounding: Option<f64>,
 }
 
 /// The curve at one place: y to the field side, z up, in mm; derivatives to the parameter.
@@ -98,6 +115,7 @@ impl Profile {
     /// of the points running back, or a shape that does not tell what is up and was not stated.
     pub fn new(body: Body, points: &[[f64; 2]], reading: Reading) -> Result<Profile, String> {
         let mut remarks = Vec::new();
+        let rounding = noise::rounding(points);
         let mut points = checked(points)?;
         let length = arc_length(&points);
         let [shortest, longest] = ARC_LENGTH;
@@ -109,6 +127,7 @@ impl Profile {
         }
         orient(body, &mut points, reading, &mut remarks)?;
         straighten(body, &mut points, &mut remarks)?;
+        cut_stray_ends(body, &mut points, &mut remarks);
         let given = points.len();
         points.dedup_by(|after, before| distance(*after, *before) < NEAR);
         if points.len() < given {
@@ -130,19 +149,78 @@ impl Profile {
                 first[0], -first[1], second[0], -second[1]
             ));
         }
-        let mut knots = vec![0.0];
+        let mut along = vec![0.0];
         for pair in points.windows(2) {
-            knots.push(knots[knots.len() - 1] + distance(pair[0], pair[1]));
+            along.push(along[along.len() - 1] + distance(pair[0], pair[1]));
         }
-        let part = |k: usize| {
-            let values: Vec<f64> = points.iter().map(|point| point[k]).collect();
-            Spline::new(&knots, &values, reading.smoothing)
+        let measured = Measured {
+            points,
+            along,
+            smoothing: reading.smoothing,
+            rounding,
         };
-        Ok(Profile {
+        Ok(Profile::of(measured, remarks))
+    }
+
+    fn of(measured: Measured, remarks: Vec<Remark>) -> Profile {
+        let part = |k: usize| {
+            let values: Vec<f64> = measured.points.iter().map(|point| point[k]).collect();
+            Spline::new(&measured.along, &values, measured.smoothing)
+        };
+        Profile {
             y: part(0),
             z: part(1),
+            measured: Arc::new(measured),
             remarks,
-        })
+        }
+    }
+
+    /// The curve of the same points with another smoothing, its cut wavelength in mm (0: none).
+    #[must_use]
+    pub fn smoothed(&self, smoothing: f64) -> Profile {
+        let measured = Measured {
+            smoothing,
+            ..(*self.measured).clone()
+        };
+        Profile::of(measured, self.remarks.clone())
+    }
+
+    /// The points the curve was made from, z up, by increasing parameter of the curve.
+    #[must_use]
+    pub fn points(&self) -> Points<'_> {
+        Points {
+            at: &self.measured.points,
+            along: &self.measured.along,
+        }
+    }
+
+    /// Median distance of neighbouring points in mm.
+    #[must_use]
+    pub fn usual_chord(&self) -> f64 {
+        let mut chords: Vec<f64> = self.chords().collect();
+        noise::median(&mut chords)
+    }
+
+    /// Largest distance of neighbouring points in mm.
+    #[must_use]
+    pub fn longest_chord(&self) -> f64 {
+        self.chords().fold(0.0, f64::max)
+    }
+
+    fn chords(&self) -> impl Iterator<Item = f64> {
+        self.measured.along.windows(2).map(|pair| pair[1] - pair[0])
+    }
+
+    /// Cut wavelength of the smoothing in mm; 0 for none.
+    #[must_use]
+    pub fn smoothing(&self) -> f64 {
+        self.measured.smoothing
+    }
+
+    /// The step in mm of which the coordinates were given as multiples, if it is 0.001 mm or more.
+    #[must_use]
+    pub fn rounding(&self) -> Option<f64> {
+        self.measured.rounding
     }
 
     /// First and last parameter, in mm along the chords of the points.
@@ -176,6 +254,7 @@ impl Profile {
         Profile {
             y: part(&|p| cos * p[0] - sin * p[1]),
             z: part(&|p| sin * p[0] + cos * p[1]),
+            measured: Arc::clone(&self.measured),
             remarks: self.remarks.clone(),
         }
     }
@@ -323,6 +402,28 @@ fn straighten(
         });
     }
     Ok(())
+}
+
+/// Drops one or two points at an end that a long chord parts from all others, as measurements have them.
+fn cut_stray_ends(body: Body, points: &mut Vec<[f64; 2]>, remarks: &mut Vec<Remark>) {
+    let [first, last] = shape::stray_ends(points);
+    let profile = body.name();
+    if let Some((count, distance_mm)) = last {
+        points.truncate(points.len() - count);
+        remarks.push(Remark::ProfileEndDropped {
+            profile,
+            count,
+            distance_mm,
+        });
+    }
+    if let Some((count, distance_mm)) = first {
+        points.drain(..count);
+        remarks.push(Remark::ProfileEndDropped {
+            profile,
+            count,
+            distance_mm,
+        });
+    }
 }
 
 fn step(from: [f64; 2], to: [f64; 2]) -> [f64; 2] {

@@ -104,6 +104,10 @@ impl WheelRail {
                 placement.rolling_radius
             ));
         }
+        Ok(WheelRail::placed(rail, wheel, placement))
+    }
+
+    fn placed(rail: Profile, wheel: Profile, placement: Placement) -> WheelRail {
         let canted = rail.turned(placement.cant);
         let places: Vec<[f64; 2]> = canted
             .parameters(0.05)
@@ -118,7 +122,7 @@ impl WheelRail {
         let (yaw, roll) = (placement.yaw, placement.roll);
         let axle = [-yaw.sin() * roll.cos(), yaw.cos() * roll.cos(), roll.sin()];
         let across = axle[1].hypot(axle[2]);
-        Ok(WheelRail {
+        WheelRail {
             placement,
             rail_given: rail,
             rail: canted,
@@ -131,7 +135,23 @@ impl WheelRail {
                 -axle[0] * axle[2] / across,
             ],
             down: [0.0, axle[2] / across, -axle[1] / across],
-        })
+        }
+    }
+
+    /// The profiles of rail (before cant) and wheel.
+    #[must_use]
+    pub fn profiles(&self) -> [&Profile; 2] {
+        [&self.rail_given, &self.wheel]
+    }
+
+    /// The same with other smoothings of rail and wheel, in mm.
+    #[must_use]
+    pub fn smoothed(&self, smoothing: [f64; 2]) -> WheelRail {
+        let rail = self.rail_given.smoothed(smoothing[0]);
+        let wheel = self.wheel.smoothed(smoothing[1]);
+        let placement = self.placement;
+        // What a wheel's profile may reach was checked; a smoothed one reaches hardly farther.
+        WheelRail::placed(rail, wheel, placement)
     }
 
     /// Unit vector along the axle, to the left.

@@ -15,6 +15,7 @@ use crate::contact::normal::hertz::Pressing;
 use crate::contact::normal::non_hertzian::gap::Gap;
 use crate::contact::normal::non_hertzian::{Failure, GapContact, Report};
 use crate::contact::normal::prescribed::PressureField;
+use crate::contact::profile_trust::Trust;
 use crate::contact::remark::{Remark, RemarkEntry};
 
 /// Heights looked at before giving up.
@@ -55,6 +56,8 @@ pub struct ProfileContact {
     pub loading: Loading,
     /// Contact modulus `E* = G/(1−ν)` in MPa.
     pub contact_modulus: f64,
+    /// What the case says about the trust in the profiles.
+    pub trust: Trust,
 }
 
 /// The wheel at rest on its rail.
@@ -134,6 +137,15 @@ impl PressedWheel {
 }
 
 impl ProfileContact {
+    /// The same with other smoothings of rail and wheel, in mm.
+    #[must_use]
+    pub fn smoothed(&self, smoothing: [f64; 2]) -> ProfileContact {
+        ProfileContact {
+            geometry: self.geometry.smoothed(smoothing),
+            ..self.clone()
+        }
+    }
+
     /// Brings the wheel to rest, from an earlier rest under a similar load if there is one.
     ///
     /// # Errors

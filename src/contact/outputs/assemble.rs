@@ -138,6 +138,7 @@ fn patch_solution((patch, points): (&Patch, Vec<PointSolution>)) -> PatchSolutio
         semi_axes_mm: patch.semi_axes,
         extent_mm: patch.extent,
         position: None,
+        quality: None,
         points,
     }
 }
@@ -168,6 +169,7 @@ fn point_solution(
         force_x_n: found.force_x,
         force_y_n: found.force_y,
         moment_z_n_mm: found.moment_z,
+        profile_uncertainty: None,
         error_estimate: point.errors[index]
             .map(|e| absolute(problem, std::slice::from_ref(patch), e)),
         stick_area_mm2: areas.map(|a| a.stick_area),
@@ -289,6 +291,7 @@ fn total(problem: &Problem, patches: &[Patch], point: &Point) -> Total {
         force_y_n: sum.force_y,
         force_z_n: None,
         moment_z_n_mm: sum.moment_z,
+        profile_uncertainty: None,
         error_estimate: point
             .errors
             .last()

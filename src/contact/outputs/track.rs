@@ -145,6 +145,7 @@ impl Part {
                         + arm[1].abs() * error.force_x_n,
                 }
             }),
+            profile_uncertainty: None,
         }
     }
 }
@@ -177,6 +178,7 @@ fn sum(so_far: Option<Total>, part: Total) -> Option<Total> {
                 force_y_n: a.force_y_n + b.force_y_n,
                 moment_z_n_mm: a.moment_z_n_mm + b.moment_z_n_mm,
             }),
+        profile_uncertainty: None,
     })
 }
 

@@ -5,6 +5,7 @@ use crate::contact::error::Fault;
 use crate::contact::influence::strips::Precision;
 use crate::contact::normal::Region;
 use crate::contact::problem::{Cost, Limits, Prescribed, Problem, Resolution};
+use crate::contact::profile_trust::before;
 use crate::contact::tangential::ladder::{CELLS_MAX, LEVELS_KEPT, Ladder};
 use crate::contact::tangential::level::precision_of;
 use crate::contact::tangential::operator_store::OperatorKind;
@@ -67,12 +68,13 @@ pub(super) struct Size {
     pub(super) normal_seconds: f64,
 }
 
-/// Time to find region and pressure, in s: that of a gap, or of the few heights of a wheel with a gap or two at each.
+/// Time to find region and pressure, in s: that of a gap, or of the few heights of a wheel with a gap or two at each, once more for every other
+/// reading of its profiles.
 pub(super) fn normal_seconds(region: &Region) -> f64 {
     match region {
         Region::Ellipse(_) | Region::Grid(_) => 0.0,
         Region::Gap(contact) => 0.005 * contact.summits() as f64,
-        Region::Profiles(_) => 0.04,
+        Region::Profiles(contact) => 0.04 * f64::from(1 + before::readings_expected(contact)),
     }
 }
 

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::contact::case::{Contact, CrossSection, Load, Motions, Wheelset};
+use crate::contact::case::{
+    Contact, CrossSection, Load, Motions, Smoothing, SmoothingWord, Wheelset,
+};
 use crate::contact::error::Fault;
 use crate::contact::geometry::contact_search::Search;
 use crate::contact::geometry::formats;
@@ -11,6 +13,9 @@ use crate::contact::geometry::wheel_rail::{Placement, WheelRail};
 use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::normal::Region;
 use crate::contact::normal::profiles::{Loading, ProfileContact};
+use crate::contact::problem::Problem;
+use crate::contact::profile_trust::quality::PairQuality;
+use crate::contact::profile_trust::{Trust, before};
 use crate::contact::remark::RemarkEntry;
 
 /// The region of a wheel on a rail, yet to be found, with its remarks; `None` without faults where the load or the contact
@@ -27,7 +32,10 @@ pub(super) fn region(
     if let Err(detail) = Search::new(&geometry) {
         return Err(vec![fault("/contact".to_owned(), detail)]);
     }
-    let remarks = geometry.remarks();
+    let mut remarks = geometry.remarks();
+    let [rail, wheel] = geometry.profiles();
+    remarks.extend(before::misplaced(rail, Body::Rail));
+    remarks.extend(before::misplaced(wheel, Body::Wheel));
     let loading = load.and_then(loading);
     let (Some(loading), Some(contact_modulus)) = (loading, contact_modulus) else {
         return Ok(None);
@@ -36,8 +44,20 @@ pub(super) fn region(
         geometry,
         loading,
         contact_modulus,
+        trust: trust(contact),
     };
     Ok(Some((Region::Profiles(Arc::new(contact)), remarks)))
+}
+
+impl Problem {
+    /// How far the points of the profiles can be trusted, as far as that is known without the contact; only of a wheel on a rail.
+    #[must_use]
+    pub fn quality(&self) -> Option<PairQuality> {
+        let Region::Profiles(contact) = &self.region else {
+            return None;
+        };
+        Some(before::quality(&contact.geometry, contact.contact_modulus))
+    }
 }
 
 /// The motion of the wheelset, if the case gives it instead of creepages.
@@ -86,6 +106,7 @@ fn wheel_rail(contact: &Contact) -> Result<WheelRail, Vec<Fault>> {
         lateral_shift_mm,
         yaw_rad,
         roll_rad,
+        accept_rough_profiles,
     } = contact
     else {
         return Err(vec![fault(
@@ -100,6 +121,9 @@ fn wheel_rail(contact: &Contact) -> Result<WheelRail, Vec<Fault>> {
         (Err(rail), Err(wheel)) => return Err([rail, wheel].concat()),
         (Err(faults), Ok(_)) | (Ok(_), Err(faults)) => return Err(faults),
     };
+    if !accept_rough_profiles {
+        exchanged(&rail, &wheel)?;
+    }
     let placement = Placement {
         side: *side,
         rolling_radius: *rolling_radius_mm,
@@ -116,12 +140,50 @@ fn wheel_rail(contact: &Contact) -> Result<WheelRail, Vec<Fault>> {
         .map_err(|detail| vec![fault("/contact/rolling_radius_mm".to_owned(), detail)])
 }
 
+/// Faults of two profiles that both look like the other body's; one of them alone may be an unusual shape.
+fn exchanged(rail: &Profile, wheel: &Profile) -> Result<(), Vec<Fault>> {
+    let both = before::misplaced(rail, Body::Rail).zip(before::misplaced(wheel, Body::Wheel));
+    let Some((rail, wheel)) = both else {
+        return Ok(());
+    };
+    let refused = |remark: RemarkEntry| {
+        format!(
+            "{}; to solve all the same give accept_rough_profiles: true",
+            remark.detail
+        )
+    };
+    Err(vec![
+        fault("/contact/rail".to_owned(), refused(rail)),
+        fault("/contact/wheel".to_owned(), refused(wheel)),
+    ])
+}
+
+fn trust(contact: &Contact) -> Trust {
+    let Contact::Profiles {
+        rail,
+        wheel,
+        accept_rough_profiles,
+        ..
+    } = contact
+    else {
+        return Trust::default();
+    };
+    let auto = |section: &CrossSection| matches!(section.smoothing_mm, Smoothing::ByNoise(_));
+    Trust {
+        auto: [auto(rail), auto(wheel)],
+        accept_rough: *accept_rough_profiles,
+    }
+}
+
 fn profile(body: Body, section: &CrossSection) -> Result<Profile, Fault> {
     let name = body.name();
     let mut reading = Reading {
         mirror_y: section.mirror_y,
         mirror_z: section.mirror_z,
-        smoothing: section.smoothing_mm,
+        smoothing: match section.smoothing_mm {
+            Smoothing::Length(length) => length,
+            Smoothing::ByNoise(SmoothingWord::Auto) => 0.0,
+        },
     };
     if let (Some(format), Some(text)) = (section.format, &section.text) {
         let refuse = |detail| fault(format!("/contact/{name}/text"), detail);

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::contact::case::{Contact, CrossSection};
+use crate::contact::case::{Contact, CrossSection, Smoothing, SmoothingWord};
 use crate::contact::geometry::formats::Format;
 use crate::contact::geometry::profile::{POINTS_MAX, POINTS_MIN};
 use crate::contact::geometry::wheel_rail::Side;
@@ -26,7 +26,7 @@ const SMOOTHING: Interval = Interval::closed(0.0, 50.0, "mm");
 const TEXT_MAX: usize = 4_000_000;
 /// Faulty points of one cross-section that are listed one by one.
 const POINT_FAULTS_MAX: usize = 5;
-const MEMBERS: [&str; 13] = [
+const MEMBERS: [&str; 14] = [
     "type",
     "rail",
     "wheel",
@@ -40,6 +40,7 @@ const MEMBERS: [&str; 13] = [
     "lateral_shift_mm",
     "yaw_rad",
     "roll_rad",
+    "accept_rough_profiles",
 ];
 
 /// Reads the members of the contact; whether the cross-sections are sound is told when they are laid over each other.
@@ -67,6 +68,7 @@ pub(super) fn read(block: &mut Object) -> Option<Contact> {
     let lateral_shift_mm = or("lateral_shift_mm", PLACE, 0.0);
     let yaw_rad = or("yaw_rad", ANGLE, 0.0);
     let roll_rad = or("roll_rad", ANGLE, 0.0);
+    let accept_rough_profiles = flag(block, "accept_rough_profiles");
     Some(Contact::Profiles {
         rail: Box::new(rail?),
         wheel: Box::new(wheel?),
@@ -80,6 +82,7 @@ pub(super) fn read(block: &mut Object) -> Option<Contact> {
         lateral_shift_mm: lateral_shift_mm?,
         yaw_rad: yaw_rad?,
         roll_rad: roll_rad?,
+        accept_rough_profiles: accept_rough_profiles?.unwrap_or(false),
     })
 }
 
@@ -98,11 +101,7 @@ fn section(contact: &mut Object, name: &str) -> Option<CrossSection> {
     );
     let mirror_y = flag(&mut block, "mirror_y");
     let mirror_z = flag(&mut block, "mirror_z");
-    let smoothing_mm = if block.has("smoothing_mm") {
-        block.number("smoothing_mm", SMOOTHING)
-    } else {
-        Some(0.0)
-    };
+    let smoothing_mm = smoothing(&mut block);
     let (points_mm, format, text) = match (block.has("points_mm"), block.has("text")) {
         (true, false) => {
             if block.has("format") {
@@ -144,6 +143,27 @@ fn section(contact: &mut Object, name: &str) -> Option<CrossSection> {
         mirror_z: mirror_z?,
         smoothing_mm: smoothing_mm?,
     })
+}
+
+/// A length, or the word `auto`.
+fn smoothing(block: &mut Object) -> Option<Smoothing> {
+    let Some(value) = block.value("smoothing_mm") else {
+        return Some(Smoothing::Length(0.0));
+    };
+    if value.as_str() == Some("auto") {
+        return Some(Smoothing::ByNoise(SmoothingWord::Auto));
+    }
+    if !value.is_number() {
+        let given = shown(value);
+        block.fault(
+            "smoothing_mm",
+            format!("{given} given; {SMOOTHING} is allowed, or \"auto\""),
+        );
+        return None;
+    }
+    block
+        .number("smoothing_mm", SMOOTHING)
+        .map(Smoothing::Length)
 }
 
 /// A truth value that may be left out; the outer `None` is a fault.

@@ -85,6 +85,246 @@ remarks! {
     advice: "Check the measurement where pieces are joined.",
     detail: format!("{profile}: {count} points that ran back (zig-zag) were dropped"),
 
+    /// One or two points at an end of a profile, far from all others, were dropped.
+    ProfileEndDropped {
+        /// Whose.
+        profile: &'static str = "wheel",
+        /// Points left out.
+        count: usize = 1,
+        /// Their distance from the next point.
+        distance_mm: f64 = 67.0,
+    }
+    code: "profile-end-dropped",
+    severity: Info,
+    advice: "Nothing if the profile ends there; else check the file.",
+    detail: format!("{profile}: {count} stray points at an end, {distance_mm:.1} mm from the next one, were dropped"),
+
+    /// A profile has the shape of the other body.
+    ProfileOfOtherBody {
+        /// Which.
+        profile: &'static str = "rail",
+        /// What it looks like.
+        like: &'static str = "a wheel with its flange",
+    }
+    code: "profile-of-other-body",
+    severity: Warning,
+    advice: "Check that rail and wheel were not exchanged. Where both look like the other the case is refused.",
+    detail: format!("the profile given as {profile} looks like {like}; were rail and wheel exchanged?"),
+
+    /// The smoothing of a profile was chosen from its noise and the pressure, as the case asked for.
+    SmoothingChosen {
+        /// Whose.
+        profile: &'static str = "rail",
+        /// Cut wavelength; 0 for none.
+        smoothing_mm: f64 = 3.4,
+    }
+    code: "smoothing-chosen",
+    severity: Info,
+    advice: "Nothing; give `smoothing_mm` as a number to use the same for other cases.",
+    detail: format!("{profile}: smoothed by {smoothing_mm:.2} mm, chosen from the noise of its points"),
+
+    /// One point of a profile near the contact is off the curve of its neighbours.
+    ProfileOutlier {
+        /// Whose.
+        profile: &'static str = "rail",
+        /// Where on the profile.
+        at_y_mm: f64 = -3.2,
+        /// Distance from the curve.
+        distance_um: f64 = 200.0,
+        /// Roughness of this profile as the pressure that flattens it.
+        waviness_mpa: f64 = 900.0,
+        /// That of both profiles over the largest pressure.
+        share: f64 = 0.4,
+    }
+    code: "profile-outlier",
+    severity: Warning,
+    advice: "Remove or correct the point; smoothing spreads it.",
+    detail: format!(
+        "the {profile}'s point at y = {at_y_mm:.2} mm is {distance_um:.1} µm off the curve of its neighbours, worth {waviness_mpa:.0} MPa: \
+         remove or correct it"
+    ),
+
+    /// A profile jumps between two points near the contact.
+    ProfileStep {
+        /// Whose.
+        profile: &'static str = "rail",
+        /// Where on the profile.
+        at_y_mm: f64 = -3.2,
+        /// Height, positive upward with y.
+        height_um: f64 = 50.0,
+        /// Roughness of this profile as the pressure that flattens it.
+        waviness_mpa: f64 = 900.0,
+        /// That of both profiles over the largest pressure.
+        share: f64 = 0.4,
+    }
+    code: "profile-step",
+    severity: Warning,
+    advice: "Measure this part again, or join the pieces better: no smoothing heals a step, and forces are off as well.",
+    detail: format!(
+        "the {profile}'s points jump by {:.1} µm at y = {at_y_mm:.2} mm, worth {waviness_mpa:.0} MPa: no smoothing heals a step, measure \
+         this part again", height_um.abs()
+    ),
+
+    /// The points of a profile lie on straight chords between fewer points, as linear resampling leaves them.
+    ProfilePolygon {
+        /// Whose.
+        profile: &'static str = "rail",
+        /// Where on the profile, from and to.
+        y_mm: [f64; 2] = [-6.0, 5.0],
+        /// Length of the chords.
+        chord_mm: f64 = 0.5,
+        /// Roughness of this profile as the pressure that flattens it.
+        waviness_mpa: f64 = 200.0,
+        /// That of both profiles over the largest pressure.
+        share: f64 = 0.15,
+        /// Smoothing that is advised.
+        smoothing_mm: Option<f64> = Some(2.5),
+    }
+    code: "profile-polygon",
+    severity: Warning,
+    advice: "Send the points as measured, without resampling, or give the `smoothing_mm` named here.",
+    detail: format!(
+        "the {profile}'s points under the patch (y {:.1} to {:.1} mm) lie on straight chords of {chord_mm:.2} mm, as linear resampling leaves \
+         them; the kinks are worth {waviness_mpa:.0} MPa: send the points as measured{}",
+        y_mm[0], y_mm[1],
+        smoothing_mm.map_or_else(String::new, |length| format!(", or give smoothing_mm: {length}"))
+    ),
+
+    /// Noise of the points of a profile, of the measurement or of rounding, is worth a good part of the pressure.
+    ProfileNoise {
+        /// Whose.
+        profile: &'static str = "rail",
+        /// Where on the profile, from and to.
+        y_mm: [f64; 2] = [-6.0, 5.0],
+        /// Standard deviation along the normal.
+        noise_um: f64 = 1.9,
+        /// Mean distance of the points.
+        spacing_mm: f64 = 0.25,
+        /// Step of which all heights are multiples, if there is one.
+        rounding_mm: Option<f64> = Some(0.01),
+        /// Roughness of this profile as the pressure that flattens it.
+        waviness_mpa: f64 = 210.0,
+        /// That of both profiles over the largest pressure.
+        share: f64 = 0.17,
+        /// Smoothing that is advised.
+        smoothing_mm: Option<f64> = Some(4.0),
+    }
+    code: "profile-noise",
+    severity: Warning,
+    advice: "Give the `smoothing_mm` named here, or `\"auto\"`; send points with more decimals where they were rounded.",
+    detail: format!(
+        "noise of {noise_um:.2} µm{} at points {spacing_mm:.2} mm apart makes waves on the {profile} (y {:.1} to {:.1} mm) worth \
+         {waviness_mpa:.0} MPa{}",
+        rounding_mm.map_or_else(String::new, |step| format!(" (heights rounded to {step} mm)")),
+        y_mm[0], y_mm[1],
+        smoothing_mm.map_or_else(String::new, |length| format!(": give smoothing_mm: {length}"))
+    ),
+
+    /// Waves of a profile that are neither noise nor a single fault are worth a good part of the pressure.
+    ProfileWaves {
+        /// Whose.
+        profile: &'static str = "wheel",
+        /// Where on the profile, from and to.
+        y_mm: [f64; 2] = [-6.0, 5.0],
+        /// Their length at most.
+        shorter_than_mm: f64 = 3.0,
+        /// Roughness of this profile as the pressure that flattens it.
+        waviness_mpa: f64 = 210.0,
+        /// That of both profiles over the largest pressure.
+        share: f64 = 0.17,
+    }
+    code: "profile-waves",
+    severity: Warning,
+    advice: "Where they come from the measurement, smooth them with a `smoothing_mm` of about their length; real waves are part of the answer.",
+    detail: format!(
+        "waves on the {profile} shorter than {shorter_than_mm:.1} mm (y {:.1} to {:.1} mm) are worth {waviness_mpa:.0} MPa: smooth them with \
+         smoothing_mm where they come from the measurement", y_mm[0], y_mm[1]
+    ),
+
+    /// The points of a profile under the contact are so far apart that the curve between them is open.
+    ProfileSpacing {
+        /// Whose.
+        profile: &'static str = "rail",
+        /// The widest distance of neighbouring points, from and to.
+        y_mm: [f64; 2] = [-4.1, 3.9],
+        /// Its length.
+        spacing_mm: f64 = 8.0,
+        /// The same over the width of the patch.
+        spacing_over_width: f64 = 0.8,
+        /// Pressure that flattens the difference of two curves through the points.
+        ambiguity_mpa: f64 = 400.0,
+    }
+    code: "profile-spacing",
+    severity: Warning,
+    advice: "Send points 0.5 mm apart on the tread, 0.25 mm at gauge corner and flange.",
+    detail: format!(
+        "the {profile}'s points are {spacing_mm:.1} mm apart where it touches (y {:.1} to {:.1} mm), {spacing_over_width:.2} times the width of the \
+         patch; the curve between them is open by {ambiguity_mpa:.0} MPa: send more points there", y_mm[0], y_mm[1]
+    ),
+
+    /// A profile has a stretch without points near the contact over which the bodies may touch as well.
+    ProfileHole {
+        /// Whose.
+        profile: &'static str = "rail",
+        /// The stretch, from and to.
+        y_mm: [f64; 2] = [-25.0, 25.0],
+        /// Its length.
+        hole_mm: f64 = 50.0,
+    }
+    code: "profile-hole",
+    severity: Warning,
+    advice: "Send the points there: the contact may be elsewhere than found.",
+    detail: format!(
+        "the {profile} has no points from y {:.1} to {:.1} mm ({hole_mm:.1} mm), where the bodies may touch: the contact may be elsewhere than \
+         found; send the points there", y_mm[0], y_mm[1]
+    ),
+
+    /// The contact is on the tip of the flange, as on a wheel that climbs or has derailed.
+    ContactOnFlangeTip {
+        /// Whose.
+        profile: &'static str = "wheel",
+        /// Where on the profile, from and to.
+        y_mm: [f64; 2] = [-58.0, -52.0],
+    }
+    code: "contact-on-flange-tip",
+    severity: Warning,
+    advice: "Check lateral shift, gauge, flange-back distance and position.",
+    detail: format!(
+        "the contact at y {:.1} to {:.1} mm of the {profile} is on the tip of its flange, as on a wheel that climbs or has derailed: check lateral \
+         shift, gauge and flange-back distance", y_mm[0], y_mm[1]
+    ),
+
+    /// The contact is near the end of a profile, so that part of it may be cut off.
+    ContactAtProfileEnd {
+        /// Whose.
+        profile: &'static str = "wheel",
+        /// Where on the profile, from and to.
+        y_mm: [f64; 2] = [52.0, 58.0],
+        /// What is left of the profile beyond the contact.
+        left_mm: f64 = 2.0,
+    }
+    code: "contact-at-profile-end",
+    severity: Warning,
+    advice: "Check lateral shift and gauge, or send at least 5 mm of profile beyond the contact.",
+    detail: format!(
+        "the contact at y {:.1} to {:.1} mm of the {profile} is {left_mm:.1} mm from the end of its profile: check lateral shift and gauge, or send \
+         a longer profile", y_mm[0], y_mm[1]
+    ),
+
+    /// The target is smaller than what the measurement of the profiles leaves open: a finer solve says nothing more.
+    TargetBelowProfileUncertainty {
+        /// The target, relative to μN.
+        target: f64 = 1e-3,
+        /// What the profiles leave open of the forces, relative to μN.
+        uncertainty: f64 = 0.02,
+    }
+    code: "target-below-profile-uncertainty",
+    severity: Info,
+    advice: "Better points help, a smaller target does not.",
+    detail: format!(
+        "the profiles leave {:.1} % of μN open, more than the target of {:.1} %", 100.0 * uncertainty, 100.0 * target
+    ),
+
     /// The rail turns over the contact by so much that a plane of contact and half-spaces describe it roughly.
     ContactTurns {
         /// Change of the rail's inclination over the patch.

@@ -3,7 +3,7 @@
 //! Lines `Name=value`, an empty line, then one point per line in the columns that `ColumnDef` names; `X` is y and `Y`
 //! is z here. Instruments differ in the sense of both: x usually runs toward the track centre, z is told by the shape.
 
-use crate::contact::geometry::formats::{Contents, numbers, unreadable};
+use crate::contact::geometry::formats::{Contents, has_decimal_commas, numbers, unreadable};
 
 /// Known by the header: a line with `=` that is not a point.
 pub(super) fn read(text: &str) -> Result<Contents, String> {
@@ -29,7 +29,9 @@ pub(super) fn read(text: &str) -> Result<Contents, String> {
             }
             continue;
         }
-        let row = numbers(line).filter(|row| columns.iter().all(|column| *column < row.len()));
+        let row = numbers(line)
+            .filter(|row| columns.iter().all(|column| *column < row.len()))
+            .filter(|_| !has_decimal_commas(line));
         let row = row.ok_or_else(|| {
             unreadable(
                 k,

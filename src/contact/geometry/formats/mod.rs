@@ -32,15 +32,66 @@ pub struct Contents {
     pub wheel: Option<bool>,
 }
 
+/// Texts shorter than this may be paths.
+const PATH_LENGTH_MAX: usize = 1000;
+
 /// Reads a profile from the text of a file.
 ///
 /// # Errors
 /// A sentence with the number of the line that cannot be read, or with what is missing.
 pub fn read(format: Format, text: &str) -> Result<Contents, String> {
-    match format {
+    if is_path(text) {
+        return Err(format!(
+            "{:?} given, which looks like a path; text is what the file holds, not its path",
+            text.trim()
+        ));
+    }
+    let contents = match format {
         Format::Columns => columns::read(text),
         Format::Simpack => simpack::read(text),
         Format::Miniprof => miniprof::read(text),
+    };
+    contents.map_err(|reason| match looks_like(text) {
+        Some(other) if other != format => {
+            format!(
+                "{reason}; this looks like a file of the format {}",
+                other.word()
+            )
+        }
+        _ => reason,
+    })
+}
+
+/// One line that ends like a file name is no file.
+fn is_path(text: &str) -> bool {
+    let line = text.trim();
+    let name = line.rsplit(['/', '\\']).next().unwrap_or_default();
+    let extension = name.rsplit_once('.').map(|(_, extension)| extension);
+    line.len() < PATH_LENGTH_MAX
+        && !line.contains('\n')
+        && extension.is_some_and(|letters| {
+            (2..=5).contains(&letters.len()) && letters.chars().all(char::is_alphabetic)
+        })
+}
+
+/// The format that the words of a text belong to.
+fn looks_like(text: &str) -> Option<Format> {
+    if text.contains("point.begin") {
+        Some(Format::Simpack)
+    } else if text.contains("ColumnDef") || text.contains("XYPoints") {
+        Some(Format::Miniprof)
+    } else {
+        None
+    }
+}
+
+impl Format {
+    fn word(self) -> &'static str {
+        match self {
+            Format::Columns => "columns",
+            Format::Simpack => "simpack",
+            Format::Miniprof => "miniprof",
+        }
     }
 }
 
@@ -52,7 +103,36 @@ fn numbers(line: &str) -> Option<Vec<f64>> {
         .collect()
 }
 
+/// Are the numbers of a line written with decimal commas? Each has one comma between digits, and no point.
+fn has_decimal_commas(line: &str) -> bool {
+    let words = line
+        .split(|c: char| c.is_whitespace() || c == ';')
+        .filter(|word| !word.is_empty());
+    let decimal = |word: &str| {
+        let (whole, part) = word.split_once(',')?;
+        let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+        (digits(whole.trim_start_matches(['-', '+'])) && digits(part)).then_some(())
+    };
+    let mut count = 0;
+    for word in words {
+        if decimal(word).is_none() && word.parse::<i64>().is_err() {
+            return false;
+        }
+        count += usize::from(word.contains(','));
+    }
+    // One such word is a pair of whole numbers.
+    count >= 2 || count == 1 && line.trim().contains([';', ' ', '\t'])
+}
+
 fn unreadable(line: usize, text: &str, needed: &str) -> String {
     let shown: String = text.chars().take(60).collect();
-    format!("line {}: {shown:?} given; {needed} is needed", line + 1)
+    let hint = if has_decimal_commas(text) {
+        "; numbers are written with a decimal point here, not with a decimal comma"
+    } else {
+        ""
+    };
+    format!(
+        "line {}: {shown:?} given; {needed} is needed{hint}",
+        line + 1
+    )
 }

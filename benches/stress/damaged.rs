@@ -1,0 +1,520 @@
+//! Damaged profiles: sound pairs of rail and wheel, what measuring and exporting does to them, and what the answer then says.
+
+use std::f64::consts::TAU;
+
+use railhead::contact::geometry::formats::{Format, read};
+use railhead::contact::geometry::profile::{Body, Profile, Reading};
+use railhead::contact::monitor::Unwatched;
+use railhead::contact::problem::Limits;
+use railhead::contact::solution::Solution;
+use railhead::contact::{check, solve};
+use serde_json::{Value, json};
+
+use crate::profile_reference_files::reference_file;
+use crate::profile_shapes::{rail_60e1, s1002};
+use crate::random::Random;
+
+/// Points of one cross-section, y to the field side and z down.
+pub type Points = Vec<[f64; 2]>;
+
+/// A rail and a wheel without damage.
+#[derive(Clone)]
+pub struct Pair {
+    pub rail: Points,
+    pub wheel: Points,
+    pub placement: Value,
+    /// Lateral shifts in mm between which places are drawn.
+    pub shifts: [f64; 2],
+}
+
+/// A wheelset on a pair.
+pub struct Place {
+    pub case: Value,
+    /// The same with sound profiles.
+    pub sound: Solution,
+    /// The contact of the main patch along rail and wheel, as number of the nearest point.
+    pub at: [[f64; 2]; 2],
+}
+
+/// What happened to the points.
+#[derive(Debug, Clone, Copy)]
+pub enum Damage {
+    /// Points this far apart.
+    Coarse(f64),
+    /// No points over this length.
+    Hole(f64),
+    /// Chords of this length, resampled linearly.
+    Polygon(f64),
+    /// Coordinates in multiples of this.
+    Rounded(f64),
+    /// White noise of this deviation.
+    Noise(f64),
+    /// One point off by this much.
+    Outlier(f64),
+    /// All points on one side higher by this much.
+    Step(f64),
+    /// Waves of this amplitude and length.
+    Waves(f64, f64),
+}
+
+impl Damage {
+    /// Names of the kinds.
+    pub const NAMES: [&'static str; Damage::KINDS] = [
+        "coarse", "hole", "polygon", "rounded", "noise", "outlier", "step", "waves",
+    ];
+
+    /// Any damage of a kind, from harmless to grave.
+    pub fn random(kind: usize, random: &mut Random) -> Damage {
+        match kind {
+            0 => Damage::Coarse(random.decades(0.5, 10.0)),
+            1 => Damage::Hole(random.decades(1.0, 50.0)),
+            2 => Damage::Polygon(random.decades(0.25, 2.5)),
+            3 => Damage::Rounded([0.001, 0.01][random.below(2)]),
+            4 => Damage::Noise(random.decades(2e-5, 2e-2)),
+            5 => Damage::Outlier(random.decades(5e-4, 0.2)),
+            6 => Damage::Step(random.decades(5e-4, 0.05)),
+            _ => {
+                let length = random.decades(1.0, 4.0);
+                Damage::Waves(random.decades(1e-4, 2e-2), length)
+            }
+        }
+    }
+
+    /// How many kinds there are.
+    pub const KINDS: usize = 8;
+
+    /// The points with the damage at or near a place.
+    pub fn done_to(self, points: &[[f64; 2]], at: [f64; 2], random: &mut Random) -> Points {
+        let even = |step: f64| resampled(points, step);
+        let nearest = |points: &[[f64; 2]]| {
+            let far = |p: &[f64; 2]| (p[0] - at[0]).hypot(p[1] - at[1]);
+            let places = 0..points.len();
+            places
+                .min_by(|a, b| far(&points[*a]).total_cmp(&far(&points[*b])))
+                .expect("points")
+        };
+        match self {
+            Damage::Coarse(step) => even(step),
+            Damage::Hole(length) => {
+                let points = even(0.25);
+                let off = random.between(-0.5, 0.5) * length;
+                let middle = nearest(&points) as f64 + off / 0.25;
+                let half = 0.5 * length / 0.25;
+                let kept =
+                    |k: usize| (k as f64 - middle).abs() > half || k < 8 || k + 8 > points.len();
+                (0..points.len())
+                    .filter(|k| kept(*k))
+                    .map(|k| points[k])
+                    .collect()
+            }
+            Damage::Polygon(chord) => linear(&even(chord), 5000),
+            Damage::Rounded(step) => {
+                let round = |v: f64| (v / step).round() * step;
+                even(0.25).into_iter().map(|p| p.map(round)).collect()
+            }
+            Damage::Noise(deviation) => off_normal(&even(0.25), |_, _| deviation * normal(random)),
+            Damage::Outlier(height) => {
+                let points = even(0.25);
+                let place = nearest(&points) as f64 + random.between(-8.0, 8.0);
+                let sign = random.sign();
+                off_normal(&points, |k, _| {
+                    if k == place as usize {
+                        sign * height
+                    } else {
+                        0.0
+                    }
+                })
+            }
+            Damage::Step(height) => {
+                let points = even(0.25);
+                let place = nearest(&points) as f64 + random.between(-8.0, 8.0);
+                let sign = random.sign();
+                off_normal(
+                    &points,
+                    |k, _| {
+                        if k as f64 > place { sign * height } else { 0.0 }
+                    },
+                )
+            }
+            Damage::Waves(amplitude, length) => {
+                let phase = random.between(0.0, TAU);
+                off_normal(&even(0.25), |_, s| {
+                    amplitude * (TAU * s / length + phase).sin()
+                })
+            }
+        }
+    }
+}
+
+fn normal(random: &mut Random) -> f64 {
+    let radius = (-2.0 * (1.0 - random.part()).ln()).sqrt();
+    radius * (TAU * random.part()).cos()
+}
+
+fn curve(points: &[[f64; 2]]) -> Profile {
+    let reading = Reading {
+        mirror_y: Some(false),
+        mirror_z: Some(false),
+        smoothing: 0.0,
+    };
+    Profile::new(Body::Rail, points, reading).expect("a sound profile")
+}
+
+/// True points at equal distances.
+pub fn resampled(points: &[[f64; 2]], step: f64) -> Points {
+    let curve = curve(points);
+    let places = curve.parameters(step);
+    places
+        .into_iter()
+        .map(|s| curve.at(s).at)
+        .map(|[y, z]| [y, -z])
+        .collect()
+}
+
+/// So many points at equal distances on the chords.
+pub fn linear(points: &[[f64; 2]], count: usize) -> Points {
+    let mut along = vec![0.0];
+    for pair in points.windows(2) {
+        let chord = (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
+        along.push(along[along.len() - 1] + chord);
+    }
+    let length = along[along.len() - 1];
+    (0..count)
+        .map(|k| {
+            let s = length * k as f64 / (count - 1) as f64;
+            let i = along
+                .partition_point(|knot| *knot <= s)
+                .clamp(1, points.len() - 1);
+            let t = (s - along[i - 1]) / (along[i] - along[i - 1]);
+            [0, 1].map(|part| points[i - 1][part] * (1.0 - t) + points[i][part] * t)
+        })
+        .collect()
+}
+
+/// Points moved along the normal of their curve by what a function of number and length says.
+fn off_normal(points: &[[f64; 2]], mut by: impl FnMut(usize, f64) -> f64) -> Points {
+    let mut along = 0.0;
+    (0..points.len())
+        .map(|k| {
+            let (a, b) = (
+                points[k.saturating_sub(1)],
+                points[(k + 1).min(points.len() - 1)],
+            );
+            let [y, z] = [b[0] - a[0], b[1] - a[1]];
+            let length = y.hypot(z);
+            if k > 0 {
+                along += (points[k][0] - points[k - 1][0]).hypot(points[k][1] - points[k - 1][1]);
+            }
+            let h = by(k, along);
+            [points[k][0] + h * z / length, points[k][1] - h * y / length]
+        })
+        .collect()
+}
+
+/// A profile worn by a smooth depth, at a place and over a width.
+fn worn(points: &[[f64; 2]], marks: &[[f64; 3]]) -> Points {
+    let points = resampled(points, 0.2);
+    off_normal(&points.clone(), |k, _| {
+        let y = points[k][0];
+        let mark = |[at, width, depth]: &[f64; 3]| depth * (-((y - at) / width).powi(2)).exp();
+        -marks.iter().map(mark).sum::<f64>()
+    })
+}
+
+fn placed(cant: f64) -> Value {
+    json!({
+        "type": "profiles", "side": "right", "rolling_radius_mm": 460, "gauge_mm": 1435,
+        "gauge_height_mm": 14, "cant_rad": cant, "flange_back_distance_mm": 1360,
+        "flange_back_position_mm": -70,
+    })
+}
+
+/// Pairs that no threshold was chosen on: other wear, other inclinations.
+pub fn held_out() -> Vec<Pair> {
+    let pair = |rail, wheel, cant, shifts| Pair {
+        rail,
+        wheel,
+        placement: placed(cant),
+        shifts,
+    };
+    vec![
+        pair(
+            // 60E1 and S1002 with wear.
+            worn(&rail_60e1(), &[[-24.0, 9.0, 0.6], [2.0, 16.0, 0.35]]),
+            worn(&s1002(), &[[-4.0, 22.0, 0.5], [-33.0, 9.0, 0.4]]),
+            0.025,
+            [-7.0, 7.0],
+        ),
+        pair(
+            // 60E1 not inclined, S1002 hollow.
+            rail_60e1(),
+            worn(&s1002(), &[[3.0, 15.0, 0.9]]),
+            0.0,
+            [-6.0, 6.0],
+        ),
+        pair(
+            // 60E1 inclined 1:20, S1002.
+            worn(&rail_60e1(), &[[-15.0, 12.0, 0.3]]),
+            s1002(),
+            0.05,
+            [-7.0, 6.0],
+        ),
+    ]
+}
+
+/// Pairs of the kind that the thresholds were chosen on; the benchmark's where its files are there.
+pub fn tuned_on() -> Vec<Pair> {
+    let mut pairs = vec![Pair {
+        rail: rail_60e1(),
+        wheel: s1002(),
+        placement: placed(0.025),
+        shifts: [-7.0, 6.0],
+    }];
+    let file = |name: &str| {
+        let contents = read(Format::Simpack, &reference_file(name)?);
+        Some(contents.expect("a file of the reference").points)
+    };
+    let rail = file("profiles/MBench_UIC60_v3.prr");
+    if let (Some(rail), Some(wheel)) = (rail, file("profiles/MBench_S1002_v3.prw")) {
+        pairs.push(Pair {
+            rail,
+            wheel,
+            placement: placed(0.0),
+            shifts: [-8.0, 8.0],
+        });
+    }
+    pairs
+}
+
+impl Pair {
+    /// A place where the sound pair has an answer.
+    pub fn place(&self, random: &mut Random) -> Option<Place> {
+        let mut contact = self.placement.clone();
+        let members = contact.as_object_mut().expect("an object");
+        let [low, high] = self.shifts;
+        members.insert("lateral_shift_mm".into(), json!(random.between(low, high)));
+        members.insert("yaw_rad".into(), json!(random.between(-0.004, 0.004)));
+        let case = json!({
+            "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
+            "friction": { "coefficient": 0.3 },
+            "contact": contact,
+            "load": { "vertical_force_n": random.between(4e4, 1.2e5) },
+            "motion": { "wheelset": { "speed_mm_per_s": 20000, "free_rolling_radius_mm": random.between(459.0, 461.0) } },
+            "solver": { "target_error": 0.02 },
+            "outputs": ["resultants"],
+        });
+        let sound = answer(&with(&case, &self.rail, &self.wheel, 0.0))?;
+        let mut place = Place {
+            case,
+            sound,
+            at: [[0.0; 2]; 2],
+        };
+        let main = place
+            .sound
+            .patches
+            .iter()
+            .max_by(|a, b| a.normal_force_n.total_cmp(&b.normal_force_n))?;
+        let position = main.position?;
+        place.at = [position.rail_mm, position.wheel_mm];
+        Some(place)
+    }
+}
+
+/// The case with these points.
+pub fn with(
+    case: &Value,
+    rail: &[[f64; 2]],
+    wheel: &[[f64; 2]],
+    smoothing: impl Into<Value>,
+) -> Value {
+    let smoothing = smoothing.into();
+    let mut case = case.clone();
+    let section = |points: &[[f64; 2]]| json!({ "points_mm": points, "mirror_y": false, "mirror_z": false, "smoothing_mm": smoothing.clone() });
+    case["contact"]["rail"] = section(rail);
+    case["contact"]["wheel"] = section(wheel);
+    case
+}
+
+/// The answer, if there is one.
+pub fn answer(case: &Value) -> Option<Solution> {
+    let problem = check(case, &Limits::default()).ok()?;
+    solve(&problem, &Unwatched)
+        .ok()
+        .map(|(solution, _)| solution)
+}
+
+/// Remarks that blame a profile, or the place of the contact on it.
+const BLAMES: [&str; 9] = [
+    "profile-outlier",
+    "profile-step",
+    "profile-polygon",
+    "profile-noise",
+    "profile-waves",
+    "profile-spacing",
+    "profile-hole",
+    "contact-on-flange-tip",
+    "contact-at-profile-end",
+];
+
+/// Codes of the remarks that blame a profile.
+pub fn blamed(solution: &Solution) -> Vec<String> {
+    let codes = solution.remarks.iter().map(|remark| remark.code.clone());
+    codes
+        .filter(|code| BLAMES.contains(&code.as_str()))
+        .collect()
+}
+
+/// Largest pressure of all patches in MPa.
+pub fn pressure_max(solution: &Solution) -> f64 {
+    let all = solution.patches.iter().map(|patch| patch.pressure_max_mpa);
+    all.fold(0.0, f64::max)
+}
+
+/// What the trials of one kind, or of all, showed.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Counts {
+    /// Places with sound profiles, and how many of them were blamed.
+    pub sound: usize,
+    pub sound_blamed: usize,
+    /// Damaged profiles, and how many of them had no answer.
+    pub damaged: usize,
+    pub refused: usize,
+    /// Wrong by more than 10 % in the largest pressure or 3 % of μN in a force, and how many carry a remark.
+    pub wrong: usize,
+    pub wrong_told: usize,
+    /// Right within 3 % and 1 %, and how many carry a remark all the same.
+    pub right: usize,
+    pub right_told: usize,
+    /// Answers whose error is within the uncertainty, of pressure and of forces.
+    pub pressure_covered: usize,
+    pub force_covered: usize,
+}
+
+impl Counts {
+    /// The sum of both.
+    pub fn and(mut self, other: &Counts) -> Counts {
+        self.sound += other.sound;
+        self.sound_blamed += other.sound_blamed;
+        self.damaged += other.damaged;
+        self.refused += other.refused;
+        self.wrong += other.wrong;
+        self.wrong_told += other.wrong_told;
+        self.right += other.right;
+        self.right_told += other.right_told;
+        self.pressure_covered += other.pressure_covered;
+        self.force_covered += other.force_covered;
+        self
+    }
+
+    fn plus(&mut self, found: &Trial) {
+        self.damaged += 1;
+        let Trial::Answered {
+            pressure,
+            force,
+            open,
+            told,
+        } = found
+        else {
+            self.refused += 1;
+            return;
+        };
+        let (wrong, right) = (
+            *pressure > 0.1 || *force > 0.03,
+            *pressure < 0.03 && *force < 0.01,
+        );
+        self.wrong += usize::from(wrong);
+        self.wrong_told += usize::from(wrong && *told);
+        self.right += usize::from(right);
+        self.right_told += usize::from(right && *told);
+        self.pressure_covered += usize::from(*pressure <= open[0]);
+        self.force_covered += usize::from(*force <= open[1]);
+    }
+}
+
+/// What one damaged case showed: errors of the largest pressure (relative) and of the force (relative to μN), and what the answer says of
+/// them.
+enum Trial {
+    Refused,
+    Answered {
+        pressure: f64,
+        force: f64,
+        open: [f64; 2],
+        told: bool,
+    },
+}
+
+/// The counts by kind of damage, or of one kind, over the pairs at so many places each; the answer counts the sound places.
+pub fn rows_of(
+    pairs: &[Pair],
+    seed: u64,
+    places: usize,
+    kind: Option<usize>,
+    smoothing: &Value,
+    rows: &mut [Counts; Damage::KINDS],
+) -> Counts {
+    let mut random = Random(seed);
+    let mut sound = Counts::default();
+    for pair in pairs {
+        for _ in 0..places {
+            let Some(place) = pair.place(&mut random) else {
+                continue;
+            };
+            sound.sound += 1;
+            sound.sound_blamed += usize::from(!blamed(&place.sound).is_empty());
+            for (k, row) in rows.iter_mut().enumerate() {
+                if kind.is_none_or(|only| only == k) {
+                    row.plus(&place.trial(
+                        pair,
+                        Damage::random(k, &mut random),
+                        smoothing,
+                        &mut random,
+                    ));
+                }
+            }
+        }
+    }
+    sound
+}
+
+impl Place {
+    fn trial(&self, pair: &Pair, damage: Damage, smoothing: &Value, random: &mut Random) -> Trial {
+        let single = matches!(
+            damage,
+            Damage::Hole(_) | Damage::Outlier(_) | Damage::Step(_)
+        );
+        let only = random.below(2);
+        let [rail, wheel] = [(0, &pair.rail), (1, &pair.wheel)].map(|(body, points)| {
+            if single && only != body {
+                points.clone()
+            } else {
+                damage.done_to(points, self.at[body], random)
+            }
+        });
+        let mut case = with(&self.case, &rail, &wheel, smoothing.clone());
+        case["contact"]["accept_rough_profiles"] = json!(true);
+        let Some(found) = answer(&case) else {
+            return Trial::Refused;
+        };
+        let normal: f64 = self
+            .sound
+            .patches
+            .iter()
+            .map(|patch| patch.normal_force_n)
+            .sum();
+        let limit = 0.3 * normal;
+        let (own, sound) = (found.total[0], self.sound.total[0]);
+        let difference = |a: f64, b: f64| (a - b).abs() / limit;
+        let open = own.profile_uncertainty.expect("an uncertainty");
+        let pressure = pressure_max(&self.sound);
+        Trial::Answered {
+            pressure: (pressure_max(&found) / pressure - 1.0).abs(),
+            force: difference(own.force_x_n, sound.force_x_n)
+                .max(difference(own.force_y_n, sound.force_y_n)),
+            open: [
+                open.pressure_max_mpa / pressure,
+                open.force_x_n.max(open.force_y_n) / limit,
+            ],
+            told: !blamed(&found).is_empty(),
+        }
+    }
+}

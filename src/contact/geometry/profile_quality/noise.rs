@@ -1,0 +1,271 @@
+//! What the points of a profile say about how they were made: noise, single outliers, steps, polygons, rounding.
+
+use crate::contact::geometry::profile_quality::Points;
+
+/// Chords of one window of the noise, and its greatest length in mm: over longer ones the shape itself is not a cubic.
+const NOISE_CHORDS: usize = 4;
+const NOISE_SPAN_MAX: f64 = 3.0;
+/// Windows that a median needs.
+const WINDOWS_MIN: usize = 12;
+/// Median of the absolute value of a normal variable of deviation 1.
+pub const MEDIAN_OF_NORMAL: f64 = 0.6745;
+/// A point is odd from this many local medians and this distance in mm on.
+/// Population: seeded damage of the stress bench (class *damaged profile*); outliers of 2 µm may be worth half of the largest pressure.
+const ODD_MEDIANS: f64 = 12.0;
+const ODD_MIN: f64 = 1.2e-3;
+const ODD_WINDOW: usize = 15;
+/// Longest stretch in mm over which six neighbours are taken for points of one cubic.
+const ODD_SPAN_MAX: f64 = 3.5;
+/// Two neighbours off to either side are a step where the smaller distance is this part of the larger one.
+const STEP_PAIR: f64 = 0.7;
+/// A polygon has nearly all its turning in fewer points than this part of them, alone or in pairs.
+const TURNING: f64 = 0.9;
+const POLYGON_SHARE_MAX: f64 = 0.5;
+const POLYGON_POINTS_MIN: usize = 24;
+const POLYGON_CORNERS_MIN: usize = 4;
+const POLYGON_PAIR_MAX: f64 = 2.3;
+
+/// One point off the curve of its neighbours.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outlier {
+    /// Number of the point.
+    pub point: usize,
+    /// Distance from the cubic of its neighbours in mm.
+    pub distance: f64,
+}
+
+/// A jump of the profile between two points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// Number of the point before it.
+    pub point: usize,
+    /// Height in mm, positive upward.
+    pub height: f64,
+}
+
+/// Standard deviation of white noise along the normal in mm, over the points of a range; `None` where too few lie near enough
+/// to each other to tell it.
+///
+/// The fourth divided difference of five neighbours, `Σ w_i h_i` with `w_i = 1/Π_{j≠i}(t_i − t_j)` and `Σ w_i² = 1`, vanishes on every
+/// cubic; of white noise of deviation s it has the deviation s. The median of its size over 0.6745 is s, whatever single
+/// outliers do. (Correlated noise, as an instrument leaves that filters, is not seen.)
+#[must_use]
+pub fn noise(points: Points, range: [usize; 2]) -> Option<f64> {
+    let mut found = Vec::new();
+    for window in points.at[range[0]..range[1]].windows(NOISE_CHORDS + 1) {
+        let local = in_chord(window);
+        let span = local[NOISE_CHORDS][0] - local[0][0];
+        if span > NOISE_SPAN_MAX || span <= 0.0 {
+            continue;
+        }
+        let weight = |i: usize| -> f64 {
+            let others = (0..=NOISE_CHORDS).filter(|j| *j != i);
+            1.0 / others
+                .map(|j| (local[i][0] - local[j][0]) / span)
+                .product::<f64>()
+        };
+        let weights: Vec<f64> = (0..=NOISE_CHORDS).map(weight).collect();
+        let length = weights.iter().map(|w| w * w).sum::<f64>().sqrt();
+        let sum: f64 = weights.iter().zip(&local).map(|(w, at)| w * at[1]).sum();
+        if (sum / length).is_finite() {
+            found.push((sum / length).abs());
+        }
+    }
+    (found.len() >= WINDOWS_MIN).then(|| median(&mut found) / MEDIAN_OF_NORMAL)
+}
+
+/// The farthest outlier and the largest step of a range: points that stand out from the cubic through their six neighbours (least
+/// squares) by more than 12 local medians, 1.2 µm at least, and more than the points beside them.
+///
+/// A step of the height h between two points puts both off by h/2, to either side; an outlier puts its neighbours off by 0.43 of its
+/// own distance. Where two arcs meet, the curvature jumps by some 0.06/mm, which puts points 0.25 mm apart off by 0.2 µm.
+#[must_use]
+pub fn oddities(points: Points, range: [usize; 2]) -> (Option<Outlier>, Option<Step>) {
+    let around = [
+        range[0].saturating_sub(ODD_WINDOW),
+        (range[1] + ODD_WINDOW).min(points.at.len()),
+    ];
+    let off: Vec<f64> = (around[0]..around[1])
+        .map(|k| off_neighbours(points, k).unwrap_or(0.0))
+        .collect();
+    let size = |j: usize| off[j].abs();
+    let (mut outlier, mut step): (Option<Outlier>, Option<Step>) = (None, None);
+    for here in range[0] - around[0]..range[1] - around[0] {
+        let own = size(here);
+        let near = here.saturating_sub(3)..(here + 4).min(off.len());
+        if own < ODD_MIN || near.clone().any(|j| size(j) > own) {
+            continue;
+        }
+        let far = here.saturating_sub(ODD_WINDOW)..(here + ODD_WINDOW + 1).min(off.len());
+        // The neighbours of an odd point are off because of it.
+        let mut usual: Vec<f64> = far.filter(|j| !near.contains(j)).map(size).collect();
+        if own <= ODD_MEDIANS * median(&mut usual) {
+            continue;
+        }
+        let other = [
+            here.checked_sub(1),
+            Some(here + 1).filter(|j| *j < off.len()),
+        ];
+        let pair = other
+            .into_iter()
+            .flatten()
+            .find(|j| -off[*j] * off[here].signum() > STEP_PAIR * own);
+        match pair {
+            Some(pair) if step.is_none_or(|found| found.height.abs() < 2.0 * own) => {
+                let (low, high) = (here.min(pair), here.max(pair));
+                step = Some(Step {
+                    point: around[0] + low,
+                    height: off[high] - off[low],
+                });
+            }
+            None if outlier.is_none_or(|found| found.distance < own) => {
+                outlier = Some(Outlier {
+                    point: around[0] + here,
+                    distance: own,
+                });
+            }
+            _ => {}
+        }
+    }
+    (outlier, step)
+}
+
+/// How far a point lies above the cubic through its six neighbours (least squares), in mm.
+fn off_neighbours(points: Points, k: usize) -> Option<f64> {
+    let window = points.at.get(k.checked_sub(3)?..k + 4)?;
+    let local = in_chord(window);
+    if local[6][0] - local[0][0] > ODD_SPAN_MAX {
+        return None;
+    }
+    let others: Vec<[f64; 2]> = (0..7).filter(|j| *j != 3).map(|j| local[j]).collect();
+    Some(local[3][1] - fitted::<4>(&others, local[3][0])?)
+}
+
+/// Length in mm of the chords of a polygon, where the points of a range lie on one: resampled linearly from fewer points, they do not
+/// turn but at its corners (or, where no point lies on the corner, at the two beside it).
+#[must_use]
+pub fn polygon(points: Points, range: [usize; 2]) -> Option<f64> {
+    let window = &points.at[range[0]..range[1]];
+    if window.len() < POLYGON_POINTS_MIN {
+        return None;
+    }
+    let turns: Vec<f64> = window
+        .windows(3)
+        .map(|at| {
+            let [a, b] = [[0, 1], [1, 2]].map(|[i, j]| {
+                let [y, z] = [0, 1].map(|part| at[j][part] - at[i][part]);
+                z.atan2(y)
+            });
+            (b - a).abs()
+        })
+        .collect();
+    let total: f64 = turns.iter().sum();
+    let mut sorted = turns.clone();
+    sorted.sort_by(|a, b| b.total_cmp(a));
+    let mut carried = 0.0;
+    let corners = sorted
+        .iter()
+        .take_while(|turn| {
+            let before = carried;
+            carried += **turn;
+            before < TURNING * total
+        })
+        .count();
+    if total <= 0.0 || corners as f64 > POLYGON_SHARE_MAX * turns.len() as f64 {
+        return None;
+    }
+    let least = sorted[corners - 1];
+    let runs = turns.chunk_by(|a, b| (*a >= least) == (*b >= least));
+    let groups = runs.filter(|run| run[0] >= least).count();
+    let alone = corners as f64 <= POLYGON_PAIR_MAX * groups as f64;
+    let length = points.along[range[1] - 1] - points.along[range[0]];
+    (alone && groups >= POLYGON_CORNERS_MIN).then(|| length / groups as f64)
+}
+
+/// The step in mm of which every height is a multiple (0.1, 0.01 or 0.001), if there is one.
+#[must_use]
+pub fn rounding(given: &[[f64; 2]]) -> Option<f64> {
+    let multiples = |places: f64| {
+        given.iter().all(|at| {
+            let scaled = at[1] * places;
+            (scaled - scaled.round()).abs() < 1e-6
+        })
+    };
+    [10.0, 100.0, 1000.0]
+        .into_iter()
+        .find(|places| multiples(*places))
+        .map(|places| 1.0 / places)
+}
+
+/// Points in axes along and across the chord from the first to the last of them.
+fn in_chord(window: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let (from, to) = (window[0], window[window.len() - 1]);
+    let chord = [to[0] - from[0], to[1] - from[1]];
+    let length = chord[0].hypot(chord[1]).max(f64::MIN_POSITIVE);
+    let axis = chord.map(|part| part / length);
+    let turned = |at: &[f64; 2]| {
+        let [y, z] = [at[0] - from[0], at[1] - from[1]];
+        [axis[0] * y + axis[1] * z, axis[0] * z - axis[1] * y]
+    };
+    window.iter().map(turned).collect()
+}
+
+/// Value at `t` of the polynomial of `N` factors nearest to points `[t, h]` (least squares).
+fn fitted<const N: usize>(points: &[[f64; 2]], t: f64) -> Option<f64> {
+    let scale = points
+        .iter()
+        .map(|at| (at[0] - t).abs())
+        .fold(0.0, f64::max);
+    let rows: Vec<([f64; N], f64)> = points
+        .iter()
+        .map(|at| {
+            let mut powers = [1.0; N];
+            for k in 1..N {
+                powers[k] = powers[k - 1] * (at[0] - t) / scale;
+            }
+            (powers, at[1])
+        })
+        .collect();
+    first_factor(&rows)
+}
+
+/// First of the `N` factors of functions whose sum is nearest to heights (least squares); `None` where the functions cannot be told
+/// apart.
+fn first_factor<const N: usize>(rows: &[([f64; N], f64)]) -> Option<f64> {
+    let mut normal = [[0.0; N]; N];
+    let mut right = [0.0; N];
+    for (functions, height) in rows {
+        for i in 0..N {
+            right[i] += functions[i] * height;
+            for j in 0..N {
+                normal[i][j] += functions[i] * functions[j];
+            }
+        }
+    }
+    // From the last function up to the first, of which alone the factor is wanted.
+    for k in (1..N).rev() {
+        let (pivot, own) = (normal[k], right[k]);
+        if pivot[k].abs() < 1e-12 {
+            return None;
+        }
+        for i in 0..k {
+            let factor = normal[i][k] / pivot[k];
+            right[i] -= factor * own;
+            for j in 0..=k {
+                normal[i][j] -= factor * pivot[j];
+            }
+        }
+    }
+    let value = right[0] / normal[0][0];
+    value.is_finite().then_some(value)
+}
+
+/// The median, 0 of nothing.
+#[must_use]
+pub fn median(values: &mut [f64]) -> f64 {
+    let middle = values.len() / 2;
+    if values.is_empty() {
+        return 0.0;
+    }
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}

@@ -1,0 +1,79 @@
+//! What can be said about profiles before their contact is known: from their points alone.
+
+use crate::contact::geometry::profile::{Body, Profile};
+use crate::contact::geometry::profile_quality::shape::{Looks, looks_like};
+use crate::contact::geometry::profile_quality::{Grain, advised_smoothing, noise};
+use crate::contact::geometry::wheel_rail::WheelRail;
+use crate::contact::normal::profiles::ProfileContact;
+use crate::contact::profile_trust::quality::{PairQuality, SectionQuality};
+use crate::contact::profile_trust::settle::PRESSURE_USUAL;
+use crate::contact::remark::{Remark, RemarkEntry};
+
+/// Noise and spacing of a whole profile.
+pub fn grain(profile: &Profile) -> Grain {
+    let points = profile.points();
+    let whole = [0, points.at.len()];
+    Grain {
+        noise: noise::noise(points, whole).unwrap_or(0.0),
+        spacing: profile.usual_chord(),
+        polygon: noise::polygon(points, whole),
+    }
+}
+
+/// The quality of both profiles as far as it is known before the solve, with the contact modulus in MPa.
+#[must_use]
+pub fn quality(geometry: &WheelRail, modulus: f64) -> PairQuality {
+    let profiles = geometry.profiles();
+    let advised = advised_smoothing(profiles.map(grain), modulus, PRESSURE_USUAL);
+    let [rail, wheel] = [0, 1].map(|k| section(profiles[k], advised[k]));
+    PairQuality { rail, wheel }
+}
+
+/// How many other readings of the profiles a solve will look at: two with a smoothing, one where the noise asks for one, and one to settle
+/// an automatic one.
+#[must_use]
+pub fn readings_expected(contact: &ProfileContact) -> u32 {
+    let profiles = contact.geometry.profiles();
+    let auto = contact.trust.auto.contains(&true);
+    let smoothed = profiles.iter().any(|profile| profile.smoothing() > 0.0);
+    let grains = profiles.map(grain);
+    let noisy = advised_smoothing(grains, contact.contact_modulus, PRESSURE_USUAL) != [0.0; 2];
+    match (auto, smoothed || auto && noisy, noisy) {
+        (true, true, _) => 3,
+        (_, true, _) => 2,
+        (_, false, true) => 1,
+        _ => 0,
+    }
+}
+
+fn section(profile: &Profile, advised: f64) -> SectionQuality {
+    let points = profile.points();
+    let chords = points.along.windows(2).enumerate();
+    let longest = chords
+        .max_by(|(_, a), (_, b)| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))
+        .map_or(0, |(k, _)| k);
+    SectionQuality {
+        points: u32::try_from(points.at.len()).unwrap_or(u32::MAX),
+        spacing_mm: profile.usual_chord(),
+        hole_mm: points.along[longest + 1] - points.along[longest],
+        y_mm: [points.at[longest][0], points.at[longest + 1][0]],
+        noise_um: noise::noise(points, [0, points.at.len()]).map(|noise| 1e3 * noise),
+        rounding_mm: profile.rounding(),
+        smoothing_mm: profile.smoothing(),
+        smoothing_suggested_mm: advised,
+    }
+}
+
+/// The remark on a profile that looks like the other body's.
+#[must_use]
+pub fn misplaced(profile: &Profile, body: Body) -> Option<RemarkEntry> {
+    let (looks, like, pointer) = match body {
+        Body::Rail => (Looks::Wheel, "a wheel with its flange", "/contact/rail"),
+        Body::Wheel => (Looks::Rail, "the head of a rail", "/contact/wheel"),
+    };
+    let remark = Remark::ProfileOfOtherBody {
+        profile: body.name(),
+        like,
+    };
+    (looks_like(profile.points().at) == Some(looks)).then(|| remark.at_pointer(pointer))
+}

@@ -1,0 +1,245 @@
+//! Looks at the points of both profiles under the patches that were found, and names what is wrong with them.
+
+use crate::contact::geometry::profile::{Body, Profile};
+use crate::contact::geometry::profile_quality::flattening::noise_pressure;
+use crate::contact::geometry::profile_quality::noise::{Outlier, Step};
+use crate::contact::geometry::profile_quality::{
+    Grain, UnderContact, advised_smoothing, shape, under_contact,
+};
+use crate::contact::geometry::wheel_rail::WheelRail;
+use crate::contact::normal::profiles::PressedGap;
+use crate::contact::profile_trust::finding::{Cause, Finding};
+use crate::contact::profile_trust::quality::{PatchQuality, ProfileQuality};
+
+/// A body is blamed for its share of that from here on.
+const BLAMED: f64 = 0.6;
+/// Largest chord over the width of the patch that is remarked on, and what makes a job fail (as does [`AMBIGUOUS`]).
+const COARSE: f64 = 1.0;
+const COARSE_MAX: f64 = 1.5;
+/// A straight stretch may have its points as far apart as it likes: below this ambiguity, relative to the pressure.
+const AMBIGUOUS_LEAST: f64 = 0.02;
+/// Ambiguity relative to the largest pressure that makes a job fail.
+const AMBIGUOUS_MAX: f64 = 0.5;
+/// A profile goes on beyond its contact by this, in mm.
+const BEYOND: f64 = 5.0;
+
+/// A patch as far as the judgement needs it.
+#[derive(Debug, Clone, Copy)]
+pub struct FoundPatch<'a> {
+    /// The gap it belongs to.
+    pub gap: &'a PressedGap,
+    /// Height of the wheel's centre in mm.
+    pub centre: f64,
+    /// From and to across, in mm, in the coordinates of the gap.
+    pub across: [f64; 2],
+    /// Largest pressure in MPa.
+    pub pressure: f64,
+    /// Its number in the answer.
+    pub number: usize,
+}
+
+/// One body under a patch.
+struct Under<'a> {
+    body: Body,
+    profile: &'a Profile,
+    /// Along the profile, in mm.
+    contact: [f64; 2],
+    found: UnderContact,
+}
+
+impl<'a> Under<'a> {
+    fn new(body: Body, profile: &'a Profile, contact: [f64; 2], modulus: f64) -> Under<'a> {
+        Under {
+            body,
+            profile,
+            contact,
+            found: under_contact(profile.points(), profile.smoothing(), contact, modulus),
+        }
+    }
+
+    /// y of a place along the profile.
+    fn y(&self, s: f64) -> f64 {
+        self.profile.at(s).at[0]
+    }
+
+    fn y_of_point(&self, point: usize) -> f64 {
+        self.profile.points().at[point][0]
+    }
+
+    fn rough(&self) -> f64 {
+        let found = self.found.roughness;
+        found.waviness.hypot(found.ambiguity)
+    }
+
+    /// Pressure in MPa of the noise that the smoothing leaves.
+    fn noise_left(&self, modulus: f64) -> f64 {
+        let smoothing = self.profile.smoothing();
+        match self.found.noise {
+            Some(noise) if smoothing > 0.0 => {
+                noise_pressure(modulus, noise, self.found.spacing, smoothing)
+            }
+            _ => 0.0,
+        }
+    }
+
+    fn grain(&self) -> Grain {
+        Grain {
+            noise: self.found.noise.unwrap_or(0.0),
+            spacing: self.found.spacing,
+            polygon: self.found.polygon,
+        }
+    }
+}
+
+/// The quality of both profiles under a patch, and what may be said about it: roughness whether it is large or not.
+pub fn judge(
+    geometry: &WheelRail,
+    patch: FoundPatch,
+    modulus: f64,
+) -> (PatchQuality, Vec<Finding>) {
+    let ends = patch
+        .across
+        .map(|y| geometry.moved(&patch.gap.frame, [0.0, y], patch.centre));
+    let sorted = |[a, b]: [f64; 2]| [a.min(b), a.max(b)];
+    let contacts = [
+        sorted(ends.map(|end| end.rail)),
+        sorted(ends.map(|end| end.wheel)),
+    ];
+    let [rail, wheel] = geometry.profiles();
+    let both = [
+        Under::new(Body::Rail, rail, contacts[0], modulus),
+        Under::new(Body::Wheel, wheel, contacts[1], modulus),
+    ];
+    let advised = advised_smoothing([both[0].grain(), both[1].grain()], modulus, patch.pressure);
+    let mut findings = Vec::new();
+    let rough = both[0].rough().hypot(both[1].rough());
+    for (own, advised) in both.iter().zip(advised) {
+        if own.rough() >= BLAMED * rough {
+            findings.push(roughness(own, rough, advised, modulus, patch));
+        }
+        findings.extend(spacing(own, patch));
+        findings.extend(place(own, patch));
+    }
+    let quality = |own: &Under, advised: f64| ProfileQuality {
+        y_mm: sorted(own.contact.map(|s| own.y(s))),
+        spacing_mm: own.found.chord[1] - own.found.chord[0],
+        spacing_over_width: own.found.over_width,
+        noise_um: own.found.noise.map(|noise| 1e3 * noise),
+        waviness_mpa: own.found.roughness.waviness,
+        ambiguity_mpa: own.found.roughness.ambiguity,
+        hole_mm: None,
+        smoothing_mm: own.profile.smoothing(),
+        smoothing_suggested_mm: advised,
+    };
+    let quality = PatchQuality {
+        rail: quality(&both[0], advised[0]),
+        wheel: quality(&both[1], advised[1]),
+    };
+    (quality, findings)
+}
+
+/// What makes the profile rough: outliers, steps, chords, noise or waves, or points that leave the curve open.
+fn roughness(own: &Under, both: f64, advised: f64, modulus: f64, patch: FoundPatch) -> Finding {
+    let smoothing = own.profile.smoothing();
+    let found = &own.found;
+    let cause = if let Some(Outlier { point, distance }) = found.outlier {
+        Cause::Outlier {
+            y: own.y_of_point(point),
+            distance,
+        }
+    } else if let Some(Step { point, height }) = found.step {
+        Cause::Step {
+            y: own.y_of_point(point),
+            height,
+        }
+    } else if let Some(chord) = found.polygon {
+        Cause::Polygon { chord }
+    } else if found.roughness.ambiguity > found.roughness.waviness && advised <= smoothing {
+        Cause::Coarse
+    } else if advised > smoothing {
+        Cause::Noise {
+            noise: found.noise.unwrap_or(0.0),
+            spacing: found.spacing,
+            rounding: own.profile.rounding(),
+        }
+    } else {
+        Cause::Waves
+    };
+    Finding {
+        body: own.body,
+        patch: patch.number,
+        y: [own.y(own.contact[0]), own.y(own.contact[1])],
+        pressure: own.rough(),
+        share: both / patch.pressure,
+        left: own.noise_left(modulus) / patch.pressure,
+        everywhere: found.roughness.everywhere / patch.pressure,
+        chord: found.chord.map(|s| own.y(s)),
+        chord_length: found.chord[1] - found.chord[0],
+        over_width: found.over_width,
+        smoothing,
+        advised,
+        refused: found.roughness.ambiguity > AMBIGUOUS_MAX * patch.pressure,
+        cause,
+    }
+}
+
+/// Points too far apart for the width of the patch.
+fn spacing(own: &Under, patch: FoundPatch) -> Option<Finding> {
+    let found = &own.found;
+    let open = found.roughness.ambiguity > AMBIGUOUS_LEAST * patch.pressure;
+    let wide = found.over_width > COARSE && open || found.over_width > COARSE_MAX;
+    wide.then(|| Finding {
+        body: own.body,
+        patch: patch.number,
+        y: [own.y(own.contact[0]), own.y(own.contact[1])],
+        pressure: own.rough(),
+        share: own.rough() / patch.pressure,
+        left: 0.0,
+        everywhere: 0.0,
+        chord: found.chord.map(|s| own.y(s)),
+        chord_length: found.chord[1] - found.chord[0],
+        over_width: found.over_width,
+        smoothing: own.profile.smoothing(),
+        advised: 0.0,
+        refused: found.over_width > COARSE_MAX,
+        cause: Cause::Spacing,
+    })
+}
+
+/// A contact at the end of a profile, or on the tip of the flange.
+fn place(own: &Under, patch: FoundPatch) -> Option<Finding> {
+    let [first, last] = own.profile.range();
+    let [low, high] = own.contact;
+    let y = [own.y(low), own.y(high)];
+    let middle = own.y(0.5 * (low + high));
+    let tip = match own.body {
+        Body::Rail => None,
+        Body::Wheel => shape::flange_tip(own.profile.points()),
+    };
+    let on_tip = tip.is_some_and(|[from, to]| (from..=to).contains(&middle));
+    let cause = if on_tip {
+        Cause::FlangeTip
+    } else if low - first < BEYOND || last - high < BEYOND {
+        Cause::End {
+            left: (low - first).min(last - high),
+        }
+    } else {
+        return None;
+    };
+    Some(Finding {
+        body: own.body,
+        patch: patch.number,
+        y,
+        pressure: 0.0,
+        share: 0.0,
+        left: 0.0,
+        everywhere: 0.0,
+        chord: y,
+        chord_length: 0.0,
+        over_width: 0.0,
+        smoothing: own.profile.smoothing(),
+        advised: 0.0,
+        refused: false,
+        cause,
+    })
+}

@@ -1,0 +1,78 @@
+//! `smoothing_mm: "auto"`: the smoothing that suits the noise of the profiles and the pressure between them.
+
+use crate::contact::error::SolveError;
+use crate::contact::geometry::contact_search::Search;
+use crate::contact::geometry::profile::Body;
+use crate::contact::geometry::profile_quality::advised_smoothing;
+use crate::contact::monitor::{Monitor, Watch};
+use crate::contact::normal::profiles::{ProfileContact, Wanted};
+use crate::contact::problem::Problem;
+use crate::contact::profile_trust::before;
+use crate::contact::remark::{Remark, RemarkEntry};
+
+/// Pressure in MPa for the first choice.
+pub(super) const PRESSURE_USUAL: f64 = 1200.0;
+/// By which part the rest for that pressure may miss the force: the length goes with its power −2/9.
+const TOLERANCE: f64 = 0.1;
+
+/// What was chosen, for the answer.
+pub(super) fn remarks(contact: &ProfileContact) -> Vec<RemarkEntry> {
+    let profiles = contact
+        .geometry
+        .profiles()
+        .into_iter()
+        .zip([Body::Rail, Body::Wheel]);
+    let chosen = profiles.zip(contact.trust.auto).filter(|(_, auto)| *auto);
+    chosen
+        .map(|((profile, body), _)| {
+            let remark = Remark::SmoothingChosen {
+                profile: body.name(),
+                smoothing_mm: profile.smoothing(),
+            };
+            remark.into()
+        })
+        .collect()
+}
+
+/// The contact with the smoothing settled where the case leaves it to the noise: first for a pressure of 1200 MPa, then for the largest one
+/// found with that, on coarse gaps.
+///
+/// # Errors
+/// There is no rest of the wheel, or the monitor stopped the work.
+pub(super) fn settled(
+    problem: &Problem,
+    contact: &ProfileContact,
+    monitor: &dyn Monitor,
+) -> Result<Option<ProfileContact>, SolveError> {
+    let auto = contact.trust.auto;
+    if auto == [false; 2] {
+        return Ok(None);
+    }
+    let modulus = contact.contact_modulus;
+    let grains = contact.geometry.profiles().map(before::grain);
+    let chosen = |pressure: f64| {
+        let advised = advised_smoothing(grains, modulus, pressure);
+        let [rail, wheel] = contact.geometry.profiles();
+        let own = [rail.smoothing(), wheel.smoothing()];
+        [0, 1].map(|k| if auto[k] { advised[k] } else { own[k] })
+    };
+    let with = |smoothing: [f64; 2]| contact.smoothed(smoothing);
+    let first = chosen(PRESSURE_USUAL);
+    if first == [0.0; 2] {
+        return Ok(Some(with(first)));
+    }
+    let trial = with(first);
+    let search =
+        Search::new(&trial.geometry).map_err(|reason| SolveError::NormalProblem { reason })?;
+    let wanted = Wanted {
+        friction_share: 0.0,
+        tolerance: TOLERANCE,
+    };
+    let watch = Watch::new(monitor, problem.time_limit, 1);
+    let wheel = trial.press(&search, wanted, None, &watch)?;
+    let pressures = wheel.patches.iter().flat_map(|gap| gap.field.patches());
+    let main = pressures
+        .max_by(|a, b| a.normal_force.total_cmp(&b.normal_force))
+        .map_or(PRESSURE_USUAL, |patch| patch.pressure_max);
+    Ok(Some(with(chosen(main))))
+}

@@ -1,0 +1,259 @@
+//! Profiles are judged before they are trusted: what exports and instruments do to points is named in the answer, or there is none.
+
+use railhead::contact::error::SolveError;
+use railhead::contact::monitor::Unwatched;
+use railhead::contact::problem::Limits;
+use railhead::contact::solution::Solution;
+use railhead::contact::{check, solve};
+use serde_json::{Value, json};
+
+use crate::damaged::{Damage, answer, blamed, linear, pressure_max, resampled, with};
+use crate::profile_cases::{generated, put};
+use crate::profile_shapes::{rail_60e1, s1002};
+use crate::random::Random;
+
+/// The contact of [`tread`] on the rail, z down.
+const CROWN: [f64; 2] = [0.0, 0.0];
+
+fn tread() -> Value {
+    let mut case = put(&generated(), "contact", json!({ "lateral_shift_mm": -1.0 }));
+    case["motion"] =
+        json!({ "wheelset": { "speed_mm_per_s": 20000, "free_rolling_radius_mm": 460 } });
+    case["solver"] = json!({ "target_error": 0.02 });
+    case
+}
+
+fn accepted(case: &Value) -> Value {
+    put(case, "contact", json!({ "accept_rough_profiles": true }))
+}
+
+fn on_rail(rail: &[[f64; 2]]) -> Value {
+    with(&tread(), rail, &s1002(), 0.0)
+}
+
+fn solved(case: &Value) -> Solution {
+    answer(case).expect("an answer")
+}
+
+fn refusal(case: &Value) -> (String, String) {
+    let problem = check(case, &Limits::default()).expect("a case");
+    match solve(&problem, &Unwatched) {
+        Err(SolveError::RoughProfile { pointer, reason }) => (pointer, reason),
+        other => panic!("{other:?}"),
+    }
+}
+
+fn without(points: &[[f64; 2]], from: f64, to: f64) -> Vec<[f64; 2]> {
+    let outside = |at: &&[f64; 2]| !(from..=to).contains(&at[0]);
+    points.iter().filter(outside).copied().collect()
+}
+
+#[test]
+fn sound_profiles_carry_their_quality_and_no_blame() {
+    let found = solved(&on_rail(&rail_60e1()));
+    assert_eq!(blamed(&found), Vec::<String>::new());
+    for patch in &found.patches {
+        let quality = patch.quality.clone().expect("a quality");
+        for own in [quality.rail, quality.wheel] {
+            assert!(
+                own.spacing_mm > 0.0 && own.spacing_over_width < 0.5,
+                "{own:?}"
+            );
+            assert!(own.y_mm[0] < own.y_mm[1], "{own:?}");
+            assert_eq!([own.smoothing_mm, own.smoothing_suggested_mm], [0.0; 2]);
+            assert!(own.waviness_mpa.hypot(own.ambiguity_mpa) < 0.1 * patch.pressure_max_mpa);
+        }
+        let open = patch.points[0].profile_uncertainty.expect("an uncertainty");
+        assert!(
+            open.pressure_max_mpa < 0.05 * patch.pressure_max_mpa,
+            "{open:?}"
+        );
+    }
+    assert!(found.total[0].profile_uncertainty.is_some());
+}
+
+#[test]
+fn a_hole_of_50_mm_at_the_crown_is_no_contact() {
+    let case = on_rail(&without(&rail_60e1(), -25.0, 25.0));
+    let (pointer, reason) = refusal(&case);
+    assert_eq!(pointer, "/contact/rail");
+    assert!(reason.contains("send"), "{reason}");
+    let found = solved(&accepted(&case));
+    assert!(!blamed(&found).is_empty());
+}
+
+#[test]
+fn a_hole_of_8_mm_and_every_tenth_point_are_told_or_refused() {
+    let sound = pressure_max(&solved(&on_rail(&rail_60e1())));
+    let thinned: Vec<_> = rail_60e1().into_iter().step_by(40).collect();
+    for rail in [without(&rail_60e1(), -4.0, 4.0), thinned] {
+        let case = accepted(&on_rail(&rail));
+        let found = solved(&case);
+        let wrong = (pressure_max(&found) / sound - 1.0).abs() > 0.05;
+        assert!(!wrong || !blamed(&found).is_empty(), "{:?}", found.remarks);
+    }
+}
+
+#[test]
+fn linear_resampling_is_named_and_the_smoothing_named_heals_it() {
+    let sound = pressure_max(&solved(&on_rail(&rail_60e1())));
+    let rail = linear(&resampled(&rail_60e1(), 1.5), 5000);
+    let found = solved(&on_rail(&rail));
+    assert!(
+        pressure_max(&found) > 1.2 * sound,
+        "{}",
+        pressure_max(&found)
+    );
+    let remark = found
+        .remarks
+        .iter()
+        .find(|remark| remark.code == "profile-polygon");
+    let remark = remark.unwrap_or_else(|| panic!("{:?}", found.remarks));
+    assert_eq!(remark.pointer.as_deref(), Some("/contact/rail"));
+    assert!(remark.detail.contains("smoothing_mm"), "{}", remark.detail);
+    let advised = found.patches[0].quality.clone().expect("a quality").rail;
+    let mut smoothed = on_rail(&rail);
+    smoothed["contact"]["rail"]["smoothing_mm"] = json!(advised.smoothing_suggested_mm);
+    let healed = solved(&smoothed);
+    let error = (pressure_max(&healed) / sound - 1.0).abs();
+    assert!(
+        error < 0.06,
+        "{error} with {}",
+        advised.smoothing_suggested_mm
+    );
+}
+
+#[test]
+fn coordinates_rounded_to_a_micrometre_are_noise() {
+    let mut random = Random(3);
+    let rail = Damage::Rounded(0.001).done_to(&rail_60e1(), CROWN, &mut random);
+    let wheel = Damage::Rounded(0.001).done_to(&s1002(), CROWN, &mut random);
+    let mut told = 0;
+    for shift in [0.0, 3.0, 5.0, 5.4] {
+        let at = |case: Value| put(&case, "contact", json!({ "lateral_shift_mm": shift }));
+        let sound = pressure_max(&solved(&at(on_rail(&rail_60e1()))));
+        let found = solved(&at(with(&tread(), &rail, &wheel, 0.0)));
+        let remark = found
+            .remarks
+            .iter()
+            .find(|remark| remark.code == "profile-noise");
+        let wrong = (pressure_max(&found) / sound - 1.0).abs();
+        assert!(wrong < 0.1 || remark.is_some(), "{shift}: {wrong}");
+        if let Some(remark) = remark {
+            told += 1;
+            assert!(
+                remark.detail.contains("rounded to 0.001 mm"),
+                "{}",
+                remark.detail
+            );
+            assert!(
+                remark.detail.contains("smoothing_mm: 2"),
+                "{}",
+                remark.detail
+            );
+        }
+    }
+    assert!(told > 0);
+}
+
+#[test]
+fn outliers_and_steps_are_told_with_their_place() {
+    let points = resampled(&rail_60e1(), 0.25);
+    let middle = points.len() / 2;
+    let mut outlier = points.clone();
+    outlier[middle][1] -= 0.2;
+    let mut step = points.clone();
+    step.iter_mut().skip(middle).for_each(|at| at[1] -= 0.05);
+    for (rail, code) in [(outlier, "profile-outlier"), (step, "profile-step")] {
+        let found = solved(&accepted(&on_rail(&rail)));
+        let told = found.remarks.iter().find(|remark| remark.code == code);
+        let told = told.unwrap_or_else(|| panic!("{code}: {:?}", found.remarks));
+        let at = serde_json::to_value(told).expect("JSON")["at_y_mm"].as_f64();
+        let at = at.expect("a place");
+        assert!((at - points[middle][0]).abs() < 0.3, "{code} at {at}");
+    }
+}
+
+#[test]
+fn noise_that_a_smoothing_leaves_is_told_and_auto_chooses_more() {
+    let mut random = Random(11);
+    let rail = Damage::Noise(0.02).done_to(&rail_60e1(), CROWN, &mut random);
+    let wheel = Damage::Noise(0.02).done_to(&s1002(), CROWN, &mut random);
+    let found = solved(&with(&tread(), &rail, &wheel, 3.0));
+    assert!(!blamed(&found).is_empty(), "{:?}", found.remarks);
+    let found = solved(&with(&tread(), &rail, &wheel, "auto"));
+    let chosen: Vec<_> = found
+        .remarks
+        .iter()
+        .filter(|r| r.code == "smoothing-chosen")
+        .collect();
+    assert_eq!(chosen.len(), 2, "{:?}", found.remarks);
+    let used = found.patches[0]
+        .quality
+        .clone()
+        .expect("a quality")
+        .rail
+        .smoothing_mm;
+    assert!((5.0..=8.0).contains(&used), "{used}");
+}
+
+#[test]
+fn auto_leaves_sound_profiles_as_they_are() {
+    let plain = solved(&on_rail(&rail_60e1()));
+    let auto = solved(&with(&tread(), &rail_60e1(), &s1002(), "auto"));
+    assert_eq!(plain.total[0].force_x_n, auto.total[0].force_x_n);
+    assert_eq!(pressure_max(&plain), pressure_max(&auto));
+}
+
+#[test]
+fn exchanged_profiles_are_refused_and_a_single_one_is_told() {
+    let exchanged = with(&tread(), &s1002(), &rail_60e1(), 0.0);
+    let error = check(&exchanged, &Limits::default()).expect_err("exchanged");
+    let pointers: Vec<&str> = error.0.iter().map(|fault| fault.pointer.as_str()).collect();
+    assert_eq!(pointers, ["/contact/rail", "/contact/wheel"]);
+    assert!(error.0[0].detail.contains("looks like a wheel"), "{error}");
+    let twice = with(&tread(), &s1002(), &s1002(), 0.0);
+    let problem = check(&twice, &Limits::default()).expect("a case");
+    let told = problem
+        .remarks
+        .iter()
+        .find(|r| r.code == "profile-of-other-body");
+    assert_eq!(
+        told.and_then(|r| r.pointer.as_deref()),
+        Some("/contact/rail")
+    );
+}
+
+#[test]
+fn a_contact_on_the_tip_of_the_flange_is_told() {
+    let case = put(
+        &on_rail(&rail_60e1()),
+        "contact",
+        json!({ "lateral_shift_mm": -40.0 }),
+    );
+    let found = solved(&accepted(&case));
+    let told = found
+        .remarks
+        .iter()
+        .any(|remark| remark.code == "contact-on-flange-tip");
+    assert!(told, "{:?}", found.remarks);
+}
+
+#[test]
+fn what_is_known_before_the_solve_is_in_the_check() {
+    let mut random = Random(5);
+    let rail = Damage::Noise(0.005).done_to(&rail_60e1(), CROWN, &mut random);
+    let rail = without(&rail, 10.0, 22.0);
+    let problem = check(&on_rail(&rail), &Limits::default()).expect("a case");
+    let quality = problem.quality().expect("a quality");
+    let noise = quality.rail.noise_um.expect("noise");
+    assert!((4.0..6.0).contains(&noise), "{noise}");
+    assert!((12.0..14.0).contains(&quality.rail.hole_mm), "{quality:?}");
+    assert!(
+        (3.0..8.0).contains(&quality.rail.smoothing_suggested_mm),
+        "{quality:?}"
+    );
+    assert!(quality.wheel.noise_um.expect("noise") < 0.1, "{quality:?}");
+    let plain = check(&on_rail(&rail_60e1()), &Limits::default()).expect("a case");
+    assert!(problem.cost().seconds > plain.cost().seconds);
+}
