@@ -108,7 +108,8 @@ async fn a_panic_fails_that_job_only() {
     let failure = job.failure.unwrap();
     assert_eq!(failure.kind, FailureKind::Panic);
     assert!(
-        failure.detail.contains("a cell without area"),
+        failure.detail.contains("a defect of its own")
+            && !failure.detail.contains("a cell without area"),
         "{}",
         failure.detail
     );
