@@ -235,3 +235,26 @@ fn a_short_sweep_is_one_slice() {
     let problem = check(&case(&json!(lines()[2]), 0.005), &Limits::default()).expect("a case");
     assert_eq!(slices(&problem), vec![0..25]);
 }
+
+#[test]
+fn the_estimate_is_continuous_along_a_sweep() {
+    for spin in [2e-4, 1.5e-3] {
+        let motions: Vec<Value> = (0..41)
+            .map(|k| json!({ "creepage_x": 1e-4 * f64::from(k), "spin_per_mm": spin }))
+            .collect();
+        let (sweep, _) = solve(&case(&json!(motions), 0.005));
+        let estimates: Vec<f64> = sweep
+            .total
+            .iter()
+            .map(|total| total.error_estimate.expect("an estimate").force_x_n)
+            .collect();
+        let mut changes: Vec<f64> = estimates
+            .windows(2)
+            .map(|pair| (pair[1] / pair[0]).ln().abs())
+            .collect();
+        changes.sort_by(f64::total_cmp);
+        // Nine of ten steps; a change of the mesh in between may be seen.
+        let most = changes[9 * (changes.len() - 1) / 10];
+        assert!(most < 0.3, "spin {spin}: {changes:?}");
+    }
+}
