@@ -9,6 +9,7 @@ mod keys;
 mod serve;
 mod solve;
 mod stop;
+mod worker_args;
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -20,6 +21,7 @@ use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::cli::commands::{BackupArgs, HealthcheckArgs, KeysAction, KeysArgs, SolveArgs};
 use crate::cli::http_args::HttpArgs;
+use crate::cli::worker_args::WorkerArgs;
 use crate::contact::problem::Limits;
 use crate::contact::tangential::operator_store::{BYTES_DEFAULT, OperatorStore};
 use crate::http;
@@ -140,6 +142,8 @@ pub struct ServeArgs {
     /// none are made.
     #[arg(long, env = "RAILHEAD_OTLP_ENDPOINT", value_name = "URL")]
     pub otlp_endpoint: Option<Endpoint>,
+    #[command(flatten)]
+    pub worker: WorkerArgs,
     #[command(flatten)]
     pub http: HttpArgs,
     #[command(flatten)]

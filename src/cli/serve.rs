@@ -28,6 +28,8 @@ use crate::telemetry::{self, Traces};
 const REQUEST_THREADS_MIN: usize = 4;
 /// Files that the process opens besides connections: the table, results, logs.
 const OTHER_FILES: u64 = 256;
+/// Exit code of a process that ends because only a new one can go on (EX_TEMPFAIL).
+const START_AGAIN: u8 = 75;
 /// Connections of the listener for probes.
 const PROBE_CONNECTIONS: usize = 64;
 
@@ -51,8 +53,7 @@ pub(super) fn run(args: &ServeArgs) -> anyhow::Result<ExitCode> {
     runtime.shutdown_background();
     // The last lines are written.
     drop(log);
-    served?;
-    Ok(ExitCode::SUCCESS)
+    served
 }
 
 /// Threads for requests: one per core, but not so few that one which writes a log line keeps the others waiting.
@@ -61,11 +62,11 @@ fn request_threads() -> usize {
     cores.max(REQUEST_THREADS_MIN)
 }
 
-async fn serve(args: &ServeArgs) -> anyhow::Result<()> {
+async fn serve(args: &ServeArgs) -> anyhow::Result<ExitCode> {
     let mut signals = Signals::listen()?;
     let workers = args.worker_count();
     let traces = args.otlp_endpoint.as_ref().map(Traces::start).transpose()?;
-    let options = Options {
+    let options = args.worker.apply(Options {
         workers,
         limits: args.case.limits(),
         attempts_max: args.attempts_max,
@@ -75,7 +76,7 @@ async fn serve(args: &ServeArgs) -> anyhow::Result<()> {
         tenant_queue_max: args.tenant_queue_max,
         tracer: traces.as_ref().map(|traces| Tracer::new(traces.tracer())),
         ..Options::new(&args.data_dir)
-    };
+    });
     let recipe = Recipe::with_operators(args.case.operators());
     let jobs = Jobs::open_with(options, recipe).await?;
     let listener = TcpListener::bind(args.listen)
@@ -132,10 +133,12 @@ async fn serve(args: &ServeArgs) -> anyhow::Result<()> {
 
     let name = tokio::select! {
         name = signals.next() => name,
+        () = jobs.broken().cancelled() => "too many solver threads that do not stop",
         ended = &mut server => {
             // The listener never ends by itself; if it does the jobs are still handed back.
             jobs.shutdown(args.shutdown_grace()).await;
-            return ended.context("the listener failed");
+            ended.context("the listener failed")?;
+            return Ok(ExitCode::SUCCESS);
         }
     };
     tracing::info!(signal = name, "stopping");
@@ -166,7 +169,11 @@ async fn serve(args: &ServeArgs) -> anyhow::Result<()> {
         traces.stop().await;
     }
     tracing::info!("stopped");
-    Ok(())
+    Ok(if jobs.broken().is_cancelled() {
+        ExitCode::from(START_AGAIN)
+    } else {
+        ExitCode::SUCCESS
+    })
 }
 
 /// The limits of requests and the origins of other pages.

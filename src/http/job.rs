@@ -12,7 +12,7 @@ use crate::contact::remark::RemarkEntry;
 use crate::http::error::{ApiError, Kind};
 use crate::http::problem::Problem;
 use crate::http::results::JobResult;
-use crate::jobs::job::{Job, State as JobState};
+use crate::jobs::job::{Job, QueuePlace, State as JobState};
 use crate::jobs::wishes::Priority;
 
 /// A job as the client sees it. Times are RFC 3339 in UTC with milliseconds.
@@ -55,6 +55,9 @@ pub struct JobAnswer {
     /// Rough progress.
     #[schema(minimum = 0.0, maximum = 1.0)]
     progress: f64,
+    /// Its place among the queued jobs; only where one job is looked at, as long as it is queued and not too far behind.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    queue: Option<QueuePlace>,
     /// What the client should know before using the numbers.
     remarks: Vec<RemarkEntry>,
     /// Why the job failed; null unless it did.
@@ -90,6 +93,7 @@ impl JobAnswer {
             attempt: job.attempt,
             cached: job.cached,
             progress: job.progress,
+            queue: job.queue,
             remarks: job.remarks,
             error,
             result,

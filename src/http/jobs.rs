@@ -298,7 +298,7 @@ problems! {
     responses((status = 200, description = "The job", body = JobAnswer), LookProblems)
 )]
 pub async fn look(Caller(jobs): Caller, JobId(id): JobId) -> Result<Json<JobAnswer>, ApiError> {
-    Ok(Json(JobAnswer::new(jobs.get(id).await?, None)))
+    Ok(Json(JobAnswer::new(jobs.look(id).await?, None)))
 }
 
 /// The case of a job, as it was submitted.

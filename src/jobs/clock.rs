@@ -2,28 +2,57 @@
 
 use std::fmt;
 use std::sync::Arc;
+use std::time::Instant;
 
-/// A clock of wall time. Clones show the same time.
+/// A clock of wall time, with one beside it that nobody turns. Clones show the same times.
 #[derive(Clone)]
-pub struct Clock(Arc<dyn Fn() -> i64 + Send + Sync>);
+pub struct Clock {
+    wall: Arc<dyn Fn() -> i64 + Send + Sync>,
+    steady: Arc<dyn Fn() -> i64 + Send + Sync>,
+}
 
 impl Clock {
-    /// The system's clock.
+    /// The system's clocks.
     #[must_use]
     pub fn system() -> Clock {
-        Clock::new(|| jiff::Timestamp::now().as_millisecond())
+        let start = Instant::now();
+        Clock {
+            wall: Arc::new(|| jiff::Timestamp::now().as_millisecond()),
+            steady: Arc::new(move || {
+                i64::try_from(start.elapsed().as_millis()).unwrap_or(i64::MAX)
+            }),
+        }
     }
 
-    /// A clock that shows what `now_ms` says, in epoch milliseconds.
+    /// A clock that shows what `now_ms` says, in epoch milliseconds; time passes as it says.
     #[must_use]
     pub fn new(now_ms: impl Fn() -> i64 + Send + Sync + 'static) -> Clock {
-        Clock(Arc::new(now_ms))
+        let wall: Arc<dyn Fn() -> i64 + Send + Sync> = Arc::new(now_ms);
+        Clock {
+            steady: wall.clone(),
+            wall,
+        }
+    }
+
+    /// A clock that shows what `now_ms` says, and is set by somebody while time passes as it always does.
+    #[must_use]
+    pub fn that_is_set(now_ms: impl Fn() -> i64 + Send + Sync + 'static) -> Clock {
+        Clock {
+            wall: Arc::new(now_ms),
+            ..Clock::system()
+        }
     }
 
     /// Epoch milliseconds.
     #[must_use]
     pub fn now_ms(&self) -> i64 {
-        (self.0)()
+        (self.wall)()
+    }
+
+    /// Milliseconds since some moment, whatever becomes of the wall clock.
+    #[must_use]
+    pub fn steady_ms(&self) -> i64 {
+        (self.steady)()
     }
 }
 

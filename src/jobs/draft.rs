@@ -1,7 +1,6 @@
 //! Batches in the making: cases are checked and staged while they arrive, on places reserved for them, and then queued.
 
-use std::collections::HashSet;
-use std::sync::{Arc, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 
 use bytes::Bytes;
@@ -11,13 +10,14 @@ use tokio::runtime::Handle;
 use uuid::Uuid;
 
 use crate::contact::error::Fault;
-use crate::jobs::batch::{Batch, DELETED_AT_ONCE};
+use crate::jobs::batch::Batch;
 use crate::jobs::error::JobsError;
 use crate::jobs::spool::{Card, Spool};
 use crate::jobs::store::{Begun, NewBatch, NewJob};
+use crate::jobs::submit::{cost_us, created_at, outputs_text};
 use crate::jobs::template::Cell;
 use crate::jobs::wishes::Wishes;
-use crate::jobs::{Jobs, Shared, cost_us, created_at, idempotency, outputs_text};
+use crate::jobs::{Jobs, idempotency};
 
 /// Jobs queued in one transaction.
 const CHUNK_JOBS: usize = 1000;
@@ -40,15 +40,6 @@ pub struct FaultyCase {
     pub line: Option<u64>,
     /// Every fault of the case.
     pub faults: Vec<Fault>,
-}
-
-/// Batches that are not acknowledged.
-#[derive(Debug, Default)]
-pub(super) struct Underway {
-    /// Being received or filled by this process.
-    pub(super) living: HashSet<Uuid>,
-    /// Given up; what is left of them is solved and shown to nobody, and removed as soon as the disk allows it.
-    pub(super) abandoned: HashSet<Uuid>,
 }
 
 /// A batch in the making: checked cases wait in a file of the data folder. Dropping it gives everything back.
@@ -432,43 +423,5 @@ impl Jobs {
             path: self.shared.options.data_dir.clone(),
             source,
         }
-    }
-}
-
-impl Shared {
-    /// Batches that are not acknowledged.
-    pub(super) fn underway(&self) -> MutexGuard<'_, Underway> {
-        self.batches.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// From now on nobody fills this batch, nobody is shown its jobs, and no worker takes one.
-    fn abandon(&self, id: Uuid) {
-        let mut batches = self.underway();
-        batches.living.remove(&id);
-        batches.abandoned.insert(id);
-    }
-
-    /// Removes what is left of batches that were given up; what cannot be removed now is tried again later.
-    pub(super) async fn drop_abandoned(&self) {
-        let abandoned: Vec<Uuid> = self.underway().abandoned.iter().copied().collect();
-        for id in abandoned {
-            let dropped = self.drop_batch(id).await;
-            self.note(&dropped);
-            match dropped {
-                Ok(()) => {
-                    self.underway().abandoned.remove(&id);
-                    tracing::info!(batch = %id, "batch that was never acknowledged removed");
-                }
-                Err(error) => {
-                    tracing::warn!(batch = %id, %error, "batch that was never acknowledged cannot be removed yet");
-                }
-            }
-        }
-        self.collect_blobs().await;
-    }
-
-    async fn drop_batch(&self, id: Uuid) -> Result<(), JobsError> {
-        while !self.store.drop_batch(id, DELETED_AT_ONCE).await? {}
-        Ok(())
     }
 }

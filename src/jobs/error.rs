@@ -109,6 +109,11 @@ pub enum JobsError {
     /// Jobs that were to be stored together could not be; nothing of them was stored.
     #[error(transparent)]
     Together(Arc<JobsError>),
+    /// The job table is damaged.
+    #[error(
+        "the job table is damaged ({0}); a copy of a folder in use is no backup: restore one that `railhead backup` made"
+    )]
+    TableDamaged(String),
     /// The data folder was written by another version.
     #[error(
         "the job table was written by another version of railhead, and data folders are not carried over between versions; \

@@ -1,6 +1,7 @@
 //! What has to be done besides solving: taking jobs from silent workers, and removing results nobody owns.
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use crate::jobs::Shared;
@@ -18,18 +19,27 @@ const COLLECT_CHUNK: u32 = 500;
 /// Takes jobs whose lease has run out from their workers, three times per lease, until the service drains.
 pub(super) async fn reap_expired(shared: Arc<Shared>) {
     let mut beat = tokio::time::interval(heartbeat(&shared));
+    let recovered = shared.recovered.wait();
+    let _ = shared.draining.run_until_cancelled(recovered).await;
+    let mut quiet_until = i64::MIN;
     while shared
         .draining
         .run_until_cancelled(beat.tick())
         .await
         .is_some()
     {
-        let now = shared.now_ms();
-        match shared
+        // While nothing can be written no lease can be renewed either, which is no silence of the workers.
+        if shared.storage_failing.load(Ordering::Relaxed) {
+            quiet_until = shared.lease_until();
+        }
+        let now = shared.steady_ms();
+        if now < quiet_until {
+            continue;
+        }
+        let reaped = shared
             .store
-            .reap(now, now, shared.options.attempts_max)
-            .await
-        {
+            .reap(now, shared.now_ms(), shared.options.attempts_max);
+        match reaped.await {
             Ok(taken) => {
                 for (id, state) in taken {
                     tracing::warn!(job = %id, state = state.name(), "lease ran out, job taken back");
@@ -74,7 +84,7 @@ impl Shared {
             return Ok(());
         }
         let attempts_max = self.options.attempts_max;
-        let taken = self.store.reap(i64::MAX, self.now_ms(), attempts_max).await;
+        let taken = self.store.reap_dead(self.now_ms(), attempts_max).await;
         self.note(&taken);
         for (id, state) in taken? {
             tracing::info!(job = %id, state = state.name(), "job of a dead process taken back");

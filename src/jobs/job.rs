@@ -49,6 +49,17 @@ pub struct Job {
     pub cached: bool,
     /// Grows with every change that a client can see.
     pub version: u64,
+    /// Its place among the queued jobs; only of a queued job that was looked at by itself.
+    pub queue: Option<QueuePlace>,
+}
+
+/// Where a queued job stands.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct QueuePlace {
+    /// Jobs of the tenant that come before it.
+    pub position: u32,
+    /// Expected time until it is begun, in s, from the estimated costs of those before it and the turns of other tenants; rough.
+    pub starts_in_s: f64,
 }
 
 /// Where a job stands.

@@ -3,7 +3,7 @@
 use std::fs::{DirBuilder, File, TryLockError};
 use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicUsize};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::available_parallelism;
 use std::time::Duration;
@@ -15,18 +15,22 @@ use tokio_util::task::TaskTracker;
 
 use crate::contact::problem::Limits;
 use crate::jobs::clock::Clock;
-use crate::jobs::draft::Underway;
 use crate::jobs::error::JobsError;
 use crate::jobs::keys::ANONYMOUS;
+use crate::jobs::leaps::Leaps;
 use crate::jobs::metrics::Metrics;
 use crate::jobs::recipe::Recipe;
 use crate::jobs::results::Results;
 use crate::jobs::staging::{Staged, StagingBounds};
 use crate::jobs::store::sqlite::SqliteStore;
 use crate::jobs::trace::Tracer;
+use crate::jobs::turns::Turns;
+use crate::jobs::underway::Underway;
 use crate::jobs::worker::Worker;
 use crate::jobs::{Jobs, Shared, housekeeping, retention, wishes};
 
+/// The file that says that the job table was closed in good order.
+const CLOSED: &str = "closed";
 /// How long a shutdown waits for workers that were told to stop, beyond their own patience.
 const STOPPED_WITHIN: Duration = Duration::from_secs(10);
 
@@ -41,6 +45,16 @@ pub struct Options {
     pub limits: Limits,
     /// How long a worker may be silent before its job is given away.
     pub lease: Duration,
+    /// Longest solver time of a case, also of one that names no `time_limit_s`.
+    pub time_limit: Duration,
+    /// Solver time after which a solve makes room for others that wait.
+    pub slice: Duration,
+    /// Most solves that wait for their next turn.
+    pub parked_max: usize,
+    /// Most memory in bytes that they are estimated to hold together.
+    pub parked_bytes_max: u64,
+    /// Solver threads that do not stop beyond which the process ends, for whoever supervises it to start it again.
+    pub abandoned_max: usize,
     /// Attempts at a job before it fails as `worker_lost`.
     pub attempts_max: u32,
     /// Bound of queued jobs.
@@ -64,7 +78,8 @@ pub struct Options {
 }
 
 impl Options {
-    /// The defaults for a data folder: one worker, a lease of 30 s, 5 attempts, 300 000 queued jobs of which
+    /// The defaults for a data folder: one worker, a lease of 30 s, a day of solver time, slices of 2 s, 4 solves of 4 GiB that
+    /// wait for a turn, 3 abandoned threads, 5 attempts, 300 000 queued jobs of which
     /// 250 000 of one tenant, 16 GiB of batches being received of which 4 GiB of one tenant,
     /// groups of 256, results up to 32 KiB in the database, results used again,
     /// ended jobs kept for ever, the system's clock, no spans.
@@ -75,6 +90,11 @@ impl Options {
             workers: 1,
             limits: Limits::default(),
             lease: Duration::from_secs(30),
+            time_limit: Duration::from_secs(24 * 3600),
+            slice: Duration::from_secs(2),
+            parked_max: 4,
+            parked_bytes_max: 4 << 30,
+            abandoned_max: 3,
             attempts_max: 5,
             queue_max: 300_000,
             tenant_queue_max: 250_000,
@@ -109,7 +129,14 @@ impl Jobs {
     /// As [`Jobs::open`].
     pub async fn open_with(options: Options, recipe: Recipe) -> Result<Jobs, JobsError> {
         let lock = lock(&options.data_dir)?;
-        let store = SqliteStore::open(&options.data_dir.join("jobs.db")).await?;
+        let table = options.data_dir.join("jobs.db");
+        // After an end that closed the table there is nothing to be checked.
+        let closed = std::fs::remove_file(options.data_dir.join(CLOSED)).is_ok();
+        let unclean = !closed && table.exists();
+        let store = SqliteStore::open(&table).await?;
+        if unclean {
+            store.check().await?;
+        }
         let results = Results::open(&options.data_dir)?;
         let underway = Underway {
             abandoned: store.incomplete_batches().await?.into_iter().collect(),
@@ -135,6 +162,12 @@ impl Jobs {
                 checks: Semaphore::new(available_parallelism().map_or(1, usize::from)),
                 staged: Staged::default(),
                 batches: Mutex::new(underway),
+                turns: Turns::default(),
+                leaps: Leaps::default(),
+                solo: Arc::default(),
+                suspects_waiting: AtomicUsize::new(0),
+                abandoned: Arc::default(),
+                broken: CancellationToken::new(),
                 recovered: SetOnce::new(),
                 lock: Mutex::new(Some(lock)),
             }),
@@ -185,6 +218,12 @@ impl Jobs {
         Worker::new(self.shared.clone(), name)
     }
 
+    /// Set when the process can do no better than end, in good order: too many solver threads do not stop.
+    #[must_use]
+    pub fn broken(&self) -> &CancellationToken {
+        &self.shared.broken
+    }
+
     /// Announces the end: not ready any more, no new claims, nobody waits any longer. Running jobs go on.
     pub fn drain(&self) {
         self.shared.draining.cancel();
@@ -206,6 +245,16 @@ impl Jobs {
             }
         }
         self.shared.store.close().await;
+        let closed = self.shared.options.data_dir.join(CLOSED);
+        let marked = File::options()
+            .create(true)
+            .truncate(true)
+            .write(true)
+            .mode(0o600)
+            .open(closed);
+        if let Err(error) = marked {
+            tracing::debug!(%error, "the next start will check the job table");
+        }
         drop(
             self.shared
                 .lock

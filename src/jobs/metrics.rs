@@ -1,6 +1,8 @@
 //! What the jobs room counts for the operator. Labels have few values, all known beforehand: never an id, never a name
 //! that a client chose.
 
+use std::sync::atomic::Ordering;
+
 use prometheus_client::encoding::EncodeLabelSet;
 use prometheus_client::metrics::counter::Counter;
 use prometheus_client::metrics::family::Family;
@@ -51,6 +53,8 @@ pub(super) struct Metrics {
     ended: Family<StateLabel, Counter>,
     failures: Family<ReasonLabel, Counter>,
     storage_failing: Gauge,
+    parked: Gauge,
+    abandoned: Gauge,
     cache_hits: Counter,
     cache_misses: Counter,
 }
@@ -68,6 +72,8 @@ impl Metrics {
             ended: Family::default(),
             failures: Family::default(),
             storage_failing: Gauge::default(),
+            parked: Gauge::default(),
+            abandoned: Gauge::default(),
             cache_hits: Counter::default(),
             cache_misses: Counter::default(),
         };
@@ -163,6 +169,16 @@ impl Metrics {
             self.storage_failing.clone(),
         );
         registry.register(
+            "solves_waiting",
+            "Solves that wait for their next turn, with all that they have in memory",
+            self.parked.clone(),
+        );
+        registry.register(
+            "solver_threads_abandoned",
+            "Solver threads that did not stop when they were told to and still run",
+            self.abandoned.clone(),
+        );
+        registry.register(
             "solve_seconds",
             "Wall time of one case on a solver thread, by the method that gave the numbers",
             self.solve_seconds.clone(),
@@ -207,7 +223,17 @@ impl Jobs {
     /// The database failed.
     pub async fn refresh_metrics(&self) -> Result<(), JobsError> {
         let metrics = &self.shared.metrics;
-        let figures = self.shared.store.figures().await?;
+        metrics.parked.set(count(self.shared.turns.parked().0));
+        let abandoned = self.shared.abandoned.load(Ordering::Acquire);
+        metrics.abandoned.set(count(abandoned));
+        let figures = match self.shared.store.figures().await {
+            Err(error) if error.trouble().is_some() => {
+                // The alert for this must not fail with it.
+                self.shared.note::<()>(&Err(error));
+                return Ok(());
+            }
+            figures => figures?,
+        };
         for (state, jobs) in figures.jobs {
             let gauge = metrics.jobs.get_or_create_owned(&state_label(state));
             gauge.set(i64::try_from(jobs).unwrap_or(i64::MAX));
@@ -224,6 +250,10 @@ impl Jobs {
         metrics.operator_bytes.set(bytes(operators));
         Ok(())
     }
+}
+
+fn count(number: usize) -> i64 {
+    i64::try_from(number).unwrap_or(i64::MAX)
 }
 
 fn state_label(state: State) -> StateLabel {

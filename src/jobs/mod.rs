@@ -6,6 +6,7 @@
 //! and stops all this. A process that dies leaves `running` rows,
 //! which go back to the queue when the data folder is opened again.
 
+mod attempt;
 pub mod backup;
 pub mod batch;
 pub mod clock;
@@ -14,36 +15,40 @@ pub mod error;
 pub mod fetch;
 pub mod fields;
 mod follow;
-mod group;
+pub mod gate;
 mod housekeeping;
 mod idempotency;
 pub mod job;
+mod keeper;
 pub mod keys;
+mod leaps;
 pub mod lifecycle;
 mod metrics;
 pub mod recipe;
 pub mod results;
 pub mod retention;
 mod reuse;
+mod settle;
 mod solver_thread;
 mod spool;
 pub mod staging;
 mod storage;
 pub mod store;
+mod submit;
 pub mod template;
 pub mod trace;
+mod turns;
+mod underway;
 pub mod watch;
 pub mod wishes;
 pub mod worker;
 
 use std::collections::HashMap;
 use std::fs::File;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicUsize};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use bytes::Bytes;
-use opentelemetry::KeyValue;
 use serde_json::Value;
 use tokio::sync::{Notify, Semaphore, SetOnce, broadcast};
 use tokio::time::{Instant, timeout, timeout_at};
@@ -51,27 +56,29 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use uuid::Uuid;
 
-use crate::contact::case::Output;
 use crate::contact::error::CaseError;
 use crate::contact::problem::Problem;
-use crate::jobs::draft::Underway;
 pub use crate::jobs::error::JobsError;
-pub use crate::jobs::job::{Failure, FailureKind, Job, State};
+pub use crate::jobs::job::{Failure, FailureKind, Job, QueuePlace, State};
 use crate::jobs::keys::Trusted;
+use crate::jobs::leaps::Leaps;
 pub use crate::jobs::lifecycle::Options;
 use crate::jobs::metrics::Metrics;
 use crate::jobs::recipe::Recipe;
 use crate::jobs::results::Results;
 use crate::jobs::staging::Staged;
 pub use crate::jobs::storage::Trouble;
+use crate::jobs::store::Deleted;
 pub use crate::jobs::store::list::{Filter, Page};
 use crate::jobs::store::sqlite::SqliteStore;
-use crate::jobs::store::{Deleted, Enqueued, NewJob, QueueBounds, Refusal};
+use crate::jobs::turns::Turns;
+use crate::jobs::underway::Underway;
 use crate::jobs::watch::{Reason, Watch};
-use crate::jobs::wishes::Wishes;
 
 /// Longest list page.
 pub const PAGE_MAX: u32 = 1000;
+/// Places of the queue beyond which a job is not told its own.
+const PLACES_COUNTED: u32 = 10_000;
 /// How often a waiting caller looks again although nothing was announced.
 const LOOK_AGAIN: Duration = Duration::from_secs(1);
 /// How long a readiness check waits for the database.
@@ -113,6 +120,18 @@ struct Shared {
     staged: Staged,
     /// Batches that are being received or filled, and those of which only remains are left.
     batches: Mutex<Underway>,
+    /// What became of the wall clock.
+    leaps: Leaps,
+    /// Whose turn it is, and solves that wait for theirs.
+    turns: Turns,
+    /// Held by all that is solved; alone by what may have killed a process.
+    solo: Arc<tokio::sync::RwLock<()>>,
+    /// Attempts that wait to be solved alone.
+    suspects_waiting: AtomicUsize,
+    /// Solver threads that did not stop and still run.
+    abandoned: Arc<AtomicUsize>,
+    /// Set when there are too many of them.
+    broken: CancellationToken,
     /// What a dead process left is taken back; nothing is claimed before.
     recovered: SetOnce<()>,
     /// Held as long as this process uses the data folder.
@@ -128,147 +147,6 @@ impl Jobs {
         (self.shared.recipe.check)(case, &self.shared.options.limits)
     }
 
-    /// Checks a case and queues it. Once this returns the job survives the death of the process. If an identical case
-    /// was solved before, the job has already succeeded, with that result.
-    ///
-    /// With an idempotency key the same case gives the same job again, however often it is submitted, for as long as
-    /// that job exists.
-    ///
-    /// # Errors
-    /// [`JobsError::Case`], [`JobsError::QueueFull`], [`JobsError::IdempotencyConflict`], [`JobsError::Draining`], or a
-    /// failed database.
-    pub async fn submit(
-        &self,
-        case: Value,
-        idempotency_key: Option<String>,
-    ) -> Result<Job, JobsError> {
-        let submitted = self.submit_with(case, idempotency_key, Wishes::default());
-        submitted.await.map(|(job, _)| job)
-    }
-
-    /// As [`Jobs::submit`], with wishes; also says whether the job is that of an earlier submission with the same
-    /// idempotency key.
-    ///
-    /// # Errors
-    /// As [`Jobs::submit`].
-    pub async fn submit_with(
-        &self,
-        case: Value,
-        idempotency_key: Option<String>,
-        wishes: Wishes,
-    ) -> Result<(Job, bool), JobsError> {
-        let span = self.submitting();
-        let traceparent = span.traceparent();
-        let submitted = self.store_case(case, idempotency_key, wishes, traceparent);
-        span.end(submitted.await, |(job, _)| {
-            vec![
-                KeyValue::new("railhead.job.id", job.id.to_string()),
-                KeyValue::new("railhead.job.cached", job.cached),
-            ]
-        })
-    }
-
-    async fn store_case(
-        &self,
-        case: Value,
-        idempotency_key: Option<String>,
-        wishes: Wishes,
-        traceparent: Option<Arc<str>>,
-    ) -> Result<(Job, bool), JobsError> {
-        if self.shared.draining.is_cancelled() {
-            return Err(JobsError::Draining);
-        }
-        let jobs = self.clone();
-        // Checking a large case is arithmetic; it stays off the threads that answer requests, and a crowd of submitters does
-        // not take the cores from them either.
-        let turn = self.shared.checks.acquire().await;
-        let read = tokio::task::spawn_blocking(move || {
-            let digest = |_: &String| wishes.digest(&idempotency::digest(&case));
-            let idempotency = idempotency_key.map(|key| {
-                let digest = digest(&key);
-                (key, digest)
-            });
-            (jobs.check(&case), serde_json::to_vec(&case), idempotency)
-        });
-        let (problem, body, idempotency) = read
-            .await
-            .map_err(|error| JobsError::Damaged(error.to_string()))?;
-        drop(turn);
-        if let Some((key, digest)) = &idempotency
-            && let Some(enqueued) = self.shared.store.by_key(&self.tenant, key, digest).await?
-        {
-            match self.of_enqueued(enqueued) {
-                // The job is over and only waits for its removal: the key is free.
-                Err(JobsError::Expired) => self.shared.store.forget_key(&self.tenant, key).await?,
-                answer => return answer,
-            }
-        }
-        let problem = problem?;
-        let (outputs, cost_us) = (problem.outputs.clone(), cost_us(&problem));
-        let id = Uuid::now_v7();
-        let mut new = NewJob {
-            id,
-            tenant: self.tenant.clone(),
-            created_at: created_at(id),
-            name: problem.name,
-            labels: problem.labels,
-            method: problem.method.name().to_owned(),
-            outputs: outputs_text(&outputs),
-            cost_us,
-            reuse_key: self.reuse_key(&problem.digest),
-            source: None,
-            body: Bytes::from(body.map_err(|error| JobsError::Damaged(error.to_string()))?),
-            row: false,
-            idempotency,
-            traceparent,
-            wishes,
-        };
-        if !wishes.fresh {
-            self.find_sources(std::iter::once(&mut new)).await?;
-        }
-        let stored = self.shared.store.enqueue(&new, self.queue_bounds()).await;
-        let (job, replayed) = self.of_enqueued(self.noted(stored)?)?;
-        if job.id == id && job.cached {
-            self.shared.ended_cached(&[id]);
-            tracing::info!(job = %id, method = new.method, "job answered from an earlier result");
-            return Ok((job, false));
-        }
-        self.shared.wake.notify_one();
-        tracing::info!(job = %job.id, method = new.method, "job queued");
-        Ok((job, replayed))
-    }
-
-    /// The bounds of the queue.
-    fn queue_bounds(&self) -> QueueBounds {
-        QueueBounds {
-            all: self.shared.options.queue_max,
-            tenant: self.shared.options.tenant_queue_max,
-        }
-    }
-
-    /// Why there is no room.
-    fn refused(&self, refusal: Refusal) -> JobsError {
-        let bounds = self.queue_bounds();
-        match refusal {
-            Refusal::Quota => JobsError::QuotaExceeded {
-                queue_max: bounds.tenant,
-            },
-            Refusal::Queue => JobsError::QueueFull {
-                queue_max: bounds.all,
-            },
-        }
-    }
-
-    /// The job that was made, or that the idempotency key stands for, and whether it is the latter.
-    fn of_enqueued(&self, enqueued: Enqueued) -> Result<(Job, bool), JobsError> {
-        match enqueued {
-            Enqueued::Created(job) => Ok((self.dated(job), false)),
-            Enqueued::Existing(job) => Ok((self.unexpired(job)?, true)),
-            Enqueued::Conflict => Err(JobsError::IdempotencyConflict),
-            Enqueued::Refused(refusal) => Err(self.refused(refusal)),
-        }
-    }
-
     /// Looks at a job.
     ///
     /// # Errors
@@ -280,6 +158,33 @@ impl Jobs {
             Some(job) => self.unexpired(job),
             None => Err(self.missing(id, JobsError::NotFound).await),
         }
+    }
+
+    /// As [`Jobs::get`], with the place of a queued job among the others; without it where too many come before.
+    ///
+    /// # Errors
+    /// As [`Jobs::get`].
+    pub async fn look(&self, id: Uuid) -> Result<Job, JobsError> {
+        let mut job = self.get(id).await?;
+        if job.state != State::Queued {
+            return Ok(job);
+        }
+        let store = &self.shared.store;
+        let (before, cost_us, tenants) = store.queued_before(&job, PLACES_COUNTED).await?;
+        if let Ok(position) = u32::try_from(before)
+            && position < PLACES_COUNTED
+        {
+            #[expect(clippy::cast_precision_loss, reason = "rough")]
+            let seconds = cost_us as f64 * 1e-6;
+            // Each of the tenants has as much solver time as this one, until its own queue is empty.
+            #[expect(clippy::cast_precision_loss, reason = "rough")]
+            let share = tenants.max(1) as f64 / self.shared.options.workers.max(1) as f64;
+            job.queue = Some(QueuePlace {
+                position,
+                starts_in_s: seconds * share,
+            });
+        }
+        Ok(job)
     }
 
     /// Waits until a job has ended, but not longer than `at_most`, and returns it as it then is. Returns at once when
@@ -389,6 +294,21 @@ impl Shared {
         self.options.clock.now_ms()
     }
 
+    /// Milliseconds of a clock that nobody turns; leases are measured with it.
+    fn steady_ms(&self) -> i64 {
+        self.options.clock.steady_ms()
+    }
+
+    /// The time from a claim or a heartbeat until the job is given away, in ms.
+    fn lease_ms(&self) -> i64 {
+        i64::try_from(self.options.lease.as_millis()).unwrap_or(i64::MAX)
+    }
+
+    /// When a lease that begins now runs out.
+    fn lease_until(&self) -> i64 {
+        self.steady_ms().saturating_add(self.lease_ms())
+    }
+
     /// The attempts of this process.
     fn running(&self) -> std::sync::MutexGuard<'_, HashMap<Uuid, Arc<Watch>>> {
         self.running.lock().unwrap_or_else(PoisonError::into_inner)
@@ -399,27 +319,4 @@ impl Shared {
         // Nobody listening is no error.
         let _ = self.ended.send(id);
     }
-}
-
-/// The names of outputs as a JSON list.
-fn outputs_text(outputs: &[Output]) -> String {
-    serde_json::to_string(outputs).unwrap_or_default()
-}
-
-/// Expected solve time in µs.
-fn cost_us(problem: &Problem) -> u32 {
-    let microseconds = (problem.cost().seconds * 1e6).clamp(1.0, f64::from(i32::MAX));
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "clamped to what a u32 holds; a NaN becomes 0"
-    )]
-    {
-        microseconds as u32
-    }
-}
-
-/// The time of submission is the one inside the id, so that order by id is order by time.
-fn created_at(id: Uuid) -> i64 {
-    i64::try_from(id.as_u128() >> 80).unwrap_or(0)
 }

@@ -280,6 +280,7 @@ mod tests {
             method: "auto".to_owned(),
             traceparent: None,
             reuse_key: None,
+            suspect: false,
         }
     }
 

@@ -51,8 +51,12 @@ impl Jobs {
         {
             return Err(JobsError::NotFound);
         }
+        let now = self.shared.now_ms();
+        let now = job
+            .ended_at
+            .map_or(now, |ended| self.shared.leap().now_for(ended, now));
         match job.expires_at {
-            Some(time) if time <= self.shared.now_ms() => Err(JobsError::Expired),
+            Some(time) if time <= now => Err(JobsError::Expired),
             _ => Ok(job),
         }
     }
@@ -76,7 +80,11 @@ impl Shared {
     async fn sweep_expired(&self) -> Result<u64, JobsError> {
         let now = self.now_ms();
         let mut removed = 0;
-        if let Some(retention) = self.options.retention {
+        let leapt = self.leap().ms > 0;
+        if leapt {
+            tracing::warn!("the clock was set forward; nothing is removed before the next start");
+        }
+        if let Some(retention) = self.options.retention.filter(|_| !leapt) {
             let expiry = Expiry {
                 now,
                 ended_before: now.saturating_sub(millis(retention)),

@@ -2,7 +2,8 @@
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::mpsc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock, mpsc};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
@@ -62,12 +63,26 @@ pub(super) type Task = Box<dyn FnOnce() + Send>;
 #[derive(Debug)]
 pub(super) struct SolverThread {
     tasks: mpsc::Sender<Task>,
+    /// Set when it is left behind; it then counts as such until it ends.
+    left: Arc<OnceLock<Counted>>,
+}
+
+/// One of a number, as long as it lives.
+#[derive(Debug)]
+struct Counted(Arc<AtomicUsize>);
+
+impl Drop for Counted {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::AcqRel);
+    }
 }
 
 impl SolverThread {
     /// Starts a thread of this name.
     pub(super) fn start(name: &str) -> Result<SolverThread, JobsError> {
         let (tasks, todo) = mpsc::channel::<Task>();
+        let left = Arc::new(OnceLock::new());
+        let until_the_end = left.clone();
         std::thread::Builder::new()
             .name(name.to_owned())
             .stack_size(STACK_BYTES)
@@ -79,14 +94,31 @@ impl SolverThread {
                         give_memory_back();
                     }
                 }
+                drop(until_the_end);
             })
             .map_err(JobsError::Thread)?;
-        Ok(SolverThread { tasks })
+        Ok(SolverThread { tasks, left })
     }
 
     /// Hands a task over; `false` if the thread is gone.
     pub(super) fn give(&self, task: Task) -> bool {
         self.tasks.send(task).is_ok()
+    }
+}
+
+impl Shared {
+    /// Leaves a thread behind whose solver does not listen. Too many of them end the process, in good order: only that ends
+    /// them.
+    pub(super) fn leave_behind(&self, thread: SolverThread) {
+        let left = self.abandoned.fetch_add(1, Ordering::AcqRel) + 1;
+        // The thread drops the other end of this with itself.
+        let _ = thread.left.set(Counted(self.abandoned.clone()));
+        drop(thread);
+        let most = self.options.abandoned_max;
+        tracing::error!(left, most, "a solver thread was left behind");
+        if left > most {
+            self.broken.cancel();
+        }
     }
 }
 
@@ -109,10 +141,13 @@ fn solve_case(shared: &Shared, watch: &Watch, stored: &StoredCase) -> Outcome {
         Ok(case) => case,
         Err(error) => return internal(error.to_string()),
     };
-    let problem = match (shared.recipe.check)(&case, &shared.options.limits) {
+    let mut problem = match (shared.recipe.check)(&case, &shared.options.limits) {
         Ok(problem) => problem,
         Err(error) => return Outcome::Refused(error),
     };
+    let limit = shared.options.time_limit;
+    problem.time_limit = Some(problem.time_limit.map_or(limit, |time| time.min(limit)));
+    watch.set_memory_bytes(problem.cost().bytes);
     watch.begin();
     let (solution, fields) = match (shared.recipe.solve)(&problem, watch) {
         Ok(answer) => answer,

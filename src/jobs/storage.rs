@@ -22,7 +22,7 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 pub enum Trouble {
     /// No space is left, or a quota is used up.
     Full,
-    /// It is read-only, it fails, or the job table is locked by another process.
+    /// It is read-only, it fails, the job table is damaged, or locked by another process.
     Unwritable,
 }
 
@@ -59,10 +59,12 @@ fn of_sqlite(code: &str) -> Option<Trouble> {
     const READONLY: u32 = 8;
     const IOERR: u32 = 10;
     const FULL: u32 = 13;
+    const CORRUPT: u32 = 11;
     const CANTOPEN: u32 = 14;
+    const NOTADB: u32 = 26;
     match code.parse::<u32>().ok()? & 0xff {
         FULL => Some(Trouble::Full),
-        BUSY | LOCKED | READONLY | IOERR | CANTOPEN => Some(Trouble::Unwritable),
+        BUSY | LOCKED | READONLY | IOERR | CORRUPT | CANTOPEN | NOTADB => Some(Trouble::Unwritable),
         _ => None,
     }
 }
@@ -158,6 +160,9 @@ mod tests {
         // SQLITE_IOERR_WRITE, SQLITE_READONLY_DBMOVED.
         assert_eq!(of_sqlite("778"), Some(Trouble::Unwritable));
         assert_eq!(of_sqlite("1032"), Some(Trouble::Unwritable));
+        // SQLITE_CORRUPT_INDEX, SQLITE_NOTADB.
+        assert_eq!(of_sqlite("779"), Some(Trouble::Unwritable));
+        assert_eq!(of_sqlite("26"), Some(Trouble::Unwritable));
         // SQLITE_CONSTRAINT_PRIMARYKEY.
         assert_eq!(of_sqlite("1555"), None);
         let wrapped = JobsError::Results(object_store::Error::Generic {

@@ -16,7 +16,8 @@ use uuid::Uuid;
 
 use crate::jobs::solver_thread::Outcome;
 use crate::jobs::store::Claim;
-use crate::jobs::{Jobs, JobsError, Shared, created_at};
+use crate::jobs::submit::created_at;
+use crate::jobs::{Jobs, JobsError, Shared};
 
 const TRACEPARENT: &str = "traceparent";
 const TRACESTATE: &str = "tracestate";

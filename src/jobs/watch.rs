@@ -1,11 +1,12 @@
 //! How a running job is followed and stopped: flags shared by the solver's thread and the async side.
 
 use std::ops::ControlFlow;
-use std::sync::OnceLock;
-use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 use crate::contact::monitor::{Monitor, Stop};
+use crate::jobs::gate::Gate;
 
 /// Why a running solve was told to stop. The first reason given stays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,6 +20,8 @@ pub enum Reason {
     Lost = 3,
     /// The deadline of the job has passed.
     Deadline = 4,
+    /// It takes longer than was thought, and nobody can wait for it; the job goes back to the queue.
+    TooLong = 5,
 }
 
 /// One attempt at a job, seen from both sides. The solver ticks, the async side reads and stops.
@@ -28,9 +31,43 @@ pub struct Watch {
     ticks: AtomicU64,
     progress: AtomicU64,
     begun: OnceLock<Instant>,
+    taken_up: AtomicBool,
+    memory_bytes: AtomicU64,
+    gate: Arc<Gate>,
 }
 
 impl Watch {
+    /// A watch over a solver that has to pass this gate.
+    #[must_use]
+    pub fn new(gate: Arc<Gate>) -> Watch {
+        Watch {
+            gate,
+            ..Watch::default()
+        }
+    }
+
+    /// The solver's thread has come to this job.
+    pub fn take_up(&self) {
+        self.taken_up.store(true, Ordering::Release);
+    }
+
+    /// Has the solver's thread come to this job?
+    #[must_use]
+    pub fn is_taken_up(&self) -> bool {
+        self.taken_up.load(Ordering::Acquire)
+    }
+
+    /// Notes what the solve is estimated to hold.
+    pub fn set_memory_bytes(&self, bytes: u64) {
+        self.memory_bytes.store(bytes, Ordering::Release);
+    }
+
+    /// What the solve is estimated to hold; 0 before that is known.
+    #[must_use]
+    pub fn memory_bytes(&self) -> u64 {
+        self.memory_bytes.load(Ordering::Acquire)
+    }
+
     /// Starts the clock of the solve, against which `contact` holds the time limit of the case. Only the first call
     /// counts.
     pub fn begin(&self) {
@@ -43,6 +80,7 @@ impl Watch {
         let _ = self
             .reason
             .compare_exchange(0, reason as u8, Ordering::AcqRel, Ordering::Acquire);
+        self.gate.nudge();
     }
 
     /// Why the solver was told to stop, if it was.
@@ -53,6 +91,7 @@ impl Watch {
             2 => Some(Reason::Shutdown),
             3 => Some(Reason::Lost),
             4 => Some(Reason::Deadline),
+            5 => Some(Reason::TooLong),
             _ => None,
         }
     }
@@ -77,6 +116,7 @@ impl Monitor for Watch {
             self.progress
                 .store(progress.clamp(0.0, 1.0).to_bits(), Ordering::Release);
         }
+        self.gate.pass(|| self.reason().is_some());
         if self.reason().is_some() {
             return ControlFlow::Break(Stop::Cancelled);
         }
@@ -84,7 +124,9 @@ impl Monitor for Watch {
     }
 
     fn elapsed(&self) -> Duration {
-        self.begun.get().map_or(Duration::ZERO, Instant::elapsed)
+        let since = self.begun.get().map_or(Duration::ZERO, Instant::elapsed);
+        // Time at the gate belongs to others.
+        since.saturating_sub(self.gate.waited())
     }
 }
 

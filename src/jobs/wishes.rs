@@ -11,6 +11,7 @@ use uuid::Uuid;
 use crate::jobs::Shared;
 use crate::jobs::error::JobsError;
 use crate::jobs::job::{Failure, FailureKind};
+use crate::jobs::store::sqlite::deadlines::Moment;
 use crate::jobs::watch::Reason;
 
 /// Time between two looks for jobs whose deadline has passed.
@@ -50,7 +51,7 @@ impl Priority {
     }
 
     /// The number for it in the database: its place in [`Priority::ALL`].
-    pub(super) fn rank(self) -> i64 {
+    pub(in crate::jobs) fn rank(self) -> i64 {
         match self {
             Priority::High => 0,
             Priority::Normal => 1,
@@ -108,14 +109,22 @@ pub(super) async fn keep_deadlines(shared: Arc<Shared>) {
 }
 
 async fn end_late_jobs(shared: &Shared) -> Result<(), JobsError> {
-    let now = shared.now_ms();
-    let late = shared.store.late(now).await?;
-    if late.queued {
-        for id in shared.store.fail_late(&too_late(), now).await? {
+    let (now, leap) = (shared.now_ms(), shared.leap());
+    let moment = Moment {
+        now,
+        set_at: leap.at,
+        unset: now.saturating_sub(leap.ms),
+    };
+    let late = shared.store.late(moment).await?;
+    let mut more = late.queued;
+    while more {
+        let ended = shared.store.fail_late(&too_late(), moment).await?;
+        for id in &ended {
             tracing::info!(job = %id, "deadline passed, job ended");
             shared.metrics.failed(FailureKind::DeadlinePassed);
-            shared.announce(id);
+            shared.announce(*id);
         }
+        more = !ended.is_empty();
     }
     for id in late.running {
         stop(shared, id);

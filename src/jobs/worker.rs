@@ -1,75 +1,85 @@
-//! Claim one job, solve it, record what became of it.
+//! Take whose turn it is, solve for a slice of time, record what became of it.
 //!
-//! The async side of a worker claims, renews the lease and finishes; the arithmetic runs on a thread of the worker's
-//! own, so that a busy solver starves nobody. A lease is renewed only while the solver ticks: a heartbeat shall prove
-//! that the solver moves, not that the process lives. A solver that does not listen any more is left behind with its
-//! thread, and the worker goes on with a new one.
+//! A turn is either a new claim, of a job or of a group of small ones, or a solve that waits at its gate. The async side
+//! claims and finishes; the arithmetic runs on a thread of the attempt's own, one at a time for each worker. When a slice
+//! is over and somebody else waits, the solver is held at its gate and the worker takes the next turn. A solver that does
+//! not listen any more is left behind with its thread, and the worker goes on with a new one.
 
-use std::pin::pin;
 use std::sync::Arc;
-use std::time::{Duration, Instant, SystemTime};
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
 
-use tokio::sync::oneshot;
 use tokio::time::{MissedTickBehavior, interval, sleep};
-use tracing::{Instrument, Span};
 use uuid::Uuid;
 
-use crate::contact::error::SolveError;
-use crate::contact::monitor::Monitor;
-use crate::contact::remark::RemarkEntry;
 use crate::jobs::Shared;
+use crate::jobs::attempt::{Attempt, Phase};
 use crate::jobs::error::JobsError;
-use crate::jobs::job::{Failure, FailureKind, Job, State};
-use crate::jobs::results::Encoded;
-use crate::jobs::solver_thread::{INTERNAL, Outcome, SolverThread, solve_guarded};
-use crate::jobs::store::{Claim, Ending, Placed, Renewal, StoredCase};
-use crate::jobs::trace::Traced;
-use crate::jobs::watch::{Reason, Watch};
-use crate::jobs::wishes::too_late;
+use crate::jobs::job::State;
+use crate::jobs::solver_thread::SolverThread;
+use crate::jobs::store::{Claim, ClaimRequest, Release};
+use crate::jobs::turns::Spent;
+use crate::jobs::watch::Reason;
 
 /// How often an idle worker looks for jobs although nobody woke it.
 const POLL: Duration = Duration::from_secs(1);
 /// How long a solver that was told to stop may go on before its thread is left behind.
-pub(super) const PATIENCE: Duration = Duration::from_secs(2);
-/// One worker with its solver thread.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// Largest sum of expected solve times in a group, in µs.
+const GROUP_COST_US: u64 = 200_000;
+/// How often a worker looks whether somebody waits for the solver.
+const LOOK_ROUND: Duration = Duration::from_millis(200);
+
+/// One worker. It has at most one solver at work.
 #[derive(Debug)]
 pub struct Worker {
     pub(super) shared: Arc<Shared>,
-    pub(super) name: String,
-    pub(super) thread: SolverThread,
+    name: String,
+    /// A thread without work.
+    thread: Option<SolverThread>,
 }
 
 /// What became of one [`Worker::step`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Step {
-    /// Nothing was queued.
-    Idle,
-    /// The job has ended in this state.
-    Ended(Uuid, State),
-    /// The job went back to the queue, its attempt uncounted.
-    HandedBack(Uuid),
-    /// The job had been given away; the outcome was discarded.
-    Lost(Uuid),
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Step {
+    /// There was something to be done.
+    pub busy: bool,
+    /// Jobs that ended, with their states.
+    pub ended: Vec<(Uuid, State)>,
+    /// Jobs that went back to the queue, their attempts uncounted.
+    pub handed_back: Vec<Uuid>,
+    /// Jobs that had been given away; their outcomes were discarded.
+    pub lost: Vec<Uuid>,
+    /// Jobs whose solve waits for its next turn.
+    pub parked: Vec<Uuid>,
+}
+
+/// How a turn ended.
+enum Turn {
+    /// The solver is done, or was left behind.
+    Over,
+    /// The solver waits at its gate.
+    Held,
 }
 
 impl Worker {
     pub(super) fn new(shared: Arc<Shared>, name: &str) -> Result<Worker, JobsError> {
         Ok(Worker {
+            thread: Some(SolverThread::start(name)?),
             shared,
             name: name.to_owned(),
-            thread: SolverThread::start(name)?,
         })
     }
 
-    /// Steps until the service drains.
+    /// Steps until the service drains and nothing waits at a gate.
     pub(super) async fn run(mut self) {
         let shared = self.shared.clone();
         let recovered = shared.recovered.wait();
         let _ = shared.draining.run_until_cancelled(recovered).await;
-        while !shared.draining.is_cancelled() {
-            match self.group_step().await {
-                Ok(false) => {}
-                Ok(true) => continue,
+        while !shared.draining.is_cancelled() || shared.turns.parked().0 > 0 {
+            match self.step().await {
+                Ok(step) if step.busy => continue,
+                Ok(_) => {}
                 Err(error) => tracing::error!(worker = self.name, %error, "worker step failed"),
             }
             tokio::select! {
@@ -80,360 +90,307 @@ impl Worker {
         }
     }
 
-    /// Claims at most one job and sees it to its end, its return to the queue, or its loss.
+    /// Takes one turn and sees what was claimed for it to its end, its return to the queue, its loss, or its gate.
     ///
     /// # Errors
-    /// The database failed; a claimed job is then taken back when its lease runs out.
+    /// The database failed; claimed jobs are given back if that is possible, or taken back when their leases run out.
     pub async fn step(&mut self) -> Result<Step, JobsError> {
-        let lease = lease_ms(&self.shared);
-        let Some(claim) = self
-            .shared
-            .store
-            .claim(&self.name, self.shared.now_ms(), lease)
-            .await?
-        else {
-            return Ok(Step::Idle);
+        let Some(mut attempt) = self.next_turn().await? else {
+            return Ok(Step::default());
         };
-        let span = tracing::info_span!("job", job = %claim.id, attempt = claim.attempt, method = claim.method);
-        self.attempt(&claim).instrument(span).await
-    }
-
-    pub(super) async fn attempt(&mut self, claim: &Claim) -> Result<Step, JobsError> {
-        let start = Instant::now();
-        tracing::info!(worker = self.name, "job started");
-        let watch = Arc::new(Watch::default());
-        let _registered = Registered::new(&self.shared, claim.id, &watch);
-        // Read after registering: a cancellation is either seen here or finds the watch.
-        let mut cases = self.shared.store.cases(&[claim.id]).await?;
-        let Some((case, cancel_requested)) = cases.remove(&claim.id) else {
-            return Ok(Step::Lost(claim.id));
+        let mut step = Step {
+            busy: true,
+            ..Step::default()
         };
-        if cancel_requested {
-            watch.stop(Reason::Cancel);
-        }
-        let outcome = self.solve(claim, &watch, case).await?;
-        let step = self.record(claim, &watch, outcome).await?;
-        let seconds = start.elapsed().as_secs_f64();
-        match step {
-            Step::Ended(_, state) => tracing::info!(state = state.name(), seconds, "job ended"),
-            Step::HandedBack(_) => tracing::info!(seconds, "job handed back to the queue"),
-            Step::Lost(_) | Step::Idle => {
-                tracing::warn!(seconds, "job lost to another attempt, outcome discarded")
+        let done = self.turn(&mut attempt, &mut step).await;
+        match done {
+            Ok(Turn::Held) => {
+                let held = attempt.claims(|phase| matches!(phase, Phase::Solving));
+                step.parked = held.iter().map(|claim| claim.id).collect();
+                attempt.resumed = true;
+                self.shared.turns.park(attempt);
+                self.shared.wake.notify_one();
+            }
+            Ok(Turn::Over) => {}
+            Err(error) => {
+                self.give_up(&mut attempt).await;
+                return Err(error);
             }
         }
         Ok(step)
     }
 
-    /// Has the case solved on the solver thread, and keeps the lease meanwhile.
-    async fn solve(
-        &mut self,
-        claim: &Claim,
-        watch: &Arc<Watch>,
-        case: StoredCase,
-    ) -> Result<Outcome, JobsError> {
-        let (reply, outcome) = oneshot::channel();
-        let task = {
-            let (shared, watch, span) = (self.shared.clone(), watch.clone(), Span::current());
-            let traced = shared.traced(claim);
-            Box::new(move || {
-                let solve = || solve_guarded(&shared, &watch, &case);
-                let outcome = span.in_scope(|| Traced::solving(traced.as_ref(), solve));
-                // An abandoned attempt has nobody listening.
-                let _ = reply.send(outcome);
-            })
-        };
-        if !self.thread.give(task) {
-            // The thread is gone, which no panic of a solver can do; the attempt counts, a new thread takes over.
-            self.thread = SolverThread::start(&self.name)?;
-            return Ok(Outcome::Broken(Failure::new(
-                FailureKind::Internal,
-                "the solver thread had died",
-            )));
+    /// What to work on next, by the turns of the tenants.
+    async fn next_turn(&self) -> Result<Option<Attempt>, JobsError> {
+        let shared = &self.shared;
+        let turns = &shared.turns;
+        if let Some(attempt) = turns.resume_stopped() {
+            return Ok(Some(attempt));
         }
-        let mut outcome = pin!(outcome);
-        let mut beat = interval(heartbeat(&self.shared));
-        beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        let mut held = Lease::new(&self.shared);
-        let mut told = false;
-        let mut patience = pin!(sleep(Duration::ZERO));
-        loop {
+        if shared.draining.is_cancelled() {
+            return Ok(turns.resume_any());
+        }
+        let tenants = shared.store.queued_tenants().await?;
+        let slice = shared.options.slice;
+        for tenant in turns.order(tenants) {
+            let parked_first = turns.queue_had_its_share(&tenant, slice);
+            if parked_first && let Some(attempt) = turns.resume(&tenant) {
+                return Ok(Some(attempt));
+            }
+            let claims = self.claim(&tenant).await?;
+            if !claims.is_empty() {
+                return Ok(Some(Attempt::new(shared, tenant, claims)));
+            }
+            if let Some(attempt) = turns.resume(&tenant) {
+                return Ok(Some(attempt));
+            }
+        }
+        Ok(None)
+    }
+
+    async fn claim(&self, tenant: &str) -> Result<Vec<Claim>, JobsError> {
+        let shared = &self.shared;
+        let options = &shared.options;
+        let full = shared.turns.parked().0 >= options.parked_max;
+        let slice_us = u64::try_from(options.slice.as_micros()).unwrap_or(u64::MAX);
+        let skip = shared.underway().abandoned.clone();
+        let request = ClaimRequest {
+            worker: &self.name,
+            tenant,
+            jobs: options.group_max.max(1),
+            cost_us: GROUP_COST_US,
+            // With no gate free, only what should be done within a slice.
+            each_cost_us: full.then_some(slice_us),
+            workers: options.workers,
+            lease_until: shared.lease_until(),
+            now: shared.now_ms(),
+            late_before: shared.now_ms().saturating_sub(shared.leap().ms),
+            skip: &skip,
+        };
+        let mut claims = shared.store.claim(&request).await?;
+        if !options.cache {
+            claims.iter_mut().for_each(|claim| claim.reuse_key = None);
+        }
+        Ok(claims)
+    }
+
+    async fn turn(&mut self, attempt: &mut Attempt, step: &mut Step) -> Result<Turn, JobsError> {
+        let start = Instant::now();
+        if !attempt.begun() {
+            self.answer_known(attempt, step).await?;
+            attempt.set_aside_twins();
+        }
+        let turn = self.solve(attempt).await?;
+        attempt.close();
+        if matches!(turn, Turn::Over) {
+            self.thread = attempt.take_thread().or(self.thread.take());
+        }
+        self.record(attempt, step).await?;
+        let seconds = start.elapsed().as_secs_f64();
+        let worker = &self.name;
+        match (attempt.members.as_slice(), &turn) {
+            ([member], Turn::Over) => {
+                let (job, attempt) = (member.claim.id, member.claim.attempt);
+                let state = step
+                    .ended
+                    .first()
+                    .map_or("not ended", |(_, state)| state.name());
+                tracing::info!(%job, attempt, worker, seconds, state, "job ended");
+            }
+            ([member], Turn::Held) => {
+                tracing::debug!(job = %member.claim.id, worker, seconds, "job waits for its next turn");
+            }
+            (members, _) => {
+                let (jobs, ended) = (members.len(), step.ended.len());
+                tracing::info!(worker, jobs, ended, seconds, "group ended");
+            }
+        }
+        Ok(turn)
+    }
+
+    /// Has the solver work for a slice, or for as long as nobody else waits.
+    async fn solve(&mut self, attempt: &mut Attempt) -> Result<Turn, JobsError> {
+        let shared = self.shared.clone();
+        if attempt.to_solve().is_empty() {
+            return Ok(Turn::Over);
+        }
+        // Shared by all that is solved, except by what may have killed a process before.
+        let _alone = if attempt.suspect {
+            let _waits = SuspectWaits::new(&shared);
+            Solo::Alone(shared.solo.clone().write_owned().await)
+        } else {
+            Solo::Beside(shared.solo.clone().read_owned().await)
+        };
+        if attempt.begun() || attempt.suspect {
+            let solving = attempt.claims(|phase| matches!(phase, Phase::Solving));
+            shared.store.set_solving(&solving, true).await?;
+        }
+        if !attempt.begun() {
+            self.begin(attempt).await?;
+        }
+        attempt.keeper.solving(true);
+        attempt.gate.open();
+        let turn = self.until_over(attempt).await;
+        attempt.keeper.solving(false);
+        if matches!(turn, Turn::Held) {
+            attempt.close();
+            let held = attempt.claims(|phase| matches!(phase, Phase::Solving));
+            shared.store.set_solving(&held, false).await?;
+        }
+        Ok(turn)
+    }
+
+    async fn begin(&mut self, attempt: &mut Attempt) -> Result<(), JobsError> {
+        let places = attempt.to_solve();
+        let ids: Vec<_> = places
+            .iter()
+            .map(|place| attempt.members[*place].claim.id)
+            .collect();
+        // Read after registering: a cancellation is either seen here or finds the watch.
+        let mut cases = self.shared.store.cases(&ids).await?;
+        let mut work = Vec::with_capacity(places.len());
+        for place in places {
+            let member = &mut attempt.members[place];
+            match cases.remove(&member.claim.id) {
+                Some((case, cancel_requested)) => {
+                    if cancel_requested {
+                        member.watch.stop(Reason::Cancel);
+                    }
+                    work.push((place, case));
+                }
+                None => member.phase = Phase::Done,
+            }
+        }
+        let thread = match self.thread.take() {
+            Some(thread) => thread,
+            None => SolverThread::start(&self.name)?,
+        };
+        attempt.begin(&self.shared, thread, work);
+        Ok(())
+    }
+
+    /// Waits until the solver is done or held, and sees to it that one of them comes.
+    async fn until_over(&self, attempt: &mut Attempt) -> Turn {
+        let shared = &self.shared;
+        let spent = if attempt.resumed {
+            Spent::OnParked
+        } else {
+            Spent::OnQueue
+        };
+        let (start, mut charged) = (Instant::now(), Instant::now());
+        let slice = shared.options.slice;
+        let mut look = interval(LOOK_ROUND.min(slice.max(Duration::from_millis(1))));
+        look.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut told = None;
+        let mut closed = false;
+        let gate = attempt.gate.clone();
+        let lost = attempt.keeper.lost().clone();
+        let turn = loop {
             tokio::select! {
                 biased;
-                outcome = &mut outcome => {
-                    return Ok(outcome.unwrap_or_else(|_| Outcome::Broken(Failure::new(
-                        FailureKind::Panic,
-                        "the solver thread died",
-                    ))));
-                }
-                _ = beat.tick() => self.beat(claim, watch, &mut held).await,
-                () = self.shared.stopping.cancelled(), if !told => {}
-                () = &mut patience, if told => {
-                    tracing::warn!("the solver does not stop; its thread is left behind");
-                    self.thread = SolverThread::start(&self.name)?;
-                    return Ok(Outcome::Abandoned);
-                }
-            }
-            let stopping = self.shared.stopping.is_cancelled();
-            if stopping {
-                watch.stop(Reason::Shutdown);
-            }
-            // A cancelled solver may take its time, the lease bounds it; otherwise nobody waits for ever.
-            let give_up = stopping || held.lost;
-            if give_up && !told {
-                told = true;
-                patience.set(sleep(PATIENCE));
-            }
-        }
-    }
-
-    /// One heartbeat: renews the lease if the solver has moved, gives up if the lease is over.
-    async fn beat(&self, claim: &Claim, watch: &Watch, held: &mut Lease) {
-        let ticks = watch.ticks();
-        if ticks == held.ticks {
-            if self.shared.now_ms() >= held.until {
-                held.lose(watch);
-            }
-            return;
-        }
-        let now = self.shared.now_ms();
-        let lease = lease_ms(&self.shared);
-        match self
-            .shared
-            .store
-            .renew(claim, watch.progress(), now, lease)
-            .await
-        {
-            Ok(Renewal::Held { cancel_requested }) => {
-                held.ticks = ticks;
-                held.until = now.saturating_add(lease);
-                if cancel_requested {
-                    watch.stop(Reason::Cancel);
-                }
-            }
-            Ok(Renewal::Lost) => held.lose(watch),
-            Err(error) => tracing::warn!(%error, "lease could not be renewed"),
-        }
-    }
-
-    /// Writes down what became of an attempt.
-    async fn record(
-        &self,
-        claim: &Claim,
-        watch: &Watch,
-        outcome: Outcome,
-    ) -> Result<Step, JobsError> {
-        let traced = self
-            .shared
-            .traced(claim)
-            .map(|traced| (traced, SystemTime::now()));
-        let ending = match judge(outcome, watch) {
-            Verdict::Lost => return Ok(Step::Lost(claim.id)),
-            Verdict::HandBack => return self.hand_back(claim).await,
-            Verdict::End(ending) => ending,
-            Verdict::Keep {
-                result,
-                remarks,
-                field_patches,
-            } => match self.place(claim, watch, result).await {
-                Ok(result) => Ending::Succeeded {
-                    remarks,
-                    result,
-                    field_patches,
+                more = attempt.next_outcome() => if !more {
+                    break Turn::Over;
                 },
-                // The service stops while the disk takes nothing.
-                Err(error) if error.trouble().is_some() => return self.hand_back(claim).await,
-                Err(error) => not_stored(&error),
-            },
+                () = gate.reached(), if closed => break Turn::Held,
+                () = shared.stopping.cancelled(), if told.is_none() => {
+                    attempt.stop(Reason::Shutdown);
+                    gate.open();
+                    (told, closed) = (Some(Instant::now()), false);
+                }
+                () = lost.cancelled(), if told.is_none() => told = Some(Instant::now()),
+                _ = look.tick() => {
+                    shared.turns.charge(&attempt.tenant, charged.elapsed(), spent);
+                    charged = Instant::now();
+                    if told.is_some_and(|since| since.elapsed() >= PATIENCE) {
+                        tracing::warn!("the solver does not stop; its thread is left behind");
+                        attempt.abandon(shared);
+                        break Turn::Over;
+                    }
+                    if told.is_none() && !closed && start.elapsed() >= slice && self.somebody_waits().await {
+                        closed = self.hold(attempt);
+                    }
+                }
+            }
         };
-        let Some(job) = self.finish(claim, &ending).await? else {
-            return Ok(Step::Lost(claim.id));
-        };
-        if let Some((traced, from)) = traced {
-            traced.stored(from, job.state.name());
-        }
-        self.shared.metrics.ending(&ending);
-        self.shared.announce(claim.id);
-        Ok(Step::Ended(job.id, job.state))
+        shared
+            .turns
+            .charge(&attempt.tenant, charged.elapsed(), spent);
+        attempt.spent += start.elapsed();
+        turn
     }
 
-    /// Puts a result where it is kept: a small one goes into the database with the end of its job.
-    pub(super) async fn place(
-        &self,
-        claim: &Claim,
-        watch: &Watch,
-        result: Encoded,
-    ) -> Result<Placed, JobsError> {
-        if result.bytes() <= self.shared.options.small_result_max_bytes {
-            return Ok(Placed::Table(result));
+    /// Closes the gate, if there is room for one more solver that waits; a job that came although there was none, because
+    /// it was thought to be short, goes back.
+    fn hold(&self, attempt: &Attempt) -> bool {
+        let options = &self.shared.options;
+        let (parked, bytes) = self.shared.turns.parked();
+        if parked >= options.parked_max {
+            attempt.stop_begun(Reason::TooLong);
+            return false;
         }
-        // A slow disk shall not cost the lease of a long solve; should it be lost all the same, the end of the job is
-        // fenced. After a short solve the lease is as good as new.
-        if watch.elapsed() >= heartbeat(&self.shared) {
-            let lease = lease_ms(&self.shared);
-            let renewal =
-                self.shared
-                    .store
-                    .renew(claim, watch.progress(), self.shared.now_ms(), lease);
-            if let Err(error) = renewal.await {
-                tracing::warn!(%error, "lease could not be renewed");
+        if bytes.saturating_add(attempt.memory_bytes()) > options.parked_bytes_max {
+            return false;
+        }
+        attempt.gate.close();
+        true
+    }
+
+    /// Is there anything else that could have the solver?
+    async fn somebody_waits(&self) -> bool {
+        let shared = &self.shared;
+        if shared.suspects_waiting.load(Ordering::Acquire) > 0 {
+            return true;
+        }
+        if shared.draining.is_cancelled() {
+            return shared.turns.parked().0 > 0;
+        }
+        shared.turns.parked().0 > 0 || shared.store.queued(None).await.is_ok_and(|jobs| jobs > 0)
+    }
+
+    /// Gives back what is still held after the table failed in between.
+    async fn give_up(&mut self, attempt: &mut Attempt) {
+        attempt.stop(Reason::Shutdown);
+        attempt.gate.open();
+        if attempt.begun() {
+            let ended = async { while attempt.next_outcome().await {} };
+            if tokio::time::timeout(PATIENCE, ended).await.is_err() {
+                attempt.abandon(&self.shared);
+            } else {
+                self.thread = attempt.take_thread();
             }
         }
-        let bytes = result.bytes() as u64;
-        let shared = &self.shared;
-        let folder = shared
-            .write_patiently(|| shared.results.put(claim, result.clone()))
-            .await?;
-        Ok(Placed::Folder(folder, bytes))
-    }
-
-    /// Ends the job in the table; a database that fails for a while does not cost the result.
-    async fn finish(&self, claim: &Claim, ending: &Ending) -> Result<Option<Job>, JobsError> {
-        let shared = &self.shared;
-        shared
-            .write_patiently(|| shared.store.finish(claim, ending, shared.now_ms()))
-            .await
-    }
-
-    pub(super) async fn hand_back(&self, claim: &Claim) -> Result<Step, JobsError> {
-        Ok(
-            match self
-                .shared
-                .store
-                .release(claim, self.shared.now_ms())
-                .await?
-            {
-                Some(state) if state.ended() => {
-                    self.shared.metrics.ended(state, 1);
-                    self.shared.announce(claim.id);
-                    Step::Ended(claim.id, state)
-                }
-                Some(_) => Step::HandedBack(claim.id),
-                None => Step::Lost(claim.id),
-            },
-        )
-    }
-}
-
-/// What follows from the outcome of an attempt.
-pub(super) enum Verdict {
-    /// There is an answer to keep.
-    Keep {
-        result: Encoded,
-        remarks: Vec<RemarkEntry>,
-        field_patches: u32,
-    },
-    /// The job ends without one.
-    End(Ending),
-    /// The job goes back to the queue, its attempt uncounted.
-    HandBack,
-    /// The lease is gone.
-    Lost,
-}
-
-/// What follows from the outcome of an attempt.
-pub(super) fn judge(outcome: Outcome, watch: &Watch) -> Verdict {
-    let failed = |reason: String| {
-        tracing::error!(reason, "a job fails inside the service");
-        Verdict::End(Ending::Failed(Failure::new(
-            FailureKind::Internal,
-            INTERNAL,
-        )))
-    };
-    match outcome {
-        Outcome::Solved { .. } if watch.reason() == Some(Reason::Lost) => Verdict::Lost,
-        Outcome::Solved {
-            result,
-            remarks,
-            field_patches,
-        } => Verdict::Keep {
-            result,
-            remarks,
-            field_patches,
-        },
-        Outcome::Unsolved(SolveError::Cancelled) | Outcome::Abandoned => match watch.reason() {
-            Some(Reason::Cancel) => Verdict::End(Ending::Cancelled),
-            Some(Reason::Shutdown) => Verdict::HandBack,
-            Some(Reason::Lost) => Verdict::Lost,
-            Some(Reason::Deadline) => Verdict::End(Ending::Failed(too_late())),
-            None => failed("the solver stopped although nobody asked it to".to_owned()),
-        },
-        Outcome::Unsolved(error) => match Failure::of_solve(&error) {
-            Some(failure) => Verdict::End(Ending::Failed(failure)),
-            None => failed(error.to_string()),
-        },
-        Outcome::Refused(error) => {
-            failed(format!("the stored case is no longer accepted: {error}"))
-        }
-        Outcome::Broken(failure) => Verdict::End(Ending::Failed(failure)),
-    }
-}
-
-/// The end of a job whose result could not be stored.
-pub(super) fn not_stored(error: &JobsError) -> Ending {
-    tracing::error!(%error, "result could not be stored");
-    let detail = "the result could not be stored; the service's log has the reason";
-    Ending::Failed(Failure::new(FailureKind::Internal, detail))
-}
-
-/// The lease as the worker knows it.
-struct Lease {
-    ticks: u64,
-    until: i64,
-    lost: bool,
-}
-
-impl Lease {
-    fn new(shared: &Shared) -> Lease {
-        Lease {
-            ticks: 0,
-            until: shared.now_ms().saturating_add(lease_ms(shared)),
-            lost: false,
-        }
-    }
-
-    /// The lease is over, also for a solver that was told to stop for another reason before.
-    fn lose(&mut self, watch: &Watch) {
-        self.lost = true;
-        watch.stop(Reason::Lost);
-    }
-}
-
-/// An entry in the list of running attempts, as long as it lives.
-pub(super) struct Registered {
-    shared: Arc<Shared>,
-    id: Uuid,
-    watch: Arc<Watch>,
-}
-
-impl Registered {
-    pub(super) fn new(shared: &Arc<Shared>, id: Uuid, watch: &Arc<Watch>) -> Registered {
-        shared.running().insert(id, watch.clone());
-        Registered {
-            shared: shared.clone(),
-            id,
-            watch: watch.clone(),
+        let held = attempt.claims(|phase| !matches!(phase, Phase::Done));
+        let mut step = Step::default();
+        let released = self.release(attempt, &held, Release::NotBegun, &mut step);
+        if let Err(error) = released.await {
+            tracing::warn!(%error, "claimed jobs could not be given back; their leases will run out");
         }
     }
 }
 
-impl Drop for Registered {
+/// The right to solve: beside others, or alone.
+enum Solo {
+    Beside(#[expect(dead_code, reason = "held")] tokio::sync::OwnedRwLockReadGuard<()>),
+    Alone(#[expect(dead_code, reason = "held")] tokio::sync::OwnedRwLockWriteGuard<()>),
+}
+
+/// Somebody waits to solve alone, so that others make room.
+struct SuspectWaits(Arc<Shared>);
+
+impl SuspectWaits {
+    fn new(shared: &Arc<Shared>) -> SuspectWaits {
+        shared.suspects_waiting.fetch_add(1, Ordering::AcqRel);
+        SuspectWaits(shared.clone())
+    }
+}
+
+impl Drop for SuspectWaits {
     fn drop(&mut self) {
-        let mut running = self.shared.running();
-        // Another worker may have taken the job over meanwhile; its entry stays.
-        if running
-            .get(&self.id)
-            .is_some_and(|watch| Arc::ptr_eq(watch, &self.watch))
-        {
-            running.remove(&self.id);
-        }
+        self.0.suspects_waiting.fetch_sub(1, Ordering::AcqRel);
     }
 }
 
 /// Time between two heartbeats of a worker, and between two looks of the reaper.
 pub(super) fn heartbeat(shared: &Shared) -> Duration {
     (shared.options.lease / 3).max(Duration::from_millis(1))
-}
-
-pub(super) fn lease_ms(shared: &Shared) -> i64 {
-    i64::try_from(shared.options.lease.as_millis()).unwrap_or(i64::MAX)
 }

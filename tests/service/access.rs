@@ -7,7 +7,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use railhead::contact;
 use railhead::http::{HttpOptions, Peer};
 use railhead::jobs::keys::Keyring;
-use railhead::jobs::store::NewJob;
 use railhead::jobs::{Jobs, Options};
 use reqwest::Method;
 use serde_json::{Value, json};
@@ -15,7 +14,6 @@ use tower::ServiceExt;
 
 use crate::errors::assert_problem;
 use crate::server::{Answer, Server, Setup};
-use crate::store::{Table, new_job};
 use crate::support::{case, endless_case, pause};
 
 /// A service with keys of two tenants and of the operator.
@@ -426,28 +424,6 @@ async fn a_tenant_may_have_so_many_queued_jobs_and_no_more() {
         .await;
     assert_eq!(cancelled.status, 200);
     guarded.submit(north, &case("has room again")).await;
-}
-
-#[tokio::test]
-async fn tenants_take_turns_however_long_their_queues_are() {
-    let table = Table::new().await;
-    let of = |tenant: &str| NewJob {
-        tenant: tenant.into(),
-        ..new_job()
-    };
-    for _ in 0..50 {
-        table.add(of("flood")).await;
-    }
-    let mut few = vec![table.add(of("a")).await.id, table.add(of("z")).await.id];
-    few.push(table.add(of("z")).await.id);
-    let mut places = Vec::new();
-    for place in 0..10 {
-        let claim = table.claim(0).await.unwrap();
-        if few.contains(&claim.id) {
-            places.push(place);
-        }
-    }
-    assert_eq!(places, [0, 2, 4], "a, flood, z, flood, z, flood, …");
 }
 
 #[tokio::test]

@@ -44,11 +44,14 @@ async fn every_example_is_solved_while_the_client_waits() {
 #[tokio::test]
 async fn wait_that_is_too_short_answers_the_job_as_it_is() {
     let server = Server::idle().await;
-    for (prefer, applied) in [
+    for (place, (prefer, applied)) in [
         (Some("wait=0"), Some("wait=0")),
         (Some("respond-async"), None),
         (None, None),
-    ] {
+    ]
+    .into_iter()
+    .enumerate()
+    {
         let case = example("spin.case.json");
         let answer = server
             .send(Method::POST, "/v1/jobs", |request| {
@@ -70,7 +73,16 @@ async fn wait_that_is_too_short_answers_the_job_as_it_is() {
             answer.json["links"]["self"].as_str()
         );
         assert_eq!(answer.header("retry-after"), Some("1"));
-        assert_eq!(server.get(&path_of(&answer.json)).await.json, answer.json);
+        let mut looked = server.get(&path_of(&answer.json)).await.json;
+        let queue = looked.as_object_mut().expect("a job").remove("queue");
+        let queue = queue.expect("a place in the queue");
+        assert_eq!(queue["position"], place);
+        assert_eq!(
+            queue["starts_in_s"].as_f64() > Some(0.0),
+            place > 0,
+            "{queue}"
+        );
+        assert_eq!(looked, answer.json);
     }
 }
 

@@ -366,8 +366,8 @@ async fn a_batch_outlives_two_kills_and_every_case_is_answered_once() {
 
 #[tokio::test]
 async fn jobs_of_a_group_that_died_are_retried_alone_and_uncounted() {
+    use crate::store::claim_up_to;
     use railhead::jobs::store::sqlite::SqliteStore;
-    use railhead::jobs::store::sqlite::groups::GroupBounds;
     let folder = tempfile::tempdir().unwrap();
     let store = SqliteStore::open(&folder.path().join("jobs.db"))
         .await
@@ -378,33 +378,19 @@ async fn jobs_of_a_group_that_died_are_retried_alone_and_uncounted() {
             .await
             .unwrap();
     }
-    let bounds = GroupBounds {
-        jobs: 8,
-        cost_us: 1_000_000,
-        workers: 1,
-    };
-    let group = store
-        .claim_group("w", 0, 10, bounds, &HashSet::new())
-        .await
-        .unwrap();
+    let group = claim_up_to(&store, 0, 10, 8).await;
     assert_eq!(group.len(), 3);
     assert_eq!(store.reap(10, 10, 1).await.unwrap().len(), 3);
     let ends: Vec<_> = group
         .iter()
         .map(|claim| (claim.clone(), crate::store::success()))
         .collect();
-    assert!(
-        store.finish_group(&ends, 11).await.unwrap().is_empty(),
-        "fenced"
-    );
+    assert!(store.finish(&ends, 11).await.unwrap().is_empty(), "fenced");
     for claim in &group {
-        let alone = store
-            .claim_group("w", 20, 10, bounds, &HashSet::new())
-            .await
-            .unwrap();
+        let alone = claim_up_to(&store, 20, 10, 8).await;
         assert_eq!(alone.len(), 1);
         assert_eq!((alone[0].id, alone[0].attempt), (claim.id, 1));
-        assert_eq!(alone[0].lease_number, 2);
+        assert_eq!((alone[0].lease_number, alone[0].suspect), (2, true));
     }
     // Alone, the one attempt that is allowed counts.
     let ended = store.reap(30, 30, 1).await.unwrap();

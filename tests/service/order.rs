@@ -51,25 +51,6 @@ async fn jobs_are_claimed_by_priority_and_then_by_age() {
     assert_eq!(claimed, [2, 4, 1, 3, 0].map(|place: usize| added[place]));
 }
 
-#[tokio::test]
-async fn priorities_win_no_turn_from_another_tenant() {
-    let table = Table::new().await;
-    for _ in 0..20 {
-        table.add(wishing("pusher", Priority::High)).await;
-    }
-    let modest = [
-        table.add(wishing("z", Priority::Low)).await.id,
-        table.add(wishing("z", Priority::Low)).await.id,
-    ];
-    let mut places = Vec::new();
-    for place in 0..6 {
-        if modest.contains(&table.claim(0).await.unwrap().id) {
-            places.push(place);
-        }
-    }
-    assert_eq!(places, [1, 3], "pusher, z, pusher, z, …");
-}
-
 /// A clock that a test turns.
 fn turned() -> (Clock, Arc<AtomicI64>) {
     let ahead = Arc::new(AtomicI64::new(0));

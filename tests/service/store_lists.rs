@@ -27,7 +27,7 @@ async fn pages_neither_repeat_nor_skip_while_jobs_arrive() {
         // A newcomer belongs before the first page; a job that ends stays where it is.
         table.add(new_job()).await;
         let claim = table.claim(0).await.unwrap();
-        table.store.finish(&claim, &success(), 1).await.unwrap();
+        table.finish(&claim, &success(), 1).await.unwrap();
         match page.next_cursor {
             Some(next) => cursor = Some(next),
             None => break,

@@ -7,9 +7,11 @@ use proptest::prelude::*;
 use railhead::jobs::State;
 use railhead::jobs::store::QueueBounds;
 use railhead::jobs::store::sqlite::SqliteStore;
-use railhead::jobs::store::{Claim, Deleted, Ending, NewJob, Placed, Renewal};
+use railhead::jobs::store::{Claim, Deleted, Ending, NewJob, Placed, Release, Renewal};
 use railhead::jobs::wishes::Wishes;
 use uuid::Uuid;
+
+use crate::store::{claim_up_to, finish_one};
 
 const LEASE: i64 = 10;
 const ATTEMPTS_MAX: u32 = 2;
@@ -121,7 +123,7 @@ impl Pair {
     }
 
     async fn claim(&mut self) {
-        let claim = self.store.claim("w", self.now, LEASE).await.unwrap();
+        let claim = claim_up_to(&self.store, self.now, LEASE, 1).await.pop();
         let oldest = self
             .rows
             .iter_mut()
@@ -165,11 +167,8 @@ impl Pair {
     }
 
     async fn renew(&mut self, claim: Claim) {
-        let renewal = self
-            .store
-            .renew(&claim, 0.5, self.now, LEASE)
-            .await
-            .unwrap();
+        let renewals = self.store.renew(&[(&claim, 0.5)], self.now + LEASE).await;
+        let renewal = renewals.unwrap()[0];
         let until = self.now + LEASE;
         let expected = self.held(&claim).map_or(Renewal::Lost, |row| {
             row.lease_until = until;
@@ -190,7 +189,7 @@ impl Pair {
         } else {
             Ending::Cancelled
         };
-        let job = self.store.finish(&claim, &ending, self.now).await.unwrap();
+        let job = finish_one(&self.store, &claim, &ending, self.now).await;
         let held = self.held(&claim);
         assert_eq!(job.is_some(), held.is_some());
         if let Some(row) = held {
@@ -203,7 +202,12 @@ impl Pair {
     }
 
     async fn release(&mut self, claim: Claim) {
-        let state = self.store.release(&claim, self.now).await.unwrap();
+        let claims = std::slice::from_ref(&claim);
+        let released = self
+            .store
+            .release(claims, Release::NotBegun, self.now)
+            .await;
+        let state = released.unwrap().first().map(|(_, state)| *state);
         let expected = self.held(&claim).map(|row| {
             row.attempt -= 1;
             row.state = if row.cancel_requested {

@@ -8,7 +8,6 @@ use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Monitor;
 use railhead::contact::problem::Problem;
 use railhead::contact::solve;
-use railhead::jobs::worker::Step;
 use railhead::jobs::{FailureKind, JobsError, Options, State};
 use serde_json::json;
 use tokio::sync::mpsc::unbounded_channel;
@@ -39,7 +38,7 @@ async fn keeps_its_answer(small_result_max_bytes: usize) {
     )
     .await;
     let mut worker = jobs.worker("w").unwrap();
-    assert_eq!(worker.step().await.unwrap(), Step::Idle);
+    assert!(!worker.step().await.unwrap().busy);
 
     let mut remarkable = case("one");
     remarkable["friction"]["coefficient"] = json!(1.5);
@@ -48,10 +47,7 @@ async fn keeps_its_answer(small_result_max_bytes: usize) {
         jobs.solution(id).await,
         Err(JobsError::NotReady(State::Queued))
     ));
-    assert_eq!(
-        worker.step().await.unwrap(),
-        Step::Ended(id, State::Succeeded)
-    );
+    assert_eq!(worker.step().await.unwrap().ended, [(id, State::Succeeded)]);
 
     let (solution, fields) = answers.recv().unwrap();
     assert!(!solution.remarks.is_empty());
@@ -96,12 +92,8 @@ async fn a_panic_fails_that_job_only() {
     let good = jobs.submit(case("good"), None).await.unwrap().id;
     let mut worker = jobs.worker("w").unwrap();
     assert_eq!(
-        worker.step().await.unwrap(),
-        Step::Ended(bad, State::Failed)
-    );
-    assert_eq!(
-        worker.step().await.unwrap(),
-        Step::Ended(good, State::Succeeded)
+        worker.step().await.unwrap().ended,
+        [(bad, State::Failed), (good, State::Succeeded)]
     );
 
     let job = jobs.get(bad).await.unwrap();
@@ -162,7 +154,7 @@ async fn a_running_job_stops_when_it_is_cancelled() {
     let step = tokio::spawn(async move { worker.step().await.unwrap() });
     has_started.recv().await.unwrap();
     assert_eq!(jobs.cancel(id).await.unwrap().state, State::Running);
-    assert_eq!(step.await.unwrap(), Step::Ended(id, State::Cancelled));
+    assert_eq!(step.await.unwrap().ended, [(id, State::Cancelled)]);
     let job = jobs.cancel(id).await.unwrap();
     assert_eq!((job.state, job.failure), (State::Cancelled, None));
 }
@@ -316,7 +308,8 @@ async fn the_same_key_gives_the_same_job_also_when_the_queue_is_full() {
 
     jobs.worker("w").unwrap().step().await.unwrap();
     jobs.submit(case("three"), None).await.unwrap();
-    let full = jobs.submit(case("four"), None).await;
+    jobs.submit(case("four"), None).await.unwrap();
+    let full = jobs.submit(case("five"), None).await;
     assert!(matches!(full, Err(JobsError::QueueFull { .. })), "{full:?}");
 }
 

@@ -7,7 +7,7 @@
 pub mod list;
 pub mod sqlite;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 
 use bytes::Bytes;
@@ -162,6 +162,47 @@ pub struct Claim {
     pub traceparent: Option<String>,
     /// What tells identical cases; `None` for a job that must be solved.
     pub reuse_key: Option<ReuseKey>,
+    /// It ran together with others when their process died, and comes alone.
+    pub suspect: bool,
+}
+
+/// What a worker asks for.
+#[derive(Debug, Clone, Copy)]
+pub struct ClaimRequest<'a> {
+    /// Name of the worker.
+    pub worker: &'a str,
+    /// Whose turn it is.
+    pub tenant: &'a str,
+    /// Most jobs.
+    pub jobs: usize,
+    /// Largest sum of the expected solve times in µs; one job may be above it.
+    pub cost_us: u64,
+    /// Largest expected solve time of each job in µs, if there is such a bound.
+    pub each_cost_us: Option<u64>,
+    /// Workers among which the queue is shared.
+    pub workers: usize,
+    /// End of the lease, by the clock of this process.
+    pub lease_until: i64,
+    /// The present, epoch milliseconds.
+    pub now: i64,
+    /// Jobs with a deadline before this time are left to whoever ends them.
+    pub late_before: i64,
+    /// Batches whose jobs are left alone.
+    pub skip: &'a HashSet<Uuid>,
+}
+
+/// Why jobs go back to the queue; none of these counts as an attempt.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Release {
+    /// They were not begun, or the service stops.
+    NotBegun,
+    /// They were to share an answer that did not come: solved next time.
+    SolveItself,
+    /// Their solve takes longer than was thought, at least this long.
+    Long {
+        /// Expected solve time from now on, in µs.
+        cost_us: u64,
+    },
 }
 
 /// The answer to a heartbeat.

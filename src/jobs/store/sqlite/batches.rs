@@ -9,7 +9,6 @@ use sqlx::{Row, SqliteConnection};
 use uuid::Uuid;
 
 use crate::jobs::batch::{Batch, Line, LineResult};
-use crate::jobs::created_at;
 use crate::jobs::error::JobsError;
 use crate::jobs::job::State;
 use crate::jobs::store::sqlite::SqliteStore;
@@ -20,6 +19,7 @@ use crate::jobs::store::sqlite::rows::{
     job_columns, read_blob_ids, read_count, read_id, read_job, read_state,
 };
 use crate::jobs::store::{Begun, NewBatch, NewJob, QueueBounds, Refusal};
+use crate::jobs::submit::created_at;
 
 const CANCEL: &str = "UPDATE jobs SET state = CASE WHEN state = 'queued' THEN 'cancelled' ELSE state END, \
      ended_at = CASE WHEN state = 'queued' THEN $1 ELSE NULL END, \

@@ -7,8 +7,7 @@ use crate::jobs::error::JobsError;
 use crate::jobs::store::list::first_id_at;
 use crate::jobs::store::sqlite::SqliteStore;
 use crate::jobs::store::sqlite::blobs::release_blobs;
-use crate::jobs::store::sqlite::groups::push_list;
-use crate::jobs::store::sqlite::rows::{read_blob_ids, read_id};
+use crate::jobs::store::sqlite::rows::{push_list, read_blob_ids, read_id};
 
 /// Ids grow with the time of submission, so the oldest rows are looked at and no others.
 const EXPIRED: &str = "SELECT id, blob_id FROM jobs \

@@ -64,13 +64,14 @@ pub(super) async fn insert_jobs(
             .collect();
         for some in labels.chunks(ROWS_PER_STATEMENT) {
             let mut rows = QueryBuilder::<Sqlite>::new(
-                "INSERT INTO job_labels (of_tenant, key, value, job_id) ",
+                "INSERT INTO job_labels (of_tenant, key, value, job_id, state) ",
             );
             rows.push_values(some, |mut row, (job, (key, value))| {
                 row.push_bind(&*job.tenant)
                     .push_bind(*key)
                     .push_bind(*value)
-                    .push_bind(job.id.to_string());
+                    .push_bind(job.id.to_string())
+                    .push("'queued'");
             });
             rows.build().execute(&mut *connection).await?;
         }

@@ -245,5 +245,6 @@ fn queued(new: &NewJob) -> Job {
         failure: None,
         cached: false,
         version: 1,
+        queue: None,
     }
 }

@@ -48,7 +48,7 @@ fn page_query(
 ) -> QueryBuilder<Sqlite> {
     let (source, id) = match filter.label {
         Some(_) => (
-            " FROM job_labels JOIN jobs ON jobs.id = job_labels.job_id",
+            " FROM (SELECT of_tenant, key, value, job_id, state AS label_state FROM job_labels) AS job_labels JOIN jobs ON jobs.id = job_id",
             "job_id",
         ),
         None => (" FROM jobs", "id"),
@@ -60,7 +60,7 @@ fn page_query(
         query.push(joint).push(condition).push_bind(value);
         joint = " AND ";
     };
-    // Within a batch its index is walked, not that of the tenant or the state: a bare expression keeps those out.
+    // Within a batch one of its indices is walked, not that of the tenant: a bare expression keeps that out.
     let owner = match (&filter.label, filter.batch) {
         (Some(_), _) => "of_tenant = ",
         (None, Some(_)) => "tenant || '' = ",
@@ -72,12 +72,16 @@ fn page_query(
         and(&mut query, "value = ", value.clone());
     }
     if let Some(batch) = filter.batch {
-        and(&mut query, "batch_id = ", batch.to_string());
+        let column = match filter.label {
+            Some(_) => "batch_id || '' = ",
+            None => "batch_id = ",
+        };
+        and(&mut query, column, batch.to_string());
     }
     if let Some(state) = filter.state {
-        let column = match filter.batch {
-            Some(_) => "state || '' = ",
-            None => "state = ",
+        let column = match (&filter.label, filter.batch) {
+            (Some(_), _) => "label_state = ",
+            (None, _) => "state = ",
         };
         and(&mut query, column, state.name().to_owned());
     }
@@ -129,7 +133,11 @@ pub(super) mod tests {
             };
             let query = page_query("t", &filter, after, 50);
             let steps = plan(&store, query.sql().as_str()).await;
-            assert!(steps[0].contains("jobs_by_batch (batch_id=?"), "{steps:?}");
+            let seek = match state {
+                None => "jobs_by_batch (batch_id=?",
+                Some(_) => "jobs_by_batch_and_state (batch_id=? AND state=?",
+            };
+            assert!(steps[0].contains(seek), "{steps:?}");
             assert_eq!(steps.len(), 1, "{steps:?}");
         }
     }
@@ -162,9 +170,15 @@ pub(super) mod tests {
                             !steps.iter().any(|step| step.starts_with("SCAN")),
                             "{filter:?}: {steps:?}"
                         );
-                        if label.is_none() && state.is_some() {
-                            assert!(steps[0].contains("jobs_by_state (state=?"), "{steps:?}");
-                        }
+                        let seek = match (&label, state) {
+                            (None, None) => "jobs_by_tenant (tenant=?",
+                            (None, Some(_)) => "jobs_by_state (state=? AND tenant=?",
+                            (Some(_), None) => "PRIMARY KEY (of_tenant=? AND key=? AND value=?",
+                            (Some(_), Some(_)) => {
+                                "job_labels_by_state (of_tenant=? AND key=? AND value=? AND state=?"
+                            }
+                        };
+                        assert!(steps[0].contains(seek), "{steps:?}");
                     }
                 }
             }

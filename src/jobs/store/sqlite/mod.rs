@@ -14,7 +14,7 @@ pub mod claims;
 pub mod deadlines;
 pub mod expiry;
 pub mod figures;
-pub mod groups;
+mod finish;
 mod insert;
 pub mod intake;
 pub mod keys;
@@ -26,7 +26,6 @@ mod schema;
 
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use sqlx::sqlite::{
@@ -55,8 +54,6 @@ const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 #[derive(Debug, Clone)]
 pub struct SqliteStore {
     file: PathBuf,
-    /// The tenant whose job was claimed last.
-    served: Arc<Mutex<String>>,
     writer: SqlitePool,
     readers: SqlitePool,
     intake: Intake,
@@ -111,7 +108,6 @@ impl SqliteStore {
         let readers = pool(READERS).connect_with(options.read_only(true)).await?;
         Ok(SqliteStore {
             file: file.to_owned(),
-            served: Arc::default(),
             intake: Intake::start(writer.clone()),
             writer,
             readers,
@@ -122,6 +118,20 @@ impl SqliteStore {
     pub async fn close(&self) {
         self.readers.close().await;
         self.writer.close().await;
+    }
+
+    /// Looks through the whole file for damage.
+    ///
+    /// # Errors
+    /// [`JobsError::TableDamaged`], or the database failed.
+    pub async fn check(&self) -> Result<(), JobsError> {
+        let found: String = sqlx::query_scalar("PRAGMA quick_check(1)")
+            .fetch_one(&self.readers)
+            .await?;
+        match found.as_str() {
+            "ok" => Ok(()),
+            _ => Err(JobsError::TableDamaged(found)),
+        }
     }
 
     /// A round trip to the database.

@@ -6,9 +6,9 @@ use sqlx::{QueryBuilder, Row, Sqlite, SqliteConnection};
 use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
+use crate::jobs::job::Job;
 use crate::jobs::store::sqlite::SqliteStore;
-use crate::jobs::store::sqlite::groups::push_list;
-use crate::jobs::store::sqlite::rows::{read_count, read_id};
+use crate::jobs::store::sqlite::rows::{push_list, read_count, read_id};
 use crate::jobs::store::{NewJob, QueueBounds, Refusal};
 
 /// Queued jobs of a tenant (all of them if it is NULL) and the places reserved for batches under way.
@@ -106,7 +106,36 @@ pub(super) async fn with_living_source(
     Ok(with.map(|job| job.id).collect())
 }
 
+/// Jobs of the tenant before one of this rank and id, and their expected µs; no further than the limit.
+const BEFORE: &str = "SELECT COUNT(*) AS jobs, COALESCE(SUM(cost_us), 0) AS cost_us FROM (SELECT cost_us FROM jobs \
+     WHERE state = 'queued' AND tenant = $1 AND (rank, id) < ($2, $3) LIMIT $4) AS before";
+
 impl SqliteStore {
+    /// Number of queued jobs of a tenant that come before this one, and their expected solve time in µs, counted no
+    /// further than `limit` jobs; and the number of tenants with queued jobs.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn queued_before(
+        &self,
+        job: &Job,
+        limit: u32,
+    ) -> Result<(u64, u64, usize), JobsError> {
+        let row = sqlx::query(BEFORE)
+            .bind(&job.tenant)
+            .bind(job.priority.rank())
+            .bind(job.id.to_string())
+            .bind(limit)
+            .fetch_one(&self.readers)
+            .await?;
+        let tenants = self.queued_tenants().await?.len();
+        Ok((
+            read_count(&row, "jobs")?,
+            read_count(&row, "cost_us")?,
+            tenants,
+        ))
+    }
+
     /// Number of queued jobs, of a tenant or of all.
     ///
     /// # Errors
@@ -120,5 +149,22 @@ impl SqliteStore {
         .fetch_one(&self.readers)
         .await?;
         Ok(u64::try_from(row.try_get::<i64, _>("queued")?).unwrap_or(0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::jobs::store::sqlite::lists::tests::plan;
+
+    #[tokio::test]
+    async fn a_place_in_the_queue_is_read_from_an_index_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = SqliteStore::open(&folder.path().join("jobs.db"))
+            .await
+            .unwrap();
+        let steps = plan(&store, BEFORE).await;
+        let seeks = |step: &String| step.contains("COVERING INDEX jobs_queued (tenant=?");
+        assert!(steps.iter().any(seeks), "{steps:?}");
     }
 }

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
+use sqlx::{QueryBuilder, Row, Sqlite};
 use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
@@ -47,6 +47,7 @@ pub(super) fn read_job(row: &SqliteRow) -> Result<Job, JobsError> {
         failure: failure.as_deref().map(from_json).transpose()?,
         cached: row.try_get("cached")?,
         version: read_count(row, "version")?,
+        queue: None,
     })
 }
 
@@ -93,4 +94,12 @@ pub(super) fn to_json<T: Serialize>(value: &T) -> Result<String, JobsError> {
 
 fn from_json<T: DeserializeOwned>(text: &str) -> Result<T, JobsError> {
     serde_json::from_str(text).map_err(|error| JobsError::Damaged(format!("{text:.80}: {error}")))
+}
+
+/// Ids as the list of an `IN`, without the brackets.
+pub(super) fn push_list(query: &mut QueryBuilder<Sqlite>, ids: &[Uuid]) {
+    let mut list = query.separated(", ");
+    for id in ids {
+        list.push_bind(id.to_string());
+    }
 }

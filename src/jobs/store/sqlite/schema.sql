@@ -20,10 +20,11 @@ CREATE TABLE jobs (
     ended_at         INTEGER,
     attempt          INTEGER NOT NULL DEFAULT 0, -- attempts that count against the limit
     lease_number     INTEGER NOT NULL DEFAULT 0, -- claims ever made: the fencing token, never lowered
-    lease_until      INTEGER,
+    lease_until      INTEGER,                    -- by the clock of the process that runs the job
     worker           TEXT,
     group_size       INTEGER NOT NULL DEFAULT 1, -- jobs claimed together with this one
-    alone            INTEGER NOT NULL DEFAULT 0, -- 1: its group died, it is claimed alone
+    suspect          INTEGER NOT NULL DEFAULT 0, -- 1: it ran together with others when their process died, it is solved alone
+    solving          INTEGER NOT NULL DEFAULT 0, -- 1: running, and not waiting for its turn
     cancel_requested INTEGER NOT NULL DEFAULT 0,
     progress         REAL    NOT NULL DEFAULT 0,
     remarks          TEXT    NOT NULL DEFAULT '[]',
@@ -38,10 +39,11 @@ CREATE TABLE jobs (
 CREATE INDEX jobs_by_state ON jobs (state, tenant, id);
 CREATE INDEX jobs_by_tenant ON jobs (tenant, id);
 -- The claim: the next job of the tenant whose turn it is. Jobs leave it when they are claimed.
-CREATE INDEX jobs_queued ON jobs (tenant, rank, id) WHERE state = 'queued';
+CREATE INDEX jobs_queued ON jobs (tenant, rank, id, cost_us) WHERE state = 'queued';
 CREATE INDEX jobs_by_deadline ON jobs (deadline) WHERE deadline IS NOT NULL AND ended_at IS NULL;
--- Ids within a batch grow with the place in it. The state is there for counting.
-CREATE INDEX jobs_by_batch ON jobs (batch_id, id, state) WHERE batch_id IS NOT NULL;
+-- Ids within a batch grow with the place in it. The second is for counting and for lists by state.
+CREATE INDEX jobs_by_batch ON jobs (batch_id, id) WHERE batch_id IS NOT NULL;
+CREATE INDEX jobs_by_batch_and_state ON jobs (batch_id, state, id) WHERE batch_id IS NOT NULL;
 -- Those of a batch that can still be cancelled.
 CREATE INDEX jobs_to_cancel ON jobs (batch_id) WHERE ended_at IS NULL AND cancel_requested = 0;
 CREATE INDEX jobs_by_reuse_key ON jobs (reuse_key) WHERE state = 'succeeded';
@@ -79,9 +81,14 @@ CREATE TABLE job_labels (
     key       TEXT NOT NULL,
     value     TEXT NOT NULL,
     job_id    TEXT NOT NULL REFERENCES jobs (id) ON DELETE CASCADE,
+    state     TEXT NOT NULL, -- of the job
     PRIMARY KEY (of_tenant, key, value, job_id)
 ) STRICT, WITHOUT ROWID;
 CREATE INDEX job_labels_by_job ON job_labels (job_id);
+CREATE INDEX job_labels_by_state ON job_labels (of_tenant, key, value, state, job_id);
+CREATE TRIGGER job_moves_with_labels AFTER UPDATE OF state ON jobs WHEN OLD.state <> NEW.state AND NEW.labels <> '{}' BEGIN
+    UPDATE job_labels SET state = NEW.state WHERE job_id = NEW.id;
+END;
 
 -- Results. A small one lies here, a large one in the folder of results under its key. A blob that no job refers to is
 -- removed in the transaction that drops the last reference; the key of a large one is then left to the collector.

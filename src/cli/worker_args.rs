@@ -1,0 +1,88 @@
+//! How solver time and the room for batches are shared: flags of `serve`.
+
+use std::time::Duration;
+
+use clap::Args;
+
+use crate::jobs::Options;
+use crate::jobs::staging::StagingBounds;
+
+/// Settings of workers and of batches that are being received.
+#[derive(Debug, Clone, Args)]
+pub struct WorkerArgs {
+    /// Most solver seconds of a case: for those that name no `time_limit_s`, and the most that one may name.
+    #[arg(long, env = "RAILHEAD_TIME_LIMIT_S", default_value_t = 86_400, value_name = "SECONDS",
+          value_parser = clap::value_parser!(u32).range(1..))]
+    pub time_limit_s: u32,
+    /// Solver seconds after which a solve waits while others have their turn, if there are any.
+    #[arg(long, env = "RAILHEAD_SLICE_S", default_value = "2", value_name = "SECONDS", value_parser = positive)]
+    pub slice_s: f64,
+    /// Most solves that wait so, each with all that it has in memory.
+    #[arg(
+        long,
+        env = "RAILHEAD_PARKED_MAX",
+        default_value_t = 4,
+        value_name = "N"
+    )]
+    pub parked_max: u16,
+    /// Most memory that they are estimated to hold together, in MB.
+    #[arg(
+        long,
+        env = "RAILHEAD_PARKED_MEMORY_MB",
+        default_value_t = 4096,
+        value_name = "MB"
+    )]
+    pub parked_memory_mb: u32,
+    /// Solver threads that do not stop when they are told to, beyond which the process ends with code 75, to be started again.
+    #[arg(
+        long,
+        env = "RAILHEAD_ABANDONED_MAX",
+        default_value_t = 3,
+        value_name = "N"
+    )]
+    pub abandoned_max: u16,
+    /// Most MB that batches being received stand for, a row of a table counted with its template.
+    #[arg(
+        long,
+        env = "RAILHEAD_STAGED_MB",
+        default_value_t = 16_384,
+        value_name = "MB"
+    )]
+    pub staged_mb: u32,
+    /// The same of one tenant.
+    #[arg(
+        long,
+        env = "RAILHEAD_TENANT_STAGED_MB",
+        default_value_t = 4096,
+        value_name = "MB"
+    )]
+    pub tenant_staged_mb: u32,
+}
+
+impl WorkerArgs {
+    /// The options with these settings.
+    #[must_use]
+    pub fn apply(&self, options: Options) -> Options {
+        let bytes = |mb: u32| u64::from(mb) << 20;
+        Options {
+            time_limit: Duration::from_secs(self.time_limit_s.into()),
+            slice: Duration::from_secs_f64(self.slice_s),
+            parked_max: self.parked_max.into(),
+            parked_bytes_max: bytes(self.parked_memory_mb),
+            abandoned_max: self.abandoned_max.into(),
+            staging: StagingBounds {
+                all: bytes(self.staged_mb),
+                tenant: bytes(self.tenant_staged_mb),
+            },
+            ..options
+        }
+    }
+}
+
+/// Reads a time of at least a millisecond, and not above a day, in s.
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(seconds) if (0.001..=86_400.0).contains(&seconds) => Ok(seconds),
+        _ => Err("a number of seconds from 0.001 to 86400".to_owned()),
+    }
+}

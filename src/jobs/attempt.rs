@@ -1,0 +1,434 @@
+//! Jobs that were claimed together, on their way through one solver thread. A single job is a group of one.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
+use uuid::Uuid;
+
+use crate::contact::error::SolveError;
+use crate::contact::remark::RemarkEntry;
+use crate::jobs::Shared;
+use crate::jobs::gate::Gate;
+use crate::jobs::job::{Failure, FailureKind};
+use crate::jobs::keeper::Keeper;
+use crate::jobs::results::Encoded;
+use crate::jobs::solver_thread::{INTERNAL, Outcome, SolverThread, Task, solve_guarded};
+use crate::jobs::store::{Claim, Ending, StoredCase};
+use crate::jobs::trace::Traced;
+use crate::jobs::watch::{Reason, Watch};
+use crate::jobs::wishes::too_late;
+
+/// A group that takes longer hands back what it has not begun.
+const GROUP_TIME: Duration = Duration::from_millis(400);
+
+/// One claimed job.
+#[derive(Debug)]
+pub(super) struct Member {
+    pub(super) claim: Claim,
+    pub(super) watch: Arc<Watch>,
+    pub(super) phase: Phase,
+    _registered: Registered,
+}
+
+/// Where a claimed job stands.
+#[derive(Debug)]
+pub(super) enum Phase {
+    /// It is to be solved, or is being solved.
+    Solving,
+    /// Its solve is over.
+    Solved(Outcome),
+    /// It was not begun and goes back to the queue.
+    NotBegun,
+    /// It is equal to this earlier job of the group and waits for its answer.
+    WaitingFor(Uuid),
+    /// Nothing is left to be done.
+    Done,
+}
+
+/// Claimed jobs with the thread that solves them one after the other.
+#[derive(Debug)]
+pub(super) struct Attempt {
+    pub(super) tenant: Arc<str>,
+    pub(super) members: Vec<Member>,
+    pub(super) keeper: Keeper,
+    pub(super) gate: Arc<Gate>,
+    /// It was running when a process died, and is solved while nothing else is.
+    pub(super) suspect: bool,
+    /// It has waited for its turn.
+    pub(super) resumed: bool,
+    /// Solver time spent on it so far.
+    pub(super) spent: Duration,
+    solver: Option<Solver>,
+}
+
+/// What comes from the thread.
+#[derive(Debug)]
+struct Solver {
+    thread: SolverThread,
+    outcomes: UnboundedReceiver<(usize, Outcome)>,
+    /// Nothing more shall be begun.
+    closed: Arc<AtomicBool>,
+}
+
+impl Attempt {
+    /// Takes note of claimed jobs and keeps their leases from now on.
+    pub(super) fn new(shared: &Arc<Shared>, tenant: Arc<str>, claims: Vec<Claim>) -> Attempt {
+        let gate = Arc::new(Gate::default());
+        let suspect = claims.iter().any(|claim| claim.suspect);
+        let members: Vec<Member> = claims
+            .into_iter()
+            .map(|claim| {
+                let watch = Arc::new(Watch::new(gate.clone()));
+                Member {
+                    _registered: Registered::new(shared, claim.id, &watch),
+                    claim,
+                    watch,
+                    phase: Phase::Solving,
+                }
+            })
+            .collect();
+        let held = members
+            .iter()
+            .map(|one| (one.claim.clone(), one.watch.clone()));
+        Attempt {
+            tenant,
+            keeper: Keeper::start(shared, held.collect()),
+            members,
+            gate,
+            suspect,
+            resumed: false,
+            spent: Duration::ZERO,
+            solver: None,
+        }
+    }
+
+    /// Has it been handed to a thread?
+    pub(super) fn begun(&self) -> bool {
+        self.solver.is_some()
+    }
+
+    /// The places of the members that are to be solved.
+    pub(super) fn to_solve(&self) -> Vec<usize> {
+        let members = self.members.iter().enumerate();
+        let solving = members.filter(|(_, member)| matches!(member.phase, Phase::Solving));
+        solving.map(|(place, _)| place).collect()
+    }
+
+    /// Hands the cases at these places to a thread.
+    pub(super) fn begin(
+        &mut self,
+        shared: &Arc<Shared>,
+        thread: SolverThread,
+        cases: Vec<(usize, StoredCase)>,
+    ) {
+        let (reply, outcomes) = unbounded_channel();
+        let closed = Arc::new(AtomicBool::new(false));
+        let work: Vec<_> = cases
+            .into_iter()
+            .map(|(place, case)| {
+                let member = &self.members[place];
+                let traced = shared.traced(&member.claim);
+                (place, member.watch.clone(), case, traced)
+            })
+            .collect();
+        let task: Task = {
+            let (shared, closed) = (shared.clone(), closed.clone());
+            Box::new(move || {
+                let start = Instant::now();
+                for (number, (place, watch, case, traced)) in work.into_iter().enumerate() {
+                    let late = number > 0 && start.elapsed() > GROUP_TIME;
+                    if late || closed.load(Ordering::Acquire) || shared.stopping.is_cancelled() {
+                        break;
+                    }
+                    watch.take_up();
+                    let solve = || solve_guarded(&shared, &watch, &case);
+                    let outcome = Traced::solving(traced.as_ref(), solve);
+                    // An abandoned attempt has nobody listening.
+                    let _ = reply.send((place, outcome));
+                }
+            })
+        };
+        if thread.give(task) {
+            self.solver = Some(Solver {
+                thread,
+                outcomes,
+                closed,
+            });
+            return;
+        }
+        // The thread is gone, which no panic of a solver can do.
+        let died = || Failure::new(FailureKind::Internal, "the solver thread had died");
+        for place in self.to_solve() {
+            self.members[place].phase = Phase::Solved(Outcome::Broken(died()));
+        }
+    }
+
+    /// Waits for the next outcome; `false` when there will be no more.
+    pub(super) async fn next_outcome(&mut self) -> bool {
+        let Some(solver) = &mut self.solver else {
+            return false;
+        };
+        match solver.outcomes.recv().await {
+            Some((place, outcome)) => {
+                self.members[place].phase = Phase::Solved(outcome);
+                self.keeper.alive();
+                true
+            }
+            None => false,
+        }
+    }
+
+    /// Nothing more is begun: what the thread has not taken up goes back to the queue. To be called while the thread waits
+    /// at the gate, has ended, or is left behind.
+    pub(super) fn close(&mut self) {
+        if let Some(solver) = &mut self.solver {
+            solver.closed.store(true, Ordering::Release);
+            while let Ok((place, outcome)) = solver.outcomes.try_recv() {
+                self.members[place].phase = Phase::Solved(outcome);
+            }
+        }
+        for member in &mut self.members {
+            if matches!(member.phase, Phase::Solving) && !member.watch.is_taken_up() {
+                member.phase = Phase::NotBegun;
+            }
+        }
+    }
+
+    /// The solver does not stop: what it is at counts as abandoned, and its thread is left behind.
+    pub(super) fn abandon(&mut self, shared: &Arc<Shared>) {
+        self.close();
+        for member in &mut self.members {
+            if matches!(member.phase, Phase::Solving) {
+                member.phase = Phase::Solved(Outcome::Abandoned);
+            }
+        }
+        if let Some(solver) = self.solver.take() {
+            shared.leave_behind(solver.thread);
+        }
+    }
+
+    /// The thread, once it has nothing more to do.
+    pub(super) fn take_thread(&mut self) -> Option<SolverThread> {
+        self.solver.take().map(|solver| solver.thread)
+    }
+
+    /// Tells the member that the solver is at to stop, and lets it begin no other.
+    pub(super) fn stop_begun(&self, reason: Reason) {
+        if let Some(solver) = &self.solver {
+            solver.closed.store(true, Ordering::Release);
+        }
+        for member in &self.members {
+            if matches!(member.phase, Phase::Solving) && member.watch.is_taken_up() {
+                member.watch.stop(reason);
+            }
+        }
+    }
+
+    /// Tells every member to stop.
+    pub(super) fn stop(&self, reason: Reason) {
+        for member in &self.members {
+            member.watch.stop(reason);
+        }
+    }
+
+    /// Was it told to stop, or has its solver ended, while it waited?
+    pub(super) fn is_stopped(&self) -> bool {
+        let stopped = |member: &Member| {
+            matches!(member.phase, Phase::Solving) && member.watch.reason().is_some()
+        };
+        self.members.iter().any(stopped)
+    }
+
+    /// Bytes that its solver is estimated to hold.
+    pub(super) fn memory_bytes(&self) -> u64 {
+        let bytes = self
+            .members
+            .iter()
+            .map(|member| member.watch.memory_bytes());
+        bytes.max().unwrap_or(0)
+    }
+
+    /// Claims of the members that are in the phase that `is` tells.
+    pub(super) fn claims(&self, is: impl Fn(&Phase) -> bool) -> Vec<Claim> {
+        let members = self.members.iter().filter(|member| is(&member.phase));
+        members.map(|member| member.claim.clone()).collect()
+    }
+
+    /// Members with these ids need nothing more.
+    pub(super) fn done(&mut self, ids: &[Uuid]) {
+        self.keeper.let_go(ids);
+        for member in &mut self.members {
+            if ids.contains(&member.claim.id) {
+                member.phase = Phase::Done;
+            }
+        }
+    }
+
+    /// Members equal to an earlier one wait for its answer.
+    pub(super) fn set_aside_twins(&mut self) {
+        let mut firsts = HashMap::new();
+        for member in &mut self.members {
+            let Some(key) = member.claim.reuse_key else {
+                continue;
+            };
+            if !matches!(member.phase, Phase::Solving) {
+                continue;
+            }
+            let first = *firsts.entry(key).or_insert(member.claim.id);
+            if first != member.claim.id {
+                member.phase = Phase::WaitingFor(first);
+            }
+        }
+    }
+}
+
+/// What follows from the outcome of an attempt.
+pub(super) enum Verdict {
+    /// There is an answer to keep.
+    Keep {
+        result: Encoded,
+        remarks: Vec<RemarkEntry>,
+        field_patches: u32,
+    },
+    /// The job ends without one.
+    End(Ending),
+    /// The job goes back to the queue, its attempt uncounted.
+    HandBack,
+    /// As before; its solve takes longer than was thought.
+    HandBackAsLong,
+    /// The lease is gone.
+    Lost,
+}
+
+/// What follows from the outcome of an attempt; the one place that decides it.
+pub(super) fn judge(outcome: Outcome, reason: Option<Reason>) -> Verdict {
+    let failed = |reason: String| {
+        tracing::error!(reason, "a job fails inside the service");
+        Verdict::End(Ending::Failed(Failure::new(
+            FailureKind::Internal,
+            INTERNAL,
+        )))
+    };
+    match outcome {
+        Outcome::Solved { .. } if reason == Some(Reason::Lost) => Verdict::Lost,
+        Outcome::Solved {
+            result,
+            remarks,
+            field_patches,
+        } => Verdict::Keep {
+            result,
+            remarks,
+            field_patches,
+        },
+        Outcome::Unsolved(SolveError::Cancelled) | Outcome::Abandoned => match reason {
+            Some(Reason::Cancel) => Verdict::End(Ending::Cancelled),
+            Some(Reason::Shutdown) => Verdict::HandBack,
+            Some(Reason::TooLong) => Verdict::HandBackAsLong,
+            Some(Reason::Lost) => Verdict::Lost,
+            Some(Reason::Deadline) => Verdict::End(Ending::Failed(too_late())),
+            None => failed("the solver stopped although nobody asked it to".to_owned()),
+        },
+        Outcome::Unsolved(error) => match Failure::of_solve(&error) {
+            Some(failure) => Verdict::End(Ending::Failed(failure)),
+            None => failed(error.to_string()),
+        },
+        Outcome::Refused(error) => {
+            failed(format!("the stored case is no longer accepted: {error}"))
+        }
+        Outcome::Broken(failure) => Verdict::End(Ending::Failed(failure)),
+    }
+}
+
+/// An entry in the list of running attempts, as long as it lives.
+#[derive(Debug)]
+pub(super) struct Registered {
+    shared: Arc<Shared>,
+    id: Uuid,
+    watch: Arc<Watch>,
+}
+
+impl Registered {
+    fn new(shared: &Arc<Shared>, id: Uuid, watch: &Arc<Watch>) -> Registered {
+        shared.running().insert(id, watch.clone());
+        Registered {
+            shared: shared.clone(),
+            id,
+            watch: watch.clone(),
+        }
+    }
+}
+
+impl Drop for Registered {
+    fn drop(&mut self) {
+        let mut running = self.shared.running();
+        // Another worker may have taken the job over meanwhile; its entry stays.
+        if running
+            .get(&self.id)
+            .is_some_and(|watch| Arc::ptr_eq(watch, &self.watch))
+        {
+            running.remove(&self.id);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What becomes of a job, as a word.
+    fn fate(outcome: Outcome, reason: Option<Reason>) -> &'static str {
+        match judge(outcome, reason) {
+            Verdict::Keep { .. } => "kept",
+            Verdict::End(ending) => ending.state().name(),
+            Verdict::HandBack => "back",
+            Verdict::HandBackAsLong => "back, long",
+            Verdict::Lost => "lost",
+        }
+    }
+
+    #[test]
+    fn every_outcome_has_one_consequence_whatever_the_solver_was_told() {
+        let reasons = [
+            None,
+            Some(Reason::Cancel),
+            Some(Reason::Shutdown),
+            Some(Reason::Lost),
+            Some(Reason::Deadline),
+            Some(Reason::TooLong),
+        ];
+        let solved = || Outcome::Solved {
+            result: Encoded {
+                solution: "{}".into(),
+                fields: None,
+            },
+            remarks: Vec::new(),
+            field_patches: 0,
+        };
+        let broken = || Outcome::Broken(Failure::new(FailureKind::Panic, "boom"));
+        let stopped = || Outcome::Unsolved(SolveError::Cancelled);
+        let late = || Outcome::Unsolved(SolveError::OutOfTime);
+        for reason in reasons {
+            // An answer counts even if it came while the solver was told to stop, unless the job is somebody else's.
+            let kept = if reason == Some(Reason::Lost) {
+                "lost"
+            } else {
+                "kept"
+            };
+            assert_eq!(fate(solved(), reason), kept, "{reason:?}");
+            let told = match reason {
+                None | Some(Reason::Deadline) => "failed",
+                Some(Reason::Cancel) => "cancelled",
+                Some(Reason::Shutdown) => "back",
+                Some(Reason::Lost) => "lost",
+                Some(Reason::TooLong) => "back, long",
+            };
+            assert_eq!(fate(stopped(), reason), told, "{reason:?}");
+            assert_eq!(fate(Outcome::Abandoned, reason), told, "{reason:?}");
+            assert_eq!(fate(broken(), reason), "failed", "{reason:?}");
+            assert_eq!(fate(late(), reason), "failed", "{reason:?}");
+        }
+    }
+}

@@ -1,0 +1,248 @@
+//! What becomes of claimed jobs: answers that are known, results that are stored, ends that are written, and the rest
+//! that goes back to the queue.
+
+use std::collections::{HashMap, HashSet};
+use std::time::SystemTime;
+
+use uuid::Uuid;
+
+use crate::jobs::attempt::{Attempt, Phase, Verdict, judge};
+use crate::jobs::error::JobsError;
+use crate::jobs::job::{Failure, FailureKind, State};
+use crate::jobs::results::Encoded;
+use crate::jobs::store::{Claim, Ending, Placed, Release};
+use crate::jobs::worker::{Step, Worker};
+
+impl Worker {
+    /// Ends those of the claimed jobs whose result has been there since they were queued.
+    pub(super) async fn answer_known(
+        &self,
+        attempt: &mut Attempt,
+        step: &mut Step,
+    ) -> Result<(), JobsError> {
+        let claims = attempt.claims(|phase| matches!(phase, Phase::Solving));
+        let keys: Vec<_> = claims.iter().filter_map(|claim| claim.reuse_key).collect();
+        let sources = self.shared.store.sources(&keys).await?;
+        let known = claims.into_iter().filter_map(|claim| {
+            let source = *sources.get(&claim.reuse_key?)?;
+            Some((claim, source))
+        });
+        self.answer_with(attempt, known.collect(), step).await
+    }
+
+    /// Ends claimed jobs with the results of these others; where there is none, the job goes back to the queue.
+    async fn answer_with(
+        &self,
+        attempt: &mut Attempt,
+        pairs: Vec<(Claim, Uuid)>,
+        step: &mut Step,
+    ) -> Result<(), JobsError> {
+        if pairs.is_empty() {
+            return Ok(());
+        }
+        let shared = &self.shared;
+        let from = shared.options.tracer.is_some().then(SystemTime::now);
+        let ended = shared
+            .write_patiently(|| shared.store.finish_with_sources(&pairs, shared.now_ms()))
+            .await?;
+        let ids: Vec<_> = ended.iter().copied().collect();
+        shared.metrics.looked_up(ids.len() as u64, 0);
+        if let Some(from) = from {
+            let claims = pairs.iter().map(|(claim, _)| claim);
+            for claim in claims.filter(|claim| ended.contains(&claim.id)) {
+                if let Some(traced) = shared.traced(claim) {
+                    traced.waited_until(from);
+                    traced.stored(from, State::Succeeded.name());
+                }
+            }
+        }
+        shared.ended_cached(&ids);
+        attempt.done(&ids);
+        step.ended
+            .extend(ids.into_iter().map(|id| (id, State::Succeeded)));
+        let back = pairs.into_iter().map(|(claim, _)| claim);
+        let back: Vec<_> = back.filter(|claim| !ended.contains(&claim.id)).collect();
+        self.release(attempt, &back, Release::SolveItself, step)
+            .await
+    }
+
+    /// Writes down what became of the members that are over.
+    pub(super) async fn record(
+        &self,
+        attempt: &mut Attempt,
+        step: &mut Step,
+    ) -> Result<(), JobsError> {
+        let shared = &self.shared;
+        let from = shared.options.tracer.is_some().then(SystemTime::now);
+        let (mut ends, mut back, mut long) = (Vec::new(), Vec::new(), Vec::new());
+        for place in 0..attempt.members.len() {
+            let member = &mut attempt.members[place];
+            if !matches!(member.phase, Phase::Solved(_)) {
+                continue;
+            }
+            let Phase::Solved(outcome) = std::mem::replace(&mut member.phase, Phase::Done) else {
+                continue;
+            };
+            let claim = member.claim.clone();
+            let ending = match judge(outcome, member.watch.reason()) {
+                Verdict::Lost => {
+                    step.lost.push(claim.id);
+                    attempt.done(&[claim.id]);
+                    continue;
+                }
+                Verdict::HandBack => {
+                    back.push(claim);
+                    continue;
+                }
+                Verdict::HandBackAsLong => {
+                    long.push(claim);
+                    continue;
+                }
+                Verdict::End(ending) => ending,
+                Verdict::Keep {
+                    result,
+                    remarks,
+                    field_patches,
+                } => match self.place(&claim, result).await {
+                    Ok(result) => Ending::Succeeded {
+                        remarks,
+                        result,
+                        field_patches,
+                    },
+                    // The service stops while the disk takes nothing.
+                    Err(error) if error.trouble().is_some() => {
+                        back.push(claim);
+                        continue;
+                    }
+                    Err(error) => not_stored(&error),
+                },
+            };
+            ends.push((claim, ending));
+        }
+        self.finish(attempt, ends, from, step).await?;
+        back.extend(attempt.claims(|phase| matches!(phase, Phase::NotBegun)));
+        self.release(attempt, &back, Release::NotBegun, step)
+            .await?;
+        let cost_us = u64::try_from(attempt.spent.as_micros()).unwrap_or(u64::MAX);
+        self.release(attempt, &long, Release::Long { cost_us }, step)
+            .await?;
+        self.settle_twins(attempt, step).await
+    }
+
+    async fn finish(
+        &self,
+        attempt: &mut Attempt,
+        ends: Vec<(Claim, Ending)>,
+        from: Option<SystemTime>,
+        step: &mut Step,
+    ) -> Result<(), JobsError> {
+        if ends.is_empty() {
+            return Ok(());
+        }
+        let shared = &self.shared;
+        // A database that fails for a while does not cost the results.
+        let ended = shared
+            .write_patiently(|| shared.store.finish(&ends, shared.now_ms()))
+            .await?;
+        for (claim, ending) in &ends {
+            if ended.contains(&claim.id) {
+                if let (Some(from), Some(traced)) = (from, shared.traced(claim)) {
+                    traced.stored(from, ending.state().name());
+                }
+                shared.metrics.ending(ending);
+                shared.announce(claim.id);
+                step.ended.push((claim.id, ending.state()));
+            } else {
+                step.lost.push(claim.id);
+                if let Ending::Succeeded {
+                    result: Placed::Folder(key, _),
+                    ..
+                } = ending
+                    && let Err(error) = shared.store.abandon_blob(key).await
+                {
+                    tracing::warn!(key, %error, "a result without a job is left until the next start");
+                }
+            }
+        }
+        let ids: Vec<_> = ends.iter().map(|(claim, _)| claim.id).collect();
+        attempt.done(&ids);
+        Ok(())
+    }
+
+    /// Members that waited for an equal one get its answer, or go back if it will not come.
+    async fn settle_twins(&self, attempt: &mut Attempt, step: &mut Step) -> Result<(), JobsError> {
+        let still: HashSet<Uuid> = attempt
+            .claims(|phase| matches!(phase, Phase::Solving))
+            .iter()
+            .map(|claim| claim.id)
+            .collect();
+        let firsts: HashMap<Uuid, Uuid> = attempt
+            .members
+            .iter()
+            .filter_map(|member| match member.phase {
+                Phase::WaitingFor(first) if !still.contains(&first) => {
+                    Some((member.claim.id, first))
+                }
+                _ => None,
+            })
+            .collect();
+        let twins = attempt.claims(|phase| matches!(phase, Phase::WaitingFor(_)));
+        let pairs = twins.into_iter().filter_map(|claim| {
+            let first = *firsts.get(&claim.id)?;
+            Some((claim, first))
+        });
+        self.answer_with(attempt, pairs.collect(), step).await
+    }
+
+    /// Puts a result where it is kept: a small one goes into the database with the end of its job.
+    async fn place(&self, claim: &Claim, result: Encoded) -> Result<Placed, JobsError> {
+        let shared = &self.shared;
+        if result.bytes() <= shared.options.small_result_max_bytes {
+            return Ok(Placed::Table(result));
+        }
+        let bytes = result.bytes() as u64;
+        let key = shared
+            .write_patiently(|| shared.results.put(claim, result.clone()))
+            .await?;
+        Ok(Placed::Folder(key, bytes))
+    }
+
+    pub(super) async fn release(
+        &self,
+        attempt: &mut Attempt,
+        claims: &[Claim],
+        why: Release,
+        step: &mut Step,
+    ) -> Result<(), JobsError> {
+        if claims.is_empty() {
+            return Ok(());
+        }
+        let shared = &self.shared;
+        let released = shared.store.release(claims, why, shared.now_ms()).await?;
+        for (id, state) in &released {
+            if state.ended() {
+                shared.metrics.ended(*state, 1);
+                shared.announce(*id);
+                step.ended.push((*id, *state));
+            } else {
+                step.handed_back.push(*id);
+            }
+        }
+        let kept: HashSet<_> = released.iter().map(|(id, _)| *id).collect();
+        let lost = claims.iter().map(|claim| claim.id);
+        step.lost.extend(lost.filter(|id| !kept.contains(id)));
+        let ids: Vec<_> = claims.iter().map(|claim| claim.id).collect();
+        attempt.done(&ids);
+        shared.wake.notify_one();
+        Ok(())
+    }
+}
+
+/// The end of a job whose result could not be stored.
+fn not_stored(error: &JobsError) -> Ending {
+    tracing::error!(%error, "result could not be stored");
+    Ending::Failed(Failure::new(
+        FailureKind::Internal,
+        "the result could not be stored; the log of the service says why",
+    ))
+}

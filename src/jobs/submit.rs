@@ -1,0 +1,182 @@
+//! Submission of single jobs: check, idempotency key, known answers, queue.
+
+use std::sync::Arc;
+
+use bytes::Bytes;
+use opentelemetry::KeyValue;
+use serde_json::Value;
+use uuid::Uuid;
+
+use crate::contact::case::Output;
+use crate::contact::problem::Problem;
+use crate::jobs::error::JobsError;
+use crate::jobs::job::Job;
+use crate::jobs::store::{Enqueued, NewJob, QueueBounds, Refusal};
+use crate::jobs::wishes::Wishes;
+use crate::jobs::{Jobs, idempotency};
+
+impl Jobs {
+    /// Checks a case and queues it. Once this returns the job survives the death of the process. If an identical case
+    /// was solved before, the job has already succeeded, with that result.
+    ///
+    /// With an idempotency key the same case gives the same job again, however often it is submitted, for as long as
+    /// that job exists.
+    ///
+    /// # Errors
+    /// [`JobsError::Case`], [`JobsError::QueueFull`], [`JobsError::IdempotencyConflict`], [`JobsError::Draining`], or a
+    /// failed database.
+    pub async fn submit(
+        &self,
+        case: Value,
+        idempotency_key: Option<String>,
+    ) -> Result<Job, JobsError> {
+        let submitted = self.submit_with(case, idempotency_key, Wishes::default());
+        submitted.await.map(|(job, _)| job)
+    }
+
+    /// As [`Jobs::submit`], with wishes; also says whether the job is that of an earlier submission with the same
+    /// idempotency key.
+    ///
+    /// # Errors
+    /// As [`Jobs::submit`].
+    pub async fn submit_with(
+        &self,
+        case: Value,
+        idempotency_key: Option<String>,
+        wishes: Wishes,
+    ) -> Result<(Job, bool), JobsError> {
+        let span = self.submitting();
+        let traceparent = span.traceparent();
+        let submitted = self.store_case(case, idempotency_key, wishes, traceparent);
+        span.end(submitted.await, |(job, _)| {
+            vec![
+                KeyValue::new("railhead.job.id", job.id.to_string()),
+                KeyValue::new("railhead.job.cached", job.cached),
+            ]
+        })
+    }
+
+    async fn store_case(
+        &self,
+        case: Value,
+        idempotency_key: Option<String>,
+        wishes: Wishes,
+        traceparent: Option<Arc<str>>,
+    ) -> Result<(Job, bool), JobsError> {
+        if self.shared.draining.is_cancelled() {
+            return Err(JobsError::Draining);
+        }
+        let jobs = self.clone();
+        // Checking a large case is arithmetic; it stays off the threads that answer requests, and a crowd of submitters does
+        // not take the cores from them either.
+        let turn = self.shared.checks.acquire().await;
+        let read = tokio::task::spawn_blocking(move || {
+            let digest = |_: &String| wishes.digest(&idempotency::digest(&case));
+            let idempotency = idempotency_key.map(|key| {
+                let digest = digest(&key);
+                (key, digest)
+            });
+            (jobs.check(&case), serde_json::to_vec(&case), idempotency)
+        });
+        let (problem, body, idempotency) = read
+            .await
+            .map_err(|error| JobsError::Damaged(error.to_string()))?;
+        drop(turn);
+        if let Some((key, digest)) = &idempotency
+            && let Some(enqueued) = self.shared.store.by_key(&self.tenant, key, digest).await?
+        {
+            match self.of_enqueued(enqueued) {
+                // The job is over and only waits for its removal: the key is free.
+                Err(JobsError::Expired) => self.shared.store.forget_key(&self.tenant, key).await?,
+                answer => return answer,
+            }
+        }
+        let problem = problem?;
+        let (outputs, cost_us) = (problem.outputs.clone(), cost_us(&problem));
+        let id = Uuid::now_v7();
+        let mut new = NewJob {
+            id,
+            tenant: self.tenant.clone(),
+            created_at: created_at(id),
+            name: problem.name,
+            labels: problem.labels,
+            method: problem.method.name().to_owned(),
+            outputs: outputs_text(&outputs),
+            cost_us,
+            reuse_key: self.reuse_key(&problem.digest),
+            source: None,
+            body: Bytes::from(body.map_err(|error| JobsError::Damaged(error.to_string()))?),
+            row: false,
+            idempotency,
+            traceparent,
+            wishes,
+        };
+        if !wishes.fresh {
+            self.find_sources(std::iter::once(&mut new)).await?;
+        }
+        let stored = self.shared.store.enqueue(&new, self.queue_bounds()).await;
+        let (job, replayed) = self.of_enqueued(self.noted(stored)?)?;
+        if job.id == id && job.cached {
+            self.shared.ended_cached(&[id]);
+            tracing::info!(job = %id, method = new.method, "job answered from an earlier result");
+            return Ok((job, false));
+        }
+        self.shared.wake.notify_one();
+        tracing::info!(job = %job.id, method = new.method, "job queued");
+        Ok((job, replayed))
+    }
+
+    /// The bounds of the queue.
+    pub(super) fn queue_bounds(&self) -> QueueBounds {
+        QueueBounds {
+            all: self.shared.options.queue_max,
+            tenant: self.shared.options.tenant_queue_max,
+        }
+    }
+
+    /// Why there is no room.
+    pub(super) fn refused(&self, refusal: Refusal) -> JobsError {
+        let bounds = self.queue_bounds();
+        match refusal {
+            Refusal::Quota => JobsError::QuotaExceeded {
+                queue_max: bounds.tenant,
+            },
+            Refusal::Queue => JobsError::QueueFull {
+                queue_max: bounds.all,
+            },
+        }
+    }
+
+    /// The job that was made, or that the idempotency key stands for, and whether it is the latter.
+    fn of_enqueued(&self, enqueued: Enqueued) -> Result<(Job, bool), JobsError> {
+        match enqueued {
+            Enqueued::Created(job) => Ok((self.dated(job), false)),
+            Enqueued::Existing(job) => Ok((self.unexpired(job)?, true)),
+            Enqueued::Conflict => Err(JobsError::IdempotencyConflict),
+            Enqueued::Refused(refusal) => Err(self.refused(refusal)),
+        }
+    }
+}
+
+/// The names of outputs as a JSON list.
+pub(super) fn outputs_text(outputs: &[Output]) -> String {
+    serde_json::to_string(outputs).unwrap_or_default()
+}
+
+/// Expected solve time in µs.
+pub(super) fn cost_us(problem: &Problem) -> u32 {
+    let microseconds = (problem.cost().seconds * 1e6).clamp(1.0, f64::from(i32::MAX));
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "clamped to what a u32 holds; a NaN becomes 0"
+    )]
+    {
+        microseconds as u32
+    }
+}
+
+/// The time of submission is the one inside the id, so that order by id is order by time.
+pub(super) fn created_at(id: Uuid) -> i64 {
+    i64::try_from(id.as_u128() >> 80).unwrap_or(0)
+}

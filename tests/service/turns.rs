@@ -1,0 +1,345 @@
+//! Do long solves make room for others, go on afterwards, and run alone when they may have killed a process?
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Duration;
+
+use railhead::contact::monitor::Monitor;
+use railhead::contact::problem::Problem;
+use railhead::contact::solve;
+use railhead::jobs::store::{QueueBounds, Release};
+use railhead::jobs::{Jobs, Options, State};
+use serde_json::json;
+
+use crate::batches::small;
+use crate::store::{Table, claim_up_to, new_job, success};
+use crate::support::{case, open};
+
+const AT_MOST: Duration = Duration::from_secs(60);
+
+/// A service with one worker and short slices, on which a case named `long` ticks until it is let go.
+struct Shop {
+    jobs: Jobs,
+    let_go: Arc<AtomicBool>,
+    /// Solvers at work at this moment, and the most there ever were.
+    working: Arc<[AtomicUsize; 2]>,
+    _folder: tempfile::TempDir,
+}
+
+async fn shop(change: impl FnOnce(&mut Options)) -> Shop {
+    let folder = tempfile::tempdir().unwrap();
+    let let_go = Arc::new(AtomicBool::new(false));
+    let working = Arc::new([AtomicUsize::new(0), AtomicUsize::new(0)]);
+    let mut options = Options {
+        slice: Duration::from_millis(20),
+        ..Options::new(folder.path())
+    };
+    change(&mut options);
+    let (go, count) = (let_go.clone(), working.clone());
+    let jobs = open(options, move |problem: &Problem, monitor: &dyn Monitor| {
+        while problem
+            .name
+            .as_deref()
+            .is_some_and(|name| name.starts_with("long"))
+        {
+            if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.5) {
+                return Err(stop.into());
+            }
+            let now = count[0].fetch_add(1, Ordering::SeqCst) + 1;
+            count[1].fetch_max(now, Ordering::SeqCst);
+            std::thread::sleep(Duration::from_millis(1));
+            count[0].fetch_sub(1, Ordering::SeqCst);
+            if go.load(Ordering::SeqCst) {
+                break;
+            }
+        }
+        solve(problem, monitor)
+    })
+    .await;
+    Shop {
+        jobs,
+        let_go,
+        working,
+        _folder: folder,
+    }
+}
+
+/// Waits until a job runs.
+async fn until_running(jobs: &Jobs, id: uuid::Uuid) {
+    while jobs.get(id).await.unwrap().state != State::Running {
+        tokio::time::sleep(Duration::from_millis(2)).await;
+    }
+}
+
+#[tokio::test]
+async fn a_long_solve_makes_room_for_short_ones_and_then_goes_on() {
+    let shop = shop(|_| {}).await;
+    let jobs = &shop.jobs;
+    jobs.start().unwrap();
+    let long = jobs.submit(case("long"), None).await.unwrap().id;
+    until_running(jobs, long).await;
+    for round in 0..5 {
+        let mut short = small("short");
+        short["load"]["normal_force_n"] = json!(50_000 + round);
+        let id = jobs.submit(short, None).await.unwrap().id;
+        let job = jobs.wait(id, AT_MOST).await.unwrap();
+        assert_eq!(job.state, State::Succeeded);
+        assert_eq!(jobs.get(long).await.unwrap().state, State::Running);
+    }
+    shop.let_go.store(true, Ordering::SeqCst);
+    let job = jobs.wait(long, AT_MOST).await.unwrap();
+    assert_eq!(
+        (job.state, job.attempt),
+        (State::Succeeded, 1),
+        "it was not begun again"
+    );
+    jobs.shutdown(Duration::from_secs(10)).await;
+}
+
+#[tokio::test]
+async fn one_worker_never_has_two_solvers_at_work() {
+    let shop = shop(|options| options.parked_max = 2).await;
+    let jobs = &shop.jobs;
+    let mut ids = Vec::new();
+    for number in 0..6 {
+        ids.push(
+            jobs.submit(case(&format!("long {number}")), None)
+                .await
+                .unwrap()
+                .id,
+        );
+    }
+    let last = jobs.submit(small("short"), None).await.unwrap().id;
+    jobs.start().unwrap();
+    // Beyond the gates there are, jobs that turn out to be long go back; the short one gets its turn all the same.
+    let job = jobs.wait(last, AT_MOST).await.unwrap();
+    assert_eq!(job.state, State::Succeeded);
+    shop.let_go.store(true, Ordering::SeqCst);
+    for id in ids {
+        let job = jobs.wait(id, AT_MOST).await.unwrap();
+        assert_eq!((job.state, job.attempt), (State::Succeeded, 1));
+    }
+    assert_eq!(shop.working[1].load(Ordering::SeqCst), 1);
+    jobs.shutdown(Duration::from_secs(10)).await;
+}
+
+#[tokio::test]
+async fn a_waiting_solve_can_be_cancelled_and_is_handed_back_at_the_end() {
+    let shop = shop(|_| {}).await;
+    let jobs = &shop.jobs;
+    jobs.start().unwrap();
+    let mut ids = Vec::new();
+    for number in 0..3 {
+        ids.push(
+            jobs.submit(case(&format!("long {number}")), None)
+                .await
+                .unwrap()
+                .id,
+        );
+    }
+    for id in &ids {
+        until_running(jobs, *id).await;
+    }
+    jobs.cancel(ids[1]).await.unwrap();
+    let job = jobs.wait(ids[1], AT_MOST).await.unwrap();
+    assert_eq!(job.state, State::Cancelled);
+    let other = jobs.of("other".into());
+    let theirs = other
+        .submit(small("another tenant's"), None)
+        .await
+        .unwrap()
+        .id;
+    let job = other.wait(theirs, AT_MOST).await.unwrap();
+    assert_eq!(job.state, State::Succeeded);
+    jobs.shutdown(Duration::from_millis(50)).await;
+    let again = Jobs::open(Options::new(shop._folder.path())).await.unwrap();
+    for id in [ids[0], ids[2]] {
+        let job = again.get(id).await.unwrap();
+        assert_eq!((job.state, job.attempt), (State::Queued, 0));
+    }
+}
+
+#[tokio::test]
+async fn a_bystander_of_a_dead_process_counts_no_attempt() {
+    let table = Table::new().await;
+    let store = &table.store;
+    let ids = [table.add(new_job()).await.id, table.add(new_job()).await.id];
+    for _ in 0..2 {
+        assert_eq!(claim_up_to(store, 0, 1000, 1).await.len(), 1);
+    }
+    // Both were being solved: nobody knows which of them it was.
+    assert_eq!(store.reap_dead(1, 1).await.unwrap().len(), 2);
+    for id in ids {
+        let job = store.get(id).await.unwrap().unwrap();
+        assert_eq!((job.state, job.attempt), (State::Queued, 0));
+    }
+    // Now each comes alone, and is marked when it is solved alone.
+    let suspect = claim_up_to(store, 2, 1000, 8).await;
+    assert_eq!((suspect.len(), suspect[0].suspect), (1, true));
+    let waiting = claim_up_to(store, 2, 1000, 8).await;
+    store.set_solving(&suspect, true).await.unwrap();
+    let mut taken = store.reap_dead(3, 1).await.unwrap();
+    taken.sort_unstable();
+    assert_eq!(taken, [(ids[0], State::Failed), (ids[1], State::Queued)]);
+    assert_eq!(waiting[0].id, ids[1]);
+    assert_eq!(store.get(ids[1]).await.unwrap().unwrap().attempt, 0);
+    // One that waited at its gate is no suspect either.
+    let other = claim_up_to(store, 4, 1000, 1).await;
+    store.set_solving(&other, false).await.unwrap();
+    assert_eq!(
+        store.reap_dead(5, 1).await.unwrap(),
+        [(ids[1], State::Queued)]
+    );
+}
+
+#[tokio::test]
+async fn a_suspect_is_solved_while_nothing_else_is() {
+    let shop = shop(|options| options.workers = 3).await;
+    let jobs = &shop.jobs;
+    let folder = shop._folder.path().join("jobs.db");
+    let store = railhead::jobs::store::sqlite::SqliteStore::open(&folder)
+        .await
+        .unwrap();
+    let mut ids = Vec::new();
+    for number in 0..3 {
+        ids.push(
+            jobs.submit(case(&format!("long {number}")), None)
+                .await
+                .unwrap()
+                .id,
+        );
+    }
+    for _ in 0..3 {
+        claim_up_to(&store, 0, 1000, 1).await;
+    }
+    store.reap_dead(1, 5).await.unwrap();
+    jobs.start().unwrap();
+    for id in &ids {
+        until_running(jobs, *id).await;
+    }
+    tokio::time::sleep(Duration::from_millis(200)).await;
+    shop.let_go.store(true, Ordering::SeqCst);
+    for id in ids {
+        let job = jobs.wait(id, AT_MOST).await.unwrap();
+        assert_eq!((job.state, job.attempt), (State::Succeeded, 1));
+    }
+    assert_eq!(shop.working[1].load(Ordering::SeqCst), 1);
+    jobs.shutdown(Duration::from_secs(10)).await;
+}
+
+#[tokio::test]
+async fn a_job_that_was_longer_than_thought_is_known_as_long() {
+    let table = Table::new().await;
+    let store = &table.store;
+    let id = table.add(new_job()).await.id;
+    let claims = claim_up_to(store, 0, 1000, 1).await;
+    let long = Release::Long { cost_us: 5_000_000 };
+    assert_eq!(
+        store.release(&claims, long, 1).await.unwrap(),
+        [(id, State::Queued)]
+    );
+    let request = |each_cost_us| railhead::jobs::store::ClaimRequest {
+        worker: "w",
+        tenant: "anonymous",
+        jobs: 8,
+        cost_us: 200_000,
+        each_cost_us,
+        workers: 1,
+        lease_until: 1000,
+        now: 2,
+        late_before: 2,
+        skip: Box::leak(Box::default()),
+    };
+    assert!(
+        store
+            .claim(&request(Some(2_000_000)))
+            .await
+            .unwrap()
+            .is_empty()
+    );
+    let claims = store.claim(&request(None)).await.unwrap();
+    assert_eq!((claims.len(), claims[0].attempt), (1, 1));
+    let ends = [(claims[0].clone(), success())];
+    assert_eq!(store.finish(&ends, 3).await.unwrap().len(), 1);
+    assert_eq!(store.queued(None).await.unwrap(), 0);
+    store.enqueue(&new_job(), QueueBounds::NONE).await.unwrap();
+    assert_eq!(store.queued(Some("anonymous")).await.unwrap(), 1);
+}
+
+#[tokio::test]
+async fn the_time_limit_of_the_operator_holds_for_every_case() {
+    let shop = shop(|options| options.time_limit = Duration::from_millis(1)).await;
+    let id = shop
+        .jobs
+        .submit(crate::support::endless_case("no limit of its own"), None)
+        .await;
+    let id = id.unwrap().id;
+    shop.jobs.start().unwrap();
+    let job = shop.jobs.wait(id, AT_MOST).await.unwrap();
+    assert_eq!(job.failure.unwrap().kind.name(), "out_of_time");
+    shop.jobs.shutdown(Duration::from_secs(10)).await;
+}
+
+#[tokio::test]
+async fn a_clock_that_is_set_forward_makes_nothing_late_or_old() {
+    let folder = tempfile::tempdir().unwrap();
+    let set = Arc::new(std::sync::atomic::AtomicI64::new(0));
+    let system = railhead::jobs::clock::Clock::system();
+    let shown = set.clone();
+    let clock = railhead::jobs::clock::Clock::that_is_set(move || {
+        system.now_ms() + shown.load(Ordering::SeqCst)
+    });
+    let let_go = Arc::new(AtomicBool::new(false));
+    let go = let_go.clone();
+    let options = Options {
+        clock,
+        retention: Some(Duration::from_secs(30 * 24 * 3600)),
+        lease: Duration::from_secs(2),
+        ..Options::new(folder.path())
+    };
+    let jobs = open(options, move |problem: &Problem, monitor: &dyn Monitor| {
+        while problem.name.as_deref() == Some("long") && !go.load(Ordering::SeqCst) {
+            assert!(
+                monitor.tick(0.5).is_continue(),
+                "it is neither late nor lost"
+            );
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        solve(problem, monitor)
+    })
+    .await;
+    jobs.start().unwrap();
+    let old = jobs.submit(small("old"), None).await.unwrap().id;
+    assert_eq!(
+        jobs.wait(old, AT_MOST).await.unwrap().state,
+        State::Succeeded
+    );
+    let wishes = railhead::jobs::wishes::Wishes {
+        ends_within: Some(Duration::from_secs(1800)),
+        ..Default::default()
+    };
+    let long = jobs
+        .submit_with(case("long"), None, wishes)
+        .await
+        .unwrap()
+        .0
+        .id;
+    until_running(&jobs, long).await;
+    set.store(40 * 24 * 3600 * 1000, Ordering::SeqCst);
+    // Some looks of whoever watches deadlines, leases and ages.
+    tokio::time::sleep(Duration::from_millis(2500)).await;
+    jobs.sweep_expired().await.unwrap();
+    assert_eq!(
+        jobs.get(old).await.unwrap().state,
+        State::Succeeded,
+        "nothing is removed"
+    );
+    let job = jobs.get(long).await.unwrap();
+    assert_eq!((job.state, job.attempt), (State::Running, 1));
+    let_go.store(true, Ordering::SeqCst);
+    assert_eq!(
+        jobs.wait(long, AT_MOST).await.unwrap().state,
+        State::Succeeded
+    );
+    jobs.shutdown(Duration::from_secs(10)).await;
+}
