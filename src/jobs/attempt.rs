@@ -215,6 +215,13 @@ impl Attempt {
         self.solver.take().map(|solver| solver.thread)
     }
 
+    /// Are there members that the solver has not come to?
+    pub(super) fn has_more_to_begin(&self) -> bool {
+        let waits =
+            |member: &Member| matches!(member.phase, Phase::Solving) && !member.watch.is_taken_up();
+        self.members.iter().any(waits)
+    }
+
     /// Tells the member that the solver is at to stop, and lets it begin no other.
     pub(super) fn stop_begun(&self, reason: Reason) {
         if let Some(solver) = &self.solver {

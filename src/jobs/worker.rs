@@ -306,7 +306,8 @@ impl Worker {
                         attempt.abandon(shared);
                         break Turn::Over;
                     }
-                    if told.is_none() && !closed && start.elapsed() >= slice && self.somebody_waits().await {
+                    if told.is_none() && !closed && start.elapsed() >= slice
+                        && (attempt.has_more_to_begin() || self.somebody_waits().await) {
                         closed = self.hold(attempt);
                     }
                 }

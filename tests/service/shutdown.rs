@@ -13,7 +13,7 @@ use sqlx::Connection;
 use tokio::sync::mpsc::unbounded_channel;
 
 use crate::store::claim_up_to;
-use crate::support::{Service, case, endless_case, jobs_with, long_case, pause};
+use crate::support::{Service, case, endless_case, jobs_with, long_case, open, pause};
 
 #[tokio::test]
 async fn a_running_job_goes_back_to_the_queue_uncounted() {
@@ -52,14 +52,16 @@ async fn a_job_that_ends_within_the_grace_period_is_not_run_again() {
     let (started, mut has_started) = unbounded_channel();
     let (finish, may_finish) = std::sync::mpsc::channel::<()>();
     let may_finish = std::sync::Mutex::new(may_finish);
-    let jobs = jobs_with(
-        folder.path(),
-        move |problem: &Problem, monitor: &dyn Monitor| {
-            started.send(()).unwrap();
-            may_finish.lock().unwrap().recv().unwrap();
-            solve(problem, monitor)
-        },
-    )
+    // Taken one by one, so that the second is still queued whenever it comes.
+    let options = Options {
+        group_max: 1,
+        ..Options::new(folder.path())
+    };
+    let jobs = open(options, move |problem: &Problem, monitor: &dyn Monitor| {
+        started.send(()).unwrap();
+        may_finish.lock().unwrap().recv().unwrap();
+        solve(problem, monitor)
+    })
     .await;
     jobs.start().unwrap();
     let first = jobs.submit(case("nearly done"), None).await.unwrap().id;
