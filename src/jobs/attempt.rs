@@ -384,6 +384,7 @@ impl Drop for Registered {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::error::CaseError;
 
     /// What becomes of a job, as a word.
     fn fate(outcome: Outcome, reason: Option<Reason>) -> &'static str {
@@ -416,7 +417,7 @@ mod tests {
         };
         let broken = || Outcome::Broken(Failure::new(FailureKind::Panic, "boom"));
         let stopped = || Outcome::Unsolved(SolveError::Cancelled);
-        let late = || Outcome::Unsolved(SolveError::OutOfTime);
+        let late = || Outcome::Refused(CaseError(Vec::new()));
         for reason in reasons {
             // An answer counts even if it came while the solver was told to stop, unless the job is somebody else's.
             let kept = if reason == Some(Reason::Lost) {

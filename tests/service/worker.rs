@@ -91,10 +91,10 @@ async fn a_panic_fails_that_job_only() {
     let bad = jobs.submit(case("bad"), None).await.unwrap().id;
     let good = jobs.submit(case("good"), None).await.unwrap().id;
     let mut worker = jobs.worker("w").unwrap();
-    assert_eq!(
-        worker.step().await.unwrap().ended,
-        [(bad, State::Failed), (good, State::Succeeded)]
-    );
+    // In one group or, where the panic took its time, one after the other.
+    let mut ended = worker.step().await.unwrap().ended;
+    ended.extend(worker.step().await.unwrap().ended);
+    assert_eq!(ended, [(bad, State::Failed), (good, State::Succeeded)]);
 
     let job = jobs.get(bad).await.unwrap();
     let failure = job.failure.unwrap();
