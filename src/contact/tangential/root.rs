@@ -126,8 +126,10 @@ mod tests {
 
     #[test]
     fn a_search_without_a_root_says_why_it_ended() {
-        assert_eq!(search(1e-9, |_| -1.0).exit, RootExit::SignKept);
-        assert_eq!(search(1e-9, |_| 1.0).exit, RootExit::SignKept);
+        assert_eq!(search(1e-9, |at| at - 1e3).exit, RootExit::SignKept);
+        assert_eq!(search(1e-9, |at| at + 1e3).exit, RootExit::SignKept);
+        // Nothing is known of a function that never changes, however far the steps lead.
+        assert_eq!(search(1e-9, |_| -1.0).exit, RootExit::TrialsUsedUp);
         // A jump has no place where the value is small.
         let jump = |at: f64| if at < 2.0 { -1.0 } else { 1.0 };
         let ended = search(1e-9, jump);
