@@ -15,7 +15,7 @@ use crate::contact::normal::profiles::{Loading, PressedGap, PressedWheel, Profil
 use crate::contact::outputs::track::merge;
 use crate::contact::problem::{Problem, Resolution};
 use crate::contact::remark::Remark;
-use crate::contact::solution::{Fields, Solution};
+use crate::contact::solution::{Fields, NormalReport, Solution};
 use crate::contact::tangential::operator_store::OperatorStore;
 
 /// The vertical force may be missed by this part of it, and by this part of the target error if that is less; the bound for
@@ -184,9 +184,12 @@ impl Rest {
         let mut answers = Vec::with_capacity(parts);
         for (k, gap) in self.wheel.patches.iter().enumerate() {
             // What all parts share is charged to the first.
-            let normal = gap
-                .report
-                .with_time(if k == 0 { self.seconds } else { 0.0 });
+            let normal = NormalReport {
+                force_residual: self.wheel.force_residual,
+                ..gap
+                    .report
+                    .with_time(if k == 0 { self.seconds } else { 0.0 })
+            };
             let motions = match &problem.wheelset {
                 None => problem.motions.clone(),
                 Some(wheelset) => vec![self.motion(gap, &contact.geometry, wheelset)],

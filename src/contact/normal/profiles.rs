@@ -69,6 +69,8 @@ pub struct PressedWheel {
     found: [f64; 2],
     /// By how much, relatively, the load of region and pressure may differ from the one wanted.
     pub load_error: f64,
+    /// By which part the prescribed force was missed at the last height, before the contact was corrected to it.
+    pub force_residual: f64,
     /// Height of the wheel's centre over the top of the rail, in mm.
     pub centre: f64,
     /// Heights looked at.
@@ -197,6 +199,7 @@ impl ProfileContact {
             {
                 // A coarse rest is not corrected: it is a place to go on from.
                 if wanted.tolerance <= FORCE_TOLERANCE {
+                    found.force_residual = (carried / target - 1.0).abs();
                     found.load_error = CORRECTED * (target / carried - 1.0).abs();
                     found.correct(target / carried, (target - carried) / found.found[1]);
                 }
@@ -209,6 +212,7 @@ impl ProfileContact {
             if closed && detail == Detail::Fine {
                 let factor = target / carried;
                 found.remarks.push(Remark::ForceJumps { factor }.into());
+                found.force_residual = (carried / target - 1.0).abs();
                 found.load_error = (target / carried - 1.0).abs();
                 found.correct(target / carried, 0.0);
                 return Ok(found);
@@ -266,6 +270,7 @@ impl ProfileContact {
             lowering,
             found: [0.0; 2],
             load_error: 0.0,
+            force_residual: 0.0,
             centre,
             heights: 1,
             patches,
