@@ -16,10 +16,15 @@ const BLAMED: f64 = 0.6;
 /// Largest chord over the width of the patch that is remarked on, and what makes a job fail (as does [`AMBIGUOUS`]).
 const COARSE: f64 = 1.0;
 const COARSE_MAX: f64 = 1.5;
+/// A chord of this length in mm is fine enough for any patch that carries a load worth the name: a lightly loaded flange touches over some
+/// tenths of a mm.
+const CHORD_MIN: f64 = 1.0;
 /// A straight stretch may have its points as far apart as it likes: below this ambiguity, relative to the pressure.
 const AMBIGUOUS_LEAST: f64 = 0.02;
 /// Ambiguity relative to the largest pressure that makes a job fail.
 const AMBIGUOUS_MAX: f64 = 0.5;
+/// Pressures in MPa below this do no harm; what is open of them makes no job fail.
+const PRESSURE_LIGHT: f64 = 200.0;
 /// A profile goes on beyond its contact by this, in mm.
 const BEYOND: f64 = 5.0;
 
@@ -178,7 +183,7 @@ fn roughness(own: &Under, both: f64, advised: f64, modulus: f64, patch: FoundPat
         over_width: found.over_width,
         smoothing,
         advised,
-        refused: found.roughness.ambiguity > AMBIGUOUS_MAX * patch.pressure,
+        refused: found.roughness.ambiguity > AMBIGUOUS_MAX * patch.pressure.max(PRESSURE_LIGHT),
         cause,
     }
 }
@@ -187,7 +192,9 @@ fn roughness(own: &Under, both: f64, advised: f64, modulus: f64, patch: FoundPat
 fn spacing(own: &Under, patch: FoundPatch) -> Option<Finding> {
     let found = &own.found;
     let open = found.roughness.ambiguity > AMBIGUOUS_LEAST * patch.pressure;
+    let length = found.chord[1] - found.chord[0];
     let wide = found.over_width > COARSE && open || found.over_width > COARSE_MAX;
+    let wide = wide && length > CHORD_MIN;
     wide.then(|| Finding {
         body: own.body,
         patch: patch.number,
