@@ -22,8 +22,10 @@ use crate::contact::tangential::operator_store::OperatorStore;
 /// a change of friction's share in one round.
 const BALANCE: f64 = 5e-4;
 const BALANCE_OF_TARGET: f64 = 0.1;
-/// Rounds of the balance; each leaves about a tenth of the difference before, on steep flanges a third.
-const ROUNDS_MAX: u32 = 8;
+/// Rounds of the balance; each leaves about a tenth of the difference before, on steep flanges a third, less by the secant.
+const ROUNDS_MAX: u32 = 12;
+/// Slopes of the friction found over the friction counted on that a secant step believes.
+const SLOPES: [f64; 2] = [-0.9, 0.6];
 /// Part of its normal forces' vertical part that a wheel carries at least; on a steep flange friction may take away all of it.
 const CARRIED_MIN: f64 = 0.1;
 /// Allowed error of the resultants in the first round, relative to μN.
@@ -90,17 +92,20 @@ pub(super) fn solve(
     let mut at_rest = rest(about, None)?;
     let answers = at_rest.answers(operators, &coarse, contact, monitor)?;
     let mut share = friction_share(&at_rest.wheel, &answers);
+    let mut counted = share;
+    let mut previous = None;
     for _ in 0..ROUNDS_MAX {
-        let counted = share;
         if 1.0 + counted < CARRIED_MIN {
             break;
         }
         at_rest = at_rest.again(rest(exactly(counted), Some(&at_rest.wheel))?);
         let answers = at_rest.answers(operators, problem, contact, monitor)?;
         share = friction_share(&at_rest.wheel, &answers);
+        let before = previous.replace((counted, share));
         if ((1.0 + share) / (1.0 + counted) - 1.0).abs() <= balance(problem.resolution) {
             return Ok(at_rest.found(problem, contact, answers));
         }
+        counted = next_share((counted, share), before);
     }
     Err(SolveError::NormalProblem {
         reason: format!(
@@ -108,6 +113,16 @@ pub(super) fn solve(
              {share:+.3} of what the normal forces do. Give a normal_force_n or an approach_mm"
         ),
     })
+}
+
+/// The friction to count on next, after rounds that counted on the first of two numbers and found the second: a secant step
+/// where two rounds tell the slope, because friction found may swing about friction counted on where a flange is steep.
+fn next_share((counted, found): (f64, f64), before: Option<(f64, f64)>) -> f64 {
+    let slope = match before {
+        Some((at, was)) if (counted - at).abs() > f64::EPSILON => (found - was) / (counted - at),
+        _ => 0.0,
+    };
+    counted + (found - counted) / (1.0 - slope.clamp(SLOPES[0], SLOPES[1]))
 }
 
 /// By which part the vertical force may be missed.

@@ -1,6 +1,7 @@
 //! Two patches of different size in one gap: both are resolved, whatever their sizes, or the answer says that one is not.
 
 use railhead::contact::normal::hertz::{Ellipse, Pressing};
+use railhead::contact::remark::RemarkEntry;
 use railhead::contact::solution::Solution;
 use serde_json::json;
 
@@ -111,6 +112,9 @@ fn a_small_patch_beside_a_large_one_is_hertzs_contact_with_its_neighbours_deflec
         }
         let grids = solution.normal.expect("a report").grids;
         assert_eq!(grids, if radius < 10.0 { 2 } else { 1 }, "{radius}");
-        assert!(solution.remarks.is_empty(), "{:?}", solution.remarks);
+        // A steel body of 1 mm would yield; nothing else is to be said.
+        let other = |remark: &&RemarkEntry| remark.code != "pressure-implausible";
+        let others: Vec<_> = solution.remarks.iter().filter(other).collect();
+        assert!(others.is_empty(), "{others:?}");
     }
 }

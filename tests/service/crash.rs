@@ -75,11 +75,13 @@ async fn every_acknowledged_job_succeeds_once_although_the_process_is_killed_twi
 
     until_busy(&service, 3).await;
     let before_first = succeeded(&service).await;
+    let mut met = count(&service, "running").await;
     service.kill();
 
     let service = Service::start(folder.path(), &flags);
     until_busy(&service, before_first.len() + 3).await;
     let before_second = succeeded(&service).await;
+    met += count(&service, "running").await;
     service.kill();
 
     let service = Service::start(folder.path(), &flags);
@@ -94,11 +96,8 @@ async fn every_acknowledged_job_succeeds_once_although_the_process_is_killed_twi
             assert_eq!(after[&id], job, "what had succeeded was not touched again");
         }
     }
-    let attempts = after.values().map(|job| job["attempt"].as_u64().unwrap());
-    assert!(
-        attempts.sum::<u64>() > JOBS as u64,
-        "the kills met running jobs"
-    );
+    // Attempts do not tell: what died together is tried again uncounted.
+    assert!(met > 0, "the kills met running jobs");
 
     for id in &ids {
         let result = service.get(&format!("/v1/jobs/{id}/result")).await;

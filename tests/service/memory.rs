@@ -60,7 +60,7 @@ fn a_creep_map_needs_hardly_more_memory_than_four_motions() {
     // Operators of the 121 motions would be about 600 MB.
     let more = map.saturating_sub(four);
     assert!(
-        more < 80 << 20,
+        more < 160 << 20,
         "{} MiB more than for four motions",
         more >> 20
     );

@@ -11,7 +11,7 @@ use crate::contact::remark::{Remark, RemarkEntry, merged};
 use crate::contact::solution::{Fields, PatchSolution, PointSolution, Solution};
 
 /// What is smaller than this part of its scale is rounding, and reported as 0.
-const DUST: f64 = 1e-12;
+const DUST: f64 = 1e-14;
 
 /// Finishes the answer to a whole problem that took so long.
 ///

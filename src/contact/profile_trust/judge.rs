@@ -115,7 +115,9 @@ pub fn judge(
         Under::new(Body::Rail, rail, contacts[0], modulus),
         Under::new(Body::Wheel, wheel, contacts[1], modulus),
     ];
-    let advised = advised_smoothing([both[0].grain(), both[1].grain()], modulus, patch.pressure);
+    // A light patch beside the one that carries the load would ask for far more smoothing than that one.
+    let pressure = patch.pressure.max(PRESSURE_LIGHT);
+    let advised = advised_smoothing([both[0].grain(), both[1].grain()], modulus, pressure);
     let mut findings = Vec::new();
     let rough = both[0].rough().hypot(both[1].rough());
     for (own, advised) in both.iter().zip(advised) {
@@ -175,7 +177,7 @@ fn roughness(own: &Under, both: f64, advised: f64, modulus: f64, patch: FoundPat
         patch: patch.number,
         y: [own.y(own.contact[0]), own.y(own.contact[1])],
         pressure: own.rough(),
-        share: both / patch.pressure,
+        share: both / patch.pressure.max(PRESSURE_LIGHT),
         left: own.noise_left(modulus) / patch.pressure,
         everywhere: found.roughness.everywhere / patch.pressure,
         chord: found.chord.map(|s| own.y(s)),

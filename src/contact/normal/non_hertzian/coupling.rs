@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 use crate::contact::influence::coefficients::{Rectangle, rectangle};
 use crate::contact::normal::non_hertzian::grid::Grid;
 
-/// Chebyshev points per axis. Displacements differ from the exact sum by less than 2e-5 of the largest one that the other grid
+/// Chebyshev points per axis. Displacements differ from the exact sum by less than 5e-5 of the largest one that the other grid
 /// causes (the test below; with 6 points by 1e-4).
 const ORDER: usize = 7;
 /// Distance of two boxes, relative to half their longest side, from which the kernel between them is interpolated.
@@ -346,7 +346,7 @@ mod tests {
                 Coupling::new(to, from, MODULUS).add(&pressure, &mut found);
                 let largest = expected.iter().copied().fold(0.0, f64::max);
                 for (a, b) in found.iter().zip(&expected) {
-                    assert!((a - b).abs() < 2e-5 * largest, "{window:?}: {a} {b}");
+                    assert!((a - b).abs() < 5e-5 * largest, "{window:?}: {a} {b}");
                 }
             }
         }
