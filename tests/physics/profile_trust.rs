@@ -7,7 +7,7 @@ use railhead::contact::solution::Solution;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 
-use crate::damaged::{Damage, answer, blamed, linear, pressure_max, resampled, with};
+use crate::damaged::{Damage, blamed, linear, pressure_max, resampled, with};
 use crate::profile_cases::{generated, put};
 use crate::profile_shapes::{rail_60e1, s1002};
 use crate::random::Random;
@@ -32,7 +32,10 @@ fn on_rail(rail: &[[f64; 2]]) -> Value {
 }
 
 fn solved(case: &Value) -> Solution {
-    answer(case).expect("an answer")
+    let problem = check(case, &Limits::default()).expect("a case");
+    solve(&problem, &Unwatched)
+        .unwrap_or_else(|reason| panic!("{reason}"))
+        .0
 }
 
 fn refusal(case: &Value) -> (String, String) {
@@ -165,7 +168,10 @@ fn outliers_and_steps_are_told_with_their_place() {
     let mut step = points.clone();
     step.iter_mut().skip(middle).for_each(|at| at[1] -= 0.05);
     for (rail, code) in [(outlier, "profile-outlier"), (step, "profile-step")] {
-        let found = solved(&accepted(&on_rail(&rail)));
+        // The ridge under such a point is too slender for the boundary element method, which fails and says so.
+        let mut case = accepted(&on_rail(&rail));
+        case["solver"] = json!({ "method": "fastsim" });
+        let found = solved(&case);
         let told = found.remarks.iter().find(|remark| remark.code == code);
         let told = told.unwrap_or_else(|| panic!("{code}: {:?}", found.remarks));
         let at = serde_json::to_value(told).expect("JSON")["at_y_mm"].as_f64();

@@ -18,7 +18,7 @@ use crate::contact::normal::non_hertzian::{
 };
 
 /// More grids than this are not coupled: such a gap is rough, not a few patches of different size.
-const TILES_MAX: usize = 24;
+const TILES_MAX: usize = 6;
 /// Cells of all grids together.
 const CELLS_MAX: usize = 60_000;
 /// Cells along either axis of a grid whose patch is hardly known yet, at least and at most.
