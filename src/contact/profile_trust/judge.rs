@@ -13,7 +13,7 @@ use crate::contact::profile_trust::quality::{PatchQuality, ProfileQuality};
 
 /// A body is blamed for its share of that from here on.
 const BLAMED: f64 = 0.6;
-/// Largest chord over the width of the patch that is remarked on, and what makes a job fail (as does [`AMBIGUOUS`]).
+/// Largest chord over the width of the patch that is remarked on, and what makes a job fail (as does [`AMBIGUOUS_MAX`]).
 const COARSE: f64 = 1.0;
 const COARSE_MAX: f64 = 1.5;
 /// A chord of this length in mm is fine enough for any patch that carries a load worth the name: a lightly loaded flange touches over some

@@ -170,7 +170,7 @@ impl Indicators {
         }
     }
 
-    /// The estimates, see [`Measured::error`].
+    /// The estimates, see `error`.
     #[must_use]
     pub fn errors(&self) -> Errors {
         match self {

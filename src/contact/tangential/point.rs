@@ -155,7 +155,7 @@ pub fn along(
 }
 
 /// Solves a motion on the level of one size, from the point of a coarser one if there is one. Estimates are those before
-/// companions, see [`refine::judge`].
+/// companions, see `judge`.
 ///
 /// # Errors
 /// Why there is no answer.

@@ -1,6 +1,6 @@
 //! Results in the embedded job table, and who refers to them.
 //!
-//! A blob is a row; jobs refer to it, lending a result is one more reference. [`release_blobs`] is the only place where a
+//! A blob is a row; jobs refer to it, lending a result is one more reference. `release_blobs` is the only place where a
 //! blob ends: it is called in every transaction that drops references.
 
 use sqlx::{QueryBuilder, Row, Sqlite, SqliteConnection};
