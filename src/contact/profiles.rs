@@ -238,3 +238,29 @@ impl Rest {
         motion
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_second_round_hits_the_balance_of_a_straight_line_however_it_swings() {
+        for slope in [-0.8, -0.3, 0.2, 0.5] {
+            let found = |counted: f64| 0.1 + slope * counted;
+            let first = (0.3, found(0.3));
+            let counted = next_share(first, None);
+            assert!(
+                (counted - first.1).abs() < 1e-12,
+                "nothing is known of the slope yet"
+            );
+            let balanced = next_share((counted, found(counted)), Some(first));
+            assert!((found(balanced) - balanced).abs() < 1e-12, "{slope}");
+        }
+    }
+
+    #[test]
+    fn a_slope_beyond_belief_makes_no_wild_step() {
+        let step = next_share((0.2, 0.3), Some((0.2 - 1e-6, 0.1))) - 0.2;
+        assert!((step - 0.25).abs() < 1e-9, "{step}");
+    }
+}
