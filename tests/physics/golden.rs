@@ -71,7 +71,7 @@ fn pressures() -> Value {
 }
 
 /// Every contact type and method, with creepage, spin, forces and sweeps.
-fn cases() -> Vec<(String, Value)> {
+pub fn cases() -> Vec<(String, Value)> {
     let radii = || json!({ "type": "radii", "rolling_mm": 460, "lateral_mm": 300 });
     let ellipse = |a: f64, b: f64| json!({ "type": "ellipse", "a_mm": a, "b_mm": b });
     let along = || json!({ "creepage_x": 0.001 });

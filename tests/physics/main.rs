@@ -53,6 +53,7 @@ mod profile_worn;
 #[path = "../../benches/stress/random.rs"]
 mod random;
 mod readme;
+mod recorder;
 mod reference;
 mod reference_hertz;
 mod regions;

@@ -1,0 +1,234 @@
+//! What is asked: the shipped examples, references of every kind, and contacts by chance, the same on every machine.
+
+use serde_json::{Value, json};
+
+use crate::gap_samples::GapReference;
+use crate::golden;
+use crate::population::{self, Class};
+use crate::profile_cases::{generated, put};
+use crate::random::Random;
+use crate::reference::{self, Ellipse, HERTZ_CLASSES};
+
+const ELLIPSES: usize = 60;
+const WHEELS: usize = 20;
+
+/// All cases with their names.
+pub fn all() -> Vec<(String, Value)> {
+    let mut cases = examples();
+    cases.extend(golden::cases());
+    cases.extend(references());
+    cases.extend(by_chance());
+    cases.extend(sweeps());
+    cases.extend(methods());
+    cases.extend(wheels());
+    cases.extend(variants());
+    for (_, case) in &mut cases {
+        // Everything that is recorded has to be there.
+        case["outputs"] = json!(["resultants", "zones", "tractions", "pressure", "slip"]);
+    }
+    cases
+}
+
+/// The shipped examples that have an answer.
+fn examples() -> Vec<(String, Value)> {
+    let folder = format!("{}/api/examples", env!("CARGO_MANIFEST_DIR"));
+    let mut cases = Vec::new();
+    for entry in std::fs::read_dir(folder).expect("the examples") {
+        let path = entry.expect("an entry").path();
+        let name = path.file_name().expect("a name").display().to_string();
+        if name.ends_with(".case.json") && !name.contains("faulty") {
+            let text = std::fs::read_to_string(&path).expect("an example");
+            let case = serde_json::from_str(&text).expect("an example is JSON");
+            cases.push((format!("example {name}"), case));
+        }
+    }
+    cases.sort_by(|(a, _), (b, _)| a.cmp(b));
+    cases
+}
+
+/// The ellipses and gaps that were solved elsewhere.
+fn references() -> Vec<(String, Value)> {
+    let ellipses = HERTZ_CLASSES
+        .iter()
+        .chain(&["hertz_linear"])
+        .flat_map(|class| reference::cases(class))
+        .map(|case| {
+            let mut question = case.ellipse().case(1, 1);
+            question["solver"] = json!({ "target_error": 0.005 });
+            (format!("reference {}", case.id), question)
+        });
+    let gaps = GapReference::profiles()
+        .into_iter()
+        .chain(GapReference::grids())
+        .map(|case| (format!("reference {}", case.id), case.case()));
+    ellipses.chain(gaps).collect()
+}
+
+/// Ellipses, pressures and gaps from the population that the error estimate is judged on.
+fn by_chance() -> Vec<(String, Value)> {
+    let classes = [
+        (Class::Ellipse, ELLIPSES),
+        (Class::Smooth, 12),
+        (Class::Jump, 6),
+        (Class::Gap, 16),
+    ];
+    classes
+        .into_iter()
+        .flat_map(|(class, count)| (0..count).map(move |number| (class, number)))
+        .map(|(class, number)| {
+            let name = format!("{} {number}", class.name());
+            (name, population::case(class, number))
+        })
+        .collect()
+}
+
+/// Sweeps of one component at each of two shapes, a map of two, and forces in the place of creepages.
+fn sweeps() -> Vec<(String, Value)> {
+    let mut cases = Vec::new();
+    for (shape, ratio) in [("wide", 0.4), ("long", 2.5)] {
+        let ellipse = Ellipse::steel(ratio, 0.28).normalised(1.0, 1.0, 1.0);
+        let [x, y, spin] = ellipse.motion;
+        let range =
+            |from: f64, to: f64, points: u32| json!({ "from": from, "to": to, "points": points });
+        let at = |value: f64, points: u32| range(value, value, points);
+        let sweeps = [
+            (
+                "spin",
+                json!({ "spin_per_mm": range(0.2 * spin, 12.0 * spin, 8) }),
+            ),
+            (
+                "creepage_x",
+                json!({ "creepage_x": range(-2.0 * x, 2.0 * x, 7) }),
+            ),
+            (
+                "lateral",
+                json!({ "creepage_y": range(0.1 * y, 3.0 * y, 6), "spin_per_mm": at(1.5 * spin, 6) }),
+            ),
+            (
+                "map",
+                json!({
+                    "creepage_x": range(0.0, 1.5 * x, 3), "creepage_y": range(-y, y, 3), "combine": "grid",
+                }),
+            ),
+            (
+                "force",
+                json!({ "force_x_n": range(-12e3, 12e3, 4), "spin_per_mm": at(0.5 * spin, 4) }),
+            ),
+        ];
+        for (name, sweep) in sweeps {
+            let mut case = ellipse.case(1, 1);
+            case["solver"] = json!({ "target_error": 0.005 });
+            case["motion"] = json!({ "sweep": sweep });
+            cases.push((format!("sweep {name} {shape}"), case));
+        }
+    }
+    cases
+}
+
+/// The other methods, and explicit meshes.
+fn methods() -> Vec<(String, Value)> {
+    let solvers = [
+        (
+            "liu_hsu",
+            json!({ "method": "liu_hsu", "mesh": { "strips": 8, "cells": 10 } }),
+        ),
+        ("fastsim", json!({ "method": "fastsim" })),
+        (
+            "parabolic",
+            json!({ "method": "fastsim", "traction_bound": "parabolic" }),
+        ),
+        ("mesh", json!({ "mesh": { "strips": 12, "cells": 16 } })),
+        ("finer", json!({ "target_error": 0.001 })),
+    ];
+    let random = &mut Random(17);
+    let mut cases = Vec::new();
+    for (name, solver) in solvers {
+        for number in 0..4 {
+            let ellipse = Ellipse::steel(random.decades(0.3, 3.0), random.between(0.0, 0.5));
+            let [x, y] = [0; 2].map(|_| random.sign() * random.decades(0.1, 3.0));
+            let spin = random.sign() * random.decades(0.1, 5.0);
+            let mut case = ellipse.normalised(x, y, spin).case(1, 1);
+            case["solver"] = solver.clone();
+            cases.push((format!("{name} {number}"), case));
+        }
+    }
+    cases
+}
+
+/// Wheels on rails: by chance from the population, and displaced step by step with the motion of their wheelset.
+fn wheels() -> Vec<(String, Value)> {
+    let mut cases: Vec<(String, Value)> = (0..WHEELS)
+        .map(|number| {
+            let name = format!("{} {number}", Class::Profiles.name());
+            (name, population::case(Class::Profiles, number))
+        })
+        .collect();
+    for (shift, yaw) in [(-5.0, 0.01), (-2.0, -0.005), (0.0, 0.0), (3.0, 0.02)] {
+        let place = json!({ "lateral_shift_mm": shift, "yaw_rad": yaw });
+        let mut case = put(&generated(), "contact", place);
+        case["motion"] =
+            json!({ "wheelset": { "speed_mm_per_s": 20_000, "free_rolling_radius_mm": 461 } });
+        cases.push((format!("wheelset {shift} {yaw}"), case));
+    }
+    cases
+}
+
+/// What else a case can say: other loads, unlike bodies, no friction, smoothed profiles.
+fn variants() -> Vec<(String, Value)> {
+    let mut cases = Vec::new();
+    let mut add = |name: &str, base: &Value, members: Value| {
+        let mut case = base.clone();
+        for (member, value) in members.as_object().expect("members") {
+            case[member] = value.clone();
+        }
+        cases.push((name.to_owned(), case));
+    };
+    let mut ellipse = Ellipse::steel(1.5, 0.28)
+        .normalised(0.8, -0.4, 1.2)
+        .case(1, 1);
+    ellipse["solver"] = json!({ "target_error": 0.005 });
+    let radii = json!({ "type": "radii", "rolling_mm": 460, "lateral_mm": 300 });
+    let steel = json!({ "shear_modulus_mpa": 82_000, "poisson_ratio": 0.28 });
+    let soft = json!({ "young_modulus_mpa": 150_000, "poisson_ratio": 0.31 });
+    add(
+        "unlike bodies",
+        &ellipse,
+        json!({ "material": { "lower": steel, "upper": soft } }),
+    );
+    add(
+        "no friction",
+        &ellipse,
+        json!({ "friction": { "coefficient": 0 } }),
+    );
+    add(
+        "approach",
+        &ellipse,
+        json!({ "contact": radii, "load": { "approach_mm": 0.08 } }),
+    );
+    let gap = GapReference::profiles()[0].case();
+    add(
+        "gap, approach",
+        &gap,
+        json!({ "load": { "approach_mm": 0.05 } }),
+    );
+    let wheel = put(&generated(), "contact", json!({ "lateral_shift_mm": 2.0 }));
+    add(
+        "wheel, normal force",
+        &wheel,
+        json!({ "load": { "normal_force_n": 60_000 } }),
+    );
+    add(
+        "wheel, approach",
+        &wheel,
+        json!({ "load": { "approach_mm": 0.1 } }),
+    );
+    add(
+        "wheel, sweep",
+        &wheel,
+        json!({ "motion": [{ "creepage_x": 0.0005 }, { "creepage_x": 0.001, "creepage_y": 0.001 }] }),
+    );
+    let smooth = json!({ "points_mm": wheel["contact"]["rail"]["points_mm"], "smoothing_mm": 4 });
+    let smoothed = put(&wheel, "contact", json!({ "rail": smooth }));
+    add("wheel, smoothed rail", &smoothed, json!({}));
+    cases
+}

@@ -1,0 +1,223 @@
+//! What differs between two recordings, in words: the first differences of each kind, and the largest change of every quantity.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use crate::recorder::record::{Kind, Record, Recording, kind};
+
+/// Differences that are written out; the others are counted.
+const SHOWN: usize = 20;
+
+/// What must be equal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Precision {
+    /// Everything, to the last bit.
+    Bits,
+    /// The numbers that a client reads, up to this change.
+    Within(f64),
+}
+
+/// Empty if the recordings agree.
+pub fn compare(recorded: &Recording, present: &Recording, precision: Precision) -> String {
+    let mut differences = Differences::new(precision);
+    let before: BTreeMap<&str, &Record> = recorded
+        .answers
+        .iter()
+        .map(|(name, record)| (name.as_str(), record))
+        .collect();
+    for (name, record) in &present.answers {
+        match before.get(name.as_str()) {
+            Some(before) => differences.record(name, before, record),
+            None => differences.add(format!("{name}: not recorded")),
+        }
+    }
+    for (name, _) in &recorded.answers {
+        if !present.answers.iter().any(|(known, _)| known == name) {
+            differences.add(format!("{name}: recorded, but asked no more"));
+        }
+    }
+    differences.text()
+}
+
+struct Differences {
+    precision: Precision,
+    lines: Vec<String>,
+    /// By quantity: how many lines differ, the largest change and where it is.
+    largest: BTreeMap<String, (usize, f64, String)>,
+}
+
+impl Differences {
+    fn new(precision: Precision) -> Differences {
+        Differences {
+            precision,
+            lines: Vec::new(),
+            largest: BTreeMap::new(),
+        }
+    }
+
+    fn add(&mut self, line: String) {
+        self.lines.push(line);
+    }
+
+    fn record(&mut self, name: &str, before: &Record, now: &Record) {
+        let known = before.0.iter().map(|(quantity, _)| quantity);
+        let new = now.0.iter().map(|(quantity, _)| quantity);
+        let new = new.filter(|quantity| before.get(quantity).is_none());
+        for quantity in known.chain(new) {
+            let (old, values) = (before.get(quantity), now.get(quantity));
+            if old == values {
+                continue;
+            }
+            let scale = scale(before, quantity);
+            let change = change(old, values, scale);
+            match (self.precision, kind(quantity)) {
+                (Precision::Within(_), Kind::Exact) => continue,
+                (Precision::Within(most), _) if change <= most => continue,
+                _ => {}
+            }
+            let entry = self
+                .largest
+                .entry(quantity.clone())
+                .or_insert((0, -1.0, String::new()));
+            entry.0 += 1;
+            if change > entry.1 {
+                (entry.1, entry.2) = (change, name.to_owned());
+            }
+            let words = first_difference(old, values);
+            self.add(format!("{name}: {quantity}{words}, change {change:.1e}"));
+        }
+    }
+
+    fn text(&self) -> String {
+        let mut text = String::new();
+        if self.lines.is_empty() {
+            return text;
+        }
+        let _ = writeln!(text, "{} lines differ:", self.lines.len());
+        for line in self.lines.iter().take(SHOWN) {
+            let _ = writeln!(text, "  {line}");
+        }
+        if self.largest.is_empty() {
+            return text;
+        }
+        let _ = writeln!(
+            text,
+            "largest change of each quantity (resultants relative to μN):"
+        );
+        for (quantity, (count, change, name)) in &self.largest {
+            let size = match kind(quantity) {
+                Kind::Exact => String::new(),
+                _ => format!(", at most {change:.1e} ({name})"),
+            };
+            let _ = writeln!(text, "  {quantity}: {count} lines{size}");
+        }
+        text
+    }
+}
+
+/// What a change of this quantity is measured by.
+fn scale(record: &Record, quantity: &str) -> f64 {
+    let scales: Vec<f64> = record.get("scales").map_or_else(Vec::new, parsed);
+    let [limit, length] = scales[..] else {
+        return 0.0;
+    };
+    match kind(quantity) {
+        Kind::Force => limit,
+        Kind::Moment => limit * length,
+        Kind::Number | Kind::Exact => {
+            let values = record.get(quantity).map_or_else(Vec::new, parsed);
+            values.into_iter().map(f64::abs).fold(0.0, f64::max)
+        }
+    }
+}
+
+fn parsed(values: &[String]) -> Vec<f64> {
+    values.iter().filter_map(|v| v.parse().ok()).collect()
+}
+
+/// The largest difference of the numbers over the scale; infinite if there are more or fewer of them, or other words.
+fn change(before: Option<&[String]>, now: Option<&[String]>, scale: f64) -> f64 {
+    let (Some(before), Some(now)) = (before, now) else {
+        return f64::INFINITY;
+    };
+    if before.len() != now.len() {
+        return f64::INFINITY;
+    }
+    let pairs = before.iter().zip(now).filter(|(old, new)| old != new);
+    pairs
+        .map(
+            |(old, new)| match (old.parse::<f64>(), new.parse::<f64>()) {
+                (Ok(old), Ok(new)) if scale > 0.0 => (old - new).abs() / scale,
+                _ => f64::INFINITY,
+            },
+        )
+        .fold(0.0, f64::max)
+}
+
+/// The first values that differ, in words.
+fn first_difference(before: Option<&[String]>, now: Option<&[String]>) -> String {
+    match (before, now) {
+        (None, _) => " was not there".to_owned(),
+        (_, None) => " is there no more".to_owned(),
+        (Some(old), Some(new)) if old.len() != new.len() => {
+            format!(": {} values instead of {}", new.len(), old.len())
+        }
+        (Some(old), Some(new)) => {
+            let at = old.iter().zip(new).position(|(old, new)| old != new);
+            at.map_or_else(String::new, |at| {
+                format!("[{at}]: {} instead of {}", new[at], old[at])
+            })
+        }
+    }
+}
+
+fn recording(force: &str, iterations: &str) -> Recording {
+    let text = format!(
+        "revision 1\narithmetic test\n\n[one]\nscales 1e4 5e0\nforce_x {force} 3e3\niterations {iterations} 7\n"
+    );
+    Recording::read(&text).expect("a recording")
+}
+
+#[test]
+fn a_recording_is_read_as_it_was_written() {
+    let one = recording("1.25e3", "4");
+    assert_eq!(Recording::read(&one.to_string()), Some(one));
+}
+
+#[test]
+fn one_bit_is_a_difference_and_is_measured_by_the_friction_limit() {
+    let before = recording("1.2500000000000002e3", "4");
+    let now = recording("1.25e3", "4");
+    assert_eq!(compare(&before, &before, Precision::Bits), "");
+    let report = compare(&before, &now, Precision::Bits);
+    assert!(
+        report.contains("one: force_x[0]: 1.25e3 instead of 1.2500000000000002e3, change 2.3e-17"),
+        "{report}"
+    );
+    assert_eq!(compare(&before, &now, Precision::Within(1e-9)), "");
+}
+
+#[test]
+fn counts_are_compared_on_the_same_machine_only() {
+    let (before, now) = (recording("1.25e3", "4"), recording("1.25e3", "5"));
+    let report = compare(&before, &now, Precision::Bits);
+    assert!(report.contains("iterations[0]: 5 instead of 4"), "{report}");
+    assert_eq!(compare(&before, &now, Precision::Within(1e-9)), "");
+    let far = recording("1.2501e3", "4");
+    let report = compare(&before, &far, Precision::Within(1e-9));
+    assert!(
+        report.contains("force_x: 1 lines, at most 1.0e-5 (one)"),
+        "{report}"
+    );
+}
+
+#[test]
+fn missing_cases_and_quantities_are_differences() {
+    let (one, mut fewer) = (recording("1.25e3", "4"), recording("1.25e3", "4"));
+    fewer.answers[0].1.0.pop();
+    let report = compare(&one, &fewer, Precision::Bits);
+    assert!(report.contains("iterations is there no more"), "{report}");
+    fewer.answers.clear();
+    assert!(!compare(&one, &fewer, Precision::Within(1e-9)).is_empty());
+    assert!(!compare(&fewer, &one, Precision::Within(1e-9)).is_empty());
+}

@@ -1,0 +1,56 @@
+//! Which arithmetic is this? Two machines with the same name here give the same bits, as far as a probe of everything that may differ can tell.
+
+use faer::Mat;
+use faer::prelude::Solve;
+use pulp::Arch;
+use realfft::RealFftPlanner;
+
+use crate::recorder::record::Digest;
+
+/// The instruction set of the kernels, and a digest of what the functions of the C library, a factorisation and a transform give: the first
+/// differ between libraries, the others between caches and instruction sets.
+pub fn arithmetic() -> String {
+    let level = format!("{:?}", Arch::new());
+    let level = level.split(['(', ' ']).next().unwrap_or_default();
+    let mut digest = Digest::new();
+    for index in 0..200 {
+        let x = 0.037 + 0.0713 * f64::from(index);
+        for value in [
+            x.sin(),
+            x.cos(),
+            x.tan(),
+            x.atan(),
+            x.ln(),
+            (-x).exp(),
+            x.powf(0.731),
+            x.cbrt(),
+            x.hypot(1.7),
+            x.tanh(),
+            x.asinh(),
+            x.atan2(0.9),
+        ] {
+            digest.word(value.to_bits());
+        }
+    }
+    let n = 250;
+    let entry = |i: usize, j: usize| ((i * 7 + j * 13) as f64).sin() + f64::from(i == j) * 9.0;
+    let matrix = Mat::from_fn(n, n, entry);
+    let right = Mat::from_fn(n, 1, |i, _| (i as f64).cos());
+    let solved = matrix.partial_piv_lu().solve(&right);
+    let product = &matrix * &matrix;
+    for i in 0..n {
+        digest.word(solved[(i, 0)].to_bits());
+        digest.word(product[(i, n - 1 - i)].to_bits());
+    }
+    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(180);
+    let mut values: Vec<f64> = (0..180).map(|i| entry(i, 1)).collect();
+    let mut spectrum = transform.make_output_vec();
+    transform
+        .process(&mut values, &mut spectrum)
+        .expect("lengths that fit");
+    for value in spectrum {
+        digest.word(value.re.to_bits());
+        digest.word(value.im.to_bits());
+    }
+    format!("{} {level} {}", std::env::consts::ARCH, digest.text())
+}
