@@ -1,0 +1,145 @@
+//! Is the house in order? Directions of use, forbidden words, sizes of files and functions.
+//!
+//! Rules that hold everywhere are tests below. Those that some files still break are in `rules.rs`; `exceptions.rs` holds them to their list.
+
+mod exceptions;
+mod order;
+mod rules;
+mod sources;
+
+use std::fs;
+
+use crate::sources::{Sources, root};
+
+/// Lines of code that contain one of the words; comments do not count.
+fn mentions(sources: &Sources, below: &str, words: &[&str]) -> Vec<String> {
+    let mut found = Vec::new();
+    for (path, text) in sources.within(below) {
+        for (number, line) in text.lines().enumerate() {
+            let code = line.split("//").next().unwrap_or_default();
+            for word in words.iter().filter(|word| code.contains(*word)) {
+                found.push(format!("{path}:{}: {word}", number + 1));
+            }
+        }
+    }
+    found
+}
+
+/// Fails if code below a folder mentions one of the words.
+fn assert_free(below: &str, words: &[&str]) {
+    let found = mentions(&Sources::below(&["src"]), below, words);
+    assert_eq!(found, Vec::<String>::new(), "{below}");
+}
+
+#[test]
+fn rooms_mention_only_the_rooms_before_them() {
+    for (room, forbidden) in [
+        (
+            "src/contact",
+            &[
+                "crate::jobs",
+                "crate::http",
+                "crate::cli",
+                "crate::telemetry",
+            ][..],
+        ),
+        (
+            "src/jobs",
+            &["crate::http", "crate::cli", "crate::telemetry"],
+        ),
+        ("src/http", &["crate::cli", "crate::telemetry"]),
+        (
+            "src/telemetry.rs",
+            &["crate::contact", "crate::jobs", "crate::http", "crate::cli"],
+        ),
+    ] {
+        assert_free(room, forbidden);
+    }
+}
+
+#[test]
+fn contact_knows_no_files_no_clock_no_network_and_prints_nothing() {
+    let words = [
+        "tokio",
+        "axum",
+        "sqlx",
+        "object_store",
+        "std::env",
+        "std::fs",
+        "std::time::Instant",
+        "std::time::SystemTime",
+        "println!",
+        "eprintln!",
+        "tracing::",
+    ];
+    assert_free("src/contact", &words);
+}
+
+#[test]
+fn outside_libraries_stay_in_their_rooms() {
+    for (room, forbidden) in [
+        (
+            "src/jobs",
+            &["axum", "StatusCode", "faer", "clap", "opentelemetry_otlp"][..],
+        ),
+        (
+            "src/http",
+            &[
+                "sqlx",
+                "object_store",
+                "faer",
+                "clap",
+                "std::env",
+                "opentelemetry_otlp",
+                "opentelemetry_sdk",
+            ],
+        ),
+        (
+            "src/cli",
+            &["sqlx", "object_store", "faer", "opentelemetry"],
+        ),
+    ] {
+        assert_free(room, forbidden);
+    }
+}
+
+#[test]
+fn forbidden_words_are_found_and_comments_are_not_code() {
+    let planted = Sources::planted(&[
+        (
+            "src/contact/a.rs",
+            "// tokio\nlet now = std::time::Instant::now();",
+        ),
+        ("src/jobs/b.rs", "use std::time::Instant;"),
+    ]);
+    let words = ["tokio", "std::time::Instant"];
+    assert_eq!(
+        mentions(&planted, "src/contact", &words),
+        ["src/contact/a.rs:2: std::time::Instant"]
+    );
+}
+
+#[test]
+fn every_file_says_what_it_is_for() {
+    let sources = Sources::below(&["src", "tests", "benches"]);
+    let silent = sources
+        .within("")
+        .filter(|(_, text)| !text.starts_with("//!"));
+    let silent: Vec<&str> = silent.map(|(path, _)| path).collect();
+    assert_eq!(silent, Vec::<&str>::new());
+}
+
+#[test]
+fn every_example_is_a_case_that_can_be_asked_or_the_faulty_one() {
+    for entry in fs::read_dir(root().join("api/examples")).expect("the examples") {
+        let path = entry.expect("an entry").path();
+        let name = path.display().to_string();
+        let text = fs::read_to_string(&path).expect("an example");
+        let value = serde_json::from_str(&text).expect("an example is JSON");
+        if name.ends_with(".case.json") {
+            let limits = railhead::contact::problem::Limits::default();
+            let checked = railhead::contact::check(&value, &limits);
+            assert_eq!(checked.is_err(), name.contains("faulty"), "{name}");
+        }
+    }
+}
