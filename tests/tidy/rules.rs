@@ -120,7 +120,7 @@ fn door(sources: &Sources) -> Findings {
                 .strip_prefix(*entry)
                 .is_some_and(|r| r.starts_with("::"))
         };
-        DOOR.contains(&target) || DOOR.iter().skip(1).any(|entry| below(&entry))
+        DOOR.contains(&target) || DOOR.iter().skip(1).any(below)
     };
     let mut wrong = Vec::new();
     for (module, targets) in uses(&sources.modules()) {
@@ -237,7 +237,7 @@ fn functions(text: &str) -> Vec<(String, usize)> {
         if line.ends_with(';') || line.ends_with('}') {
             continue;
         }
-        if let Some(length) = lines[start + 1..].iter().position(|line| ends(&line)) {
+        if let Some(length) = lines[start + 1..].iter().position(ends) {
             functions.push((name, length + 2));
         }
     }
