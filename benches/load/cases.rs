@@ -78,5 +78,7 @@ pub fn bare_rate(threads: usize, time: Duration, case: impl Fn(usize) -> Value +
 /// As a worker does it, operators kept by the process included.
 fn solve_one(recipe: &Recipe, case: &Value) {
     let problem = (recipe.check)(case, &Limits::default()).expect("a case");
-    (recipe.solve)(&problem, &Unwatched).expect("a solution");
+    for slice in (recipe.slices)(&problem) {
+        (recipe.solve)(&problem, slice, &Unwatched).expect("a solution");
+    }
 }

@@ -48,11 +48,11 @@ pub struct JobAnswer {
     /// When the job will be removed with its result; null before its end, and where ended jobs are kept for ever.
     #[schema(format = "date-time")]
     expires_at: Option<String>,
-    /// Attempts made, the current one included.
+    /// Attempts since the last slice of the job was stored, the current one included.
     attempt: u32,
     /// The result was computed for an identical case before, so nothing was solved.
     cached: bool,
-    /// Rough progress.
+    /// Rough progress. A queued job of which some slices are solved keeps theirs.
     #[schema(minimum = 0.0, maximum = 1.0)]
     progress: f64,
     /// Its place among the queued jobs; only where one job is looked at, as long as it is queued and not too far behind.

@@ -15,9 +15,11 @@ use crate::jobs::gate::Gate;
 use crate::jobs::job::{Failure, FailureKind};
 use crate::jobs::keeper::Keeper;
 use crate::jobs::results::Encoded;
-use crate::jobs::solver_thread::{INTERNAL, Outcome, SolverThread, Task, solve_guarded};
-use crate::jobs::store::{Claim, Ending, StoredCase};
+use crate::jobs::solver_thread::{INTERNAL, Outcome, SolverThread, Task, Work, solve_guarded};
+use crate::jobs::store::{Claim, Ending, SliceNote};
+use crate::jobs::sweep::Sweep;
 use crate::jobs::trace::Traced;
+use crate::jobs::turns::Spent;
 use crate::jobs::watch::{Reason, Watch};
 use crate::jobs::wishes::too_late;
 
@@ -30,6 +32,8 @@ pub(super) struct Member {
     pub(super) claim: Claim,
     pub(super) watch: Arc<Watch>,
     pub(super) phase: Phase,
+    /// What it goes on with, once it is known.
+    pub(super) sweep: Option<Box<Sweep>>,
     _registered: Registered,
 }
 
@@ -57,9 +61,11 @@ pub(super) struct Attempt {
     pub(super) gate: Arc<Gate>,
     /// It was running when a process died, and is solved while nothing else is.
     pub(super) suspect: bool,
-    /// It has waited for its turn.
-    pub(super) resumed: bool,
-    /// Solver time spent on it so far.
+    /// What its time is spent on.
+    pub(super) on: Spent,
+    /// Begin of its turn.
+    pub(super) turn_began: Instant,
+    /// Solver time spent on what it is at.
     pub(super) spent: Duration,
     solver: Option<Solver>,
 }
@@ -78,6 +84,10 @@ impl Attempt {
     pub(super) fn new(shared: &Arc<Shared>, tenant: Arc<str>, claims: Vec<Claim>) -> Attempt {
         let gate = Arc::new(Gate::default());
         let suspect = claims.iter().any(|claim| claim.suspect);
+        let on = match claims.iter().any(|claim| claim.slices > 0) {
+            true => Spent::Begun,
+            false => Spent::New,
+        };
         let members: Vec<Member> = claims
             .into_iter()
             .map(|claim| {
@@ -87,6 +97,7 @@ impl Attempt {
                     claim,
                     watch,
                     phase: Phase::Solving,
+                    sweep: None,
                 }
             })
             .collect();
@@ -99,7 +110,8 @@ impl Attempt {
             members,
             gate,
             suspect,
-            resumed: false,
+            on,
+            turn_began: Instant::now(),
             spent: Duration::ZERO,
             solver: None,
         }
@@ -117,35 +129,38 @@ impl Attempt {
         solving.map(|(place, _)| place).collect()
     }
 
-    /// Hands the cases at these places to a thread.
+    /// Hands the work for the members at these places to a thread.
     pub(super) fn begin(
         &mut self,
         shared: &Arc<Shared>,
         thread: SolverThread,
-        cases: Vec<(usize, StoredCase)>,
+        work: Vec<(usize, Work)>,
     ) {
+        self.spent = Duration::ZERO;
         let (reply, outcomes) = unbounded_channel();
         let closed = Arc::new(AtomicBool::new(false));
-        let work: Vec<_> = cases
+        let work: Vec<_> = work
             .into_iter()
-            .map(|(place, case)| {
+            .map(|(place, work)| {
                 let member = &self.members[place];
+                member.watch.set_aside();
                 let traced = shared.traced(&member.claim);
-                (place, member.watch.clone(), case, traced)
+                (place, member.watch.clone(), work, traced)
             })
             .collect();
         let task: Task = {
             let (shared, closed) = (shared.clone(), closed.clone());
             Box::new(move || {
                 let start = Instant::now();
-                for (number, (place, watch, case, traced)) in work.into_iter().enumerate() {
+                for (number, (place, watch, work, traced)) in work.into_iter().enumerate() {
                     let late = number > 0 && start.elapsed() > GROUP_TIME;
                     if late || closed.load(Ordering::Acquire) || shared.stopping.is_cancelled() {
                         break;
                     }
                     watch.take_up();
-                    let solve = || solve_guarded(&shared, &watch, &case);
-                    let outcome = Traced::solving(traced.as_ref(), solve);
+                    let from_queue = matches!(work, Work::New(..));
+                    let solve = || solve_guarded(&shared, &watch, work);
+                    let outcome = Traced::solving(traced.as_ref(), from_queue, solve);
                     // An abandoned attempt has nobody listening.
                     let _ = reply.send((place, outcome));
                 }
@@ -294,6 +309,12 @@ impl Attempt {
 
 /// What follows from the outcome of an attempt.
 pub(super) enum Verdict {
+    /// There is a part of an answer to keep, if any, and more to be solved: now, or by somebody else later.
+    GoOn {
+        sweep: Box<Sweep>,
+        part: Option<(SliceNote, Encoded)>,
+        stopped: Option<Reason>,
+    },
     /// There is an answer to keep.
     Keep {
         result: Encoded,
@@ -320,7 +341,19 @@ pub(super) fn judge(outcome: Outcome, reason: Option<Reason>) -> Verdict {
         )))
     };
     match outcome {
-        Outcome::Solved { .. } if reason == Some(Reason::Lost) => Verdict::Lost,
+        Outcome::Solved { .. } | Outcome::Slice { .. } if reason == Some(Reason::Lost) => {
+            Verdict::Lost
+        }
+        // A slice counts like an answer where somebody wants the whole.
+        Outcome::Slice { sweep, part }
+            if matches!(reason, None | Some(Reason::Shutdown | Reason::TooLong)) =>
+        {
+            Verdict::GoOn {
+                sweep,
+                part,
+                stopped: reason,
+            }
+        }
         Outcome::Solved {
             result,
             remarks,
@@ -330,14 +363,16 @@ pub(super) fn judge(outcome: Outcome, reason: Option<Reason>) -> Verdict {
             remarks,
             field_patches,
         },
-        Outcome::Unsolved(SolveError::Cancelled) | Outcome::Abandoned => match reason {
-            Some(Reason::Cancel) => Verdict::End(Ending::Cancelled),
-            Some(Reason::Shutdown) => Verdict::HandBack,
-            Some(Reason::TooLong) => Verdict::HandBackAsLong,
-            Some(Reason::Lost) => Verdict::Lost,
-            Some(Reason::Deadline) => Verdict::End(Ending::Failed(too_late())),
-            None => failed("the solver stopped although nobody asked it to".to_owned()),
-        },
+        Outcome::Unsolved(SolveError::Cancelled) | Outcome::Abandoned | Outcome::Slice { .. } => {
+            match reason {
+                Some(Reason::Cancel) => Verdict::End(Ending::Cancelled),
+                Some(Reason::Shutdown) => Verdict::HandBack,
+                Some(Reason::TooLong) => Verdict::HandBackAsLong,
+                Some(Reason::Lost) => Verdict::Lost,
+                Some(Reason::Deadline) => Verdict::End(Ending::Failed(too_late())),
+                None => failed("the solver stopped although nobody asked it to".to_owned()),
+            }
+        }
         Outcome::Unsolved(error) => match Failure::of_solve(&error) {
             Some(failure) => Verdict::End(Ending::Failed(failure)),
             None => failed(error.to_string()),
@@ -386,10 +421,23 @@ mod tests {
     use super::*;
     use crate::contact::error::CaseError;
 
+    fn problem() -> crate::contact::problem::Problem {
+        let case = serde_json::json!({
+            "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
+            "friction": { "coefficient": 0.3 },
+            "contact": { "type": "radii", "rolling_mm": 460, "lateral_mm": 300 },
+            "load": { "normal_force_n": 100_000 },
+            "motion": [{ "creepage_x": 0.001 }, { "creepage_x": 0.002 }]
+        });
+        crate::contact::check(&case, &crate::contact::problem::Limits::default()).unwrap()
+    }
+
     /// What becomes of a job, as a word.
     fn fate(outcome: Outcome, reason: Option<Reason>) -> &'static str {
         match judge(outcome, reason) {
             Verdict::Keep { .. } => "kept",
+            Verdict::GoOn { stopped: None, .. } => "goes on",
+            Verdict::GoOn { .. } => "part kept",
             Verdict::End(ending) => ending.state().name(),
             Verdict::HandBack => "back",
             Verdict::HandBackAsLong => "back, long",
@@ -415,6 +463,10 @@ mod tests {
             remarks: Vec::new(),
             field_patches: 0,
         };
+        let slice = || Outcome::Slice {
+            sweep: Box::new(Sweep::new(problem(), vec![0..1, 1..2], &[])),
+            part: None,
+        };
         let broken = || Outcome::Broken(Failure::new(FailureKind::Panic, "boom"));
         let stopped = || Outcome::Unsolved(SolveError::Cancelled);
         let late = || Outcome::Refused(CaseError(Vec::new()));
@@ -426,6 +478,15 @@ mod tests {
                 "kept"
             };
             assert_eq!(fate(solved(), reason), kept, "{reason:?}");
+            // A slice is kept where the whole is still wanted.
+            let part = match reason {
+                None => "goes on",
+                Some(Reason::Shutdown | Reason::TooLong) => "part kept",
+                Some(Reason::Lost) => "lost",
+                Some(Reason::Cancel) => "cancelled",
+                Some(Reason::Deadline) => "failed",
+            };
+            assert_eq!(fate(slice(), reason), part, "{reason:?}");
             let told = match reason {
                 None | Some(Reason::Deadline) => "failed",
                 Some(Reason::Cancel) => "cancelled",

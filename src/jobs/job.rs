@@ -37,7 +37,8 @@ pub struct Job {
     pub deadline: Option<i64>,
     /// When it will be removed with its result; absent before its end, and where ended jobs are kept for ever.
     pub expires_at: Option<i64>,
-    /// Attempts that count, from 1 once running; an attempt handed back by a graceful shutdown does not count.
+    /// Attempts that count, from 1 once running, since the last slice was stored; one handed back by a graceful shutdown does
+    /// not count.
     pub attempt: u32,
     /// 0 to 1, rough; written at most with each heartbeat.
     pub progress: f64,

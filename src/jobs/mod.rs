@@ -35,6 +35,7 @@ pub mod staging;
 mod storage;
 pub mod store;
 mod submit;
+mod sweep;
 pub mod template;
 pub mod trace;
 mod turns;

@@ -1,6 +1,7 @@
 //! What the workers do with a case: check it, solve it. Production uses `contact`; tests may put in their own.
 
 use std::fmt;
+use std::ops::Range;
 use std::sync::Arc;
 
 use serde_json::Value;
@@ -9,21 +10,27 @@ use crate::contact;
 use crate::contact::error::{CaseError, SolveError};
 use crate::contact::monitor::Monitor;
 use crate::contact::problem::{Limits, Problem};
+use crate::contact::slices::{slices, solve_slice};
 use crate::contact::solution::{Fields, Solution};
 use crate::contact::tangential::operator_store::OperatorStore;
 
 /// Checks a case against limits.
 pub type Check = dyn Fn(&Value, &Limits) -> Result<Problem, CaseError> + Send + Sync;
-/// Solves a checked case under a monitor.
-pub type Solve =
-    dyn Fn(&Problem, &dyn Monitor) -> Result<(Solution, Fields), SolveError> + Send + Sync;
+/// Where a checked case is cut: ranges of motions, one after the other.
+pub type Slices = dyn Fn(&Problem) -> Vec<Range<usize>> + Send + Sync;
+/// Solves one of these ranges of a checked case under a monitor.
+pub type Solve = dyn Fn(&Problem, Range<usize>, &dyn Monitor) -> Result<(Solution, Fields), SolveError>
+    + Send
+    + Sync;
 
 /// How a case becomes an answer.
 #[derive(Clone)]
 pub struct Recipe {
     /// The first step, done at submission and again before solving.
     pub check: Arc<Check>,
-    /// The second step, done on a solver thread.
+    /// Where the second step is cut, by the case alone.
+    pub slices: Arc<Slices>,
+    /// The second step, done on a solver thread, slice by slice.
     pub solve: Arc<Solve>,
     /// What all solver threads share.
     pub operators: Arc<OperatorStore>,
@@ -43,8 +50,27 @@ impl Recipe {
         let store = Arc::clone(&operators);
         Recipe {
             check: Arc::new(contact::check),
-            solve: Arc::new(move |problem, monitor| contact::solve_with(&store, problem, monitor)),
+            slices: Arc::new(slices),
+            solve: Arc::new(move |problem, slice, monitor| {
+                solve_slice(&store, problem, slice, monitor)
+            }),
             operators,
+        }
+    }
+
+    /// The same with another solver, which solves every case at once.
+    #[must_use]
+    pub fn solving<F>(self, solve: F) -> Recipe
+    where
+        F: Fn(&Problem, &dyn Monitor) -> Result<(Solution, Fields), SolveError>
+            + Send
+            + Sync
+            + 'static,
+    {
+        Recipe {
+            slices: Arc::new(|problem| std::iter::once(0..problem.motions.len()).collect()),
+            solve: Arc::new(move |problem, _, monitor| solve(problem, monitor)),
+            ..self
         }
     }
 }

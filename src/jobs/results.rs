@@ -102,6 +102,25 @@ impl Results {
     /// The result could not be written.
     pub async fn put(&self, claim: &Claim, result: Encoded) -> Result<String, JobsError> {
         let folder = job_folder(claim.id).join(claim.lease_number.to_string());
+        self.put_into(folder, result).await
+    }
+
+    /// As [`Results::put`], of one slice of a sweep: `{lease number}-{number of the slice}` stands in place of the lease
+    /// number.
+    ///
+    /// # Errors
+    /// The result could not be written.
+    pub async fn put_slice(
+        &self,
+        claim: &Claim,
+        number: u32,
+        result: Encoded,
+    ) -> Result<String, JobsError> {
+        let folder = job_folder(claim.id).join(format!("{}-{number}", claim.lease_number));
+        self.put_into(folder, result).await
+    }
+
+    async fn put_into(&self, folder: Path, result: Encoded) -> Result<String, JobsError> {
         if let Some(fields) = result.fields {
             self.blobs
                 .put(&folder.clone().join(FIELDS), PutPayload::from_bytes(fields))
@@ -124,6 +143,21 @@ impl Results {
     pub async fn solution(&self, folder: &str) -> Result<Bytes, JobsError> {
         let path = Path::from(folder).join(SOLUTION);
         Ok(self.blobs.get(&path).await?.bytes().await?)
+    }
+
+    /// Reads a whole stored result.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    pub async fn whole(&self, folder: &str) -> Result<Encoded, JobsError> {
+        let solution = self.solution(folder).await?;
+        let path = Path::from(folder).join(FIELDS);
+        let fields = match self.blobs.get(&path).await {
+            Ok(found) => Some(found.bytes().await?),
+            Err(object_store::Error::NotFound { .. }) => None,
+            Err(error) => return Err(error.into()),
+        };
+        Ok(Encoded { solution, fields })
     }
 
     /// Reads the cells of one patch, with the values of one motion or of all of them, and nothing else.
@@ -281,6 +315,7 @@ mod tests {
             traceparent: None,
             reuse_key: None,
             suspect: false,
+            slices: 0,
         }
     }
 

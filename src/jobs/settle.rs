@@ -10,7 +10,10 @@ use crate::jobs::attempt::{Attempt, Phase, Verdict, judge};
 use crate::jobs::error::JobsError;
 use crate::jobs::job::{Failure, FailureKind, State};
 use crate::jobs::results::Encoded;
-use crate::jobs::store::{Claim, Ending, Placed, Release};
+use crate::jobs::store::{Claim, Ending, NewSlice, Placed, Release, SliceNote};
+use crate::jobs::submit::microseconds;
+use crate::jobs::sweep::Sweep;
+use crate::jobs::watch::Reason;
 use crate::jobs::worker::{Step, Worker};
 
 impl Worker {
@@ -98,6 +101,31 @@ impl Worker {
                     long.push(claim);
                     continue;
                 }
+                Verdict::GoOn {
+                    sweep,
+                    part,
+                    stopped,
+                } => match self.keep_slice(attempt, place, sweep, part).await {
+                    Ok(Kept::Lost) => {
+                        step.lost.push(claim.id);
+                        attempt.done(&[claim.id]);
+                        continue;
+                    }
+                    Ok(Kept::There) => {
+                        match stopped {
+                            Some(Reason::TooLong) => long.push(claim),
+                            Some(_) => back.push(claim),
+                            None if self.makes_room(attempt).await => back.push(claim),
+                            None => attempt.members[place].phase = Phase::Solving,
+                        }
+                        continue;
+                    }
+                    Err(error) if error.trouble().is_some() => {
+                        back.push(claim);
+                        continue;
+                    }
+                    Err(error) => not_stored(&error),
+                },
                 Verdict::End(ending) => ending,
                 Verdict::Keep {
                     result,
@@ -123,8 +151,8 @@ impl Worker {
         back.extend(attempt.claims(|phase| matches!(phase, Phase::NotBegun)));
         self.release(attempt, &back, Release::NotBegun, step)
             .await?;
-        let cost_us = u64::try_from(attempt.spent.as_micros()).unwrap_or(u64::MAX);
-        self.release(attempt, &long, Release::Long { cost_us }, step)
+        let slice_us = u64::try_from(attempt.spent.as_micros()).unwrap_or(u64::MAX);
+        self.release(attempt, &long, Release::Long { slice_us }, step)
             .await?;
         self.settle_twins(attempt, step).await
     }
@@ -158,15 +186,68 @@ impl Worker {
                     result: Placed::Folder(key, _),
                     ..
                 } = ending
-                    && let Err(error) = shared.store.abandon_blob(key).await
                 {
-                    tracing::warn!(key, %error, "a result without a job is left until the next start");
+                    self.abandon_blob(key).await;
                 }
             }
         }
         let ids: Vec<_> = ends.iter().map(|(claim, _)| claim.id).collect();
         attempt.done(&ids);
+        if ends.iter().any(|(claim, _)| claim.slices > 0) {
+            shared.collect_blobs().await;
+        }
         Ok(())
+    }
+
+    /// Stores a solved slice of a member, which goes on from there.
+    async fn keep_slice(
+        &self,
+        attempt: &mut Attempt,
+        place: usize,
+        mut sweep: Box<Sweep>,
+        part: Option<(SliceNote, Encoded)>,
+    ) -> Result<Kept, JobsError> {
+        let shared = &self.shared;
+        let member = &mut attempt.members[place];
+        if let Some((note, part)) = part {
+            let claim = &member.claim;
+            let (number, done) = (note.number, sweep.done_after_next());
+            let result = match part.bytes() <= shared.options.small_result_max_bytes {
+                true => Placed::Table(part),
+                false => {
+                    let bytes = part.bytes() as u64;
+                    let put = || shared.results.put_slice(claim, number, part.clone());
+                    Placed::Folder(shared.write_patiently(put).await?, bytes)
+                }
+            };
+            let slice = NewSlice {
+                rest_us: u64::from(microseconds(sweep.problem.cost().seconds * (1.0 - done))),
+                note,
+                result,
+                done,
+            };
+            let added = shared
+                .write_patiently(|| shared.store.add_slice(claim, &slice))
+                .await?;
+            if !added {
+                if let Placed::Folder(key, _) = &slice.result {
+                    self.abandon_blob(key).await;
+                }
+                return Ok(Kept::Lost);
+            }
+            tracing::debug!(job = %claim.id, number, done, "slice stored");
+            sweep.advance(slice.note.spent);
+            member.claim.slices = number + 1;
+        }
+        member.sweep = Some(sweep);
+        Ok(Kept::There)
+    }
+
+    /// Leaves a result that no job refers to, to be removed.
+    async fn abandon_blob(&self, key: &str) {
+        if let Err(error) = self.shared.store.abandon_blob(key).await {
+            tracing::warn!(key, %error, "a result without a job is left until the next start");
+        }
     }
 
     /// Members that waited for an equal one get its answer, or go back if it will not come.
@@ -236,6 +317,14 @@ impl Worker {
         shared.wake.notify_one();
         Ok(())
     }
+}
+
+/// What became of a slice that was to be stored.
+enum Kept {
+    /// It is stored.
+    There,
+    /// The lease is gone.
+    Lost,
 }
 
 /// The end of a job whose result could not be stored.

@@ -11,12 +11,14 @@ use bytes::Bytes;
 use crate::contact::error::{CaseError, SolveError};
 use crate::contact::monitor::Monitor;
 use crate::contact::remark::RemarkEntry;
+use crate::contact::solution::{Fields, Solution};
 use crate::jobs::Shared;
 use crate::jobs::error::JobsError;
 use crate::jobs::fields;
 use crate::jobs::job::{Failure, FailureKind};
 use crate::jobs::results::Encoded;
-use crate::jobs::store::StoredCase;
+use crate::jobs::store::{SliceNote, StoredCase};
+use crate::jobs::sweep::{Sweep, join};
 use crate::jobs::watch::Watch;
 
 /// Tasks from this length on leave enough free memory behind to be worth a look at the whole heap.
@@ -33,6 +35,11 @@ pub(super) enum Outcome {
         remarks: Vec<RemarkEntry>,
         field_patches: u32,
     },
+    /// The next slice of a sweep, in its stored form, if one was solved; there is more to be done.
+    Slice {
+        sweep: Box<Sweep>,
+        part: Option<(SliceNote, Encoded)>,
+    },
     /// The solver gave up or was stopped.
     Unsolved(SolveError),
     /// The case no longer passes its checks.
@@ -41,6 +48,17 @@ pub(super) enum Outcome {
     Broken(Failure),
     /// The solver did not listen and was left behind.
     Abandoned,
+}
+
+/// What is to be done for a job.
+#[derive(Debug)]
+pub(super) enum Work {
+    /// Check the case, of which this is stored, and solve what comes next.
+    New(StoredCase, Vec<SliceNote>),
+    /// Solve the next slice.
+    Next(Box<Sweep>),
+    /// All slices are solved: put the parts of the answer together.
+    Join(Box<Sweep>, Vec<Encoded>),
 }
 
 /// What clients are told of a failure of the service itself.
@@ -122,9 +140,14 @@ impl Shared {
     }
 }
 
-/// Solves a case; a panic becomes a failure and the thread stays usable.
-pub(super) fn solve_guarded(shared: &Shared, watch: &Watch, stored: &StoredCase) -> Outcome {
-    catch_unwind(AssertUnwindSafe(|| solve_case(shared, watch, stored))).unwrap_or_else(|payload| {
+/// Does the work; a panic becomes a failure and the thread stays usable.
+pub(super) fn solve_guarded(shared: &Shared, watch: &Watch, work: Work) -> Outcome {
+    let done = catch_unwind(AssertUnwindSafe(|| match work {
+        Work::New(stored, notes) => check_and_solve(shared, watch, &stored, &notes),
+        Work::Next(sweep) => solve_next(shared, watch, sweep),
+        Work::Join(sweep, parts) => join_parts(shared, watch, sweep, &parts),
+    }));
+    done.unwrap_or_else(|payload| {
         // What a defect says of the program is for the log, not for clients.
         tracing::error!(reason = panic_text(payload.as_ref()), "the solver panicked");
         let detail = "the solver stopped on a defect of its own; the service's log has the reason";
@@ -132,14 +155,20 @@ pub(super) fn solve_guarded(shared: &Shared, watch: &Watch, stored: &StoredCase)
     })
 }
 
-fn solve_case(shared: &Shared, watch: &Watch, stored: &StoredCase) -> Outcome {
-    let internal = |reason: String| {
-        tracing::error!(reason, "a job fails inside the service");
-        Outcome::Broken(Failure::new(FailureKind::Internal, INTERNAL))
-    };
+fn internal(reason: &str) -> Outcome {
+    tracing::error!(reason, "a job fails inside the service");
+    Outcome::Broken(Failure::new(FailureKind::Internal, INTERNAL))
+}
+
+fn check_and_solve(
+    shared: &Shared,
+    watch: &Watch,
+    stored: &StoredCase,
+    notes: &[SliceNote],
+) -> Outcome {
     let case = match stored.value() {
         Ok(case) => case,
-        Err(error) => return internal(error.to_string()),
+        Err(error) => return internal(&error.to_string()),
     };
     let mut problem = match (shared.recipe.check)(&case, &shared.options.limits) {
         Ok(problem) => problem,
@@ -148,30 +177,84 @@ fn solve_case(shared: &Shared, watch: &Watch, stored: &StoredCase) -> Outcome {
     let limit = shared.options.time_limit;
     problem.time_limit = Some(problem.time_limit.map_or(limit, |time| time.min(limit)));
     watch.set_memory_bytes(problem.cost().bytes);
-    watch.begin();
-    let (solution, fields) = match (shared.recipe.solve)(&problem, watch) {
+    let slices = (shared.recipe.slices)(&problem);
+    solve_next(shared, watch, Box::new(Sweep::new(problem, slices, notes)))
+}
+
+fn solve_next(shared: &Shared, watch: &Watch, sweep: Box<Sweep>) -> Outcome {
+    let Some(slice) = sweep.next() else {
+        return Outcome::Slice { sweep, part: None };
+    };
+    watch.begin(sweep.spent);
+    let solved = (shared.recipe.solve)(&sweep.problem, slice, watch);
+    let spent = watch.pause();
+    let (solution, fields) = match solved {
         Ok(answer) => answer,
         Err(error) => return Outcome::Unsolved(error),
     };
-    let seconds = watch.elapsed().as_secs_f64();
-    shared.metrics.solved(problem.method, &solution, seconds);
-    let field_patches = u32::try_from(fields.patches.len()).unwrap_or(u32::MAX);
-    let packed = match field_patches {
-        0 => Ok(None),
-        _ => fields::encode(&fields).map(|bytes| Some(Bytes::from(bytes))),
-    };
-    match (serde_json::to_vec(&solution), packed) {
-        (Ok(json), Ok(fields)) => Outcome::Solved {
-            result: Encoded {
-                solution: Bytes::from(json),
-                fields,
-            },
-            remarks: solution.remarks,
-            field_patches,
-        },
-        (Err(error), _) => internal(format!("the solution cannot be written as JSON: {error}")),
-        (_, Err(error)) => internal(format!("the fields cannot be packed: {error}")),
+    if sweep.is_one() {
+        return whole(shared, &sweep, spent, solution, &fields);
     }
+    match encoded(&solution, &fields) {
+        Ok(part) => Outcome::Slice {
+            part: Some((sweep.note(spent), part)),
+            sweep,
+        },
+        Err(reason) => internal(&reason),
+    }
+}
+
+fn join_parts(shared: &Shared, watch: &Watch, mut sweep: Box<Sweep>, parts: &[Encoded]) -> Outcome {
+    let joined = match sweep.is_whole(parts.len()) {
+        true => join(parts, || watch.tick(1.0).is_continue()),
+        false => Err(JobsError::Damaged(
+            "slices of a sweep are missing".to_owned(),
+        )),
+    };
+    match joined {
+        Ok(Some((solution, fields))) => whole(shared, &sweep, sweep.spent, solution, &fields),
+        Ok(None) => Outcome::Unsolved(SolveError::Cancelled),
+        Err(error) => {
+            tracing::error!(%error, "the slices of a sweep cannot be used; it is solved again");
+            sweep.begin_again();
+            Outcome::Slice { sweep, part: None }
+        }
+    }
+}
+
+/// The outcome of a case that is solved whole.
+fn whole(
+    shared: &Shared,
+    sweep: &Sweep,
+    spent: Duration,
+    solution: Solution,
+    fields: &Fields,
+) -> Outcome {
+    let seconds = spent.as_secs_f64();
+    let method = sweep.problem.method;
+    shared.metrics.solved(method, &solution, seconds);
+    match encoded(&solution, fields) {
+        Ok(result) => Outcome::Solved {
+            result,
+            field_patches: u32::try_from(fields.patches.len()).unwrap_or(u32::MAX),
+            remarks: solution.remarks,
+        },
+        Err(reason) => internal(&reason),
+    }
+}
+
+/// An answer, or a part of one, in its stored form.
+fn encoded(solution: &Solution, fields: &Fields) -> Result<Encoded, String> {
+    let packed = match fields.patches.len() {
+        0 => None,
+        _ => Some(fields::encode(fields).map_err(|e| format!("the fields cannot be packed: {e}"))?),
+    };
+    let json = serde_json::to_vec(solution)
+        .map_err(|error| format!("the solution cannot be written as JSON: {error}"))?;
+    Ok(Encoded {
+        solution: Bytes::from(json),
+        fields: packed.map(Bytes::from),
+    })
 }
 
 fn panic_text(payload: &(dyn Any + Send)) -> &str {

@@ -20,6 +20,7 @@ pub(super) struct Card {
     pub(super) method: String,
     pub(super) outputs: String,
     pub(super) cost_us: u32,
+    pub(super) slice_us: u32,
     pub(super) digest: String,
 }
 
@@ -105,6 +106,7 @@ mod tests {
             method: "auto".to_owned(),
             outputs: "[]".to_owned(),
             cost_us: 7,
+            slice_us: 7,
             digest: "d".to_owned(),
         };
         for index in 0..5 {

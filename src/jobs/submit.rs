@@ -92,7 +92,8 @@ impl Jobs {
             }
         }
         let problem = problem?;
-        let (outputs, cost_us) = (problem.outputs.clone(), cost_us(&problem));
+        let (cost_us, slice_us) = (cost_us(&problem), self.slice_us(&problem));
+        let outputs = problem.outputs.clone();
         let id = Uuid::now_v7();
         let mut new = NewJob {
             id,
@@ -103,6 +104,7 @@ impl Jobs {
             method: problem.method.name().to_owned(),
             outputs: outputs_text(&outputs),
             cost_us,
+            slice_us,
             reuse_key: self.reuse_key(&problem.digest),
             source: None,
             body: Bytes::from(body.map_err(|error| JobsError::Damaged(error.to_string()))?),
@@ -124,6 +126,14 @@ impl Jobs {
         self.shared.wake.notify_one();
         tracing::info!(job = %job.id, method = new.method, "job queued");
         Ok((job, replayed))
+    }
+
+    /// Expected solve time of the longest slice of a case in µs.
+    pub(super) fn slice_us(&self, problem: &Problem) -> u32 {
+        let slices = (self.shared.recipe.slices)(problem);
+        let longest = slices.iter().map(ExactSizeIterator::len).max().unwrap_or(1);
+        let part = longest as f64 / problem.motions.len().max(1) as f64;
+        microseconds(problem.cost().seconds * part)
     }
 
     /// The bounds of the queue.
@@ -165,7 +175,12 @@ pub(super) fn outputs_text(outputs: &[Output]) -> String {
 
 /// Expected solve time in µs.
 pub(super) fn cost_us(problem: &Problem) -> u32 {
-    let microseconds = (problem.cost().seconds * 1e6).clamp(1.0, f64::from(i32::MAX));
+    microseconds(problem.cost().seconds)
+}
+
+/// A time in s as µs, at least 1.
+pub(super) fn microseconds(seconds: f64) -> u32 {
+    let microseconds = (seconds * 1e6).clamp(1.0, f64::from(i32::MAX));
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,

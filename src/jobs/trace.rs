@@ -151,15 +151,21 @@ pub(super) struct Traced {
 
 impl Traced {
     /// Solves a case and writes down how long it had waited and how long it took.
-    pub(super) fn solving(traced: Option<&Traced>, solve: impl FnOnce() -> Outcome) -> Outcome {
+    pub(super) fn solving(
+        traced: Option<&Traced>,
+        comes_from_queue: bool,
+        solve: impl FnOnce() -> Outcome,
+    ) -> Outcome {
         let Some(traced) = traced else {
             return solve();
         };
         let from = SystemTime::now();
-        traced.waited_until(from);
+        if comes_from_queue {
+            traced.waited_until(from);
+        }
         let outcome = solve();
         let fault = match &outcome {
-            Outcome::Solved { .. } => None,
+            Outcome::Solved { .. } | Outcome::Slice { .. } => None,
             Outcome::Unsolved(error) => Some(error.to_string()),
             Outcome::Refused(error) => Some(error.to_string()),
             Outcome::Broken(failure) => Some(failure.detail.clone()),

@@ -28,8 +28,10 @@ struct Used {
     /// As of `at`.
     seconds: f64,
     at: Instant,
-    /// Seconds that the queue of the tenant has had since one of its long solves had a turn.
+    /// Seconds that new jobs of the tenant have had since one of its long solves had a turn.
     queue_since: f64,
+    /// That was one that had waited at its gate.
+    parked_was_last: bool,
 }
 
 impl Used {
@@ -42,10 +44,21 @@ impl Used {
 /// What a worker spent its time on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Spent {
-    /// Jobs that came from the queue.
-    OnQueue,
+    /// Jobs that came from the queue for the first time.
+    New,
+    /// A sweep that had been in the queue between two of its slices.
+    Begun,
     /// A solve that had waited at its gate.
-    OnParked,
+    Parked,
+}
+
+/// One of the two kinds of long solves that wait.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Long {
+    /// At its gate, with all that it has in memory.
+    Parked,
+    /// In the queue, between two slices.
+    Begun,
 }
 
 impl Turns {
@@ -57,12 +70,16 @@ impl Turns {
             seconds: 0.0,
             at: now,
             queue_since: 0.0,
+            parked_was_last: false,
         });
         used.seconds = used.now() + time.as_secs_f64();
         used.at = now;
         match spent {
-            Spent::OnQueue => used.queue_since += time.as_secs_f64(),
-            Spent::OnParked => used.queue_since = 0.0,
+            Spent::New => used.queue_since += time.as_secs_f64(),
+            Spent::Parked | Spent::Begun => {
+                used.queue_since = 0.0;
+                used.parked_was_last = spent == Spent::Parked;
+            }
         }
         inner.used.retain(|_, used| used.now() > FORGOTTEN);
     }
@@ -85,6 +102,19 @@ impl Turns {
         let inner = self.lock();
         let used = inner.used.get(tenant);
         used.is_some_and(|used| used.queue_since >= slice.as_secs_f64())
+    }
+
+    /// The kinds of long solves of this tenant in the order of their turns: they take turns too.
+    pub(super) fn long_ones(&self, tenant: &str) -> [Long; 2] {
+        let inner = self.lock();
+        match inner
+            .used
+            .get(tenant)
+            .is_some_and(|used| used.parked_was_last)
+        {
+            true => [Long::Begun, Long::Parked],
+            false => [Long::Parked, Long::Begun],
+        }
     }
 
     /// An attempt waits at its gate from now on.
@@ -139,12 +169,12 @@ mod tests {
         let turns = Turns::default();
         let tenants: Vec<Arc<str>> = ["a", "b", "c"].map(Arc::from).to_vec();
         assert_eq!(names(&turns.order(tenants.clone())), ["a", "b", "c"]);
-        turns.charge(&tenants[0], Duration::from_secs(100), Spent::OnQueue);
-        turns.charge(&tenants[1], Duration::from_secs(1), Spent::OnQueue);
+        turns.charge(&tenants[0], Duration::from_secs(100), Spent::New);
+        turns.charge(&tenants[1], Duration::from_secs(1), Spent::New);
         assert_eq!(names(&turns.order(tenants.clone())), ["c", "b", "a"]);
         // Many short jobs weigh what they take, not how many they are.
         for _ in 0..1000 {
-            turns.charge(&tenants[2], Duration::from_micros(10), Spent::OnQueue);
+            turns.charge(&tenants[2], Duration::from_micros(10), Spent::New);
         }
         assert_eq!(names(&turns.order(tenants)), ["c", "b", "a"]);
     }
@@ -154,9 +184,13 @@ mod tests {
         let turns = Turns::default();
         let (tenant, slice): (Arc<str>, _) = ("a".into(), Duration::from_secs(2));
         assert!(!turns.queue_had_its_share("a", slice));
-        turns.charge(&tenant, slice, Spent::OnQueue);
+        turns.charge(&tenant, slice, Spent::New);
         assert!(turns.queue_had_its_share("a", slice));
-        turns.charge(&tenant, slice, Spent::OnParked);
+        turns.charge(&tenant, slice, Spent::Parked);
         assert!(!turns.queue_had_its_share("a", slice));
+        // So do those at a gate and those in the queue.
+        assert_eq!(turns.long_ones("a"), [Long::Begun, Long::Parked]);
+        turns.charge(&tenant, slice, Spent::Begun);
+        assert_eq!(turns.long_ones("a"), [Long::Parked, Long::Begun]);
     }
 }

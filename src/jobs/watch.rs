@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::contact::monitor::{Monitor, Stop};
@@ -30,10 +30,19 @@ pub struct Watch {
     reason: AtomicU8,
     ticks: AtomicU64,
     progress: AtomicU64,
-    begun: OnceLock<Instant>,
+    clock: Mutex<Clock>,
     taken_up: AtomicBool,
     memory_bytes: AtomicU64,
     gate: Arc<Gate>,
+}
+
+/// How long a solve has taken.
+#[derive(Debug, Default)]
+struct Clock {
+    /// Before it last went on.
+    spent: Duration,
+    /// Since when it goes on, and how long it had waited at the gate by then.
+    since: Option<(Instant, Duration)>,
 }
 
 impl Watch {
@@ -49,6 +58,11 @@ impl Watch {
     /// The solver's thread has come to this job.
     pub fn take_up(&self) {
         self.taken_up.store(true, Ordering::Release);
+    }
+
+    /// The solver's thread has not come to this job, or has yet to come again.
+    pub fn set_aside(&self) {
+        self.taken_up.store(false, Ordering::Release);
     }
 
     /// Has the solver's thread come to this job?
@@ -68,10 +82,28 @@ impl Watch {
         self.memory_bytes.load(Ordering::Acquire)
     }
 
-    /// Starts the clock of the solve, against which `contact` holds the time limit of the case. Only the first call
-    /// counts.
-    pub fn begin(&self) {
-        self.begun.get_or_init(Instant::now);
+    /// Starts the clock of the solve, against which `contact` holds the time limit of the case, at the time that was spent
+    /// before. It goes on until [`Watch::pause`]; a clock that goes is left alone.
+    pub fn begin(&self, spent: Duration) {
+        let waited = self.gate.waited();
+        let mut clock = self.clock();
+        if clock.since.is_none() {
+            *clock = Clock {
+                spent,
+                since: Some((Instant::now(), waited)),
+            };
+        }
+    }
+
+    /// Stops the clock and returns the time spent in all.
+    pub fn pause(&self) -> Duration {
+        let spent = self.elapsed();
+        *self.clock() = Clock { spent, since: None };
+        spent
+    }
+
+    fn clock(&self) -> MutexGuard<'_, Clock> {
+        self.clock.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Tells the solver to stop at its next tick.
@@ -124,9 +156,13 @@ impl Monitor for Watch {
     }
 
     fn elapsed(&self) -> Duration {
-        let since = self.begun.get().map_or(Duration::ZERO, Instant::elapsed);
-        // Time at the gate belongs to others.
-        since.saturating_sub(self.gate.waited())
+        let waited = self.gate.waited();
+        let clock = self.clock();
+        let since = clock.since.map_or(Duration::ZERO, |(since, before)| {
+            // Time at the gate belongs to others.
+            since.elapsed().saturating_sub(waited - before)
+        });
+        clock.spent + since
     }
 }
 
@@ -146,13 +182,19 @@ mod tests {
     }
 
     #[test]
-    fn the_clock_starts_once_and_with_the_solve() {
+    fn the_clock_counts_the_solve_and_what_was_spent_before() {
         let watch = Watch::default();
         assert_eq!(watch.elapsed(), Duration::ZERO);
-        watch.begin();
+        let before = Duration::from_secs(100);
+        watch.begin(before);
         let first = watch.elapsed();
-        watch.begin();
-        assert!(watch.elapsed() >= first);
+        watch.begin(Duration::ZERO);
+        assert!(first >= before && watch.elapsed() >= first);
+        let spent = watch.pause();
+        std::thread::sleep(Duration::from_millis(2));
+        assert_eq!(watch.elapsed(), spent, "nothing is solved meanwhile");
+        watch.begin(spent);
+        assert!(watch.elapsed() >= spent);
     }
 
     #[test]

@@ -16,9 +16,11 @@ use crate::jobs::Shared;
 use crate::jobs::attempt::{Attempt, Phase};
 use crate::jobs::error::JobsError;
 use crate::jobs::job::State;
-use crate::jobs::solver_thread::SolverThread;
-use crate::jobs::store::{Claim, ClaimRequest, Release};
-use crate::jobs::turns::Spent;
+use crate::jobs::results::Encoded;
+use crate::jobs::solver_thread::{SolverThread, Work};
+use crate::jobs::store::{Claim, ClaimRequest, Placed, Release, Which};
+use crate::jobs::sweep::Sweep;
+use crate::jobs::turns::{Long, Spent};
 use crate::jobs::watch::Reason;
 
 /// How often an idle worker looks for jobs although nobody woke it.
@@ -107,7 +109,7 @@ impl Worker {
             Ok(Turn::Held) => {
                 let held = attempt.claims(|phase| matches!(phase, Phase::Solving));
                 step.parked = held.iter().map(|claim| claim.id).collect();
-                attempt.resumed = true;
+                attempt.on = Spent::Parked;
                 self.shared.turns.park(attempt);
                 self.shared.wake.notify_one();
             }
@@ -133,22 +135,43 @@ impl Worker {
         let tenants = shared.store.queued_tenants().await?;
         let slice = shared.options.slice;
         for tenant in turns.order(tenants) {
-            let parked_first = turns.queue_had_its_share(&tenant, slice);
-            if parked_first && let Some(attempt) = turns.resume(&tenant) {
+            let long_first = turns.queue_had_its_share(&tenant, slice);
+            if long_first && let Some(attempt) = self.next_long(&tenant).await? {
                 return Ok(Some(attempt));
             }
-            let claims = self.claim(&tenant).await?;
+            let claims = self.claim(&tenant, Which::New).await?;
             if !claims.is_empty() {
                 return Ok(Some(Attempt::new(shared, tenant, claims)));
             }
-            if let Some(attempt) = turns.resume(&tenant) {
+            if let Some(attempt) = self.next_long(&tenant).await? {
                 return Ok(Some(attempt));
             }
         }
         Ok(None)
     }
 
-    async fn claim(&self, tenant: &str) -> Result<Vec<Claim>, JobsError> {
+    /// A solve of a tenant that waits for its next turn, at its gate or in the queue.
+    async fn next_long(&self, tenant: &Arc<str>) -> Result<Option<Attempt>, JobsError> {
+        let shared = &self.shared;
+        for long in shared.turns.long_ones(tenant) {
+            match long {
+                Long::Parked => {
+                    if let Some(attempt) = shared.turns.resume(tenant) {
+                        return Ok(Some(attempt));
+                    }
+                }
+                Long::Begun => {
+                    let claims = self.claim(tenant, Which::Begun).await?;
+                    if !claims.is_empty() {
+                        return Ok(Some(Attempt::new(shared, tenant.clone(), claims)));
+                    }
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    async fn claim(&self, tenant: &str, which: Which) -> Result<Vec<Claim>, JobsError> {
         let shared = &self.shared;
         let options = &shared.options;
         let full = shared.turns.parked().0 >= options.parked_max;
@@ -157,10 +180,11 @@ impl Worker {
         let request = ClaimRequest {
             worker: &self.name,
             tenant,
+            which,
             jobs: options.group_max.max(1),
             cost_us: GROUP_COST_US,
-            // With no gate free, only what should be done within a slice.
-            each_cost_us: full.then_some(slice_us),
+            // With no gate free, only what should be done, or come to its next cut, within a slice.
+            each_slice_us: full.then_some(slice_us),
             workers: options.workers,
             lease_until: shared.lease_until(),
             now: shared.now_ms(),
@@ -180,12 +204,19 @@ impl Worker {
             self.answer_known(attempt, step).await?;
             attempt.set_aside_twins();
         }
-        let turn = self.solve(attempt).await?;
-        attempt.close();
-        if matches!(turn, Turn::Over) {
-            self.thread = attempt.take_thread().or(self.thread.take());
-        }
-        self.record(attempt, step).await?;
+        attempt.turn_began = start;
+        // A sweep comes back with every slice.
+        let turn = loop {
+            let turn = self.solve(attempt).await?;
+            attempt.close();
+            if matches!(turn, Turn::Over) {
+                self.thread = attempt.take_thread().or(self.thread.take());
+            }
+            self.record(attempt, step).await?;
+            if matches!(turn, Turn::Held) || attempt.to_solve().is_empty() {
+                break turn;
+            }
+        };
         let seconds = start.elapsed().as_secs_f64();
         let worker = &self.name;
         match (attempt.members.as_slice(), &turn) {
@@ -242,21 +273,28 @@ impl Worker {
 
     async fn begin(&mut self, attempt: &mut Attempt) -> Result<(), JobsError> {
         let places = attempt.to_solve();
-        let ids: Vec<_> = places
-            .iter()
-            .map(|place| attempt.members[*place].claim.id)
-            .collect();
+        let members = places.iter().map(|place| &attempt.members[*place]);
+        let new = members.filter(|member| member.sweep.is_none());
+        let ids: Vec<_> = new.map(|member| member.claim.id).collect();
         // Read after registering: a cancellation is either seen here or finds the watch.
         let mut cases = self.shared.store.cases(&ids).await?;
         let mut work = Vec::with_capacity(places.len());
         for place in places {
             let member = &mut attempt.members[place];
+            if let Some(sweep) = member.sweep.take() {
+                work.push((place, self.next_of(member.claim.id, sweep).await?));
+                continue;
+            }
             match cases.remove(&member.claim.id) {
                 Some((case, cancel_requested)) => {
                     if cancel_requested {
                         member.watch.stop(Reason::Cancel);
                     }
-                    work.push((place, case));
+                    let notes = match member.claim.slices {
+                        0 => Vec::new(),
+                        _ => self.shared.store.slice_notes(member.claim.id).await?,
+                    };
+                    work.push((place, Work::New(case, notes)));
                 }
                 None => member.phase = Phase::Done,
             }
@@ -269,15 +307,42 @@ impl Worker {
         Ok(())
     }
 
+    /// What is to be done next for a sweep.
+    async fn next_of(&self, id: Uuid, mut sweep: Box<Sweep>) -> Result<Work, JobsError> {
+        if sweep.next().is_some() {
+            return Ok(Work::Next(sweep));
+        }
+        match self.parts(id).await {
+            Ok(parts) => Ok(Work::Join(sweep, parts)),
+            Err(error) if error.trouble().is_some() => Err(error),
+            Err(error) => {
+                tracing::error!(job = %id, %error, "slices cannot be read; the sweep is solved again");
+                sweep.begin_again();
+                Ok(Work::Next(sweep))
+            }
+        }
+    }
+
+    /// The stored parts of the answer of a sweep.
+    async fn parts(&self, id: Uuid) -> Result<Vec<Encoded>, JobsError> {
+        let shared = &self.shared;
+        let placed = shared.store.slice_results(id).await?;
+        let mut parts = Vec::with_capacity(placed.len());
+        for part in placed {
+            parts.push(match part {
+                Placed::Table(part) => part,
+                Placed::Folder(key, _) => shared.results.whole(&key).await?,
+            });
+        }
+        Ok(parts)
+    }
+
     /// Waits until the solver is done or held, and sees to it that one of them comes.
     async fn until_over(&self, attempt: &mut Attempt) -> Turn {
         let shared = &self.shared;
-        let spent = if attempt.resumed {
-            Spent::OnParked
-        } else {
-            Spent::OnQueue
-        };
+        let spent = attempt.on;
         let (start, mut charged) = (Instant::now(), Instant::now());
+        let turn_began = attempt.turn_began;
         let slice = shared.options.slice;
         let mut look = interval(LOOK_ROUND.min(slice.max(Duration::from_millis(1))));
         look.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -306,7 +371,7 @@ impl Worker {
                         attempt.abandon(shared);
                         break Turn::Over;
                     }
-                    if told.is_none() && !closed && start.elapsed() >= slice
+                    if told.is_none() && !closed && turn_began.elapsed() >= slice
                         && (attempt.has_more_to_begin() || self.somebody_waits().await) {
                         closed = self.hold(attempt);
                     }
@@ -318,6 +383,13 @@ impl Worker {
             .charge(&attempt.tenant, charged.elapsed(), spent);
         attempt.spent += start.elapsed();
         turn
+    }
+
+    /// Shall a sweep that is at a cut go back to the queue? It has had a good part of a slice by then, so that the next is
+    /// hardly ever interrupted within one of its own.
+    pub(super) async fn makes_room(&self, attempt: &Attempt) -> bool {
+        let slice = self.shared.options.slice;
+        attempt.turn_began.elapsed() >= slice / 2 && self.somebody_waits().await
     }
 
     /// Closes the gate, if there is room for one more solver that waits; a job that came although there was none, because

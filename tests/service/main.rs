@@ -43,6 +43,7 @@ mod store;
 mod store_lists;
 mod store_model;
 mod support;
+mod sweeps;
 mod traces;
 mod turns;
 mod under_load;

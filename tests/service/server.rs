@@ -3,7 +3,6 @@
 use std::io::Read;
 use std::net::SocketAddr;
 use std::path::Path;
-use std::sync::Arc;
 
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Monitor;
@@ -70,7 +69,7 @@ impl Setup {
         + Sync
         + 'static,
     ) -> Setup {
-        self.recipe.solve = Arc::new(solve);
+        self.recipe = self.recipe.solving(solve);
         self
     }
 

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use railhead::contact::problem::Limits;
 use reqwest::Method;
 use serde_json::{Value, json};
 use sqlx::Connection;
@@ -11,6 +12,7 @@ use tempfile::TempDir;
 use crate::errors::assert_problem;
 use crate::server::Answer;
 use crate::support::{Service, case, long_case, pause, railhead, skip};
+use crate::sweeps::sliced_case;
 
 /// A small file system of its own, unmounted when dropped.
 struct Disk {
@@ -144,6 +146,43 @@ async fn a_full_disk_refuses_what_comes_and_loses_nothing_it_has() {
     let list = service.get("/v1/jobs?limit=1000").await;
     let known = list["jobs"].as_array().unwrap().len();
     assert_eq!(known, accepted.len() + 1, "no more than were acknowledged");
+}
+
+#[tokio::test]
+async fn a_full_disk_costs_a_sweep_no_slice() {
+    let Some(disk) = Disk::mount("size=16m") else {
+        skip("this process may not mount a file system");
+        return;
+    };
+    let flags = [
+        "--cache",
+        "false",
+        "--workers",
+        "1",
+        "--log",
+        "info,railhead::jobs=debug",
+    ];
+    let service = Service::start(&disk.data_dir(), &flags);
+    let question = sliced_case("long", 150);
+    let problem = railhead::contact::check(&question, &Limits::default()).unwrap();
+    let slices = railhead::contact::slices::slices(&problem).len();
+    let id = service.submit(&question).await;
+    while service.logged("slice stored") < 1 {
+        pause().await;
+    }
+    let ballast = disk.fill();
+    while service.logged("could not be written yet") < 2 {
+        pause().await;
+    }
+    let stored = service.logged("slice stored");
+    assert!(stored < slices, "{stored} of {slices}");
+    std::fs::remove_file(ballast).unwrap();
+    all_succeed(&service, &[id]).await;
+    assert_eq!(
+        service.logged("slice stored"),
+        slices,
+        "each was solved once"
+    );
 }
 
 #[tokio::test]

@@ -8,6 +8,7 @@ use railhead::jobs::store::list::Filter;
 use railhead::jobs::store::sqlite::SqliteStore;
 use railhead::jobs::store::{
     Claim, ClaimRequest, Deleted, Ending, Enqueued, NewJob, Placed, QueueBounds, Release, Renewal,
+    Which,
 };
 use railhead::jobs::wishes::Wishes;
 use railhead::jobs::{Failure, FailureKind, Job, State};
@@ -40,6 +41,14 @@ impl Table {
     /// Claims one job of any tenant.
     pub async fn claim(&self, now: i64) -> Option<Claim> {
         claim_up_to(&self.store, now, LEASE, 1).await.pop()
+    }
+
+    /// The file, for what no store would do.
+    pub async fn other_writer(&self) -> sqlx::SqlitePool {
+        let file = self.folder.path().join("jobs.db");
+        sqlx::SqlitePool::connect(&format!("sqlite:{}", file.display()))
+            .await
+            .unwrap()
     }
 
     /// Extends one lease.
@@ -84,7 +93,8 @@ pub async fn claim_up_to(store: &SqliteStore, now: i64, lease_ms: i64, jobs: usi
             tenant,
             jobs,
             cost_us: 1_000_000,
-            each_cost_us: None,
+            which: Which::New,
+            each_slice_us: None,
             workers: 1,
             lease_until: now + lease_ms,
             now,
@@ -97,6 +107,24 @@ pub async fn claim_up_to(store: &SqliteStore, now: i64, lease_ms: i64, jobs: usi
         }
     }
     Vec::new()
+}
+
+/// Claims a job of which some slices are solved.
+pub async fn claim_begun(store: &SqliteStore, now: i64) -> Option<Claim> {
+    let request = ClaimRequest {
+        worker: "w",
+        tenant: "anonymous",
+        which: Which::Begun,
+        jobs: 1,
+        cost_us: 1_000_000,
+        each_slice_us: None,
+        workers: 1,
+        lease_until: now + LEASE,
+        now,
+        late_before: now,
+        skip: &HashSet::new(),
+    };
+    store.claim(&request).await.unwrap().pop()
 }
 
 /// Ends one job; `None` if its lease was lost.
@@ -127,6 +155,7 @@ pub fn new_job() -> NewJob {
         row: false,
         outputs: "[]".to_owned(),
         cost_us: 1000,
+        slice_us: 1000,
         reuse_key: None,
         source: None,
         idempotency: None,

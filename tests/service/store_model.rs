@@ -104,6 +104,7 @@ impl Pair {
             row: false,
             outputs: "[]".to_owned(),
             cost_us: 1000,
+            slice_us: 1000,
             reuse_key: None,
             source: None,
             idempotency: None,

@@ -45,10 +45,7 @@ pub async fn open<F>(options: Options, solve: F) -> Jobs
 where
     F: Fn(&Problem, &dyn Monitor) -> Result<(Solution, Fields), SolveError> + Send + Sync + 'static,
 {
-    let recipe = Recipe {
-        solve: Arc::new(solve),
-        ..Recipe::contact()
-    };
+    let recipe = Recipe::contact().solving(solve);
     let options = Options {
         cache: false,
         ..options

@@ -7,7 +7,7 @@ use std::time::Duration;
 use railhead::contact::monitor::Monitor;
 use railhead::contact::problem::Problem;
 use railhead::contact::solve;
-use railhead::jobs::store::{QueueBounds, Release};
+use railhead::jobs::store::{QueueBounds, Release, Which};
 use railhead::jobs::{Jobs, Options, State};
 use serde_json::json;
 
@@ -233,17 +233,20 @@ async fn a_job_that_was_longer_than_thought_is_known_as_long() {
     let store = &table.store;
     let id = table.add(new_job()).await.id;
     let claims = claim_up_to(store, 0, 1000, 1).await;
-    let long = Release::Long { cost_us: 5_000_000 };
+    let long = Release::Long {
+        slice_us: 5_000_000,
+    };
     assert_eq!(
         store.release(&claims, long, 1).await.unwrap(),
         [(id, State::Queued)]
     );
-    let request = |each_cost_us| railhead::jobs::store::ClaimRequest {
+    let request = |each_slice_us| railhead::jobs::store::ClaimRequest {
         worker: "w",
         tenant: "anonymous",
         jobs: 8,
         cost_us: 200_000,
-        each_cost_us,
+        which: Which::New,
+        each_slice_us,
         workers: 1,
         lease_until: 1000,
         now: 2,

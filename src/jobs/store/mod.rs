@@ -9,6 +9,7 @@ pub mod sqlite;
 
 use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
+use std::time::Duration;
 
 use bytes::Bytes;
 use uuid::Uuid;
@@ -44,6 +45,8 @@ pub struct NewJob {
     pub outputs: String,
     /// Expected solve time in µs; small jobs are claimed in groups.
     pub cost_us: u32,
+    /// That of its longest slice.
+    pub slice_us: u32,
     /// What tells later identical cases that this job's result is theirs too.
     pub reuse_key: Option<ReuseKey>,
     /// A succeeded job whose result this one gets, instead of being queued, and the time at which it ends so.
@@ -164,6 +167,43 @@ pub struct Claim {
     pub reuse_key: Option<ReuseKey>,
     /// It ran together with others when their process died, and comes alone.
     pub suspect: bool,
+    /// Slices that are solved and stored.
+    pub slices: u32,
+}
+
+/// What is known of a stored slice of a sweep.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SliceNote {
+    /// Place among the slices of the case, from 0.
+    pub number: u32,
+    /// Motions of the case up to its end.
+    pub motions: u32,
+    /// Digest of the case as the solver that solved it knew it; of another digest it is of no use.
+    pub digest: String,
+    /// Solver time of the job up to its end.
+    pub spent: Duration,
+}
+
+/// A solved slice about to be stored.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NewSlice {
+    /// What is known of it.
+    pub note: SliceNote,
+    /// Its part of the answer.
+    pub result: Placed,
+    /// Part of the job that is done with it, 0 to 1.
+    pub done: f64,
+    /// Expected solve time of the rest in µs.
+    pub rest_us: u64,
+}
+
+/// Which of the queued jobs a worker asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Which {
+    /// Those of which nothing is solved.
+    New,
+    /// One of which some slices are solved.
+    Begun,
 }
 
 /// What a worker asks for.
@@ -173,12 +213,14 @@ pub struct ClaimRequest<'a> {
     pub worker: &'a str,
     /// Whose turn it is.
     pub tenant: &'a str,
+    /// Which of the tenant's jobs.
+    pub which: Which,
     /// Most jobs.
     pub jobs: usize,
     /// Largest sum of the expected solve times in µs; one job may be above it.
     pub cost_us: u64,
-    /// Largest expected solve time of each job in µs, if there is such a bound.
-    pub each_cost_us: Option<u64>,
+    /// Largest expected solve time of one slice of each job in µs, if there is such a bound.
+    pub each_slice_us: Option<u64>,
     /// Workers among which the queue is shared.
     pub workers: usize,
     /// End of the lease, by the clock of this process.
@@ -194,14 +236,14 @@ pub struct ClaimRequest<'a> {
 /// Why jobs go back to the queue; none of these counts as an attempt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Release {
-    /// They were not begun, or the service stops.
+    /// They were not begun, they had their slice, or the service stops.
     NotBegun,
     /// They were to share an answer that did not come: solved next time.
     SolveItself,
-    /// Their solve takes longer than was thought, at least this long.
+    /// A slice of them takes longer than was thought, at least this long.
     Long {
-        /// Expected solve time from now on, in µs.
-        cost_us: u64,
+        /// Its expected solve time from now on, in µs.
+        slice_us: u64,
     },
 }
 

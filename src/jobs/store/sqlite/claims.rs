@@ -14,7 +14,7 @@ use crate::jobs::store::sqlite::SqliteStore;
 use crate::jobs::store::sqlite::rows::{
     push_list, read_count, read_id, read_reuse_key, read_state, to_json,
 };
-use crate::jobs::store::{Claim, ClaimRequest, Release, Renewal, StoredCase};
+use crate::jobs::store::{Claim, ClaimRequest, Release, Renewal, StoredCase, Which};
 
 /// Queued jobs looked at in one claim, whatever the number of workers.
 const PEEK_JOBS: i64 = 256;
@@ -24,7 +24,11 @@ const QUEUED_TENANTS: &str =
 /// The queued jobs of a tenant that come first: by priority, the oldest of each first. Jobs whose deadline has passed are
 /// left to whoever ends them.
 const PEEK: &str = "SELECT id, suspect, cost_us FROM jobs \
-     WHERE state = 'queued' AND tenant = $1 AND (deadline IS NULL OR deadline > $3) AND cost_us <= $4 \
+     WHERE state = 'queued' AND tenant = $1 AND (deadline IS NULL OR deadline > $3) AND slice_us <= $4 AND slices = 0 \
+     ORDER BY rank, id LIMIT $2";
+/// The same of those of which some slices are solved.
+const PEEK_BEGUN: &str = "SELECT id, suspect, cost_us FROM jobs \
+     WHERE state = 'queued' AND tenant = $1 AND (deadline IS NULL OR deadline > $3) AND slice_us <= $4 AND slices > 0 \
      ORDER BY rank, id LIMIT $2";
 /// Those whose worker is silent: single ones count the attempt, those of a group do not and come alone next time.
 const REAP: &str = "UPDATE jobs SET \
@@ -35,7 +39,7 @@ const REAP: &str = "UPDATE jobs SET \
      started_at = CASE WHEN cancel_requested = 1 OR (group_size = 1 AND attempt >= $1) THEN started_at ELSE NULL END, \
      attempt = CASE WHEN group_size > 1 THEN attempt - 1 ELSE attempt END, \
      suspect = CASE WHEN group_size > 1 THEN 1 ELSE suspect END, \
-     progress = 0, lease_until = NULL, worker = NULL, solving = 0, version = version + 1 \
+     progress = done, lease_until = NULL, worker = NULL, solving = 0, version = version + 1 \
      WHERE state = 'running' AND lease_until <= $4 RETURNING id, state";
 /// Those of a dead process that were not what it died of, or not certainly: none counts, and those that were being solved
 /// come alone next time. Left are those that were solved alone.
@@ -44,7 +48,7 @@ const REAP_BYSTANDERS: &str = "UPDATE jobs SET \
      ended_at = CASE WHEN cancel_requested = 1 THEN $1 ELSE NULL END, \
      started_at = CASE WHEN cancel_requested = 1 THEN started_at ELSE NULL END, \
      attempt = attempt - 1, suspect = CASE WHEN solving = 1 THEN 1 ELSE suspect END, \
-     progress = 0, lease_until = NULL, worker = NULL, solving = 0, version = version + 1 \
+     progress = done, lease_until = NULL, worker = NULL, solving = 0, version = version + 1 \
      WHERE state = 'running' AND (solving = 0 OR group_size > 1 \
          OR (SELECT COUNT(*) FROM jobs AS other WHERE other.state = 'running' AND other.solving = 1) > 1) \
      RETURNING id, state";
@@ -68,17 +72,21 @@ impl SqliteStore {
     /// The database failed; nothing changed.
     pub async fn claim(&self, request: &ClaimRequest<'_>) -> Result<Vec<Claim>, JobsError> {
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
+        let (peek, at_most) = match request.which {
+            Which::New => (PEEK, PEEK_JOBS),
+            Which::Begun => (PEEK_BEGUN, 1),
+        };
         let peek = match request.skip.is_empty() {
-            true => PEEK.to_owned(),
-            false => PEEK.replace(
+            true => peek.to_owned(),
+            false => peek.replace(
                 " ORDER BY",
                 &format!(" AND {} ORDER BY", none_of(request.skip)),
             ),
         };
-        let each = request.each_cost_us.unwrap_or(u64::MAX);
+        let each = request.each_slice_us.unwrap_or(u64::MAX);
         let queued = sqlx::query(AssertSqlSafe(peek))
             .bind(request.tenant)
-            .bind(PEEK_JOBS)
+            .bind(at_most)
             .bind(request.late_before)
             .bind(i64::try_from(each).unwrap_or(i64::MAX))
             .fetch_all(&mut *transaction)
@@ -102,10 +110,10 @@ impl SqliteStore {
         update.push(", group_size = ");
         update.push_bind(i64::try_from(ids.len()).unwrap_or(i64::MAX));
         // A suspect has to wait until nothing else is solved.
-        update.push(", solving = 1 - suspect, progress = 0, version = version + 1 WHERE state = 'queued' AND id IN (");
+        update.push(", solving = 1 - suspect, progress = done, version = version + 1 WHERE state = 'queued' AND id IN (");
         push_list(&mut update, &ids);
         update.push(
-            ") RETURNING id, attempt, lease_number, method, traceparent, suspect, \
+            ") RETURNING id, attempt, lease_number, method, traceparent, suspect, slices, \
              CASE WHEN fresh = 1 THEN NULL ELSE reuse_key END AS reuse_key",
         );
         let rows = update.build().fetch_all(&mut *transaction).await?;
@@ -180,8 +188,8 @@ impl SqliteStore {
         query.push(") UPDATE jobs SET lease_until = ");
         query.push_bind(lease_until);
         query.push(
-            ", progress = held.now_at, \
-             version = CASE WHEN progress = held.now_at THEN version ELSE version + 1 END",
+            ", progress = MAX(held.now_at, done), \
+             version = CASE WHEN progress = MAX(held.now_at, done) THEN version ELSE version + 1 END",
         );
         query.push(OF_HELD).push("jobs.id AS id, cancel_requested");
         let rows = query.build().fetch_all(&self.writer).await?;
@@ -232,15 +240,18 @@ impl SqliteStore {
         query.push(
             " UPDATE jobs SET state = CASE WHEN cancel_requested = 1 THEN 'cancelled' ELSE 'queued' END, \
              started_at = CASE WHEN cancel_requested = 1 THEN started_at ELSE NULL END, \
-             attempt = attempt - 1, progress = 0, lease_until = NULL, worker = NULL, solving = 0, \
+             attempt = attempt - 1, progress = done, lease_until = NULL, worker = NULL, solving = 0, \
              version = version + 1",
         );
         match why {
             Release::NotBegun => {}
             Release::SolveItself => drop(query.push(", fresh = 1")),
-            Release::Long { cost_us } => {
-                query.push(", cost_us = MAX(cost_us, ");
-                query.push_bind(i64::try_from(cost_us).unwrap_or(i64::MAX));
+            Release::Long { slice_us } => {
+                let slice_us = i64::try_from(slice_us).unwrap_or(i64::MAX);
+                query
+                    .push(", slice_us = MAX(slice_us, ")
+                    .push_bind(slice_us);
+                query.push("), cost_us = MAX(cost_us, ").push_bind(slice_us);
                 query.push(")");
             }
         }
@@ -351,6 +362,7 @@ fn read_claim(row: &SqliteRow) -> Result<Claim, JobsError> {
         traceparent: row.try_get("traceparent")?,
         reuse_key: read_reuse_key(row)?,
         suspect: row.try_get("suspect")?,
+        slices: row.try_get("slices")?,
     })
 }
 
@@ -393,6 +405,7 @@ mod tests {
         for (statement, seek) in [
             (QUEUED_TENANTS, "PRIMARY KEY (state=?"),
             (PEEK, "jobs_queued (tenant=?"),
+            (PEEK_BEGUN, "jobs_begun (tenant=?"),
             (REAP, "jobs_by_state (state=?"),
             (bystanders, "jobs_by_state (state=?"),
         ] {

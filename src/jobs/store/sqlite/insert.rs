@@ -8,7 +8,7 @@ use crate::jobs::store::sqlite::reuse::end_with_sources;
 use crate::jobs::store::sqlite::rows::to_json;
 use crate::jobs::store::{NewJob, ReuseKey};
 
-/// Jobs in one statement; with 16 values each far below the bound of SQLite.
+/// Jobs in one statement; with 17 values each far below the bound of SQLite.
 const ROWS_PER_STATEMENT: usize = 250;
 
 /// Queues jobs within the caller's transaction, those of a batch with their places in it. Returns those that ended at
@@ -26,7 +26,7 @@ pub(super) async fn insert_jobs(
             .map(|(_, job)| to_json(&job.labels))
             .collect::<Result<Vec<_>, _>>()?;
         let mut rows = QueryBuilder::<Sqlite>::new(
-            "INSERT INTO jobs (id, state, name, labels, method, created_at, batch_id, batch_index, cost_us, outputs, \
+            "INSERT INTO jobs (id, state, name, labels, method, created_at, batch_id, batch_index, cost_us, slice_us, outputs, \
              reuse_key, tenant, fresh, rank, deadline, traceparent) ",
         );
         rows.push_values(
@@ -41,6 +41,7 @@ pub(super) async fn insert_jobs(
                     .push_bind(&batch)
                     .push_bind(*index)
                     .push_bind(job.cost_us)
+                    .push_bind(job.slice_us)
                     .push_bind(&job.outputs)
                     .push_bind(job.reuse_key.as_ref().map(ReuseKey::as_slice))
                     .push_bind(&*job.tenant)

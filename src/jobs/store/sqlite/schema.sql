@@ -7,7 +7,10 @@ CREATE TABLE jobs (
     labels           TEXT    NOT NULL,           -- JSON object, as shown to clients; job_labels is for finding
     method           TEXT    NOT NULL,
     outputs          TEXT    NOT NULL,           -- JSON list of the outputs asked for
-    cost_us          INTEGER NOT NULL,           -- expected solve time in µs
+    cost_us          INTEGER NOT NULL,           -- expected solve time of what is still to be solved, in µs
+    slice_us         INTEGER NOT NULL,           -- that of its longest slice
+    slices           INTEGER NOT NULL DEFAULT 0, -- slices that are solved and stored
+    done             REAL    NOT NULL DEFAULT 0, -- the part of the job that they are, 0 to 1
     reuse_key        BLOB,                       -- equal for cases that have the same answer; NULL: never a source
     fresh            INTEGER NOT NULL,           -- 1: solved even if an identical case was solved before
     rank             INTEGER NOT NULL,           -- 0: high priority, 1: normal, 2: low
@@ -40,6 +43,8 @@ CREATE INDEX jobs_by_state ON jobs (state, tenant, id);
 CREATE INDEX jobs_by_tenant ON jobs (tenant, id);
 -- The claim: the next job of the tenant whose turn it is. Jobs leave it when they are claimed.
 CREATE INDEX jobs_queued ON jobs (tenant, rank, id, cost_us) WHERE state = 'queued';
+-- Those that are solved in part.
+CREATE INDEX jobs_begun ON jobs (tenant, rank, id) WHERE state = 'queued' AND slices > 0;
 CREATE INDEX jobs_by_deadline ON jobs (deadline) WHERE deadline IS NOT NULL AND ended_at IS NULL;
 -- Ids within a batch grow with the place in it. The second is for counting and for lists by state.
 CREATE INDEX jobs_by_batch ON jobs (batch_id, id) WHERE batch_id IS NOT NULL;
@@ -105,6 +110,28 @@ CREATE INDEX blobs_by_key ON blobs (key, bytes) WHERE key IS NOT NULL;
 CREATE TABLE blob_outbox (
     key TEXT NOT NULL PRIMARY KEY
 ) STRICT, WITHOUT ROWID;
+
+-- Solved slices of sweeps that are not yet solved whole. Each has a blob of its own, which nobody else refers to. They go in
+-- the transaction in which their job ends, whatever ends it.
+CREATE TABLE job_slices (
+    job_id   TEXT    NOT NULL REFERENCES jobs (id) ON DELETE CASCADE,
+    number   INTEGER NOT NULL, -- among the slices of the case, from 0
+    motions  INTEGER NOT NULL, -- motions of the case up to the end of the slice
+    digest   TEXT    NOT NULL, -- of the case, as the solver that solved the slice knew it
+    spent_us INTEGER NOT NULL, -- solver time of the job up to the end of the slice
+    blob_id  INTEGER NOT NULL REFERENCES blobs (id),
+    PRIMARY KEY (job_id, number)
+) STRICT, WITHOUT ROWID;
+CREATE INDEX job_slices_by_blob ON job_slices (blob_id);
+CREATE TRIGGER slice_goes AFTER DELETE ON job_slices BEGIN
+    INSERT INTO blob_outbox (key) SELECT key FROM blobs WHERE id = OLD.blob_id AND key IS NOT NULL
+        ON CONFLICT (key) DO NOTHING;
+    DELETE FROM blobs WHERE id = OLD.blob_id;
+END;
+CREATE TRIGGER job_ends_with_its_slices AFTER UPDATE OF state ON jobs WHEN NEW.slices > 0
+    AND NEW.state IN ('succeeded', 'failed', 'cancelled') BEGIN
+    DELETE FROM job_slices WHERE job_id = NEW.id;
+END;
 
 CREATE TABLE batches (
     id         TEXT    NOT NULL PRIMARY KEY,

@@ -1,0 +1,233 @@
+//! A case on its way, slice by slice: where it is cut, what is solved already, and how the parts become the whole answer.
+//!
+//! The cuts depend on the case alone, so that a slice that was stored by a process that died serves the next one.
+
+use std::ops::Range;
+use std::time::Duration;
+
+use crate::contact::problem::Problem;
+use crate::contact::solution::{Fields, PatchFields, Solution};
+use crate::jobs::error::JobsError;
+use crate::jobs::results::Encoded;
+use crate::jobs::store::SliceNote;
+
+/// A checked case with its slices, of which the first `done` are stored.
+#[derive(Debug)]
+pub(super) struct Sweep {
+    pub(super) problem: Problem,
+    slices: Vec<Range<usize>>,
+    done: usize,
+    /// Solver time up to the end of what is stored.
+    pub(super) spent: Duration,
+}
+
+impl Sweep {
+    /// A case cut here, of which this is stored. What was cut elsewhere, or solved by another solver, is left aside.
+    pub(super) fn new(problem: Problem, slices: Vec<Range<usize>>, stored: &[SliceNote]) -> Sweep {
+        let fits = |(place, (note, slice)): (usize, (&SliceNote, &Range<usize>))| {
+            note.number as usize == place
+                && note.motions as usize == slice.end
+                && note.digest == problem.digest
+        };
+        let pairs = stored.iter().zip(&slices).enumerate();
+        let done = pairs.take_while(|pair| fits(*pair)).count();
+        let last = done.checked_sub(1).and_then(|last| stored.get(last));
+        Sweep {
+            spent: last.map_or(Duration::ZERO, |note| note.spent),
+            problem,
+            slices,
+            done,
+        }
+    }
+
+    /// There is one slice: the whole.
+    pub(super) fn is_one(&self) -> bool {
+        self.slices.len() <= 1
+    }
+
+    /// The slice to be solved next, if there is one.
+    pub(super) fn next(&self) -> Option<Range<usize>> {
+        self.slices.get(self.done).cloned()
+    }
+
+    /// What is to be noted of the next slice, solved when the job had taken so long.
+    pub(super) fn note(&self, spent: Duration) -> SliceNote {
+        let motions = self.next().map_or(0, |slice| slice.end);
+        SliceNote {
+            number: u32::try_from(self.done).unwrap_or(u32::MAX),
+            motions: u32::try_from(motions).unwrap_or(u32::MAX),
+            digest: self.problem.digest.clone(),
+            spent,
+        }
+    }
+
+    /// Part of the motions that is done once the next slice is, 0 to 1.
+    pub(super) fn done_after_next(&self) -> f64 {
+        let motions = self.next().map_or(0, |slice| slice.end);
+        motions as f64 / self.problem.motions.len().max(1) as f64
+    }
+
+    /// The next slice is stored.
+    pub(super) fn advance(&mut self, spent: Duration) {
+        self.done += 1;
+        self.spent = spent;
+    }
+
+    /// What is stored cannot be used.
+    pub(super) fn begin_again(&mut self) {
+        self.done = 0;
+    }
+
+    /// Are these parts as many as there are slices?
+    pub(super) fn is_whole(&self, parts: usize) -> bool {
+        parts == self.slices.len()
+    }
+}
+
+/// Puts the parts of an answer together, in the order of their slices. `go_on` is asked before each part.
+///
+/// # Errors
+/// A part cannot be read, or does not fit to the others. `None` if `go_on` said no.
+pub(super) fn join(
+    parts: &[Encoded],
+    go_on: impl Fn() -> bool,
+) -> Result<Option<(Solution, Fields)>, JobsError> {
+    let mut whole: Option<(Solution, Fields)> = None;
+    for part in parts {
+        if !go_on() {
+            return Ok(None);
+        }
+        let (solution, fields) = read(part)?;
+        match &mut whole {
+            None => whole = Some((solution, fields)),
+            Some((all, all_fields)) => {
+                if all.patches.len() != solution.patches.len()
+                    || all_fields.patches.len() != fields.patches.len()
+                {
+                    let reason = "the slices of a sweep have different patches";
+                    return Err(JobsError::Damaged(reason.to_owned()));
+                }
+                all.append(solution);
+                all_fields.append(fields);
+            }
+        }
+    }
+    let none = || JobsError::Damaged("a sweep without slices".to_owned());
+    whole.ok_or_else(none).map(Some)
+}
+
+fn read(part: &Encoded) -> Result<(Solution, Fields), JobsError> {
+    let damaged = |error: serde_json::Error| JobsError::Damaged(format!("a slice: {error}"));
+    let solution: Solution = serde_json::from_slice(&part.solution).map_err(damaged)?;
+    let patches = match &part.fields {
+        None => Vec::new(),
+        Some(_) => (0..solution.patches.len())
+            .map(|patch| part.patch_fields(patch, None))
+            .collect::<Result<Vec<PatchFields>, JobsError>>()?,
+    };
+    Ok((solution, Fields { patches }))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use bytes::Bytes;
+    use serde_json::json;
+
+    use super::*;
+    use crate::contact;
+    use crate::contact::monitor::Unwatched;
+    use crate::contact::problem::Limits;
+    use crate::contact::slices::solve_slice;
+    use crate::jobs::fields;
+
+    fn problem() -> Problem {
+        let case = json!({
+            "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
+            "friction": { "coefficient": 0.3 },
+            "contact": { "type": "radii", "rolling_mm": 460, "lateral_mm": 300 },
+            "load": { "normal_force_n": 100_000 },
+            "motion": { "sweep": { "creepage_x": { "from": 0.0005, "to": 0.003, "points": 7 } } },
+            "solver": { "mesh": { "strips": 6, "cells": 6 } },
+            "outputs": ["resultants", "zones", "tractions", "slip", "pressure"]
+        });
+        contact::check(&case, &Limits::default()).unwrap()
+    }
+
+    fn note(number: u32, motions: u32, problem: &Problem) -> SliceNote {
+        SliceNote {
+            number,
+            motions,
+            digest: problem.digest.clone(),
+            spent: Duration::from_secs(u64::from(motions)),
+        }
+    }
+
+    #[test]
+    fn only_what_was_cut_here_and_solved_by_this_solver_counts_as_done() {
+        let problem = problem();
+        let cuts = || vec![0..3, 3..5, 5..7];
+        let sweep = |stored: &[SliceNote]| Sweep::new(problem.clone(), cuts(), stored);
+        let good = [note(0, 3, &problem), note(1, 5, &problem)];
+        let going = sweep(&good);
+        assert_eq!(
+            (going.next(), going.spent),
+            (Some(5..7), Duration::from_secs(5))
+        );
+        assert_eq!(going.note(Duration::ZERO).motions, 7);
+        assert!((going.done_after_next() - 1.0).abs() < f64::EPSILON);
+        assert_eq!(sweep(&[]).next(), Some(0..3));
+        // Cut elsewhere, a hole, another solver.
+        assert_eq!(sweep(&[note(0, 2, &problem)]).next(), Some(0..3));
+        assert_eq!(sweep(&good[1..]).next(), Some(0..3));
+        let other = SliceNote {
+            digest: "of another revision".to_owned(),
+            ..good[1].clone()
+        };
+        let half = sweep(&[good[0].clone(), other]);
+        assert_eq!(
+            (half.next(), half.spent),
+            (Some(3..5), Duration::from_secs(3))
+        );
+    }
+
+    #[test]
+    fn parts_read_from_where_they_were_stored_are_the_answer_bit_for_bit() {
+        let problem = problem();
+        let store = Arc::default();
+        let mut parts = Vec::new();
+        let mut whole: Option<(Solution, Fields)> = None;
+        for cut in [0..3, 3..5, 5..7] {
+            let (solution, fields) = solve_slice(&store, &problem, cut, &Unwatched).unwrap();
+            parts.push(Encoded {
+                solution: Bytes::from(serde_json::to_vec(&solution).unwrap()),
+                fields: Some(Bytes::from(fields::encode(&fields).unwrap())),
+            });
+            match &mut whole {
+                None => whole = Some((solution, fields)),
+                Some((all, all_fields)) => {
+                    all.append(solution);
+                    all_fields.append(fields);
+                }
+            }
+        }
+        let (solution, fields) = join(&parts, || true).unwrap().unwrap();
+        let (expected, expected_fields) = whole.unwrap();
+        assert_eq!(solution.total.len(), 7);
+        assert_eq!(
+            serde_json::to_vec(&solution).unwrap(),
+            serde_json::to_vec(&expected).unwrap()
+        );
+        assert_eq!(
+            fields::encode(&fields).unwrap(),
+            fields::encode(&expected_fields).unwrap()
+        );
+        assert!(join(&parts, || false).unwrap().is_none());
+        parts[1].fields = None;
+        assert!(matches!(join(&parts, || true), Err(JobsError::Damaged(_))));
+        parts[1].solution = Bytes::from_static(b"{");
+        assert!(join(&parts, || true).is_err());
+        assert!(join(&[], || true).is_err());
+    }
+}

@@ -1,0 +1,475 @@
+//! Do long sweeps go on where their last slice ended, whatever ends the process, and give the same answer?
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Duration;
+
+use bytes::Bytes;
+use railhead::contact;
+use railhead::contact::monitor::{Monitor, Unwatched};
+use railhead::contact::problem::Limits;
+use railhead::contact::solution::{PatchFields, Solution};
+use railhead::jobs::recipe::Recipe;
+use railhead::jobs::results::Encoded;
+use railhead::jobs::store::sqlite::SqliteStore;
+use railhead::jobs::store::{Ending, NewSlice, Placed, Release, SliceNote};
+use railhead::jobs::{Failure, FailureKind, Jobs, Options, State};
+use reqwest::Method;
+use serde_json::{Value, json};
+use uuid::Uuid;
+
+use crate::batches::small;
+use crate::store::{Table, claim_up_to, new_job, success};
+use crate::support::{Service, long_case, pause};
+
+const AT_MOST: Duration = Duration::from_secs(60);
+
+/// Slow by its estimate, and so cut into slices; fast in truth, since everything slips.
+pub fn sliced_case(name: &str, motions: u32) -> Value {
+    let mut case = long_case(name, motions);
+    case["motion"] = json!({ "sweep": {
+        "creepage_x": { "from": 0.01, "to": 0.3, "points": motions }
+    } });
+    case["solver"] = json!({ "method": "boundary_element", "mesh": { "strips": 32, "cells": 32 } });
+    case
+}
+
+/// A service whose solver cuts every sweep after each second motion, counts slices, and holds the slices of a case named
+/// `held` beyond the first two until it is let go.
+struct Shop {
+    solved: Arc<AtomicUsize>,
+    let_go: Arc<AtomicBool>,
+    folder: tempfile::TempDir,
+}
+
+impl Shop {
+    fn new() -> Shop {
+        Shop {
+            solved: Arc::default(),
+            let_go: Arc::default(),
+            folder: tempfile::tempdir().unwrap(),
+        }
+    }
+
+    /// Opens the service, once more if it was open before.
+    async fn open(&self, change: impl FnOnce(&mut Options)) -> Jobs {
+        let real = Recipe::contact();
+        let (solved, go) = (self.solved.clone(), self.let_go.clone());
+        let recipe = Recipe {
+            slices: Arc::new(|problem| {
+                let motions = problem.motions.len();
+                let cuts = (0..motions).step_by(2);
+                cuts.map(|from| from..(from + 2).min(motions)).collect()
+            }),
+            solve: Arc::new(move |problem, slice, monitor: &dyn Monitor| {
+                let held = problem.name.as_deref() == Some("held") && slice.start >= 4;
+                while held && !go.load(Ordering::SeqCst) {
+                    if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.3) {
+                        return Err(stop.into());
+                    }
+                    std::thread::sleep(Duration::from_millis(1));
+                }
+                let answer = (real.solve)(problem, slice, monitor)?;
+                solved.fetch_add(1, Ordering::SeqCst);
+                Ok(answer)
+            }),
+            ..Recipe::contact()
+        };
+        let mut options = Options {
+            slice: Duration::from_millis(10),
+            // Some parts lie in the table, others outside it.
+            small_result_max_bytes: 4000,
+            cache: false,
+            ..Options::new(self.folder.path())
+        };
+        change(&mut options);
+        Jobs::open_with(options, recipe).await.unwrap()
+    }
+
+    fn solved(&self) -> usize {
+        self.solved.load(Ordering::SeqCst)
+    }
+
+    /// Files of stored results.
+    fn files(&self) -> usize {
+        files_below(&self.folder.path().join("results"))
+    }
+}
+
+fn files_below(folder: &std::path::Path) -> usize {
+    let entries = std::fs::read_dir(folder).into_iter().flatten();
+    let paths = entries.map(|entry| entry.unwrap().path());
+    paths
+        .map(|path| if path.is_dir() { files_below(&path) } else { 1 })
+        .sum()
+}
+
+/// A sweep of so many motions on a coarse mesh.
+fn sweep(name: &str, motions: u32) -> Value {
+    let mut sweep = long_case(name, motions);
+    sweep["solver"]["mesh"] = json!({ "strips": 6, "cells": 6 });
+    sweep["outputs"] = json!(["resultants", "zones", "tractions"]);
+    sweep
+}
+
+async fn until_slices(jobs: &Jobs, id: Uuid, done: f64) {
+    while jobs.get(id).await.unwrap().progress < done {
+        tokio::time::sleep(Duration::from_millis(2)).await;
+    }
+}
+
+/// An answer without its times.
+fn timeless(mut solution: Solution) -> Value {
+    let patches = solution.patches.iter_mut();
+    for point in patches.flat_map(|patch| &mut patch.points) {
+        point.solver.seconds = 0.0;
+    }
+    serde_json::to_value(solution).unwrap()
+}
+
+async fn answer(jobs: &Jobs, id: Uuid) -> (Value, PatchFields) {
+    let fields = jobs.patch_fields(id, 0).await.unwrap();
+    (timeless(jobs.solution(id).await.unwrap()), fields)
+}
+
+#[tokio::test]
+async fn a_sweep_goes_on_after_a_restart_and_solves_no_slice_twice() {
+    let shop = Shop::new();
+    let jobs = shop.open(|_| {}).await;
+    jobs.start().unwrap();
+    let whole = jobs.submit(sweep("whole", 11), None).await.unwrap().id;
+    let job = jobs.wait(whole, AT_MOST).await.unwrap();
+    assert_eq!((job.state, job.attempt), (State::Succeeded, 1));
+    assert_eq!(shop.solved(), 6);
+    jobs.sweep_expired().await.unwrap();
+    let files = shop.files();
+    let expected = answer(&jobs, whole).await;
+
+    let held = jobs.submit(sweep("held", 11), None).await.unwrap().id;
+    until_slices(&jobs, held, 4.0 / 11.0).await;
+    jobs.shutdown(Duration::ZERO).await;
+    assert_eq!(
+        shop.files(),
+        files + 2 * 2,
+        "two parts lie outside the table"
+    );
+    assert_eq!(shop.solved(), 6 + 2);
+    shop.let_go.store(true, Ordering::SeqCst);
+    let jobs = shop.open(|_| {}).await;
+    let job = jobs.get(held).await.unwrap();
+    assert_eq!((job.state, job.attempt), (State::Queued, 0));
+    assert!(
+        (job.progress - 4.0 / 11.0).abs() < 1e-12,
+        "{}",
+        job.progress
+    );
+    jobs.start().unwrap();
+    let job = jobs.wait(held, AT_MOST).await.unwrap();
+    assert_eq!((job.state, job.attempt), (State::Succeeded, 1));
+    assert_eq!(shop.solved(), 12, "two slices were there already");
+    let mut found = answer(&jobs, held).await;
+    // The name is part of the question and not of the answer; everything else is.
+    assert_eq!(found.0["patches"], expected.0["patches"]);
+    found.0["case_digest"] = expected.0["case_digest"].clone();
+    assert_eq!(found, expected);
+    jobs.sweep_expired().await.unwrap();
+    assert_eq!(shop.files(), 2 * files, "parts go with the whole");
+    jobs.shutdown(Duration::from_secs(10)).await;
+}
+
+#[tokio::test]
+async fn a_sweep_that_ends_before_its_time_leaves_no_parts() {
+    let shop = Shop::new();
+    let jobs = shop.open(|_| {}).await;
+    jobs.start().unwrap();
+    for ends_by_itself in [false, true] {
+        let wishes = railhead::jobs::wishes::Wishes {
+            ends_within: ends_by_itself.then_some(Duration::from_secs(1)),
+            ..Default::default()
+        };
+        let submitted = jobs.submit_with(sweep("held", 11), None, wishes).await;
+        let id = submitted.unwrap().0.id;
+        if !ends_by_itself {
+            until_slices(&jobs, id, 0.3).await;
+            assert!(shop.files() > 0);
+            jobs.cancel(id).await.unwrap();
+        }
+        let job = jobs.wait(id, AT_MOST).await.unwrap();
+        let expected = match ends_by_itself {
+            true => State::Failed,
+            false => State::Cancelled,
+        };
+        assert_eq!(job.state, expected, "{:?}", job.failure);
+    }
+    jobs.sweep_expired().await.unwrap();
+    assert_eq!(shop.files(), 0);
+    jobs.shutdown(Duration::from_secs(10)).await;
+}
+
+#[tokio::test]
+async fn the_time_limit_counts_every_slice_and_every_process() {
+    let shop = Shop::new();
+    let limit = |options: &mut Options| options.time_limit = Duration::from_millis(600);
+    let jobs = shop.open(limit).await;
+    jobs.start().unwrap();
+    let id = jobs.submit(sweep("held", 11), None).await.unwrap().id;
+    until_slices(&jobs, id, 4.0 / 11.0).await;
+    let about = SqliteStore::open(&shop.folder.path().join("jobs.db")).await;
+    let spent = about.unwrap().slice_notes(id).await.unwrap()[1].spent;
+    assert!(
+        spent > Duration::ZERO && spent < Duration::from_millis(600),
+        "{spent:?}"
+    );
+    jobs.shutdown(Duration::ZERO).await;
+    // A limit that is used up by what the first process has stored.
+    let used_up = |options: &mut Options| options.time_limit = spent;
+    let jobs = shop.open(used_up).await;
+    shop.let_go.store(true, Ordering::SeqCst);
+    jobs.start().unwrap();
+    let job = jobs.wait(id, AT_MOST).await.unwrap();
+    let failure = job.failure.unwrap();
+    assert_eq!(failure.kind, FailureKind::OutOfTime);
+    assert!(failure.detail.contains("4 of 11"), "{}", failure.detail);
+    assert_eq!(shop.solved(), 2);
+    jobs.shutdown(Duration::from_secs(10)).await;
+}
+
+#[tokio::test]
+async fn short_jobs_pass_a_sweep_at_its_cuts_and_it_still_goes_on() {
+    let shop = Shop::new();
+    // Nobody may wait at a gate: what is not at a cut goes on.
+    let jobs = shop
+        .open(|options| {
+            options.slice = Duration::from_micros(1);
+            options.parked_bytes_max = 0;
+        })
+        .await;
+    jobs.start().unwrap();
+    let long = jobs.submit(sweep("long", 400), None).await.unwrap().id;
+    until_slices(&jobs, long, 1e-6).await;
+    let (mut passed, mut progress) = (0, Vec::new());
+    for number in 0..20 {
+        let mut short = small("short");
+        short["load"]["normal_force_n"] = json!(50_000 + number);
+        let id = jobs.submit(short, None).await.unwrap().id;
+        jobs.wait(id, AT_MOST).await.unwrap();
+        let job = jobs.get(long).await.unwrap();
+        passed += usize::from(!job.state.ended());
+        progress.push(job.progress);
+    }
+    assert!(passed > 2, "{progress:?}");
+    assert!(
+        progress.is_sorted() && progress[0] < progress[19],
+        "{progress:?}"
+    );
+    let job = jobs.wait(long, AT_MOST).await.unwrap();
+    assert_eq!((job.state, job.attempt), (State::Succeeded, 1));
+    assert!(shop.solved() >= 200 + 20);
+    jobs.shutdown(Duration::from_secs(10)).await;
+}
+
+#[tokio::test]
+async fn parts_that_cannot_be_read_are_solved_again() {
+    let shop = Shop::new();
+    let jobs = shop
+        .open(|options| options.small_result_max_bytes = 0)
+        .await;
+    jobs.start().unwrap();
+    let id = jobs.submit(sweep("held", 7), None).await.unwrap().id;
+    until_slices(&jobs, id, 4.0 / 7.0).await;
+    std::fs::remove_dir_all(shop.folder.path().join("results")).unwrap();
+    shop.let_go.store(true, Ordering::SeqCst);
+    let job = jobs.wait(id, AT_MOST).await.unwrap();
+    assert_eq!(job.state, State::Succeeded);
+    assert_eq!(shop.solved(), 4 + 4);
+    assert_eq!(jobs.solution(id).await.unwrap().total.len(), 7);
+    jobs.shutdown(Duration::from_secs(10)).await;
+}
+
+fn slice(number: u32, key: Option<&str>) -> NewSlice {
+    NewSlice {
+        note: SliceNote {
+            number,
+            motions: 2 * (number + 1),
+            digest: "d".to_owned(),
+            spent: Duration::from_secs(u64::from(number) + 1),
+        },
+        result: match key {
+            Some(key) => Placed::Folder(key.to_owned(), 7),
+            None => Placed::Table(Encoded {
+                solution: Bytes::from_static(b"{}"),
+                fields: None,
+            }),
+        },
+        done: f64::from(number + 1) / 4.0,
+        rest_us: 1000,
+    }
+}
+
+#[tokio::test]
+async fn a_stored_slice_is_fenced_and_stored_once_and_begins_the_count_of_attempts_anew() {
+    let table = Table::new().await;
+    let store = &table.store;
+    let id = table.add(new_job()).await.id;
+    // Two attempts die alone.
+    for _ in 0..2 {
+        claim_up_to(store, 0, 1000, 1).await;
+        store.reap_dead(1, 5).await.unwrap();
+    }
+    let old = table.claim(2).await.unwrap();
+    assert_eq!((old.attempt, old.slices), (3, 0));
+    for _ in 0..2 {
+        assert!(store.add_slice(&old, &slice(0, Some("a"))).await.unwrap());
+    }
+    assert!(store.add_slice(&old, &slice(1, None)).await.unwrap());
+    let job = store.get(id).await.unwrap().unwrap();
+    assert_eq!((job.attempt, job.progress), (1, 0.5));
+    let why = Release::NotBegun;
+    store
+        .release(std::slice::from_ref(&old), why, 3)
+        .await
+        .unwrap();
+    let job = store.get(id).await.unwrap().unwrap();
+    assert_eq!(
+        (job.state, job.attempt, job.progress),
+        (State::Queued, 0, 0.5)
+    );
+    assert!(
+        !store.add_slice(&old, &slice(2, None)).await.unwrap(),
+        "it is not held"
+    );
+    let tenants = claim_up_to(store, 4, 1000, 1).await;
+    assert!(tenants.is_empty(), "it is no new job");
+    let claim = crate::store::claim_begun(store, 4).await.unwrap();
+    assert_eq!((claim.attempt, claim.slices), (1, 2));
+    let notes = store.slice_notes(id).await.unwrap();
+    assert_eq!(notes, [slice(0, None).note, slice(1, None).note]);
+    // Another solver begins again: what was there from its number on is replaced.
+    let mut other = slice(0, Some("b"));
+    other.note.digest = "e".to_owned();
+    assert!(store.add_slice(&claim, &other).await.unwrap());
+    assert_eq!(store.slice_notes(id).await.unwrap(), [other.note]);
+    assert_eq!(store.released_blobs(&[], 9).await.unwrap(), ["a"]);
+    assert_eq!(
+        store.known_blobs(&["a".into(), "b".into()]).await.unwrap(),
+        ["b"]
+    );
+}
+
+#[tokio::test]
+async fn whatever_ends_a_job_releases_its_slices() {
+    let lost = || Ending::Failed(Failure::worker_lost(1));
+    for end in [
+        "succeeded",
+        "failed",
+        "cancelled",
+        "cancelled queued",
+        "reaped",
+        "late",
+    ] {
+        let table = Table::new().await;
+        let store = &table.store;
+        let id = table.add(new_job()).await.id;
+        let claim = table.claim(0).await.unwrap();
+        assert!(store.add_slice(&claim, &slice(0, Some("a"))).await.unwrap());
+        assert!(store.add_slice(&claim, &slice(1, None)).await.unwrap());
+        match end {
+            "succeeded" => drop(table.finish(&claim, &success(), 1).await.unwrap()),
+            "failed" => drop(table.finish(&claim, &lost(), 1).await.unwrap()),
+            "cancelled" => drop(table.finish(&claim, &Ending::Cancelled, 1).await.unwrap()),
+            "cancelled queued" => {
+                store.release(&[claim], Release::NotBegun, 1).await.unwrap();
+                store.cancel(id, 2).await.unwrap();
+            }
+            "reaped" => drop(store.reap_dead(1, 1).await.unwrap()),
+            _ => {
+                store.release(&[claim], Release::NotBegun, 1).await.unwrap();
+                sqlx::query("UPDATE jobs SET deadline = 5")
+                    .execute(&table.other_writer().await)
+                    .await
+                    .unwrap();
+                let moment = railhead::jobs::store::sqlite::deadlines::Moment {
+                    now: 6,
+                    set_at: 0,
+                    unset: 6,
+                };
+                let late = store.fail_late(&Failure::worker_lost(1), moment).await;
+                assert_eq!(late.unwrap(), [id]);
+            }
+        }
+        assert!(store.get(id).await.unwrap().unwrap().state.ended(), "{end}");
+        assert!(store.slice_notes(id).await.unwrap().is_empty(), "{end}");
+        assert_eq!(store.released_blobs(&[], 9).await.unwrap(), ["a"], "{end}");
+        let blobs: i64 = sqlx::query_scalar("SELECT COUNT(*) FROM blobs")
+            .fetch_one(&table.other_writer().await)
+            .await
+            .unwrap();
+        assert_eq!(blobs, i64::from(end == "succeeded"), "{end}");
+    }
+}
+
+/// The answer of a job without its times.
+async fn timeless_result(service: &Service, id: &str) -> Value {
+    let mut result = service.get(&format!("/v1/jobs/{id}/result")).await;
+    for patch in result["patches"].as_array_mut().unwrap() {
+        for point in patch["points"].as_array_mut().unwrap() {
+            point["solver"]["seconds"] = json!(0);
+        }
+    }
+    result
+}
+
+#[tokio::test]
+async fn a_killed_process_costs_a_sweep_no_more_than_the_slice_it_was_at() {
+    let folder = tempfile::tempdir().unwrap();
+    let flags = ["--cache", "false", "--log", "info,railhead::jobs=debug"];
+    let service = Service::start(folder.path(), &flags);
+    let question = sliced_case("killed", 150);
+    let problem = contact::check(&question, &Limits::default()).unwrap();
+    let slices = contact::slices::slices(&problem).len();
+    assert!(slices > 5, "{slices}");
+    let id = service.submit(&question).await;
+    while service.logged("slice stored") < 2 {
+        pause().await;
+    }
+    let before = service.get(&format!("/v1/jobs/{id}")).await;
+    assert!(
+        before["progress"].as_f64().unwrap() > 1.5 / slices as f64,
+        "{before}"
+    );
+    service.kill();
+
+    // What the dead process did not come to say is in its table.
+    let store = SqliteStore::open(&folder.path().join("jobs.db"))
+        .await
+        .unwrap();
+    let stored = store.slice_notes(id.parse().unwrap()).await.unwrap().len();
+    store.close().await;
+    assert!((2..slices).contains(&stored), "{stored} of {slices}");
+
+    let service = Service::start(folder.path(), &flags);
+    let after = service.get(&format!("/v1/jobs/{id}")).await;
+    let kept = stored as f64 / slices as f64;
+    assert!(after["progress"].as_f64().unwrap() > 0.9 * kept, "{after}");
+    let job = service.until(&id, "succeeded").await;
+    assert_eq!(job["attempt"], 1, "each stored slice begins the count anew");
+    assert_eq!(service.logged("slice stored"), slices - stored);
+    let found = timeless_result(&service, &id).await;
+    let (solution, _) = contact::solve(&problem, &Unwatched).unwrap();
+    let expected = timeless(solution);
+    for part in ["patches", "total", "remarks"] {
+        let zeroed = |value: &Value| {
+            value
+                .to_string()
+                .replace("\"seconds\":0.0", "\"seconds\":0")
+        };
+        assert_eq!(zeroed(&found[part]), zeroed(&expected[part]), "{part}");
+    }
+    let cancelled = service.submit(&sliced_case("cancelled", 400)).await;
+    while service.logged("slice stored") < slices - stored + 1 {
+        pause().await;
+    }
+    let cancel = service.request(Method::POST, &format!("/v1/jobs/{cancelled}/cancel"));
+    assert!(cancel.send().await.unwrap().status().is_success());
+    service.until(&cancelled, "cancelled").await;
+}
