@@ -5,9 +5,9 @@ use railhead::contact;
 use railhead::contact::geometry::formats::{self, Format};
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
 use railhead::contact::problem::Limits;
-use railhead::http::body::read_strict;
-use railhead::http::elements::{Element, Layout, Splitter};
-use railhead::http::table_body::TableBody;
+use railhead::http::extract::batch::splitter::{Element, Layout, Splitter};
+use railhead::http::extract::batch::table::TableBody;
+use railhead::http::extract::json::read_strict;
 use serde_json::{Value, json};
 
 /// A case in small, so that a table can fill every kind of member.

@@ -2,56 +2,20 @@
 //!
 //! Handlers translate: they read a request, call [`Jobs`] and answer. Nothing is computed here.
 
-mod accept;
-mod access;
-mod batch_body;
-mod batch_results;
-mod batches;
-pub mod body;
-mod caching;
-mod carrying;
-mod cases;
-mod cells;
-mod coding;
-mod connections;
-mod crowds;
-pub mod elements;
-mod error;
-mod events;
-mod fields;
-mod formats;
-mod guard;
-mod headers;
-mod health;
-mod job;
-mod jobs;
-mod json_weight;
-mod memory;
-mod methods;
-mod metrics;
-mod openapi;
+mod contract;
+mod dto;
+pub mod extract;
+mod layers;
+mod limits;
 mod options;
-mod picture;
-mod places;
-mod plot;
 mod problem;
-mod problems;
-mod process;
-mod query;
-mod remarks;
-mod resultants;
-mod results;
-mod shares;
-mod spans;
-pub mod table_body;
-mod trace;
-mod unread;
-mod wishes;
-mod write_limit;
-mod zones;
+mod render;
+mod routes;
+mod server;
+mod state;
 
 use axum::Router;
-use axum::extract::{DefaultBodyLimit, FromRef};
+use axum::extract::DefaultBodyLimit;
 use axum::http::Uri;
 use axum::middleware::{from_fn, from_fn_with_state};
 use axum::response::Redirect;
@@ -62,29 +26,28 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
-use crate::http::access::{Access, Unscoped};
-use crate::http::crowds::Crowds;
-use crate::http::error::{ApiError, Kind};
-use crate::http::memory::Memory;
-use crate::http::metrics::Metrics;
+use crate::http::extract::accept;
+use crate::http::layers::metrics::Metrics;
+use crate::http::layers::{
+    compression, etag, metrics, origin_guard, otel, request_log, security_headers,
+};
+use crate::http::limits::holding_body;
+use crate::http::problem::error::{self, ApiError};
+use crate::http::problem::kinds::Kind;
+use crate::http::routes::service::metrics as service_metrics;
+use crate::http::routes::service::{health, methods, problems, remarks};
+use crate::http::routes::{
+    batch_results, batches, cases, events, fields, jobs, plots, resultants, results, zones,
+};
+use crate::http::server::drain_body;
+use crate::http::state::AppState;
 use crate::jobs::Jobs;
 
-pub use crate::http::access::Peer;
-pub use crate::http::connections::serve;
-pub use crate::http::headers::allow_origins;
-pub use crate::http::openapi::openapi_json;
+pub use crate::http::contract::openapi_json;
+pub use crate::http::layers::security_headers::allow_origins;
 pub use crate::http::options::HttpOptions;
-
-/// What every handler can reach.
-#[derive(Clone, FromRef)]
-struct Shared {
-    unscoped: Unscoped,
-    access: Access,
-    options: HttpOptions,
-    crowds: Crowds,
-    memory: Memory,
-    metrics: Metrics,
-}
+pub use crate::http::server::connection::Peer;
+pub use crate::http::server::listener::serve;
 
 /// The whole API, ready to be served.
 pub fn router(jobs: Jobs, options: HttpOptions) -> Router {
@@ -107,8 +70,11 @@ pub fn routers(
     let probes = probes
         .fallback(|uri: Uri| async move { error::unknown_route(uri.path()) })
         .layer(from_fn(error::name_instance))
-        .with_state(Shared::new(jobs.clone(), alone, metrics.clone()));
-    [api(jobs, options, metrics), headers::secure(probes)]
+        .with_state(AppState::new(jobs.clone(), alone, metrics.clone()));
+    [
+        api(jobs, options, metrics),
+        security_headers::secure(probes),
+    ]
 }
 
 fn api(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> Router {
@@ -126,49 +92,39 @@ fn api(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> Router {
         .method_not_allowed_fallback(method_not_allowed)
         .layer(DefaultBodyLimit::max(options.body_max_bytes))
         .layer(RequestDecompressionLayer::new().gzip(true).zstd(true))
-        .layer(from_fn_with_state(options.clone(), coding::limit_packed))
-        .layer(CatchPanicLayer::custom(trace::answer_panic))
-        .layer(from_fn(carrying::hold))
-        .layer(from_fn(guard::admit))
+        .layer(from_fn_with_state(
+            options.clone(),
+            compression::limit_packed,
+        ))
+        .layer(CatchPanicLayer::custom(request_log::answer_panic))
+        .layer(from_fn(holding_body::hold))
+        .layer(from_fn(origin_guard::admit))
         .layer(from_fn(error::name_instance))
-        .layer(coding::packing())
-        .layer(from_fn(caching::complete))
+        .layer(compression::packing())
+        .layer(from_fn(etag::complete))
         .layer(from_fn_with_state(metrics.clone(), metrics::count));
-    let router = spans::trace(router, jobs.tracer())
-        .layer(trace::span_layer())
-        .layer(from_fn(trace::carry_request_id))
-        .layer(from_fn(unread::read_away))
-        .with_state(Shared::new(jobs, options, metrics));
-    headers::secure(router)
-}
-
-impl Shared {
-    fn new(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> Shared {
-        Shared {
-            access: Access::new(&jobs, &options),
-            crowds: Crowds::new(&options),
-            memory: Memory::new(&options),
-            unscoped: Unscoped(jobs),
-            options,
-            metrics,
-        }
-    }
+    let router = otel::trace(router, jobs.tracer())
+        .layer(request_log::span_layer())
+        .layer(from_fn(request_log::carry_request_id))
+        .layer(from_fn(drain_body::read_away))
+        .with_state(AppState::new(jobs, options, metrics));
+    security_headers::secure(router)
 }
 
 /// Every documented route, in the order of the contract.
-fn resources() -> OpenApiRouter<Shared> {
-    let changing = OpenApiRouter::with_openapi(openapi::head())
+fn resources() -> OpenApiRouter<AppState> {
+    let changing = OpenApiRouter::with_openapi(contract::head())
         .routes(routes!(jobs::look, jobs::delete))
         .routes(routes!(batches::look, batches::delete))
         .routes(routes!(methods::methods))
         .routes(routes!(remarks::remarks))
-        .route_layer(from_fn(caching::changing));
-    let changing = openapi::conditional(changing);
+        .route_layer(from_fn(etag::changing));
+    let changing = contract::conditional(changing);
     let finished = OpenApiRouter::new()
         .routes(routes!(jobs::case))
         .routes(routes!(results::result))
-        .route_layer(from_fn(caching::finished));
-    let finished = openapi::conditional(finished);
+        .route_layer(from_fn(etag::finished));
+    let finished = contract::conditional(finished);
     let v1 = changing
         .merge(finished)
         .routes(routes!(jobs::submit, jobs::list))
@@ -186,14 +142,14 @@ fn resources() -> OpenApiRouter<Shared> {
         .routes(routes!(fields::tractions))
         .routes(routes!(fields::pressure))
         .routes(routes!(fields::slip))
-        .routes(routes!(plot::svg))
-        .routes(routes!(plot::png))
-        .route_layer(from_fn(caching::finished));
-    let parts = openapi::conditional(parts);
+        .routes(routes!(plots::svg))
+        .routes(routes!(plots::png))
+        .route_layer(from_fn(etag::finished));
+    let parts = contract::conditional(parts);
     let contract = OpenApiRouter::new()
-        .routes(routes!(openapi::contract))
-        .route_layer(from_fn(caching::changing));
-    let contract = openapi::conditional(contract);
+        .routes(routes!(contract::contract))
+        .route_layer(from_fn(etag::changing));
+    let contract = contract::conditional(contract);
     v1.merge(parts)
         .routes(routes!(batch_results::results))
         .routes(routes!(events::job))
@@ -203,11 +159,11 @@ fn resources() -> OpenApiRouter<Shared> {
 }
 
 /// What is asked every few seconds, of a port of its own if there is one.
-fn probes() -> OpenApiRouter<Shared> {
+fn probes() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
         .routes(routes!(health::alive))
         .routes(routes!(health::ready))
-        .routes(routes!(metrics::metrics))
+        .routes(routes!(service_metrics::metrics))
 }
 
 async fn method_not_allowed(method: axum::http::Method, uri: Uri) -> ApiError {

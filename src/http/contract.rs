@@ -1,0 +1,254 @@
+//! The contract: an OpenAPI 3.1 document made from the handlers and their types, with the examples of `api/examples`.
+
+use std::sync::LazyLock;
+
+use axum::http::header;
+use axum::response::{IntoResponse, Response};
+use serde_json::Value;
+use utoipa::OpenApi;
+use utoipa::openapi::RefOr;
+use utoipa::openapi::example::ExampleBuilder;
+use utoipa::openapi::path::{ParameterBuilder, ParameterIn};
+use utoipa::openapi::schema::Type;
+use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement, SecurityScheme};
+use utoipa::openapi::{HeaderBuilder, ObjectBuilder, Required, ResponseBuilder};
+use utoipa_axum::router::OpenApiRouter;
+
+use crate::http::dto::problem::Problem;
+use crate::http::problem::catalogue::describe_also;
+use crate::http::problem::kinds::Kind;
+use crate::http::resources;
+
+#[derive(OpenApi)]
+#[openapi(
+    info(
+        title = "railhead",
+        description = "Rolling-contact stress service: describe how two bodies touch, press and roll, and get tractions, stick and slip zones and forces.\n\nUnits are part of every name: mm, N, MPa; creepages are dimensionless, spin is in 1/mm. x is along rolling, y to the left, z up; forces and tractions act on the lower body. Times are RFC 3339 in UTC. Every failure is a problem (RFC 9457) with a `type` that explains itself.",
+        license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
+    ),
+    tags(
+        (name = "jobs", description = "Submit cases and follow them"),
+        (name = "batches", description = "Many cases at once"),
+        (name = "results", description = "What came out, part by part"),
+        (name = "cases", description = "What can be asked"),
+        (name = "service", description = "State of the service, its problems and this document")
+    ),
+    components(schemas(Problem))
+)]
+struct Head;
+
+/// The part of the document that no route carries.
+pub fn head() -> utoipa::openapi::OpenApi {
+    Head::openapi()
+}
+
+/// Documents that every `GET` of these routes answers conditional requests.
+pub fn conditional<S: Clone + Send + Sync + 'static>(
+    mut routes: OpenApiRouter<S>,
+) -> OpenApiRouter<S> {
+    let text = || Some(ObjectBuilder::new().schema_type(Type::String).build());
+    for item in routes.get_openapi_mut().paths.paths.values_mut() {
+        let Some(operation) = &mut item.get else {
+            continue;
+        };
+        let given = ParameterBuilder::new()
+            .name("If-None-Match")
+            .parameter_in(ParameterIn::Header)
+            .required(Required::False)
+            .description(Some("Tags of answers that the client has"))
+            .schema(text());
+        operation
+            .parameters
+            .get_or_insert_default()
+            .push(given.build().into());
+        let responses = &mut operation.responses.responses;
+        if let Some(RefOr::T(found)) = responses.get_mut("200") {
+            let tag = HeaderBuilder::new()
+                .schema(text())
+                .description(Some("Digest of the answer, for `If-None-Match`"));
+            found.headers.insert("ETag".to_owned(), tag.build().into());
+        }
+        let unchanged = ResponseBuilder::new().description("The client has this answer already");
+        responses.insert("304".to_owned(), unchanged.build().into());
+    }
+    routes
+}
+
+/// Cases that the document shows: name, summary, text.
+const EXAMPLES: [(&str, &str, &str); 12] = [
+    (
+        "hertz-steel",
+        "A wheel on a rail by its radii, with both creepages and spin",
+        include_str!("../../api/examples/hertz-steel.case.json"),
+    ),
+    (
+        "spin",
+        "An ellipse with lateral creepage and spin",
+        include_str!("../../api/examples/spin.case.json"),
+    ),
+    (
+        "uic60-crown",
+        "A wheel on a UIC60-like crown of arcs, as a measured gap: region and pressure are found",
+        include_str!("../../api/examples/uic60-crown.case.json"),
+    ),
+    (
+        "area-132re-crown",
+        "A coned wheel on an AREA-132RE-like crown, touching beside the middle",
+        include_str!("../../api/examples/area-132re-crown.case.json"),
+    ),
+    (
+        "two-patches",
+        "A gap on a grid with two contact patches",
+        include_str!("../../api/examples/two-patches.case.json"),
+    ),
+    (
+        "wheel-rail",
+        "A wheel on a rail by their cross-sections, under a vertical force, with the motion of the wheelset",
+        include_str!("../../api/examples/wheel-rail.case.json"),
+    ),
+    (
+        "wheel-rail-flange",
+        "A wheel on a rail by their cross-sections, touching at the gauge corner and at the flange",
+        include_str!("../../api/examples/wheel-rail-flange.case.json"),
+    ),
+    (
+        "pressure-grid",
+        "A given pressure over a patch of any shape",
+        include_str!("../../api/examples/pressure-grid.case.json"),
+    ),
+    (
+        "sweep",
+        "A creep curve: many motions on the same patch",
+        include_str!("../../api/examples/sweep.case.json"),
+    ),
+    (
+        "paper-figure-3",
+        "Slip and stick under longitudinal creepage and several spins, as figure 3 of Liu and Hsu, on a patch without symmetry",
+        include_str!("../../api/examples/paper-figure-3.case.json"),
+    ),
+    (
+        "paper-figure-4",
+        "Slip and stick under pure spin, down to separate poles, as their figure 4",
+        include_str!("../../api/examples/paper-figure-4.case.json"),
+    ),
+    (
+        "paper-figure-5",
+        "Force and moment against longitudinal creepage, as their figure 5",
+        include_str!("../../api/examples/paper-figure-5.case.json"),
+    ),
+];
+
+static DOCUMENT: LazyLock<String> = LazyLock::new(|| {
+    let (_, mut document) = resources().split_for_parts();
+    for path in ["/v1/jobs", "/v1/cases/check"] {
+        add_examples(&mut document, path);
+    }
+    add_batches(&mut document);
+    require_keys(&mut document);
+    let text = document.to_pretty_json();
+    // Only a map with keys that are not strings cannot be written; the document has none.
+    text.map(|text| text + "\n").unwrap_or_default()
+});
+
+/// The contract as JSON text, ending with a line break; the same as `api/openapi.json`.
+#[must_use]
+pub fn openapi_json() -> String {
+    DOCUMENT.clone()
+}
+
+/// Says of every operation on what belongs to a tenant that it may need a key, and that jobs and batches may expire.
+fn require_keys(document: &mut utoipa::openapi::OpenApi) {
+    let scheme = HttpBuilder::new()
+        .scheme(HttpAuthScheme::Bearer)
+        .description(Some(
+            "An API key; not needed where the service lets anybody in, as it does on loopback",
+        ))
+        .build();
+    let components = document.components.get_or_insert_default();
+    components.add_security_scheme("key", SecurityScheme::Http(scheme));
+    for (path, item) in &mut document.paths.paths {
+        let operations = [&mut item.get, &mut item.post, &mut item.delete];
+        for operation in operations.into_iter().filter_map(Option::as_mut) {
+            if !matches!(path.as_str(), "/healthz" | "/readyz" | "/metrics") {
+                describe_also(&mut operation.responses.responses, &[Kind::Overloaded]);
+            }
+            let tags = operation.tags.as_deref().unwrap_or_default();
+            let open = tags.iter().any(|tag| tag == "service");
+            let metrics = operation.operation_id.as_deref() == Some("get_metrics");
+            let lists = ["list_methods", "list_remarks"].map(Some);
+            if (open && !metrics) || lists.contains(&operation.operation_id.as_deref()) {
+                continue;
+            }
+            operation.security = Some(vec![
+                SecurityRequirement::new("key", Vec::<String>::new()),
+                SecurityRequirement::default(),
+            ]);
+            let mut kinds = vec![Kind::Unauthorized, Kind::TooManyRequests, Kind::BadHeader];
+            kinds.extend([Kind::HostNotAllowed, Kind::CrossSite]);
+            if path.contains("{id}") {
+                kinds.push(Kind::Expired);
+            }
+            // A locked or failing disk can meet every request.
+            kinds.extend([Kind::StorageUnwritable, Kind::StorageFull]);
+            describe_also(&mut operation.responses.responses, &kinds);
+        }
+    }
+}
+
+fn add_examples(document: &mut utoipa::openapi::OpenApi, path: &str) {
+    for (name, summary, text) in EXAMPLES {
+        let Ok(value) = serde_json::from_str::<Value>(text) else {
+            continue;
+        };
+        add_example(document, path, "application/json", [name, summary], value);
+    }
+}
+
+/// Shows a batch in the forms that need nothing else.
+fn add_batches(document: &mut utoipa::openapi::OpenApi) {
+    let cases = EXAMPLES.iter().take(2);
+    let cases = cases.filter_map(|(_, _, text)| serde_json::from_str(text).ok());
+    let cases: Vec<Value> = cases.collect();
+    let lines: String = cases.iter().map(|case| format!("{case}\n")).collect();
+    let path = "/v1/batches";
+    let words = ["two", "Two cases"];
+    add_example(document, path, "application/x-ndjson", words, lines.into());
+    add_example(document, path, "application/json", words, cases.into());
+}
+
+fn add_example(
+    document: &mut utoipa::openapi::OpenApi,
+    path: &str,
+    media: &str,
+    [name, summary]: [&str; 2],
+    value: Value,
+) {
+    let item = document.paths.paths.get_mut(path);
+    let operation = item.and_then(|item| item.post.as_mut());
+    let Some(RefOr::T(body)) = operation.and_then(|operation| operation.request_body.as_mut())
+    else {
+        return;
+    };
+    let Some(RefOr::T(content)) = body.content.get_mut(media) else {
+        return;
+    };
+    let example = ExampleBuilder::new().summary(summary).value(Some(value));
+    let example = RefOr::T(example.build());
+    content.examples.insert(name.to_owned(), example);
+}
+
+/// This document.
+#[utoipa::path(
+    get,
+    path = "/openapi.json",
+    tag = "service",
+    operation_id = "get_contract",
+    responses((status = 200, description = "The contract in OpenAPI 3.1", body = Value))
+)]
+pub async fn contract() -> Response {
+    (
+        [(header::CONTENT_TYPE, "application/json")],
+        DOCUMENT.as_str(),
+    )
+        .into_response()
+}

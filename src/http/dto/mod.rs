@@ -1,0 +1,6 @@
+//! What clients read, as types of the contract.
+
+pub mod cells;
+pub mod job;
+pub mod problem;
+pub mod result;

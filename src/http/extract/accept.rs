@@ -1,0 +1,216 @@
+//! Content negotiation: JSON unless a resource offers more.
+
+use axum::extract::{Query as Pairs, Request};
+use axum::http::{HeaderMap, Uri, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+
+use crate::http::extract::query::Query;
+use crate::http::problem::error::ApiError;
+use crate::http::problem::kinds::Kind;
+
+/// Refuses requests that want something else than JSON, by `format` or because `Accept` excludes `application/json`.
+pub async fn require_json(request: Request, next: Next) -> Response {
+    let named = named(request.uri());
+    if let Some(other) = named.as_deref().filter(|name| *name != Format::Json.name()) {
+        let detail = format!("`format` is `{other}`; this resource answers `json` only");
+        return ApiError::new(Kind::NotAcceptable, detail).into_response();
+    }
+    if named.is_some() {
+        return next.run(request).await;
+    }
+    if accepts_json(request.headers()) {
+        return next.run(request).await;
+    }
+    let given: Vec<&str> = accept_values(request.headers()).collect();
+    let detail = format!(
+        "`Accept` is `{}`; this resource answers `application/json` only",
+        given.join(", ")
+    );
+    ApiError::new(Kind::NotAcceptable, detail).into_response()
+}
+
+/// A form in which something can be answered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// `application/json`.
+    Json,
+    /// `application/x-ndjson`: one JSON value per line.
+    Ndjson,
+    /// `text/csv`.
+    Csv,
+    /// NumPy's archive of arrays.
+    Npz,
+    /// Legacy VTK, binary.
+    Vtk,
+    /// A picture as SVG.
+    Svg,
+    /// A picture as PNG.
+    Png,
+    /// Server-sent events.
+    Events,
+}
+
+impl Format {
+    /// The name that `?format=` takes.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Format::Json => "json",
+            Format::Ndjson => "ndjson",
+            Format::Csv => "csv",
+            Format::Npz => "npz",
+            Format::Vtk => "vtk",
+            Format::Svg => "svg",
+            Format::Png => "png",
+            Format::Events => "events",
+        }
+    }
+
+    /// The content type of the answer.
+    #[must_use]
+    pub fn media_type(self) -> &'static str {
+        match self {
+            Format::Json => "application/json",
+            Format::Ndjson => "application/x-ndjson",
+            Format::Csv => "text/csv; charset=utf-8",
+            Format::Npz => "application/x-npz",
+            Format::Vtk => "application/x-vtk",
+            Format::Svg => "image/svg+xml",
+            Format::Png => "image/png",
+            Format::Events => "text/event-stream",
+        }
+    }
+}
+
+/// Takes the parameter `format` from a query.
+pub fn named_format(query: &mut Query, offered: &[Format]) -> Option<Format> {
+    let names: Vec<String> = offered
+        .iter()
+        .map(|format| format!("`{}`", format.name()))
+        .collect();
+    query.take("format", &names.join(", "), |text| {
+        offered.iter().copied().find(|format| format.name() == text)
+    })
+}
+
+/// The format to answer in: the one that was named, else the one that `Accept` likes best, the first one offered among
+/// equals.
+///
+/// # Errors
+/// `not-acceptable`: `Accept` excludes all that are offered.
+pub fn choose(
+    headers: &HeaderMap,
+    named: Option<Format>,
+    offered: &[Format],
+) -> Result<Format, ApiError> {
+    if let Some(format) = named {
+        return Ok(format);
+    }
+    let essence = |format: Format| format.media_type().split(';').next().unwrap_or_default();
+    let mut best = None;
+    for format in offered.iter().copied() {
+        let quality = quality(headers, essence(format));
+        if quality > best.map_or(0.0, |(_, quality)| quality) {
+            best = Some((format, quality));
+        }
+    }
+    best.map(|(format, _)| format).ok_or_else(|| {
+        let offered: Vec<String> = offered
+            .iter()
+            .map(|format| format!("`{}`", essence(*format)))
+            .collect();
+        let given: Vec<&str> = accept_values(headers).collect();
+        let detail = format!(
+            "`Accept` is `{}`; this resource answers {}",
+            given.join(", "),
+            offered.join(", ")
+        );
+        ApiError::new(Kind::NotAcceptable, detail)
+    })
+}
+
+/// What `format` is in a query that is not read otherwise.
+fn named(uri: &Uri) -> Option<String> {
+    let Pairs(pairs) = Pairs::<Vec<(String, String)>>::try_from_uri(uri).ok()?;
+    let format = pairs.into_iter().find(|(name, _)| name == "format");
+    format.map(|(_, value)| value)
+}
+
+/// Does `Accept` allow `application/json`?
+fn accepts_json(headers: &HeaderMap) -> bool {
+    quality(headers, "application/json") > 0.0
+}
+
+/// How much `Accept` likes a media type (RFC 9110, section 12.5.1), 0 to 1. The most specific range decides; without
+/// the header everything is liked.
+fn quality(headers: &HeaderMap, media_type: &str) -> f64 {
+    if !headers.contains_key(header::ACCEPT) {
+        return 1.0;
+    }
+    let family = media_type.split('/').next().unwrap_or_default();
+    let mut decision = (0, 0.0);
+    for range in accept_values(headers).flat_map(|value| value.split(',')) {
+        let mut parts = range.split(';').map(str::trim);
+        let range = parts.next().unwrap_or_default().to_ascii_lowercase();
+        let specificity = if range == media_type {
+            3
+        } else if range.strip_suffix("/*") == Some(family) {
+            2
+        } else if range == "*/*" {
+            1
+        } else {
+            continue;
+        };
+        let quality = parts
+            .filter_map(|part| part.split_once('='))
+            .find(|(name, _)| name.trim().eq_ignore_ascii_case("q"))
+            .map_or(1.0, |(_, value)| value.trim().parse().unwrap_or(0.0));
+        if specificity >= decision.0 {
+            decision = (specificity, quality);
+        }
+    }
+    decision.1
+}
+
+fn accept_values(headers: &HeaderMap) -> impl Iterator<Item = &str> {
+    headers
+        .get_all(header::ACCEPT)
+        .iter()
+        .map(|value| value.to_str().unwrap_or("?"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_most_specific_range_decides() {
+        let accepts = |value: &str| {
+            let mut headers = HeaderMap::new();
+            headers.insert(header::ACCEPT, value.parse().unwrap());
+            accepts_json(&headers)
+        };
+        for value in [
+            "*/*",
+            "application/*",
+            "application/json",
+            "text/html, */*;q=0.8",
+            "Application/JSON;q=0.1",
+            "text/csv;q=1, application/json; q=0.5",
+        ] {
+            assert!(accepts(value), "{value} allows JSON");
+        }
+        for value in [
+            "text/csv",
+            "application/json;q=0",
+            "*/*, application/json;q=0",
+            "application/xml, text/*",
+            "application/problem+json",
+            "",
+        ] {
+            assert!(!accepts(value), "{value} excludes JSON");
+        }
+        assert!(accepts_json(&HeaderMap::new()));
+    }
+}

@@ -1,0 +1,48 @@
+//! The ids of jobs and batches in paths.
+
+use axum::extract::{FromRequestParts, Path};
+use axum::http::request::Parts;
+use uuid::Uuid;
+
+use crate::http::problem::error::ApiError;
+use crate::http::problem::kinds::Kind;
+
+/// The id in the path. A text that is no id names no job, so it is answered like an unknown one.
+#[derive(Debug, Clone, Copy)]
+pub struct JobId(pub Uuid);
+
+impl<S: Send + Sync> FromRequestParts<S> for JobId {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+        let id = read_id(parts, state, Kind::JobNotFound, "job").await?;
+        tracing::Span::current().record("job", tracing::field::display(id));
+        Ok(JobId(id))
+    }
+}
+
+/// The id of a batch in the path.
+#[derive(Debug, Clone, Copy)]
+pub struct BatchId(pub Uuid);
+
+impl<S: Send + Sync> FromRequestParts<S> for BatchId {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+        let id = read_id(parts, state, Kind::BatchNotFound, "batch").await?;
+        Ok(BatchId(id))
+    }
+}
+
+async fn read_id<S: Send + Sync>(
+    parts: &mut Parts,
+    state: &S,
+    kind: Kind,
+    what: &str,
+) -> Result<Uuid, ApiError> {
+    let Path(text) = Path::<String>::from_request_parts(parts, state)
+        .await
+        .map_err(|rejection| ApiError::new(kind, rejection.body_text()))?;
+    Uuid::try_parse(&text)
+        .map_err(|_| ApiError::new(kind, format!("`{text}` is no {what} id; ids are UUIDs")))
+}

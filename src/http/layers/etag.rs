@@ -1,0 +1,209 @@
+//! What a client may keep and for how long: entity tags, conditional requests, `Cache-Control`.
+//!
+//! A tag is a digest of the body, so it is a strong one (RFC 9110, section 8.8.3); that of a result, which never changes, a digest
+//! of what it is asked by. Compressed forms of a body have tags of their own:
+//! the same digest with the coding behind it.
+
+use axum::body::Body;
+use axum::extract::{Query as Pairs, Request};
+use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, Uri, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+use http_body_util::BodyExt;
+use uuid::Uuid;
+
+use crate::http::extract::accept::Format;
+use crate::http::problem::error::ApiError;
+use crate::jobs::Jobs;
+use crate::jobs::job::State;
+
+/// Results never change, but they can be deleted.
+const FINISHED: HeaderValue = HeaderValue::from_static("private, max-age=3600");
+/// May be kept, but has to be asked for again each time.
+const CHANGING: HeaderValue = HeaderValue::from_static("private, no-cache");
+/// Everything else.
+const FLEETING: HeaderValue = HeaderValue::from_static("no-store");
+
+/// Codings that a tag may end with.
+const CODINGS: [&str; 2] = ["-gzip", "-zstd"];
+
+/// Layer around resources that never change once they are there.
+pub async fn finished(request: Request, next: Next) -> Response {
+    tag(request, next, FINISHED).await
+}
+
+/// Layer around resources that change.
+pub async fn changing(request: Request, next: Next) -> Response {
+    tag(request, next, CHANGING).await
+}
+
+/// Outermost of the layers here, around compression: nothing is kept unless something was said about it, and the tag of a
+/// compressed body names its coding.
+pub async fn complete(request: Request, next: Next) -> Response {
+    let mut response = next.run(request).await;
+    let headers = response.headers_mut();
+    if !headers.contains_key(header::CACHE_CONTROL) && !headers.contains_key(header::ETAG) {
+        headers.insert(header::CACHE_CONTROL, FLEETING);
+    }
+    let coding = headers
+        .get(header::CONTENT_ENCODING)
+        .and_then(|coding| coding.to_str().ok());
+    let tag = headers
+        .get(header::ETAG)
+        .and_then(|tag| tag.to_str().ok()?.strip_suffix('"'));
+    if let (Some(coding), Some(tag)) = (coding, tag)
+        && let Ok(tag) = HeaderValue::from_str(&format!("{tag}-{coding}\""))
+    {
+        headers.insert(header::ETAG, tag);
+    }
+    response
+}
+
+/// What the result of a job, or a part of it, is known by.
+#[derive(Debug)]
+pub enum Known {
+    /// The client has it: this is the answer.
+    Unchanged(Response),
+    /// It has to be made, and gets this tag.
+    Tag(String),
+}
+
+impl Known {
+    /// Compares what a client has with what an address stands for, before anything is loaded or made. Results never
+    /// change, so the job, the address, the form and the version of the program say all. A tag that stands for anything
+    /// (`*`) is left to [`finished`]: whether there is something only the work itself can say.
+    ///
+    /// # Errors
+    /// There is no such job.
+    pub async fn of(
+        jobs: &Jobs,
+        id: Uuid,
+        uri: &Uri,
+        headers: &HeaderMap,
+        format: Format,
+    ) -> Result<Known, ApiError> {
+        let job = jobs.get(id).await?;
+        let query = Pairs::<Vec<(String, String)>>::try_from_uri(uri);
+        let mut query = query.map_or_else(|_| Vec::new(), |Pairs(pairs)| pairs);
+        query.sort();
+        let parts = (id, job.version, uri.path(), query, format.name());
+        let text = format!("{} {parts:?}", env!("CARGO_PKG_VERSION"));
+        let digest = digest(text.as_bytes());
+        if job.state != State::Succeeded {
+            return Ok(Known::Tag(digest));
+        }
+        let Some(tag) = matching(headers, &digest).filter(|_| !asks_for_any(headers)) else {
+            return Ok(Known::Tag(digest));
+        };
+        let head = [
+            (header::ETAG, tag),
+            (header::CACHE_CONTROL, FINISHED),
+            (header::VARY, HeaderValue::from_static("Accept")),
+        ];
+        Ok(Known::Unchanged(
+            (StatusCode::NOT_MODIFIED, head).into_response(),
+        ))
+    }
+}
+
+/// The answer with its tag.
+pub fn tagged(tag: &str, mut response: Response) -> Response {
+    if let Ok(tag) = HeaderValue::from_str(&format!("\"{tag}\"")) {
+        response.headers_mut().insert(header::ETAG, tag);
+    }
+    response
+}
+
+async fn tag(request: Request, next: Next, lifetime: HeaderValue) -> Response {
+    let reading = matches!(*request.method(), Method::GET | Method::HEAD);
+    let known = request.headers().clone();
+    let response = next.run(request).await;
+    if !reading || response.status() != StatusCode::OK {
+        return response;
+    }
+    let (mut parts, body) = response.into_parts();
+    if parts.headers.contains_key(header::ETAG) {
+        parts.headers.insert(header::CACHE_CONTROL, lifetime);
+        if asks_for_any(&known) {
+            parts.status = StatusCode::NOT_MODIFIED;
+            parts.headers.remove(header::CONTENT_TYPE);
+            parts.headers.remove(header::CONTENT_LENGTH);
+            return Response::from_parts(parts, Body::empty());
+        }
+        return Response::from_parts(parts, body);
+    }
+    // The bodies of these resources are in memory already.
+    let body = match body.collect().await {
+        Ok(body) => body.to_bytes(),
+        Err(error) => return ApiError::internal(&error).into_response(),
+    };
+    parts.headers.insert(header::CACHE_CONTROL, lifetime);
+    let digest = digest(&body);
+    if let Some(known) = matching(&known, &digest) {
+        parts.status = StatusCode::NOT_MODIFIED;
+        parts.headers.insert(header::ETAG, known);
+        parts.headers.remove(header::CONTENT_TYPE);
+        parts.headers.remove(header::CONTENT_LENGTH);
+        return Response::from_parts(parts, Body::empty());
+    }
+    if let Ok(tag) = HeaderValue::from_str(&format!("\"{digest}\"")) {
+        parts.headers.insert(header::ETAG, tag);
+    }
+    Response::from_parts(parts, Body::from(body))
+}
+
+/// Does `If-None-Match` stand for whatever there is?
+fn asks_for_any(headers: &HeaderMap) -> bool {
+    let mut values = headers.get_all(header::IF_NONE_MATCH).iter();
+    values.any(|value| value.as_bytes() == b"*")
+}
+
+fn digest(body: &[u8]) -> String {
+    // 128 bits are enough where nobody gains by a collision with an own body.
+    blake3::hash(body).to_hex()[..32].to_owned()
+}
+
+/// The tag among those of `If-None-Match` that stands for this digest, in whatever coding; compared weakly (RFC 9110,
+/// section 13.1.2).
+fn matching(headers: &HeaderMap, digest: &str) -> Option<HeaderValue> {
+    let values = headers.get_all(header::IF_NONE_MATCH).iter();
+    let given = values.filter_map(|value| value.to_str().ok());
+    let mut tags = given.flat_map(|value| value.split(',')).map(str::trim);
+    let found = tags.find(|tag| {
+        let inner = tag.trim_start_matches("W/").trim_matches('"');
+        let plain = CODINGS
+            .iter()
+            .find_map(|coding| inner.strip_suffix(coding))
+            .unwrap_or(inner);
+        *tag == "*" || plain == digest
+    })?;
+    let own = format!("\"{digest}\"");
+    HeaderValue::from_str(if found == "*" { &own } else { found }).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tags_match_weakly_and_in_every_coding() {
+        let matches = |value: &'static str| {
+            let mut headers = HeaderMap::new();
+            headers.insert(header::IF_NONE_MATCH, HeaderValue::from_static(value));
+            matching(&headers, "abc").is_some()
+        };
+        for value in [
+            "*",
+            "\"abc\"",
+            "W/\"abc\"",
+            "\"x\", \"abc-zstd\"",
+            "\"abc-gzip\"",
+        ] {
+            assert!(matches(value), "{value}");
+        }
+        for value in ["\"ab\"", "\"abcd\"", "", "\"abc-br\""] {
+            assert!(!matches(value), "{value}");
+        }
+        assert!(matching(&HeaderMap::new(), "abc").is_none());
+    }
+}

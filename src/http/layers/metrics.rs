@@ -1,0 +1,122 @@
+//! Counts requests and their times, by route, method and status.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use axum::extract::{MatchedPath, Request, State};
+use axum::http::Method;
+use axum::middleware::Next;
+use axum::response::Response;
+use prometheus_client::encoding::EncodeLabelSet;
+use prometheus_client::encoding::text::encode;
+use prometheus_client::metrics::counter::Counter;
+use prometheus_client::metrics::family::Family;
+use prometheus_client::metrics::histogram::Histogram;
+use prometheus_client::registry::Registry;
+
+use crate::http::layers::process_metrics::Process;
+use crate::jobs::Jobs;
+
+/// Upper bounds of times to the head of an answer in s; `Prefer: wait` may take 60 of them.
+const REQUEST_SECONDS: [f64; 13] = [
+    0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 1.0, 2.5, 10.0, 60.0,
+];
+
+/// The label of requests for addresses that do not exist: clients could make up any number of those.
+const UNMATCHED: &str = "unmatched";
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+struct RequestLabel {
+    method: &'static str,
+    route: String,
+    status: u16,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+struct RouteLabel {
+    method: &'static str,
+    route: String,
+}
+
+/// What is counted about requests, and the registry of everything that is counted; clones share it.
+#[derive(Debug, Clone)]
+pub struct Metrics {
+    requests: Family<RequestLabel, Counter>,
+    seconds: Family<RouteLabel, Histogram>,
+    registry: Arc<Registry>,
+}
+
+impl Metrics {
+    /// A registry with the figures of the jobs room and those of requests.
+    #[must_use]
+    pub fn new(jobs: &Jobs, dropped_lines: fn() -> u64) -> Metrics {
+        let mut registry = Registry::with_prefix("railhead");
+        jobs.register_metrics(&mut registry);
+        let requests = Family::default();
+        let seconds: Family<RouteLabel, Histogram> =
+            Family::new_with_constructor(|| Histogram::new(REQUEST_SECONDS));
+        registry.register(
+            "http_requests",
+            "Requests answered, by method, route and status",
+            Family::clone(&requests),
+        );
+        registry.register(
+            "http_request_seconds",
+            "Time from a request to the head of its answer, waits that the client asked for included",
+            Family::clone(&seconds),
+        );
+        registry.register_collector(Box::new(Process { dropped_lines }));
+        Metrics {
+            requests,
+            seconds,
+            registry: Arc::new(registry),
+        }
+    }
+
+    /// All figures as OpenMetrics text, behind what is there already.
+    ///
+    /// # Errors
+    /// As the writing of text.
+    pub fn write(&self, text: &mut String) -> std::fmt::Result {
+        encode(text, &self.registry)
+    }
+}
+
+/// Counts a request; layer around all routes.
+pub async fn count(State(metrics): State<Metrics>, request: Request, next: Next) -> Response {
+    let matched = request.extensions().get::<MatchedPath>();
+    let route = matched.map_or(UNMATCHED, MatchedPath::as_str).to_owned();
+    let method = known(request.method());
+    let start = Instant::now();
+    let response = next.run(request).await;
+    let route = if response.status() == axum::http::StatusCode::METHOD_NOT_ALLOWED {
+        UNMATCHED.to_owned()
+    } else {
+        route
+    };
+    metrics
+        .requests
+        .get_or_create(&RequestLabel {
+            method,
+            route: route.clone(),
+            status: response.status().as_u16(),
+        })
+        .inc();
+    metrics
+        .seconds
+        .get_or_create(&RouteLabel { method, route })
+        .observe(start.elapsed().as_secs_f64());
+    response
+}
+
+/// The methods that the service knows; a client may send any word.
+fn known(method: &Method) -> &'static str {
+    match *method {
+        Method::GET => "GET",
+        Method::HEAD => "HEAD",
+        Method::POST => "POST",
+        Method::DELETE => "DELETE",
+        Method::OPTIONS => "OPTIONS",
+        _ => "other",
+    }
+}

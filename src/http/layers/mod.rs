@@ -1,0 +1,11 @@
+//! What stands around every request; one layer is one file. `mod.rs` of the room says in which order.
+
+pub mod auth;
+pub mod compression;
+pub mod etag;
+pub mod metrics;
+pub mod origin_guard;
+pub mod otel;
+pub mod process_metrics;
+pub mod request_log;
+pub mod security_headers;

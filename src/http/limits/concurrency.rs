@@ -1,0 +1,68 @@
+//! How many requests of what kind may be under way: in all, and of one tenant.
+
+use crate::http::limits::shares::{Share, Shares};
+use crate::http::options::HttpOptions;
+use crate::http::problem::error::ApiError;
+use crate::http::problem::kinds::Kind;
+
+/// Requests, streams and waits under way; clones share them.
+#[derive(Debug, Clone)]
+pub struct Crowds {
+    requests: Shares,
+    streams: Shares,
+    waits: Shares,
+}
+
+impl Crowds {
+    /// The limits of these options.
+    #[must_use]
+    pub fn new(options: &HttpOptions) -> Crowds {
+        Crowds {
+            requests: Shares::new(options.connections_max, options.tenant_requests_max),
+            streams: Shares::new(options.streams_max, options.tenant_streams_max),
+            waits: Shares::new(options.waits_max, options.tenant_waits_max),
+        }
+    }
+
+    /// A place for one more request of a tenant.
+    ///
+    /// # Errors
+    /// `too-many-requests`: there are as many as there may be.
+    pub fn request(&self, tenant: &str) -> Result<Share, ApiError> {
+        self.requests.try_take(tenant, 1).ok_or_else(|| {
+            too_many(
+                "the tenant has as many requests under way as it may (`--tenant-requests-max`)",
+            )
+        })
+    }
+
+    /// A place for one more stream of events of a tenant.
+    ///
+    /// # Errors
+    /// As [`Crowds::request`].
+    pub fn stream(&self, tenant: &str) -> Result<Share, ApiError> {
+        self.streams.try_take(tenant, 1).ok_or_else(|| {
+            too_many("as many streams of events are open as there may be (`--tenant-streams-max`, `--streams-max`)")
+        })
+    }
+
+    /// A place for one more request that waits. Without one it is answered at once, for a wait is a wish only.
+    #[must_use]
+    pub fn wait(&self, tenant: &str) -> Option<Share> {
+        self.waits.try_take(tenant, 1)
+    }
+
+    /// The same where the wait decides what is answered.
+    ///
+    /// # Errors
+    /// As [`Crowds::request`].
+    pub fn require_wait(&self, tenant: &str) -> Result<Share, ApiError> {
+        self.wait(tenant).ok_or_else(|| {
+            too_many("as many requests wait as there may be (`--tenant-waits-max`, `--waits-max`)")
+        })
+    }
+}
+
+fn too_many(detail: &str) -> ApiError {
+    ApiError::new(Kind::TooManyRequests, detail)
+}

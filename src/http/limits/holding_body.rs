@@ -1,0 +1,70 @@
+//! A body that holds something as long as it is read: a place, a share of memory.
+
+use std::pin::Pin;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::task::{Context, Poll};
+
+use axum::body::{Body, Bytes, HttpBody};
+use axum::extract::Request;
+use axum::middleware::Next;
+use axum::response::Response;
+use hyper::body::{Frame, SizeHint};
+
+use crate::http::limits::shares::Share;
+
+/// The body with what it holds.
+struct Carrying<T>(Body, T);
+
+/// The same answer; `held` is dropped with its body.
+pub fn carrying<T: Send + Unpin + 'static>(response: Response, held: T) -> Response {
+    response.map(|body| Body::new(Carrying(body, held)))
+}
+
+impl<T: Unpin> HttpBody for Carrying<T> {
+    type Data = Bytes;
+    type Error = axum::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
+        Pin::new(&mut self.0).poll_frame(context)
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.0.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.0.size_hint()
+    }
+}
+
+/// What a request holds until its answer has been handed over; in its extensions.
+#[derive(Debug, Clone, Default)]
+pub struct Held(Arc<Mutex<Vec<Share>>>);
+
+impl Held {
+    /// Holds this too.
+    pub fn add(&self, share: Share) {
+        self.0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .push(share);
+    }
+
+    /// Gives everything back: what the request goes on with is counted elsewhere.
+    pub fn release(&self) {
+        self.0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clear();
+    }
+}
+
+/// Layer in which requests can hold shares.
+pub async fn hold(mut request: Request, next: Next) -> Response {
+    let held = Held::default();
+    request.extensions_mut().insert(held.clone());
+    carrying(next.run(request).await, held)
+}

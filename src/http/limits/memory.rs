@@ -1,0 +1,220 @@
+//! What requests may hold in memory, and whose turn it is to compute: bodies, parsed cases and answers are counted in
+//! bytes before they come to be, and what takes long is done by few at a time.
+
+use std::sync::Arc;
+use std::thread::available_parallelism;
+use std::time::Duration;
+
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+
+use crate::http::limits::shares::{Share, Shares};
+use crate::http::options::HttpOptions;
+use crate::http::problem::error::ApiError;
+use crate::http::problem::kinds::Kind;
+
+/// Shares are counted in units of so many bytes.
+const UNIT: usize = 1 << 10;
+/// What is smaller is not counted: as many of it as there may be requests take little.
+pub const SMALL_BYTES: usize = 64 << 10;
+/// How long a request waits for memory or for its turn.
+const WITHIN: Duration = Duration::from_secs(20);
+/// What answers are called where their memory is taken.
+const ANSWERS: &str = "answers that clients have not taken yet";
+
+/// The memory and the turns of all requests; clones share them.
+#[derive(Debug, Clone)]
+pub struct Memory {
+    bodies: Shares,
+    parsed: Shares,
+    answers: Shares,
+    /// For large cases; half of the cores, so that small ones are not kept waiting.
+    large: Arc<Semaphore>,
+    small: Arc<Semaphore>,
+    /// For large grids.
+    grids: Arc<Semaphore>,
+    /// For pictures, small grids and tables, which are not kept waiting by large grids.
+    renderings: Arc<Semaphore>,
+    waiting: Shares,
+}
+
+impl Share {
+    /// Gives back what is held beyond so many bytes.
+    pub fn keep(&mut self, bytes: usize) {
+        self.keep_units(bytes.div_ceil(UNIT));
+    }
+}
+
+/// A turn to make an answer, and the memory for it.
+#[derive(Debug)]
+pub struct Rendering {
+    share: Option<Share>,
+    turn: OwnedSemaphorePermit,
+    memory: Memory,
+    tenant: String,
+}
+
+/// Memory and a turn, as long as it is held.
+#[derive(Debug, Default)]
+pub struct Room {
+    /// The memory.
+    pub share: Option<Share>,
+    /// The turn.
+    pub turn: Option<OwnedSemaphorePermit>,
+}
+
+impl Memory {
+    /// The limits of these options.
+    #[must_use]
+    pub fn new(options: &HttpOptions) -> Memory {
+        let part = |eighths: usize| {
+            let units = |bytes: usize| bytes / 8 * eighths / UNIT;
+            Shares::new(
+                units(options.memory_max_bytes),
+                units(options.tenant_memory_max_bytes),
+            )
+        };
+        let cores = available_parallelism().map_or(1, usize::from);
+        let turns = |count: usize| Arc::new(Semaphore::new(count.max(1)));
+        let waiting = options.renderings_waiting_max;
+        Memory {
+            bodies: part(1),
+            parsed: part(3),
+            answers: part(4),
+            large: turns(cores / 2),
+            small: turns(cores),
+            grids: turns(options.renderings),
+            renderings: turns(options.renderings),
+            waiting: Shares::new(waiting, waiting.div_ceil(2)),
+        }
+    }
+
+    /// Memory for a body of so many bytes.
+    ///
+    /// # Errors
+    /// `overloaded`: it is not free in time.
+    pub async fn body(&self, tenant: &str, bytes: usize) -> Result<Option<Share>, ApiError> {
+        take(&self.bodies, tenant, bytes, "the bodies of requests").await
+    }
+
+    /// Memory for a parsed case of so many bytes.
+    ///
+    /// # Errors
+    /// As [`Memory::body`].
+    pub async fn parsed(&self, tenant: &str, bytes: usize) -> Result<Option<Share>, ApiError> {
+        take(&self.parsed, tenant, bytes, "cases that are read").await
+    }
+
+    /// A turn for a case that takes so much memory.
+    ///
+    /// # Errors
+    /// `overloaded`: it does not come in time.
+    pub async fn turn(&self, bytes: usize) -> Result<OwnedSemaphorePermit, ApiError> {
+        let turns = if bytes > SMALL_BYTES {
+            &self.large
+        } else {
+            &self.small
+        };
+        in_turn(turns).await
+    }
+
+    /// Memory for an answer that is there already, without waiting: it would be held meanwhile.
+    ///
+    /// # Errors
+    /// `overloaded`: it is not free.
+    pub fn ready_answer(&self, tenant: &str, bytes: usize) -> Result<Option<Share>, ApiError> {
+        if bytes <= SMALL_BYTES {
+            return Ok(None);
+        }
+        let share = self.answers.try_take(tenant, units(bytes));
+        share.map(Some).ok_or_else(|| no_memory(ANSWERS, bytes))
+    }
+
+    /// A turn for an answer that will take so many bytes; to be had before anything is loaded for it.
+    ///
+    /// # Errors
+    /// `overloaded`: too many wait already, or too long.
+    pub async fn rendering(&self, tenant: &str, bytes: usize) -> Result<Rendering, ApiError> {
+        let waiting = self.waiting.try_take(tenant, 1).ok_or_else(|| {
+            overloaded("as many requests wait for pictures, grids and tables as there may be (`--renderings-waiting-max`)")
+        })?;
+        let share = take(&self.answers, tenant, bytes, ANSWERS).await?;
+        let turns = if bytes > SMALL_BYTES {
+            &self.grids
+        } else {
+            &self.renderings
+        };
+        let turn = in_turn(turns).await?;
+        drop(waiting);
+        Ok(Rendering {
+            share,
+            turn,
+            memory: self.clone(),
+            tenant: tenant.to_owned(),
+        })
+    }
+}
+
+impl Rendering {
+    /// Does the work off the threads that answer requests. The memory of the answer, by its true size, is held as long as the
+    /// second value.
+    ///
+    /// # Errors
+    /// What `work` fails with, or `overloaded` if the answer is larger than was thought and there is no memory for it.
+    pub async fn run<T: Send + 'static>(
+        self,
+        work: impl FnOnce() -> Result<T, ApiError> + Send + 'static,
+        size: impl Fn(&T) -> usize,
+    ) -> Result<(T, Option<Share>), ApiError> {
+        let turn = self.turn;
+        let work = tokio::task::spawn_blocking(move || {
+            // Kept to the end of the work, also if nobody waits for it any more.
+            let _turn = turn;
+            work()
+        });
+        let done = work.await.map_err(|error| ApiError::internal(&error))??;
+        let bytes = size(&done);
+        let share = match self.share {
+            Some(mut share) => {
+                share.keep(bytes);
+                Some(share)
+            }
+            None => self.memory.ready_answer(&self.tenant, bytes)?,
+        };
+        Ok((done, share))
+    }
+}
+
+async fn in_turn(turns: &Arc<Semaphore>) -> Result<OwnedSemaphorePermit, ApiError> {
+    let turn = tokio::time::timeout(WITHIN, turns.clone().acquire_owned());
+    match turn.await {
+        Ok(Ok(turn)) => Ok(turn),
+        _ => Err(overloaded("other requests of this kind take all turns")),
+    }
+}
+
+async fn take(
+    shares: &Shares,
+    tenant: &str,
+    bytes: usize,
+    what: &str,
+) -> Result<Option<Share>, ApiError> {
+    if bytes <= SMALL_BYTES {
+        return Ok(None);
+    }
+    let share = shares.take(tenant, units(bytes), WITHIN).await;
+    share.map(Some).ok_or_else(|| no_memory(what, bytes))
+}
+
+fn units(bytes: usize) -> u32 {
+    u32::try_from(bytes.div_ceil(UNIT)).unwrap_or(u32::MAX)
+}
+
+fn no_memory(what: &str, bytes: usize) -> ApiError {
+    overloaded(&format!(
+        "the memory for {what} is taken; {bytes} bytes are needed (`--request-memory-mb`, `--tenant-request-memory-mb`)"
+    ))
+}
+
+fn overloaded(detail: &str) -> ApiError {
+    ApiError::new(Kind::Overloaded, detail)
+}

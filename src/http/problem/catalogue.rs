@@ -1,0 +1,134 @@
+//! What each kind of problem means, as a type of the contract, and which problems a route can answer.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use utoipa::ToSchema;
+use utoipa::openapi::schema::Type;
+use utoipa::openapi::{
+    ContentBuilder, HeaderBuilder, ObjectBuilder, Ref, RefOr, Response, ResponseBuilder,
+};
+
+use crate::http::problem::error::PROBLEM_JSON;
+use crate::http::problem::kinds::Kind;
+
+/// A kind of problem, explained.
+#[derive(Debug, Clone, Copy, Serialize, ToSchema)]
+pub struct ProblemKind {
+    /// The `type` that problems of this kind carry.
+    #[serde(rename = "type")]
+    #[schema(value_type = String, example = "/problems/faulty-case")]
+    path: ProblemPath,
+    /// The kind in a few words.
+    title: &'static str,
+    /// HTTP status code.
+    status: u16,
+    /// What it means and what to do about it.
+    meaning: &'static str,
+}
+
+/// Written as `/problems/{slug}`.
+#[derive(Debug, Clone, Copy)]
+struct ProblemPath(&'static str);
+
+impl Serialize for ProblemPath {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(&format_args!("/problems/{}", self.0))
+    }
+}
+
+impl From<Kind> for ProblemKind {
+    fn from(kind: Kind) -> Self {
+        ProblemKind {
+            path: ProblemPath(kind.slug()),
+            title: kind.title(),
+            status: kind.status(),
+            meaning: kind.meaning(),
+        }
+    }
+}
+
+/// Declares the problems that a route can answer, for its documentation. `NotAcceptable` and `Internal` are always among them.
+macro_rules! problems {
+    ($(#[$meta:meta])* $name:ident: $($kind:ident),* $(,)?) => {
+        $(#[$meta])*
+        pub struct $name;
+
+        impl utoipa::IntoResponses for $name {
+            fn responses() -> std::collections::BTreeMap<
+                String,
+                utoipa::openapi::RefOr<utoipa::openapi::Response>,
+            > {
+                $crate::http::problem::catalogue::describe(&[$($crate::http::problem::kinds::Kind::$kind),*])
+            }
+        }
+    };
+}
+pub(crate) use problems;
+
+problems! {
+    /// What every route can fail with.
+    Always:
+}
+
+/// Adds problems that many operations can answer to the responses of one.
+pub fn describe_also(responses: &mut BTreeMap<String, RefOr<Response>>, kinds: &[Kind]) {
+    for kind in kinds {
+        let status = kind.status().to_string();
+        let mut described = describe(&[*kind]);
+        match (responses.get_mut(&status), described.remove(&status)) {
+            (Some(RefOr::T(known)), Some(_)) => {
+                let line = format!("`{}`: {}", kind.slug(), kind.meaning());
+                if !known.description.contains(&line) {
+                    known.description = format!("{line}\n\n{}", known.description);
+                }
+            }
+            (None, Some(new)) => {
+                responses.insert(status, new);
+            }
+            _ => {}
+        }
+    }
+}
+
+/// The responses of these kinds of problems and of those every route has, one per status code.
+#[must_use]
+pub fn describe(kinds: &[Kind]) -> BTreeMap<String, RefOr<Response>> {
+    let mut by_status = BTreeMap::<u16, Vec<Kind>>::new();
+    for kind in kinds
+        .iter()
+        .copied()
+        .chain([Kind::NotAcceptable, Kind::Internal])
+    {
+        let same = by_status.entry(kind.status()).or_default();
+        if !same.contains(&kind) {
+            same.push(kind);
+        }
+    }
+    by_status
+        .into_iter()
+        .map(|(status, kinds)| (status.to_string(), describe_status(&kinds)))
+        .collect()
+}
+
+fn describe_status(kinds: &[Kind]) -> RefOr<Response> {
+    let lines: Vec<String> = kinds
+        .iter()
+        .map(|kind| format!("`{}`: {}", kind.slug(), kind.meaning()))
+        .collect();
+    let content = ContentBuilder::new()
+        .schema(Some(Ref::from_schema_name("Problem")))
+        .build();
+    let mut response = ResponseBuilder::new()
+        .description(lines.join("\n\n"))
+        .content(PROBLEM_JSON, content);
+    if kinds.iter().any(|kind| kind.passes()) {
+        let schema = ObjectBuilder::new().schema_type(Type::Integer);
+        let header = HeaderBuilder::new()
+            .schema(Some(schema))
+            .description(Some("Seconds after which to try again."))
+            .build();
+        response = response.header("Retry-After", header);
+    }
+    response.build().into()
+}

@@ -1,0 +1,334 @@
+//! Every failure that a client can see, as `application/problem+json` (RFC 9457), and which error becomes which kind.
+
+use axum::extract::Request;
+use axum::http::{HeaderValue, StatusCode, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+
+use crate::contact::error::CaseError;
+use crate::http::dto::problem::{Fault, Problem};
+use crate::http::problem::kinds::Kind;
+use crate::jobs::Trouble;
+use crate::jobs::error::JobsError;
+use crate::jobs::job::{Job, State};
+
+/// Content type of every failure.
+pub const PROBLEM_JSON: &str = "application/problem+json";
+
+/// Seconds after which a refused client may try again.
+const RETRY_SECONDS: u32 = 1;
+/// The same where somebody has to make room first.
+const DISK_RETRY_SECONDS: u32 = 10;
+
+/// Faults of one case that are listed.
+const FAULTS_LISTED: usize = 1000;
+
+/// A failure on its way to the client.
+#[derive(Debug)]
+pub struct ApiError {
+    problem: Box<Problem>,
+    retry_after: Option<u32>,
+}
+
+impl ApiError {
+    /// A problem of this kind with a sentence about this occurrence.
+    #[must_use]
+    pub fn new(kind: Kind, detail: impl Into<String>) -> Self {
+        ApiError {
+            problem: Box::new(Problem::new(kind, detail)),
+            retry_after: kind.passes().then_some(RETRY_SECONDS),
+        }
+    }
+
+    /// The same, with the seconds after which to try again.
+    #[must_use]
+    pub fn after(mut self, seconds: u32) -> Self {
+        self.retry_after = Some(seconds);
+        self
+    }
+
+    /// The same, naming the query parameter that it is about.
+    #[must_use]
+    pub fn about(mut self, parameter: &str) -> Self {
+        let detail = self.problem.detail.clone();
+        self.problem
+            .errors
+            .push(Fault::parameter(parameter, detail));
+        self
+    }
+
+    /// The same in other words.
+    #[must_use]
+    pub fn saying(mut self, detail: impl Into<String>) -> Self {
+        self.problem.detail = detail.into();
+        self
+    }
+
+    /// A failure of the service itself: the reason goes to the log, not to the client.
+    #[must_use]
+    pub fn internal(reason: &dyn std::fmt::Display) -> Self {
+        tracing::error!(%reason, "a request failed inside the service");
+        ApiError::new(
+            Kind::Internal,
+            "the request could not be answered; the service's log has the reason under the request id",
+        )
+    }
+
+    /// Malformed JSON with its position.
+    #[must_use]
+    pub fn malformed(error: &serde_json::Error) -> Self {
+        let mut failure = ApiError::new(
+            Kind::MalformedJson,
+            format!("the body is not JSON: {error}"),
+        );
+        failure.problem.line = Some(error.line());
+        failure.problem.column = Some(error.column());
+        failure
+    }
+
+    /// An element of an array that is not JSON, with its place in the array.
+    #[must_use]
+    pub fn malformed_element(index: u32, error: &serde_json::Error) -> Self {
+        ApiError::new(
+            Kind::MalformedJson,
+            format!(
+                "the body is not JSON: element {index} (counted from 0): {error}, within the element"
+            ),
+        )
+    }
+
+    /// A batch that is refused; `faults` names its faulty cases.
+    #[must_use]
+    pub fn faulty_batch(detail: String, faults: Vec<Fault>) -> Self {
+        let mut failure = ApiError::new(Kind::FaultyBatch, detail);
+        failure.problem.errors = faults;
+        failure
+    }
+
+    /// A query with faults; `faults` is not empty.
+    #[must_use]
+    pub fn bad_query(faults: Vec<Fault>) -> Self {
+        let names: Vec<String> = faults.iter().map(|fault| fault.detail.clone()).collect();
+        let mut failure = ApiError::new(Kind::BadQuery, names.join("; "));
+        failure.problem.errors = faults;
+        failure
+    }
+
+    /// One query parameter with a value that is not allowed.
+    #[must_use]
+    pub fn bad_parameter(name: &str, detail: impl Into<String>) -> Self {
+        ApiError::bad_query(vec![Fault::parameter(name, detail)])
+    }
+
+    /// A number of a motion or patch beyond the `count` that there are.
+    #[must_use]
+    pub fn no_such_index(name: &str, count: usize) -> Self {
+        ApiError::bad_parameter(
+            name,
+            format!(
+                "`{name}` is too large; allowed: 0 to {}",
+                count.saturating_sub(1)
+            ),
+        )
+    }
+
+    /// A request header with a value that is not allowed.
+    #[must_use]
+    pub fn bad_header(name: &str, detail: impl Into<String>) -> Self {
+        let detail = detail.into();
+        let mut failure = ApiError::new(Kind::BadHeader, detail.clone());
+        failure.problem.errors = vec![Fault {
+            pointer: None,
+            parameter: None,
+            header: Some(name.to_owned()),
+            line: None,
+            detail,
+        }];
+        failure
+    }
+}
+
+impl From<CaseError> for ApiError {
+    fn from(CaseError(faults): CaseError) -> Self {
+        let detail = match faults.len() {
+            1 => "the case has 1 fault".to_owned(),
+            count if count > FAULTS_LISTED => {
+                format!("the case has {count} faults; the first {FAULTS_LISTED} are listed")
+            }
+            count => format!("the case has {count} faults"),
+        };
+        let mut failure = ApiError::new(Kind::FaultyCase, detail);
+        failure.problem.errors = faults
+            .into_iter()
+            .take(FAULTS_LISTED)
+            .map(|fault| Fault {
+                pointer: Some(fault.pointer),
+                parameter: None,
+                header: None,
+                line: None,
+                detail: fault.detail,
+            })
+            .collect();
+        failure
+    }
+}
+
+impl From<JobsError> for ApiError {
+    fn from(error: JobsError) -> Self {
+        match error {
+            JobsError::Case(faults) => faults.into(),
+            JobsError::NotFound => ApiError::new(Kind::JobNotFound, "no job has this id"),
+            JobsError::Expired => ApiError::new(
+                Kind::Expired,
+                "ended longer ago than this service keeps ended jobs, so it was removed",
+            ),
+            JobsError::BatchNotFound => ApiError::new(Kind::BatchNotFound, "no batch has this id"),
+            JobsError::NotReady(state) => ApiError::new(
+                Kind::ResultNotReady,
+                format!("the job is {}, so there is no result yet", state.name()),
+            ),
+            JobsError::NotSucceeded(job) => without_result(&job),
+            JobsError::NotEnded(_) => ApiError::new(
+                Kind::JobNotEnded,
+                "the job is queued or running; cancel it first, then delete it",
+            ),
+            JobsError::BatchNotEnded(jobs) => ApiError::new(
+                Kind::BatchNotEnded,
+                format!(
+                    "{jobs} jobs of the batch are queued or running; cancel it first, then delete it"
+                ),
+            ),
+            JobsError::NoSuchPatch { patches } => ApiError::no_such_index("patch", patches),
+            JobsError::NoSuchPoint { points } => ApiError::no_such_index("point", points),
+            JobsError::IdempotencyConflict => ApiError::new(
+                Kind::IdempotencyConflict,
+                "this `Idempotency-Key` was used before with a different case",
+            ),
+            JobsError::QueueFull { queue_max } => ApiError::new(
+                Kind::QueueFull,
+                format!("{queue_max} jobs are waiting, which is the limit; nothing was stored"),
+            ),
+            JobsError::QuotaExceeded { queue_max } => ApiError::new(
+                Kind::QuotaExceeded,
+                format!(
+                    "{queue_max} jobs of this tenant are waiting, which is its limit; nothing was stored"
+                ),
+            ),
+            JobsError::StagingQuotaExceeded { .. } => {
+                ApiError::new(Kind::QuotaExceeded, error.to_string())
+            }
+            JobsError::StagingFull { .. } => ApiError::new(Kind::QueueFull, error.to_string()),
+            JobsError::BadCursor => ApiError::bad_parameter(
+                "cursor",
+                "`cursor` is not one that this service gave out for the same filters; start again without it",
+            ),
+            JobsError::Draining => ApiError::new(
+                Kind::Draining,
+                "the service is shutting down and takes no new jobs",
+            ),
+            other => match other.trouble() {
+                Some(trouble) => troubled(trouble, &other),
+                None => ApiError::internal(&other),
+            },
+        }
+    }
+}
+
+/// The disk takes nothing; the log has the system's own words.
+fn troubled(trouble: Trouble, reason: &JobsError) -> ApiError {
+    tracing::warn!(%reason, "a request failed for want of a disk");
+    let (kind, what) = match trouble {
+        Trouble::Full => (Kind::StorageFull, "the disk of the service is full"),
+        Trouble::Unwritable => (
+            Kind::StorageUnwritable,
+            "the disk of the service cannot be written at the moment",
+        ),
+    };
+    ApiError::new(kind, what).after(DISK_RETRY_SECONDS)
+}
+
+/// Why an ended job has no result.
+fn without_result(job: &Job) -> ApiError {
+    if job.state == State::Cancelled {
+        return ApiError::new(
+            Kind::JobCancelled,
+            "the job was cancelled, so it has no result",
+        );
+    }
+    let reason = job
+        .failure
+        .as_ref()
+        .map_or("the reason is not known", |failure| &failure.detail);
+    ApiError::new(
+        Kind::JobFailed,
+        format!("the job failed, so it has no result: {reason}"),
+    )
+}
+
+impl IntoResponse for ApiError {
+    fn into_response(self) -> Response {
+        let mut response = render(&self.problem);
+        if let Some(seconds) = self.retry_after {
+            response
+                .headers_mut()
+                .insert(header::RETRY_AFTER, HeaderValue::from(seconds));
+        }
+        if self.problem.status == 401 {
+            let scheme = HeaderValue::from_static("Bearer realm=\"railhead\"");
+            response
+                .headers_mut()
+                .insert(header::WWW_AUTHENTICATE, scheme);
+        }
+        // The handler does not know the path it answers for; `name_instance` writes the problem again with it.
+        response.extensions_mut().insert(self.problem);
+        response
+    }
+}
+
+/// Completes every problem with the path it is about; layer around all routes.
+pub async fn name_instance(request: Request, next: Next) -> Response {
+    let path = request.uri().path().to_owned();
+    let mut response = next.run(request).await;
+    // The readable contract answers unknown files of its own with bare text.
+    if response.status() == StatusCode::NOT_FOUND
+        && response.extensions().get::<Box<Problem>>().is_none()
+    {
+        response = unknown_route(&path).into_response();
+    }
+    let Some(mut problem) = response.extensions_mut().remove::<Box<Problem>>() else {
+        return response;
+    };
+    problem.instance = Some(path);
+    let (mut parts, _) = response.into_parts();
+    parts.headers.remove(header::CONTENT_LENGTH);
+    let (_, body) = render(&problem).into_parts();
+    Response::from_parts(parts, body)
+}
+
+/// The answer for a path that names nothing.
+#[must_use]
+pub fn unknown_route(path: &str) -> ApiError {
+    if path.len() > 1 && path.ends_with('/') {
+        let detail = format!(
+            "there is nothing at `{path}`; the paths of this service do not end with a slash"
+        );
+        return ApiError::new(Kind::UnknownRoute, detail);
+    }
+    ApiError::new(
+        Kind::UnknownRoute,
+        format!(
+            "there is nothing at `{path}`; `/openapi.json` lists every resource, `/docs` shows them"
+        ),
+    )
+}
+
+fn render(problem: &Problem) -> Response {
+    let status = StatusCode::from_u16(problem.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
+    match serde_json::to_vec(problem) {
+        Ok(body) => (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], body).into_response(),
+        Err(error) => {
+            tracing::error!(%error, "a problem could not be written as JSON");
+            StatusCode::INTERNAL_SERVER_ERROR.into_response()
+        }
+    }
+}

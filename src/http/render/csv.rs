@@ -1,0 +1,105 @@
+//! CSV (RFC 4180): a header with the names, one line per row. Zones are words; what lies outside the patch is empty.
+
+use std::ops::Range;
+
+use crate::http::render::table::{Column, Data, PLACES, Rows, Table};
+
+/// The line with the names.
+///
+/// # Errors
+/// None that memory does not have.
+pub fn head(table: &Table) -> Result<Vec<u8>, csv::Error> {
+    let mut out = csv::Writer::from_writer(Vec::new());
+    let places: &[&str] = match table.rows {
+        Rows::Cells { .. } => &["strip"],
+        Rows::Grid { .. } => &[],
+    };
+    let axes = match table.rows {
+        Rows::Cells { .. } => &PLACES[..],
+        Rows::Grid { .. } => &PLACES[..2],
+    };
+    let values = table.values.iter().map(|column| column.name);
+    out.write_record(axes.iter().chain(places).copied().chain(values))?;
+    finish(out)
+}
+
+/// Some lines. Numbers have as many digits as it takes to read the same number back.
+///
+/// # Errors
+/// None that memory does not have.
+pub fn lines(table: &Table, rows: Range<usize>) -> Result<Vec<u8>, csv::Error> {
+    let mut out = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        match &table.rows {
+            Rows::Cells { places, strip } => {
+                for place in places {
+                    out.write_field(number(place[row]))?;
+                }
+                out.write_field(strip[row].to_string())?;
+            }
+            Rows::Grid { x_mm, y_mm } => {
+                out.write_field(number(x_mm[row % x_mm.len()]))?;
+                out.write_field(number(y_mm[row / x_mm.len()]))?;
+            }
+        }
+        end_row(&mut out, &table.values, row)?;
+    }
+    finish(out)
+}
+
+fn finish(out: csv::Writer<Vec<u8>>) -> Result<Vec<u8>, csv::Error> {
+    out.into_inner()
+        .map_err(|error| csv::Error::from(error.into_error()))
+}
+
+fn end_row(
+    out: &mut csv::Writer<Vec<u8>>,
+    columns: &[Column],
+    row: usize,
+) -> Result<(), csv::Error> {
+    for column in columns {
+        match &column.data {
+            Data::Numbers(values) => out.write_field(number(values[row]))?,
+            Data::Zones(zones) => {
+                out.write_field(zones[row].map_or("", |zone| zone.name()))?;
+            }
+        }
+    }
+    out.write_record(None::<&[u8]>)
+}
+
+/// The shortest text that reads back as the same number; empty for NaN.
+#[must_use]
+pub fn number(value: f64) -> String {
+    if value.is_nan() {
+        String::new()
+    } else {
+        format!("{value:?}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_back_as_they_were() {
+        for value in [
+            0.0,
+            -0.0,
+            0.1 + 0.2,
+            1e-300,
+            123_456_789.123_456_78,
+            f64::MAX,
+        ] {
+            let text = number(value);
+            assert!(text.len() < 26, "{text}");
+            assert_eq!(
+                text.parse::<f64>().unwrap().to_bits(),
+                value.to_bits(),
+                "{text}"
+            );
+        }
+        assert_eq!(number(f64::NAN), "");
+    }
+}

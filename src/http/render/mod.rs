@@ -1,0 +1,8 @@
+//! The forms of an answer other than JSON; one format is one file.
+
+pub mod csv;
+pub mod npz;
+pub mod picture;
+pub mod pieces;
+pub mod table;
+pub mod vtk;

@@ -1,0 +1,254 @@
+//! Text of a table piece by piece, made when the client takes it: a large answer takes no more memory than its table.
+
+use std::fmt::Write;
+use std::ops::Range;
+
+use axum::body::{Body, Bytes};
+use futures_util::stream;
+
+use crate::contact::zones::Zone;
+use crate::http::render::csv;
+use crate::http::render::table::{Data, PLACES, Rows, Table};
+
+/// Pieces are at least this large, but for the last one.
+const PIECE_BYTES: usize = 32 << 10;
+/// Rows written at once.
+const ROWS: usize = 256;
+
+/// A part of a JSON text.
+enum Part {
+    Text(String),
+    /// Values of a column, parted by commas.
+    Values(Column, Range<usize>),
+}
+
+#[derive(Clone, Copy)]
+enum Column {
+    Place(usize),
+    Strip,
+    X,
+    Y,
+    Value(usize),
+}
+
+/// The table as CSV.
+pub fn csv_body(table: Table) -> Body {
+    let starts = (0..table.len()).step_by(ROWS);
+    let head = csv::head(&table);
+    let lines = starts.map(move |start| {
+        let end = (start + ROWS).min(table.len());
+        csv::lines(&table, start..end)
+    });
+    body(std::iter::once(head).chain(lines))
+}
+
+/// The table as the JSON of a field: per cell inside `cells`, or on a grid.
+pub fn json_body(table: Table, patch: usize, point: usize) -> Body {
+    let parts = parts(&table, patch, point);
+    let texts = parts.into_iter().map(move |part| match part {
+        Part::Text(text) => Ok::<_, std::convert::Infallible>(text.into_bytes()),
+        Part::Values(column, rows) => Ok(values(&table, column, rows).into_bytes()),
+    });
+    body(texts)
+}
+
+/// The texts, gathered into pieces.
+fn body<E>(mut texts: impl Iterator<Item = Result<Vec<u8>, E>> + Send + 'static) -> Body
+where
+    E: std::error::Error + Send + Sync + 'static,
+{
+    let pieces = std::iter::from_fn(move || {
+        let mut piece = Vec::with_capacity(2 * PIECE_BYTES);
+        while piece.len() < PIECE_BYTES {
+            match texts.next() {
+                Some(Ok(text)) => piece.extend_from_slice(&text),
+                Some(Err(error)) => return Some(Err(error)),
+                None => break,
+            }
+        }
+        (!piece.is_empty()).then(|| Ok(Bytes::from(piece)))
+    });
+    Body::from_stream(stream::iter(pieces))
+}
+
+fn parts(table: &Table, patch: usize, point: usize) -> Vec<Part> {
+    let mut parts = Vec::new();
+    let open = match table.rows {
+        Rows::Cells { .. } => ",\"cells\":{",
+        Rows::Grid { .. } => ",",
+    };
+    parts.push(Part::Text(format!(
+        "{{\"patch\":{patch},\"point\":{point}{open}"
+    )));
+    let close = match &table.rows {
+        Rows::Cells { .. } => {
+            for (number, name) in PLACES.iter().enumerate() {
+                array(&mut parts, name, Column::Place(number), table.len());
+            }
+            array(&mut parts, "strip", Column::Strip, table.len());
+            "}}"
+        }
+        Rows::Grid { x_mm, y_mm } => {
+            array(&mut parts, "x_mm", Column::X, x_mm.len());
+            array(&mut parts, "y_mm", Column::Y, y_mm.len());
+            "}"
+        }
+    };
+    for (number, column) in table.values.iter().enumerate() {
+        let values = Column::Value(number);
+        match &table.rows {
+            Rows::Cells { .. } => array(&mut parts, column.name, values, table.len()),
+            Rows::Grid { x_mm, y_mm } => {
+                let nx = x_mm.len();
+                parts.push(Part::Text(format!("\"{}\":[", column.name)));
+                for iy in 0..y_mm.len() {
+                    let open = if iy == 0 { "[" } else { ",[" };
+                    parts.push(Part::Text(open.to_owned()));
+                    parts.push(Part::Values(values, iy * nx..(iy + 1) * nx));
+                    parts.push(Part::Text("]".to_owned()));
+                }
+                parts.push(Part::Text("],".to_owned()));
+            }
+        }
+    }
+    // The comma after the last array makes way.
+    if let Some(Part::Text(last)) = parts.last_mut() {
+        last.pop();
+    }
+    parts.push(Part::Text(close.to_owned()));
+    parts
+}
+
+/// `"name":[…],`
+fn array(parts: &mut Vec<Part>, name: &str, column: Column, count: usize) {
+    parts.push(Part::Text(format!("\"{name}\":[")));
+    for start in (0..count).step_by(ROWS) {
+        if start > 0 {
+            parts.push(Part::Text(",".to_owned()));
+        }
+        parts.push(Part::Values(column, start..(start + ROWS).min(count)));
+    }
+    parts.push(Part::Text("],".to_owned()));
+}
+
+fn values(table: &Table, column: Column, rows: Range<usize>) -> String {
+    let mut out = String::new();
+    for row in rows {
+        if !out.is_empty() {
+            out.push(',');
+        }
+        match (column, &table.rows) {
+            (Column::Place(number), Rows::Cells { places, .. }) => {
+                push(&mut out, places[number][row])
+            }
+            (Column::Strip, Rows::Cells { strip, .. }) => {
+                // Writing to a string cannot fail.
+                let _ = write!(out, "{}", strip[row]);
+            }
+            (Column::X, Rows::Grid { x_mm, .. }) => push(&mut out, x_mm[row]),
+            (Column::Y, Rows::Grid { y_mm, .. }) => push(&mut out, y_mm[row]),
+            (Column::Value(number), _) => match &table.values[number].data {
+                Data::Numbers(numbers) => push(&mut out, numbers[row]),
+                Data::Zones(zones) => push_zone(&mut out, zones[row]),
+            },
+            _ => unreachable!("the parts were made from this table"),
+        }
+    }
+    out
+}
+
+/// The number as JSON; null where there is none.
+fn push(out: &mut String, value: f64) {
+    match serde_json::Number::from_f64(value) {
+        Some(number) => {
+            let _ = write!(out, "{number}");
+        }
+        None => out.push_str("null"),
+    }
+}
+
+fn push_zone(out: &mut String, zone: Option<Zone>) {
+    match zone {
+        Some(zone) => {
+            let _ = write!(out, "\"{}\"", zone.name());
+        }
+        None => out.push_str("null"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use http_body_util::BodyExt;
+    use serde_json::Value;
+
+    use super::*;
+    use crate::http::dto::cells::{Cells, GriddedField};
+    use crate::http::routes::fields::Field;
+
+    async fn text(body: Body) -> String {
+        let bytes = body.collect().await.unwrap().to_bytes();
+        String::from_utf8(bytes.to_vec()).unwrap()
+    }
+
+    /// Numbers that need all their digits, and more rows than are written at once.
+    fn numbers(count: usize) -> Vec<f64> {
+        (1..=count).map(|number| 1.0 / number as f64).collect()
+    }
+
+    async fn reads_back(make: impl Fn() -> Field) {
+        let whole: Value = serde_json::from_str(&serde_json::to_string(&make()).unwrap()).unwrap();
+        let pieces = text(json_body(make().into(), 1, 2)).await;
+        assert_eq!(serde_json::from_str::<Value>(&pieces).unwrap(), whole);
+    }
+
+    #[tokio::test]
+    async fn pieces_of_json_are_what_the_whole_would_be() {
+        for count in [0, 1, ROWS, 3 * ROWS + 1] {
+            reads_back(|| Field::PerCell {
+                patch: 1,
+                point: 2,
+                cells: Cells {
+                    x_mm: numbers(count),
+                    y_mm: numbers(count),
+                    dx_mm: numbers(count),
+                    dy_mm: numbers(count),
+                    strip: (0..count as u32).collect(),
+                    zone: Some(vec![Zone::Slip; count]),
+                    slip_x: Some(numbers(count)),
+                    ..Cells::default()
+                },
+            })
+            .await;
+        }
+        reads_back(|| {
+            let row = vec![Some(0.1), None, Some(-3e-300)];
+            Field::Gridded(GriddedField {
+                patch: 1,
+                point: 2,
+                x_mm: numbers(3),
+                y_mm: numbers(700),
+                zone: Some(vec![vec![Some(Zone::Stick), None, Some(Zone::Slip)]; 700]),
+                pressure_mpa: Some(vec![row; 700]),
+                ..GriddedField::default()
+            })
+        })
+        .await;
+    }
+
+    #[tokio::test]
+    async fn a_table_has_one_line_per_row_after_its_head() {
+        let field = Field::Gridded(GriddedField {
+            x_mm: numbers(2),
+            y_mm: numbers(400),
+            pressure_mpa: Some(vec![vec![Some(1.5), None]; 400]),
+            ..GriddedField::default()
+        });
+        let text = text(csv_body(field.into())).await;
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines.len(), 801);
+        assert_eq!(
+            lines[..3],
+            ["x_mm,y_mm,pressure_mpa", "1.0,1.0,1.5", "0.5,1.0,"]
+        );
+    }
+}

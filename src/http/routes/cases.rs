@@ -1,0 +1,95 @@
+//! `/v1/cases/check`: is this a case, and what would it cost? Makes no job.
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::Uri;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::contact::case::{Case, Method, Output};
+use crate::contact::profile_trust::quality::PairQuality;
+use crate::contact::remark::RemarkEntry;
+use crate::http::extract::json::JsonBody;
+use crate::http::extract::query::Query;
+use crate::http::layers::auth::Caller;
+use crate::http::limits::memory::Memory;
+use crate::http::problem::catalogue::problems;
+use crate::http::problem::error::ApiError;
+
+/// A case that can be solved, and its expected cost.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct CheckedCase {
+    /// Digest of everything that determines the answer; cases with equal digests have equal answers.
+    digest: String,
+    /// The method the case asks for.
+    method: Method,
+    /// What will be computed.
+    outputs: Vec<Output>,
+    /// Number of motions.
+    motions: usize,
+    /// Expected cost.
+    estimate: Estimate,
+    /// How far the points of the profiles can be trusted, as far as that is known without the contact; only for `profiles`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    quality: Option<PairQuality>,
+    /// What the client should know before using the numbers.
+    remarks: Vec<RemarkEntry>,
+}
+
+/// Expected cost of a case, rough.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct Estimate {
+    /// Peak memory in bytes.
+    bytes: u64,
+    /// Solve time on one core, in s.
+    seconds: f64,
+}
+
+problems! {
+    /// What `POST /v1/cases/check` can fail with.
+    CheckProblems: BadQuery, MalformedJson, UnreadableBody, BodyTimeout, BodyTooLarge, UnsupportedMediaType, UnsupportedEncoding, FaultyCase
+}
+
+/// Checks a case and estimates its cost, without making a job.
+#[utoipa::path(
+    post,
+    path = "/v1/cases/check",
+    tag = "cases",
+    operation_id = "check_case",
+    request_body(content = Case, description = "One case", content_type = "application/json"),
+    responses((status = 200, description = "The case can be solved", body = CheckedCase), CheckProblems)
+)]
+pub async fn check(
+    Caller(jobs): Caller,
+    State(memory): State<Memory>,
+    uri: Uri,
+    JsonBody { value, mut room }: JsonBody,
+) -> Result<Json<CheckedCase>, ApiError> {
+    Query::read(&uri, &[]).finish()?;
+    if room.turn.is_none() {
+        room.turn = Some(memory.turn(0).await?);
+    }
+    // A large grid takes long enough to check that it must not hold up other requests.
+    let checked = tokio::task::spawn_blocking(move || {
+        // Kept to the end of the work, also if nobody waits for it any more.
+        let _room = room;
+        jobs.check(&value).map(|problem| {
+            let cost = problem.cost();
+            CheckedCase {
+                digest: problem.digest.clone(),
+                method: problem.method,
+                outputs: problem.outputs.clone(),
+                motions: problem.motions.len(),
+                estimate: Estimate {
+                    bytes: cost.bytes,
+                    seconds: cost.seconds,
+                },
+                quality: problem.quality(),
+                remarks: problem.remarks,
+            }
+        })
+    });
+    let checked = checked.await.map_err(|error| ApiError::internal(&error))?;
+    Ok(Json(checked?))
+}

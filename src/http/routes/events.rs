@@ -1,0 +1,253 @@
+//! `/v1/jobs/{id}/events` and `/v1/batches/{id}/events`: changes as they happen, as server-sent events.
+//!
+//! Nothing is kept for a client: the next event is made when the connection takes it. The id of an event says what was
+//! seen, so `Last-Event-ID` resumes over lost connections and restarts of the service alike.
+
+use std::convert::Infallible;
+use std::time::Duration;
+
+use axum::Extension;
+use axum::extract::State;
+use axum::http::{HeaderMap, HeaderName, StatusCode};
+use axum::response::sse::{Event, KeepAlive, Sse};
+use axum::response::{IntoResponse, Response};
+use futures_util::stream::unfold;
+use futures_util::{Stream, StreamExt};
+use serde::Serialize;
+use serde_json::json;
+use utoipa::openapi::extensions::Extensions;
+use utoipa::openapi::schema::Type;
+use utoipa::openapi::{ObjectBuilder, RefOr, Schema};
+use utoipa::{PartialSchema, ToSchema};
+use uuid::Uuid;
+
+use crate::http::extract::accept::{Format, choose};
+use crate::http::extract::ids::{BatchId, JobId};
+use crate::http::layers::auth::{Caller, Credential, revoked};
+use crate::http::limits::concurrency::Crowds;
+use crate::http::limits::holding_body::{Held, carrying};
+use crate::http::problem::error::ApiError;
+use crate::http::routes::batches::{BatchAnswer, LookBatchProblems};
+use crate::http::routes::jobs::LookProblems;
+use crate::jobs::Jobs;
+use crate::jobs::job::{Job, State as JobState};
+
+/// A comment is sent when nothing has happened for this long, so that no one in between closes the connection.
+const KEEP_ALIVE: Duration = Duration::from_secs(15);
+/// When a client should connect again after the connection was lost.
+const RETRY: Duration = Duration::from_secs(1);
+
+const LAST_EVENT_ID: HeaderName = HeaderName::from_static("last-event-id");
+
+/// The data of an event of a job.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct JobEvent {
+    /// Where the job stands.
+    state: JobState,
+    /// Rough progress.
+    #[schema(minimum = 0.0, maximum = 1.0)]
+    progress: f64,
+    /// Grows with every change; also the id of the event.
+    version: u64,
+}
+
+/// One event of the stream of a job, in the contract.
+pub struct JobEventSent;
+
+/// One event of the stream of a batch, in the contract.
+pub struct BatchEventSent;
+
+impl PartialSchema for JobEventSent {
+    fn schema() -> RefOr<Schema> {
+        event_schema::<JobEvent>()
+    }
+}
+
+impl ToSchema for JobEventSent {
+    fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
+        // Only its data leads to it, in a way that is not followed.
+        schemas.push((JobEvent::name().into_owned(), JobEvent::schema()));
+        JobEvent::schemas(schemas);
+    }
+}
+
+impl PartialSchema for BatchEventSent {
+    fn schema() -> RefOr<Schema> {
+        event_schema::<BatchAnswer>()
+    }
+}
+
+impl ToSchema for BatchEventSent {}
+
+/// An event line by line; its data is `T` as JSON text.
+fn event_schema<T: ToSchema>() -> RefOr<Schema> {
+    let text = |what: &str| {
+        let text = ObjectBuilder::new().schema_type(Type::String);
+        text.description(Some(what))
+    };
+    let holds = json!({ "$ref": format!("#/components/schemas/{}", T::name()) });
+    let data = text("What changed, as JSON")
+        .content_media_type("application/json")
+        .extensions(Some(Extensions::from_iter([("contentSchema", holds)])));
+    let retry = ObjectBuilder::new()
+        .schema_type(Type::Integer)
+        .description(Some("Milliseconds after which to connect again"));
+    let event = ObjectBuilder::new()
+        .description(Some("One event of the stream, line by line"))
+        .property("event", text("`state`"))
+        .required("event")
+        .property("id", text("What was seen, for `Last-Event-ID`"))
+        .required("id")
+        .property("retry", retry)
+        .property("data", data)
+        .required("data");
+    event.into()
+}
+
+impl JobEvent {
+    fn of(job: &Job) -> Self {
+        JobEvent {
+            state: job.state,
+            progress: job.progress,
+            version: job.version,
+        }
+    }
+}
+
+/// Follows a job.
+///
+/// Events are called `state`; their data is JSON with `state`, `progress` and `version`, their id is the version. The
+/// first event comes at once with the job as it is, unless `Last-Event-ID` says that it was seen; the stream closes after the final
+/// state, and when the service shuts down. An ended job whose last event was seen is answered with `204`, which tells
+/// an `EventSource` not to connect again.
+#[utoipa::path(
+    get,
+    path = "/v1/jobs/{id}/events",
+    tag = "jobs",
+    operation_id = "follow_job",
+    params(
+        ("id" = String, Path, description = "Id of the job", format = "uuid"),
+        ("Last-Event-ID" = Option<String>, Header, description = "Id of the last event that was seen")
+    ),
+    responses(
+        (status = 200, description = "One event per change", content((JobEventSent = "text/event-stream"))),
+        (status = 204, description = "The job has ended and the client has seen it"),
+        LookProblems
+    )
+)]
+pub async fn job(
+    Caller(jobs): Caller,
+    JobId(id): JobId,
+    State(crowds): State<Crowds>,
+    Extension(held): Extension<Held>,
+    key: Option<Extension<Credential>>,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    choose(&headers, None, &[Format::Events])?;
+    let job = jobs.get(id).await?;
+    let seen = last_event_id(&headers).and_then(|text| text.parse().ok());
+    if job.state.ended() && seen == Some(job.version) {
+        return Ok(StatusCode::NO_CONTENT.into_response());
+    }
+    let place = crowds.stream(jobs.tenant())?;
+    held.release();
+    let revoked = revoked(jobs.clone(), key.map(|Extension(key)| key));
+    let events = unfold(Some(seen), move |seen| {
+        let jobs = jobs.clone();
+        async move { next_of_job(&jobs, id, seen?).await }
+    });
+    let events = answer(events.take_until(revoked));
+    Ok(carrying(events, place))
+}
+
+/// The next event of a job and what has then been seen; nothing after the final one.
+async fn next_of_job(
+    jobs: &Jobs,
+    id: Uuid,
+    seen: Option<u64>,
+) -> Option<(Result<Event, Infallible>, Option<Option<u64>>)> {
+    let job = changed(jobs.next_change(id, seen).await)?;
+    let event = event(&job.version.to_string(), &JobEvent::of(&job))?;
+    let next = (!job.state.ended()).then_some(Some(job.version));
+    Some((Ok(event), next))
+}
+
+/// Follows a batch.
+///
+/// Events are called `state`; their data is the batch as `/v1/batches/{id}` answers it. Several changes between two looks are one event.
+/// Otherwise as the events of a job.
+#[utoipa::path(
+    get,
+    path = "/v1/batches/{id}/events",
+    tag = "batches",
+    operation_id = "follow_batch",
+    params(
+        ("id" = String, Path, description = "Id of the batch", format = "uuid"),
+        ("Last-Event-ID" = Option<String>, Header, description = "Id of the last event that was seen")
+    ),
+    responses(
+        (status = 200, description = "One event per change", content((BatchEventSent = "text/event-stream"))),
+        (status = 204, description = "Every job has ended and the client has seen it"),
+        LookBatchProblems
+    )
+)]
+pub async fn batch(
+    Caller(jobs): Caller,
+    BatchId(id): BatchId,
+    State(crowds): State<Crowds>,
+    Extension(held): Extension<Held>,
+    key: Option<Extension<Credential>>,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    choose(&headers, None, &[Format::Events])?;
+    let batch = jobs.batch(id).await?;
+    let seen = last_event_id(&headers);
+    let (ended, all) = batch.ended();
+    if ended == all && seen.as_deref() == Some(&batch.mark()) {
+        return Ok(StatusCode::NO_CONTENT.into_response());
+    }
+    let place = crowds.stream(jobs.tenant())?;
+    held.release();
+    let revoked = revoked(jobs.clone(), key.map(|Extension(key)| key));
+    let events = unfold(Some(seen), move |seen| {
+        let jobs = jobs.clone();
+        async move { next_of_batch(&jobs, id, seen?).await }
+    });
+    let events = answer(events.take_until(revoked));
+    Ok(carrying(events, place))
+}
+
+async fn next_of_batch(
+    jobs: &Jobs,
+    id: Uuid,
+    seen: Option<String>,
+) -> Option<(Result<Event, Infallible>, Option<Option<String>>)> {
+    let batch = changed(jobs.next_change_of_batch(id, seen.as_deref()).await)?;
+    let (mark, (ended, all)) = (batch.mark(), batch.ended());
+    let event = event(&mark, &BatchAnswer::from(batch))?;
+    Some((Ok(event), (ended < all).then_some(Some(mark))))
+}
+
+fn answer(events: impl Stream<Item = Result<Event, Infallible>> + Send + 'static) -> Response {
+    Sse::new(events)
+        .keep_alive(KeepAlive::new().interval(KEEP_ALIVE))
+        .into_response()
+}
+
+/// The change, if there is one; a failure ends the stream, and the client connects again.
+fn changed<T>(change: Result<Option<T>, impl std::fmt::Display>) -> Option<T> {
+    change
+        .inspect_err(|reason| tracing::debug!(%reason, "a stream of events ended early"))
+        .ok()
+        .flatten()
+}
+
+fn event<T: Serialize>(id: &str, data: &T) -> Option<Event> {
+    let event = Event::default().event("state").id(id).retry(RETRY);
+    event.json_data(data).ok()
+}
+
+fn last_event_id(headers: &HeaderMap) -> Option<String> {
+    let value = headers.get(LAST_EVENT_ID)?;
+    value.to_str().ok().map(str::to_owned)
+}

@@ -1,0 +1,396 @@
+//! `/v1/jobs/{id}/tractions`, `/pressure` and `/slip`: values per cell, or on a regular grid.
+
+use axum::body::Body;
+use axum::extract::State;
+use axum::http::{HeaderMap, HeaderValue, Uri, header};
+use axum::response::{IntoResponse, Response};
+use serde::Serialize;
+use utoipa::{IntoParams, ToSchema};
+use uuid::Uuid;
+
+use crate::contact::case::Output;
+use crate::http::dto::cells::{Cells, GriddedField, gridded, per_cell};
+use crate::http::dto::result::name_of;
+use crate::http::extract::accept::{Format, choose, named_format};
+use crate::http::extract::ids::JobId;
+use crate::http::extract::query::{INDEX, index};
+use crate::http::extract::query::{Query, whole};
+use crate::http::layers::auth::Caller;
+use crate::http::layers::etag::{Known, tagged};
+use crate::http::limits::holding_body::carrying;
+use crate::http::limits::memory::{Memory, Rendering};
+use crate::http::problem::error::ApiError;
+use crate::http::render::pieces::{csv_body, json_body};
+use crate::http::render::table::{File, Table};
+use crate::http::render::{npz, vtk};
+use crate::http::routes::plots::{WIDTH_DEFAULT, Wish, picture};
+use crate::http::routes::stored_fields::{FieldProblems, stored};
+use crate::http::state::AppState;
+use crate::jobs::Jobs;
+
+/// Most samples along one axis of a regular grid.
+const GRID_AXIS_MAX: u32 = 1000;
+
+/// What a sample takes until the client has taken it: two components.
+const SAMPLE_BYTES: usize = 2 * size_of::<f64>();
+
+/// The forms that a field comes in.
+const FORMATS: [Format; 6] = [
+    Format::Json,
+    Format::Csv,
+    Format::Npz,
+    Format::Vtk,
+    Format::Svg,
+    Format::Png,
+];
+
+/// A field of one patch for one motion.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum Field {
+    /// Without `grid`: the values where they were computed.
+    PerCell {
+        /// Number of the patch, counted from 0.
+        patch: usize,
+        /// Number of the motion, counted from 0.
+        point: usize,
+        /// Geometry and values of the cells.
+        cells: Cells,
+    },
+    /// With `grid`: resampled.
+    Gridded(GriddedField),
+}
+
+impl From<Field> for Table {
+    fn from(field: Field) -> Self {
+        match field {
+            Field::PerCell { cells, .. } => cells.into(),
+            Field::Gridded(field) => field.into(),
+        }
+    }
+}
+
+/// The parameters of a field, for the contract; [`Selection::read`] reads them.
+#[derive(Debug, IntoParams)]
+#[into_params(parameter_in = Query)]
+#[expect(
+    dead_code,
+    reason = "describes the query, which is read with all its faults elsewhere"
+)]
+pub struct FieldQuery {
+    /// The motion, counted from 0; 0 when left out
+    point: Option<u32>,
+    /// The patch, counted from 0; 0 when left out
+    patch: Option<u32>,
+    /// `NXxNY`: resample on a regular grid over the bounding box of the patch, 2 to 1000 samples along each axis, and
+    /// 250 000 in all where the operator says nothing else
+    #[param(example = "60x40")]
+    grid: Option<String>,
+    /// `json`, `csv`, `npz`, `vtk`, or `svg` and `png` for a picture; overrides `Accept`
+    #[param(example = "csv")]
+    format: Option<String>,
+}
+
+/// Which patch and motion are wanted, on which grid and in which form.
+#[derive(Debug, Clone, Copy)]
+pub struct Selection {
+    /// Number of the patch.
+    pub patch: usize,
+    /// Number of the motion.
+    pub point: usize,
+    /// Samples along x and y, if the field is to be resampled.
+    pub grid: Option<(usize, usize)>,
+    /// The form of the answer.
+    pub format: Format,
+}
+
+impl Selection {
+    /// Reads `point`, `patch` (0 when left out), `grid`, and `format` or `Accept`.
+    ///
+    /// # Errors
+    /// `bad-query` with every fault, or `not-acceptable`.
+    pub fn read(uri: &Uri, headers: &HeaderMap, samples_max: usize) -> Result<Self, ApiError> {
+        let mut query = Query::read(uri, &["point", "patch", "grid", "format"]);
+        let point = query.take("point", INDEX, index);
+        let patch = query.take("patch", INDEX, index);
+        let grid = query.take(
+            "grid",
+            &format!("`NXxNY` such as `60x40`, each from 2 to 1000, and at most {samples_max} samples in all"),
+            |text| grid_size(text).filter(|(nx, ny)| nx * ny <= samples_max),
+        );
+        let named = named_format(&mut query, &FORMATS);
+        query.finish()?;
+        Ok(Selection {
+            patch: patch.unwrap_or(0),
+            point: point.unwrap_or(0),
+            grid,
+            format: choose(headers, named, &FORMATS)?,
+        })
+    }
+
+    /// The picture of an output, if a picture is what was asked for.
+    ///
+    /// # Errors
+    /// `bad-query` if there is a `grid`, else as [`picture`].
+    pub async fn picture(
+        &self,
+        jobs: &Jobs,
+        memory: &Memory,
+        id: Uuid,
+        shown: Output,
+    ) -> Result<Option<Response>, ApiError> {
+        if !matches!(self.format, Format::Svg | Format::Png) {
+            return Ok(None);
+        }
+        if self.grid.is_some() {
+            return Err(ApiError::bad_parameter(
+                "grid",
+                "a picture shows the cells themselves; leave `grid` out",
+            ));
+        }
+        let wish = Wish {
+            shown,
+            patch: self.patch,
+            point: self.point,
+            width: WIDTH_DEFAULT,
+        };
+        let mut response = picture(jobs, memory, id, wish, self.format).await?;
+        let vary = HeaderValue::from_static("Accept");
+        response.headers_mut().insert(header::VARY, vary);
+        Ok(Some(response))
+    }
+
+    /// What the answer takes in memory before it is taken by the client, in bytes.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        let (nx, ny) = self.grid.unwrap_or_default();
+        nx * ny * SAMPLE_BYTES
+    }
+}
+
+fn grid_size(text: &str) -> Option<(usize, usize)> {
+    let (nx, ny) = text.split_once(['x', 'X'])?;
+    let axis = |text| whole(text, 2, GRID_AXIS_MAX).and_then(|number| usize::try_from(number).ok());
+    Some((axis(nx)?, axis(ny)?))
+}
+
+/// Tangential tractions of a succeeded job.
+///
+/// CSV, NPZ and VTK have the same names as the JSON; see `docs/formats.md`.
+#[utoipa::path(
+    get,
+    path = "/v1/jobs/{id}/tractions",
+    tag = "results",
+    operation_id = "get_tractions",
+    params(("id" = String, Path, description = "Id of the job", format = "uuid"), FieldQuery),
+    responses((status = 200, description = "Tractions on the lower body, in MPa", content(
+        (Field = "application/json"),
+        (String = "text/csv"),
+        (File = "application/x-npz"),
+        (File = "application/x-vtk"),
+        (String = "image/svg+xml"),
+        (File = "image/png")
+    )), FieldProblems)
+)]
+pub async fn tractions(
+    Caller(jobs): Caller,
+    JobId(id): JobId,
+    State(shared): State<AppState>,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    answer(&jobs, &shared, id, &uri, &headers, Output::Tractions).await
+}
+
+/// Pressure of a succeeded job; the same for every motion.
+///
+/// CSV, NPZ and VTK have the same names as the JSON; see `docs/formats.md`.
+#[utoipa::path(
+    get,
+    path = "/v1/jobs/{id}/pressure",
+    tag = "results",
+    operation_id = "get_pressure",
+    params(("id" = String, Path, description = "Id of the job", format = "uuid"), FieldQuery),
+    responses((status = 200, description = "Pressure in MPa", content(
+        (Field = "application/json"),
+        (String = "text/csv"),
+        (File = "application/x-npz"),
+        (File = "application/x-vtk"),
+        (String = "image/svg+xml"),
+        (File = "image/png")
+    )), FieldProblems)
+)]
+pub async fn pressure(
+    Caller(jobs): Caller,
+    JobId(id): JobId,
+    State(shared): State<AppState>,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    answer(&jobs, &shared, id, &uri, &headers, Output::Pressure).await
+}
+
+/// Slip of a succeeded job: the upper body relative to the lower one, divided by rolling speed.
+///
+/// CSV, NPZ and VTK have the same names as the JSON; see `docs/formats.md`.
+#[utoipa::path(
+    get,
+    path = "/v1/jobs/{id}/slip",
+    tag = "results",
+    operation_id = "get_slip",
+    params(("id" = String, Path, description = "Id of the job", format = "uuid"), FieldQuery),
+    responses((status = 200, description = "Relative slip, dimensionless", content(
+        (Field = "application/json"),
+        (String = "text/csv"),
+        (File = "application/x-npz"),
+        (File = "application/x-vtk"),
+        (String = "image/svg+xml"),
+        (File = "image/png")
+    )), FieldProblems)
+)]
+pub async fn slip(
+    Caller(jobs): Caller,
+    JobId(id): JobId,
+    State(shared): State<AppState>,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    answer(&jobs, &shared, id, &uri, &headers, Output::Slip).await
+}
+
+async fn answer(
+    jobs: &Jobs,
+    shared: &AppState,
+    id: Uuid,
+    uri: &Uri,
+    headers: &HeaderMap,
+    output: Output,
+) -> Result<Response, ApiError> {
+    let selection = Selection::read(uri, headers, shared.options.grid_max_samples)?;
+    let tag = match Known::of(jobs, id, uri, headers, selection.format).await? {
+        Known::Unchanged(answer) => return Ok(answer),
+        Known::Tag(tag) => tag,
+    };
+    if let Some(picture) = selection.picture(jobs, &shared.memory, id, output).await? {
+        return Ok(tagged(&tag, picture));
+    }
+    let (patch, point) = (selection.patch, selection.point);
+    let rendering = shared.memory.rendering(jobs.tenant(), selection.bytes());
+    let rendering = rendering.await?;
+    let (fields, values) = stored(jobs, id, patch, point, output).await?;
+    let written = write_as(
+        rendering,
+        selection,
+        name_of(output),
+        move || match selection.grid {
+            None => Field::PerCell {
+                patch,
+                point,
+                cells: per_cell(fields, values, output),
+            },
+            Some((nx, ny)) => Field::Gridded(GriddedField {
+                patch,
+                point,
+                ..gridded(&fields, &values, output, nx, ny)
+            }),
+        },
+    );
+    Ok(tagged(&tag, written.await?))
+}
+
+/// What an answer is written from.
+pub enum Written {
+    /// A table, whose text is made when the client takes it.
+    Table(Table),
+    /// The whole answer.
+    Whole(Vec<u8>),
+}
+
+/// Builds a field in its turn and writes it in the form that was asked for.
+///
+/// # Errors
+/// `internal` if that fails.
+pub async fn write_as(
+    rendering: Rendering,
+    selection: Selection,
+    name: &'static str,
+    make: impl FnOnce() -> Field + Send + 'static,
+) -> Result<Response, ApiError> {
+    write(rendering, selection, name, move |format| {
+        let table = make().into();
+        match format {
+            Format::Json | Format::Csv => Ok(Written::Table(table)),
+            _ => write_file(&table, selection, name),
+        }
+    })
+    .await
+}
+
+/// The table as one of the binary files.
+///
+/// # Errors
+/// `internal` if that fails.
+pub fn write_file(
+    table: &Table,
+    selection: Selection,
+    name: &'static str,
+) -> Result<Written, ApiError> {
+    let Selection { patch, point, .. } = selection;
+    let bytes = match selection.format {
+        Format::Npz => npz::write(table).map_err(|error| ApiError::internal(&error))?,
+        _ => vtk::write(
+            table,
+            &format!("{name}, patch {patch}, motion {point}; mm, N, MPa"),
+        ),
+    };
+    Ok(Written::Whole(bytes))
+}
+
+/// Makes an answer in its turn. Its memory is held until the client has taken it.
+///
+/// # Errors
+/// What making it fails with.
+pub async fn write(
+    rendering: Rendering,
+    selection: Selection,
+    name: &'static str,
+    make: impl FnOnce(Format) -> Result<Written, ApiError> + Send + 'static,
+) -> Result<Response, ApiError> {
+    let Selection {
+        patch,
+        point,
+        format,
+        ..
+    } = selection;
+    let size = |written: &Written| match written {
+        Written::Table(table) => table.bytes(),
+        Written::Whole(bytes) => bytes.len(),
+    };
+    let (written, share) = rendering.run(move || make(format), size).await?;
+    let body = match written {
+        Written::Table(table) if format == Format::Csv => csv_body(table),
+        Written::Table(table) => json_body(table, patch, point),
+        Written::Whole(bytes) => Body::from(bytes),
+    };
+    let headers = [
+        (
+            header::CONTENT_TYPE,
+            HeaderValue::from_static(format.media_type()),
+        ),
+        (header::VARY, HeaderValue::from_static("Accept")),
+    ];
+    let mut response = (headers, body).into_response();
+    if matches!(format, Format::Npz | Format::Vtk) {
+        // Programs that open these files go by the ending of the name.
+        let file = format!(
+            "attachment; filename=\"{name}-{patch}-{point}.{}\"",
+            format.name()
+        );
+        if let Ok(file) = HeaderValue::from_str(&file) {
+            response
+                .headers_mut()
+                .insert(header::CONTENT_DISPOSITION, file);
+        }
+    }
+    Ok(carrying(response, share))
+}

@@ -1,0 +1,14 @@
+//! What can be asked; one resource is one file. Handlers read a request, call `jobs` and answer.
+
+pub mod batch_results;
+pub mod batches;
+pub mod cases;
+pub mod events;
+pub mod fields;
+pub mod jobs;
+pub mod plots;
+pub mod resultants;
+pub mod results;
+pub mod service;
+pub mod stored_fields;
+pub mod zones;

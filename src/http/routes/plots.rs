@@ -1,0 +1,283 @@
+//! `/v1/jobs/{id}/plot.svg` and `/plot.png`: a picture of one patch for one motion.
+
+use axum::extract::State;
+use axum::http::{HeaderMap, HeaderValue, Uri, header};
+use axum::response::{IntoResponse, Response};
+use utoipa::IntoParams;
+use uuid::Uuid;
+
+use crate::contact::case::Output;
+use crate::contact::solution::PointSolution;
+use crate::http::extract::accept::Format;
+use crate::http::extract::ids::JobId;
+use crate::http::extract::query::{INDEX, index, require_index};
+use crate::http::extract::query::{Query, whole};
+use crate::http::layers::auth::Caller;
+use crate::http::layers::etag::{Known, tagged};
+use crate::http::limits::holding_body::carrying;
+use crate::http::limits::memory::Memory;
+use crate::http::problem::error::ApiError;
+use crate::http::render::picture::{Scene, draw, raster};
+use crate::http::render::table::File;
+use crate::http::routes::stored_fields::{FieldProblems, stored};
+use crate::jobs::Jobs;
+
+/// Width of a picture in pixels when nothing is said.
+pub const WIDTH_DEFAULT: u32 = 800;
+/// Limits of the width in pixels.
+const WIDTH: [u32; 2] = [200, 2400];
+
+/// The parameters of a picture, for the contract.
+#[derive(Debug, IntoParams)]
+#[into_params(parameter_in = Query)]
+#[expect(
+    dead_code,
+    reason = "describes the query, which is read with all its faults elsewhere"
+)]
+pub struct PlotQuery {
+    /// `traction` (when left out), `pressure`, `slip` or `zones`; the case has to ask for that output. The border of the stick
+    /// zone is drawn if it asks for `zones` too
+    #[param(example = "traction")]
+    field: Option<String>,
+    /// The motion, counted from 0; 0 when left out
+    point: Option<u32>,
+    /// The patch, counted from 0; 0 when left out
+    patch: Option<u32>,
+    /// Width in pixels; 800 when left out. The height follows from the patch
+    #[param(minimum = 200, maximum = 2400)]
+    width: Option<u32>,
+}
+
+/// What a picture is to show.
+#[derive(Debug, Clone, Copy)]
+pub struct Wish {
+    /// The field.
+    pub shown: Output,
+    /// Number of the patch.
+    pub patch: usize,
+    /// Number of the motion.
+    pub point: usize,
+    /// Width in pixels.
+    pub width: u32,
+}
+
+impl Wish {
+    fn read(uri: &Uri) -> Result<Wish, ApiError> {
+        let mut query = Query::read(uri, &["field", "point", "patch", "width"]);
+        let shown = query.take(
+            "field",
+            "`traction`, `pressure`, `slip` or `zones`",
+            |text| match text {
+                "traction" => Some(Output::Tractions),
+                "pressure" => Some(Output::Pressure),
+                "slip" => Some(Output::Slip),
+                "zones" => Some(Output::Zones),
+                _ => None,
+            },
+        );
+        let point = query.take("point", INDEX, index);
+        let patch = query.take("patch", INDEX, index);
+        let width = query.take("width", "a whole number from 200 to 2400", |text| {
+            whole(text, WIDTH[0], WIDTH[1])
+        });
+        query.finish()?;
+        Ok(Wish {
+            shown: shown.unwrap_or(Output::Tractions),
+            patch: patch.unwrap_or(0),
+            point: point.unwrap_or(0),
+            width: width.unwrap_or(WIDTH_DEFAULT),
+        })
+    }
+}
+
+/// A picture of a patch as SVG.
+///
+/// A heat map of the cells with a scale, the border of the stick zone, arrows along the traction or the slip, axes in mm with the same
+/// scale, and the rolling direction. Readable without colour.
+#[utoipa::path(
+    get,
+    path = "/v1/jobs/{id}/plot.svg",
+    tag = "results",
+    operation_id = "get_plot_svg",
+    params(("id" = String, Path, description = "Id of the job", format = "uuid"), PlotQuery),
+    responses((status = 200, description = "The picture", content((String = "image/svg+xml"))), FieldProblems)
+)]
+pub async fn svg(
+    Caller(jobs): Caller,
+    JobId(id): JobId,
+    State(memory): State<Memory>,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    plot(&jobs, &memory, id, &uri, &headers, Format::Svg).await
+}
+
+/// The same picture as PNG.
+#[utoipa::path(
+    get,
+    path = "/v1/jobs/{id}/plot.png",
+    tag = "results",
+    operation_id = "get_plot_png",
+    params(("id" = String, Path, description = "Id of the job", format = "uuid"), PlotQuery),
+    responses((status = 200, description = "The picture", content((File = "image/png"))), FieldProblems)
+)]
+pub async fn png(
+    Caller(jobs): Caller,
+    JobId(id): JobId,
+    State(memory): State<Memory>,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    plot(&jobs, &memory, id, &uri, &headers, Format::Png).await
+}
+
+async fn plot(
+    jobs: &Jobs,
+    memory: &Memory,
+    id: Uuid,
+    uri: &Uri,
+    headers: &HeaderMap,
+    format: Format,
+) -> Result<Response, ApiError> {
+    let wish = Wish::read(uri)?;
+    match Known::of(jobs, id, uri, headers, format).await? {
+        Known::Unchanged(answer) => Ok(answer),
+        Known::Tag(tag) => Ok(tagged(&tag, picture(jobs, memory, id, wish, format).await?)),
+    }
+}
+
+/// Draws what was wished for.
+///
+/// # Errors
+/// The output was not asked for, there is no such patch or motion, or there is no result.
+pub async fn picture(
+    jobs: &Jobs,
+    memory: &Memory,
+    id: Uuid,
+    wish: Wish,
+    format: Format,
+) -> Result<Response, ApiError> {
+    // Its pixels are there during its turn only; what is sent is small.
+    let rendering = memory.rendering(jobs.tenant(), 0).await?;
+    let job = jobs.get(id).await?;
+    let solution = jobs.solution(id).await?;
+    let patches = solution.patches.len();
+    require_index("patch", Some(wish.patch), patches)?;
+    let points = &solution.patches[wish.patch].points;
+    require_index("point", Some(wish.point), points.len())?;
+    let (fields, values) = stored(jobs, id, wish.patch, wish.point, wish.shown).await?;
+    let normal = solution.patches[wish.patch].normal_force_n;
+    let counted = counted(wish, patches, points.len());
+    let remarks = remarks(&points[wish.point], normal, &counted);
+    let scene = Scene {
+        title: job.name.unwrap_or_else(|| format!("job {id}")),
+        remarks,
+        shown: wish.shown,
+        fields,
+        values,
+    };
+    let draw = move || {
+        let svg = draw(&scene, wish.width);
+        match format {
+            Format::Png => {
+                raster::png(&svg, wish.width).map_err(|error| ApiError::internal(&error))
+            }
+            _ => Ok(svg.into_bytes()),
+        }
+    };
+    let (body, share) = rendering.run(draw, Vec::len).await?;
+    let mut response = ([(header::CONTENT_TYPE, format.media_type())], body).into_response();
+    // A picture is opened in browsers: whatever a client managed to write into a name, nothing in it may run.
+    response.headers_mut().insert(
+        header::CONTENT_SECURITY_POLICY,
+        HeaderValue::from_static("default-src 'none'; style-src 'unsafe-inline'; sandbox"),
+    );
+    Ok(carrying(response, share))
+}
+
+/// Which patch and motion this is, where there are several.
+fn counted(wish: Wish, patches: usize, points: usize) -> String {
+    let mut text = String::new();
+    if patches > 1 {
+        text += &format!(", patch {} of 0 to {}", wish.patch, patches - 1);
+    }
+    if points > 1 {
+        text += &format!(", point {} of 0 to {}", wish.point, points - 1);
+    }
+    text
+}
+
+/// Motion and forces in two lines.
+fn remarks(point: &PointSolution, normal: f64, counted: &str) -> Vec<String> {
+    let motion = point.motion;
+    // What rounding leaves of a force that is nothing.
+    let force = |value: f64| {
+        let lost = value.abs() < 1e-9 * normal;
+        short(if lost { 0.0 } else { value })
+    };
+    vec![
+        format!(
+            "creepage x {}, y {}, spin {} 1/mm{counted}",
+            short(motion.creepage_x),
+            short(motion.creepage_y),
+            short(motion.spin_per_mm),
+        ),
+        format!(
+            "normal force {} N; on the lower body: force x {} N, y {} N, moment {} N·mm",
+            short(normal),
+            force(point.force_x_n),
+            force(point.force_y_n),
+            force(point.moment_z_n_mm)
+        ),
+    ]
+}
+
+/// A number with four digits that count.
+fn short(value: f64) -> String {
+    let size = value.abs();
+    let text = if size == 0.0 {
+        "0".to_owned()
+    } else if (1e-3..1e4).contains(&size) {
+        let digits = (3.0 - size.log10().floor()).clamp(0.0, 6.0);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "from 0 to 6"
+        )]
+        let text = format!("{value:.*}", digits as usize);
+        if text.contains('.') {
+            text.trim_end_matches('0').trim_end_matches('.').to_owned()
+        } else {
+            text
+        }
+    } else if (1e4..1e9).contains(&size) {
+        format!("{value:.0}")
+    } else {
+        let text = format!("{value:.3e}");
+        let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+        let digits = digits.trim_end_matches('0').trim_end_matches('.');
+        format!("{digits}e{exponent}")
+    };
+    text.replace('-', "−")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short() {
+        for (value, text) in [
+            (0.0, "0"),
+            (0.001, "0.001"),
+            (-0.0004, "−4e−4"),
+            (1.25e-12, "1.25e−12"),
+            (100_000.0, "100000"),
+            (1234.56, "1235"),
+            (12.3456, "12.35"),
+            (-3.0, "−3"),
+        ] {
+            assert_eq!(short(value), text);
+        }
+    }
+}

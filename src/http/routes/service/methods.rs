@@ -1,0 +1,184 @@
+//! `/v1/methods`: what the service can do, in words a client can choose from.
+
+use axum::Json;
+use axum::extract::State;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::contact::case::{Method, Output};
+use crate::http::options::HttpOptions;
+use crate::http::problem::catalogue::Always;
+use crate::http::routes::jobs::WAIT_MAX_SECONDS;
+use crate::jobs::PAGE_MAX;
+
+/// What the service can do.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct Abilities {
+    /// Values of `solver.method`.
+    methods: Vec<MethodAbility>,
+    /// Values of `contact.type`.
+    contacts: Vec<ContactAbility>,
+    /// Values of `outputs`.
+    outputs: Vec<OutputAbility>,
+    /// Limits of requests.
+    limits: RequestLimits,
+    /// Version of the service.
+    #[schema(value_type = String)]
+    version: &'static str,
+}
+
+/// A method of solving the tangential contact.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct MethodAbility {
+    /// The word for `solver.method`.
+    name: Method,
+    /// Used when the case names none.
+    default: bool,
+    /// What it is and when to choose it.
+    #[schema(value_type = String)]
+    summary: &'static str,
+}
+
+/// A way to describe where the bodies touch.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct ContactAbility {
+    /// The word for `contact.type`.
+    #[schema(value_type = String)]
+    name: &'static str,
+    /// Must the case have a `load`?
+    needs_load: bool,
+    /// What it describes.
+    #[schema(value_type = String)]
+    summary: &'static str,
+}
+
+/// Something a case can ask for.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct OutputAbility {
+    /// The word for `outputs`.
+    name: Output,
+    /// Computed when the case names no outputs.
+    default: bool,
+    /// What it is.
+    #[schema(value_type = String)]
+    summary: &'static str,
+}
+
+/// Limits of requests.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct RequestLimits {
+    /// Largest body of one case in bytes.
+    body_max_bytes: usize,
+    /// Longest `Prefer: wait`, in s.
+    wait_max_seconds: u32,
+    /// Most jobs in one page of a list.
+    list_limit_max: u32,
+}
+
+/// The methods, contacts and outputs that a case can name.
+#[utoipa::path(
+    get,
+    path = "/v1/methods",
+    tag = "cases",
+    operation_id = "list_methods",
+    responses((status = 200, description = "What the service can do", body = Abilities), Always)
+)]
+pub async fn methods(State(options): State<HttpOptions>) -> Json<Abilities> {
+    Json(Abilities {
+        methods: [
+            Method::Auto,
+            Method::BoundaryElement,
+            Method::LiuHsu,
+            Method::Fastsim,
+        ]
+        .map(describe_method)
+        .into(),
+        contacts: contacts(),
+        outputs: [
+            Output::Resultants,
+            Output::Zones,
+            Output::Tractions,
+            Output::Pressure,
+            Output::Slip,
+        ]
+        .map(describe_output)
+        .into(),
+        limits: RequestLimits {
+            body_max_bytes: options.body_max_bytes,
+            wait_max_seconds: WAIT_MAX_SECONDS,
+            list_limit_max: PAGE_MAX,
+        },
+        version: env!("CARGO_PKG_VERSION"),
+    })
+}
+
+fn describe_method(method: Method) -> MethodAbility {
+    let summary = match method {
+        Method::Auto => "The best method for the case; today always `boundary_element`.",
+        Method::BoundaryElement => {
+            "Boundary elements with a semismooth Newton iteration: fast, for every motion and any shape of patch."
+        }
+        Method::LiuHsu => {
+            "The Newton–Raphson method of Liu and Hsu with its two initial guesses. Slower, for small meshes; \
+             it does not converge at every spin and then says so."
+        }
+        Method::Fastsim => {
+            "Kalker's simplified theory: a draft in microseconds, with a stated error instead of an estimated one."
+        }
+    };
+    MethodAbility {
+        name: method,
+        default: method == Method::default(),
+        summary,
+    }
+}
+
+fn describe_output(output: Output) -> OutputAbility {
+    let (default, summary) = match output {
+        Output::Resultants => (true, "Forces, moment and dissipated power."),
+        Output::Zones => (true, "Stick and slip zones: cells, areas and outlines."),
+        Output::Tractions => (false, "Tangential tractions per cell."),
+        Output::Pressure => (false, "Pressure per cell."),
+        Output::Slip => (false, "Relative slip per cell, divided by rolling speed."),
+    };
+    OutputAbility {
+        name: output,
+        default,
+        summary,
+    }
+}
+
+fn contacts() -> Vec<ContactAbility> {
+    vec![
+        ContactAbility {
+            name: "radii",
+            needs_load: true,
+            summary: "Relative radii of curvature: an elliptic patch after Hertz.",
+        },
+        ContactAbility {
+            name: "ellipse",
+            needs_load: true,
+            summary: "An elliptic patch of given semi-axes with Hertz's pressure.",
+        },
+        ContactAbility {
+            name: "gap_profile",
+            needs_load: true,
+            summary: "A gap measured across, between bodies that are circular along rolling: region and pressure are found.",
+        },
+        ContactAbility {
+            name: "gap_grid",
+            needs_load: true,
+            summary: "Any gap on a grid: region and pressure are found, in one or several patches.",
+        },
+        ContactAbility {
+            name: "profiles",
+            needs_load: true,
+            summary: "A wheel on a rail by their cross-sections: every patch is found, with its place and its own frame.",
+        },
+        ContactAbility {
+            name: "pressure_grid",
+            needs_load: false,
+            summary: "A given pressure on a grid; its positive part is the contact, in one or several patches.",
+        },
+    ]
+}

@@ -1,0 +1,7 @@
+//! What can be asked about the service itself.
+
+pub mod health;
+pub mod methods;
+pub mod metrics;
+pub mod problems;
+pub mod remarks;

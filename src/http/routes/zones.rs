@@ -1,0 +1,161 @@
+//! `/v1/jobs/{id}/zones`: where the patch sticks and where it slips.
+
+use axum::extract::State;
+use axum::http::{HeaderMap, Uri};
+use axum::response::Response;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::contact::case::Output;
+use crate::contact::outputs::outline::{outlines, patch_outline};
+use crate::contact::zones::Zone;
+use crate::http::dto::cells::{Cells, GriddedField, gridded, per_cell};
+use crate::http::extract::accept::Format;
+use crate::http::extract::ids::JobId;
+use crate::http::extract::query::require_index;
+use crate::http::layers::auth::Caller;
+use crate::http::layers::etag::{Known, tagged};
+use crate::http::problem::error::ApiError;
+use crate::http::render::table::File;
+use crate::http::routes::fields::{FieldQuery, Selection, Written, write, write_file};
+use crate::http::routes::stored_fields::{FieldProblems, not_asked, stored};
+use crate::http::state::AppState;
+
+/// Stick and slip zones of one patch for one motion.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum Zones {
+    /// Without `grid`: areas, outlines and the zone of every cell.
+    PerCell(ZoneCells),
+    /// With `grid`: the zone of the nearest cell, resampled.
+    #[expect(
+        dead_code,
+        reason = "for the contract; its text is written piece by piece"
+    )]
+    Gridded(GriddedField),
+}
+
+/// Areas, outlines and the zone of every cell.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct ZoneCells {
+    /// Number of the patch, counted from 0.
+    patch: usize,
+    /// Number of the motion, counted from 0.
+    point: usize,
+    /// Area that sticks in mm²: the share of the sticking cells in the area of the patch.
+    stick_area_mm2: f64,
+    /// Area that slips in mm², likewise; both add up to the area of the patch.
+    slip_area_mm2: f64,
+    /// Number of cells that stick.
+    stick_cells: u32,
+    /// Number of cells that slip.
+    slip_cells: u32,
+    /// Closed polygons around the patch and its zones.
+    outlines: Outlines,
+    /// Geometry and zone of the cells.
+    cells: Cells,
+}
+
+/// Closed polygons as lists of `[x, y]` in mm; the last point is joined to the first. Outer borders run
+/// counter-clockwise, holes clockwise.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct Outlines {
+    /// The whole patch.
+    patch: Vec<Vec<[f64; 2]>>,
+    /// The cells that stick.
+    stick: Vec<Vec<[f64; 2]>>,
+    /// The cells that slip.
+    slip: Vec<Vec<[f64; 2]>>,
+}
+
+/// Stick and slip zones of a succeeded job.
+#[utoipa::path(
+    get,
+    path = "/v1/jobs/{id}/zones",
+    tag = "results",
+    operation_id = "get_zones",
+    params(
+        ("id" = String, Path, description = "Id of the job", format = "uuid"),
+        FieldQuery
+    ),
+    responses((status = 200, description = "Areas, outlines and the zone of every cell, or zones on a regular grid; only cells or grid in forms other than JSON", content(
+        (Zones = "application/json"),
+        (String = "text/csv"),
+        (File = "application/x-npz"),
+        (File = "application/x-vtk"),
+        (String = "image/svg+xml"),
+        (File = "image/png")
+    )), FieldProblems)
+)]
+pub async fn zones(
+    Caller(jobs): Caller,
+    JobId(id): JobId,
+    State(shared): State<AppState>,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    let selection = Selection::read(&uri, &headers, shared.options.grid_max_samples)?;
+    let tag = match Known::of(&jobs, id, &uri, &headers, selection.format).await? {
+        Known::Unchanged(answer) => return Ok(answer),
+        Known::Tag(tag) => tag,
+    };
+    let shown = Output::Zones;
+    if let Some(picture) = selection.picture(&jobs, &shared.memory, id, shown).await? {
+        return Ok(tagged(&tag, picture));
+    }
+    let rendering = shared.memory.rendering(jobs.tenant(), selection.bytes());
+    let rendering = rendering.await?;
+    let solution = jobs.solution(id).await?;
+    require_index("patch", Some(selection.patch), solution.patches.len())?;
+    let points = &solution.patches[selection.patch].points;
+    require_index("point", Some(selection.point), points.len())?;
+    let point = &points[selection.point];
+    let summary = (
+        point.stick_area_mm2,
+        point.slip_area_mm2,
+        point.stick_cells,
+        point.slip_cells,
+    );
+    let (Some(stick_area_mm2), Some(slip_area_mm2), Some(stick_cells), Some(slip_cells)) = summary
+    else {
+        return not_asked(&jobs, id, shown).await;
+    };
+    drop(solution);
+    let (patch, point) = (selection.patch, selection.point);
+    let (fields, values) = stored(&jobs, id, patch, point, shown).await?;
+    let written = write(rendering, selection, "zones", move |format| {
+        if let Some((nx, ny)) = selection.grid {
+            let table = gridded(&fields, &values, shown, nx, ny).into();
+            return match format {
+                Format::Json | Format::Csv => Ok(Written::Table(table)),
+                _ => write_file(&table, selection, "zones"),
+            };
+        }
+        let outlines = Outlines {
+            patch: patch_outline(&fields),
+            stick: outlines(&fields, values.zone.as_deref(), Some(Zone::Stick)),
+            slip: outlines(&fields, values.zone.as_deref(), Some(Zone::Slip)),
+        };
+        let cells = per_cell(fields, values, shown);
+        match format {
+            Format::Json => {
+                let zones = Zones::PerCell(ZoneCells {
+                    patch,
+                    point,
+                    stick_area_mm2,
+                    slip_area_mm2,
+                    stick_cells,
+                    slip_cells,
+                    outlines,
+                    cells,
+                });
+                let text = serde_json::to_vec(&zones);
+                let text = text.map_err(|error| ApiError::internal(&error))?;
+                Ok(Written::Whole(text))
+            }
+            Format::Csv => Ok(Written::Table(cells.into())),
+            _ => write_file(&cells.into(), selection, "zones"),
+        }
+    });
+    Ok(tagged(&tag, written.await?))
+}

@@ -1,0 +1,48 @@
+//! One connection: whose it is, its requests, and how long it may be silent.
+
+use std::net::IpAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::Router;
+use axum::body::Body;
+use axum::http::{Request, Response};
+use hyper::body::Incoming;
+use tokio::time::sleep;
+use tower::ServiceExt;
+
+use crate::http::limits::holding_body::carrying;
+use crate::http::server::places::Place;
+
+/// The address that a request comes from; in its extensions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Peer(pub IpAddr);
+
+/// Marks a request on a connection that came when all places were taken: only the probes are answered.
+#[derive(Debug, Clone, Copy)]
+pub struct ProbesOnly;
+
+/// Answers one request; its connection counts as busy until the answer has been handed over.
+pub async fn answer(
+    router: Router,
+    peer: Peer,
+    place: &Arc<Place>,
+    request: Request<Incoming>,
+) -> Response<Body> {
+    let busy = place.begin();
+    let mut request = request.map(Body::new);
+    request.extensions_mut().insert(peer);
+    if place.probes_only {
+        request.extensions_mut().insert(ProbesOnly);
+    }
+    let Ok(response) = router.oneshot(request).await;
+    carrying(response, busy)
+}
+
+/// Ends if there is no complete head within this time.
+pub async fn silent(place: &Place, within: Duration) {
+    sleep(within).await;
+    if place.is_used() {
+        std::future::pending::<()>().await;
+    }
+}
