@@ -33,6 +33,7 @@ const ORDER: &[&str] = &[
     "jobs::staging",
     "jobs::store",
     "jobs::results",
+    "jobs::sweep",
     "jobs::batch",
     "jobs::keys",
     "jobs::leaps",
@@ -98,6 +99,7 @@ pub const DOOR: &[&str] = &[
     "contact::outputs",
     "contact::problem",
     "contact::remark",
+    "contact::slices",
     "contact::solution",
     "contact::zones",
 ];
