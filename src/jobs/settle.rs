@@ -6,13 +6,13 @@ use std::time::SystemTime;
 
 use uuid::Uuid;
 
-use crate::jobs::attempt::{Attempt, Phase, Verdict, judge};
+use crate::jobs::attempt::{Attempt, Phase};
 use crate::jobs::error::JobsError;
 use crate::jobs::job::{Failure, FailureKind, State};
+use crate::jobs::part::SliceFate;
 use crate::jobs::results::Encoded;
-use crate::jobs::store::{Claim, Ending, NewSlice, Placed, Release, SliceNote};
-use crate::jobs::submit::microseconds;
-use crate::jobs::sweep::Sweep;
+use crate::jobs::store::{Claim, Ending, Placed, Release};
+use crate::jobs::verdict::{Verdict, judge};
 use crate::jobs::watch::Reason;
 use crate::jobs::worker::{Step, Worker};
 
@@ -77,76 +77,26 @@ impl Worker {
     ) -> Result<(), JobsError> {
         let shared = &self.shared;
         let from = shared.options.tracer.is_some().then(SystemTime::now);
-        let (mut ends, mut back, mut long) = (Vec::new(), Vec::new(), Vec::new());
+        let mut sorted = Sorted::default();
         for place in 0..attempt.members.len() {
-            let member = &mut attempt.members[place];
-            if !matches!(member.phase, Phase::Solved(_)) {
+            let phase = &mut attempt.members[place].phase;
+            if !matches!(phase, Phase::Solved(_)) {
                 continue;
             }
-            let Phase::Solved(outcome) = std::mem::replace(&mut member.phase, Phase::Done) else {
-                continue;
-            };
-            let claim = member.claim.clone();
-            let ending = match judge(outcome, member.watch.reason()) {
-                Verdict::Lost => {
-                    step.lost.push(claim.id);
-                    attempt.done(&[claim.id]);
-                    continue;
-                }
-                Verdict::HandBack => {
-                    back.push(claim);
-                    continue;
-                }
-                Verdict::HandBackAsLong => {
-                    long.push(claim);
-                    continue;
-                }
-                Verdict::GoOn {
-                    sweep,
-                    part,
-                    stopped,
-                } => match self.keep_slice(attempt, place, sweep, part).await {
-                    Ok(Kept::Lost) => {
-                        step.lost.push(claim.id);
-                        attempt.done(&[claim.id]);
-                        continue;
-                    }
-                    Ok(Kept::There) => {
-                        match stopped {
-                            Some(Reason::TooLong) => long.push(claim),
-                            Some(_) => back.push(claim),
-                            None if self.makes_room(attempt).await => back.push(claim),
-                            None => attempt.members[place].phase = Phase::Solving,
-                        }
-                        continue;
-                    }
-                    Err(error) if error.trouble().is_some() => {
-                        back.push(claim);
-                        continue;
-                    }
-                    Err(error) => not_stored(&error),
-                },
-                Verdict::End(ending) => ending,
-                Verdict::Keep {
-                    result,
-                    remarks,
-                    field_patches,
-                } => match self.place(&claim, result).await {
-                    Ok(result) => Ending::Succeeded {
-                        remarks,
-                        result,
-                        field_patches,
-                    },
-                    // The service stops while the disk takes nothing.
-                    Err(error) if error.trouble().is_some() => {
-                        back.push(claim);
-                        continue;
-                    }
-                    Err(error) => not_stored(&error),
-                },
-            };
-            ends.push((claim, ending));
+            if let Phase::Solved(outcome) = std::mem::replace(phase, Phase::Done) {
+                let reason = attempt.members[place].watch.reason();
+                self.sort(attempt, place, judge(outcome, reason), &mut sorted)
+                    .await;
+            }
         }
+        attempt.done(&sorted.lost);
+        step.lost.append(&mut sorted.lost);
+        let Sorted {
+            ends,
+            mut back,
+            long,
+            ..
+        } = sorted;
         self.finish(attempt, ends, from, step).await?;
         back.extend(attempt.claims(|phase| matches!(phase, Phase::NotBegun)));
         self.release(attempt, &back, Release::NotBegun, step)
@@ -155,6 +105,55 @@ impl Worker {
         self.release(attempt, &long, Release::Long { slice_us }, step)
             .await?;
         self.settle_twins(attempt, step).await
+    }
+
+    /// Stores what there is to be stored of a member, and says what is to be written down of it.
+    async fn sort(
+        &self,
+        attempt: &mut Attempt,
+        place: usize,
+        verdict: Verdict,
+        sorted: &mut Sorted,
+    ) {
+        let claim = attempt.members[place].claim.clone();
+        let stored = match verdict {
+            Verdict::Lost => return sorted.lost.push(claim.id),
+            Verdict::HandBack => return sorted.back.push(claim),
+            Verdict::HandBackAsLong => return sorted.long.push(claim),
+            Verdict::End(ending) => Ok(ending),
+            Verdict::GoOn {
+                sweep,
+                part,
+                stopped,
+            } => match self.keep_slice(attempt, place, sweep, part).await {
+                Ok(SliceFate::Lost) => return sorted.lost.push(claim.id),
+                Ok(SliceFate::Stored) => match stopped {
+                    Some(Reason::TooLong) => return sorted.long.push(claim),
+                    Some(_) => return sorted.back.push(claim),
+                    None if self.makes_room(attempt).await => return sorted.back.push(claim),
+                    None => return attempt.members[place].phase = Phase::Solving,
+                },
+                Err(error) => Err(error),
+            },
+            Verdict::Keep {
+                result,
+                remarks,
+                field_patches,
+            } => self
+                .place(&claim, result)
+                .await
+                .map(|result| Ending::Succeeded {
+                    remarks,
+                    result,
+                    field_patches,
+                }),
+        };
+        match stored {
+            Ok(ending) => sorted.ends.push((claim, ending)),
+            // The service stops while the disk takes nothing.
+            Err(error) if error.trouble().is_some() => sorted.back.push(claim),
+            Err(error) => sorted.ends.push((claim, not_stored(&error))),
+        }
     }
 
     async fn finish(
@@ -199,52 +198,8 @@ impl Worker {
         Ok(())
     }
 
-    /// Stores a solved slice of a member, which goes on from there.
-    async fn keep_slice(
-        &self,
-        attempt: &mut Attempt,
-        place: usize,
-        mut sweep: Box<Sweep>,
-        part: Option<(SliceNote, Encoded)>,
-    ) -> Result<Kept, JobsError> {
-        let shared = &self.shared;
-        let member = &mut attempt.members[place];
-        if let Some((note, part)) = part {
-            let claim = &member.claim;
-            let (number, done) = (note.number, sweep.done_after_next());
-            let result = match part.bytes() <= shared.options.small_result_max_bytes {
-                true => Placed::Table(part),
-                false => {
-                    let bytes = part.bytes() as u64;
-                    let put = || shared.results.put_slice(claim, number, part.clone());
-                    Placed::Folder(shared.write_patiently(put).await?, bytes)
-                }
-            };
-            let slice = NewSlice {
-                rest_us: u64::from(microseconds(sweep.problem.cost().seconds * (1.0 - done))),
-                note,
-                result,
-                done,
-            };
-            let added = shared
-                .write_patiently(|| shared.store.add_slice(claim, &slice))
-                .await?;
-            if !added {
-                if let Placed::Folder(key, _) = &slice.result {
-                    self.abandon_blob(key).await;
-                }
-                return Ok(Kept::Lost);
-            }
-            tracing::debug!(job = %claim.id, number, done, "slice stored");
-            sweep.advance(slice.note.spent);
-            member.claim.slices = number + 1;
-        }
-        member.sweep = Some(sweep);
-        Ok(Kept::There)
-    }
-
     /// Leaves a result that no job refers to, to be removed.
-    async fn abandon_blob(&self, key: &str) {
+    pub(super) async fn abandon_blob(&self, key: &str) {
         if let Err(error) = self.shared.store.abandon_blob(key).await {
             tracing::warn!(key, %error, "a result without a job is left until the next start");
         }
@@ -319,12 +274,13 @@ impl Worker {
     }
 }
 
-/// What became of a slice that was to be stored.
-enum Kept {
-    /// It is stored.
-    There,
-    /// The lease is gone.
-    Lost,
+/// What is to be written down of the members of an attempt.
+#[derive(Default)]
+struct Sorted {
+    ends: Vec<(Claim, Ending)>,
+    back: Vec<Claim>,
+    long: Vec<Claim>,
+    lost: Vec<Uuid>,
 }
 
 /// The end of a job whose result could not be stored.

@@ -11,14 +11,14 @@ use bytes::Bytes;
 use crate::contact::error::{CaseError, SolveError};
 use crate::contact::monitor::Monitor;
 use crate::contact::remark::RemarkEntry;
-use crate::contact::solution::{Fields, Solution};
+use crate::contact::solution::{Fields, PatchFields, Solution};
 use crate::jobs::Shared;
 use crate::jobs::error::JobsError;
 use crate::jobs::fields;
 use crate::jobs::job::{Failure, FailureKind};
 use crate::jobs::results::Encoded;
-use crate::jobs::store::{SliceNote, StoredCase};
-use crate::jobs::sweep::{Sweep, join};
+use crate::jobs::store::StoredCase;
+use crate::jobs::sweep::{SliceNote, Sweep};
 use crate::jobs::watch::Watch;
 
 /// Tasks from this length on leave enough free memory behind to be worth a look at the whole heap.
@@ -257,10 +257,113 @@ fn encoded(solution: &Solution, fields: &Fields) -> Result<Encoded, String> {
     })
 }
 
+/// Puts the parts of an answer together, in the order of their slices. `go_on` is asked before each part.
+///
+/// # Errors
+/// A part cannot be read, or does not fit to the others. `None` if `go_on` said no.
+fn join(
+    parts: &[Encoded],
+    go_on: impl Fn() -> bool,
+) -> Result<Option<(Solution, Fields)>, JobsError> {
+    let mut whole: Option<(Solution, Fields)> = None;
+    for part in parts {
+        if !go_on() {
+            return Ok(None);
+        }
+        let (solution, fields) = read(part)?;
+        match &mut whole {
+            None => whole = Some((solution, fields)),
+            Some((all, all_fields)) => {
+                if all.patches.len() != solution.patches.len()
+                    || all_fields.patches.len() != fields.patches.len()
+                {
+                    let reason = "the slices of a sweep have different patches";
+                    return Err(JobsError::Damaged(reason.to_owned()));
+                }
+                all.append(solution);
+                all_fields.append(fields);
+            }
+        }
+    }
+    let none = || JobsError::Damaged("a sweep without slices".to_owned());
+    whole.ok_or_else(none).map(Some)
+}
+
+fn read(part: &Encoded) -> Result<(Solution, Fields), JobsError> {
+    let damaged = |error: serde_json::Error| JobsError::Damaged(format!("a slice: {error}"));
+    let solution: Solution = serde_json::from_slice(&part.solution).map_err(damaged)?;
+    let patches = match &part.fields {
+        None => Vec::new(),
+        Some(_) => (0..solution.patches.len())
+            .map(|patch| part.patch_fields(patch, None))
+            .collect::<Result<Vec<PatchFields>, JobsError>>()?,
+    };
+    Ok((solution, Fields { patches }))
+}
+
 fn panic_text(payload: &(dyn Any + Send)) -> &str {
     payload
         .downcast_ref::<&str>()
         .copied()
         .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
         .unwrap_or("no message")
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+    use crate::contact;
+    use crate::contact::monitor::Unwatched;
+    use crate::contact::problem::Limits;
+    use crate::jobs::recipe::Recipe;
+
+    #[test]
+    fn parts_read_from_where_they_were_stored_are_the_answer_bit_for_bit() {
+        let case = json!({
+            "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
+            "friction": { "coefficient": 0.3 },
+            "contact": { "type": "radii", "rolling_mm": 460, "lateral_mm": 300 },
+            "load": { "normal_force_n": 100_000 },
+            "motion": { "sweep": { "creepage_x": { "from": 0.0005, "to": 0.003, "points": 7 } } },
+            "solver": { "mesh": { "strips": 6, "cells": 6 } },
+            "outputs": ["resultants", "zones", "tractions", "slip", "pressure"]
+        });
+        let problem = contact::check(&case, &Limits::default()).unwrap();
+        let recipe = Recipe::contact();
+        let mut parts = Vec::new();
+        let mut whole: Option<(Solution, Fields)> = None;
+        for cut in [0..3, 3..5, 5..7] {
+            let (solution, fields) = (recipe.solve)(&problem, cut, &Unwatched).unwrap();
+            parts.push(Encoded {
+                solution: Bytes::from(serde_json::to_vec(&solution).unwrap()),
+                fields: Some(Bytes::from(fields::encode(&fields).unwrap())),
+            });
+            match &mut whole {
+                None => whole = Some((solution, fields)),
+                Some((all, all_fields)) => {
+                    all.append(solution);
+                    all_fields.append(fields);
+                }
+            }
+        }
+        let (solution, fields) = join(&parts, || true).unwrap().unwrap();
+        let (expected, expected_fields) = whole.unwrap();
+        assert_eq!(solution.total.len(), 7);
+        assert_eq!(
+            serde_json::to_vec(&solution).unwrap(),
+            serde_json::to_vec(&expected).unwrap()
+        );
+        assert_eq!(
+            fields::encode(&fields).unwrap(),
+            fields::encode(&expected_fields).unwrap()
+        );
+        assert!(join(&parts, || false).unwrap().is_none());
+        parts[1].fields = None;
+        assert!(matches!(join(&parts, || true), Err(JobsError::Damaged(_))));
+        parts[1].solution = Bytes::from_static(b"{");
+        assert!(join(&parts, || true).is_err());
+        assert!(join(&[], || true).is_err());
+    }
 }

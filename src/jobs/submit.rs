@@ -71,11 +71,8 @@ impl Jobs {
         // not take the cores from them either.
         let turn = self.shared.checks.acquire().await;
         let read = tokio::task::spawn_blocking(move || {
-            let digest = |_: &String| wishes.digest(&idempotency::digest(&case));
-            let idempotency = idempotency_key.map(|key| {
-                let digest = digest(&key);
-                (key, digest)
-            });
+            let digest = || wishes.digest(&idempotency::digest(&case));
+            let idempotency = idempotency_key.map(|key| (key, digest()));
             (jobs.check(&case), serde_json::to_vec(&case), idempotency)
         });
         let (problem, body, idempotency) = read

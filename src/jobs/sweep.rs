@@ -6,10 +6,19 @@ use std::ops::Range;
 use std::time::Duration;
 
 use crate::contact::problem::Problem;
-use crate::contact::solution::{Fields, PatchFields, Solution};
-use crate::jobs::error::JobsError;
-use crate::jobs::results::Encoded;
-use crate::jobs::store::SliceNote;
+
+/// What is known of a stored slice of a sweep.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SliceNote {
+    /// Place among the slices of the case, from 0.
+    pub number: u32,
+    /// Motions of the case up to its end.
+    pub motions: u32,
+    /// Digest of the case as the solver that solved it knew it; of another digest it is of no use.
+    pub digest: String,
+    /// Solver time of the job up to its end.
+    pub spent: Duration,
+}
 
 /// A checked case with its slices, of which the first `done` are stored.
 #[derive(Debug)]
@@ -84,63 +93,13 @@ impl Sweep {
     }
 }
 
-/// Puts the parts of an answer together, in the order of their slices. `go_on` is asked before each part.
-///
-/// # Errors
-/// A part cannot be read, or does not fit to the others. `None` if `go_on` said no.
-pub(super) fn join(
-    parts: &[Encoded],
-    go_on: impl Fn() -> bool,
-) -> Result<Option<(Solution, Fields)>, JobsError> {
-    let mut whole: Option<(Solution, Fields)> = None;
-    for part in parts {
-        if !go_on() {
-            return Ok(None);
-        }
-        let (solution, fields) = read(part)?;
-        match &mut whole {
-            None => whole = Some((solution, fields)),
-            Some((all, all_fields)) => {
-                if all.patches.len() != solution.patches.len()
-                    || all_fields.patches.len() != fields.patches.len()
-                {
-                    let reason = "the slices of a sweep have different patches";
-                    return Err(JobsError::Damaged(reason.to_owned()));
-                }
-                all.append(solution);
-                all_fields.append(fields);
-            }
-        }
-    }
-    let none = || JobsError::Damaged("a sweep without slices".to_owned());
-    whole.ok_or_else(none).map(Some)
-}
-
-fn read(part: &Encoded) -> Result<(Solution, Fields), JobsError> {
-    let damaged = |error: serde_json::Error| JobsError::Damaged(format!("a slice: {error}"));
-    let solution: Solution = serde_json::from_slice(&part.solution).map_err(damaged)?;
-    let patches = match &part.fields {
-        None => Vec::new(),
-        Some(_) => (0..solution.patches.len())
-            .map(|patch| part.patch_fields(patch, None))
-            .collect::<Result<Vec<PatchFields>, JobsError>>()?,
-    };
-    Ok((solution, Fields { patches }))
-}
-
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
-    use bytes::Bytes;
     use serde_json::json;
 
     use super::*;
     use crate::contact;
-    use crate::contact::monitor::Unwatched;
     use crate::contact::problem::Limits;
-    use crate::contact::slices::solve_slice;
-    use crate::jobs::fields;
 
     fn problem() -> Problem {
         let case = json!({
@@ -190,44 +149,5 @@ mod tests {
             (half.next(), half.spent),
             (Some(3..5), Duration::from_secs(3))
         );
-    }
-
-    #[test]
-    fn parts_read_from_where_they_were_stored_are_the_answer_bit_for_bit() {
-        let problem = problem();
-        let store = Arc::default();
-        let mut parts = Vec::new();
-        let mut whole: Option<(Solution, Fields)> = None;
-        for cut in [0..3, 3..5, 5..7] {
-            let (solution, fields) = solve_slice(&store, &problem, cut, &Unwatched).unwrap();
-            parts.push(Encoded {
-                solution: Bytes::from(serde_json::to_vec(&solution).unwrap()),
-                fields: Some(Bytes::from(fields::encode(&fields).unwrap())),
-            });
-            match &mut whole {
-                None => whole = Some((solution, fields)),
-                Some((all, all_fields)) => {
-                    all.append(solution);
-                    all_fields.append(fields);
-                }
-            }
-        }
-        let (solution, fields) = join(&parts, || true).unwrap().unwrap();
-        let (expected, expected_fields) = whole.unwrap();
-        assert_eq!(solution.total.len(), 7);
-        assert_eq!(
-            serde_json::to_vec(&solution).unwrap(),
-            serde_json::to_vec(&expected).unwrap()
-        );
-        assert_eq!(
-            fields::encode(&fields).unwrap(),
-            fields::encode(&expected_fields).unwrap()
-        );
-        assert!(join(&parts, || false).unwrap().is_none());
-        parts[1].fields = None;
-        assert!(matches!(join(&parts, || true), Err(JobsError::Damaged(_))));
-        parts[1].solution = Bytes::from_static(b"{");
-        assert!(join(&parts, || true).is_err());
-        assert!(join(&[], || true).is_err());
     }
 }

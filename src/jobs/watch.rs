@@ -30,7 +30,7 @@ pub struct Watch {
     reason: AtomicU8,
     ticks: AtomicU64,
     progress: AtomicU64,
-    clock: Mutex<Clock>,
+    clock: Mutex<SolveClock>,
     taken_up: AtomicBool,
     memory_bytes: AtomicU64,
     gate: Arc<Gate>,
@@ -38,7 +38,7 @@ pub struct Watch {
 
 /// How long a solve has taken.
 #[derive(Debug, Default)]
-struct Clock {
+struct SolveClock {
     /// Before it last went on.
     spent: Duration,
     /// Since when it goes on, and how long it had waited at the gate by then.
@@ -88,7 +88,7 @@ impl Watch {
         let waited = self.gate.waited();
         let mut clock = self.clock();
         if clock.since.is_none() {
-            *clock = Clock {
+            *clock = SolveClock {
                 spent,
                 since: Some((Instant::now(), waited)),
             };
@@ -98,11 +98,11 @@ impl Watch {
     /// Stops the clock and returns the time spent in all.
     pub fn pause(&self) -> Duration {
         let spent = self.elapsed();
-        *self.clock() = Clock { spent, since: None };
+        *self.clock() = SolveClock { spent, since: None };
         spent
     }
 
-    fn clock(&self) -> MutexGuard<'_, Clock> {
+    fn clock(&self) -> MutexGuard<'_, SolveClock> {
         self.clock.lock().unwrap_or_else(PoisonError::into_inner)
     }
 

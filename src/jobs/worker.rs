@@ -16,10 +16,8 @@ use crate::jobs::Shared;
 use crate::jobs::attempt::{Attempt, Phase};
 use crate::jobs::error::JobsError;
 use crate::jobs::job::State;
-use crate::jobs::results::Encoded;
 use crate::jobs::solver_thread::{SolverThread, Work};
-use crate::jobs::store::{Claim, ClaimRequest, Placed, Release, Which};
-use crate::jobs::sweep::Sweep;
+use crate::jobs::store::{Claim, ClaimRequest, Release, Which};
 use crate::jobs::turns::{Long, Spent};
 use crate::jobs::watch::Reason;
 
@@ -305,36 +303,6 @@ impl Worker {
         };
         attempt.begin(&self.shared, thread, work);
         Ok(())
-    }
-
-    /// What is to be done next for a sweep.
-    async fn next_of(&self, id: Uuid, mut sweep: Box<Sweep>) -> Result<Work, JobsError> {
-        if sweep.next().is_some() {
-            return Ok(Work::Next(sweep));
-        }
-        match self.parts(id).await {
-            Ok(parts) => Ok(Work::Join(sweep, parts)),
-            Err(error) if error.trouble().is_some() => Err(error),
-            Err(error) => {
-                tracing::error!(job = %id, %error, "slices cannot be read; the sweep is solved again");
-                sweep.begin_again();
-                Ok(Work::Next(sweep))
-            }
-        }
-    }
-
-    /// The stored parts of the answer of a sweep.
-    async fn parts(&self, id: Uuid) -> Result<Vec<Encoded>, JobsError> {
-        let shared = &self.shared;
-        let placed = shared.store.slice_results(id).await?;
-        let mut parts = Vec::with_capacity(placed.len());
-        for part in placed {
-            parts.push(match part {
-                Placed::Table(part) => part,
-                Placed::Folder(key, _) => shared.results.whole(&key).await?,
-            });
-        }
-        Ok(parts)
     }
 
     /// Waits until the solver is done or held, and sees to it that one of them comes.

@@ -1,6 +1,6 @@
 //! Does the job table keep its promises? One suite for every store.
 
-use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::collections::{BTreeMap, HashSet};
 
 use bytes::Bytes;
 use railhead::contact::remark::{Remark, RemarkEntry};
@@ -15,11 +15,13 @@ use railhead::jobs::{Failure, FailureKind, Job, State};
 use tempfile::TempDir;
 use uuid::Uuid;
 
+use crate::store_keys::keyed;
+
 const LEASE: i64 = 1_000;
 
 pub struct Table {
     pub store: SqliteStore,
-    folder: TempDir,
+    pub folder: TempDir,
 }
 
 impl Table {
@@ -41,14 +43,6 @@ impl Table {
     /// Claims one job of any tenant.
     pub async fn claim(&self, now: i64) -> Option<Claim> {
         claim_up_to(&self.store, now, LEASE, 1).await.pop()
-    }
-
-    /// The file, for what no store would do.
-    pub async fn other_writer(&self) -> sqlx::SqlitePool {
-        let file = self.folder.path().join("jobs.db");
-        sqlx::SqlitePool::connect(&format!("sqlite:{}", file.display()))
-            .await
-            .unwrap()
     }
 
     /// Extends one lease.
@@ -109,24 +103,6 @@ pub async fn claim_up_to(store: &SqliteStore, now: i64, lease_ms: i64, jobs: usi
     Vec::new()
 }
 
-/// Claims a job of which some slices are solved.
-pub async fn claim_begun(store: &SqliteStore, now: i64) -> Option<Claim> {
-    let request = ClaimRequest {
-        worker: "w",
-        tenant: "anonymous",
-        which: Which::Begun,
-        jobs: 1,
-        cost_us: 1_000_000,
-        each_slice_us: None,
-        workers: 1,
-        lease_until: now + LEASE,
-        now,
-        late_before: now,
-        skip: &HashSet::new(),
-    };
-    store.claim(&request).await.unwrap().pop()
-}
-
 /// Ends one job; `None` if its lease was lost.
 pub async fn finish_one(
     store: &SqliteStore,
@@ -167,13 +143,6 @@ pub fn new_job() -> NewJob {
 pub fn labelled(key: &str, value: &str) -> NewJob {
     NewJob {
         labels: BTreeMap::from([(key.to_owned(), value.to_owned())]),
-        ..new_job()
-    }
-}
-
-fn keyed(key: &str, digest: u8) -> NewJob {
-    NewJob {
-        idempotency: Some((key.to_owned(), [digest; 32])),
         ..new_job()
     }
 }
@@ -416,69 +385,6 @@ async fn a_cancelled_job_never_goes_back_to_the_queue() {
         assert_eq!((job.state, job.failure), (State::Cancelled, None));
         assert!(job.ended_at.is_some());
     }
-}
-
-#[tokio::test]
-async fn one_idempotency_key_makes_one_job() {
-    let table = Table::new().await;
-    let tries = (0..16).map(|_| {
-        let store = table.store.clone();
-        tokio::spawn(async move {
-            store
-                .enqueue(&keyed("k", 1), QueueBounds::NONE)
-                .await
-                .unwrap()
-        })
-    });
-    let mut ids = BTreeSet::new();
-    let mut created = 0;
-    for enqueued in tries.collect::<Vec<_>>() {
-        match enqueued.await.unwrap() {
-            Enqueued::Created(job) => {
-                created += 1;
-                ids.insert(job.id);
-            }
-            Enqueued::Existing(job) => {
-                ids.insert(job.id);
-            }
-            other => panic!("the cases are the same: {other:?}"),
-        }
-    }
-    assert_eq!((created, ids.len()), (1, 1));
-    assert_eq!(table.store.queued(None).await.unwrap(), 1);
-
-    assert_eq!(
-        table
-            .store
-            .enqueue(&keyed("k", 2), QueueBounds::NONE)
-            .await
-            .unwrap(),
-        Enqueued::Conflict
-    );
-    assert_eq!(
-        table
-            .store
-            .by_key("anonymous", "k", &[2; 32])
-            .await
-            .unwrap(),
-        Some(Enqueued::Conflict)
-    );
-    assert_eq!(
-        table
-            .store
-            .by_key("anonymous", "other", &[1; 32])
-            .await
-            .unwrap(),
-        None
-    );
-    assert!(matches!(
-        table
-            .store
-            .enqueue(&keyed("other", 2), QueueBounds::NONE)
-            .await
-            .unwrap(),
-        Enqueued::Created(_)
-    ));
 }
 
 #[tokio::test]

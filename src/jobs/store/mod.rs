@@ -9,7 +9,6 @@ pub mod sqlite;
 
 use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
-use std::time::Duration;
 
 use bytes::Bytes;
 use uuid::Uuid;
@@ -17,6 +16,7 @@ use uuid::Uuid;
 use crate::contact::remark::RemarkEntry;
 use crate::jobs::job::{Failure, Job, State};
 use crate::jobs::results::Encoded;
+use crate::jobs::sweep::SliceNote;
 use crate::jobs::wishes::Wishes;
 
 /// Equal for cases of one tenant that have the same answer.
@@ -171,19 +171,6 @@ pub struct Claim {
     pub slices: u32,
 }
 
-/// What is known of a stored slice of a sweep.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct SliceNote {
-    /// Place among the slices of the case, from 0.
-    pub number: u32,
-    /// Motions of the case up to its end.
-    pub motions: u32,
-    /// Digest of the case as the solver that solved it knew it; of another digest it is of no use.
-    pub digest: String,
-    /// Solver time of the job up to its end.
-    pub spent: Duration,
-}
-
 /// A solved slice about to be stored.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NewSlice {
@@ -299,6 +286,14 @@ pub enum Placed {
 }
 
 impl Placed {
+    /// A result that was read from the database.
+    pub(super) fn read(solution: Vec<u8>, fields: Option<Vec<u8>>) -> Placed {
+        Placed::Table(Encoded {
+            solution: solution.into(),
+            fields: fields.map(Bytes::from),
+        })
+    }
+
     /// Size in bytes.
     #[must_use]
     pub fn bytes(&self) -> u64 {

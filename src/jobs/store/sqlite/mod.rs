@@ -23,7 +23,6 @@ mod quota;
 pub mod reuse;
 mod rows;
 mod schema;
-pub mod slices;
 
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
