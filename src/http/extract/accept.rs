@@ -5,7 +5,7 @@ use axum::http::{HeaderMap, Uri, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
-use crate::http::extract::query::Query;
+use crate::http::extract::query::{Reader, reader};
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::Kind;
 
@@ -83,13 +83,13 @@ impl Format {
     }
 }
 
-/// Takes the parameter `format` from a query.
-pub fn named_format(query: &mut Query, offered: &[Format]) -> Option<Format> {
+/// Reads the name of one of the formats that are offered.
+pub fn one_of(offered: &'static [Format]) -> Reader<Format> {
     let names: Vec<String> = offered
         .iter()
         .map(|format| format!("`{}`", format.name()))
         .collect();
-    query.take("format", &names.join(", "), |text| {
+    reader(names.join(", "), |text| {
         offered.iter().copied().find(|format| format.name() == text)
     })
 }

@@ -1,10 +1,147 @@
-//! Reads query parameters strictly: unknown, repeated and unreadable ones are refused together.
+//! Query parameters: each is one entry of a table, which gives its reader, its place in the contract and its fault. Unknown, repeated and
+//! unreadable parameters are refused together.
+
+use std::borrow::Cow;
 
 use axum::extract::Query as Pairs;
 use axum::http::Uri;
+use uuid::Uuid;
 
 use crate::http::dto::problem::Fault;
 use crate::http::problem::error::ApiError;
+
+/// Parameters that belong together; [`query`] makes such types.
+pub trait Parameters: Sized {
+    /// What the readers need to know of the service.
+    type Limits;
+
+    /// The names of the parameters.
+    fn names() -> Vec<&'static str>;
+
+    /// Takes the parameters from a query, which notes their faults.
+    fn take(query: &mut Query, limits: &Self::Limits) -> Self;
+
+    /// Reads the query of an address that has no other parameters.
+    ///
+    /// # Errors
+    /// `bad-query` with every fault.
+    fn read(uri: &Uri, limits: &Self::Limits) -> Result<Self, ApiError> {
+        let mut query = Query::read(uri, &Self::names());
+        let parameters = Self::take(&mut query, limits);
+        query.finish()?;
+        Ok(parameters)
+    }
+}
+
+/// Both groups of parameters.
+impl<A: Parameters<Limits = ()>, B: Parameters<Limits = ()>> Parameters for (A, B) {
+    type Limits = ();
+
+    fn names() -> Vec<&'static str> {
+        [A::names(), B::names()].concat()
+    }
+
+    fn take(query: &mut Query, limits: &()) -> Self {
+        (A::take(query, limits), B::take(query, limits))
+    }
+}
+
+/// How the text of a parameter is read, and what is allowed, in words.
+pub struct Reader<T> {
+    allowed: Cow<'static, str>,
+    read: Box<dyn Fn(&str) -> Option<T>>,
+}
+
+/// Reads by a function; `allowed` says in words what it accepts.
+pub fn reader<T>(
+    allowed: impl Into<Cow<'static, str>>,
+    read: impl Fn(&str) -> Option<T> + 'static,
+) -> Reader<T> {
+    Reader {
+        allowed: allowed.into(),
+        read: Box::new(read),
+    }
+}
+
+/// The number of a motion or a patch.
+pub fn index() -> Reader<usize> {
+    reader("a whole number, counted from 0", |text| {
+        whole(text, 0, u32::MAX).and_then(|number| usize::try_from(number).ok())
+    })
+}
+
+/// A whole number of something from `low` to `high`.
+pub fn count(low: u32, high: u32) -> Reader<u32> {
+    reader(
+        format!("a whole number from {low} to {high}"),
+        move |text| whole(text, low, high),
+    )
+}
+
+/// A whole number of seconds from `low` to `high`.
+pub fn seconds(low: u32, high: u32) -> Reader<u32> {
+    reader(
+        format!("a whole number of seconds from {low} to {high}"),
+        move |text| whole(text, low, high),
+    )
+}
+
+/// The id of a job or batch.
+pub fn id(of: &'static str) -> Reader<Uuid> {
+    reader(format!("the id of a {of}"), |text| {
+        Uuid::try_parse(text).ok()
+    })
+}
+
+/// Declares a group of parameters: a type with one field for each, `None` where it was left out. An entry has what the contract says of the
+/// parameter (`///` and `#[param(…)]`), its type, `as` its type in the contract, and its [`Reader`].
+macro_rules! query {
+    (
+        $(#[doc = $about:literal])*
+        $name:ident($limits:pat => $of:ty) {
+            $(
+                $(#[doc = $doc:literal])*
+                $(#[param($($attribute:tt)*)])?
+                $parameter:ident: $value:ty as $wire:ty = $reader:expr;
+            )*
+        }
+    ) => {
+        $(#[doc = $about])*
+        #[derive(Debug)]
+        pub struct $name {
+            $($(#[doc = $doc])* pub $parameter: Option<$value>,)*
+        }
+
+        impl $crate::http::extract::query::Parameters for $name {
+            type Limits = $of;
+
+            fn names() -> Vec<&'static str> {
+                vec![$(stringify!($parameter)),*]
+            }
+
+            fn take(query: &mut $crate::http::extract::query::Query, $limits: &$of) -> Self {
+                $name {
+                    $($parameter: query.take(stringify!($parameter), &$reader),)*
+                }
+            }
+        }
+
+        impl utoipa::IntoParams for $name {
+            fn into_params(
+                place: impl Fn() -> Option<utoipa::openapi::path::ParameterIn>,
+            ) -> Vec<utoipa::openapi::path::Parameter> {
+                #[derive(utoipa::IntoParams)]
+                #[into_params(parameter_in = Query)]
+                #[expect(dead_code, reason = "describes the parameters in the contract")]
+                struct Contract {
+                    $($(#[doc = $doc])* $(#[param($($attribute)*)])? $parameter: Option<$wire>,)*
+                }
+                Contract::into_params(place)
+            }
+        }
+    };
+}
+pub(crate) use query;
 
 /// The parameters of one request and the faults found in them so far.
 #[derive(Debug)]
@@ -53,19 +190,14 @@ impl Query {
         query
     }
 
-    /// The value of a parameter, if it is given and `parse` can read it; otherwise notes what would be `allowed`.
-    pub fn take<T>(
-        &mut self,
-        name: &str,
-        allowed: &str,
-        parse: impl Fn(&str) -> Option<T>,
-    ) -> Option<T> {
+    /// The value of a parameter, if it is given and can be read; otherwise notes what would be allowed.
+    pub fn take<T>(&mut self, name: &str, reader: &Reader<T>) -> Option<T> {
         let (_, text) = self.pairs.iter().find(|(other, _)| other == name)?;
-        let value = parse(text);
+        let value = (reader.read)(text);
         if value.is_none() {
             self.faults.push(Fault::parameter(
                 name,
-                format!("`{name}` is `{text}`; allowed: {allowed}"),
+                format!("`{name}` is `{text}`; allowed: {}", reader.allowed),
             ));
         }
         value
@@ -95,15 +227,6 @@ pub fn whole(text: &str, low: u32, high: u32) -> Option<u32> {
         reason = "checked to be whole and within the range of u32"
     )]
     within.then_some(value as u32)
-}
-
-/// What a number of a motion or a patch may be.
-pub const INDEX: &str = "a whole number, counted from 0";
-
-/// Reads the number of a motion or a patch.
-#[must_use]
-pub fn index(text: &str) -> Option<usize> {
-    whole(text, 0, u32::MAX).and_then(|number| usize::try_from(number).ok())
 }
 
 /// Is the number of a motion or patch, if one is given, one of `count`?
@@ -146,11 +269,37 @@ mod tests {
     fn all_faults_of_a_query_are_named_together() {
         let uri: Uri = "/v1/jobs?limit=0&limit=5&colour=red".parse().unwrap();
         let mut query = Query::read(&uri, &["limit"]);
-        assert_eq!(
-            query.take("limit", "1 to 1000", |text| whole(text, 1, 1000)),
-            None
-        );
+        assert_eq!(query.take("limit", &count(1, 1000)), None);
         assert_eq!(query.faults.len(), 3, "{:?}", query.faults);
         assert!(query.finish().is_err());
+    }
+
+    query! {
+        /// Two parameters.
+        Two(largest => u32) {
+            /// How many
+            #[param(minimum = 1)]
+            many: u32 as u32 = count(1, *largest);
+            /// Of what
+            of: String as String = reader("a word", |text| Some(text.to_owned()));
+        }
+    }
+
+    #[test]
+    fn a_table_of_parameters_reads_names_faults_and_describes_itself() {
+        let read = |text: &str| Two::read(&text.parse().unwrap(), &7);
+        let two = read("/x?of=cases&many=7").unwrap();
+        assert_eq!((two.many, two.of.as_deref()), (Some(7), Some("cases")));
+        assert!(read("/x").unwrap().many.is_none());
+        let fault = format!("{:?}", read("/x?many=8&off=1").unwrap_err());
+        assert!(fault.contains("`many` is `8`; allowed: a whole number from 1 to 7"));
+        assert!(fault.contains("`off` is not a parameter here; allowed: `many`, `of`"));
+        let described = <Two as utoipa::IntoParams>::into_params(|| None);
+        let described = serde_json::to_value(described).unwrap();
+        assert_eq!(described[0]["name"], "many");
+        assert_eq!(described[0]["in"], "query");
+        assert_eq!(described[0]["description"], "How many");
+        assert_eq!(described[0]["required"], false);
+        assert_eq!(described[1]["schema"]["type"], "string");
     }
 }

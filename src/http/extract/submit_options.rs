@@ -1,34 +1,38 @@
-//! `?priority=` and `?deadline_s=`, and `Cache-Control: no-cache`: what may be wished for jobs at their submission.
+//! `?priority=`, `?deadline_s=` and `Cache-Control: no-cache`: the options of a submission.
 
 use std::time::Duration;
 
 use axum::http::{HeaderMap, header};
 
-use crate::http::extract::query::{Query, whole};
+use crate::http::extract::query::{query, reader, seconds};
 use crate::jobs::wishes::{Priority, Wishes};
-
-/// The parameters read here.
-pub const PARAMETERS: [&str; 2] = ["priority", "deadline_s"];
 
 /// Longest deadline in s: 30 days.
 const DEADLINE_MAX_SECONDS: u32 = 30 * 24 * 3600;
 
-/// Reads the wishes; faults of the query are told by its end.
-pub fn take_wishes(query: &mut Query, headers: &HeaderMap) -> Wishes {
-    let priority = query.take(
-        "priority",
-        &Priority::ALL.map(Priority::name).join(", "),
-        Priority::from_name,
-    );
-    let seconds = query.take(
-        "deadline_s",
-        "a whole number of seconds from 1 to 2592000",
-        |text| whole(text, 1, DEADLINE_MAX_SECONDS),
-    );
-    Wishes {
-        priority: priority.unwrap_or_default(),
-        ends_within: seconds.map(|seconds| Duration::from_secs(seconds.into())),
-        fresh: wants_fresh(headers),
+query! {
+    /// What may be asked for jobs at their submission.
+    SubmitQuery(() => ()) {
+        /// Which of the queued jobs of the tenant are solved first: `high` before `normal` (when left out) before `low`. Tenants take turns whatever the priorities of their jobs
+        #[param(example = "high")]
+        priority: Priority as Priority = reader(Priority::ALL.map(Priority::name).join(", "), Priority::from_name);
+        /// Seconds from now within which a job must have ended. One that has not, queued or running, fails as `deadline-passed`
+        #[param(minimum = 1, maximum = 2_592_000, example = 600)]
+        deadline_s: u32 as u32 = seconds(1, DEADLINE_MAX_SECONDS);
+    }
+}
+
+impl SubmitQuery {
+    /// The options of a submission with these headers.
+    #[must_use]
+    pub fn options(self, headers: &HeaderMap) -> Wishes {
+        Wishes {
+            priority: self.priority.unwrap_or_default(),
+            ends_within: self
+                .deadline_s
+                .map(|seconds| Duration::from_secs(seconds.into())),
+            fresh: wants_fresh(headers),
+        }
     }
 }
 

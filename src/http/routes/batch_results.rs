@@ -18,9 +18,9 @@ use crate::contact::remark::RemarkEntry;
 use crate::contact::solution::Solution;
 use crate::http::dto::problem::Problem;
 use crate::http::dto::result::JobResult;
-use crate::http::extract::accept::{Format, choose, named_format};
+use crate::http::extract::accept::{Format, choose, one_of};
 use crate::http::extract::ids::BatchId;
-use crate::http::extract::query::{Query, whole};
+use crate::http::extract::query::{Parameters, query, seconds};
 use crate::http::layers::auth::{Caller, Credential, revoked};
 use crate::http::layers::compression::AsItComes;
 use crate::http::limits::concurrency::Crowds;
@@ -62,6 +62,21 @@ pub struct BatchLine {
     error: Option<Problem>,
 }
 
+/// The forms that the results of a batch come in.
+const FORMATS: &[Format] = &[Format::Ndjson, Format::Csv];
+
+query! {
+    /// How the results of a batch are asked for.
+    BatchResultsQuery(() => ()) {
+        /// Wait for jobs that have not ended, at most this many seconds in all; lines are sent as soon as everything before them is there
+        #[param(minimum = 0, maximum = 3600)]
+        wait: u32 as u32 = seconds(0, WAIT_MAX_SECONDS);
+        /// `ndjson` or `csv`; overrides `Accept`
+        #[param(pattern = "^(ndjson|csv)$", example = "csv")]
+        format: Format as String = one_of(FORMATS);
+    }
+}
+
 problems! {
     /// What the results of a batch can fail with.
     BatchResultProblems: BadQuery, BatchNotFound
@@ -78,8 +93,7 @@ problems! {
     operation_id = "get_batch_results",
     params(
         ("id" = String, Path, description = "Id of the batch", format = "uuid"),
-        ("wait" = Option<u32>, Query, minimum = 0, maximum = 3600, description = "Wait for jobs that have not ended, at most this many seconds in all; lines are sent as soon as everything before them is there"),
-        ("format" = Option<String>, Query, description = "`ndjson` or `csv`; overrides `Accept`", pattern = "^(ndjson|csv)$", example = "csv")
+        BatchResultsQuery
     ),
     responses((status = 200, description = "One line per job", content((BatchLine = "application/x-ndjson"), (String = "text/csv"))), BatchResultProblems)
 )]
@@ -92,14 +106,8 @@ pub async fn results(
     key: Option<Extension<Credential>>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    let mut query = Query::read(&uri, &["wait", "format"]);
-    let wait = query.take("wait", "a whole number of seconds from 0 to 3600", |text| {
-        whole(text, 0, WAIT_MAX_SECONDS)
-    });
-    let offered = [Format::Ndjson, Format::Csv];
-    let named = named_format(&mut query, &offered);
-    query.finish()?;
-    let format = choose(&headers, named, &offered)?;
+    let BatchResultsQuery { wait, format } = BatchResultsQuery::read(&uri, &())?;
+    let format = choose(&headers, format, FORMATS)?;
     // Unknown batches are answered before the stream begins.
     jobs.batch(id).await?;
     let place = match wait {

@@ -15,8 +15,8 @@ use crate::http::dto::job::rfc3339;
 use crate::http::dto::problem::Fault;
 use crate::http::extract::batch::body::{form, read_draft};
 use crate::http::extract::ids::BatchId;
-use crate::http::extract::query::Query;
-use crate::http::extract::submit_options::{PARAMETERS, take_wishes};
+use crate::http::extract::query::{Parameters, id, query, reader};
+use crate::http::extract::submit_options::SubmitQuery;
 use crate::http::layers::auth::Caller;
 use crate::http::limits::memory::Memory;
 use crate::http::options::HttpOptions;
@@ -27,7 +27,6 @@ use crate::http::routes::jobs::{idempotency_key, mark_replay};
 use crate::jobs::batch::Batch;
 use crate::jobs::draft::Draft;
 use crate::jobs::job::State as JobState;
-use crate::jobs::wishes::{Priority, Wishes};
 
 /// The cases of a batch.
 #[derive(ToSchema)]
@@ -134,6 +133,22 @@ problems! {
     FaultyBatch, FaultyTable, JobNotFound, IdempotencyConflict, QuotaExceeded, QueueFull, Draining, StorageFull, StorageUnwritable
 }
 
+query! {
+    /// What the query of a submission says about the batch itself.
+    BatchQuery(() => ()) {
+        /// `all` (when left out): one faulty case refuses the batch; `valid`: faulty cases are left out and reported
+        #[param(pattern = "^(all|valid)$", example = "valid")]
+        accept: bool as String = reader("`all` or `valid`", |text| match text {
+            "all" => Some(false),
+            "valid" => Some(true),
+            _ => None,
+        });
+        /// With `text/csv`, and needed there: the job whose case is the template
+        #[param(format = "uuid")]
+        template: Uuid as String = id("job");
+    }
+}
+
 /// Submits many cases as one batch of jobs.
 ///
 /// The body is a JSON array of cases, one case per line (`application/x-ndjson`), or a table (`text/csv`) whose lines fill the cells of
@@ -146,10 +161,8 @@ problems! {
     tag = "batches",
     operation_id = "submit_batch",
     params(
-        ("accept" = Option<String>, Query, description = "`all` (when left out): one faulty case refuses the batch; `valid`: faulty cases are left out and reported", pattern = "^(all|valid)$", example = "valid"),
-        ("template" = Option<String>, Query, description = "With `text/csv`, and needed there: the job whose case is the template", format = "uuid"),
-        ("priority" = Option<Priority>, Query, description = "Which of the queued jobs of the tenant are solved first: `high` before `normal` (when left out) before `low`. Tenants take turns whatever the priorities of their jobs", example = "high"),
-        ("deadline_s" = Option<u32>, Query, minimum = 1, maximum = 2_592_000, description = "Seconds from now within which a job must have ended. One that has not, queued or running, fails as `deadline-passed`", example = 600),
+        BatchQuery,
+        SubmitQuery,
         ("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[!-~]+$", description = "1 to 255 visible ASCII characters. Repeating a request with the same key, the same cases and the same options answers the first batch instead of making another"),
         ("Cache-Control" = Option<String>, Header, description = "`no-cache`: solve all cases, also those that are identical to cases solved before", example = "no-cache"),
         ("traceparent" = Option<String>, Header, description = "W3C trace context: where the service sends traces, that of the jobs goes on with the client's. What cannot be read is passed over", example = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01")
@@ -174,11 +187,12 @@ pub async fn submit(
     request: Request,
 ) -> Result<Response, ApiError> {
     let key = idempotency_key(request.headers())?;
-    let (asked, wishes) = read_query(&request)?;
-    let form = form(&jobs, request.headers(), asked.template).await?;
+    let (batch, submit) = <(BatchQuery, SubmitQuery)>::read(request.uri(), &())?;
+    let wishes = submit.options(request.headers());
+    let form = form(&jobs, request.headers(), batch.template).await?;
     let mut draft = read_draft(&jobs, &memory, &options, form, request).await?;
     draft.wishes = wishes;
-    if draft.cases == draft.rejected || (draft.rejected > 0 && !asked.valid_only) {
+    if draft.cases == draft.rejected || (draft.rejected > 0 && !batch.accept.unwrap_or(false)) {
         return Err(refusal(&draft));
     }
     let errors = faults(&draft);
@@ -194,34 +208,6 @@ pub async fn submit(
     let mut response = (StatusCode::ACCEPTED, location, Json(receipt)).into_response();
     mark_replay(&mut response, replayed);
     Ok(response)
-}
-
-/// What the query says about the batch itself.
-struct Asked {
-    /// Good cases are taken without the faulty ones.
-    valid_only: bool,
-    /// The job whose case is the template of a table.
-    template: Option<Uuid>,
-}
-
-fn read_query(request: &Request) -> Result<(Asked, Wishes), ApiError> {
-    let [priority, deadline] = PARAMETERS;
-    let mut query = Query::read(request.uri(), &["accept", "template", priority, deadline]);
-    let valid = query.take("accept", "`all` or `valid`", |text| match text {
-        "all" => Some(false),
-        "valid" => Some(true),
-        _ => None,
-    });
-    let template = query.take("template", "the id of a job", |text| {
-        Uuid::try_parse(text).ok()
-    });
-    let wishes = take_wishes(&mut query, request.headers());
-    query.finish()?;
-    let asked = Asked {
-        valid_only: valid.unwrap_or(false),
-        template,
-    };
-    Ok((asked, wishes))
 }
 
 /// Why a batch is not taken.

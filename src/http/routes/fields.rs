@@ -5,16 +5,15 @@ use axum::extract::State;
 use axum::http::{HeaderMap, HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
-use utoipa::{IntoParams, ToSchema};
+use utoipa::ToSchema;
 use uuid::Uuid;
 
 use crate::contact::case::Output;
 use crate::http::dto::cells::{Cells, GriddedField, gridded, per_cell};
 use crate::http::dto::result::name_of;
-use crate::http::extract::accept::{Format, choose, named_format};
+use crate::http::extract::accept::{Format, choose, one_of};
 use crate::http::extract::ids::JobId;
-use crate::http::extract::query::{INDEX, index};
-use crate::http::extract::query::{Query, whole};
+use crate::http::extract::query::{Parameters, Reader, index, query, reader, whole};
 use crate::http::layers::auth::Caller;
 use crate::http::layers::etag::{Known, tagged};
 use crate::http::limits::holding_body::carrying;
@@ -35,7 +34,7 @@ const GRID_AXIS_MAX: u32 = 1000;
 const SAMPLE_BYTES: usize = 2 * size_of::<f64>();
 
 /// The forms that a field comes in.
-const FORMATS: [Format; 6] = [
+const FORMATS: &[Format] = &[
     Format::Json,
     Format::Csv,
     Format::Npz,
@@ -70,25 +69,21 @@ impl From<Field> for Table {
     }
 }
 
-/// The parameters of a field, for the contract; [`Selection::read`] reads them.
-#[derive(Debug, IntoParams)]
-#[into_params(parameter_in = Query)]
-#[expect(
-    dead_code,
-    reason = "describes the query, which is read with all its faults elsewhere"
-)]
-pub struct FieldQuery {
-    /// The motion, counted from 0; 0 when left out
-    point: Option<u32>,
-    /// The patch, counted from 0; 0 when left out
-    patch: Option<u32>,
-    /// `NXxNY`: resample on a regular grid over the bounding box of the patch, 2 to 1000 samples along each axis, and
-    /// 250 000 in all where the operator says nothing else
-    #[param(example = "60x40")]
-    grid: Option<String>,
-    /// `json`, `csv`, `npz`, `vtk`, or `svg` and `png` for a picture; overrides `Accept`
-    #[param(example = "csv")]
-    format: Option<String>,
+query! {
+    /// The parameters of a field.
+    FieldQuery(samples_max => usize) {
+        /// The motion, counted from 0; 0 when left out
+        point: usize as u32 = index();
+        /// The patch, counted from 0; 0 when left out
+        patch: usize as u32 = index();
+        /// `NXxNY`: resample on a regular grid over the bounding box of the patch, 2 to 1000 samples along each axis, and
+        /// 250 000 in all where the operator says nothing else
+        #[param(example = "60x40")]
+        grid: (usize, usize) as String = grid(*samples_max);
+        /// `json`, `csv`, `npz`, `vtk`, or `svg` and `png` for a picture; overrides `Accept`
+        #[param(example = "csv")]
+        format: Format as String = one_of(FORMATS);
+    }
 }
 
 /// Which patch and motion are wanted, on which grid and in which form.
@@ -110,21 +105,12 @@ impl Selection {
     /// # Errors
     /// `bad-query` with every fault, or `not-acceptable`.
     pub fn read(uri: &Uri, headers: &HeaderMap, samples_max: usize) -> Result<Self, ApiError> {
-        let mut query = Query::read(uri, &["point", "patch", "grid", "format"]);
-        let point = query.take("point", INDEX, index);
-        let patch = query.take("patch", INDEX, index);
-        let grid = query.take(
-            "grid",
-            &format!("`NXxNY` such as `60x40`, each from 2 to 1000, and at most {samples_max} samples in all"),
-            |text| grid_size(text).filter(|(nx, ny)| nx * ny <= samples_max),
-        );
-        let named = named_format(&mut query, &FORMATS);
-        query.finish()?;
+        let query = FieldQuery::read(uri, &samples_max)?;
         Ok(Selection {
-            patch: patch.unwrap_or(0),
-            point: point.unwrap_or(0),
-            grid,
-            format: choose(headers, named, &FORMATS)?,
+            patch: query.patch.unwrap_or(0),
+            point: query.point.unwrap_or(0),
+            grid: query.grid,
+            format: choose(headers, query.format, FORMATS)?,
         })
     }
 
@@ -168,10 +154,18 @@ impl Selection {
     }
 }
 
-fn grid_size(text: &str) -> Option<(usize, usize)> {
-    let (nx, ny) = text.split_once(['x', 'X'])?;
-    let axis = |text| whole(text, 2, GRID_AXIS_MAX).and_then(|number| usize::try_from(number).ok());
-    Some((axis(nx)?, axis(ny)?))
+/// A regular grid of at most so many samples.
+fn grid(samples_max: usize) -> Reader<(usize, usize)> {
+    let allowed = format!(
+        "`NXxNY` such as `60x40`, each from 2 to 1000, and at most {samples_max} samples in all"
+    );
+    reader(allowed, move |text| {
+        let (nx, ny) = text.split_once(['x', 'X'])?;
+        let axis =
+            |text| whole(text, 2, GRID_AXIS_MAX).and_then(|number| usize::try_from(number).ok());
+        let (nx, ny) = (axis(nx)?, axis(ny)?);
+        (nx * ny <= samples_max).then_some((nx, ny))
+    })
 }
 
 /// Tangential tractions of a succeeded job.

@@ -14,8 +14,8 @@ use crate::contact::case::Case;
 use crate::http::dto::job::JobAnswer;
 use crate::http::extract::ids::JobId;
 use crate::http::extract::json::JsonBody;
-use crate::http::extract::query::{Query, whole};
-use crate::http::extract::submit_options::{PARAMETERS, take_wishes};
+use crate::http::extract::query::{Parameters, Reader, count, id, query, reader};
+use crate::http::extract::submit_options::SubmitQuery;
 use crate::http::layers::auth::Caller;
 use crate::http::limits::concurrency::Crowds;
 use crate::http::limits::holding_body::Held;
@@ -23,7 +23,6 @@ use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 use crate::http::routes::results::result_of;
 use crate::jobs::job::State as JobState;
-use crate::jobs::wishes::Priority;
 use crate::jobs::{Filter, PAGE_MAX};
 
 /// Longest time that `Prefer: wait` holds a request, in s.
@@ -66,8 +65,7 @@ problems! {
     tag = "jobs",
     operation_id = "submit_job",
     params(
-        ("priority" = Option<Priority>, Query, description = "Which of the queued jobs of the tenant are solved first: `high` before `normal` (when left out) before `low`. Tenants take turns whatever the priorities of their jobs", example = "high"),
-        ("deadline_s" = Option<u32>, Query, minimum = 1, maximum = 2_592_000, description = "Seconds from now within which a job must have ended. One that has not, queued or running, fails as `deadline-passed`", example = 600),
+        SubmitQuery,
         ("Prefer" = Option<String>, Header, description = "`wait=N`: answer when the job has ended, at most N seconds (60 at most) later (RFC 7240)", example = "wait=10"),
         ("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[!-~]+$", description = "1 to 255 visible ASCII characters. Repeating a request with the same key, the same case and the same options answers the first job instead of making another"),
         ("Cache-Control" = Option<String>, Header, description = "`no-cache`: solve the case even if an identical one was solved before", example = "no-cache"),
@@ -101,9 +99,7 @@ pub async fn submit(
     let place =
         preferred_wait(&headers).and_then(|seconds| Some((seconds, crowds.wait(jobs.tenant())?)));
     let wait = place.as_ref().map(|(seconds, _)| *seconds);
-    let mut query = Query::read(&uri, &PARAMETERS);
-    let wishes = take_wishes(&mut query, &headers);
-    query.finish()?;
+    let wishes = SubmitQuery::read(&uri, &())?.options(&headers);
     let (mut job, replayed) = jobs.submit_with(value, key, wishes).await?;
     drop(room);
     let location = format!("/v1/jobs/{}", job.id);
@@ -207,65 +203,67 @@ problems! {
     ListProblems: BadQuery
 }
 
+query! {
+    /// Which jobs are listed.
+    ListQuery(() => ()) {
+        /// Only jobs in this state
+        state: JobState as JobState = reader(JobState::ALL.map(JobState::name).join(", "), JobState::from_name);
+        /// Only jobs of this batch
+        #[param(format = "uuid")]
+        batch: Uuid as String = id("batch");
+        /// Only jobs with this label, written `key:value`
+        #[param(example = "line:A12")]
+        label: (String, String) as String = reader("`key:value`", |text| {
+            let (key, value) = text.split_once(':')?;
+            Some((key.to_owned(), value.to_owned()))
+        });
+        /// Only jobs submitted at or after this time (RFC 3339)
+        #[param(format = "date-time", example = "2026-01-31T09:30:00Z")]
+        created_after: i64 as String = time();
+        /// Only jobs submitted before this time (RFC 3339)
+        #[param(format = "date-time")]
+        created_before: i64 as String = time();
+        /// Jobs in one page; 50 when left out
+        #[param(minimum = 1, maximum = 1000)]
+        limit: u32 as u32 = count(1, PAGE_MAX);
+        /// `next_cursor` of the page before, with the same filters
+        #[param(pattern = "^[0-9a-f]{40}$")]
+        cursor: String as String = reader("a cursor of this service", |text| Some(text.to_owned()));
+    }
+}
+
+/// A time, as milliseconds since 1970.
+fn time() -> Reader<i64> {
+    let allowed = "a time in RFC 3339 such as `2026-01-31T09:30:00Z` (write `+` as `%2B`)";
+    reader(allowed, |text| {
+        let time = text.parse::<jiff::Timestamp>();
+        time.ok().map(jiff::Timestamp::as_millisecond)
+    })
+}
+
 /// Lists jobs, newest first.
 #[utoipa::path(
     get,
     path = "/v1/jobs",
     tag = "jobs",
     operation_id = "list_jobs",
-    params(
-        ("state" = Option<JobState>, Query, description = "Only jobs in this state"),
-        ("batch" = Option<String>, Query, description = "Only jobs of this batch", format = "uuid"),
-        ("label" = Option<String>, Query, description = "Only jobs with this label, written `key:value`", example = "line:A12"),
-        ("created_after" = Option<String>, Query, description = "Only jobs submitted at or after this time (RFC 3339)", format = "date-time", example = "2026-01-31T09:30:00Z"),
-        ("created_before" = Option<String>, Query, description = "Only jobs submitted before this time (RFC 3339)", format = "date-time"),
-        ("limit" = Option<u32>, Query, minimum = 1, maximum = 1000, description = "Jobs in one page; 50 when left out"),
-        ("cursor" = Option<String>, Query, pattern = "^[0-9a-f]{40}$", description = "`next_cursor` of the page before, with the same filters")
-    ),
+    params(ListQuery),
     responses((status = 200, description = "A page of jobs", body = JobPage), ListProblems)
 )]
 pub async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Json<JobPage>, ApiError> {
-    let mut query = Query::read(
-        &uri,
-        &[
-            "state",
-            "batch",
-            "label",
-            "created_after",
-            "created_before",
-            "limit",
-            "cursor",
-        ],
-    );
-    let time = "a time in RFC 3339 such as `2026-01-31T09:30:00Z` (write `+` as `%2B`)";
+    let query = ListQuery::read(&uri, &())?;
     let filter = Filter {
-        state: query.take(
-            "state",
-            &JobState::ALL.map(JobState::name).join(", "),
-            JobState::from_name,
-        ),
-        batch: query.take("batch", "the id of a batch", |text| {
-            Uuid::try_parse(text).ok()
-        }),
-        label: query.take("label", "`key:value`", |text| {
-            let (key, value) = text.split_once(':')?;
-            Some((key.to_owned(), value.to_owned()))
-        }),
-        created_after: query.take("created_after", time, epoch_ms),
-        created_before: query.take("created_before", time, epoch_ms),
+        state: query.state,
+        batch: query.batch,
+        label: query.label,
+        created_after: query.created_after,
+        created_before: query.created_before,
     };
-    let limit = query.take("limit", "a whole number from 1 to 1000", |text| {
-        whole(text, 1, PAGE_MAX)
-    });
-    let cursor = query.take("cursor", "a cursor of this service", |text| {
-        Some(text.to_owned())
-    });
-    query.finish()?;
     let page = jobs
         .list(
             &filter,
-            cursor.as_deref(),
-            limit.unwrap_or(LIST_LIMIT_DEFAULT),
+            query.cursor.as_deref(),
+            query.limit.unwrap_or(LIST_LIMIT_DEFAULT),
         )
         .await?;
     Ok(Json(JobPage {
@@ -276,12 +274,6 @@ pub async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Json<JobPage>, ApiEr
             .collect(),
         next_cursor: page.next_cursor,
     }))
-}
-
-fn epoch_ms(text: &str) -> Option<i64> {
-    text.parse::<jiff::Timestamp>()
-        .ok()
-        .map(jiff::Timestamp::as_millisecond)
 }
 
 problems! {

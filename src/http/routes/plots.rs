@@ -3,15 +3,13 @@
 use axum::extract::State;
 use axum::http::{HeaderMap, HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
-use utoipa::IntoParams;
 use uuid::Uuid;
 
 use crate::contact::case::Output;
 use crate::contact::solution::PointSolution;
 use crate::http::extract::accept::Format;
 use crate::http::extract::ids::JobId;
-use crate::http::extract::query::{INDEX, index, require_index};
-use crate::http::extract::query::{Query, whole};
+use crate::http::extract::query::{Parameters, count, index, query, reader, require_index};
 use crate::http::layers::auth::Caller;
 use crate::http::layers::etag::{Known, tagged};
 use crate::http::limits::holding_body::carrying;
@@ -27,25 +25,27 @@ pub const WIDTH_DEFAULT: u32 = 800;
 /// Limits of the width in pixels.
 const WIDTH: [u32; 2] = [200, 2400];
 
-/// The parameters of a picture, for the contract.
-#[derive(Debug, IntoParams)]
-#[into_params(parameter_in = Query)]
-#[expect(
-    dead_code,
-    reason = "describes the query, which is read with all its faults elsewhere"
-)]
-pub struct PlotQuery {
-    /// `traction` (when left out), `pressure`, `slip` or `zones`; the case has to ask for that output. The border of the stick
-    /// zone is drawn if it asks for `zones` too
-    #[param(example = "traction")]
-    field: Option<String>,
-    /// The motion, counted from 0; 0 when left out
-    point: Option<u32>,
-    /// The patch, counted from 0; 0 when left out
-    patch: Option<u32>,
-    /// Width in pixels; 800 when left out. The height follows from the patch
-    #[param(minimum = 200, maximum = 2400)]
-    width: Option<u32>,
+query! {
+    /// The parameters of a picture.
+    PlotQuery(() => ()) {
+        /// `traction` (when left out), `pressure`, `slip` or `zones`; the case has to ask for that output. The border of the stick
+        /// zone is drawn if it asks for `zones` too
+        #[param(example = "traction")]
+        field: Output as String = reader("`traction`, `pressure`, `slip` or `zones`", |text| match text {
+            "traction" => Some(Output::Tractions),
+            "pressure" => Some(Output::Pressure),
+            "slip" => Some(Output::Slip),
+            "zones" => Some(Output::Zones),
+            _ => None,
+        });
+        /// The motion, counted from 0; 0 when left out
+        point: usize as u32 = index();
+        /// The patch, counted from 0; 0 when left out
+        patch: usize as u32 = index();
+        /// Width in pixels; 800 when left out. The height follows from the patch
+        #[param(minimum = 200, maximum = 2400)]
+        width: u32 as u32 = count(WIDTH[0], WIDTH[1]);
+    }
 }
 
 /// What a picture is to show.
@@ -63,29 +63,12 @@ pub struct Wish {
 
 impl Wish {
     fn read(uri: &Uri) -> Result<Wish, ApiError> {
-        let mut query = Query::read(uri, &["field", "point", "patch", "width"]);
-        let shown = query.take(
-            "field",
-            "`traction`, `pressure`, `slip` or `zones`",
-            |text| match text {
-                "traction" => Some(Output::Tractions),
-                "pressure" => Some(Output::Pressure),
-                "slip" => Some(Output::Slip),
-                "zones" => Some(Output::Zones),
-                _ => None,
-            },
-        );
-        let point = query.take("point", INDEX, index);
-        let patch = query.take("patch", INDEX, index);
-        let width = query.take("width", "a whole number from 200 to 2400", |text| {
-            whole(text, WIDTH[0], WIDTH[1])
-        });
-        query.finish()?;
+        let query = PlotQuery::read(uri, &())?;
         Ok(Wish {
-            shown: shown.unwrap_or(Output::Tractions),
-            patch: patch.unwrap_or(0),
-            point: point.unwrap_or(0),
-            width: width.unwrap_or(WIDTH_DEFAULT),
+            shown: query.field.unwrap_or(Output::Tractions),
+            patch: query.patch.unwrap_or(0),
+            point: query.point.unwrap_or(0),
+            width: query.width.unwrap_or(WIDTH_DEFAULT),
         })
     }
 }

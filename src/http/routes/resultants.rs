@@ -9,10 +9,9 @@ use utoipa::ToSchema;
 use crate::contact::case::Motion;
 use crate::contact::profile_trust::quality::ProfileUncertainty;
 use crate::contact::solution::{ErrorEstimate, Origin, Solution, Total};
-use crate::http::extract::accept::{Format, choose, named_format};
+use crate::http::extract::accept::{Format, choose, one_of};
 use crate::http::extract::ids::JobId;
-use crate::http::extract::query::Query;
-use crate::http::extract::query::{INDEX, index, require_index};
+use crate::http::extract::query::{Parameters, index, query, require_index};
 use crate::http::layers::auth::Caller;
 use crate::http::layers::etag::{Known, tagged};
 use crate::http::limits::holding_body::carrying;
@@ -74,6 +73,22 @@ problems! {
     PartProblems: BadQuery, JobNotFound, ResultNotReady, JobFailed, JobCancelled
 }
 
+/// The forms that resultants come in.
+const FORMATS: &[Format] = &[Format::Json, Format::Csv];
+
+query! {
+    /// Which resultants are asked for.
+    ResultantsQuery(() => ()) {
+        /// Only this motion, counted from 0
+        point: usize as u32 = index();
+        /// Only this patch, counted from 0; `total` stays the sum over all
+        patch: usize as u32 = index();
+        /// `json` or `csv`; overrides `Accept`
+        #[param(pattern = "^(json|csv)$", example = "csv")]
+        format: Format as String = one_of(FORMATS);
+    }
+}
+
 /// Forces and moments of a succeeded job. They are always computed, whatever the case asked for.
 #[utoipa::path(
     get,
@@ -82,9 +97,7 @@ problems! {
     operation_id = "get_resultants",
     params(
         ("id" = String, Path, description = "Id of the job", format = "uuid"),
-        ("point" = Option<u32>, Query, description = "Only this motion, counted from 0"),
-        ("patch" = Option<u32>, Query, description = "Only this patch, counted from 0; `total` stays the sum over all"),
-        ("format" = Option<String>, Query, description = "`json` or `csv`; overrides `Accept`", pattern = "^(json|csv)$", example = "csv")
+        ResultantsQuery
     ),
     responses((status = 200, description = "Forces and moments on the lower body. CSV: one line per patch and motion, then one per motion with `total` as its patch", content((Resultants = "application/json"), (String = "text/csv"))), PartProblems)
 )]
@@ -95,13 +108,13 @@ pub async fn resultants(
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    let mut query = Query::read(&uri, &["point", "patch", "format"]);
-    let point = query.take("point", INDEX, index);
-    let patch = query.take("patch", INDEX, index);
-    let offered = [Format::Json, Format::Csv];
-    let named = named_format(&mut query, &offered);
-    query.finish()?;
-    let format = choose(&headers, named, &offered)?;
+    let query = ResultantsQuery::read(&uri, &())?;
+    let ResultantsQuery {
+        point,
+        patch,
+        format,
+    } = query;
+    let format = choose(&headers, format, FORMATS)?;
     let tag = match Known::of(&jobs, id, &uri, &headers, format).await? {
         Known::Unchanged(answer) => return Ok(answer),
         Known::Tag(tag) => tag,
