@@ -6,15 +6,17 @@ use std::sync::Arc;
 use crate::contact::answer;
 use crate::contact::case::{Motion, Output};
 use crate::contact::error::SolveError;
-use crate::contact::geometry::contact_search::Search;
+use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::geometry::wheelset::{WheelsetMotion, creepages};
 use crate::contact::monitor::{Monitor, Watch};
 use crate::contact::normal::Region;
-use crate::contact::normal::profiles::{Loading, PressedGap, PressedWheel, ProfileContact, Wanted};
+use crate::contact::normal::profiles::{
+    Accuracy, Loading, PressedGap, PressedWheel, ProfileContact, Wanted,
+};
 use crate::contact::outputs::track::merge;
 use crate::contact::problem::{Problem, Resolution};
-use crate::contact::remark::Remark;
+use crate::contact::remark::{Remark, RemarkEntry};
 use crate::contact::solution::{Fields, NormalReport, Solution};
 use crate::contact::tangential::operator_store::OperatorStore;
 
@@ -22,6 +24,8 @@ use crate::contact::tangential::operator_store::OperatorStore;
 /// a change of friction's share in one round.
 const BALANCE: f64 = 5e-4;
 const BALANCE_OF_TARGET: f64 = 0.1;
+/// When the rounds are used up, a share that still changes by no more than this is answered with a remark.
+const BALANCE_POOR: f64 = 5e-3;
 /// Rounds of the balance; each leaves about a tenth of the difference before, on steep flanges a third, less by the secant.
 const ROUNDS_MAX: u32 = 12;
 /// Slopes of the friction found over the friction counted on that a secant step believes.
@@ -30,6 +34,8 @@ const SLOPES: [f64; 2] = [-0.9, 0.6];
 const CARRIED_MIN: f64 = 0.1;
 /// Allowed error of the resultants in the first round, relative to μN.
 const TARGET_FIRST: f64 = 0.05;
+/// What patches may do to each other without a remark where no target is given, relative to the load.
+const UNCOUPLED: f64 = 0.01;
 /// By which part the first rest may miss the force: friction's share hardly depends on it.
 const TOLERANCE_FIRST: f64 = 0.1;
 
@@ -47,8 +53,9 @@ pub(super) fn solve(
     contact: &ProfileContact,
     monitor: &dyn Monitor,
 ) -> Result<Found, SolveError> {
-    let search =
-        Search::new(&contact.geometry).map_err(|reason| SolveError::NormalProblem { reason })?;
+    let search = contact
+        .search()
+        .map_err(|reason| SolveError::NormalProblem { reason })?;
     let vertical = matches!(contact.loading, Loading::Vertical(_)) && problem.friction > 0.0;
     let balanced = vertical && problem.part.all == 1;
     let rest = |wanted: Wanted, before: Option<&PressedWheel>| -> Result<Rest, SolveError> {
@@ -66,7 +73,7 @@ pub(super) fn solve(
     };
     let exactly = |friction_share: f64| Wanted {
         friction_share,
-        tolerance: 0.0,
+        accuracy: Accuracy::For(problem.target()),
     };
     if !balanced {
         let mut at_rest = rest(exactly(0.0), None)?;
@@ -87,32 +94,64 @@ pub(super) fn solve(
     };
     let about = Wanted {
         friction_share: 0.0,
-        tolerance: TOLERANCE_FIRST,
+        accuracy: Accuracy::About(TOLERANCE_FIRST),
     };
     let mut at_rest = rest(about, None)?;
     let answers = at_rest.answers(operators, &coarse, contact, monitor)?;
     let mut share = friction_share(&at_rest.wheel, &answers);
     let mut counted = share;
     let mut previous = None;
+    let tolerance = balance(problem.resolution);
+    let mut exit = BalanceExit::NothingCarried;
+    let mut last = None;
     for _ in 0..ROUNDS_MAX {
         if 1.0 + counted < CARRIED_MIN {
+            exit = BalanceExit::NothingCarried;
             break;
         }
         at_rest = at_rest.again(rest(exactly(counted), Some(&at_rest.wheel))?);
         let answers = at_rest.answers(operators, problem, contact, monitor)?;
         share = friction_share(&at_rest.wheel, &answers);
         let before = previous.replace((counted, share));
-        if ((1.0 + share) / (1.0 + counted) - 1.0).abs() <= balance(problem.resolution) {
-            return Ok(at_rest.found(problem, contact, answers));
+        last = Some(answers);
+        let change = ((1.0 + share) / (1.0 + counted) - 1.0).abs();
+        exit = BalanceExit::RoundsUsedUp { change };
+        if change <= tolerance {
+            exit = BalanceExit::Balanced;
+            break;
         }
         counted = next_share((counted, share), before);
     }
-    Err(SolveError::NormalProblem {
-        reason: format!(
-            "normal and tangential forces do not come to balance the vertical force in {ROUNDS_MAX} rounds; friction carries \
-             {share:+.3} of what the normal forces do. Give a normal_force_n or an approach_mm"
-        ),
-    })
+    match (exit, last) {
+        (BalanceExit::Balanced, Some(answers)) => Ok(at_rest.found(problem, contact, answers)),
+        (BalanceExit::RoundsUsedUp { change }, Some(answers)) if change <= BALANCE_POOR => {
+            let remark = Remark::IterationInexact {
+                iteration: "balance of friction and the vertical force",
+                reason: "the rounds were used up",
+                residual: change,
+                tolerance,
+            };
+            at_rest.wheel.remarks.push(remark.into());
+            Ok(at_rest.found(problem, contact, answers))
+        }
+        _ => Err(SolveError::NormalProblem {
+            reason: format!(
+                "normal and tangential forces do not come to balance the vertical force in {ROUNDS_MAX} rounds; friction \
+                 carries {share:+.3} of what the normal forces do. Give a normal_force_n or an approach_mm"
+            ),
+        }),
+    }
+}
+
+/// How the rounds of friction end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum BalanceExit {
+    /// Friction's share is what it was taken for.
+    Balanced,
+    /// In the last round the vertical force changed by this part.
+    RoundsUsedUp { change: f64 },
+    /// Friction takes nearly all that the normal forces carry.
+    NothingCarried,
 }
 
 /// The friction to count on next, after rounds that counted on the first of two numbers and found the second: a secant step
@@ -162,11 +201,17 @@ struct Rest {
 
 impl Rest {
     fn found(
-        self,
+        mut self,
         problem: &Problem,
         contact: &ProfileContact,
         answers: Vec<(Solution, Fields)>,
     ) -> Found {
+        let part = match problem.resolution {
+            Resolution::Target(target) => target,
+            Resolution::Mesh(_) => UNCOUPLED,
+        };
+        let remark = contact.uncoupled(&self.wheel, part);
+        self.wheel.remarks.extend(remark.map(RemarkEntry::from));
         let (solution, fields) = merge(problem, &contact.geometry, &self.wheel, answers);
         Found {
             wheel: self.wheel,
@@ -207,7 +252,7 @@ impl Rest {
             };
             let motions = match &problem.wheelset {
                 None => problem.motions.clone(),
-                Some(wheelset) => vec![self.motion(gap, &contact.geometry, wheelset)],
+                Some(wheelset) => vec![self.motion(gap, &contact.geometry, wheelset)?],
             };
             let region = Region::Grid(gap.field.clone());
             let load_error = self.wheel.load_error.hypot(self.unbalanced);
@@ -219,7 +264,12 @@ impl Rest {
 
     /// Creepages and spin about the origin of a gap: those at its patches, weighted with their forces. Between patches
     /// that share a gap the surfaces do not touch, so that the origin itself says nothing.
-    fn motion(&self, gap: &PressedGap, geometry: &WheelRail, wheelset: &WheelsetMotion) -> Motion {
+    fn motion(
+        &self,
+        gap: &PressedGap,
+        geometry: &WheelRail,
+        wheelset: &WheelsetMotion,
+    ) -> Result<Motion, SolveError> {
         let force = gap.normal_force();
         let mut motion = Motion {
             creepage_x: 0.0,
@@ -228,14 +278,22 @@ impl Rest {
         };
         for (k, patch) in gap.field.patches().iter().enumerate() {
             let [x, y] = gap.field.load_centre(Some(k));
-            let place = geometry.moved(&gap.frame, [x, y], self.wheel.centre);
-            let [along, across, spin] = creepages(geometry, &place, self.wheel.centre, wheelset);
+            let place = geometry.moved(&gap.frame, [x, y], self.wheel.centre)?;
+            let [along, across, spin] = creepages(geometry, &place, self.wheel.centre, wheelset)?;
             let share = patch.normal_force / force;
             motion.creepage_x += share * (along + spin * y);
             motion.creepage_y += share * (across - spin * x);
             motion.spin_per_mm += share * spin;
         }
-        motion
+        Ok(motion)
+    }
+}
+
+impl From<SurfaceMissed> for SolveError {
+    fn from(miss: SurfaceMissed) -> SolveError {
+        SolveError::NormalProblem {
+            reason: miss.to_string(),
+        }
     }
 }
 

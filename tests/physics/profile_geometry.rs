@@ -250,8 +250,11 @@ fn a_larger_clearance_of_the_wheel_makes_the_overlap_smaller_by_as_much() {
     .unwrap();
     let search = Search::new(&geometry).unwrap();
     let frame = search.frames(0.02).unwrap()[0];
-    let [low, high] =
-        [0.02, 0.03].map(|lowering| geometry.overlap(&frame, search.touch - lowering));
+    let [low, high] = [0.02, 0.03].map(|lowering| {
+        geometry
+            .overlap(&frame, search.touch - lowering)
+            .expect("a point of the wheel")
+    });
     let expected = 0.01 * frame.angle.cos();
     assert!(
         (high - low - expected).abs() < 1e-4,

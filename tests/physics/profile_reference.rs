@@ -81,7 +81,8 @@ fn frames_and_creepages_agree_with_contact() {
             yaw_rate: 0.0,
             roll_rate: 0.0,
         };
-        let [x, y, spin] = creepages(&geometry, &frame, search.touch - lowering, &motion);
+        let [x, y, spin] = creepages(&geometry, &frame, search.touch - lowering, &motion)
+            .expect("a point of the wheel");
         // CONTACT takes the radius at the deepest overlap, this is the one at the origin of the patch, up to 0.15 mm away.
         assert!(
             (-frame.origin[1] - on_track[1]).abs() < 0.15,

@@ -7,7 +7,7 @@
 //! wheel as surface of revolution, the rail as cylinder.
 
 use crate::contact::geometry::local_gap::{Detail, LocalGap};
-use crate::contact::geometry::overlaps::Overlap;
+use crate::contact::geometry::overlaps::{Grouping, Overlap};
 use crate::contact::geometry::wheel_rail::WheelRail;
 
 /// Spacing of the search across and along the curves, in mm.
@@ -29,6 +29,8 @@ const LOWERING_MAX: f64 = 16.0;
 pub struct Search<'g> {
     pub(super) geometry: &'g WheelRail,
     pub(super) lines: Vec<Line>,
+    /// Which lines share a gap, if that is decided for all heights.
+    pub(super) grouping: Option<Grouping>,
     /// Height of the wheel's centre in mm at which the bodies just touch.
     pub touch: f64,
 }
@@ -124,6 +126,7 @@ impl<'g> Search<'g> {
         Ok(Search {
             geometry,
             lines,
+            grouping: None,
             touch: -least,
         })
     }

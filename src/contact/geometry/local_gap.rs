@@ -1,6 +1,7 @@
 //! The gap of one patch in its own frame: the wheel as surface of revolution over the rail as cylinder.
 
 use crate::contact::geometry::contact_search::Frame;
+use crate::contact::geometry::surface_exit::{SurfaceExit, SurfaceMissed};
 use crate::contact::geometry::wheel_rail::WheelRail;
 
 /// How closely a gap is sampled. Along x it is as smooth as the wheel is round; across it has what the profiles have.
@@ -27,6 +28,9 @@ const CURVE_STEP: f64 = 0.1;
 /// The rail belongs to a patch as far as its tangent keeps this much of the frame's direction.
 const TANGENT_MIN: f64 = 0.1;
 
+/// How much farther away a surface is taken to be than its neighbour, in mm, where it has no point.
+const OPEN: f64 = 1.0;
+
 /// The gap of one patch at one height of the wheel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LocalGap {
@@ -38,6 +42,8 @@ pub struct LocalGap {
     pub y: Vec<f64>,
     /// Distance of the surfaces along the frame's normal in mm, negative where they overlap; `[j][i]` at `(x[i], y[j])`.
     pub gap: Vec<Vec<f64>>,
+    /// Samples over which the wheel's surface was not found although its profile goes on; the gap opens there.
+    pub missed: Vec<[f64; 2]>,
 }
 
 impl LocalGap {
@@ -71,7 +77,7 @@ impl LocalGap {
                 geometry.on_rail(frame.rail)[0]
             ));
         }
-        let wheel = WheelInFrame {
+        let (wheel, missed) = WheelInFrame {
             geometry,
             frame: &frame,
             centre,
@@ -82,7 +88,13 @@ impl LocalGap {
             .zip(&heights)
             .map(|(row, height)| row.into_iter().map(|wheel| wheel - height).collect())
             .collect();
-        Ok(LocalGap { frame, x, y, gap })
+        Ok(LocalGap {
+            frame,
+            x,
+            y,
+            gap,
+            missed,
+        })
     }
 
     /// Do the bodies still overlap at the ends of the window along x, and at those across?
@@ -157,16 +169,23 @@ impl<'g> RailInFrame<'g> {
             && v <= self.samples[self.samples.len() - 1][0]
     }
 
-    /// Height over the plane at v, and the parameter there, by bracketed secant steps along the curve.
+    /// Height over the plane at v, and the parameter there, by bracketed secant steps along the curve and a halving after every
+    /// second one: v runs steadily along the chosen part of the curve, so that the bracket of 0.1 mm holds one place and is
+    /// narrower than the tolerance before the steps are used up.
     fn height(&self, v: f64) -> [f64; 2] {
+        const STEPS: u32 = 120;
         let k = self
             .samples
             .partition_point(|sample| sample[0] < v)
             .clamp(1, self.samples.len() - 1);
         let [mut low, mut high] = [self.samples[k - 1], self.samples[k]];
         let mut found = [0.0; 2];
-        for _ in 0..30 {
-            let t = ((v - low[0]) / (high[0] - low[0])).clamp(0.0, 1.0);
+        for step in 0..STEPS {
+            let t = if step % 3 == 2 {
+                0.5
+            } else {
+                ((v - low[0]) / (high[0] - low[0])).clamp(0.0, 1.0)
+            };
             let s = low[1] + t * (high[1] - low[1]);
             let at = self.local(s);
             found = [at[1], s];
@@ -208,8 +227,9 @@ impl Guess {
 }
 
 impl WheelInFrame<'_> {
-    /// Height of the wheel's surface over the plane of the frame, outward from the middle.
-    fn heights(&self, x: &[f64], y: &[f64]) -> Vec<Vec<f64>> {
+    /// Height of the wheel's surface over the plane of the frame, outward from the middle, and the places where it was not found
+    /// although the profile goes on. Where there is no point of the wheel, the surface opens from the last one found.
+    fn heights(&self, x: &[f64], y: &[f64]) -> (Vec<Vec<f64>>, Vec<[f64; 2]>) {
         let nearest = |axis: &[f64]| axis.partition_point(|at| *at < 0.0).min(axis.len() - 1);
         let middle = [nearest(x), nearest(y)];
         // With an odd number of columns over a symmetric window the middle one is x = 0, and both halves are alike; without
@@ -217,15 +237,27 @@ impl WheelInFrame<'_> {
         let images = x.iter().zip(x.iter().rev()).all(|(a, b)| *a == -b);
         let mirrored = images && self.geometry.axle()[0] == 0.0 && self.frame.origin[0] == 0.0;
         let mut rows = vec![vec![f64::NAN; x.len()]; y.len()];
+        let mut missed = Vec::new();
+        let mut found_or_open = |at: [f64; 2], start: Guess| -> Guess {
+            self.height(at[0], at[1], start).unwrap_or_else(|miss| {
+                if miss.exit == SurfaceExit::StepsUsedUp {
+                    missed.push(at);
+                }
+                Guess {
+                    height: start.height + OPEN,
+                    wheel: start.wheel,
+                }
+            })
+        };
         let mut fill = |j: usize, start: Guess| -> Guess {
-            let first = self.height(x[middle[0]], y[j], start);
+            let first = found_or_open([x[middle[0]], y[j]], start);
             rows[j][middle[0]] = first.height;
             let (right, left) = outward(middle[0], x.len());
             let sides = [right, if mirrored { Vec::new() } else { left }];
             for columns in sides {
                 let (mut before, mut guess) = (first, first);
                 for i in columns {
-                    let found = self.height(x[i], y[j], guess);
+                    let found = found_or_open([x[i], y[j]], guess);
                     rows[j][i] = found.height;
                     if mirrored {
                         rows[j][x.len() - 1 - i] = found.height;
@@ -251,12 +283,12 @@ impl WheelInFrame<'_> {
                 (before, guess) = (found, found.beyond(before));
             }
         }
-        rows
+        (rows, missed)
     }
 
     /// Where the normal through (u, v) meets the wheel, by Newton's method in the height and the parameter of the
-    /// wheel's curve; where there is no such point, a surface that opens quickly.
-    fn height(&self, u: f64, v: f64, start: Guess) -> Guess {
+    /// wheel's curve.
+    fn height(&self, u: f64, v: f64, start: Guess) -> Result<Guess, SurfaceMissed> {
         const STEP_MAX: f64 = 1.0;
         const STEP_LAST: f64 = 1e-6;
         let [tangent, normal] = self.frame.axes();
@@ -287,21 +319,52 @@ impl WheelInFrame<'_> {
             guess.wheel += wheel.clamp(-STEP_MAX, STEP_MAX);
             // The error falls with the square of the step.
             if height.abs() + wheel.abs() < STEP_LAST {
-                return guess;
+                return Ok(guess);
             }
         }
-        Guess {
-            height: start.height + 1.0,
-            wheel: start.wheel,
+        let [first, last] = self.geometry.ranges()[1];
+        let beyond = !(first..=last).contains(&guess.wheel);
+        Err(SurfaceMissed {
+            at: [u, v],
+            exit: if beyond {
+                SurfaceExit::BeyondProfile
+            } else {
+                SurfaceExit::StepsUsedUp
+            },
+        })
+    }
+}
+
+impl WheelInFrame<'_> {
+    /// The same from the origin of the frame, in steps that Newton's method can follow.
+    fn height_from_origin(&self, [u, v]: [f64; 2]) -> Result<Guess, SurfaceMissed> {
+        /// Length of a step in mm; the sides of the windows, where rows follow each other like this, are as long.
+        const STRIDE: f64 = 2.0;
+        let mut before = Guess {
+            height: 0.0,
+            wheel: self.frame.wheel,
+        };
+        let mut guess = before;
+        let strides = (u.hypot(v) / STRIDE).ceil() as u32;
+        for k in 0..strides {
+            let part = f64::from(k) / f64::from(strides);
+            // The surface may be missed on the way and found at the end.
+            if let Ok(found) = self.height(part * u, part * v, guess) {
+                guess = if k == 0 { found } else { found.beyond(before) };
+                before = found;
+            }
         }
+        self.height(u, v, guess)
     }
 }
 
 impl WheelRail {
     /// A frame of the same directions with its origin on the rail's surface over the point `by` of the plane, `[x, y]` in
     /// mm, with the wheel's centre at the height `centre`.
-    #[must_use]
-    pub fn moved(&self, frame: &Frame, by: [f64; 2], centre: f64) -> Frame {
+    ///
+    /// # Errors
+    /// The wheel has no point there, or none was found.
+    pub fn moved(&self, frame: &Frame, by: [f64; 2], centre: f64) -> Result<Frame, SurfaceMissed> {
         let [u, v] = by;
         let [tangent, normal] = frame.axes();
         let [height, rail] = RailInFrame::new(self, frame).height(v);
@@ -310,11 +373,7 @@ impl WheelRail {
             frame,
             centre,
         };
-        let start = Guess {
-            height: 0.0,
-            wheel: frame.wheel,
-        };
-        Frame {
+        Ok(Frame {
             origin: [
                 frame.origin[0] + u,
                 frame.origin[1] + v * tangent[0] + height * normal[0],
@@ -322,28 +381,27 @@ impl WheelRail {
             ],
             angle: frame.angle,
             rail,
-            wheel: surface.height(u, v, start).wheel,
-        }
+            wheel: surface.height_from_origin([u, v])?.wheel,
+        })
+    }
+
+    /// Parameter of the rail's curve over the place `y` in mm across the plane of a frame.
+    #[must_use]
+    pub fn rail_over(&self, frame: &Frame, y: f64) -> f64 {
+        RailInFrame::new(self, frame).height(y)[1]
     }
 
     /// Overlap in mm of the undeformed bodies along the normal at the origin of a frame, with the wheel's centre at the
     /// height `centre`; negative where there is a gap.
-    #[must_use]
-    pub fn overlap(&self, frame: &Frame, centre: f64) -> f64 {
+    ///
+    /// # Errors
+    /// The wheel has no point there, or none was found.
+    pub fn overlap(&self, frame: &Frame, centre: f64) -> Result<f64, SurfaceMissed> {
         let surface = WheelInFrame {
             geometry: self,
             frame,
             centre,
         };
-        -surface
-            .height(
-                0.0,
-                0.0,
-                Guess {
-                    height: 0.0,
-                    wheel: frame.wheel,
-                },
-            )
-            .height
+        Ok(-surface.height_from_origin([0.0; 2])?.height)
     }
 }

@@ -8,5 +8,6 @@ mod overlaps;
 pub mod profile;
 pub mod profile_quality;
 pub mod smoothing;
+pub mod surface_exit;
 pub mod wheel_rail;
 pub mod wheelset;

@@ -7,6 +7,7 @@
 //! Source: Kalker 1990, section 1.3; the same as in the Manchester contact benchmark.
 
 use crate::contact::geometry::contact_search::Frame;
+use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
 
 /// How a wheelset moves; mm, s and rad.
@@ -26,16 +27,18 @@ pub struct WheelsetMotion {
 
 /// Creepages `ν_x`, `ν_y` and the spin φ in 1/mm about the origin of a frame, with the wheel's centre at the height
 /// `centre` in mm.
-#[must_use]
+///
+/// # Errors
+/// The wheel has no point over the origin, or none was found.
 pub fn creepages(
     geometry: &WheelRail,
     frame: &Frame,
     centre: f64,
     motion: &WheelsetMotion,
-) -> [f64; 3] {
+) -> Result<[f64; 3], SurfaceMissed> {
     let axle = geometry.axle();
     let [tangent, normal] = frame.axes();
-    let overlap = geometry.overlap(frame, centre);
+    let overlap = geometry.overlap(frame, centre)?;
     // The wheel's surface lies below the rail's by the overlap.
     let arm = [
         frame.origin[0],
@@ -50,10 +53,10 @@ pub fn creepages(
         motion.lateral_velocity + turn[2] * arm[0] - turn[0] * arm[2],
         turn[0] * arm[1] - turn[1] * arm[0],
     ];
-    [
+    let relative = [
         velocity[0],
         velocity[1] * tangent[0] + velocity[2] * tangent[1],
         turn[1] * normal[0] + turn[2] * normal[1],
-    ]
-    .map(|part| part / motion.speed)
+    ];
+    Ok(relative.map(|part| part / motion.speed))
 }

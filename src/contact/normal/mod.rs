@@ -1,8 +1,10 @@
 //! How hard is it pressed? Contact region and pressure, whatever they come from.
 
 pub mod fitted;
+mod height_bracket;
 pub mod hertz;
 mod interpolation;
+mod neighbours;
 pub mod non_hertzian;
 pub mod prescribed;
 pub mod profiles;

@@ -9,9 +9,12 @@ use std::f64::consts::PI;
 
 use crate::contact::geometry::contact_search::{Frame, Search};
 use crate::contact::geometry::local_gap::{Detail, LocalGap};
+use crate::contact::geometry::surface_exit::SurfaceExit;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::monitor::Monitor;
+use crate::contact::normal::height_bracket::{Bracket, HeightExit};
 use crate::contact::normal::hertz::Pressing;
+use crate::contact::normal::neighbours::{Neighbour, neglected};
 use crate::contact::normal::non_hertzian::gap::Gap;
 use crate::contact::normal::non_hertzian::{Failure, GapContact, Report};
 use crate::contact::normal::prescribed::PressureField;
@@ -20,19 +23,14 @@ use crate::contact::remark::{Remark, RemarkEntry};
 
 /// Heights looked at before giving up.
 const HEIGHTS_MAX: u32 = 40;
-/// The force found may differ from the one wanted by this part; the contact is then grown to the force as Hertz's would be. What
-/// is left is of second order for Hertz's contacts, about a third of this part in pressures and lengths at worst.
-const FORCE_TOLERANCE: f64 = 5e-3;
+/// The force found may differ from the one wanted by the target of the resultants' error, but by no more and no less than this; the
+/// contact is then grown to the force as Hertz's would be. What is left is of second order for Hertz's contacts, about a third
+/// of this part in pressures and lengths at worst. Below the lower bound heights differ by no more than their grids do.
+const FORCE_TOLERANCE: [f64; 2] = [5e-4, 5e-3];
 /// That third, as an error of the load.
 const CORRECTED: f64 = 1.0 / 3.0;
 /// A coarse look that misses the force by no more than this is followed by a fine one.
 const NEAR: f64 = 0.02;
-/// A bracket narrower than this part of the lowering holds a jump of the force, where patches merge.
-const BRACKET_MIN: f64 = 2e-4;
-/// Steps in a row that may leave the bracket more than half as wide.
-const SLOW_MAX: u32 = 3;
-/// So close to a lowering that cannot be solved, relative to it, the search ends.
-const CLOSE: f64 = 0.02;
 /// A patch that overlaps by less than this part of the deepest overlap carries nothing to speak of (about its power 3/2).
 const DEPTH_SHARE_MIN: f64 = 2e-3;
 
@@ -86,6 +84,8 @@ pub struct PressedWheel {
 pub struct PressedGap {
     /// Frame of the coordinates, with its origin at the load centre.
     pub frame: Frame,
+    /// Deepest overlap of the undeformed bodies in mm.
+    approach: f64,
     /// Region and pressure.
     pub field: PressureField,
     /// How it was found.
@@ -114,11 +114,70 @@ impl PressedGap {
 pub struct Wanted {
     /// Of a vertical force the normal forces carry the part `1 / (1 + friction_share)`.
     pub friction_share: f64,
-    /// The force may be missed by this part; 0 for as little as matters.
-    pub tolerance: f64,
+    /// How exactly.
+    pub accuracy: Accuracy,
+}
+
+/// How exactly a force is to be carried.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Accuracy {
+    /// It may be missed by this part, by coarse gaps: a place to go on from.
+    About(f64),
+    /// As resultants with this error relative to μN need it; the contact is corrected to the force.
+    For(f64),
+}
+
+impl Accuracy {
+    fn tolerance(self) -> f64 {
+        let [low, high] = FORCE_TOLERANCE;
+        match self {
+            Accuracy::About(part) => part,
+            Accuracy::For(target) => target.clamp(low, high),
+        }
+    }
+}
+
+/// How finely the wheel is solved at one height.
+#[derive(Debug, Clone, Copy)]
+struct Look {
+    detail: Detail,
+    /// Target of the resultants' error relative to μN.
+    target: f64,
+}
+
+impl Look {
+    fn fine(wanted: Wanted) -> Look {
+        let target = match wanted.accuracy {
+            Accuracy::About(_) => f64::INFINITY,
+            Accuracy::For(target) => target,
+        };
+        Look {
+            detail: Detail::Fine,
+            target,
+        }
+    }
 }
 
 impl PressedWheel {
+    /// The wheel at the height where the search ended, corrected to the force that was wanted.
+    fn at_rest(mut self, exit: HeightExit, wanted: f64) -> PressedWheel {
+        let [carried, slope] = self.found;
+        // Where the force jumps, its slope says nothing of the height.
+        let lower = if exit.converged() {
+            (wanted - carried) / slope
+        } else {
+            0.0
+        };
+        self.force_residual = exit.missed();
+        self.load_error = match exit {
+            HeightExit::Jump { .. } => exit.missed(),
+            _ => CORRECTED * exit.missed(),
+        };
+        self.remarks.extend(exit.remark().map(RemarkEntry::from));
+        self.correct(wanted / carried, lower);
+        self
+    }
+
     /// Forces times a factor near 1, and the wheel lower by so much in mm.
     fn correct(&mut self, factor: f64, lower: f64) {
         self.found[0] *= factor;
@@ -126,6 +185,7 @@ impl PressedWheel {
         self.centre -= lower;
         for gap in &mut self.patches {
             let approach = lower * gap.frame.angle.cos();
+            gap.approach += approach;
             gap.field = gap.field.clone().corrected(factor, approach);
         }
     }
@@ -148,6 +208,21 @@ impl ProfileContact {
         }
     }
 
+    /// The search for the places of contact, with its overlaps divided among gaps as near the height that is expected.
+    ///
+    /// # Errors
+    /// As [`Search::new`].
+    pub fn search(&self) -> Result<Search<'_>, String> {
+        let search = Search::new(&self.geometry)?;
+        let expected = match self.loading {
+            Loading::Vertical(force) | Loading::Normal(force) => {
+                search.estimated_lowering(force / self.contact_modulus)
+            }
+            Loading::Lowering(lowering) => lowering,
+        };
+        Ok(search.grouped_near(expected))
+    }
+
     /// Brings the wheel to rest, from an earlier rest under a similar load if there is one.
     ///
     /// # Errors
@@ -163,16 +238,21 @@ impl ProfileContact {
             Loading::Vertical(force) => force / (1.0 + wanted.friction_share),
             Loading::Normal(force) => force,
             Loading::Lowering(lowering) => {
-                return self.lowered(search, lowering, Detail::Fine, monitor);
+                return self.lowered(search, lowering, Look::fine(wanted), monitor);
             }
         };
         let near = |force: f64| (force / target - 1.0).abs() <= NEAR;
+        let tolerance = wanted.accuracy.tolerance();
+        let exact = matches!(wanted.accuracy, Accuracy::For(_));
         let mut bracket = Bracket::default();
-        let mut detail = Detail::Coarse;
+        let mut look = Look {
+            detail: Detail::Coarse,
+            ..Look::fine(wanted)
+        };
         let mut lowering = match before {
             Some(before) => {
-                if near(before.found[0]) && wanted.tolerance < NEAR {
-                    detail = Detail::Fine;
+                if near(before.found[0]) && exact {
+                    look.detail = Detail::Fine;
                 }
                 bracket.next(before.lowering, before.found[0], target, before.found[1])
             }
@@ -180,7 +260,7 @@ impl ProfileContact {
         };
         let mut closed = false;
         for heights in 1..=HEIGHTS_MAX {
-            let mut found = match self.looked_at(search, lowering, detail, monitor) {
+            let mut found = match self.looked_at(search, lowering, look, monitor) {
                 Ok(found) => found,
                 Err(Failure::NoAnswer(reason)) => {
                     // Too deep, perhaps; the load may be carried higher up.
@@ -194,35 +274,31 @@ impl ProfileContact {
             let next = bracket.next(lowering, carried, target, slope);
             found.found[1] = bracket.slope.or(known).unwrap_or(slope);
             found.heights = heights;
-            if (carried / target - 1.0).abs() <= wanted.tolerance.max(FORCE_TOLERANCE)
-                && (detail == Detail::Fine || wanted.tolerance > FORCE_TOLERANCE)
-            {
-                // A coarse rest is not corrected: it is a place to go on from.
-                if wanted.tolerance <= FORCE_TOLERANCE {
-                    found.force_residual = (carried / target - 1.0).abs();
-                    found.load_error = CORRECTED * (target / carried - 1.0).abs();
-                    found.correct(target / carried, (target - carried) / found.found[1]);
-                }
+            let missed = (carried / target - 1.0).abs();
+            if missed <= tolerance && !exact {
                 return Ok(found);
+            }
+            if missed <= tolerance && look.detail == Detail::Fine {
+                return Ok(found.at_rest(HeightExit::Met { missed }, target));
             }
             if let Some(reason) = bracket.closed_on_refusal(lowering) {
                 return Err(Failure::NoAnswer(reason));
             }
-            closed |= bracket.width() < BRACKET_MIN * lowering;
-            if closed && detail == Detail::Fine {
-                let factor = target / carried;
-                found.remarks.push(Remark::ForceJumps { factor }.into());
-                found.force_residual = (carried / target - 1.0).abs();
-                found.load_error = (target / carried - 1.0).abs();
-                found.correct(target / carried, 0.0);
-                return Ok(found);
+            closed |= bracket.is_closed(lowering);
+            if closed && look.detail == Detail::Fine {
+                let exit = HeightExit::closed(target / carried, tolerance);
+                return Ok(found.at_rest(exit, target));
             }
-            if detail == Detail::Coarse && (closed || near(carried)) {
+            lowering = next;
+            if look.detail == Detail::Coarse && (closed || near(carried)) {
                 // What coarse looks said of the forces on either side is not sharp enough to go on from, the slope is.
-                detail = Detail::Fine;
+                if closed {
+                    lowering = found.lowering;
+                }
+                look.detail = Detail::Fine;
                 bracket = bracket.opened(found.found[1]);
+                closed = false;
             }
-            lowering = if closed { lowering } else { next };
         }
         Err(Failure::NoAnswer(format!(
             "no height of the wheel carries the load after {HEIGHTS_MAX} tries"
@@ -234,12 +310,16 @@ impl ProfileContact {
         &self,
         search: &Search,
         lowering: f64,
-        detail: Detail,
+        look: Look,
         monitor: &dyn Monitor,
     ) -> Result<PressedWheel, Failure> {
-        match self.lowered(search, lowering, detail, monitor) {
-            Err(Failure::NoAnswer(_)) if detail == Detail::Coarse => {
-                self.lowered(search, lowering, Detail::Fine, monitor)
+        match self.lowered(search, lowering, look, monitor) {
+            Err(Failure::NoAnswer(_)) if look.detail == Detail::Coarse => {
+                let fine = Look {
+                    detail: Detail::Fine,
+                    ..look
+                };
+                self.lowered(search, lowering, fine, monitor)
             }
             found => found,
         }
@@ -250,16 +330,18 @@ impl ProfileContact {
         &self,
         search: &Search,
         lowering: f64,
-        detail: Detail,
+        look: Look,
         monitor: &dyn Monitor,
     ) -> Result<PressedWheel, Failure> {
         let centre = search.touch - lowering;
-        let gaps = search.gaps(lowering, detail).map_err(Failure::NoAnswer)?;
+        let gaps = search
+            .gaps(lowering, look.detail)
+            .map_err(Failure::NoAnswer)?;
         let depths: Vec<f64> = gaps.iter().map(depth).collect();
         let least = DEPTH_SHARE_MIN * depths.iter().copied().fold(0.0, f64::max);
         let touching = gaps.iter().zip(&depths).filter(|(_, d)| **d > least);
         let patches = touching
-            .map(|(gap, depth)| self.pressed(gap, *depth, centre, detail, monitor))
+            .map(|(gap, depth)| self.pressed(gap, *depth, centre, look, monitor))
             .collect::<Result<Vec<_>, _>>()?;
         if patches.is_empty() {
             return Err(Failure::NoAnswer(
@@ -287,9 +369,12 @@ impl ProfileContact {
         gap: &LocalGap,
         depth: f64,
         centre: f64,
-        detail: Detail,
+        look: Look,
         monitor: &dyn Monitor,
     ) -> Result<PressedGap, Failure> {
+        if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.0) {
+            return Err(Failure::Stopped(stop));
+        }
         let above: Vec<Vec<f64>> = gap
             .gap
             .iter()
@@ -300,17 +385,43 @@ impl ProfileContact {
             pressing: Pressing::Approach(depth),
             contact_modulus: self.contact_modulus,
         };
-        let found = match detail {
+        let found = match look.detail {
             Detail::Coarse => contact.estimate(monitor)?,
-            Detail::Fine => contact.solve(monitor)?,
+            Detail::Fine => contact.solve_for(look.target, monitor)?,
         };
+        let mut remarks = found.remarks;
+        remarks.extend(missed_beside(gap, &found.field));
+        let moved = |to: [f64; 2]| {
+            let place = self.geometry.moved(&gap.frame, to, centre);
+            place.map_err(|miss| Failure::NoAnswer(miss.to_string()))
+        };
+        if look.detail == Detail::Fine {
+            for patch in 0..found.field.patches().len() {
+                moved(found.field.load_centre(Some(patch)))?;
+            }
+        }
         let middle = found.field.load_centre(None);
         Ok(PressedGap {
-            frame: self.geometry.moved(&gap.frame, middle, centre),
+            frame: moved(middle)?,
+            approach: depth,
             field: found.field.from_origin(middle),
             report: found.report,
-            remarks: found.remarks,
+            remarks,
         })
+    }
+
+    /// A remark if the patches in gaps of their own would change each other's forces by more than a part of the load.
+    #[must_use]
+    pub fn uncoupled(&self, wheel: &PressedWheel, part: f64) -> Option<Remark> {
+        let gaps = wheel.patches.iter().map(|gap| Neighbour {
+            frame: gap.frame,
+            force: gap.normal_force(),
+            approach: gap.approach,
+        });
+        let keeps_load = !matches!(self.loading, Loading::Lowering(_));
+        let gaps: Vec<Neighbour> = gaps.collect();
+        let [share, distance_mm] = neglected(&gaps, self.contact_modulus, keeps_load)?;
+        (share > part).then_some(Remark::PatchesUncoupled { share, distance_mm })
     }
 
     /// The force that is prescribed, as it came out.
@@ -339,6 +450,30 @@ impl ProfileContact {
     }
 }
 
+/// A remark on samples of a gap over which the wheel's surface was not found, if some lie in a patch or next to it: elsewhere
+/// the bodies are apart all the same.
+fn missed_beside(gap: &LocalGap, field: &PressureField) -> Option<RemarkEntry> {
+    let spacing = |axis: &[f64]| axis[1] - axis[0];
+    let [along, across] = [spacing(&gap.x), spacing(&gap.y)];
+    let patches = field.patches();
+    let beside = |[x, y]: &[f64; 2]| {
+        patches.iter().any(|patch| {
+            let [x_min, x_max, y_min, y_max] = patch.extent;
+            (x_min - along..=x_max + along).contains(x)
+                && (y_min - across..=y_max + across).contains(y)
+        })
+    };
+    let count = gap.missed.iter().filter(|place| beside(place)).count();
+    let share = count as f64 / (gap.x.len() * gap.y.len()) as f64;
+    let remark = Remark::IterationInexact {
+        iteration: "samples of the wheel's surface over the plane of contact",
+        reason: SurfaceExit::StepsUsedUp.reason(),
+        residual: share,
+        tolerance: 0.0,
+    };
+    (count > 0).then(|| remark.into())
+}
+
 /// Deepest overlap of a gap in mm.
 fn depth(gap: &LocalGap) -> f64 {
     -gap.gap
@@ -346,156 +481,4 @@ fn depth(gap: &LocalGap) -> f64 {
         .flatten()
         .copied()
         .fold(f64::INFINITY, f64::min)
-}
-
-/// What is known of the height sought.
-#[derive(Debug, Default)]
-struct Bracket {
-    /// Lowering with too little force.
-    low: f64,
-    /// Lowering with too much force, or one that could not be solved.
-    high: Option<f64>,
-    /// Why `high` could not be solved.
-    refused: Option<String>,
-    /// The height before, with the power 2/3 of its force.
-    before: Option<[f64; 2]>,
-    /// The width at the step before, and steps in a row that hardly changed it.
-    width_before: f64,
-    slow: u32,
-    /// Derivative of the force by the lowering between the last two heights, where it can be trusted.
-    slope: Option<f64>,
-    /// The same from elsewhere, for the next step.
-    known: Option<f64>,
-}
-
-impl Bracket {
-    fn width(&self) -> f64 {
-        self.high.map_or(f64::INFINITY, |high| high - self.low)
-    }
-
-    /// The next lowering to try, after one that carries a force.
-    fn next(&mut self, lowering: f64, carried: f64, target: f64, slope: f64) -> f64 {
-        const POWER: f64 = 2.0 / 3.0;
-        let [here, wanted] = [carried, target].map(|force| force.powf(POWER));
-        if carried < target {
-            self.low = lowering;
-        } else {
-            self.high = Some(lowering);
-            self.refused = None;
-        }
-        let estimate = POWER * here / carried * self.known.take().unwrap_or(slope);
-        let secant = self
-            .before
-            .map(|[at, value]| (here - value) / (lowering - at))
-            // Between heights that are nearly the same the difference is that of their grids.
-            .filter(|secant| (0.7..1.5).contains(&(secant / estimate)));
-        self.before = Some([lowering, here]);
-        self.slope = secant.map(|secant| secant / POWER * carried / here);
-        let next = lowering + (wanted - here) / secant.unwrap_or(estimate);
-        let next = next.clamp(0.25 * lowering, 4.0 * lowering);
-        self.within(next)
-    }
-
-    /// The next lowering to try, after one that could not be solved.
-    fn refuse(&mut self, lowering: f64, reason: String) -> Result<f64, Failure> {
-        self.high = Some(lowering);
-        if lowering - self.low < CLOSE * lowering || lowering < 1e-6 {
-            return Err(Failure::NoAnswer(reason));
-        }
-        self.refused = Some(reason);
-        Ok(0.5 * (self.low + lowering))
-    }
-
-    /// The same without its sides, except for what could not be solved, and with a derivative that is known.
-    fn opened(self, slope: f64) -> Bracket {
-        Bracket {
-            high: self.high.filter(|_| self.refused.is_some()),
-            refused: self.refused,
-            slope: Some(slope),
-            known: Some(slope),
-            ..Bracket::default()
-        }
-    }
-
-    /// Why nothing deeper could be solved, once the bracket has closed on it from below.
-    fn closed_on_refusal(&self, lowering: f64) -> Option<String> {
-        let closed = self.width() < CLOSE * lowering;
-        self.refused.clone().filter(|_| closed)
-    }
-
-    /// The next lowering, in the middle of the bracket if it lies outside or the bracket does not shrink.
-    fn within(&mut self, next: f64) -> f64 {
-        let Some(high) = self.high else {
-            return next;
-        };
-        let width = high - self.low;
-        self.slow = if width > 0.5 * self.width_before {
-            self.slow + 1
-        } else {
-            0
-        };
-        self.width_before = width;
-        if next < high && next > self.low && self.slow < SLOW_MAX {
-            return next;
-        }
-        self.slow = 0;
-        0.5 * (self.low + high)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A force of lowering^1.5 with a jump at 0.5.
-    fn force(lowering: f64, jump: f64) -> f64 {
-        lowering.powf(1.5) + if lowering > 0.5 { jump } else { 0.0 }
-    }
-
-    fn sought(target: f64, jump: f64, start: f64) -> (f64, u32) {
-        let mut bracket = Bracket::default();
-        let mut lowering = start;
-        for count in 1..100 {
-            let carried = force(lowering, jump);
-            let next = bracket.next(lowering, carried, target, 1.3 * lowering.sqrt());
-            if (carried / target - 1.0).abs() < FORCE_TOLERANCE
-                || bracket.width() < BRACKET_MIN * lowering
-            {
-                return (lowering, count);
-            }
-            lowering = next;
-        }
-        panic!("not found")
-    }
-
-    #[test]
-    fn hertzian_forces_are_met_in_a_few_steps_from_far_away() {
-        for start in [0.01, 0.2, 0.9, 7.0] {
-            let (lowering, count) = sought(0.2, 0.0, start);
-            assert!((force(lowering, 0.0) / 0.2 - 1.0).abs() < FORCE_TOLERANCE);
-            assert!(count <= 8, "{count} steps from {start}");
-        }
-        assert!(sought(0.2, 0.0, 0.33).1 <= 3);
-    }
-
-    #[test]
-    fn a_jump_of_the_force_is_closed_in_on() {
-        let (lowering, count) = sought(0.4, 0.2, 0.3);
-        assert!((lowering - 0.5).abs() < 2e-4, "{lowering}");
-        assert!(count < 40, "{count}");
-    }
-
-    #[test]
-    fn what_cannot_be_solved_bounds_the_search_and_is_the_reason_in_the_end() {
-        let mut bracket = Bracket::default();
-        let mut lowering = 1.0;
-        let reason = loop {
-            match bracket.refuse(lowering, "cut off".to_owned()) {
-                Ok(next) => lowering = next,
-                Err(Failure::NoAnswer(reason)) => break reason,
-                Err(other) => panic!("{other:?}"),
-            }
-        };
-        assert_eq!(reason, "cut off");
-    }
 }

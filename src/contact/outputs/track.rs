@@ -51,10 +51,13 @@ pub fn merge(
         let own = gap.remarks.iter().chain(&solution.remarks);
         remarks.extend(own.map(|remark| in_wheel(remark, before, alone)));
         for (k, patch) in solution.patches.iter_mut().enumerate() {
-            let place = geometry.moved(&gap.frame, gap.field.load_centre(Some(k)), wheel.centre);
+            // Every load centre was found when the gap was solved, up to the correction of the height.
+            let place = geometry
+                .moved(&gap.frame, gap.field.load_centre(Some(k)), wheel.centre)
+                .unwrap_or(gap.frame);
             patch.position = Some(position(geometry, &place, &gap.frame));
             let [.., y_min, y_max] = patch.extent_mm;
-            let turn = turn(geometry, gap, wheel.centre, [y_min, y_max]);
+            let turn = turn(geometry, gap, [y_min, y_max]);
             if turn > TURN_USUAL_MAX {
                 let remark = Remark::ContactTurns { turn_rad: turn };
                 remarks.push(remark.at_patch(before + k));
@@ -102,9 +105,9 @@ fn in_wheel(remark: &RemarkEntry, first: usize, alone: bool) -> RemarkEntry {
 }
 
 /// By how much the rail's inclination changes over a patch, in rad.
-fn turn(geometry: &WheelRail, gap: &PressedGap, centre: f64, across: [f64; 2]) -> f64 {
+fn turn(geometry: &WheelRail, gap: &PressedGap, across: [f64; 2]) -> f64 {
     let [low, high] = across.map(|y| {
-        let rail = geometry.moved(&gap.frame, [0.0, y], centre).rail;
+        let rail = geometry.rail_over(&gap.frame, y);
         let [y, z] = geometry.rail_at(rail).tangent();
         (z / y).atan()
     });

@@ -6,6 +6,7 @@ use crate::contact::geometry::profile_quality::noise::{Outlier, Step};
 use crate::contact::geometry::profile_quality::{
     Grain, UnderContact, advised_smoothing, shape, under_contact,
 };
+use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::profiles::PressedGap;
 use crate::contact::profile_trust::finding::{Cause, Finding};
@@ -97,14 +98,16 @@ impl<'a> Under<'a> {
 }
 
 /// The quality of both profiles under a patch, and what may be said about it: roughness whether it is large or not.
+///
+/// # Errors
+/// The wheel's surface was not found over an end of the patch.
 pub fn judge(
     geometry: &WheelRail,
     patch: FoundPatch,
     modulus: f64,
-) -> (PatchQuality, Vec<Finding>) {
-    let ends = patch
-        .across
-        .map(|y| geometry.moved(&patch.gap.frame, [0.0, y], patch.centre));
+) -> Result<(PatchQuality, Vec<Finding>), SurfaceMissed> {
+    let over = |y: f64| geometry.moved(&patch.gap.frame, [0.0, y], patch.centre);
+    let ends = [over(patch.across[0])?, over(patch.across[1])?];
     let sorted = |[a, b]: [f64; 2]| [a.min(b), a.max(b)];
     let contacts = [
         sorted(ends.map(|end| end.rail)),
@@ -142,7 +145,7 @@ pub fn judge(
         rail: quality(&both[0], advised[0]),
         wheel: quality(&both[1], advised[1]),
     };
-    (quality, findings)
+    Ok((quality, findings))
 }
 
 /// What makes the profile rough: outliers, steps, chords, noise or waves, or points that leave the curve open.

@@ -46,7 +46,7 @@ pub(super) fn solve(
     let settled = settle::settled(problem, contact, monitor)?;
     let contact = settled.as_ref().unwrap_or(contact);
     let mut found = profiles::solve(operators, problem, contact, monitor)?;
-    let findings = judged(&mut found, contact);
+    let findings = judged(&mut found, contact)?;
     let refused = findings.iter().find(|finding| finding.refused);
     if let (Some(finding), false) = (refused, contact.trust.accept_rough) {
         return Err(SolveError::RoughProfile {
@@ -97,7 +97,7 @@ fn worst_of_each(findings: impl Iterator<Item = Finding>) -> Vec<Finding> {
 }
 
 /// Writes the quality of the profiles into every patch, and lists what is wrong with them.
-fn judged(found: &mut Found, contact: &ProfileContact) -> Vec<Finding> {
+fn judged(found: &mut Found, contact: &ProfileContact) -> Result<Vec<Finding>, SolveError> {
     let geometry = &contact.geometry;
     let mut findings = Vec::new();
     let mut number = 0;
@@ -112,14 +112,14 @@ fn judged(found: &mut Found, contact: &ProfileContact) -> Vec<Finding> {
                 pressure: patch.pressure_max_mpa,
                 number,
             };
-            let (quality, of_patch) = judge(geometry, place, contact.contact_modulus);
+            let (quality, of_patch) = judge(geometry, place, contact.contact_modulus)?;
             patch.quality = Some(quality);
             findings.extend(of_patch);
             number += 1;
         }
     }
     findings.extend(hidden(found, contact));
-    findings
+    Ok(findings)
 }
 
 /// Stretches without points where the bodies may touch beside the patches that were found.

@@ -1,11 +1,10 @@
 //! `smoothing_mm: "auto"`: the smoothing that suits the noise of the profiles and the pressure between them.
 
 use crate::contact::error::SolveError;
-use crate::contact::geometry::contact_search::Search;
 use crate::contact::geometry::profile::Body;
 use crate::contact::geometry::profile_quality::advised_smoothing;
 use crate::contact::monitor::{Monitor, Watch};
-use crate::contact::normal::profiles::{ProfileContact, Wanted};
+use crate::contact::normal::profiles::{Accuracy, ProfileContact, Wanted};
 use crate::contact::problem::Problem;
 use crate::contact::profile_trust::before;
 use crate::contact::remark::{Remark, RemarkEntry};
@@ -62,11 +61,12 @@ pub(super) fn settled(
         return Ok(Some(with(first)));
     }
     let trial = with(first);
-    let search =
-        Search::new(&trial.geometry).map_err(|reason| SolveError::NormalProblem { reason })?;
+    let search = trial
+        .search()
+        .map_err(|reason| SolveError::NormalProblem { reason })?;
     let wanted = Wanted {
         friction_share: 0.0,
-        tolerance: TOLERANCE,
+        accuracy: Accuracy::About(TOLERANCE),
     };
     let watch = Watch::new(monitor, problem.time_limit, 1);
     let wheel = trial.press(&search, wanted, None, &watch)?;

@@ -349,6 +349,21 @@ remarks! {
         "the force jumps at this height of the wheel, where patches merge; forces were scaled by {factor:.4}"
     ),
 
+    /// Patches lie in gaps of their own, where they do not press on each other's half-space, and that could matter.
+    PatchesUncoupled {
+        /// By how much the force of a patch would change, relative to the load.
+        share: f64 = 0.012,
+        /// Least distance of two load centres.
+        distance_mm: f64 = 38.0,
+    }
+    code: "patches-uncoupled",
+    severity: Warning,
+    advice: "Expect that a part of the load moves from one patch to the other; this is not part of the error estimate.",
+    detail: format!(
+        "patches {distance_mm:.1} mm apart are solved as if each were alone; pressing on each other they would exchange {:.1} % of the load",
+        100.0 * share
+    ),
+
     /// Several motions share their patches, so that the vertical load is balanced by normal forces alone.
     NormalForcesAloneBalance {}
     code: "normal-forces-alone-balance",
