@@ -4,10 +4,9 @@ use std::f64::consts::PI;
 use std::fmt::Write as _;
 use std::hint::black_box;
 
-use railhead::contact::geometry::contact_search::Search;
 use railhead::contact::monitor::Unwatched;
 use railhead::contact::normal::Region;
-use railhead::contact::normal::profiles::Wanted;
+use railhead::contact::normal::profiles::{Accuracy, Wanted};
 use railhead::contact::problem::Problem;
 use railhead::contact::solution::Solution;
 use serde_json::{Value, json};
@@ -241,10 +240,10 @@ fn at_rest(problem: &Problem) -> (f64, u32) {
     };
     let wanted = Wanted {
         friction_share: 0.0,
-        tolerance: 0.0,
+        accuracy: Accuracy::For(0.005),
     };
     let rest = || {
-        let search = Search::new(&contact.geometry).expect("a wheel over a rail");
+        let search = contact.search().expect("a wheel over a rail");
         contact
             .press(&search, wanted, None, &Unwatched)
             .expect("a rest")
