@@ -58,7 +58,7 @@ pub enum SolveError {
         reason: String,
     },
     /// The points of a profile allow no answer that can be relied on.
-    #[error("{reason} (at {pointer}). To solve all the same give accept_rough_profiles: true")]
+    #[error("{reason} (at {pointer})")]
     RoughProfile {
         /// JSON pointer to the profile.
         pointer: String,

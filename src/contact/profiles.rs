@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::contact::answer;
 use crate::contact::case::{Motion, Output};
 use crate::contact::error::SolveError;
+use crate::contact::geometry::contact_search::Search;
 use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::geometry::wheelset::{WheelsetMotion, creepages};
@@ -46,100 +47,142 @@ const TOLERANCE_FIRST: f64 = 0.1;
 /// motions share their patches, so that only normal forces balance then; a remark says so.
 ///
 /// # Errors
-/// A named reason why there is no answer.
+/// A named reason why there is no answer, with what `judge` says of it.
 pub(super) fn solve(
     operators: &Arc<OperatorStore>,
     problem: &Problem,
     contact: &ProfileContact,
+    judge: &dyn Judge,
     monitor: &dyn Monitor,
 ) -> Result<Found, SolveError> {
     let search = contact
         .search()
         .map_err(|reason| SolveError::NormalProblem { reason })?;
     let vertical = matches!(contact.loading, Loading::Vertical(_)) && problem.friction > 0.0;
-    let balanced = vertical && problem.part.all == 1;
-    let rest = |wanted: Wanted, before: Option<&PressedWheel>| -> Result<Rest, SolveError> {
-        let watch = Watch::new(monitor, problem.time_limit, 1);
-        let began = monitor.elapsed();
-        let wheel = contact.press(&search, wanted, before, &watch);
-        let wheel = wheel.map_err(|failure| watch.explained(failure.into(), problem))?;
-        let seconds = (monitor.elapsed() - began).as_secs_f64();
-        let unbalanced = if balanced { BALANCE } else { 0.0 };
+    let solve = WheelSolve {
+        operators,
+        problem,
+        contact,
+        search,
+        balanced: vertical && problem.part.all == 1,
+        judge,
+        monitor,
+    };
+    if solve.balanced {
+        return solve.balance();
+    }
+    let mut at_rest = solve.rest(solve.exactly(0.0), None)?;
+    let answers = solve.answers(&at_rest, problem)?;
+    if vertical {
+        let remark = Remark::NormalForcesAloneBalance {};
+        at_rest.wheel.remarks.push(remark.into());
+    }
+    Ok(at_rest.found(problem, contact, answers))
+}
+
+/// Who judges a wheel at rest before and after its motions are solved.
+pub(super) trait Judge {
+    /// Is there any point in solving its motions?
+    ///
+    /// # Errors
+    /// There is none, and why.
+    fn before(&self, wheel: &PressedWheel) -> Result<(), SolveError>;
+
+    /// The error of a motion that was not solved, with what the wheel at rest says of its cause.
+    fn explain(&self, wheel: &PressedWheel, error: SolveError) -> SolveError;
+}
+
+/// One wheel on its rail.
+struct WheelSolve<'a> {
+    operators: &'a Arc<OperatorStore>,
+    problem: &'a Problem,
+    contact: &'a ProfileContact,
+    search: Search<'a>,
+    balanced: bool,
+    judge: &'a dyn Judge,
+    monitor: &'a dyn Monitor,
+}
+
+impl WheelSolve<'_> {
+    fn exactly(&self, friction_share: f64) -> Wanted {
+        Wanted {
+            friction_share,
+            accuracy: Accuracy::For(self.problem.target()),
+        }
+    }
+
+    fn rest(&self, wanted: Wanted, before: Option<&PressedWheel>) -> Result<Rest, SolveError> {
+        let watch = Watch::new(self.monitor, self.problem.time_limit, 1);
+        let began = self.monitor.elapsed();
+        let wheel = self.contact.press(&self.search, wanted, before, &watch);
+        let wheel = wheel.map_err(|failure| watch.explained(failure.into(), self.problem))?;
+        if matches!(wanted.accuracy, Accuracy::For(_)) {
+            self.judge.before(&wheel)?;
+        }
+        let seconds = (self.monitor.elapsed() - began).as_secs_f64();
+        let unbalanced = if self.balanced { BALANCE } else { 0.0 };
         Ok(Rest {
             wheel,
             seconds,
             unbalanced,
         })
-    };
-    let exactly = |friction_share: f64| Wanted {
-        friction_share,
-        accuracy: Accuracy::For(problem.target()),
-    };
-    if !balanced {
-        let mut at_rest = rest(exactly(0.0), None)?;
-        let answers = at_rest.answers(operators, problem, contact, monitor)?;
-        if vertical {
-            let remark = Remark::NormalForcesAloneBalance {};
-            at_rest.wheel.remarks.push(remark.into());
-        }
-        return Ok(at_rest.found(problem, contact, answers));
     }
-    let coarse = Problem {
-        resolution: match problem.resolution {
-            Resolution::Target(target) => Resolution::Target(target.max(TARGET_FIRST)),
-            mesh @ Resolution::Mesh(_) => mesh,
-        },
-        outputs: vec![Output::Resultants],
-        ..problem.clone()
-    };
-    let about = Wanted {
-        friction_share: 0.0,
-        accuracy: Accuracy::About(TOLERANCE_FIRST),
-    };
-    let mut at_rest = rest(about, None)?;
-    let answers = at_rest.answers(operators, &coarse, contact, monitor)?;
-    let mut share = friction_share(&at_rest.wheel, &answers);
-    let mut counted = share;
-    let mut previous = None;
-    let tolerance = balance(problem.resolution);
-    let mut exit = BalanceExit::NothingCarried;
-    let mut last = None;
-    for _ in 0..ROUNDS_MAX {
-        if 1.0 + counted < CARRIED_MIN {
-            exit = BalanceExit::NothingCarried;
-            break;
-        }
-        at_rest = at_rest.again(rest(exactly(counted), Some(&at_rest.wheel))?);
-        let answers = at_rest.answers(operators, problem, contact, monitor)?;
-        share = friction_share(&at_rest.wheel, &answers);
-        let before = previous.replace((counted, share));
-        last = Some(answers);
-        let change = ((1.0 + share) / (1.0 + counted) - 1.0).abs();
-        exit = BalanceExit::RoundsUsedUp { change };
-        if change <= tolerance {
-            exit = BalanceExit::Balanced;
-            break;
-        }
-        counted = next_share((counted, share), before);
+
+    fn answers(
+        &self,
+        at_rest: &Rest,
+        problem: &Problem,
+    ) -> Result<Vec<(Solution, Fields)>, SolveError> {
+        at_rest
+            .answers(self.operators, problem, self.contact, self.monitor)
+            .map_err(|error| self.judge.explain(&at_rest.wheel, error))
     }
-    match (exit, last) {
-        (BalanceExit::Balanced, Some(answers)) => Ok(at_rest.found(problem, contact, answers)),
-        (BalanceExit::RoundsUsedUp { change }, Some(answers)) if change <= BALANCE_POOR => {
-            let remark = Remark::IterationInexact {
-                iteration: "balance of friction and the vertical force",
-                reason: "the rounds were used up",
-                residual: change,
-                tolerance,
-            };
-            at_rest.wheel.remarks.push(remark.into());
-            Ok(at_rest.found(problem, contact, answers))
+
+    /// Brings normal and tangential forces to balance the vertical force together.
+    fn balance(&self) -> Result<Found, SolveError> {
+        let WheelSolve {
+            problem, contact, ..
+        } = *self;
+        let coarse = Problem {
+            resolution: match problem.resolution {
+                Resolution::Target(target) => Resolution::Target(target.max(TARGET_FIRST)),
+                mesh @ Resolution::Mesh(_) => mesh,
+            },
+            outputs: vec![Output::Resultants],
+            ..problem.clone()
+        };
+        let about = Wanted {
+            friction_share: 0.0,
+            accuracy: Accuracy::About(TOLERANCE_FIRST),
+        };
+        let mut at_rest = self.rest(about, None)?;
+        let answers = self.answers(&at_rest, &coarse)?;
+        let mut share = friction_share(&at_rest.wheel, &answers);
+        let mut counted = share;
+        let mut previous = None;
+        let tolerance = tolerance(problem.resolution);
+        let mut exit = BalanceExit::NothingCarried;
+        let mut last = None;
+        for _ in 0..ROUNDS_MAX {
+            if 1.0 + counted < CARRIED_MIN {
+                exit = BalanceExit::NothingCarried;
+                break;
+            }
+            at_rest = at_rest.again(self.rest(self.exactly(counted), Some(&at_rest.wheel))?);
+            let answers = self.answers(&at_rest, problem)?;
+            share = friction_share(&at_rest.wheel, &answers);
+            let before = previous.replace((counted, share));
+            last = Some(answers);
+            let change = ((1.0 + share) / (1.0 + counted) - 1.0).abs();
+            exit = BalanceExit::RoundsUsedUp { change };
+            if change <= tolerance {
+                exit = BalanceExit::Balanced;
+                break;
+            }
+            counted = next_share((counted, share), before);
         }
-        _ => Err(SolveError::NormalProblem {
-            reason: format!(
-                "normal and tangential forces do not come to balance the vertical force in {ROUNDS_MAX} rounds; friction \
-                 carries {share:+.3} of what the normal forces do. Give a normal_force_n or an approach_mm"
-            ),
-        }),
+        let answers = exit.judged(last, tolerance, share, &mut at_rest.wheel)?;
+        Ok(at_rest.found(problem, contact, answers))
     }
 }
 
@@ -154,6 +197,37 @@ enum BalanceExit {
     NothingCarried,
 }
 
+impl BalanceExit {
+    /// The answers of the last round, if they are good enough: with a remark where they are not quite.
+    fn judged<A>(
+        self,
+        last: Option<A>,
+        tolerance: f64,
+        share: f64,
+        wheel: &mut PressedWheel,
+    ) -> Result<A, SolveError> {
+        match (self, last) {
+            (BalanceExit::Balanced, Some(answers)) => Ok(answers),
+            (BalanceExit::RoundsUsedUp { change }, Some(answers)) if change <= BALANCE_POOR => {
+                let remark = Remark::IterationInexact {
+                    iteration: "balance of friction and the vertical force",
+                    reason: "the rounds were used up",
+                    residual: change,
+                    tolerance,
+                };
+                wheel.remarks.push(remark.into());
+                Ok(answers)
+            }
+            _ => Err(SolveError::NormalProblem {
+                reason: format!(
+                    "normal and tangential forces do not come to balance the vertical force in {ROUNDS_MAX} rounds; \
+                     friction carries {share:+.3} of what the normal forces do. Give a normal_force_n or an approach_mm"
+                ),
+            }),
+        }
+    }
+}
+
 /// The friction to count on next, after rounds that counted on the first of two numbers and found the second: a secant step
 /// where two rounds tell the slope, because friction found may swing about friction counted on where a flange is steep.
 fn next_share((counted, found): (f64, f64), before: Option<(f64, f64)>) -> f64 {
@@ -165,10 +239,35 @@ fn next_share((counted, found): (f64, f64), before: Option<(f64, f64)>) -> f64 {
 }
 
 /// By which part the vertical force may be missed.
-fn balance(resolution: Resolution) -> f64 {
+fn tolerance(resolution: Resolution) -> f64 {
     match resolution {
         Resolution::Target(target) => BALANCE.min(BALANCE_OF_TARGET * target),
         Resolution::Mesh(_) => BALANCE,
+    }
+}
+
+/// The same error with the place of the gap whose coordinates it speaks of.
+fn of_gap(error: SolveError, gap: &PressedGap, geometry: &WheelRail) -> SolveError {
+    match error {
+        SolveError::NotConverged {
+            method,
+            point,
+            iterations,
+            residual,
+            tolerance,
+            advice,
+        } => SolveError::NotConverged {
+            method,
+            point,
+            iterations,
+            residual,
+            tolerance,
+            advice: format!(
+                "{advice}; in the coordinates of the contact at y = {:.2} mm on the rail",
+                geometry.on_rail(gap.frame.rail)[0]
+            ),
+        },
+        other => other,
     }
 }
 
@@ -257,7 +356,8 @@ impl Rest {
             let region = Region::Grid(gap.field.clone());
             let load_error = self.wheel.load_error.hypot(self.unbalanced);
             let part = problem.of_part(region, motions, normal, load_error)?;
-            answers.push(answer(operators, &part, &watch)?);
+            let answered = answer(operators, &part, &watch);
+            answers.push(answered.map_err(|error| of_gap(error, gap, &contact.geometry))?);
         }
         Ok(answers)
     }

@@ -139,19 +139,19 @@ impl Accuracy {
 
 /// How finely the wheel is solved at one height.
 #[derive(Debug, Clone, Copy)]
-struct Look {
+struct Fineness {
     detail: Detail,
     /// Target of the resultants' error relative to μN.
     target: f64,
 }
 
-impl Look {
-    fn fine(wanted: Wanted) -> Look {
+impl Fineness {
+    fn fine(wanted: Wanted) -> Fineness {
         let target = match wanted.accuracy {
             Accuracy::About(_) => f64::INFINITY,
             Accuracy::For(target) => target,
         };
-        Look {
+        Fineness {
             detail: Detail::Fine,
             target,
         }
@@ -238,33 +238,35 @@ impl ProfileContact {
             Loading::Vertical(force) => force / (1.0 + wanted.friction_share),
             Loading::Normal(force) => force,
             Loading::Lowering(lowering) => {
-                return self.lowered(search, lowering, Look::fine(wanted), monitor);
+                return self.lowered(search, lowering, Fineness::fine(wanted), monitor);
             }
         };
         let near = |force: f64| (force / target - 1.0).abs() <= NEAR;
         let tolerance = wanted.accuracy.tolerance();
         let exact = matches!(wanted.accuracy, Accuracy::For(_));
         let mut bracket = Bracket::default();
-        let mut look = Look {
+        let mut fineness = Fineness {
             detail: Detail::Coarse,
-            ..Look::fine(wanted)
+            ..Fineness::fine(wanted)
         };
         let mut lowering = match before {
             Some(before) => {
                 if near(before.found[0]) && exact {
-                    look.detail = Detail::Fine;
+                    fineness.detail = Detail::Fine;
                 }
-                bracket.next(before.lowering, before.found[0], target, before.found[1])
+                let [carried, slope] = before.found;
+                bracket.next(before.lowering, carried, target, slope)
             }
             None => search.estimated_lowering(target / self.contact_modulus),
         };
-        let mut closed = false;
         for heights in 1..=HEIGHTS_MAX {
-            let mut found = match self.looked_at(search, lowering, look, monitor) {
+            let mut found = match self.looked_at(search, lowering, fineness, monitor) {
                 Ok(found) => found,
                 Err(Failure::NoAnswer(reason)) => {
                     // Too deep, perhaps; the load may be carried higher up.
-                    lowering = bracket.refuse(lowering, reason)?;
+                    lowering = bracket
+                        .refuse(lowering, reason)
+                        .map_err(Failure::NoAnswer)?;
                     continue;
                 }
                 Err(stopped) => return Err(stopped),
@@ -278,26 +280,23 @@ impl ProfileContact {
             if missed <= tolerance && !exact {
                 return Ok(found);
             }
-            if missed <= tolerance && look.detail == Detail::Fine {
+            let fine = fineness.detail == Detail::Fine;
+            if missed <= tolerance && fine {
                 return Ok(found.at_rest(HeightExit::Met { missed }, target));
             }
             if let Some(reason) = bracket.closed_on_refusal(lowering) {
                 return Err(Failure::NoAnswer(reason));
             }
-            closed |= bracket.is_closed(lowering);
-            if closed && look.detail == Detail::Fine {
+            let closed = bracket.is_closed(lowering);
+            if closed && fine {
                 let exit = HeightExit::closed(target / carried, tolerance);
                 return Ok(found.at_rest(exit, target));
             }
-            lowering = next;
-            if look.detail == Detail::Coarse && (closed || near(carried)) {
+            lowering = if closed { found.lowering } else { next };
+            if closed || !fine && near(carried) {
                 // What coarse looks said of the forces on either side is not sharp enough to go on from, the slope is.
-                if closed {
-                    lowering = found.lowering;
-                }
-                look.detail = Detail::Fine;
+                fineness.detail = Detail::Fine;
                 bracket = bracket.opened(found.found[1]);
-                closed = false;
             }
         }
         Err(Failure::NoAnswer(format!(
@@ -310,14 +309,14 @@ impl ProfileContact {
         &self,
         search: &Search,
         lowering: f64,
-        look: Look,
+        fineness: Fineness,
         monitor: &dyn Monitor,
     ) -> Result<PressedWheel, Failure> {
-        match self.lowered(search, lowering, look, monitor) {
-            Err(Failure::NoAnswer(_)) if look.detail == Detail::Coarse => {
-                let fine = Look {
+        match self.lowered(search, lowering, fineness, monitor) {
+            Err(Failure::NoAnswer(_)) if fineness.detail == Detail::Coarse => {
+                let fine = Fineness {
                     detail: Detail::Fine,
-                    ..look
+                    ..fineness
                 };
                 self.lowered(search, lowering, fine, monitor)
             }
@@ -330,18 +329,18 @@ impl ProfileContact {
         &self,
         search: &Search,
         lowering: f64,
-        look: Look,
+        fineness: Fineness,
         monitor: &dyn Monitor,
     ) -> Result<PressedWheel, Failure> {
         let centre = search.touch - lowering;
         let gaps = search
-            .gaps(lowering, look.detail)
+            .gaps(lowering, fineness.detail)
             .map_err(Failure::NoAnswer)?;
         let depths: Vec<f64> = gaps.iter().map(depth).collect();
         let least = DEPTH_SHARE_MIN * depths.iter().copied().fold(0.0, f64::max);
         let touching = gaps.iter().zip(&depths).filter(|(_, d)| **d > least);
         let patches = touching
-            .map(|(gap, depth)| self.pressed(gap, *depth, centre, look, monitor))
+            .map(|(gap, depth)| self.pressed(gap, *depth, centre, fineness, monitor))
             .collect::<Result<Vec<_>, _>>()?;
         if patches.is_empty() {
             return Err(Failure::NoAnswer(
@@ -369,7 +368,7 @@ impl ProfileContact {
         gap: &LocalGap,
         depth: f64,
         centre: f64,
-        look: Look,
+        fineness: Fineness,
         monitor: &dyn Monitor,
     ) -> Result<PressedGap, Failure> {
         if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.0) {
@@ -385,9 +384,9 @@ impl ProfileContact {
             pressing: Pressing::Approach(depth),
             contact_modulus: self.contact_modulus,
         };
-        let found = match look.detail {
+        let found = match fineness.detail {
             Detail::Coarse => contact.estimate(monitor)?,
-            Detail::Fine => contact.solve_for(look.target, monitor)?,
+            Detail::Fine => contact.solve_for(fineness.target, monitor)?,
         };
         let mut remarks = found.remarks;
         remarks.extend(missed_beside(gap, &found.field));
@@ -395,7 +394,7 @@ impl ProfileContact {
             let place = self.geometry.moved(&gap.frame, to, centre);
             place.map_err(|miss| Failure::NoAnswer(miss.to_string()))
         };
-        if look.detail == Detail::Fine {
+        if fineness.detail == Detail::Fine {
             for patch in 0..found.field.patches().len() {
                 moved(found.field.load_centre(Some(patch)))?;
             }

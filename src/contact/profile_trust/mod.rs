@@ -12,12 +12,13 @@ use std::sync::Arc;
 
 use crate::contact::error::SolveError;
 use crate::contact::geometry::contact_search::Search;
-use crate::contact::geometry::profile::Body;
+use crate::contact::geometry::profile::{Body, Profile};
 use crate::contact::geometry::profile_quality::holes::{Hole, holes};
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::profiles::ProfileContact;
+use crate::contact::normal::profiles::{PressedWheel, ProfileContact};
 use crate::contact::problem::Problem;
-use crate::contact::profiles::{self, Found};
+use crate::contact::profile_trust::quality::{PatchQuality, ProfileQuality};
+use crate::contact::profiles::{self, Found, Judge};
 use crate::contact::solution::{Fields, Solution};
 use crate::contact::tangential::operator_store::OperatorStore;
 use finding::{Cause, Finding};
@@ -45,20 +46,17 @@ pub(super) fn solve(
 ) -> Result<(Solution, Fields), SolveError> {
     let settled = settle::settled(problem, contact, monitor)?;
     let contact = settled.as_ref().unwrap_or(contact);
-    let mut found = profiles::solve(operators, problem, contact, monitor)?;
-    let findings = judged(&mut found, contact)?;
-    let refused = findings.iter().find(|finding| finding.refused);
-    if let (Some(finding), false) = (refused, contact.trust.accept_rough) {
-        return Err(SolveError::RoughProfile {
-            pointer: finding.pointer().to_owned(),
-            reason: finding.remark().detail,
-        });
-    }
+    let judgement = Judgement { contact };
+    let found = profiles::solve(operators, problem, contact, &judgement, monitor)?;
+    let (qualities, findings) = judgement.of(&found.wheel)?;
     let Found {
         mut solution,
         fields,
         ..
     } = found;
+    for (patch, quality) in solution.patches.iter_mut().zip(qualities) {
+        patch.quality = Some(quality);
+    }
     let suspicious = findings.iter().any(|finding| {
         finding.of_roughness() && finding.has_evidence() && finding.share > uncertainty::HARMLESS
     });
@@ -96,93 +94,142 @@ fn worst_of_each(findings: impl Iterator<Item = Finding>) -> Vec<Finding> {
     worst
 }
 
-/// Writes the quality of the profiles into every patch, and lists what is wrong with them.
-fn judged(found: &mut Found, contact: &ProfileContact) -> Result<Vec<Finding>, SolveError> {
-    let geometry = &contact.geometry;
-    let mut findings = Vec::new();
-    let mut number = 0;
-    for gap in &found.wheel.patches {
-        for _ in gap.field.patches() {
-            let patch = &mut found.solution.patches[number];
-            let [.., from, to] = patch.extent_mm;
-            let place = FoundPatch {
-                gap,
-                centre: found.wheel.centre,
-                across: [from, to],
-                pressure: patch.pressure_max_mpa,
-                number,
-            };
-            let (quality, of_patch) = judge(geometry, place, contact.contact_modulus)?;
-            patch.quality = Some(quality);
-            findings.extend(of_patch);
-            number += 1;
-        }
-    }
-    findings.extend(hidden(found, contact));
-    Ok(findings)
+/// Judges the profiles under the patches of a wheel at rest.
+struct Judgement<'a> {
+    contact: &'a ProfileContact,
 }
 
-/// Stretches without points where the bodies may touch beside the patches that were found.
-fn hidden(found: &mut Found, contact: &ProfileContact) -> Vec<Finding> {
-    let patches = &found.solution.patches;
-    let width = patches
-        .iter()
-        .map(|patch| patch.extent_mm[3] - patch.extent_mm[2])
-        .fold(0.0, f64::max);
-    let [rail, wheel] = contact.geometry.profiles();
-    let longest = rail.longest_chord().max(wheel.longest_chord());
-    if longest < Hole::least(width) {
-        return Vec::new();
+impl Judge for Judgement<'_> {
+    /// Where an answer would mislead none is sought: a tangential problem on the ridge under an outlier would fail for reasons that say
+    /// nothing of the outlier.
+    fn before(&self, wheel: &PressedWheel) -> Result<(), SolveError> {
+        if self.contact.trust.accept_rough {
+            return Ok(());
+        }
+        let (_, findings) = self.of(wheel)?;
+        let refused = findings.iter().find(|finding| finding.refused);
+        refused.map_or(Ok(()), |finding| Err(rough(finding, ACCEPT)))
     }
-    // The search is a good part of a solve; few profiles have chords so long.
-    let Ok(search) = Search::new(&contact.geometry) else {
-        return Vec::new();
-    };
-    let mut findings = Vec::new();
-    for hole in holes(&search, found.wheel.lowering, width) {
-        let (profile, body) = match hole.body {
-            Body::Rail => (rail, Body::Rail),
-            Body::Wheel => (wheel, Body::Wheel),
+
+    fn explain(&self, wheel: &PressedWheel, error: SolveError) -> SolveError {
+        if !matches!(
+            error,
+            SolveError::NotConverged { .. } | SolveError::Unmeshable { .. }
+        ) {
+            return error;
+        }
+        let Ok((_, findings)) = self.of(wheel) else {
+            return error;
+        };
+        let worst = findings
+            .iter()
+            .filter(|finding| finding.refused || finding.is_told(false))
+            .reduce(|worst, other| {
+                if other.worse_than(worst) {
+                    other
+                } else {
+                    worst
+                }
+            });
+        match worst {
+            Some(finding) => rough(finding, &format!("; {error}")),
+            None => error,
+        }
+    }
+}
+
+/// What may be done about a profile that is refused.
+const ACCEPT: &str = "; to solve all the same give accept_rough_profiles: true";
+
+/// The failure that a finding explains, with what else there is to say.
+fn rough(finding: &Finding, more: &str) -> SolveError {
+    SolveError::RoughProfile {
+        pointer: finding.pointer().to_owned(),
+        reason: finding.remark().detail + more,
+    }
+}
+
+impl Judgement<'_> {
+    /// The quality of the profiles under every patch, and what is wrong with them.
+    fn of(&self, wheel: &PressedWheel) -> Result<(Vec<PatchQuality>, Vec<Finding>), SolveError> {
+        let contact = self.contact;
+        let (mut qualities, mut findings) = (Vec::new(), Vec::new());
+        let mut width: f64 = 0.0;
+        for gap in &wheel.patches {
+            for patch in gap.field.patches() {
+                let [.., from, to] = patch.extent;
+                let place = FoundPatch {
+                    gap,
+                    centre: wheel.centre,
+                    across: [from, to],
+                    pressure: patch.pressure_max,
+                    number: qualities.len(),
+                };
+                let (quality, own) = judge(&contact.geometry, place, contact.contact_modulus)?;
+                width = width.max(to - from);
+                qualities.push(quality);
+                findings.extend(own);
+            }
+        }
+        let hidden = self.hidden(wheel, width, &mut qualities);
+        findings.extend(hidden);
+        Ok((qualities, findings))
+    }
+
+    /// Stretches without points where the bodies may touch beside the patches that were found, the widest of which has the width given
+    /// in mm.
+    fn hidden(
+        &self,
+        wheel: &PressedWheel,
+        width: f64,
+        qualities: &mut [PatchQuality],
+    ) -> Vec<Finding> {
+        let geometry = &self.contact.geometry;
+        let longest = geometry.profiles().map(Profile::longest_chord);
+        if longest[0].max(longest[1]) < Hole::least(width) {
+            return Vec::new();
+        }
+        // The search is a good part of a solve; few profiles have chords so long.
+        let Ok(search) = Search::new(geometry) else {
+            return Vec::new();
+        };
+        holes(&search, wheel.lowering, width)
+            .into_iter()
+            .filter_map(|hole| self.beside(&hole, width, qualities))
+            .collect()
+    }
+
+    /// A hole that lies under no patch, noted at the nearest one.
+    fn beside(&self, hole: &Hole, width: f64, qualities: &mut [PatchQuality]) -> Option<Finding> {
+        let [rail, wheel] = self.contact.geometry.profiles();
+        let profile = match hole.body {
+            Body::Rail => rail,
+            Body::Wheel => wheel,
+        };
+        let own = |quality: &PatchQuality| match hole.body {
+            Body::Rail => quality.rail,
+            Body::Wheel => quality.wheel,
         };
         let y = hole.chord.map(|s| profile.at(s).at[0]);
-        let quality = |patch: &crate::contact::solution::PatchSolution| {
-            patch.quality.as_ref().map(|quality| match body {
-                Body::Rail => quality.rail,
-                Body::Wheel => quality.wheel,
-            })
-        };
-        let under = |own: &quality::ProfileQuality| own.y_mm[0] < y[1] && own.y_mm[1] > y[0];
-        if found
-            .solution
-            .patches
-            .iter()
-            .filter_map(quality)
-            .any(|own| under(&own))
-        {
-            continue;
+        let under = |own: ProfileQuality| own.y_mm[0] < y[1] && own.y_mm[1] > y[0];
+        if qualities.iter().any(|quality| under(own(quality))) {
+            return None;
         }
-        let middle = 0.5 * (y[0] + y[1]);
-        let distance = |patch: &crate::contact::solution::PatchSolution| {
-            quality(patch).map_or(f64::INFINITY, |own| {
-                (0.5 * (own.y_mm[0] + own.y_mm[1]) - middle).abs()
-            })
+        let distance = |quality: &PatchQuality| {
+            let [from, to] = own(quality).y_mm;
+            (from + to - y[0] - y[1]).abs()
         };
-        let nearest = (0..found.solution.patches.len()).min_by(|a, b| {
-            let [a, b] = [a, b].map(|k| distance(&found.solution.patches[*k]));
-            a.total_cmp(&b)
-        });
-        let Some(number) = nearest else { continue };
+        let nearest = (0..qualities.len())
+            .min_by(|a, b| distance(&qualities[*a]).total_cmp(&distance(&qualities[*b])))?;
         let length = hole.chord[1] - hole.chord[0];
-        if let Some(quality) = &mut found.solution.patches[number].quality {
-            let own = match body {
-                Body::Rail => &mut quality.rail,
-                Body::Wheel => &mut quality.wheel,
-            };
-            own.hole_mm = Some(own.hole_mm.unwrap_or(0.0).max(length));
-        }
-        findings.push(Finding {
-            body,
-            patch: number,
+        let quality = match hole.body {
+            Body::Rail => &mut qualities[nearest].rail,
+            Body::Wheel => &mut qualities[nearest].wheel,
+        };
+        quality.hole_mm = Some(quality.hole_mm.unwrap_or(0.0).max(length));
+        Some(Finding {
+            body: hole.body,
+            patch: nearest,
             y,
             pressure: 0.0,
             share: 0.0,
@@ -195,7 +242,6 @@ fn hidden(found: &mut Found, contact: &ProfileContact) -> Vec<Finding> {
             advised: 0.0,
             refused: hole.wide,
             cause: Cause::Hole,
-        });
+        })
     }
-    findings
 }

@@ -13,10 +13,10 @@ use crate::contact::error::SolveError;
 use crate::contact::geometry::profile::Profile;
 use crate::contact::geometry::profile_quality::flattening::noise_pressure;
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::normal::profiles::ProfileContact;
+use crate::contact::normal::profiles::{PressedWheel, ProfileContact};
 use crate::contact::problem::{Problem, Resolution};
 use crate::contact::profile_trust::quality::{ProfileQuality, ProfileUncertainty};
-use crate::contact::profiles;
+use crate::contact::profiles::{self, Judge};
 use crate::contact::remark::{Remark, RemarkEntry};
 use crate::contact::solution::{PatchSolution, Solution};
 use crate::contact::tangential::operator_store::OperatorStore;
@@ -55,6 +55,19 @@ impl Monitor for Afterwards<'_> {
     }
 }
 
+/// Another reading of the profiles is no better than they are.
+struct NoJudge;
+
+impl Judge for NoJudge {
+    fn before(&self, _wheel: &PressedWheel) -> Result<(), SolveError> {
+        Ok(())
+    }
+
+    fn explain(&self, _wheel: &PressedWheel, error: SolveError) -> SolveError {
+        error
+    }
+}
+
 /// Writes the uncertainty into every point and total, and says which patches another reading changes so much that it must be told.
 ///
 /// # Errors
@@ -84,6 +97,7 @@ pub(super) fn add(
                 operators,
                 &companion(problem, &chosen),
                 &other,
+                &NoJudge,
                 &Afterwards(monitor),
             ) {
                 Ok(found) => companions.push(found.solution),

@@ -3,6 +3,7 @@
 use crate::contact::case::{MeshSize, Method, Motion};
 use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
+use crate::contact::normal::Patch;
 use crate::contact::outputs::resultants::Resultants;
 use crate::contact::problem::{Problem, Resolution};
 use crate::contact::tangential::estimate::{self, Before, Circumstances, Errors, Indicators};
@@ -22,6 +23,8 @@ const POLE_MESH: MeshSize = MeshSize {
 /// A mesh of so many cells is worth a start on a coarser one, whose sides are no shorter than this.
 const CELLS_NESTED: u64 = 1000;
 const SIDE_HALVED: u32 = 8;
+/// Patches longer along rolling than so many times their width are named where a solve does not converge; nearly all of them are solved.
+const SLENDER: f64 = 20.0;
 /// A motion of a problem, and the creepages it is solved with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Asked {
@@ -303,9 +306,33 @@ fn named(failure: Failure, problem: &Problem, point: usize) -> SolveError {
             iterations: work.iterations as usize,
             residual: work.residual,
             tolerance,
-            advice,
+            advice: match slender(problem) {
+                Some(slender) => format!("{slender}; {advice}"),
+                None => advice,
+            },
         },
     }
+}
+
+/// The patch that is longest along rolling for its width, as a clause, if it may be the reason why there is no answer.
+fn slender(problem: &Problem) -> Option<String> {
+    let ratio = |patch: &Patch| {
+        let [x_min, x_max, y_min, y_max] = patch.extent;
+        (x_max - x_min) / (y_max - y_min)
+    };
+    let patches = problem.region.patches();
+    let (number, patch) = patches
+        .iter()
+        .enumerate()
+        .max_by(|(_, a), (_, b)| ratio(a).total_cmp(&ratio(b)))?;
+    let [x_min, x_max, y_min, y_max] = patch.extent;
+    (ratio(patch) > SLENDER).then(|| {
+        format!(
+            "patch {number} at x {x_min:.2} to {x_max:.2} mm, y {y_min:.3} to {y_max:.3} mm is {:.0} times as long along \
+             rolling as wide, which fastsim solves in any case",
+            ratio(patch)
+        )
+    })
 }
 
 /// A start from the answer on a coarser level.
