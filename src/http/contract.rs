@@ -1,7 +1,6 @@
 //! The contract: an OpenAPI 3.1 document made from the handlers and their types, with the examples of `api/examples`.
 
-use std::sync::LazyLock;
-
+use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use serde_json::Value;
@@ -14,10 +13,9 @@ use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement
 use utoipa::openapi::{HeaderBuilder, ObjectBuilder, Required, ResponseBuilder};
 use utoipa_axum::router::OpenApiRouter;
 
-use crate::http::dto::problem::Problem;
+use crate::http::dto::problem::ProblemBody;
 use crate::http::problem::catalogue::describe_also;
-use crate::http::problem::kinds::Kind;
-use crate::http::resources;
+use crate::http::problem::kinds::ProblemKind;
 
 #[derive(OpenApi)]
 #[openapi(
@@ -33,7 +31,7 @@ use crate::http::resources;
         (name = "cases", description = "What can be asked"),
         (name = "service", description = "State of the service, its problems and this document")
     ),
-    components(schemas(Problem))
+    components(schemas(ProblemBody))
 )]
 struct Head;
 
@@ -138,8 +136,8 @@ const EXAMPLES: [(&str, &str, &str); 12] = [
     ),
 ];
 
-static DOCUMENT: LazyLock<String> = LazyLock::new(|| {
-    let (_, mut document) = resources().split_for_parts();
+/// The contract as JSON text, ending with a line break, made from what the routes say of themselves.
+pub fn text(mut document: utoipa::openapi::OpenApi) -> String {
     for path in ["/v1/jobs", "/v1/cases/check"] {
         add_examples(&mut document, path);
     }
@@ -148,13 +146,11 @@ static DOCUMENT: LazyLock<String> = LazyLock::new(|| {
     let text = document.to_pretty_json();
     // Only a map with keys that are not strings cannot be written; the document has none.
     text.map(|text| text + "\n").unwrap_or_default()
-});
-
-/// The contract as JSON text, ending with a line break; the same as `api/openapi.json`.
-#[must_use]
-pub fn openapi_json() -> String {
-    DOCUMENT.clone()
 }
+
+/// Gives the text of the contract, which is made when it is asked for first.
+#[derive(Debug, Clone, Copy)]
+pub struct Document(pub fn() -> &'static str);
 
 /// Says of every operation on what belongs to a tenant that it may need a key, and that jobs and batches may expire.
 fn require_keys(document: &mut utoipa::openapi::OpenApi) {
@@ -170,7 +166,10 @@ fn require_keys(document: &mut utoipa::openapi::OpenApi) {
         let operations = [&mut item.get, &mut item.post, &mut item.delete];
         for operation in operations.into_iter().filter_map(Option::as_mut) {
             if !matches!(path.as_str(), "/healthz" | "/readyz" | "/metrics") {
-                describe_also(&mut operation.responses.responses, &[Kind::Overloaded]);
+                describe_also(
+                    &mut operation.responses.responses,
+                    &[ProblemKind::Overloaded],
+                );
             }
             let tags = operation.tags.as_deref().unwrap_or_default();
             let open = tags.iter().any(|tag| tag == "service");
@@ -183,13 +182,17 @@ fn require_keys(document: &mut utoipa::openapi::OpenApi) {
                 SecurityRequirement::new("key", Vec::<String>::new()),
                 SecurityRequirement::default(),
             ]);
-            let mut kinds = vec![Kind::Unauthorized, Kind::TooManyRequests, Kind::BadHeader];
-            kinds.extend([Kind::HostNotAllowed, Kind::CrossSite]);
+            let mut kinds = vec![
+                ProblemKind::Unauthorized,
+                ProblemKind::TooManyRequests,
+                ProblemKind::BadHeader,
+            ];
+            kinds.extend([ProblemKind::HostNotAllowed, ProblemKind::CrossSite]);
             if path.contains("{id}") {
-                kinds.push(Kind::Expired);
+                kinds.push(ProblemKind::Expired);
             }
             // A locked or failing disk can meet every request.
-            kinds.extend([Kind::StorageUnwritable, Kind::StorageFull]);
+            kinds.extend([ProblemKind::StorageUnwritable, ProblemKind::StorageFull]);
             describe_also(&mut operation.responses.responses, &kinds);
         }
     }
@@ -245,10 +248,6 @@ fn add_example(
     operation_id = "get_contract",
     responses((status = 200, description = "The contract in OpenAPI 3.1", body = Value))
 )]
-pub async fn contract() -> Response {
-    (
-        [(header::CONTENT_TYPE, "application/json")],
-        DOCUMENT.as_str(),
-    )
-        .into_response()
+pub async fn contract(State(Document(text)): State<Document>) -> Response {
+    ([(header::CONTENT_TYPE, "application/json")], text()).into_response()
 }

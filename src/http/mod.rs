@@ -14,6 +14,8 @@ mod routes;
 mod server;
 mod state;
 
+use std::sync::LazyLock;
+
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
 use axum::http::Uri;
@@ -26,14 +28,16 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
+use crate::http::contract::Document;
 use crate::http::extract::accept;
 use crate::http::layers::metrics::Metrics;
 use crate::http::layers::{
-    compression, etag, metrics, origin_guard, otel, request_log, security_headers,
+    admission, catch_panic, compression, etag, metrics, origin_guard, otel, request_id,
+    request_log, security_headers,
 };
 use crate::http::limits::holding_body;
 use crate::http::problem::error::{self, ApiError};
-use crate::http::problem::kinds::Kind;
+use crate::http::problem::kinds::ProblemKind;
 use crate::http::routes::service::metrics as service_metrics;
 use crate::http::routes::service::{health, methods, problems, remarks};
 use crate::http::routes::{
@@ -43,11 +47,24 @@ use crate::http::server::drain_body;
 use crate::http::state::AppState;
 use crate::jobs::Jobs;
 
-pub use crate::http::contract::openapi_json;
-pub use crate::http::layers::security_headers::allow_origins;
+pub use crate::http::layers::cors::allow_origins;
 pub use crate::http::options::HttpOptions;
 pub use crate::http::server::connection::Peer;
 pub use crate::http::server::listener::serve;
+
+/// The contract as JSON text, ending with a line break; the same as `api/openapi.json`.
+#[must_use]
+pub fn openapi_json() -> String {
+    (DOCUMENT.0)().to_owned()
+}
+
+const DOCUMENT: Document = Document(|| {
+    static TEXT: LazyLock<String> = LazyLock::new(|| {
+        let (_, document) = resources().split_for_parts();
+        contract::text(document)
+    });
+    &TEXT
+});
 
 /// The whole API, ready to be served.
 pub fn router(jobs: Jobs, options: HttpOptions) -> Router {
@@ -70,7 +87,12 @@ pub fn routers(
     let probes = probes
         .fallback(|uri: Uri| async move { error::unknown_route(uri.path()) })
         .layer(from_fn(error::name_instance))
-        .with_state(AppState::new(jobs.clone(), alone, metrics.clone()));
+        .with_state(AppState::new(
+            jobs.clone(),
+            alone,
+            metrics.clone(),
+            DOCUMENT,
+        ));
     [
         api(jobs, options, metrics),
         security_headers::secure(probes),
@@ -92,38 +114,35 @@ fn api(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> Router {
         .method_not_allowed_fallback(method_not_allowed)
         .layer(DefaultBodyLimit::max(options.body_max_bytes))
         .layer(RequestDecompressionLayer::new().gzip(true).zstd(true))
-        .layer(from_fn_with_state(
-            options.clone(),
-            compression::limit_packed,
-        ))
-        .layer(CatchPanicLayer::custom(request_log::answer_panic))
+        .layer(from_fn_with_state(options.clone(), admission::limit_packed))
+        .layer(CatchPanicLayer::custom(catch_panic::answer_panic))
         .layer(from_fn(holding_body::hold))
         .layer(from_fn(origin_guard::admit))
         .layer(from_fn(error::name_instance))
-        .layer(compression::packing())
+        .layer(compression::compression_layer())
         .layer(from_fn(etag::complete))
         .layer(from_fn_with_state(metrics.clone(), metrics::count));
     let router = otel::trace(router, jobs.tracer())
         .layer(request_log::span_layer())
-        .layer(from_fn(request_log::carry_request_id))
-        .layer(from_fn(drain_body::read_away))
-        .with_state(AppState::new(jobs, options, metrics));
+        .layer(from_fn(request_id::carry_request_id))
+        .layer(from_fn(drain_body::drain_body))
+        .with_state(AppState::new(jobs, options, metrics, DOCUMENT));
     security_headers::secure(router)
 }
 
 /// Every documented route, in the order of the contract.
 fn resources() -> OpenApiRouter<AppState> {
     let changing = OpenApiRouter::with_openapi(contract::head())
-        .routes(routes!(jobs::look, jobs::delete))
-        .routes(routes!(batches::look, batches::delete))
+        .routes(routes!(jobs::get, jobs::delete))
+        .routes(routes!(batches::get, batches::delete))
         .routes(routes!(methods::methods))
         .routes(routes!(remarks::remarks))
-        .route_layer(from_fn(etag::changing));
+        .route_layer(from_fn(etag::revalidate));
     let changing = contract::conditional(changing);
     let finished = OpenApiRouter::new()
         .routes(routes!(jobs::case))
         .routes(routes!(results::result))
-        .route_layer(from_fn(etag::finished));
+        .route_layer(from_fn(etag::immutable));
     let finished = contract::conditional(finished);
     let v1 = changing
         .merge(finished)
@@ -144,11 +163,11 @@ fn resources() -> OpenApiRouter<AppState> {
         .routes(routes!(fields::slip))
         .routes(routes!(plots::svg))
         .routes(routes!(plots::png))
-        .route_layer(from_fn(etag::finished));
+        .route_layer(from_fn(etag::immutable));
     let parts = contract::conditional(parts);
     let contract = OpenApiRouter::new()
         .routes(routes!(contract::contract))
-        .route_layer(from_fn(etag::changing));
+        .route_layer(from_fn(etag::revalidate));
     let contract = contract::conditional(contract);
     v1.merge(parts)
         .routes(routes!(batch_results::results))
@@ -172,7 +191,7 @@ async fn method_not_allowed(method: axum::http::Method, uri: Uri) -> ApiError {
         _ => "",
     };
     ApiError::new(
-        Kind::MethodNotAllowed,
+        ProblemKind::MethodNotAllowed,
         format!(
             "`{method}` is not possible on `{}`; the header `Allow` lists what is{hint}",
             uri.path()

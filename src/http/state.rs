@@ -2,9 +2,11 @@
 
 use axum::extract::FromRef;
 
-use crate::http::layers::auth::{Access, Unscoped};
+use crate::http::contract::Document;
+use crate::http::extract::caller::AnyTenant;
+use crate::http::layers::auth::Access;
 use crate::http::layers::metrics::Metrics;
-use crate::http::limits::concurrency::Crowds;
+use crate::http::limits::concurrency::ConcurrencyLimits;
 use crate::http::limits::memory::Memory;
 use crate::http::options::HttpOptions;
 use crate::jobs::Jobs;
@@ -12,24 +14,26 @@ use crate::jobs::Jobs;
 /// What every handler can reach; clones share it.
 #[derive(Clone, FromRef)]
 pub struct AppState {
-    pub unscoped: Unscoped,
+    pub unscoped: AnyTenant,
     pub access: Access,
     pub options: HttpOptions,
-    pub crowds: Crowds,
+    pub crowds: ConcurrencyLimits,
     pub memory: Memory,
     pub metrics: Metrics,
+    pub document: Document,
 }
 
 impl AppState {
     /// The jobs and the limits of these options.
-    pub fn new(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> AppState {
+    pub fn new(jobs: Jobs, options: HttpOptions, metrics: Metrics, document: Document) -> AppState {
         AppState {
             access: Access::new(&jobs, &options),
-            crowds: Crowds::new(&options),
+            crowds: ConcurrencyLimits::new(&options),
             memory: Memory::new(&options),
-            unscoped: Unscoped(jobs),
+            unscoped: AnyTenant(jobs),
             options,
             metrics,
+            document,
         }
     }
 }

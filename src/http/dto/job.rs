@@ -6,7 +6,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::contact::remark::RemarkEntry;
-use crate::http::dto::problem::Problem;
+use crate::http::dto::problem::ProblemBody;
 use crate::http::dto::result::JobResult;
 use crate::jobs::job::{Job, QueuePlace, State as JobState};
 use crate::jobs::wishes::Priority;
@@ -57,7 +57,7 @@ pub struct JobAnswer {
     /// What the client should know before using the numbers.
     remarks: Vec<RemarkEntry>,
     /// Why the job failed; null unless it did.
-    error: Option<Problem>,
+    error: Option<ProblemBody>,
     /// Where to go from here.
     links: BTreeMap<String, String>,
     /// The result; only in the answer to `Prefer: wait`, when the job succeeded in time.
@@ -72,7 +72,7 @@ impl JobAnswer {
         let error = job
             .failure
             .as_ref()
-            .map(|failure| Problem::of_job(&job, failure));
+            .map(|failure| ProblemBody::of_job(&job, failure));
         JobAnswer {
             id: job.id.to_string(),
             state: job.state,

@@ -1,5 +1,6 @@
 //! What clients read, as types of the contract.
 
+pub mod batch;
 pub mod cells;
 pub mod job;
 pub mod problem;

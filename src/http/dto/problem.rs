@@ -3,12 +3,13 @@
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::http::problem::kinds::Kind;
+use crate::http::problem::kinds::ProblemKind;
 use crate::jobs::job::{Failure, FailureKind, Job};
 
 /// A failure as the client reads it (RFC 9457).
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct Problem {
+#[schema(as = Problem)]
+pub struct ProblemBody {
     /// Address of the kind of problem, relative to this service; it answers with an explanation.
     #[serde(rename = "type")]
     #[schema(example = "/problems/faulty-case")]
@@ -75,11 +76,11 @@ impl Fault {
     }
 }
 
-impl Problem {
+impl ProblemBody {
     /// A problem of this kind with a sentence about this occurrence.
     #[must_use]
-    pub fn new(kind: Kind, detail: impl Into<String>) -> Self {
-        Problem {
+    pub fn new(kind: ProblemKind, detail: impl Into<String>) -> Self {
+        ProblemBody {
             kind: format!("/problems/{}", kind.slug()),
             title: kind.title().to_owned(),
             status: kind.status(),
@@ -97,15 +98,15 @@ impl Problem {
     #[must_use]
     pub fn of_job(job: &Job, failure: &Failure) -> Self {
         let kind = match failure.kind {
-            FailureKind::NotConverged => Kind::NotConverged,
-            FailureKind::Unsolvable => Kind::Unsolvable,
-            FailureKind::OutOfTime => Kind::OutOfTime,
-            FailureKind::DeadlinePassed => Kind::DeadlinePassed,
-            FailureKind::Panic => Kind::SolverPanic,
-            FailureKind::WorkerLost => Kind::WorkerLost,
-            FailureKind::Internal => Kind::Internal,
+            FailureKind::NotConverged => ProblemKind::NotConverged,
+            FailureKind::Unsolvable => ProblemKind::Unsolvable,
+            FailureKind::OutOfTime => ProblemKind::OutOfTime,
+            FailureKind::DeadlinePassed => ProblemKind::DeadlinePassed,
+            FailureKind::Panic => ProblemKind::SolverPanic,
+            FailureKind::WorkerLost => ProblemKind::WorkerLost,
+            FailureKind::Internal => ProblemKind::Internal,
         };
-        let mut problem = Problem::new(kind, failure.detail.clone());
+        let mut problem = ProblemBody::new(kind, failure.detail.clone());
         problem.instance = Some(format!("/v1/jobs/{}", job.id));
         problem.residual = failure.residual;
         problem.iterations = failure.iterations;

@@ -7,14 +7,14 @@ use axum::response::{IntoResponse, Response};
 
 use crate::http::extract::query::{Reader, reader};
 use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::Kind;
+use crate::http::problem::kinds::ProblemKind;
 
 /// Refuses requests that want something else than JSON, by `format` or because `Accept` excludes `application/json`.
 pub async fn require_json(request: Request, next: Next) -> Response {
     let named = named(request.uri());
     if let Some(other) = named.as_deref().filter(|name| *name != Format::Json.name()) {
         let detail = format!("`format` is `{other}`; this resource answers `json` only");
-        return ApiError::new(Kind::NotAcceptable, detail).into_response();
+        return ApiError::new(ProblemKind::NotAcceptable, detail).into_response();
     }
     if named.is_some() {
         return next.run(request).await;
@@ -27,7 +27,7 @@ pub async fn require_json(request: Request, next: Next) -> Response {
         "`Accept` is `{}`; this resource answers `application/json` only",
         given.join(", ")
     );
-    ApiError::new(Kind::NotAcceptable, detail).into_response()
+    ApiError::new(ProblemKind::NotAcceptable, detail).into_response()
 }
 
 /// A form in which something can be answered.
@@ -126,7 +126,7 @@ pub fn choose(
             given.join(", "),
             offered.join(", ")
         );
-        ApiError::new(Kind::NotAcceptable, detail)
+        ApiError::new(ProblemKind::NotAcceptable, detail)
     })
 }
 

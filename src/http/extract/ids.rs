@@ -5,7 +5,7 @@ use axum::http::request::Parts;
 use uuid::Uuid;
 
 use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::Kind;
+use crate::http::problem::kinds::ProblemKind;
 
 /// The id in the path. A text that is no id names no job, so it is answered like an unknown one.
 #[derive(Debug, Clone, Copy)]
@@ -15,7 +15,7 @@ impl<S: Send + Sync> FromRequestParts<S> for JobId {
     type Rejection = ApiError;
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
-        let id = read_id(parts, state, Kind::JobNotFound, "job").await?;
+        let id = read_id(parts, state, ProblemKind::JobNotFound, "job").await?;
         tracing::Span::current().record("job", tracing::field::display(id));
         Ok(JobId(id))
     }
@@ -29,7 +29,7 @@ impl<S: Send + Sync> FromRequestParts<S> for BatchId {
     type Rejection = ApiError;
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
-        let id = read_id(parts, state, Kind::BatchNotFound, "batch").await?;
+        let id = read_id(parts, state, ProblemKind::BatchNotFound, "batch").await?;
         Ok(BatchId(id))
     }
 }
@@ -37,7 +37,7 @@ impl<S: Send + Sync> FromRequestParts<S> for BatchId {
 async fn read_id<S: Send + Sync>(
     parts: &mut Parts,
     state: &S,
-    kind: Kind,
+    kind: ProblemKind,
     what: &str,
 ) -> Result<Uuid, ApiError> {
     let Path(text) = Path::<String>::from_request_parts(parts, state)

@@ -9,14 +9,14 @@ use http_body_util::{BodyExt, Limited};
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Number, Value};
 
+use crate::http::extract::caller::Tenant;
 use crate::http::extract::json_weight::{MEMBERS_MAX, weigh};
-use crate::http::layers::auth::Tenant;
-use crate::http::layers::compression::too_long;
+use crate::http::layers::admission::too_long;
 use crate::http::limits::memory::{Memory, Room, SMALL_BYTES};
 use crate::http::limits::shares::Share;
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::Kind;
+use crate::http::problem::kinds::ProblemKind;
 
 /// The JSON body of a request. What it means is for others to judge.
 #[derive(Debug)]
@@ -88,7 +88,7 @@ pub fn weigh_case(text: &[u8], max_bytes: usize) -> Result<usize, ApiError> {
     let weight = weigh(text);
     if weight.bytes > max_bytes {
         return Err(ApiError::new(
-            Kind::BodyTooLarge,
+            ProblemKind::BodyTooLarge,
             format!(
                 "the case would take about {} bytes in memory; allowed: {max_bytes}",
                 weight.bytes
@@ -97,7 +97,7 @@ pub fn weigh_case(text: &[u8], max_bytes: usize) -> Result<usize, ApiError> {
     }
     if weight.members > MEMBERS_MAX {
         return Err(ApiError::new(
-            Kind::BodyTooLarge,
+            ProblemKind::BodyTooLarge,
             format!(
                 "the objects of the case have {} members; allowed: {MEMBERS_MAX}",
                 weight.members
@@ -164,7 +164,7 @@ fn require_json(headers: &HeaderMap) -> Result<(), ApiError> {
         format!("`{value}` was given")
     });
     Err(ApiError::new(
-        Kind::UnsupportedMediaType,
+        ProblemKind::UnsupportedMediaType,
         format!("{given}; send the case with `Content-Type: application/json`"),
     ))
 }
@@ -180,7 +180,7 @@ async fn read_whole(
     let max_bytes = options.body_max_bytes;
     let too_large = || {
         ApiError::new(
-            Kind::BodyTooLarge,
+            ProblemKind::BodyTooLarge,
             format!("the body is larger than the {max_bytes} bytes that are allowed for one case"),
         )
     };
@@ -222,7 +222,7 @@ async fn read_whole(
         Ok(read) => read?,
         Err(_) => {
             return Err(ApiError::new(
-                Kind::BodyTimeout,
+                ProblemKind::BodyTimeout,
                 format!(
                     "the body did not arrive within {} s",
                     options.body_timeout.as_secs_f64()
@@ -243,7 +243,7 @@ pub fn unreadable(error: &(dyn std::error::Error + 'static)) -> ApiError {
         deepest = next;
     }
     ApiError::new(
-        Kind::UnreadableBody,
+        ProblemKind::UnreadableBody,
         format!("the body broke off or cannot be unpacked: {deepest}"),
     )
 }

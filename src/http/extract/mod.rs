@@ -2,6 +2,7 @@
 
 pub mod accept;
 pub mod batch;
+pub mod caller;
 pub mod ids;
 pub mod json;
 pub mod json_weight;

@@ -49,8 +49,11 @@ impl<A: Parameters<Limits = ()>, B: Parameters<Limits = ()>> Parameters for (A, 
 /// How the text of a parameter is read, and what is allowed, in words.
 pub struct Reader<T> {
     allowed: Cow<'static, str>,
-    read: Box<dyn Fn(&str) -> Option<T>>,
+    read: Read<T>,
 }
+
+/// The value of a text; nothing if it cannot be read.
+type Read<T> = Box<dyn Fn(&str) -> Option<T>>;
 
 /// Reads by a function; `allowed` says in words what it accepts.
 pub fn reader<T>(

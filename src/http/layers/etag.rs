@@ -18,23 +18,23 @@ use crate::jobs::Jobs;
 use crate::jobs::job::State;
 
 /// Results never change, but they can be deleted.
-const FINISHED: HeaderValue = HeaderValue::from_static("private, max-age=3600");
+const IMMUTABLE: HeaderValue = HeaderValue::from_static("private, max-age=3600");
 /// May be kept, but has to be asked for again each time.
-const CHANGING: HeaderValue = HeaderValue::from_static("private, no-cache");
+const REVALIDATE: HeaderValue = HeaderValue::from_static("private, no-cache");
 /// Everything else.
-const FLEETING: HeaderValue = HeaderValue::from_static("no-store");
+const NO_STORE: HeaderValue = HeaderValue::from_static("no-store");
 
 /// Codings that a tag may end with.
 const CODINGS: [&str; 2] = ["-gzip", "-zstd"];
 
 /// Layer around resources that never change once they are there.
-pub async fn finished(request: Request, next: Next) -> Response {
-    tag(request, next, FINISHED).await
+pub async fn immutable(request: Request, next: Next) -> Response {
+    tag(request, next, IMMUTABLE).await
 }
 
 /// Layer around resources that change.
-pub async fn changing(request: Request, next: Next) -> Response {
-    tag(request, next, CHANGING).await
+pub async fn revalidate(request: Request, next: Next) -> Response {
+    tag(request, next, REVALIDATE).await
 }
 
 /// Outermost of the layers here, around compression: nothing is kept unless something was said about it, and the tag of a
@@ -43,7 +43,7 @@ pub async fn complete(request: Request, next: Next) -> Response {
     let mut response = next.run(request).await;
     let headers = response.headers_mut();
     if !headers.contains_key(header::CACHE_CONTROL) && !headers.contains_key(header::ETAG) {
-        headers.insert(header::CACHE_CONTROL, FLEETING);
+        headers.insert(header::CACHE_CONTROL, NO_STORE);
     }
     let coding = headers
         .get(header::CONTENT_ENCODING)
@@ -71,7 +71,7 @@ pub enum Known {
 impl Known {
     /// Compares what a client has with what an address stands for, before anything is loaded or made. Results never
     /// change, so the job, the address, the form and the version of the program say all. A tag that stands for anything
-    /// (`*`) is left to [`finished`]: whether there is something only the work itself can say.
+    /// (`*`) is left to [`immutable`]: whether there is something only the work itself can say.
     ///
     /// # Errors
     /// There is no such job.
@@ -97,7 +97,7 @@ impl Known {
         };
         let head = [
             (header::ETAG, tag),
-            (header::CACHE_CONTROL, FINISHED),
+            (header::CACHE_CONTROL, IMMUTABLE),
             (header::VARY, HeaderValue::from_static("Accept")),
         ];
         Ok(Known::Unchanged(

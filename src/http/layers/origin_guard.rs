@@ -16,7 +16,7 @@ use axum::response::{IntoResponse, Response};
 
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::Kind;
+use crate::http::problem::kinds::ProblemKind;
 use crate::http::server::connection::ProbesOnly;
 
 /// What proxies say of their clients.
@@ -64,7 +64,7 @@ impl Guard {
             .find(|name| parts.headers.contains_key(*name));
         match told {
             Some(name) if !self.proxied => Err(ApiError::new(
-                Kind::Unauthorized,
+                ProblemKind::Unauthorized,
                 format!(
                     "the request came through a proxy (`{name}`), so it needs a key: send `Authorization: Bearer` with one. \
                      Without a key only direct requests of this machine are answered (`--anonymous loopback`); keys are made with \
@@ -88,7 +88,7 @@ impl Guard {
             return Ok(());
         }
         Err(ApiError::new(
-            Kind::HostNotAllowed,
+            ProblemKind::HostNotAllowed,
             format!(
                 "the service is asked as `{name}`; without a key it answers to addresses, to `localhost` and to names given by `--allowed-host`"
             ),
@@ -116,7 +116,7 @@ impl Guard {
             return Ok(());
         }
         Err(ApiError::new(
-            Kind::CrossSite,
+            ProblemKind::CrossSite,
             format!(
                 "a page of another origin ({}) may not change anything here without a key; `--cors-origin` names the origins that may",
                 origin.unwrap_or("not named")
@@ -159,7 +159,7 @@ pub async fn admit(request: Request, next: Next) -> Response {
     let crowded = request.extensions().get::<ProbesOnly>().is_some();
     if crowded && !PROBES.contains(&request.uri().path()) {
         let detail = "every connection of the service, or of this address, has a request under way";
-        let mut refusal = ApiError::new(Kind::Overloaded, detail).into_response();
+        let mut refusal = ApiError::new(ProblemKind::Overloaded, detail).into_response();
         let close = axum::http::HeaderValue::from_static("close");
         refusal.headers_mut().insert(header::CONNECTION, close);
         return refusal;

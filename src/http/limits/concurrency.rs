@@ -3,21 +3,21 @@
 use crate::http::limits::shares::{Share, Shares};
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::Kind;
+use crate::http::problem::kinds::ProblemKind;
 
 /// Requests, streams and waits under way; clones share them.
 #[derive(Debug, Clone)]
-pub struct Crowds {
+pub struct ConcurrencyLimits {
     requests: Shares,
     streams: Shares,
     waits: Shares,
 }
 
-impl Crowds {
+impl ConcurrencyLimits {
     /// The limits of these options.
     #[must_use]
-    pub fn new(options: &HttpOptions) -> Crowds {
-        Crowds {
+    pub fn new(options: &HttpOptions) -> ConcurrencyLimits {
+        ConcurrencyLimits {
             requests: Shares::new(options.connections_max, options.tenant_requests_max),
             streams: Shares::new(options.streams_max, options.tenant_streams_max),
             waits: Shares::new(options.waits_max, options.tenant_waits_max),
@@ -39,7 +39,7 @@ impl Crowds {
     /// A place for one more stream of events of a tenant.
     ///
     /// # Errors
-    /// As [`Crowds::request`].
+    /// As [`ConcurrencyLimits::request`].
     pub fn stream(&self, tenant: &str) -> Result<Share, ApiError> {
         self.streams.try_take(tenant, 1).ok_or_else(|| {
             too_many("as many streams of events are open as there may be (`--tenant-streams-max`, `--streams-max`)")
@@ -55,7 +55,7 @@ impl Crowds {
     /// The same where the wait decides what is answered.
     ///
     /// # Errors
-    /// As [`Crowds::request`].
+    /// As [`ConcurrencyLimits::request`].
     pub fn require_wait(&self, tenant: &str) -> Result<Share, ApiError> {
         self.wait(tenant).ok_or_else(|| {
             too_many("as many requests wait as there may be (`--tenant-waits-max`, `--waits-max`)")
@@ -64,5 +64,5 @@ impl Crowds {
 }
 
 fn too_many(detail: &str) -> ApiError {
-    ApiError::new(Kind::TooManyRequests, detail)
+    ApiError::new(ProblemKind::TooManyRequests, detail)
 }

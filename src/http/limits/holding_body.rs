@@ -13,14 +13,14 @@ use hyper::body::{Frame, SizeHint};
 use crate::http::limits::shares::Share;
 
 /// The body with what it holds.
-struct Carrying<T>(Body, T);
+struct HoldingBody<T>(Body, T);
 
 /// The same answer; `held` is dropped with its body.
-pub fn carrying<T: Send + Unpin + 'static>(response: Response, held: T) -> Response {
-    response.map(|body| Body::new(Carrying(body, held)))
+pub fn hold_while_sent<T: Send + Unpin + 'static>(response: Response, held: T) -> Response {
+    response.map(|body| Body::new(HoldingBody(body, held)))
 }
 
-impl<T: Unpin> HttpBody for Carrying<T> {
+impl<T: Unpin> HttpBody for HoldingBody<T> {
     type Data = Bytes;
     type Error = axum::Error;
 
@@ -42,9 +42,9 @@ impl<T: Unpin> HttpBody for Carrying<T> {
 
 /// What a request holds until its answer has been handed over; in its extensions.
 #[derive(Debug, Clone, Default)]
-pub struct Held(Arc<Mutex<Vec<Share>>>);
+pub struct HeldShares(Arc<Mutex<Vec<Share>>>);
 
-impl Held {
+impl HeldShares {
     /// Holds this too.
     pub fn add(&self, share: Share) {
         self.0
@@ -64,7 +64,7 @@ impl Held {
 
 /// Layer in which requests can hold shares.
 pub async fn hold(mut request: Request, next: Next) -> Response {
-    let held = Held::default();
+    let held = HeldShares::default();
     request.extensions_mut().insert(held.clone());
-    carrying(next.run(request).await, held)
+    hold_while_sent(next.run(request).await, held)
 }

@@ -10,7 +10,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use crate::http::limits::shares::{Share, Shares};
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::Kind;
+use crate::http::problem::kinds::ProblemKind;
 
 /// Shares are counted in units of so many bytes.
 const UNIT: usize = 1 << 10;
@@ -216,5 +216,5 @@ fn no_memory(what: &str, bytes: usize) -> ApiError {
 }
 
 fn overloaded(detail: &str) -> ApiError {
-    ApiError::new(Kind::Overloaded, detail)
+    ApiError::new(ProblemKind::Overloaded, detail)
 }

@@ -10,11 +10,12 @@ use utoipa::openapi::{
 };
 
 use crate::http::problem::error::PROBLEM_JSON;
-use crate::http::problem::kinds::Kind;
+use crate::http::problem::kinds::ProblemKind;
 
 /// A kind of problem, explained.
 #[derive(Debug, Clone, Copy, Serialize, ToSchema)]
-pub struct ProblemKind {
+#[schema(as = ProblemKind)]
+pub struct ProblemMeaning {
     /// The `type` that problems of this kind carry.
     #[serde(rename = "type")]
     #[schema(value_type = String, example = "/problems/faulty-case")]
@@ -37,9 +38,9 @@ impl Serialize for ProblemPath {
     }
 }
 
-impl From<Kind> for ProblemKind {
-    fn from(kind: Kind) -> Self {
-        ProblemKind {
+impl From<ProblemKind> for ProblemMeaning {
+    fn from(kind: ProblemKind) -> Self {
+        ProblemMeaning {
             path: ProblemPath(kind.slug()),
             title: kind.title(),
             status: kind.status(),
@@ -59,7 +60,7 @@ macro_rules! problems {
                 String,
                 utoipa::openapi::RefOr<utoipa::openapi::Response>,
             > {
-                $crate::http::problem::catalogue::describe(&[$($crate::http::problem::kinds::Kind::$kind),*])
+                $crate::http::problem::catalogue::describe(&[$($crate::http::problem::kinds::ProblemKind::$kind),*])
             }
         }
     };
@@ -72,7 +73,7 @@ problems! {
 }
 
 /// Adds problems that many operations can answer to the responses of one.
-pub fn describe_also(responses: &mut BTreeMap<String, RefOr<Response>>, kinds: &[Kind]) {
+pub fn describe_also(responses: &mut BTreeMap<String, RefOr<Response>>, kinds: &[ProblemKind]) {
     for kind in kinds {
         let status = kind.status().to_string();
         let mut described = describe(&[*kind]);
@@ -93,12 +94,12 @@ pub fn describe_also(responses: &mut BTreeMap<String, RefOr<Response>>, kinds: &
 
 /// The responses of these kinds of problems and of those every route has, one per status code.
 #[must_use]
-pub fn describe(kinds: &[Kind]) -> BTreeMap<String, RefOr<Response>> {
-    let mut by_status = BTreeMap::<u16, Vec<Kind>>::new();
+pub fn describe(kinds: &[ProblemKind]) -> BTreeMap<String, RefOr<Response>> {
+    let mut by_status = BTreeMap::<u16, Vec<ProblemKind>>::new();
     for kind in kinds
         .iter()
         .copied()
-        .chain([Kind::NotAcceptable, Kind::Internal])
+        .chain([ProblemKind::NotAcceptable, ProblemKind::Internal])
     {
         let same = by_status.entry(kind.status()).or_default();
         if !same.contains(&kind) {
@@ -111,7 +112,7 @@ pub fn describe(kinds: &[Kind]) -> BTreeMap<String, RefOr<Response>> {
         .collect()
 }
 
-fn describe_status(kinds: &[Kind]) -> RefOr<Response> {
+fn describe_status(kinds: &[ProblemKind]) -> RefOr<Response> {
     let lines: Vec<String> = kinds
         .iter()
         .map(|kind| format!("`{}`: {}", kind.slug(), kind.meaning()))

@@ -6,8 +6,8 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
 use crate::contact::error::CaseError;
-use crate::http::dto::problem::{Fault, Problem};
-use crate::http::problem::kinds::Kind;
+use crate::http::dto::problem::{Fault, ProblemBody};
+use crate::http::problem::kinds::ProblemKind;
 use crate::jobs::Trouble;
 use crate::jobs::error::JobsError;
 use crate::jobs::job::{Job, State};
@@ -26,16 +26,16 @@ const FAULTS_LISTED: usize = 1000;
 /// A failure on its way to the client.
 #[derive(Debug)]
 pub struct ApiError {
-    problem: Box<Problem>,
+    problem: Box<ProblemBody>,
     retry_after: Option<u32>,
 }
 
 impl ApiError {
     /// A problem of this kind with a sentence about this occurrence.
     #[must_use]
-    pub fn new(kind: Kind, detail: impl Into<String>) -> Self {
+    pub fn new(kind: ProblemKind, detail: impl Into<String>) -> Self {
         ApiError {
-            problem: Box::new(Problem::new(kind, detail)),
+            problem: Box::new(ProblemBody::new(kind, detail)),
             retry_after: kind.passes().then_some(RETRY_SECONDS),
         }
     }
@@ -69,7 +69,7 @@ impl ApiError {
     pub fn internal(reason: &dyn std::fmt::Display) -> Self {
         tracing::error!(%reason, "a request failed inside the service");
         ApiError::new(
-            Kind::Internal,
+            ProblemKind::Internal,
             "the request could not be answered; the service's log has the reason under the request id",
         )
     }
@@ -78,7 +78,7 @@ impl ApiError {
     #[must_use]
     pub fn malformed(error: &serde_json::Error) -> Self {
         let mut failure = ApiError::new(
-            Kind::MalformedJson,
+            ProblemKind::MalformedJson,
             format!("the body is not JSON: {error}"),
         );
         failure.problem.line = Some(error.line());
@@ -90,7 +90,7 @@ impl ApiError {
     #[must_use]
     pub fn malformed_element(index: u32, error: &serde_json::Error) -> Self {
         ApiError::new(
-            Kind::MalformedJson,
+            ProblemKind::MalformedJson,
             format!(
                 "the body is not JSON: element {index} (counted from 0): {error}, within the element"
             ),
@@ -100,7 +100,7 @@ impl ApiError {
     /// A batch that is refused; `faults` names its faulty cases.
     #[must_use]
     pub fn faulty_batch(detail: String, faults: Vec<Fault>) -> Self {
-        let mut failure = ApiError::new(Kind::FaultyBatch, detail);
+        let mut failure = ApiError::new(ProblemKind::FaultyBatch, detail);
         failure.problem.errors = faults;
         failure
     }
@@ -109,7 +109,7 @@ impl ApiError {
     #[must_use]
     pub fn bad_query(faults: Vec<Fault>) -> Self {
         let names: Vec<String> = faults.iter().map(|fault| fault.detail.clone()).collect();
-        let mut failure = ApiError::new(Kind::BadQuery, names.join("; "));
+        let mut failure = ApiError::new(ProblemKind::BadQuery, names.join("; "));
         failure.problem.errors = faults;
         failure
     }
@@ -136,7 +136,7 @@ impl ApiError {
     #[must_use]
     pub fn bad_header(name: &str, detail: impl Into<String>) -> Self {
         let detail = detail.into();
-        let mut failure = ApiError::new(Kind::BadHeader, detail.clone());
+        let mut failure = ApiError::new(ProblemKind::BadHeader, detail.clone());
         failure.problem.errors = vec![Fault {
             pointer: None,
             parameter: None,
@@ -157,7 +157,7 @@ impl From<CaseError> for ApiError {
             }
             count => format!("the case has {count} faults"),
         };
-        let mut failure = ApiError::new(Kind::FaultyCase, detail);
+        let mut failure = ApiError::new(ProblemKind::FaultyCase, detail);
         failure.problem.errors = faults
             .into_iter()
             .take(FAULTS_LISTED)
@@ -177,23 +177,25 @@ impl From<JobsError> for ApiError {
     fn from(error: JobsError) -> Self {
         match error {
             JobsError::Case(faults) => faults.into(),
-            JobsError::NotFound => ApiError::new(Kind::JobNotFound, "no job has this id"),
+            JobsError::NotFound => ApiError::new(ProblemKind::JobNotFound, "no job has this id"),
             JobsError::Expired => ApiError::new(
-                Kind::Expired,
+                ProblemKind::Expired,
                 "ended longer ago than this service keeps ended jobs, so it was removed",
             ),
-            JobsError::BatchNotFound => ApiError::new(Kind::BatchNotFound, "no batch has this id"),
+            JobsError::BatchNotFound => {
+                ApiError::new(ProblemKind::BatchNotFound, "no batch has this id")
+            }
             JobsError::NotReady(state) => ApiError::new(
-                Kind::ResultNotReady,
+                ProblemKind::ResultNotReady,
                 format!("the job is {}, so there is no result yet", state.name()),
             ),
             JobsError::NotSucceeded(job) => without_result(&job),
             JobsError::NotEnded(_) => ApiError::new(
-                Kind::JobNotEnded,
+                ProblemKind::JobNotEnded,
                 "the job is queued or running; cancel it first, then delete it",
             ),
             JobsError::BatchNotEnded(jobs) => ApiError::new(
-                Kind::BatchNotEnded,
+                ProblemKind::BatchNotEnded,
                 format!(
                     "{jobs} jobs of the batch are queued or running; cancel it first, then delete it"
                 ),
@@ -201,29 +203,31 @@ impl From<JobsError> for ApiError {
             JobsError::NoSuchPatch { patches } => ApiError::no_such_index("patch", patches),
             JobsError::NoSuchPoint { points } => ApiError::no_such_index("point", points),
             JobsError::IdempotencyConflict => ApiError::new(
-                Kind::IdempotencyConflict,
+                ProblemKind::IdempotencyConflict,
                 "this `Idempotency-Key` was used before with a different case",
             ),
             JobsError::QueueFull { queue_max } => ApiError::new(
-                Kind::QueueFull,
+                ProblemKind::QueueFull,
                 format!("{queue_max} jobs are waiting, which is the limit; nothing was stored"),
             ),
             JobsError::QuotaExceeded { queue_max } => ApiError::new(
-                Kind::QuotaExceeded,
+                ProblemKind::QuotaExceeded,
                 format!(
                     "{queue_max} jobs of this tenant are waiting, which is its limit; nothing was stored"
                 ),
             ),
             JobsError::StagingQuotaExceeded { .. } => {
-                ApiError::new(Kind::QuotaExceeded, error.to_string())
+                ApiError::new(ProblemKind::QuotaExceeded, error.to_string())
             }
-            JobsError::StagingFull { .. } => ApiError::new(Kind::QueueFull, error.to_string()),
+            JobsError::StagingFull { .. } => {
+                ApiError::new(ProblemKind::QueueFull, error.to_string())
+            }
             JobsError::BadCursor => ApiError::bad_parameter(
                 "cursor",
                 "`cursor` is not one that this service gave out for the same filters; start again without it",
             ),
             JobsError::Draining => ApiError::new(
-                Kind::Draining,
+                ProblemKind::Draining,
                 "the service is shutting down and takes no new jobs",
             ),
             other => match other.trouble() {
@@ -238,9 +242,9 @@ impl From<JobsError> for ApiError {
 fn troubled(trouble: Trouble, reason: &JobsError) -> ApiError {
     tracing::warn!(%reason, "a request failed for want of a disk");
     let (kind, what) = match trouble {
-        Trouble::Full => (Kind::StorageFull, "the disk of the service is full"),
+        Trouble::Full => (ProblemKind::StorageFull, "the disk of the service is full"),
         Trouble::Unwritable => (
-            Kind::StorageUnwritable,
+            ProblemKind::StorageUnwritable,
             "the disk of the service cannot be written at the moment",
         ),
     };
@@ -251,7 +255,7 @@ fn troubled(trouble: Trouble, reason: &JobsError) -> ApiError {
 fn without_result(job: &Job) -> ApiError {
     if job.state == State::Cancelled {
         return ApiError::new(
-            Kind::JobCancelled,
+            ProblemKind::JobCancelled,
             "the job was cancelled, so it has no result",
         );
     }
@@ -260,7 +264,7 @@ fn without_result(job: &Job) -> ApiError {
         .as_ref()
         .map_or("the reason is not known", |failure| &failure.detail);
     ApiError::new(
-        Kind::JobFailed,
+        ProblemKind::JobFailed,
         format!("the job failed, so it has no result: {reason}"),
     )
 }
@@ -291,11 +295,11 @@ pub async fn name_instance(request: Request, next: Next) -> Response {
     let mut response = next.run(request).await;
     // The readable contract answers unknown files of its own with bare text.
     if response.status() == StatusCode::NOT_FOUND
-        && response.extensions().get::<Box<Problem>>().is_none()
+        && response.extensions().get::<Box<ProblemBody>>().is_none()
     {
         response = unknown_route(&path).into_response();
     }
-    let Some(mut problem) = response.extensions_mut().remove::<Box<Problem>>() else {
+    let Some(mut problem) = response.extensions_mut().remove::<Box<ProblemBody>>() else {
         return response;
     };
     problem.instance = Some(path);
@@ -312,17 +316,17 @@ pub fn unknown_route(path: &str) -> ApiError {
         let detail = format!(
             "there is nothing at `{path}`; the paths of this service do not end with a slash"
         );
-        return ApiError::new(Kind::UnknownRoute, detail);
+        return ApiError::new(ProblemKind::UnknownRoute, detail);
     }
     ApiError::new(
-        Kind::UnknownRoute,
+        ProblemKind::UnknownRoute,
         format!(
             "there is nothing at `{path}`; `/openapi.json` lists every resource, `/docs` shows them"
         ),
     )
 }
 
-fn render(problem: &Problem) -> Response {
+fn render(problem: &ProblemBody) -> Response {
     let status = StatusCode::from_u16(problem.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
     match serde_json::to_vec(problem) {
         Ok(body) => (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], body).into_response(),

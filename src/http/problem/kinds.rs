@@ -5,27 +5,27 @@ macro_rules! kinds {
     ($($kind:ident $status:literal $slug:literal $title:literal $meaning:literal)*) => {
         /// A kind of problem; its slug is the last part of the problem's `type`.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-        pub enum Kind { $(#[doc = $meaning] $kind,)* }
+        pub enum ProblemKind { $(#[doc = $meaning] $kind,)* }
 
-        impl Kind {
+        impl ProblemKind {
             /// Every kind there is.
-            pub const ALL: &[Kind] = &[$(Kind::$kind),*];
+            pub const ALL: &[ProblemKind] = &[$(ProblemKind::$kind),*];
 
             /// The last part of the problem's `type`.
             #[must_use]
-            pub fn slug(self) -> &'static str { match self { $(Kind::$kind => $slug),* } }
+            pub fn slug(self) -> &'static str { match self { $(ProblemKind::$kind => $slug),* } }
 
             /// The problem's `title`.
             #[must_use]
-            pub fn title(self) -> &'static str { match self { $(Kind::$kind => $title),* } }
+            pub fn title(self) -> &'static str { match self { $(ProblemKind::$kind => $title),* } }
 
             /// What this kind means and what to do about it.
             #[must_use]
-            pub fn meaning(self) -> &'static str { match self { $(Kind::$kind => $meaning),* } }
+            pub fn meaning(self) -> &'static str { match self { $(ProblemKind::$kind => $meaning),* } }
 
             /// The status code that goes with it.
             #[must_use]
-            pub fn status(self) -> u16 { match self { $(Kind::$kind => $status),* } }
+            pub fn status(self) -> u16 { match self { $(ProblemKind::$kind => $status),* } }
         }
     };
 }
@@ -76,21 +76,21 @@ kinds! {
     WorkerLost 500 "worker-lost" "The workers of this job were lost" "Only inside a job: each worker that took the job ended without an answer, as often as is allowed."
 }
 
-impl Kind {
+impl ProblemKind {
     /// Does it pass with time, so that the answer carries `Retry-After`?
     #[must_use]
     pub fn passes(self) -> bool {
         matches!(
             self,
-            Kind::ResultNotReady
-                | Kind::TooManyRequests
-                | Kind::QuotaExceeded
-                | Kind::QueueFull
-                | Kind::StorageUnwritable
-                | Kind::StorageFull
-                | Kind::Draining
-                | Kind::Overloaded
-                | Kind::NotReady
+            ProblemKind::ResultNotReady
+                | ProblemKind::TooManyRequests
+                | ProblemKind::QuotaExceeded
+                | ProblemKind::QueueFull
+                | ProblemKind::StorageUnwritable
+                | ProblemKind::StorageFull
+                | ProblemKind::Draining
+                | ProblemKind::Overloaded
+                | ProblemKind::NotReady
         )
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::http::render::table::{Column, Data, PLACES, Rows, Table};
+use crate::http::render::table::{ArrayData, PLACES, Rows, Table, TableColumn};
 
 /// The line with the names.
 ///
@@ -54,13 +54,13 @@ fn finish(out: csv::Writer<Vec<u8>>) -> Result<Vec<u8>, csv::Error> {
 
 fn end_row(
     out: &mut csv::Writer<Vec<u8>>,
-    columns: &[Column],
+    columns: &[TableColumn],
     row: usize,
 ) -> Result<(), csv::Error> {
     for column in columns {
         match &column.data {
-            Data::Numbers(values) => out.write_field(number(values[row]))?,
-            Data::Zones(zones) => {
+            ArrayData::Numbers(values) => out.write_field(number(values[row]))?,
+            ArrayData::Zones(zones) => {
                 out.write_field(zones[row].map_or("", |zone| zone.name()))?;
             }
         }

@@ -10,7 +10,7 @@ use zip::result::ZipResult;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
-use crate::http::render::table::{Data, PLACES, Rows, Table, zone_code};
+use crate::http::render::table::{ArrayData, PLACES, Rows, Table, zone_code};
 
 /// What an NPY header has to be a multiple of, the parts before it included.
 const ALIGNMENT: usize = 64;
@@ -40,10 +40,10 @@ pub fn write(table: &Table) -> ZipResult<Vec<u8>> {
     };
     for column in &table.values {
         match &column.data {
-            Data::Numbers(values) => {
+            ArrayData::Numbers(values) => {
                 archive.add(column.name, "<f8", &shape, &f64_bytes(values))?;
             }
-            Data::Zones(zones) => {
+            ArrayData::Zones(zones) => {
                 let codes = zones.iter().flat_map(|zone| zone_code(*zone).to_le_bytes());
                 let codes: Vec<u8> = codes.collect();
                 archive.add(column.name, "|i1", &shape, &codes)?;

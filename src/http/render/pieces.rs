@@ -8,7 +8,7 @@ use futures_util::stream;
 
 use crate::contact::zones::Zone;
 use crate::http::render::csv;
-use crate::http::render::table::{Data, PLACES, Rows, Table};
+use crate::http::render::table::{ArrayData, PLACES, Rows, Table};
 
 /// Pieces are at least this large, but for the last one.
 const PIECE_BYTES: usize = 32 << 10;
@@ -19,11 +19,11 @@ const ROWS: usize = 256;
 enum Part {
     Text(String),
     /// Values of a column, parted by commas.
-    Values(Column, Range<usize>),
+    Values(ColumnName, Range<usize>),
 }
 
 #[derive(Clone, Copy)]
-enum Column {
+enum ColumnName {
     Place(usize),
     Strip,
     X,
@@ -83,19 +83,19 @@ fn parts(table: &Table, patch: usize, point: usize) -> Vec<Part> {
     let close = match &table.rows {
         Rows::Cells { .. } => {
             for (number, name) in PLACES.iter().enumerate() {
-                array(&mut parts, name, Column::Place(number), table.len());
+                array(&mut parts, name, ColumnName::Place(number), table.len());
             }
-            array(&mut parts, "strip", Column::Strip, table.len());
+            array(&mut parts, "strip", ColumnName::Strip, table.len());
             "}}"
         }
         Rows::Grid { x_mm, y_mm } => {
-            array(&mut parts, "x_mm", Column::X, x_mm.len());
-            array(&mut parts, "y_mm", Column::Y, y_mm.len());
+            array(&mut parts, "x_mm", ColumnName::X, x_mm.len());
+            array(&mut parts, "y_mm", ColumnName::Y, y_mm.len());
             "}"
         }
     };
     for (number, column) in table.values.iter().enumerate() {
-        let values = Column::Value(number);
+        let values = ColumnName::Value(number);
         match &table.rows {
             Rows::Cells { .. } => array(&mut parts, column.name, values, table.len()),
             Rows::Grid { x_mm, y_mm } => {
@@ -120,7 +120,7 @@ fn parts(table: &Table, patch: usize, point: usize) -> Vec<Part> {
 }
 
 /// `"name":[…],`
-fn array(parts: &mut Vec<Part>, name: &str, column: Column, count: usize) {
+fn array(parts: &mut Vec<Part>, name: &str, column: ColumnName, count: usize) {
     parts.push(Part::Text(format!("\"{name}\":[")));
     for start in (0..count).step_by(ROWS) {
         if start > 0 {
@@ -131,25 +131,25 @@ fn array(parts: &mut Vec<Part>, name: &str, column: Column, count: usize) {
     parts.push(Part::Text("],".to_owned()));
 }
 
-fn values(table: &Table, column: Column, rows: Range<usize>) -> String {
+fn values(table: &Table, column: ColumnName, rows: Range<usize>) -> String {
     let mut out = String::new();
     for row in rows {
         if !out.is_empty() {
             out.push(',');
         }
         match (column, &table.rows) {
-            (Column::Place(number), Rows::Cells { places, .. }) => {
+            (ColumnName::Place(number), Rows::Cells { places, .. }) => {
                 push(&mut out, places[number][row])
             }
-            (Column::Strip, Rows::Cells { strip, .. }) => {
+            (ColumnName::Strip, Rows::Cells { strip, .. }) => {
                 // Writing to a string cannot fail.
                 let _ = write!(out, "{}", strip[row]);
             }
-            (Column::X, Rows::Grid { x_mm, .. }) => push(&mut out, x_mm[row]),
-            (Column::Y, Rows::Grid { y_mm, .. }) => push(&mut out, y_mm[row]),
-            (Column::Value(number), _) => match &table.values[number].data {
-                Data::Numbers(numbers) => push(&mut out, numbers[row]),
-                Data::Zones(zones) => push_zone(&mut out, zones[row]),
+            (ColumnName::X, Rows::Grid { x_mm, .. }) => push(&mut out, x_mm[row]),
+            (ColumnName::Y, Rows::Grid { y_mm, .. }) => push(&mut out, y_mm[row]),
+            (ColumnName::Value(number), _) => match &table.values[number].data {
+                ArrayData::Numbers(numbers) => push(&mut out, numbers[row]),
+                ArrayData::Zones(zones) => push_zone(&mut out, zones[row]),
             },
             _ => unreachable!("the parts were made from this table"),
         }

@@ -17,7 +17,7 @@ pub struct Table {
     /// What a row belongs to.
     pub rows: Rows,
     /// The values of the field.
-    pub values: Vec<Column>,
+    pub values: Vec<TableColumn>,
 }
 
 impl Table {
@@ -65,16 +65,16 @@ pub const PLACES: [&str; 4] = ["x_mm", "y_mm", "dx_mm", "dy_mm"];
 
 /// One value per row.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Column {
+pub struct TableColumn {
     /// The same name in every format.
     pub name: &'static str,
     /// The values.
-    pub data: Data,
+    pub data: ArrayData,
 }
 
 /// The values of a column.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Data {
+pub enum ArrayData {
     /// Numbers; NaN outside the patch.
     Numbers(Vec<f64>),
     /// Zones; `None` outside the patch.
@@ -93,9 +93,9 @@ pub fn zone_code(zone: Option<Zone>) -> i8 {
 
 impl From<Cells> for Table {
     fn from(cells: Cells) -> Self {
-        let zone = cells.zone.map(|zones| Column {
+        let zone = cells.zone.map(|zones| TableColumn {
             name: "zone",
-            data: Data::Zones(zones.into_iter().map(Some).collect()),
+            data: ArrayData::Zones(zones.into_iter().map(Some).collect()),
         });
         let numbers = [
             ("pressure_mpa", cells.pressure_mpa),
@@ -116,9 +116,9 @@ impl From<Cells> for Table {
 
 impl From<GriddedField> for Table {
     fn from(field: GriddedField) -> Self {
-        let zone = field.zone.map(|rows| Column {
+        let zone = field.zone.map(|rows| TableColumn {
             name: "zone",
-            data: Data::Zones(rows.concat()),
+            data: ArrayData::Zones(rows.concat()),
         });
         let flat = |rows: Option<Vec<Vec<Option<f64>>>>| {
             let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
@@ -143,11 +143,11 @@ impl From<GriddedField> for Table {
 
 fn columns<const N: usize>(
     numbers: [(&'static str, Option<Vec<f64>>); N],
-) -> impl Iterator<Item = Column> {
+) -> impl Iterator<Item = TableColumn> {
     numbers.into_iter().filter_map(|(name, values)| {
-        Some(Column {
+        Some(TableColumn {
             name,
-            data: Data::Numbers(values?),
+            data: ArrayData::Numbers(values?),
         })
     })
 }

@@ -4,7 +4,7 @@
 //! points with the values as point data, NaN outside the patch. Pairs such as `traction_x_mpa`, `traction_y_mpa` come as
 //! one vector `traction_mpa` (z is 0), ready for glyphs; zones are 0 stick, 1 slip, -1 outside.
 
-use crate::http::render::table::{Column, Data, Rows, Table, zone_code};
+use crate::http::render::table::{ArrayData, Rows, Table, TableColumn, zone_code};
 
 /// Longest title that the format allows, its line break not counted.
 const TITLE_MAX: usize = 255;
@@ -85,21 +85,21 @@ fn write_points(out: &mut Vec<u8>, x: &[f64], y: &[f64]) {
     line(out, &format!("SPACING {:?} {:?} 1", step(x), step(y)));
 }
 
-fn write_values(out: &mut Vec<u8>, columns: &[Column]) {
+fn write_values(out: &mut Vec<u8>, columns: &[TableColumn]) {
     let numbers = |name: &str| {
         columns.iter().find_map(|column| match &column.data {
-            Data::Numbers(values) if column.name == name => Some(values),
+            ArrayData::Numbers(values) if column.name == name => Some(values),
             _ => None,
         })
     };
     for column in columns {
         match &column.data {
-            Data::Zones(zones) => {
+            ArrayData::Zones(zones) => {
                 line(out, &format!("SCALARS {} int 1", column.name));
                 line(out, "LOOKUP_TABLE default");
                 integers(out, zones.iter().map(|zone| zone_code(*zone).into()));
             }
-            Data::Numbers(values) => {
+            ArrayData::Numbers(values) => {
                 let vector = VECTORS
                     .iter()
                     .find(|(x, y, _)| [*x, *y].contains(&column.name));

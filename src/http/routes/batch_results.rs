@@ -16,18 +16,18 @@ use uuid::Uuid;
 
 use crate::contact::remark::RemarkEntry;
 use crate::contact::solution::Solution;
-use crate::http::dto::problem::Problem;
+use crate::http::dto::problem::ProblemBody;
 use crate::http::dto::result::JobResult;
 use crate::http::extract::accept::{Format, choose, one_of};
+use crate::http::extract::caller::{Caller, Credential, revoked};
 use crate::http::extract::ids::BatchId;
 use crate::http::extract::query::{Parameters, query, seconds};
-use crate::http::layers::auth::{Caller, Credential, revoked};
-use crate::http::layers::compression::AsItComes;
-use crate::http::limits::concurrency::Crowds;
-use crate::http::limits::holding_body::{Held, carrying};
+use crate::http::layers::compression::StreamedUnbuffered;
+use crate::http::limits::concurrency::ConcurrencyLimits;
+use crate::http::limits::holding_body::{HeldShares, hold_while_sent};
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::Kind;
+use crate::http::problem::kinds::ProblemKind;
 use crate::http::render::csv::number;
 use crate::jobs::Jobs;
 use crate::jobs::batch::{Line, LineResult};
@@ -59,7 +59,7 @@ pub struct BatchLine {
     result: Option<JobResult>,
     /// Why there is no result: why the job failed, or that its result was removed while the lines were read or cannot be read.
     #[serde(skip_serializing_if = "Option::is_none")]
-    error: Option<Problem>,
+    error: Option<ProblemBody>,
 }
 
 /// The forms that the results of a batch come in.
@@ -101,8 +101,8 @@ pub async fn results(
     Caller(jobs): Caller,
     BatchId(id): BatchId,
     uri: Uri,
-    State(crowds): State<Crowds>,
-    Extension(held): Extension<Held>,
+    State(crowds): State<ConcurrencyLimits>,
+    Extension(held): Extension<HeldShares>,
     key: Option<Extension<Credential>>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
@@ -123,7 +123,7 @@ pub async fn results(
         _ => None,
     };
     let revoked = Box::pin(revoked(jobs.clone(), key.map(|Extension(key)| key)));
-    let start = Place {
+    let start = StreamPosition {
         revoked,
         jobs,
         batch: id,
@@ -140,13 +140,13 @@ pub async fn results(
     ];
     let mut response = (headers, body).into_response();
     if wait.is_some() {
-        response.extensions_mut().insert(AsItComes);
+        response.extensions_mut().insert(StreamedUnbuffered);
     }
-    Ok(carrying(response, place))
+    Ok(hold_while_sent(response, place))
 }
 
 /// Where a stream of results stands.
-struct Place {
+struct StreamPosition {
     /// The key was revoked; nothing more is sent.
     revoked: Pin<Box<dyn Future<Output = ()> + Send>>,
     jobs: Jobs,
@@ -159,7 +159,9 @@ struct Place {
     head: Option<Bytes>,
 }
 
-async fn next_piece(mut place: Place) -> Result<Option<(Bytes, Place)>, JobsError> {
+async fn next_piece(
+    mut place: StreamPosition,
+) -> Result<Option<(Bytes, StreamPosition)>, JobsError> {
     if let Some(head) = place.head.take() {
         return Ok(Some((head, place)));
     }
@@ -197,7 +199,7 @@ struct Front<'a> {
     labels: &'a std::collections::BTreeMap<String, String>,
     state: JobState,
     #[serde(skip_serializing_if = "Option::is_none")]
-    error: Option<Problem>,
+    error: Option<ProblemBody>,
 }
 
 /// Writes lines of NDJSON. A stored solution is passed on as it is, without reading it.
@@ -240,18 +242,18 @@ fn write_json<T: Serialize>(out: &mut Vec<u8>, value: &T) -> Result<(), JobsErro
 const UNREADABLE: &str = "the stored result cannot be read";
 
 /// Why a line has no result although its job has ended.
-fn error_of(line: &Line) -> Option<Problem> {
+fn error_of(line: &Line) -> Option<ProblemBody> {
     let job = &line.job;
     let mut problem = match &line.result {
         None | Some(LineResult::Solution(_)) => {
             let failure = job.failure.as_ref()?;
-            return Some(Problem::of_job(job, failure));
+            return Some(ProblemBody::of_job(job, failure));
         }
-        Some(LineResult::Gone) => Problem::new(
-            Kind::Expired,
+        Some(LineResult::Gone) => ProblemBody::new(
+            ProblemKind::Expired,
             "the job was removed with its result while the results were read",
         ),
-        Some(LineResult::Unreadable) => Problem::new(Kind::Internal, UNREADABLE),
+        Some(LineResult::Unreadable) => ProblemBody::new(ProblemKind::Internal, UNREADABLE),
     };
     problem.instance = Some(format!("/v1/jobs/{}", job.id));
     Some(problem)

@@ -1,131 +1,25 @@
 //! `/v1/batches`: many cases in one request, followed and cancelled as one.
 
-use std::collections::BTreeMap;
-
 use axum::Json;
 use axum::extract::{Request, State};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use serde::Serialize;
-use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::contact::case::Case;
-use crate::http::dto::job::rfc3339;
+use crate::http::dto::batch::{BatchAnswer, BatchReceipt, Cases, links};
 use crate::http::dto::problem::Fault;
 use crate::http::extract::batch::body::{form, read_draft};
+use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::BatchId;
 use crate::http::extract::query::{Parameters, id, query, reader};
 use crate::http::extract::submit_options::SubmitQuery;
-use crate::http::layers::auth::Caller;
 use crate::http::limits::memory::Memory;
 use crate::http::options::HttpOptions;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::Kind;
+use crate::http::problem::kinds::ProblemKind;
 use crate::http::routes::jobs::{idempotency_key, mark_replay};
-use crate::jobs::batch::Batch;
 use crate::jobs::draft::Draft;
-use crate::jobs::job::State as JobState;
-
-/// The cases of a batch.
-#[derive(ToSchema)]
-#[schema(min_items = 1, max_items = 200_000)]
-#[expect(
-    dead_code,
-    reason = "the form of a body that is cut into cases while it arrives"
-)]
-pub struct Cases(Vec<Case>);
-
-/// A batch that was accepted.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct BatchReceipt {
-    /// Identifier of the batch.
-    #[schema(value_type = String, format = "uuid")]
-    id: String,
-    /// Number of jobs made.
-    count: u32,
-    /// Number of faulty cases that were left out; 0 unless the request said `accept=valid`.
-    rejected: u32,
-    /// The faults of the cases that were left out, those of the first 1000.
-    errors: Vec<Fault>,
-    /// Where to go from here.
-    links: BTreeMap<String, String>,
-}
-
-/// A batch: how far it is.
-#[derive(Debug, Serialize, ToSchema)]
-#[schema(as = Batch)]
-pub struct BatchAnswer {
-    /// Identifier of the batch.
-    #[schema(value_type = String, format = "uuid")]
-    id: String,
-    /// Time of submission.
-    #[schema(format = "date-time", example = "2026-01-31T09:30:00.000Z")]
-    created_at: String,
-    /// Number of jobs made.
-    count: u32,
-    /// Number of faulty cases that were left out.
-    rejected: u32,
-    /// Number of jobs in each state.
-    states: BatchStates,
-    /// Share of the jobs that have ended.
-    #[schema(minimum = 0.0, maximum = 1.0)]
-    progress: f64,
-    /// Every job has ended.
-    ended: bool,
-    /// Where to go from here.
-    links: BTreeMap<String, String>,
-}
-
-/// Number of jobs in each state.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct BatchStates {
-    queued: u64,
-    running: u64,
-    succeeded: u64,
-    failed: u64,
-    cancelled: u64,
-}
-
-impl From<Batch> for BatchAnswer {
-    fn from(batch: Batch) -> Self {
-        let (ended, all) = batch.ended();
-        #[expect(clippy::cast_precision_loss, reason = "far fewer jobs than 2^53")]
-        let progress = if all == 0 {
-            1.0
-        } else {
-            ended as f64 / all as f64
-        };
-        BatchAnswer {
-            id: batch.id.to_string(),
-            created_at: rfc3339(batch.created_at),
-            count: batch.count,
-            rejected: batch.rejected,
-            states: BatchStates {
-                queued: batch.in_state(JobState::Queued),
-                running: batch.in_state(JobState::Running),
-                succeeded: batch.in_state(JobState::Succeeded),
-                failed: batch.in_state(JobState::Failed),
-                cancelled: batch.in_state(JobState::Cancelled),
-            },
-            progress,
-            ended: ended == all,
-            links: links(&batch),
-        }
-    }
-}
-
-fn links(batch: &Batch) -> BTreeMap<String, String> {
-    let own = format!("/v1/batches/{}", batch.id);
-    BTreeMap::from([
-        ("results".to_owned(), format!("{own}/results")),
-        ("cancel".to_owned(), format!("{own}/cancel")),
-        ("events".to_owned(), format!("{own}/events")),
-        ("jobs".to_owned(), format!("/v1/jobs?batch={}", batch.id)),
-        ("self".to_owned(), own),
-    ])
-}
 
 problems! {
     /// What `POST /v1/batches` can fail with.
@@ -213,7 +107,7 @@ pub async fn submit(
 /// Why a batch is not taken.
 fn refusal(draft: &Draft) -> ApiError {
     if draft.cases == 0 {
-        return ApiError::new(Kind::FaultyBatch, "the batch has no case");
+        return ApiError::new(ProblemKind::FaultyBatch, "the batch has no case");
     }
     let kept = draft.faulty.len();
     let more = match draft.rejected as usize - kept {
@@ -244,8 +138,8 @@ fn faults(draft: &Draft) -> Vec<Fault> {
 }
 
 problems! {
-    /// What looking at a batch can fail with.
-    LookBatchProblems: BatchNotFound
+    /// What asking for a batch can fail with.
+    GetBatchProblems: BatchNotFound
 }
 
 /// Looks at a batch.
@@ -255,9 +149,9 @@ problems! {
     tag = "batches",
     operation_id = "get_batch",
     params(("id" = String, Path, description = "Id of the batch", format = "uuid")),
-    responses((status = 200, description = "The batch", body = BatchAnswer), LookBatchProblems)
+    responses((status = 200, description = "The batch", body = BatchAnswer), GetBatchProblems)
 )]
-pub async fn look(
+pub async fn get(
     Caller(jobs): Caller,
     BatchId(id): BatchId,
 ) -> Result<Json<BatchAnswer>, ApiError> {
@@ -274,7 +168,7 @@ pub async fn look(
     responses(
         (status = 200, description = "Every job has ended", body = BatchAnswer),
         (status = 202, description = "The running jobs will stop shortly", body = BatchAnswer),
-        LookBatchProblems
+        GetBatchProblems
     )
 )]
 pub async fn cancel(Caller(jobs): Caller, BatchId(id): BatchId) -> Result<Response, ApiError> {

@@ -9,16 +9,17 @@ use utoipa::ToSchema;
 use crate::contact::case::{Case, Method, Output};
 use crate::contact::profile_trust::quality::PairQuality;
 use crate::contact::remark::RemarkEntry;
+use crate::http::extract::caller::Caller;
 use crate::http::extract::json::JsonBody;
 use crate::http::extract::query::Query;
-use crate::http::layers::auth::Caller;
 use crate::http::limits::memory::Memory;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 
 /// A case that can be solved, and its expected cost.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct CheckedCase {
+#[schema(as = CheckedCase)]
+pub struct CheckReport {
     /// Digest of everything that determines the answer; cases with equal digests have equal answers.
     digest: String,
     /// The method the case asks for.
@@ -58,14 +59,14 @@ problems! {
     tag = "cases",
     operation_id = "check_case",
     request_body(content = Case, description = "One case", content_type = "application/json"),
-    responses((status = 200, description = "The case can be solved", body = CheckedCase), CheckProblems)
+    responses((status = 200, description = "The case can be solved", body = CheckReport), CheckProblems)
 )]
 pub async fn check(
     Caller(jobs): Caller,
     State(memory): State<Memory>,
     uri: Uri,
     JsonBody { value, mut room }: JsonBody,
-) -> Result<Json<CheckedCase>, ApiError> {
+) -> Result<Json<CheckReport>, ApiError> {
     Query::read(&uri, &[]).finish()?;
     if room.turn.is_none() {
         room.turn = Some(memory.turn(0).await?);
@@ -76,7 +77,7 @@ pub async fn check(
         let _room = room;
         jobs.check(&value).map(|problem| {
             let cost = problem.cost();
-            CheckedCase {
+            CheckReport {
                 digest: problem.digest.clone(),
                 method: problem.method,
                 outputs: problem.outputs.clone(),

@@ -21,14 +21,15 @@ use utoipa::openapi::{ObjectBuilder, RefOr, Schema};
 use utoipa::{PartialSchema, ToSchema};
 use uuid::Uuid;
 
+use crate::http::dto::batch::BatchAnswer;
 use crate::http::extract::accept::{Format, choose};
+use crate::http::extract::caller::{Caller, Credential, revoked};
 use crate::http::extract::ids::{BatchId, JobId};
-use crate::http::layers::auth::{Caller, Credential, revoked};
-use crate::http::limits::concurrency::Crowds;
-use crate::http::limits::holding_body::{Held, carrying};
+use crate::http::limits::concurrency::ConcurrencyLimits;
+use crate::http::limits::holding_body::{HeldShares, hold_while_sent};
 use crate::http::problem::error::ApiError;
-use crate::http::routes::batches::{BatchAnswer, LookBatchProblems};
-use crate::http::routes::jobs::LookProblems;
+use crate::http::routes::batches::GetBatchProblems;
+use crate::http::routes::jobs::GetProblems;
 use crate::jobs::Jobs;
 use crate::jobs::job::{Job, State as JobState};
 
@@ -132,14 +133,14 @@ impl JobEvent {
     responses(
         (status = 200, description = "One event per change", content((JobEventSent = "text/event-stream"))),
         (status = 204, description = "The job has ended and the client has seen it"),
-        LookProblems
+        GetProblems
     )
 )]
 pub async fn job(
     Caller(jobs): Caller,
     JobId(id): JobId,
-    State(crowds): State<Crowds>,
-    Extension(held): Extension<Held>,
+    State(crowds): State<ConcurrencyLimits>,
+    Extension(held): Extension<HeldShares>,
     key: Option<Extension<Credential>>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
@@ -157,7 +158,7 @@ pub async fn job(
         async move { next_of_job(&jobs, id, seen?).await }
     });
     let events = answer(events.take_until(revoked));
-    Ok(carrying(events, place))
+    Ok(hold_while_sent(events, place))
 }
 
 /// The next event of a job and what has then been seen; nothing after the final one.
@@ -188,14 +189,14 @@ async fn next_of_job(
     responses(
         (status = 200, description = "One event per change", content((BatchEventSent = "text/event-stream"))),
         (status = 204, description = "Every job has ended and the client has seen it"),
-        LookBatchProblems
+        GetBatchProblems
     )
 )]
 pub async fn batch(
     Caller(jobs): Caller,
     BatchId(id): BatchId,
-    State(crowds): State<Crowds>,
-    Extension(held): Extension<Held>,
+    State(crowds): State<ConcurrencyLimits>,
+    Extension(held): Extension<HeldShares>,
     key: Option<Extension<Credential>>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
@@ -214,7 +215,7 @@ pub async fn batch(
         async move { next_of_batch(&jobs, id, seen?).await }
     });
     let events = answer(events.take_until(revoked));
-    Ok(carrying(events, place))
+    Ok(hold_while_sent(events, place))
 }
 
 async fn next_of_batch(

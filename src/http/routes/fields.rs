@@ -12,17 +12,17 @@ use crate::contact::case::Output;
 use crate::http::dto::cells::{Cells, GriddedField, gridded, per_cell};
 use crate::http::dto::result::name_of;
 use crate::http::extract::accept::{Format, choose, one_of};
+use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::JobId;
 use crate::http::extract::query::{Parameters, Reader, index, query, reader, whole};
-use crate::http::layers::auth::Caller;
 use crate::http::layers::etag::{Known, tagged};
-use crate::http::limits::holding_body::carrying;
+use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::limits::memory::{Memory, Rendering};
 use crate::http::problem::error::ApiError;
 use crate::http::render::pieces::{csv_body, json_body};
 use crate::http::render::table::{File, Table};
 use crate::http::render::{npz, vtk};
-use crate::http::routes::plots::{WIDTH_DEFAULT, Wish, picture};
+use crate::http::routes::plots::{PlotOptions, WIDTH_DEFAULT, picture};
 use crate::http::routes::stored_fields::{FieldProblems, stored};
 use crate::http::state::AppState;
 use crate::jobs::Jobs;
@@ -134,7 +134,7 @@ impl Selection {
                 "a picture shows the cells themselves; leave `grid` out",
             ));
         }
-        let wish = Wish {
+        let wish = PlotOptions {
             shown,
             patch: self.patch,
             point: self.point,
@@ -386,5 +386,5 @@ pub async fn write(
                 .insert(header::CONTENT_DISPOSITION, file);
         }
     }
-    Ok(carrying(response, share))
+    Ok(hold_while_sent(response, share))
 }

@@ -12,13 +12,13 @@ use uuid::Uuid;
 
 use crate::contact::case::Case;
 use crate::http::dto::job::JobAnswer;
+use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::JobId;
 use crate::http::extract::json::JsonBody;
 use crate::http::extract::query::{Parameters, Reader, count, id, query, reader};
 use crate::http::extract::submit_options::SubmitQuery;
-use crate::http::layers::auth::Caller;
-use crate::http::limits::concurrency::Crowds;
-use crate::http::limits::holding_body::Held;
+use crate::http::limits::concurrency::ConcurrencyLimits;
+use crate::http::limits::holding_body::HeldShares;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 use crate::http::routes::results::result_of;
@@ -90,8 +90,8 @@ problems! {
 pub async fn submit(
     Caller(jobs): Caller,
     uri: Uri,
-    State(crowds): State<Crowds>,
-    Extension(held): Extension<Held>,
+    State(crowds): State<ConcurrencyLimits>,
+    Extension(held): Extension<HeldShares>,
     headers: HeaderMap,
     JsonBody { value, room }: JsonBody,
 ) -> Result<Response, ApiError> {
@@ -277,8 +277,8 @@ pub async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Json<JobPage>, ApiEr
 }
 
 problems! {
-    /// What looking at one job can fail with.
-    LookProblems: JobNotFound
+    /// What asking for one job can fail with.
+    GetProblems: JobNotFound
 }
 
 /// Looks at a job.
@@ -288,9 +288,9 @@ problems! {
     tag = "jobs",
     operation_id = "get_job",
     params(("id" = String, Path, description = "Id of the job", format = "uuid")),
-    responses((status = 200, description = "The job", body = JobAnswer), LookProblems)
+    responses((status = 200, description = "The job", body = JobAnswer), GetProblems)
 )]
-pub async fn look(Caller(jobs): Caller, JobId(id): JobId) -> Result<Json<JobAnswer>, ApiError> {
+pub async fn get(Caller(jobs): Caller, JobId(id): JobId) -> Result<Json<JobAnswer>, ApiError> {
     Ok(Json(JobAnswer::new(jobs.look(id).await?, None)))
 }
 
@@ -301,7 +301,7 @@ pub async fn look(Caller(jobs): Caller, JobId(id): JobId) -> Result<Json<JobAnsw
     tag = "jobs",
     operation_id = "get_case",
     params(("id" = String, Path, description = "Id of the job", format = "uuid")),
-    responses((status = 200, description = "The case", body = Case), LookProblems)
+    responses((status = 200, description = "The case", body = Case), GetProblems)
 )]
 pub async fn case(Caller(jobs): Caller, JobId(id): JobId) -> Result<Response, ApiError> {
     let text = jobs.case(id).await?;
@@ -318,7 +318,7 @@ pub async fn case(Caller(jobs): Caller, JobId(id): JobId) -> Result<Response, Ap
     responses(
         (status = 200, description = "The job has ended", body = JobAnswer),
         (status = 202, description = "The running job will stop shortly", body = JobAnswer),
-        LookProblems
+        GetProblems
     )
 )]
 pub async fn cancel(Caller(jobs): Caller, JobId(id): JobId) -> Result<Response, ApiError> {

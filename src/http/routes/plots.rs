@@ -8,14 +8,16 @@ use uuid::Uuid;
 use crate::contact::case::Output;
 use crate::contact::solution::PointSolution;
 use crate::http::extract::accept::Format;
+use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::JobId;
 use crate::http::extract::query::{Parameters, count, index, query, reader, require_index};
-use crate::http::layers::auth::Caller;
 use crate::http::layers::etag::{Known, tagged};
-use crate::http::limits::holding_body::carrying;
+use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::limits::memory::Memory;
 use crate::http::problem::error::ApiError;
-use crate::http::render::picture::{Scene, draw, raster};
+use crate::http::render::picture::draw::draw;
+use crate::http::render::picture::raster;
+use crate::http::render::picture::scene::Scene;
 use crate::http::render::table::File;
 use crate::http::routes::stored_fields::{FieldProblems, stored};
 use crate::jobs::Jobs;
@@ -50,7 +52,7 @@ query! {
 
 /// What a picture is to show.
 #[derive(Debug, Clone, Copy)]
-pub struct Wish {
+pub struct PlotOptions {
     /// The field.
     pub shown: Output,
     /// Number of the patch.
@@ -61,10 +63,10 @@ pub struct Wish {
     pub width: u32,
 }
 
-impl Wish {
-    fn read(uri: &Uri) -> Result<Wish, ApiError> {
+impl PlotOptions {
+    fn read(uri: &Uri) -> Result<PlotOptions, ApiError> {
         let query = PlotQuery::read(uri, &())?;
-        Ok(Wish {
+        Ok(PlotOptions {
             shown: query.field.unwrap_or(Output::Tractions),
             patch: query.patch.unwrap_or(0),
             point: query.point.unwrap_or(0),
@@ -122,7 +124,7 @@ async fn plot(
     headers: &HeaderMap,
     format: Format,
 ) -> Result<Response, ApiError> {
-    let wish = Wish::read(uri)?;
+    let wish = PlotOptions::read(uri)?;
     match Known::of(jobs, id, uri, headers, format).await? {
         Known::Unchanged(answer) => Ok(answer),
         Known::Tag(tag) => Ok(tagged(&tag, picture(jobs, memory, id, wish, format).await?)),
@@ -137,7 +139,7 @@ pub async fn picture(
     jobs: &Jobs,
     memory: &Memory,
     id: Uuid,
-    wish: Wish,
+    wish: PlotOptions,
     format: Format,
 ) -> Result<Response, ApiError> {
     // Its pixels are there during its turn only; what is sent is small.
@@ -175,11 +177,11 @@ pub async fn picture(
         header::CONTENT_SECURITY_POLICY,
         HeaderValue::from_static("default-src 'none'; style-src 'unsafe-inline'; sandbox"),
     );
-    Ok(carrying(response, share))
+    Ok(hold_while_sent(response, share))
 }
 
 /// Which patch and motion this is, where there are several.
-fn counted(wish: Wish, patches: usize, points: usize) -> String {
+fn counted(wish: PlotOptions, patches: usize, points: usize) -> String {
     let mut text = String::new();
     if patches > 1 {
         text += &format!(", patch {} of 0 to {}", wish.patch, patches - 1);

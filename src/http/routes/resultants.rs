@@ -10,11 +10,11 @@ use crate::contact::case::Motion;
 use crate::contact::profile_trust::quality::ProfileUncertainty;
 use crate::contact::solution::{ErrorEstimate, Origin, Solution, Total};
 use crate::http::extract::accept::{Format, choose, one_of};
+use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::JobId;
 use crate::http::extract::query::{Parameters, index, query, require_index};
-use crate::http::layers::auth::Caller;
 use crate::http::layers::etag::{Known, tagged};
-use crate::http::limits::holding_body::carrying;
+use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::limits::memory::Memory;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
@@ -135,7 +135,7 @@ pub async fn resultants(
     let share = memory.ready_answer(jobs.tenant(), body.len())?;
     Ok(tagged(
         &tag,
-        carrying((headers, body).into_response(), share),
+        hold_while_sent((headers, body).into_response(), share),
     ))
 }
 

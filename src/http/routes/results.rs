@@ -7,11 +7,11 @@ use uuid::Uuid;
 
 use crate::http::dto::result::JobResult;
 use crate::http::extract::accept::Format;
+use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::JobId;
 use crate::http::extract::query::Query;
-use crate::http::layers::auth::Caller;
 use crate::http::layers::etag::{Known, tagged};
-use crate::http::limits::holding_body::carrying;
+use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::limits::memory::Memory;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
@@ -48,7 +48,10 @@ pub async fn result(
     let text = serde_json::to_vec(&result).map_err(|error| ApiError::internal(&error))?;
     let share = memory.ready_answer(jobs.tenant(), text.len())?;
     let head = [(header::CONTENT_TYPE, Format::Json.media_type())];
-    Ok(tagged(&tag, carrying((head, text).into_response(), share)))
+    Ok(tagged(
+        &tag,
+        hold_while_sent((head, text).into_response(), share),
+    ))
 }
 
 /// The result of a succeeded job with its links.

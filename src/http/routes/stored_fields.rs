@@ -7,7 +7,7 @@ use crate::contact::solution::{PatchCells, PointFields};
 use crate::http::dto::result::name_of;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::Kind;
+use crate::http::problem::kinds::ProblemKind;
 use crate::jobs::Jobs;
 use crate::jobs::error::JobsError;
 
@@ -61,7 +61,7 @@ pub async fn not_asked<T>(jobs: &Jobs, id: Uuid, output: Output) -> Result<T, Ap
         .collect();
     let name = name_of(output);
     Err(ApiError::new(
-        Kind::OutputNotAsked,
+        ProblemKind::OutputNotAsked,
         format!(
             "the case asked for {} only; submit it again with `{name}` among its `outputs`",
             asked.join(", ")

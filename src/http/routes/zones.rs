@@ -5,21 +5,23 @@ use axum::http::{HeaderMap, Uri};
 use axum::response::Response;
 use serde::Serialize;
 use utoipa::ToSchema;
+use uuid::Uuid;
 
 use crate::contact::case::Output;
 use crate::contact::outputs::outline::{outlines, patch_outline};
 use crate::contact::zones::Zone;
 use crate::http::dto::cells::{Cells, GriddedField, gridded, per_cell};
 use crate::http::extract::accept::Format;
+use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::JobId;
 use crate::http::extract::query::require_index;
-use crate::http::layers::auth::Caller;
 use crate::http::layers::etag::{Known, tagged};
 use crate::http::problem::error::ApiError;
 use crate::http::render::table::File;
 use crate::http::routes::fields::{FieldQuery, Selection, Written, write, write_file};
 use crate::http::routes::stored_fields::{FieldProblems, not_asked, stored};
 use crate::http::state::AppState;
+use crate::jobs::Jobs;
 
 /// Stick and slip zones of one patch for one motion.
 #[derive(Debug, Serialize, ToSchema)]
@@ -105,22 +107,9 @@ pub async fn zones(
     }
     let rendering = shared.memory.rendering(jobs.tenant(), selection.bytes());
     let rendering = rendering.await?;
-    let solution = jobs.solution(id).await?;
-    require_index("patch", Some(selection.patch), solution.patches.len())?;
-    let points = &solution.patches[selection.patch].points;
-    require_index("point", Some(selection.point), points.len())?;
-    let point = &points[selection.point];
-    let summary = (
-        point.stick_area_mm2,
-        point.slip_area_mm2,
-        point.stick_cells,
-        point.slip_cells,
-    );
-    let (Some(stick_area_mm2), Some(slip_area_mm2), Some(stick_cells), Some(slip_cells)) = summary
-    else {
+    let Some(sizes) = zone_sizes(&jobs, id, selection).await? else {
         return not_asked(&jobs, id, shown).await;
     };
-    drop(solution);
     let (patch, point) = (selection.patch, selection.point);
     let (fields, values) = stored(&jobs, id, patch, point, shown).await?;
     let written = write(rendering, selection, "zones", move |format| {
@@ -142,10 +131,10 @@ pub async fn zones(
                 let zones = Zones::PerCell(ZoneCells {
                     patch,
                     point,
-                    stick_area_mm2,
-                    slip_area_mm2,
-                    stick_cells,
-                    slip_cells,
+                    stick_area_mm2: sizes.stick_area_mm2,
+                    slip_area_mm2: sizes.slip_area_mm2,
+                    stick_cells: sizes.stick_cells,
+                    slip_cells: sizes.slip_cells,
                     outlines,
                     cells,
                 });
@@ -158,4 +147,34 @@ pub async fn zones(
         }
     });
     Ok(tagged(&tag, written.await?))
+}
+
+/// The areas and cells of the zones of one patch for one motion.
+struct ZoneSizes {
+    stick_area_mm2: f64,
+    slip_area_mm2: f64,
+    stick_cells: u32,
+    slip_cells: u32,
+}
+
+/// Nothing if the case did not ask for zones.
+async fn zone_sizes(
+    jobs: &Jobs,
+    id: Uuid,
+    selection: Selection,
+) -> Result<Option<ZoneSizes>, ApiError> {
+    let solution = jobs.solution(id).await?;
+    require_index("patch", Some(selection.patch), solution.patches.len())?;
+    let points = &solution.patches[selection.patch].points;
+    require_index("point", Some(selection.point), points.len())?;
+    let point = &points[selection.point];
+    let sizes = || {
+        Some(ZoneSizes {
+            stick_area_mm2: point.stick_area_mm2?,
+            slip_area_mm2: point.slip_area_mm2?,
+            stick_cells: point.stick_cells?,
+            slip_cells: point.slip_cells?,
+        })
+    };
+    Ok(sizes())
 }

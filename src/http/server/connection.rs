@@ -11,7 +11,7 @@ use hyper::body::Incoming;
 use tokio::time::sleep;
 use tower::ServiceExt;
 
-use crate::http::limits::holding_body::carrying;
+use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::server::places::Place;
 
 /// The address that a request comes from; in its extensions.
@@ -36,7 +36,7 @@ pub async fn answer(
         request.extensions_mut().insert(ProbesOnly);
     }
     let Ok(response) = router.oneshot(request).await;
-    carrying(response, busy)
+    hold_while_sent(response, busy)
 }
 
 /// Ends if there is no complete head within this time.

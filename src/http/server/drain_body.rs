@@ -23,18 +23,18 @@ const REST_BYTES: usize = 1 << 20;
 /// How long the client may take to send it.
 const REST_WITHIN: Duration = Duration::from_millis(500);
 
-type Slot = Arc<Mutex<Option<Body>>>;
+type BodySlot = Arc<Mutex<Option<Body>>>;
 
 /// Reads away what is left of a body, or ends the connection; layer around everything that reads bodies.
-pub async fn read_away(request: Request, next: Next) -> Response {
+pub async fn drain_body(request: Request, next: Next) -> Response {
     if request.body().is_end_stream() {
         return next.run(request).await;
     }
     // A client that asks before it sends has not begun, and reading would tell it to.
     let asks = request.headers().contains_key(header::EXPECT);
-    let slot = Slot::default();
+    let slot = BodySlot::default();
     let kept = slot.clone();
-    let request = request.map(|body| Body::new(Kept(Some(body), kept)));
+    let request = request.map(|body| Body::new(DrainableBody(Some(body), kept)));
     let mut response = next.run(request).await;
     let rest = slot.lock().unwrap_or_else(PoisonError::into_inner).take();
     if let Some(rest) = rest
@@ -58,9 +58,9 @@ async fn ends(body: Body) -> bool {
 }
 
 /// A body that goes into the slot when its reader loses interest before the end.
-struct Kept(Option<Body>, Slot);
+struct DrainableBody(Option<Body>, BodySlot);
 
-impl HttpBody for Kept {
+impl HttpBody for DrainableBody {
     type Data = Bytes;
     type Error = axum::Error;
 
@@ -88,7 +88,7 @@ impl HttpBody for Kept {
     }
 }
 
-impl Drop for Kept {
+impl Drop for DrainableBody {
     fn drop(&mut self) {
         if let Some(body) = self.0.take().filter(|body| !body.is_end_stream()) {
             let mut slot = self.1.lock().unwrap_or_else(PoisonError::into_inner);

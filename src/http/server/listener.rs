@@ -15,7 +15,7 @@ use tokio_util::sync::CancellationToken;
 use crate::http::options::HttpOptions;
 use crate::http::server::connection::{Peer, answer, silent};
 use crate::http::server::places::Places;
-use crate::http::server::write_timeout::WriteLimit;
+use crate::http::server::write_timeout::WriteTimeout;
 
 /// Serves a router until `stop`; then no connection is accepted any more, and this returns when the open requests have
 /// been answered.
@@ -52,7 +52,7 @@ pub async fn serve(
             tracing::debug!(%error, "a connection sends in large pieces only");
         }
         let place = places.enter(address.ip());
-        let stream = WriteLimit::new(stream, options.write_timeout);
+        let stream = WriteTimeout::new(stream, options.write_timeout);
         let (router, peer, own) = (router.clone(), Peer(address.ip()), place.clone());
         let service = service_fn(move |request: Request<Incoming>| {
             let (router, place) = (router.clone(), own.clone());

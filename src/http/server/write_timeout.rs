@@ -12,7 +12,7 @@ use tokio::time::{Instant, Sleep, sleep};
 
 /// A connection with a limit on how long a write may stand still.
 #[derive(Debug)]
-pub struct WriteLimit {
+pub struct WriteTimeout {
     stream: TcpStream,
     limit: Duration,
     /// Runs while `waiting`.
@@ -20,11 +20,11 @@ pub struct WriteLimit {
     waiting: bool,
 }
 
-impl WriteLimit {
+impl WriteTimeout {
     /// The connection with this limit.
     #[must_use]
-    pub fn new(stream: TcpStream, limit: Duration) -> WriteLimit {
-        WriteLimit {
+    pub fn new(stream: TcpStream, limit: Duration) -> WriteTimeout {
+        WriteTimeout {
             stream,
             limit,
             timer: Box::pin(sleep(limit)),
@@ -48,7 +48,7 @@ impl WriteLimit {
     }
 }
 
-impl AsyncWrite for WriteLimit {
+impl AsyncWrite for WriteTimeout {
     fn poll_write(
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
@@ -80,7 +80,7 @@ impl AsyncWrite for WriteLimit {
     }
 }
 
-impl AsyncRead for WriteLimit {
+impl AsyncRead for WriteTimeout {
     fn poll_read(
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,

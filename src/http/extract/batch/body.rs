@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use axum::body::Body;
+use axum::body::{Body, BodyDataStream, Bytes};
 use axum::extract::Request;
 use axum::http::{HeaderMap, header};
 use futures_util::StreamExt;
@@ -13,11 +13,11 @@ use uuid::Uuid;
 use crate::http::extract::batch::splitter::{Element, Layout, Splitter};
 use crate::http::extract::batch::table::TableBody;
 use crate::http::extract::json::{essence, read_json, read_strict, unreadable, weigh_case};
-use crate::http::layers::compression::{Packed, too_long};
+use crate::http::layers::admission::{PackedLength, too_long};
 use crate::http::limits::memory::{Memory, SMALL_BYTES};
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::Kind;
+use crate::http::problem::kinds::ProblemKind;
 use crate::jobs::Jobs;
 use crate::jobs::draft::Draft;
 
@@ -78,7 +78,7 @@ pub async fn form(
             "a table needs `?template=` with the id of a job; its case is what the columns are filled into",
         )),
         (other, _) => Err(ApiError::new(
-            Kind::UnsupportedMediaType,
+            ProblemKind::UnsupportedMediaType,
             format!(
                 "the content type is `{other}`; send an array with `application/json`, one case per line with `application/x-ndjson`, or a table with `text/csv`"
             ),
@@ -97,30 +97,14 @@ pub async fn read_draft(
     mut form: Form,
     request: Request<Body>,
 ) -> Result<Draft, ApiError> {
-    let too_large = || {
-        ApiError::new(
-            Kind::BodyTooLarge,
-            format!(
-                "the body is larger than the {} bytes that are allowed for one batch",
-                options.batch_max_bytes
-            ),
-        )
-    };
-    let declared = request.headers().get(header::CONTENT_LENGTH);
-    let declared = declared.and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
-    if declared.is_some_and(|length| length > options.batch_max_bytes) {
-        return Err(too_large());
-    }
-    let packed = request.extensions().get::<Packed>().cloned();
+    let mut arriving = Arriving::new(options, request)?;
     let mut draft = jobs.draft()?;
     if let Form::Table(table) = &form {
         draft.set_template(table.text());
     }
     let mut splitter = Splitter::new(form.layout(), options.body_max_bytes);
-    let mut pieces = request.into_body().into_data_stream();
     let mut portion = Vec::new();
-    let (mut total, mut held) = (0_u64, 0);
-    let begun = Instant::now();
+    let mut held = 0;
     let mut share = None;
     let checking = Checking {
         memory,
@@ -129,38 +113,7 @@ pub async fn read_draft(
     };
     // Dropped with this request when its client goes away.
     let _gone = checking.gone.clone().drop_guard();
-    loop {
-        #[expect(clippy::cast_precision_loss, reason = "far fewer bytes than 2^53")]
-        let owed = Duration::from_secs_f64(total as f64 / LOWEST_RATE);
-        let latest = begun + options.body_timeout + owed;
-        let piece = timeout_at(
-            latest.min(Instant::now() + options.body_timeout),
-            pieces.next(),
-        );
-        let piece = piece.await.map_err(|_| {
-            ApiError::new(
-                Kind::BodyTimeout,
-                format!(
-                    "nothing of the body arrived for {} s, or all of it at less than {LOWEST_RATE} bytes per second",
-                    options.body_timeout.as_secs_f64()
-                ),
-            )
-        })?;
-        let Some(piece) = piece else { break };
-        let piece = piece.map_err(|error| {
-            if too_long(&error) {
-                too_large()
-            } else {
-                unreadable(&error)
-            }
-        })?;
-        total += piece.len() as u64;
-        if total > options.batch_max_bytes {
-            return Err(too_large());
-        }
-        if packed.as_ref().is_some_and(|packed| packed.is_bomb(total)) {
-            return Err(Packed::refusal());
-        }
+    while let Some(piece) = arriving.next().await? {
         held += piece.len();
         // Most cases are small; a large one is held until its end has come.
         if share.is_none() && splitter.held() + piece.len() > SMALL_BYTES.max(PORTION_BYTES) {
@@ -182,12 +135,90 @@ pub async fn read_draft(
     Ok(draft)
 }
 
+/// A body on its way, held to its limits of size and time.
+struct Arriving<'a> {
+    options: &'a HttpOptions,
+    pieces: BodyDataStream,
+    packed: Option<PackedLength>,
+    total: u64,
+    begun: Instant,
+}
+
+impl Arriving<'_> {
+    /// # Errors
+    /// The body says itself that it is too large.
+    fn new(options: &HttpOptions, request: Request<Body>) -> Result<Arriving<'_>, ApiError> {
+        let declared = request.headers().get(header::CONTENT_LENGTH);
+        let declared = declared.and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
+        let packed = request.extensions().get::<PackedLength>().cloned();
+        let arriving = Arriving {
+            options,
+            pieces: request.into_body().into_data_stream(),
+            packed,
+            total: 0,
+            begun: Instant::now(),
+        };
+        if declared.is_some_and(|length| length > options.batch_max_bytes) {
+            return Err(arriving.too_large());
+        }
+        Ok(arriving)
+    }
+
+    /// The next piece, or nothing at the end.
+    async fn next(&mut self) -> Result<Option<Bytes>, ApiError> {
+        let options = self.options;
+        #[expect(clippy::cast_precision_loss, reason = "far fewer bytes than 2^53")]
+        let owed = Duration::from_secs_f64(self.total as f64 / LOWEST_RATE);
+        let latest = self.begun + options.body_timeout + owed;
+        let piece = timeout_at(
+            latest.min(Instant::now() + options.body_timeout),
+            self.pieces.next(),
+        );
+        let piece = piece.await.map_err(|_| {
+            ApiError::new(
+                ProblemKind::BodyTimeout,
+                format!(
+                    "nothing of the body arrived for {} s, or all of it at less than {LOWEST_RATE} bytes per second",
+                    options.body_timeout.as_secs_f64()
+                ),
+            )
+        })?;
+        let Some(piece) = piece else { return Ok(None) };
+        let piece = piece.map_err(|error| {
+            if too_long(&error) {
+                self.too_large()
+            } else {
+                unreadable(&error)
+            }
+        })?;
+        self.total += piece.len() as u64;
+        if self.total > options.batch_max_bytes {
+            return Err(self.too_large());
+        }
+        let packed = self.packed.as_ref();
+        if packed.is_some_and(|packed| packed.is_bomb(self.total)) {
+            return Err(PackedLength::refusal());
+        }
+        Ok(Some(piece))
+    }
+
+    fn too_large(&self) -> ApiError {
+        ApiError::new(
+            ProblemKind::BodyTooLarge,
+            format!(
+                "the body is larger than the {} bytes that are allowed for one batch",
+                self.options.batch_max_bytes
+            ),
+        )
+    }
+}
+
 fn require_count(draft: &Draft, options: &HttpOptions) -> Result<(), ApiError> {
     if draft.cases <= options.batch_max_cases {
         return Ok(());
     }
     Err(ApiError::new(
-        Kind::BodyTooLarge,
+        ProblemKind::BodyTooLarge,
         format!(
             "the batch has more than the {} cases that are allowed",
             options.batch_max_cases

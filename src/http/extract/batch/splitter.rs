@@ -4,7 +4,7 @@
 //! found, nothing else.
 
 use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::Kind;
+use crate::http::problem::kinds::ProblemKind;
 
 /// How cases stand in a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,7 +28,7 @@ pub struct Element {
 
 /// Where in an array the cutting stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Place {
+enum SplitterState {
     Before,
     /// In an element, or before it.
     Inside,
@@ -42,7 +42,7 @@ pub struct Splitter {
     max_bytes: usize,
     held: Vec<u8>,
     line: u64,
-    place: Place,
+    place: SplitterState,
     depth: usize,
     in_string: bool,
     escaped: bool,
@@ -58,7 +58,7 @@ impl Splitter {
             max_bytes,
             held: Vec::new(),
             line: 1,
-            place: Place::Before,
+            place: SplitterState::Before,
             depth: 0,
             in_string: false,
             escaped: false,
@@ -92,8 +92,8 @@ impl Splitter {
         match self.layout {
             Layout::Lines => self.complete_line(out),
             Layout::Rows => self.complete_row(out),
-            Layout::Array if self.place == Place::After => {}
-            Layout::Array if self.place == Place::Before => {
+            Layout::Array if self.place == SplitterState::After => {}
+            Layout::Array if self.place == SplitterState::Before => {
                 return Err(malformed("the body is empty; send an array of cases"));
             }
             Layout::Array => {
@@ -159,11 +159,13 @@ impl Splitter {
 
     fn feed_byte(&mut self, byte: u8, out: &mut Vec<Element>) -> Result<(), ApiError> {
         match self.place {
-            _ if self.place != Place::Inside && byte.is_ascii_whitespace() => {}
-            Place::Before if byte == b'[' => self.place = Place::Inside,
-            Place::Before => return Err(no_array()),
-            Place::After => return Err(malformed("something follows the end of the array")),
-            Place::Inside if self.in_string => {
+            _ if self.place != SplitterState::Inside && byte.is_ascii_whitespace() => {}
+            SplitterState::Before if byte == b'[' => self.place = SplitterState::Inside,
+            SplitterState::Before => return Err(no_array()),
+            SplitterState::After => {
+                return Err(malformed("something follows the end of the array"));
+            }
+            SplitterState::Inside if self.in_string => {
                 self.hold(byte)?;
                 match byte {
                     _ if self.escaped => self.escaped = false,
@@ -172,13 +174,13 @@ impl Splitter {
                     _ => {}
                 }
             }
-            Place::Inside => match byte {
+            SplitterState::Inside => match byte {
                 b',' if self.depth == 0 => self.complete_element(out)?,
                 b']' if self.depth == 0 => {
                     if self.elements > 0 || !blank(&self.held) {
                         self.complete_element(out)?;
                     }
-                    self.place = Place::After;
+                    self.place = SplitterState::After;
                 }
                 _ => {
                     match byte {
@@ -226,7 +228,7 @@ impl Splitter {
             Layout::Array => format!("element {} (counted from 0)", self.elements),
         };
         Err(ApiError::new(
-            Kind::BodyTooLarge,
+            ProblemKind::BodyTooLarge,
             format!(
                 "{place} is larger than the {} bytes that are allowed for one case",
                 self.max_bytes
@@ -241,14 +243,14 @@ fn blank(text: &[u8]) -> bool {
 
 fn malformed(detail: &str) -> ApiError {
     ApiError::new(
-        Kind::MalformedJson,
+        ProblemKind::MalformedJson,
         format!("the body is not JSON: {detail}"),
     )
 }
 
 fn no_array() -> ApiError {
     ApiError::new(
-        Kind::FaultyBatch,
+        ProblemKind::FaultyBatch,
         "the body is no array; send `[case, case, …]`, or one case per line with `Content-Type: application/x-ndjson`",
     )
 }

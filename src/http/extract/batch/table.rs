@@ -9,7 +9,7 @@ use axum::body::Bytes;
 use serde_json::Value;
 
 use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::Kind;
+use crate::http::problem::kinds::ProblemKind;
 use crate::jobs::template::{self, Cell};
 
 /// Short names of columns and what they stand for.
@@ -38,14 +38,14 @@ pub struct TableBody {
     template: Value,
     /// The template as it is stored.
     text: Bytes,
-    columns: Option<Vec<Column>>,
+    columns: Option<Vec<TemplateColumn>>,
 }
 
 /// The case of a line with what it puts into the template, or why it stands for none.
 pub type Row = Result<(Value, Vec<Cell>), String>;
 
 #[derive(Debug, PartialEq, Eq)]
-struct Column {
+struct TemplateColumn {
     /// As it stands in the header.
     title: String,
     /// The members that lead to the value.
@@ -79,8 +79,9 @@ impl TableBody {
     pub fn take(&mut self, line: &[u8]) -> Result<Option<Row>, ApiError> {
         let Some(columns) = &self.columns else {
             let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
-            let columns = read_header(line)
-                .map_err(|detail| ApiError::new(Kind::FaultyTable, format!("line 1: {detail}")))?;
+            let columns = read_header(line).map_err(|detail| {
+                ApiError::new(ProblemKind::FaultyTable, format!("line 1: {detail}"))
+            })?;
             self.columns = Some(columns);
             return Ok(None);
         };
@@ -88,7 +89,7 @@ impl TableBody {
     }
 }
 
-fn read_header(line: &[u8]) -> Result<Vec<Column>, String> {
+fn read_header(line: &[u8]) -> Result<Vec<TemplateColumn>, String> {
     let titles = fields(line)?;
     if titles.len() > COLUMNS_MAX {
         return Err(format!(
@@ -108,7 +109,7 @@ fn read_header(line: &[u8]) -> Result<Vec<Column>, String> {
     Ok(columns)
 }
 
-fn column(title: &str) -> Result<Column, String> {
+fn column(title: &str) -> Result<TemplateColumn, String> {
     let short = SHORT_NAMES.iter().find(|(name, _)| *name == title);
     let path = if let Some((_, pointer)) = short {
         pointed(pointer)
@@ -127,7 +128,7 @@ fn column(title: &str) -> Result<Column, String> {
         ));
     };
     let text = path[0] == "labels" || path[0] == "name";
-    Ok(Column {
+    Ok(TemplateColumn {
         title: title.to_owned(),
         path,
         text,
@@ -142,7 +143,7 @@ fn pointed(pointer: &str) -> Vec<String> {
         .collect()
 }
 
-fn fill(template: &Value, columns: &[Column], line: &[u8]) -> Row {
+fn fill(template: &Value, columns: &[TemplateColumn], line: &[u8]) -> Row {
     let fields = fields(line)?;
     if fields.len() != columns.len() {
         return Err(format!(

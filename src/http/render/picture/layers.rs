@@ -9,8 +9,8 @@ use crate::contact::solution::PatchCells;
 use crate::contact::zones::Zone;
 use crate::http::render::picture::colour::{LEVELS, SLIP, STICK, level, ramp};
 use crate::http::render::picture::frame::{Frame, exponent, ticks};
+use crate::http::render::picture::scene::{Heat, Scene, extent, zones_present};
 use crate::http::render::picture::svg::{Anchor, Svg, polyline, px};
-use crate::http::render::picture::{Heat, Scene, zones_present};
 
 /// Distance between arrows.
 const ARROW_SPACING: f64 = 30.0;
@@ -126,7 +126,7 @@ pub(super) fn arrows(
     along: &[f64],
     across: &[f64],
 ) -> bool {
-    let shape = super::extent(fields);
+    let shape = extent(fields);
     let count = |length: f64| {
         #[expect(
             clippy::cast_possible_truncation,

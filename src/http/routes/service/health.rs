@@ -5,10 +5,10 @@ use axum::extract::State;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::http::layers::auth::Unscoped;
+use crate::http::extract::caller::AnyTenant;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::Kind;
+use crate::http::problem::kinds::ProblemKind;
 use crate::jobs::error::JobsError;
 
 /// A healthy answer.
@@ -56,7 +56,7 @@ problems! {
     operation_id = "readyz",
     responses((status = 200, description = "The service takes jobs", body = Health), ReadyProblems)
 )]
-pub async fn ready(State(Unscoped(jobs)): State<Unscoped>) -> Result<Json<Health>, ApiError> {
+pub async fn ready(State(AnyTenant(jobs)): State<AnyTenant>) -> Result<Json<Health>, ApiError> {
     match jobs.ready().await {
         Ok(()) => Ok(Health::new("ready")),
         Err(reason) if matches!(reason, JobsError::Draining) || reason.trouble().is_some() => {
@@ -65,7 +65,7 @@ pub async fn ready(State(Unscoped(jobs)): State<Unscoped>) -> Result<Json<Health
         Err(reason) => {
             tracing::warn!(%reason, "the job store does not answer");
             Err(ApiError::new(
-                Kind::NotReady,
+                ProblemKind::NotReady,
                 "the job store cannot be reached; the service's log has the reason",
             ))
         }

@@ -13,13 +13,14 @@ use crate::jobs::PAGE_MAX;
 
 /// What the service can do.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct Abilities {
+#[schema(as = Abilities)]
+pub struct Capabilities {
     /// Values of `solver.method`.
-    methods: Vec<MethodAbility>,
+    methods: Vec<MethodCapability>,
     /// Values of `contact.type`.
-    contacts: Vec<ContactAbility>,
+    contacts: Vec<ContactCapability>,
     /// Values of `outputs`.
-    outputs: Vec<OutputAbility>,
+    outputs: Vec<OutputCapability>,
     /// Limits of requests.
     limits: RequestLimits,
     /// Version of the service.
@@ -29,7 +30,8 @@ pub struct Abilities {
 
 /// A method of solving the tangential contact.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct MethodAbility {
+#[schema(as = MethodAbility)]
+pub struct MethodCapability {
     /// The word for `solver.method`.
     name: Method,
     /// Used when the case names none.
@@ -41,7 +43,8 @@ pub struct MethodAbility {
 
 /// A way to describe where the bodies touch.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct ContactAbility {
+#[schema(as = ContactAbility)]
+pub struct ContactCapability {
     /// The word for `contact.type`.
     #[schema(value_type = String)]
     name: &'static str,
@@ -54,7 +57,8 @@ pub struct ContactAbility {
 
 /// Something a case can ask for.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct OutputAbility {
+#[schema(as = OutputAbility)]
+pub struct OutputCapability {
     /// The word for `outputs`.
     name: Output,
     /// Computed when the case names no outputs.
@@ -81,10 +85,10 @@ pub struct RequestLimits {
     path = "/v1/methods",
     tag = "cases",
     operation_id = "list_methods",
-    responses((status = 200, description = "What the service can do", body = Abilities), Always)
+    responses((status = 200, description = "What the service can do", body = Capabilities), Always)
 )]
-pub async fn methods(State(options): State<HttpOptions>) -> Json<Abilities> {
-    Json(Abilities {
+pub async fn methods(State(options): State<HttpOptions>) -> Json<Capabilities> {
+    Json(Capabilities {
         methods: [
             Method::Auto,
             Method::BoundaryElement,
@@ -112,7 +116,7 @@ pub async fn methods(State(options): State<HttpOptions>) -> Json<Abilities> {
     })
 }
 
-fn describe_method(method: Method) -> MethodAbility {
+fn describe_method(method: Method) -> MethodCapability {
     let summary = match method {
         Method::Auto => "The best method for the case; today always `boundary_element`.",
         Method::BoundaryElement => {
@@ -126,14 +130,14 @@ fn describe_method(method: Method) -> MethodAbility {
             "Kalker's simplified theory: a draft in microseconds, with a stated error instead of an estimated one."
         }
     };
-    MethodAbility {
+    MethodCapability {
         name: method,
         default: method == Method::default(),
         summary,
     }
 }
 
-fn describe_output(output: Output) -> OutputAbility {
+fn describe_output(output: Output) -> OutputCapability {
     let (default, summary) = match output {
         Output::Resultants => (true, "Forces, moment and dissipated power."),
         Output::Zones => (true, "Stick and slip zones: cells, areas and outlines."),
@@ -141,41 +145,41 @@ fn describe_output(output: Output) -> OutputAbility {
         Output::Pressure => (false, "Pressure per cell."),
         Output::Slip => (false, "Relative slip per cell, divided by rolling speed."),
     };
-    OutputAbility {
+    OutputCapability {
         name: output,
         default,
         summary,
     }
 }
 
-fn contacts() -> Vec<ContactAbility> {
+fn contacts() -> Vec<ContactCapability> {
     vec![
-        ContactAbility {
+        ContactCapability {
             name: "radii",
             needs_load: true,
             summary: "Relative radii of curvature: an elliptic patch after Hertz.",
         },
-        ContactAbility {
+        ContactCapability {
             name: "ellipse",
             needs_load: true,
             summary: "An elliptic patch of given semi-axes with Hertz's pressure.",
         },
-        ContactAbility {
+        ContactCapability {
             name: "gap_profile",
             needs_load: true,
             summary: "A gap measured across, between bodies that are circular along rolling: region and pressure are found.",
         },
-        ContactAbility {
+        ContactCapability {
             name: "gap_grid",
             needs_load: true,
             summary: "Any gap on a grid: region and pressure are found, in one or several patches.",
         },
-        ContactAbility {
+        ContactCapability {
             name: "profiles",
             needs_load: true,
             summary: "A wheel on a rail by their cross-sections: every patch is found, with its place and its own frame.",
         },
-        ContactAbility {
+        ContactCapability {
             name: "pressure_grid",
             needs_load: false,
             summary: "A given pressure on a grid; its positive part is the contact, in one or several patches.",

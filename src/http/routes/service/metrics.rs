@@ -4,7 +4,7 @@ use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
 
-use crate::http::layers::auth::Operator;
+use crate::http::extract::caller::Operator;
 use crate::http::layers::metrics::Metrics;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;

@@ -3,9 +3,9 @@
 use axum::Json;
 use axum::extract::Path;
 
-use crate::http::problem::catalogue::{Always, ProblemKind, problems};
+use crate::http::problem::catalogue::{Always, ProblemMeaning, problems};
 use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::Kind;
+use crate::http::problem::kinds::ProblemKind;
 
 problems! {
     /// What `GET /problems/{name}` can fail with.
@@ -18,10 +18,16 @@ problems! {
     path = "/problems",
     tag = "service",
     operation_id = "list_problems",
-    responses((status = 200, description = "All kinds of problems", body = Vec<ProblemKind>), Always)
+    responses((status = 200, description = "All kinds of problems", body = Vec<ProblemMeaning>), Always)
 )]
-pub async fn list() -> Json<Vec<ProblemKind>> {
-    Json(Kind::ALL.iter().copied().map(ProblemKind::from).collect())
+pub async fn list() -> Json<Vec<ProblemMeaning>> {
+    Json(
+        ProblemKind::ALL
+            .iter()
+            .copied()
+            .map(ProblemMeaning::from)
+            .collect(),
+    )
 }
 
 /// One kind of problem, explained; a problem's `type` leads here.
@@ -31,13 +37,16 @@ pub async fn list() -> Json<Vec<ProblemKind>> {
     tag = "service",
     operation_id = "explain_problem",
     params(("name" = String, Path, description = "The last part of a problem's `type`", example = "faulty-case")),
-    responses((status = 200, description = "What this kind of problem means", body = ProblemKind), ExplainProblems)
+    responses((status = 200, description = "What this kind of problem means", body = ProblemMeaning), ExplainProblems)
 )]
-pub async fn explain(Path(name): Path<String>) -> Result<Json<ProblemKind>, ApiError> {
-    let known = Kind::ALL.iter().copied().find(|kind| kind.slug() == name);
+pub async fn explain(Path(name): Path<String>) -> Result<Json<ProblemMeaning>, ApiError> {
+    let known = ProblemKind::ALL
+        .iter()
+        .copied()
+        .find(|kind| kind.slug() == name);
     known.map(|kind| Json(kind.into())).ok_or_else(|| {
         ApiError::new(
-            Kind::UnknownRoute,
+            ProblemKind::UnknownRoute,
             format!("`{name}` is no kind of problem; `/problems` lists them all"),
         )
     })

@@ -1,0 +1,111 @@
+//! A batch as the client sends and sees it.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::contact::case::Case;
+use crate::http::dto::job::rfc3339;
+use crate::http::dto::problem::Fault;
+use crate::jobs::batch::Batch;
+use crate::jobs::job::State as JobState;
+
+/// The cases of a batch.
+#[derive(ToSchema)]
+#[schema(min_items = 1, max_items = 200_000)]
+#[expect(
+    dead_code,
+    reason = "the form of a body that is cut into cases while it arrives"
+)]
+pub struct Cases(Vec<Case>);
+
+/// A batch that was accepted.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct BatchReceipt {
+    /// Identifier of the batch.
+    #[schema(value_type = String, format = "uuid")]
+    pub id: String,
+    /// Number of jobs made.
+    pub count: u32,
+    /// Number of faulty cases that were left out; 0 unless the request said `accept=valid`.
+    pub rejected: u32,
+    /// The faults of the cases that were left out, those of the first 1000.
+    pub errors: Vec<Fault>,
+    /// Where to go from here.
+    pub links: BTreeMap<String, String>,
+}
+
+/// A batch: how far it is.
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Batch)]
+pub struct BatchAnswer {
+    /// Identifier of the batch.
+    #[schema(value_type = String, format = "uuid")]
+    id: String,
+    /// Time of submission.
+    #[schema(format = "date-time", example = "2026-01-31T09:30:00.000Z")]
+    created_at: String,
+    /// Number of jobs made.
+    count: u32,
+    /// Number of faulty cases that were left out.
+    rejected: u32,
+    /// Number of jobs in each state.
+    states: BatchStates,
+    /// Share of the jobs that have ended.
+    #[schema(minimum = 0.0, maximum = 1.0)]
+    progress: f64,
+    /// Every job has ended.
+    pub ended: bool,
+    /// Where to go from here.
+    links: BTreeMap<String, String>,
+}
+
+/// Number of jobs in each state.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct BatchStates {
+    queued: u64,
+    running: u64,
+    succeeded: u64,
+    failed: u64,
+    cancelled: u64,
+}
+
+impl From<Batch> for BatchAnswer {
+    fn from(batch: Batch) -> Self {
+        let (ended, all) = batch.ended();
+        #[expect(clippy::cast_precision_loss, reason = "far fewer jobs than 2^53")]
+        let progress = if all == 0 {
+            1.0
+        } else {
+            ended as f64 / all as f64
+        };
+        BatchAnswer {
+            id: batch.id.to_string(),
+            created_at: rfc3339(batch.created_at),
+            count: batch.count,
+            rejected: batch.rejected,
+            states: BatchStates {
+                queued: batch.in_state(JobState::Queued),
+                running: batch.in_state(JobState::Running),
+                succeeded: batch.in_state(JobState::Succeeded),
+                failed: batch.in_state(JobState::Failed),
+                cancelled: batch.in_state(JobState::Cancelled),
+            },
+            progress,
+            ended: ended == all,
+            links: links(&batch),
+        }
+    }
+}
+
+pub fn links(batch: &Batch) -> BTreeMap<String, String> {
+    let own = format!("/v1/batches/{}", batch.id);
+    BTreeMap::from([
+        ("results".to_owned(), format!("{own}/results")),
+        ("cancel".to_owned(), format!("{own}/cancel")),
+        ("events".to_owned(), format!("{own}/events")),
+        ("jobs".to_owned(), format!("/v1/jobs?batch={}", batch.id)),
+        ("self".to_owned(), own),
+    ])
+}

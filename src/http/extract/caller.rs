@@ -1,0 +1,95 @@
+//! Who asks: the tenant whose jobs a handler may reach, or the operator of the service.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::extract::{FromRef, FromRequestParts};
+use axum::http::header;
+use axum::http::request::Parts;
+
+use crate::http::layers::auth::{Access, bearer};
+use crate::http::limits::concurrency::ConcurrencyLimits;
+use crate::http::limits::holding_body::HeldShares;
+use crate::http::problem::error::ApiError;
+use crate::http::problem::kinds::ProblemKind;
+use crate::jobs::Jobs;
+use crate::jobs::keys::{ANONYMOUS, OPERATOR};
+
+/// Whose request it is, once that is known; in its extensions.
+#[derive(Debug, Clone)]
+pub struct Tenant(pub Arc<str>);
+
+/// The key that a request came with, to be looked at again while its answer goes on; in its extensions.
+#[derive(Debug, Clone)]
+pub struct Credential(Arc<str>);
+
+/// How often the key of an answer that goes on is looked at.
+const POLL_INTERVAL: Duration = Duration::from_secs(2);
+
+/// Ends when the key that a request came with has been revoked; never without a key.
+pub async fn revoked(jobs: Jobs, credential: Option<Credential>) {
+    let Some(Credential(text)) = credential else {
+        return std::future::pending().await;
+    };
+    loop {
+        tokio::time::sleep(POLL_INTERVAL).await;
+        // A table that does not answer revokes nothing.
+        if matches!(jobs.key(&text).await, Ok(None)) {
+            return;
+        }
+    }
+}
+
+/// The jobs that the client may see: those of its tenant. Every handler that touches jobs takes this.
+#[derive(Debug, Clone)]
+pub struct Caller(pub Jobs);
+
+/// A client that may read the figures of the whole service.
+#[derive(Debug, Clone)]
+pub struct Operator(pub Jobs);
+
+/// All jobs, for what concerns no tenant.
+#[derive(Debug, Clone)]
+pub struct AnyTenant(pub Jobs);
+
+impl<S: Send + Sync> FromRequestParts<S> for Caller
+where
+    Access: FromRef<S>,
+    ConcurrencyLimits: FromRef<S>,
+{
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+        let access = Access::from_ref(state);
+        let tenant = access.tenant(parts).await?;
+        let tenant = tenant.unwrap_or_else(|| ANONYMOUS.into());
+        if let Some(held) = parts.extensions.get::<HeldShares>() {
+            held.add(ConcurrencyLimits::from_ref(state).request(&tenant)?);
+        }
+        parts.extensions.insert(Tenant(tenant.clone()));
+        let key = parts.headers.get(header::AUTHORIZATION);
+        if let Some(key) = key.and_then(|header| bearer(header.to_str().ok()?)) {
+            let credential = Credential(key.into());
+            parts.extensions.insert(credential);
+        }
+        Ok(Caller(access.jobs.of(tenant)))
+    }
+}
+
+impl<S: Send + Sync> FromRequestParts<S> for Operator
+where
+    Access: FromRef<S>,
+{
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+        let access = Access::from_ref(state);
+        match access.tenant(parts).await? {
+            Some(tenant) if *tenant != *OPERATOR => Err(ApiError::new(
+                ProblemKind::Forbidden,
+                format!("only keys of the tenant `{OPERATOR}` may read this"),
+            )),
+            _ => Ok(Operator(access.jobs.clone())),
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! What a picture shows, and what follows from it: the coloured values, the box around the cells, the zones.
+
+use crate::contact::case::Output;
+use crate::contact::solution::{PatchCells, PointFields};
+use crate::contact::zones::Zone;
+
+/// What a picture shows.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// First line, a text of the client.
+    pub title: String,
+    /// Smaller lines below, two at most.
+    pub remarks: Vec<String>,
+    /// The field that is coloured.
+    pub shown: Output,
+    /// The cells.
+    pub fields: PatchCells,
+    /// The values of one motion.
+    pub values: PointFields,
+}
+
+/// The coloured values: magnitudes per cell, their name and unit.
+pub struct Heat {
+    /// Magnitude per cell.
+    pub values: Vec<f64>,
+    /// What they are.
+    pub label: &'static str,
+    /// Their unit; empty if they have none.
+    pub unit: &'static str,
+}
+
+/// The magnitudes that a heat map shows; `None` for zones.
+pub fn heat(scene: &Scene) -> Option<Heat> {
+    let magnitude = |x: &Option<Vec<f64>>, y: &Option<Vec<f64>>| {
+        let (x, y) = (x.as_deref().unwrap_or(&[]), y.as_deref().unwrap_or(&[]));
+        x.iter().zip(y).map(|(x, y)| x.hypot(*y)).collect()
+    };
+    let values = &scene.values;
+    match scene.shown {
+        Output::Tractions => Some(Heat {
+            values: magnitude(&values.traction_x_mpa, &values.traction_y_mpa),
+            label: "traction",
+            unit: "MPa",
+        }),
+        Output::Pressure => Some(Heat {
+            values: scene.fields.pressure_mpa.clone().unwrap_or_default(),
+            label: "pressure",
+            unit: "MPa",
+        }),
+        Output::Slip => Some(Heat {
+            values: magnitude(&values.slip_x, &values.slip_y),
+            label: "slip / rolling speed",
+            unit: "",
+        }),
+        Output::Zones | Output::Resultants => None,
+    }
+}
+
+/// Box around the cells in mm.
+pub fn extent(fields: &PatchCells) -> [f64; 4] {
+    let mut shape = [
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+    ];
+    for cell in 0..fields.x_mm.len() {
+        let (x, y) = (fields.x_mm[cell], fields.y_mm[cell]);
+        let (dx, dy) = (0.5 * fields.dx_mm[cell], 0.5 * fields.dy_mm[cell]);
+        shape = [
+            shape[0].min(x - dx),
+            shape[1].max(x + dx),
+            shape[2].min(y - dy),
+            shape[3].max(y + dy),
+        ];
+    }
+    if shape.iter().all(|value| value.is_finite()) {
+        shape
+    } else {
+        [-1.0, 1.0, -1.0, 1.0]
+    }
+}
+
+/// Does any cell stick, or slip?
+pub fn zones_present(scene: &Scene) -> (bool, bool) {
+    let zones = scene.values.zone.as_deref().unwrap_or(&[]);
+    (zones.contains(&Zone::Stick), zones.contains(&Zone::Slip))
+}
