@@ -7,21 +7,26 @@ use std::time::Duration;
 use crate::jobs::Shared;
 use crate::jobs::error::JobsError;
 use crate::jobs::job::{FailureKind, State};
+use crate::jobs::reserve;
 use crate::jobs::worker::heartbeat;
 
 /// Jobs looked up in one statement by the sweep.
 const SWEEP_CHUNK: usize = 500;
 /// Time between two tries to do what a full disk did not allow.
 const RECOVER_EVERY: Duration = Duration::from_secs(1);
+/// Time between two looks whether there is room in reserve.
+const RESERVE_EVERY: Duration = Duration::from_secs(60);
 /// Results taken from the outbox at once.
 const COLLECT_CHUNK: u32 = 500;
 
 /// Takes jobs whose lease has run out from their workers, three times per lease, until the service drains.
 pub(super) async fn reap_expired(shared: Arc<Shared>) {
     let mut beat = tokio::time::interval(heartbeat(&shared));
+    beat.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
     let recovered = shared.recovered.wait();
     let _ = shared.draining.run_until_cancelled(recovered).await;
     let mut quiet_until = i64::MIN;
+    let mut looked = shared.steady_ms();
     while shared
         .draining
         .run_until_cancelled(beat.tick())
@@ -33,6 +38,11 @@ pub(super) async fn reap_expired(shared: Arc<Shared>) {
             quiet_until = shared.lease_until();
         }
         let now = shared.steady_ms();
+        // Who was held up by the table has held up the heartbeats of the workers as well.
+        if now.saturating_sub(looked) > shared.lease_ms() * 2 / 3 {
+            quiet_until = shared.lease_until();
+        }
+        looked = now;
         if now < quiet_until {
             continue;
         }
@@ -60,6 +70,7 @@ pub(super) async fn reap_expired(shared: Arc<Shared>) {
 /// long as the disk does not allow it.
 pub(super) async fn recover(shared: Arc<Shared>) {
     let mut beat = tokio::time::interval(RECOVER_EVERY);
+    let mut reserved = tokio::time::Instant::now();
     while shared
         .draining
         .run_until_cancelled(beat.tick())
@@ -73,6 +84,12 @@ pub(super) async fn recover(shared: Arc<Shared>) {
         }
         if !shared.underway().abandoned.is_empty() {
             shared.drop_abandoned().await;
+        }
+        if reserved.elapsed() >= RESERVE_EVERY && !shared.storage_failing.load(Ordering::Relaxed) {
+            reserved = tokio::time::Instant::now();
+            let data_dir = shared.options.data_dir.clone();
+            // It is tried again at the next time.
+            let _ = tokio::task::spawn_blocking(move || reserve::keep(&data_dir)).await;
         }
     }
 }

@@ -27,7 +27,7 @@ use crate::jobs::trace::Tracer;
 use crate::jobs::turns::Turns;
 use crate::jobs::underway::Underway;
 use crate::jobs::worker::Worker;
-use crate::jobs::{Jobs, Shared, housekeeping, retention, wishes};
+use crate::jobs::{Jobs, Shared, housekeeping, reserve, retention, wishes};
 
 /// The file that says that the job table was closed in good order.
 const CLOSED: &str = "closed";
@@ -133,7 +133,13 @@ impl Jobs {
         // After an end that closed the table there is nothing to be checked.
         let closed = std::fs::remove_file(options.data_dir.join(CLOSED)).is_ok();
         let unclean = !closed && table.exists();
-        let store = SqliteStore::open(&table).await?;
+        let store = match SqliteStore::open(&table).await {
+            Err(error) if error.trouble().is_some() && reserve::give_back(&options.data_dir) => {
+                tracing::warn!(%error, "the job table is opened on the reserve");
+                SqliteStore::open(&table).await?
+            }
+            opened => opened?,
+        };
         if unclean {
             store.check().await?;
         }
@@ -177,7 +183,10 @@ impl Jobs {
             Err(error) if error.trouble().is_some() => {
                 tracing::error!(%error, "the disk takes nothing; the service starts for reading");
             }
-            recovered => recovered?,
+            recovered => {
+                recovered?;
+                reserve::keep(&jobs.shared.options.data_dir);
+            }
         }
         Ok(jobs)
     }

@@ -26,6 +26,7 @@ pub mod lifecycle;
 mod metrics;
 mod part;
 pub mod recipe;
+mod reserve;
 pub mod results;
 pub mod retention;
 mod reuse;

@@ -22,7 +22,7 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 pub enum Trouble {
     /// No space is left, or a quota is used up.
     Full,
-    /// It is read-only, it fails, the job table is damaged, or locked by another process.
+    /// It is read-only, it fails, the job table is damaged, or locked by another process, or the results cannot be reached.
     Unwritable,
 }
 
@@ -37,15 +37,17 @@ impl JobsError {
                 of_io(source)
             }
             JobsError::Together(error) => error.trouble(),
+            JobsError::Results(object_store::Error::NotFound { .. }) => None,
             JobsError::Results(error) => {
                 let mut cause: Option<&(dyn Error + 'static)> = Some(error);
                 while let Some(error) = cause {
                     if let Some(error) = error.downcast_ref::<io::Error>() {
-                        return of_io(error);
+                        return of_io(error).or(Some(Trouble::Unwritable));
                     }
                     cause = error.source();
                 }
-                None
+                // Whatever it is, it is not about the job.
+                Some(Trouble::Unwritable)
             }
             _ => None,
         }
@@ -170,6 +172,16 @@ mod tests {
             source: Box::new(io::Error::from(io::ErrorKind::StorageFull)),
         });
         assert_eq!(wrapped.trouble(), Some(Trouble::Full));
+        let away = JobsError::Results(object_store::Error::Generic {
+            store: "a test",
+            source: Box::new(io::Error::from(io::ErrorKind::NotADirectory)),
+        });
+        assert_eq!(away.trouble(), Some(Trouble::Unwritable));
+        let gone = JobsError::Results(object_store::Error::NotFound {
+            path: "a key".to_owned(),
+            source: Box::new(io::Error::from(io::ErrorKind::NotFound)),
+        });
+        assert_eq!(gone.trouble(), None);
         assert_eq!(JobsError::NotFound.trouble(), None);
     }
 }

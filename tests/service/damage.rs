@@ -1,9 +1,11 @@
 //! Is a damaged job table noticed, and said so?
 
 use railhead::jobs::{Jobs, JobsError, Options};
+use reqwest::Method;
+use serde_json::Value;
 
 use crate::batches::small;
-use crate::support::open;
+use crate::support::{Service, open};
 
 #[tokio::test]
 async fn a_table_that_was_damaged_is_refused_after_an_unclean_end() {
@@ -27,4 +29,45 @@ async fn a_table_that_was_damaged_is_refused_after_an_unclean_end() {
         }
         other => panic!("{other:?}"),
     }
+}
+
+#[tokio::test]
+async fn a_table_that_is_damaged_under_a_service_is_told_by_probes_metrics_and_refusals() {
+    let folder = tempfile::tempdir().unwrap();
+    let jobs = open(Options::new(folder.path()), railhead::contact::solve).await;
+    for number in 0..400 {
+        jobs.submit(small(&number.to_string()), None).await.unwrap();
+    }
+    jobs.shutdown(std::time::Duration::ZERO).await;
+    // After an orderly end nobody looks for damage at the start: it is met while the service runs. What the tables begin with
+    // lies in front.
+    let file = folder.path().join("jobs.db");
+    let mut bytes = std::fs::read(&file).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle..].fill(0xA5);
+    std::fs::write(&file, bytes).unwrap();
+    let service = Service::start(folder.path(), &["--cache", "false"]);
+    let mut refusal = None;
+    for _ in 0..50 {
+        let request = service.request(Method::POST, "/v1/jobs");
+        let answer = request.json(&small("more")).send().await.unwrap();
+        if answer.status() != 202 {
+            refusal = Some(answer);
+            break;
+        }
+    }
+    let refusal = refusal.expect("a damaged table takes no jobs");
+    assert_eq!(refusal.status(), 503);
+    assert!(refusal.headers().contains_key("retry-after"));
+    let problem: Value = refusal.json().await.unwrap();
+    assert_eq!(problem["type"], "/problems/storage-unwritable", "{problem}");
+    let get = async |path: &str| service.request(Method::GET, path).send().await.unwrap();
+    let metrics = get("/metrics").await;
+    assert_eq!(metrics.status(), 200);
+    let metrics = metrics.text().await.unwrap();
+    assert!(
+        metrics.contains("\nrailhead_storage_failing 1\n"),
+        "{metrics}"
+    );
+    assert_eq!(get("/healthz").await.status(), 200);
 }

@@ -22,6 +22,7 @@ mod formats;
 mod fuzzed;
 mod guides;
 mod keys;
+mod leases;
 mod malformed;
 #[cfg(target_os = "linux")]
 mod memory;

@@ -9,9 +9,10 @@ use serde_json::{Value, json};
 use sqlx::Connection;
 use tempfile::TempDir;
 
+use crate::batches::small;
 use crate::errors::assert_problem;
 use crate::server::Answer;
-use crate::support::{Service, case, long_case, pause, railhead, skip};
+use crate::support::{Service, case, endless_case, long_case, pause, railhead, skip};
 use crate::sweeps::sliced_case;
 
 /// A small file system of its own, unmounted when dropped.
@@ -37,12 +38,19 @@ impl Disk {
 
     /// Takes all the room that is left.
     fn fill(&self) -> PathBuf {
+        self.fill_but(0)
+    }
+
+    /// Takes all the room but this many bytes.
+    fn fill_but(&self, spare: u64) -> PathBuf {
         use std::io::Write;
         let path = self.folder.path().join("ballast");
         let mut file = std::fs::File::create(&path).unwrap();
         for size in [1 << 16, 1 << 10, 1] {
             while file.write_all(&vec![1; size]).is_ok() {}
         }
+        let taken = file.metadata().unwrap().len();
+        file.set_len(taken.saturating_sub(spare)).unwrap();
         path
     }
 }
@@ -146,6 +154,103 @@ async fn a_full_disk_refuses_what_comes_and_loses_nothing_it_has() {
     let list = service.get("/v1/jobs?limit=1000").await;
     let known = list["jobs"].as_array().unwrap().len();
     assert_eq!(known, accepted.len() + 1, "no more than were acknowledged");
+}
+
+/// Sends a batch under a key.
+async fn send_batch(service: &Service, key: &str, cases: &[Value]) -> Answer {
+    let request = service.request(Method::POST, "/v1/batches");
+    let lines: String = cases.iter().map(|case| format!("{case}\n")).collect();
+    let request = request
+        .header("Idempotency-Key", key)
+        .header("Content-Type", "application/x-ndjson");
+    answer(request.body(lines)).await
+}
+
+#[tokio::test]
+async fn a_batch_that_fills_the_disk_leaves_nothing_and_its_key_is_free_at_once() {
+    let Some(disk) = Disk::mount("size=64m") else {
+        skip("this process may not mount a file system");
+        return;
+    };
+    let flags = ["--cache", "false", "--workers", "1"];
+    let service = Service::start(&disk.data_dir(), &flags);
+    let cases: Vec<Value> = (0..6000)
+        .map(|number| {
+            let mut case = small(&number.to_string());
+            case["load"]["normal_force_n"] = json!(50_000 + number);
+            case
+        })
+        .collect();
+    let bytes: usize = cases.iter().map(|case| case.to_string().len() + 1).sum();
+    // Room for the staged cases and some of the rows.
+    let ballast = disk.fill_but(bytes as u64 * 2 + (1 << 20));
+    let refusal = send_batch(&service, "k", &cases).await;
+    assert_problem(&refusal, 507, "storage-full", "");
+    let list = service.get("/v1/jobs?limit=1000").await;
+    assert_eq!(list["jobs"], json!([]), "nothing is listed");
+    std::fs::remove_file(ballast).unwrap();
+    let again = send_batch(&service, "k", &cases).await;
+    assert_eq!(again.status, 202, "{}", again.text);
+    let path = format!("/v1/batches/{}", again.json["id"].as_str().unwrap());
+    while service.get(&path).await["states"]["succeeded"] != json!(cases.len()) {
+        pause().await;
+    }
+    let metrics = answer(service.request(Method::GET, "/metrics")).await.text;
+    let solved = format!(
+        "\nrailhead_jobs_ended_total{{state=\"succeeded\"}} {}\n",
+        cases.len()
+    );
+    assert!(
+        metrics.contains(&solved),
+        "no case of the refused batch was solved: {metrics}"
+    );
+}
+
+#[tokio::test]
+async fn a_service_starts_on_a_full_disk_and_serves_what_it_has() {
+    // A kill leaves most to be done by a start, an orderly end the fewest files.
+    for killed in [true, false] {
+        starts_on_a_full_disk(killed).await;
+    }
+}
+
+async fn starts_on_a_full_disk(killed: bool) {
+    let Some(disk) = Disk::mount("size=16m") else {
+        skip("this process may not mount a file system");
+        return;
+    };
+    let flags = ["--cache", "false", "--workers", "1"];
+    let flags = [&flags[..], &["--shutdown-grace-s", "0"]].concat();
+    let service = Service::start(&disk.data_dir(), &flags);
+    let solved = service.submit(&case("solved")).await;
+    service.until(&solved, "succeeded").await;
+    let running = service.submit(&endless_case("running")).await;
+    service.until(&running, "running").await;
+    if killed {
+        service.kill();
+    } else {
+        service.signal("TERM");
+        assert!(service.wait().success());
+    }
+    let ballast = disk.fill();
+    let service = Service::start(&disk.data_dir(), &flags);
+    service.get(&format!("/v1/jobs/{solved}/result")).await;
+    if killed {
+        // The other one has the room that was kept for its start.
+        assert_problem(
+            &submit(&service, &case("refused")).await,
+            507,
+            "storage-full",
+            "",
+        );
+        assert_problem(&ready(&service).await, 507, "storage-full", "");
+    }
+    std::fs::remove_file(ballast).unwrap();
+    until_ready(&service).await;
+    service.until(&running, "running").await;
+    let after = submit(&service, &case("after")).await;
+    assert_eq!(after.status, 202, "{}", after.text);
+    all_succeed(&service, &[after.json["id"].as_str().unwrap().to_owned()]).await;
 }
 
 #[tokio::test]

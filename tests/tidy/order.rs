@@ -26,6 +26,7 @@ const ORDER: &[&str] = &[
     "jobs::gate",
     "jobs::idempotency",
     "jobs::recipe",
+    "jobs::reserve",
     "jobs::spool",
     "jobs::watch",
     "jobs::sweep",

@@ -100,7 +100,11 @@ impl SqliteStore {
                 .max_lifetime(None)
                 .test_before_acquire(false)
         };
-        let writing = options.clone().auto_vacuum(SqliteAutoVacuum::Incremental);
+        let mut writing = options.clone();
+        // The mode stays with the file. Setting it again writes a page, which a full disk does not take.
+        if std::fs::metadata(file).is_ok_and(|about| about.len() == 0) {
+            writing = writing.auto_vacuum(SqliteAutoVacuum::Incremental);
+        }
         let writer = pool(1)
             .before_acquire(|connection, _| Box::pin(is_free(connection)))
             .connect_with(writing)
