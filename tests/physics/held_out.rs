@@ -103,7 +103,7 @@ fn estimates_cover_the_error_of_random_ellipses() {
 
 #[test]
 fn estimates_cover_the_error_of_random_smooth_pressures() {
-    assert_covers(Class::Smooth, 95, 3, 6.5);
+    assert_covers(Class::Smooth, 95, 3, 4.3);
 }
 
 #[test]
@@ -113,7 +113,7 @@ fn estimates_cover_the_error_of_pressures_that_jump_or_a_remark_says_so() {
 
 #[test]
 fn estimates_cover_the_error_of_random_gaps() {
-    assert_covers(Class::Gap, 95, 1, 5.0);
+    assert_covers(Class::Gap, 95, 1, 4.2);
 }
 
 #[test]

@@ -64,3 +64,4 @@ mod sweeps;
 mod targets;
 #[path = "../../benches/calibrate/truth.rs"]
 mod truth;
+mod watched;

@@ -10,7 +10,7 @@ use crate::contact::tangential::companions::Seen;
 use crate::contact::tangential::estimate_constants::{
     CAUTION, DATA, DECAY, DENSE_LEVELS, DENSE_LEVELS_NEAR, DIFFERENCES, JUMPING, LEVELS_LIKE,
     LEVELS_UNLIKE, LOAD, POLE_WEIGHT, REGION, REGION_CELLS, RULES_ON_MESH, RULES_ON_MESH_SAMPLED,
-    SHARE_LARGE, STRIPS_FEW, WITHOUT_COMPANION,
+    SAMPLED, SAMPLED_DECAY, SHARE_LARGE, STRIPS_FEW, SURPRISES, WITHOUT_COMPANION,
 };
 use crate::contact::tangential::ladder::{CELLS_FIRST, Regime};
 use crate::contact::tangential::level::Level;
@@ -212,9 +212,17 @@ impl Measured {
 /// The factor on the root of the squares.
 fn scale(problem: &Problem, level: &Level, patches: usize) -> f64 {
     let cells = level.mesh.cells() as f64 / patches.max(1) as f64;
-    let decay = (CELLS_FIRST / cells).min(1.0).powf(DECAY);
-    let samples = if jumps(problem) { JUMPING } else { 1.0 };
-    samples * decay * few_strips(level).sqrt()
+    let finer = (CELLS_FIRST / cells).min(1.0);
+    let (samples, decay) = match (&problem.region, problem.normal) {
+        (Region::Grid(field), None) => {
+            let [smooth, jumping] = SURPRISES;
+            let between = ((field.surprise() - smooth) / (jumping - smooth)).clamp(0.0, 1.0);
+            let mixed = |smooth: f64, jumping: f64| smooth + between * (jumping - smooth);
+            (mixed(SAMPLED, JUMPING), mixed(SAMPLED_DECAY, DECAY))
+        }
+        _ => (1.0, DECAY),
+    };
+    samples * finer.powf(decay) * few_strips(level).sqrt()
 }
 
 /// Is the pressure one that was given with jumps?

@@ -81,6 +81,13 @@ impl PressureField {
         self.grids.iter().find_map(GridPressure::jump)
     }
 
+    /// How far a given pressure is from smooth, see [`GridPressure::surprise`].
+    #[must_use]
+    pub fn surprise(&self) -> f64 {
+        let each = self.grids.iter().map(GridPressure::surprise);
+        each.fold(0.0, f64::max)
+    }
+
     /// Segments that a strip has on average, for each patch.
     #[must_use]
     pub fn segments_per_strip(&self) -> Vec<f64> {

@@ -56,6 +56,7 @@ pub struct GridPressure {
     images: Vec<usize>,
     /// The largest jump from one given sample to the next.
     jump: Option<Jump>,
+    surprise: f64,
 }
 
 impl GridPressure {
@@ -89,7 +90,7 @@ impl GridPressure {
         }
         let (mut field, samples) = GridPressure::from_squares(grid, q, pressure_max)?;
         let mut remarks = field.remarks(&samples, &field.shapes);
-        field.jump = field.find_jump();
+        (field.surprise, field.jump) = field.find_jump();
         if let Some(jump) = field.jump {
             let remark = Remark::PressureJumps {
                 x_mm: jump.at[0],
@@ -122,6 +123,7 @@ impl GridPressure {
             shapes: Vec::new(),
             images: Vec::new(),
             jump: None,
+            surprise: 0.0,
         };
         field.shapes = field.shapes_from_samples(&samples, count);
         field.images = field.find_images(&samples);

@@ -1,0 +1,108 @@
+//! A caller is asked again and again whether a solve shall go on, also on the largest inputs.
+
+use std::cell::Cell;
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use railhead::contact::error::SolveError;
+use railhead::contact::monitor::{Monitor, Stop};
+use railhead::contact::problem::Limits;
+use railhead::contact::{check, solve};
+use serde_json::{Value, json};
+
+use crate::damaged::{resampled, with};
+use crate::profile_cases::{generated, put};
+use crate::profile_shapes::{rail_60e1, s1002};
+
+/// Measured on the inputs below: at most 0.04 s. This is a guard against a stage that asks nobody, not a limit of time.
+const SILENCE_MAX: Duration = Duration::from_secs(1);
+
+/// Counts ticks and the longest time between two, and stops at one of them.
+struct Counting {
+    began: Instant,
+    last: Cell<Instant>,
+    silence: Cell<Duration>,
+    ticks: Cell<u32>,
+    stop_at: Option<u32>,
+}
+
+impl Counting {
+    fn new(stop_at: Option<u32>) -> Counting {
+        let now = Instant::now();
+        Counting {
+            began: now,
+            last: Cell::new(now),
+            silence: Cell::new(Duration::ZERO),
+            ticks: Cell::new(0),
+            stop_at,
+        }
+    }
+}
+
+impl Monitor for Counting {
+    fn tick(&self, _progress: f64) -> ControlFlow<Stop> {
+        let now = Instant::now();
+        let silence = now - self.last.replace(now);
+        self.silence.set(self.silence.get().max(silence));
+        self.ticks.set(self.ticks.get() + 1);
+        match self.stop_at {
+            Some(stop) if self.ticks.get() >= stop => ControlFlow::Break(Stop::Cancelled),
+            _ => ControlFlow::Continue(()),
+        }
+    }
+
+    fn elapsed(&self) -> Duration {
+        self.began.elapsed()
+    }
+}
+
+/// Profiles of nearly as many points as are allowed, in contact at gauge corner and flange.
+fn long_profiles() -> Value {
+    let case = put(&generated(), "contact", json!({ "lateral_shift_mm": -5.0 }));
+    let fine = |points: Vec<[f64; 2]>| resampled(&points, 0.009);
+    let mut case = with(&case, &fine(rail_60e1()), &fine(s1002()), 3.0);
+    case["solver"] = json!({ "target_error": 0.02 });
+    case
+}
+
+/// A rough gap of 600 by 600 samples.
+fn large_gap() -> Value {
+    let count = 600;
+    let axis: Vec<f64> = (0..count)
+        .map(|k| 24.0 * (f64::from(k) / f64::from(count - 1) - 0.5))
+        .collect();
+    let row = |y: &f64| -> Vec<f64> {
+        let height =
+            |x: &f64| x * x / 800.0 + y * y / 600.0 + 0.003 * (5.0 * x).sin() * (7.0 * y).cos();
+        axis.iter().map(height).collect()
+    };
+    let gap: Vec<Vec<f64>> = axis.iter().map(row).collect();
+    let mut case = put(&generated(), "material", json!({}));
+    case["contact"] = json!({ "type": "gap_grid", "x_mm": axis, "y_mm": axis, "gap_mm": gap });
+    case["load"] = json!({ "normal_force_n": 80e3 });
+    case["motion"] = json!({ "creepage_x": 0.001 });
+    case["solver"] = json!({ "target_error": 0.02 });
+    case
+}
+
+#[test]
+fn no_stage_leaves_the_caller_unasked_on_the_largest_inputs() {
+    for (name, case) in [("profiles", long_profiles()), ("gap", large_gap())] {
+        let problem = check(&case, &Limits::default()).expect("a case");
+        let monitor = Counting::new(None);
+        solve(&problem, &monitor).expect("an answer");
+        assert!(monitor.tick(1.0).is_continue());
+        let silence = monitor.silence.get();
+        assert!(silence < SILENCE_MAX, "{name}: {silence:?}");
+        // A stop is obeyed wherever it comes, at the tick that says it.
+        let ticks = monitor.ticks.get();
+        assert!(ticks > 50, "{name}: {ticks} ticks");
+        for part in 1..8 {
+            let stop_at = 1 + part * ticks / 9;
+            let monitor = Counting::new(Some(stop_at));
+            let found = solve(&problem, &monitor).map(|_| ());
+            assert_eq!(found, Err(SolveError::Cancelled), "{name} at {stop_at}");
+            assert_eq!(monitor.ticks.get(), stop_at, "{name}");
+        }
+    }
+}
