@@ -4,7 +4,8 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 
-use crate::cli::{BackupArgs, print};
+use crate::cli::commands::BackupArgs;
+use crate::cli::output::print;
 use crate::jobs::backup::backup;
 
 /// Makes the copy and names it.

@@ -1,11 +1,42 @@
-//! The settings of the commands beside `serve`.
+//! The command line: every command, and the settings of those beside `serve`.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
-use clap::{Args, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
 
-use crate::cli::{CaseArgs, address};
+use crate::cli::case_args::CaseArgs;
+use crate::cli::serve_args::ServeArgs;
+use crate::cli::values::address;
+
+/// Rolling-contact stress service: tractions, stick and slip zones and forces between wheel and rail.
+#[derive(Debug, Parser)]
+#[command(name = "railhead", version, about)]
+pub struct Cli {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What can be started.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Serve the HTTP API and solve what is submitted.
+    Serve(ServeArgs),
+    /// Solve one case without a server; the result goes to standard output.
+    ///
+    /// Exit code 0: solved; 1: no answer; 2: the case is faulty.
+    Solve(SolveArgs),
+    /// Make, list and revoke API keys; also while the service runs.
+    Keys(KeysArgs),
+    /// Copy the data folder, also while the service runs; a service can be started on the copy.
+    Backup(BackupArgs),
+    /// Print the settings that `serve` would run with and where each comes from, as JSON; takes the flags of `serve`.
+    Config(ServeArgs),
+    /// Ask a running service whether it is ready; exit code 0 if it is, 1 if not.
+    Healthcheck(HealthcheckArgs),
+    /// Print the contract of the HTTP API (OpenAPI 3.1, JSON).
+    Openapi,
+}
 
 /// Settings of `backup`.
 #[derive(Debug, Clone, Args)]
@@ -106,4 +137,72 @@ pub struct HealthcheckArgs {
         value_parser = address
     )]
     pub listen: SocketAddr,
+}
+
+/// Variables named `RAILHEAD_…` that no command reads: most likely misspelt.
+#[must_use]
+pub fn unknown_variables() -> Vec<String> {
+    let command = Cli::command();
+    let mut known = Vec::new();
+    let mut commands = vec![&command];
+    while let Some(command) = commands.pop() {
+        let names = command.get_arguments().filter_map(clap::Arg::get_env);
+        known.extend(names.map(|name| name.to_string_lossy().into_owned()));
+        commands.extend(command.get_subcommands());
+    }
+    let given = std::env::vars_os().map(|(name, _)| name.to_string_lossy().into_owned());
+    let ours =
+        given.filter(|name| name.starts_with("RAILHEAD_") && !name.starts_with("RAILHEAD_TEST_"));
+    ours.filter(|name| !known.contains(name)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn every_setting_of_a_service_has_its_variable() {
+        let command = Cli::command();
+        let serve = command.find_subcommand("serve").unwrap();
+        for arg in serve
+            .get_arguments()
+            .filter(|arg| arg.get_long() != Some("help"))
+        {
+            let flag = arg.get_long().unwrap();
+            let variable = format!("RAILHEAD_{}", flag.to_uppercase().replace('-', "_"));
+            assert_eq!(
+                arg.get_env().and_then(|name| name.to_str()),
+                Some(variable.as_str())
+            );
+        }
+    }
+
+    #[test]
+    fn every_setting_of_a_service_is_in_the_manual() {
+        // Read and not compiled in: the image is built without the documents.
+        let manual = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/operations.md");
+        let manual = std::fs::read_to_string(manual).expect("the manual");
+        let command = Cli::command();
+        let serve = command.find_subcommand("serve").unwrap();
+        for flag in serve.get_arguments().filter_map(clap::Arg::get_long) {
+            let there = flag == "help" || manual.contains(&format!("--{flag}"));
+            assert!(there, "--{flag} is not in docs/operations.md");
+        }
+    }
+
+    #[test]
+    fn without_flags_one_core_is_left_to_the_service() {
+        let Command::Serve(args) = Cli::try_parse_from(["railhead", "serve"]).unwrap().command
+        else {
+            panic!("serve was asked for");
+        };
+        let cores = std::thread::available_parallelism().unwrap().get();
+        assert_eq!(args.worker_count(), if cores > 1 { cores - 1 } else { 1 });
+        assert!(Cli::try_parse_from(["railhead", "serve", "--workers", "0"]).is_err());
+    }
 }

@@ -4,7 +4,7 @@ use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Command};
 use serde_json::{Map, Value, json};
 
-use crate::cli::ServeArgs;
+use crate::cli::serve_args::ServeArgs;
 
 /// What is shown in place of a secret.
 const MASK: &str = "***";
@@ -60,7 +60,7 @@ mod tests {
     use clap::{CommandFactory, FromArgMatches};
 
     use super::*;
-    use crate::cli::{Cli, Command as Asked};
+    use crate::cli::commands::{Cli, Command as Asked};
 
     #[test]
     fn a_secret_is_masked_and_the_rest_is_told() {

@@ -7,10 +7,10 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 
-use crate::cli::HealthcheckArgs;
+use crate::cli::commands::HealthcheckArgs;
 
 /// How long each step may take.
-const PATIENCE: Duration = Duration::from_secs(3);
+const STEP_TIMEOUT: Duration = Duration::from_secs(3);
 /// Enough for the status line.
 const ANSWER_BYTES: u64 = 1024;
 
@@ -63,7 +63,7 @@ fn parse(url: &str) -> anyhow::Result<(String, String)> {
 fn ask(authority: &str, path: &str) -> anyhow::Result<u16> {
     let mut reason = anyhow::anyhow!("{authority} has no address");
     for address in authority.to_socket_addrs()? {
-        match TcpStream::connect_timeout(&address, PATIENCE) {
+        match TcpStream::connect_timeout(&address, STEP_TIMEOUT) {
             Ok(stream) => return status(stream, authority, path),
             Err(error) => reason = error.into(),
         }
@@ -72,8 +72,8 @@ fn ask(authority: &str, path: &str) -> anyhow::Result<u16> {
 }
 
 fn status(mut stream: TcpStream, authority: &str, path: &str) -> anyhow::Result<u16> {
-    stream.set_read_timeout(Some(PATIENCE))?;
-    stream.set_write_timeout(Some(PATIENCE))?;
+    stream.set_read_timeout(Some(STEP_TIMEOUT))?;
+    stream.set_write_timeout(Some(STEP_TIMEOUT))?;
     write!(
         stream,
         "GET {path} HTTP/1.1\r\nHost: {authority}\r\nConnection: close\r\n\r\n"

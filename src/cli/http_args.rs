@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::Args;
 
-use crate::cli::address;
+use crate::cli::values::address;
 use crate::http::HttpOptions;
 
 /// Limits of requests and connections.

@@ -4,7 +4,8 @@ use std::process::ExitCode;
 
 use anyhow::{Context, bail};
 
-use crate::cli::{KeysAction, KeysArgs, complain, print};
+use crate::cli::commands::{KeysAction, KeysArgs};
+use crate::cli::output::{print, print_error};
 use crate::jobs::keys::{Key, Keyring};
 
 /// Does what was asked of the keys.
@@ -28,7 +29,7 @@ async fn act(args: &KeysArgs) -> anyhow::Result<ExitCode> {
     let done = match &args.action {
         KeysAction::Create { tenant, name, .. } => {
             let (key, secret) = keys.create(tenant, name.clone()).await?;
-            complain(&format!(
+            print_error(&format!(
                 "key {} of tenant {} in {} follows; it is shown this one time",
                 key.id,
                 key.tenant,

@@ -8,17 +8,21 @@
 //! back to the queue uncounted; the data folder is closed; the last spans are sent. A second signal ends the process at
 //! once, which loses nothing either: the next start takes the running jobs back.
 
+use std::net::SocketAddr;
 use std::process::ExitCode;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
 use axum::http::HeaderValue;
 use tokio::net::TcpListener;
+use tokio::task::JoinHandle;
 use tokio::time::{Instant, sleep_until, timeout_at};
 use tokio_util::sync::CancellationToken;
 
+use crate::cli::commands::unknown_variables;
+use crate::cli::serve_args::ServeArgs;
 use crate::cli::stop::{Schedule, Signals};
-use crate::cli::{Anonymous, ServeArgs, unknown_variables};
+use crate::cli::values::Anonymous;
 use crate::http::{self, HttpOptions};
 use crate::jobs::recipe::Recipe;
 use crate::jobs::trace::Tracer;
@@ -62,26 +66,12 @@ fn request_threads() -> usize {
     cores.max(REQUEST_THREADS_MIN)
 }
 
+/// Starts a service, waits until it is to stop, and stops it.
 async fn serve(args: &ServeArgs) -> anyhow::Result<ExitCode> {
     let mut signals = Signals::listen()?;
-    let workers = args.worker_count();
     let traces = args.otlp_endpoint.as_ref().map(Traces::start).transpose()?;
-    let options = args.worker.apply(Options {
-        workers,
-        limits: args.case.limits(),
-        attempts_max: args.attempts_max,
-        queue_max: args.queue_max,
-        cache: args.cache,
-        retention: args.retention.0,
-        tenant_queue_max: args.tenant_queue_max,
-        tracer: traces.as_ref().map(|traces| Tracer::new(traces.tracer())),
-        ..Options::new(&args.data_dir)
-    });
-    let recipe = Recipe::with_operators(args.case.operators());
-    let jobs = Jobs::open_with(options, recipe).await?;
-    let listener = TcpListener::bind(args.listen)
-        .await
-        .with_context(|| format!("cannot listen on {}", args.listen))?;
+    let jobs = open_jobs(args, traces.as_ref()).await?;
+    let listener = bind(args.listen).await?;
     let address = listener.local_addr()?;
     let anonymous = args.anonymous.on(address);
     if !anonymous && !jobs.any_key().await? {
@@ -94,15 +84,73 @@ async fn serve(args: &ServeArgs) -> anyhow::Result<ExitCode> {
         );
     }
     jobs.start()?;
-
     let stop = CancellationToken::new();
+    let mut server = start_listening(args, &jobs, listener, anonymous, stop.clone()).await?;
+    if anonymous && !address.ip().is_loopback() {
+        tracing::warn!(%address, "whoever reaches this address may use the service without a key");
+    }
+    let workers = args.worker_count();
+    tracing::info!(%address, workers, data_dir = %args.data_dir.display(), "listening");
+
+    let name = tokio::select! {
+        name = signals.next() => name,
+        () = jobs.broken().cancelled() => "too many solver threads that do not stop",
+        ended = &mut server => {
+            // The listener never ends by itself; if it does the jobs are still handed back.
+            jobs.shutdown(args.shutdown_grace()).await;
+            ended.context("the listener failed")?;
+            return Ok(ExitCode::SUCCESS);
+        }
+    };
+    tracing::info!(signal = name, "stopping");
+    let schedule = Schedule::new(args.drain_delay(name), args.shutdown_grace());
+    schedule.enforce();
+    signals.end_at_next();
+    stop_service(&jobs, schedule, stop, server).await?;
+    if let Some(traces) = traces {
+        traces.stop().await;
+    }
+    tracing::info!("stopped");
+    Ok(if jobs.broken().is_cancelled() {
+        ExitCode::from(START_AGAIN)
+    } else {
+        ExitCode::SUCCESS
+    })
+}
+
+/// Opens the data folder with the settings of the workers.
+async fn open_jobs(args: &ServeArgs, traces: Option<&Traces>) -> anyhow::Result<Jobs> {
+    let options = args.worker.apply(Options {
+        workers: args.worker_count(),
+        limits: args.case.limits(),
+        attempts_max: args.attempts_max,
+        queue_max: args.queue_max,
+        cache: args.cache,
+        retention: args.retention.0,
+        tenant_queue_max: args.tenant_queue_max,
+        tracer: traces.map(|traces| Tracer::new(traces.tracer())),
+        ..Options::new(&args.data_dir)
+    });
+    let recipe = Recipe::with_operators(args.case.operators());
+    Ok(Jobs::open_with(options, recipe).await?)
+}
+
+async fn bind(address: SocketAddr) -> anyhow::Result<TcpListener> {
+    let listener = TcpListener::bind(address).await;
+    listener.with_context(|| format!("cannot listen on {address}"))
+}
+
+/// Answers requests until `stop`, and probes on their own port, if they have one, until the process ends.
+async fn start_listening(
+    args: &ServeArgs,
+    jobs: &Jobs,
+    listener: TcpListener,
+    anonymous: bool,
+    stop: CancellationToken,
+) -> anyhow::Result<JoinHandle<()>> {
     let (options, origins) = http_options(args, anonymous)?;
     let probe_listener = match args.http.probe_listen {
-        Some(address) => Some(
-            TcpListener::bind(address)
-                .await
-                .with_context(|| format!("cannot listen on {address}"))?,
-        ),
+        Some(address) => Some(bind(address).await?),
         None => None,
     };
     let probe_address = probe_listener.as_ref().map(TcpListener::local_addr);
@@ -122,29 +170,18 @@ async fn serve(args: &ServeArgs) -> anyhow::Result<ExitCode> {
             address_connections_max: PROBE_CONNECTIONS,
             ..options.clone()
         };
-        // Probes are answered until the process ends.
         tokio::spawn(http::serve(listener, probes, few, CancellationToken::new()));
     }
-    let mut server = tokio::spawn(http::serve(listener, router, options, stop.clone()));
-    if anonymous && !address.ip().is_loopback() {
-        tracing::warn!(%address, "whoever reaches this address may use the service without a key");
-    }
-    tracing::info!(%address, workers, data_dir = %args.data_dir.display(), "listening");
+    Ok(tokio::spawn(http::serve(listener, router, options, stop)))
+}
 
-    let name = tokio::select! {
-        name = signals.next() => name,
-        () = jobs.broken().cancelled() => "too many solver threads that do not stop",
-        ended = &mut server => {
-            // The listener never ends by itself; if it does the jobs are still handed back.
-            jobs.shutdown(args.shutdown_grace()).await;
-            ended.context("the listener failed")?;
-            return Ok(ExitCode::SUCCESS);
-        }
-    };
-    tracing::info!(signal = name, "stopping");
-    let schedule = Schedule::new(args.drain_delay(name), args.shutdown_grace());
-    schedule.enforce();
-    signals.end_at_next();
+/// Stops step by step: not ready, port closed, requests ended, jobs handed back, data folder closed.
+async fn stop_service(
+    jobs: &Jobs,
+    schedule: Schedule,
+    stop: CancellationToken,
+    mut server: JoinHandle<()>,
+) -> anyhow::Result<()> {
     jobs.drain();
     sleep_until(schedule.port_closes).await;
     stop.cancel();
@@ -165,15 +202,7 @@ async fn serve(args: &ServeArgs) -> anyhow::Result<ExitCode> {
             "the data folder could not be closed in time; the next start takes the running jobs back"
         );
     }
-    if let Some(traces) = traces {
-        traces.stop().await;
-    }
-    tracing::info!("stopped");
-    Ok(if jobs.broken().is_cancelled() {
-        ExitCode::from(START_AGAIN)
-    } else {
-        ExitCode::SUCCESS
-    })
+    Ok(())
 }
 
 /// The limits of requests and the origins of other pages.

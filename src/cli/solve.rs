@@ -11,7 +11,8 @@ use anyhow::Context;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use crate::cli::{SolveArgs, complain, print};
+use crate::cli::commands::SolveArgs;
+use crate::cli::output::{print, print_error};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::solution::{Fields, PatchCells, PatchFields, PointFields, Solution};
 use crate::contact::{check, solve_with};
@@ -48,7 +49,7 @@ pub(super) fn run(args: &SolveArgs) -> anyhow::Result<ExitCode> {
     let case: Value = match serde_json::from_slice(&text) {
         Ok(case) => case,
         Err(error) => {
-            complain(&format!("{} is not JSON: {error}", args.file.display()));
+            print_error(&format!("{} is not JSON: {error}", args.file.display()));
             return Ok(ExitCode::from(FAULTY_CASE));
         }
     };
@@ -61,7 +62,7 @@ pub(super) fn run(args: &SolveArgs) -> anyhow::Result<ExitCode> {
                 } else {
                     &fault.pointer
                 };
-                complain(&format!("{place}: {}", fault.detail));
+                print_error(&format!("{place}: {}", fault.detail));
             }
             return Ok(ExitCode::from(FAULTY_CASE));
         }

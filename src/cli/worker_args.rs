@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use clap::Args;
 
+use crate::cli::values::positive;
 use crate::jobs::Options;
 use crate::jobs::staging::StagingBounds;
 
@@ -76,13 +77,5 @@ impl WorkerArgs {
             },
             ..options
         }
-    }
-}
-
-/// Reads a time of at least a millisecond, and not above a day, in s.
-fn positive(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(seconds) if (0.001..=86_400.0).contains(&seconds) => Ok(seconds),
-        _ => Err("a number of seconds from 0.001 to 86400".to_owned()),
     }
 }

@@ -80,10 +80,14 @@ const ORDER: &[&str] = &[
     "http::routes",
     "http",
     "telemetry",
-    "cli::stop",
+    "cli::output",
+    "cli::values",
+    "cli::case_args",
     "cli::worker_args",
     "cli::http_args",
+    "cli::serve_args",
     "cli::commands",
+    "cli::stop",
     "cli::solve",
     "cli::serve",
     "cli::keys",
@@ -105,6 +109,7 @@ pub const DOOR: &[&str] = &[
     "contact::remark",
     "contact::slices",
     "contact::solution",
+    "contact::tangential::operator_store",
     "contact::zones",
 ];
 

@@ -1,0 +1,151 @@
+//! The settings of `serve`.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::thread::available_parallelism;
+use std::time::Duration;
+
+use clap::Args;
+
+use crate::cli::case_args::CaseArgs;
+use crate::cli::http_args::HttpArgs;
+use crate::cli::values::{Anonymous, Retention, address, origin, retention};
+use crate::cli::worker_args::WorkerArgs;
+use crate::telemetry::{Endpoint, LogFormat};
+
+/// Settings of `serve`.
+#[derive(Debug, Clone, Args)]
+pub struct ServeArgs {
+    /// Address and port to listen on; port 0 takes a free one, which the log event `listening` names.
+    #[arg(
+        long,
+        env = "RAILHEAD_LISTEN",
+        default_value = "127.0.0.1:8080",
+        value_name = "ADDRESS:PORT",
+        value_parser = address
+    )]
+    pub listen: SocketAddr,
+    /// Folder of the job table and the results; created if it is not there. One process at a time.
+    #[arg(
+        long,
+        env = "RAILHEAD_DATA_DIR",
+        default_value = "./railhead-data",
+        value_name = "FOLDER"
+    )]
+    pub data_dir: PathBuf,
+    /// Number of jobs solved at the same time, each on a thread of its own [default: cores − 1, at least 1].
+    #[arg(long, env = "RAILHEAD_WORKERS", value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub workers: Option<u16>,
+    #[command(flatten)]
+    pub case: CaseArgs,
+    /// Attempts at a job whose worker is lost each time, before it fails.
+    #[arg(long, env = "RAILHEAD_ATTEMPTS_MAX", default_value_t = 5, value_name = "N",
+          value_parser = clap::value_parser!(u32).range(1..))]
+    pub attempts_max: u32,
+    /// Queued jobs beyond which new ones are turned away.
+    #[arg(long, env = "RAILHEAD_QUEUE_MAX", default_value_t = 300_000, value_name = "N",
+          value_parser = clap::value_parser!(u64).range(1..))]
+    pub queue_max: u64,
+    /// Answer a case that is identical to one solved before with that result, without solving it again.
+    #[arg(long, env = "RAILHEAD_CACHE", default_value_t = true, value_name = "BOOL",
+          action = clap::ArgAction::Set)]
+    pub cache: bool,
+    /// How long ended jobs and their results are kept, such as `30d` or `12h`; `forever`: until they are deleted.
+    #[arg(long, env = "RAILHEAD_RETENTION", default_value = "forever", value_name = "TIME", value_parser = retention)]
+    pub retention: Retention,
+    /// Seconds a running job may go on after the service was told to stop; then it goes back to the queue.
+    #[arg(
+        long,
+        env = "RAILHEAD_SHUTDOWN_GRACE_S",
+        default_value_t = 10,
+        value_name = "SECONDS"
+    )]
+    pub shutdown_grace_s: u32,
+    /// Seconds between SIGTERM, when `/readyz` turns 503, and the closing of the port; connections are accepted
+    /// meanwhile. None after SIGINT.
+    #[arg(
+        long,
+        env = "RAILHEAD_DRAIN_DELAY_S",
+        default_value_t = 2,
+        value_name = "SECONDS"
+    )]
+    pub drain_delay_s: u32,
+    /// Queued jobs of one tenant beyond which its new ones are turned away.
+    #[arg(long, env = "RAILHEAD_TENANT_QUEUE_MAX", default_value_t = 250_000, value_name = "N",
+          value_parser = clap::value_parser!(u64).range(1..))]
+    pub tenant_queue_max: u64,
+    /// Whether requests without an API key are answered. Without keys and without anonymous use the service does not
+    /// start.
+    #[arg(
+        long,
+        env = "RAILHEAD_ANONYMOUS",
+        value_enum,
+        default_value = "loopback"
+    )]
+    pub anonymous: Anonymous,
+    /// Requests per second of one API key, twice as many at once; 0: any number. Requests without a key are counted by
+    /// address, those from this machine itself not at all.
+    #[arg(
+        long,
+        env = "RAILHEAD_RATE_LIMIT",
+        default_value_t = 200,
+        value_name = "N"
+    )]
+    pub rate_limit: u32,
+    /// Origins of web pages that may read answers, such as `https://dashboard.example`, separated by commas.
+    #[arg(long, env = "RAILHEAD_CORS_ORIGIN", value_delimiter = ',', value_name = "ORIGIN", value_parser = origin)]
+    pub cors_origin: Vec<String>,
+    /// Collector that gets the spans of requests and jobs by OTLP over HTTP, such as `http://127.0.0.1:4318`; without it
+    /// none are made.
+    #[arg(long, env = "RAILHEAD_OTLP_ENDPOINT", value_name = "URL")]
+    pub otlp_endpoint: Option<Endpoint>,
+    #[command(flatten)]
+    pub worker: WorkerArgs,
+    #[command(flatten)]
+    pub http: HttpArgs,
+    #[command(flatten)]
+    pub log: LogArgs,
+}
+
+/// How to log.
+#[derive(Debug, Clone, Args)]
+pub struct LogArgs {
+    /// How a log line looks.
+    #[arg(long, env = "RAILHEAD_LOG_FORMAT", value_enum, default_value = "text")]
+    pub log_format: LogFormat,
+    /// What is logged, for example `info,railhead::jobs=debug`.
+    #[arg(
+        long,
+        env = "RAILHEAD_LOG",
+        default_value = "info",
+        value_name = "FILTER"
+    )]
+    pub log: String,
+}
+
+impl ServeArgs {
+    /// Workers as asked for, or one less than there are cores.
+    #[must_use]
+    pub fn worker_count(&self) -> usize {
+        self.workers.map_or_else(
+            || available_parallelism().map_or(1, |cores| cores.get().saturating_sub(1).max(1)),
+            usize::from,
+        )
+    }
+
+    /// How long running jobs may go on after the signal.
+    #[must_use]
+    pub fn shutdown_grace(&self) -> Duration {
+        Duration::from_secs(u64::from(self.shutdown_grace_s))
+    }
+
+    /// How long connections are still accepted after a signal: whoever stops a service at a terminal does not want to
+    /// wait for a load balancer.
+    #[must_use]
+    pub fn drain_delay(&self, signal: &str) -> Duration {
+        match signal {
+            "SIGTERM" => Duration::from_secs(u64::from(self.drain_delay_s)),
+            _ => Duration::ZERO,
+        }
+    }
+}
