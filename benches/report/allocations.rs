@@ -9,7 +9,7 @@ static COUNT: AtomicU64 = AtomicU64::new(0);
 pub struct Counting;
 
 // SAFETY: every call goes to the system's allocator unchanged.
-#[allow(unsafe_code)]
+#[expect(unsafe_code, reason = "an allocator is unsafe; this one only counts")]
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         COUNT.fetch_add(1, Ordering::Relaxed);

@@ -1,6 +1,21 @@
-//! What may a client ask? The route list, the limits and the layers around every request.
+//! What may a client ask, and how is it answered? Handlers translate: they read a request, call [`Jobs`] and answer. Nothing is
+//! computed here.
 //!
-//! Handlers translate: they read a request, call [`Jobs`] and answer. Nothing is computed here.
+//! The way of a request:
+//!
+//! 1. [`server::listener`] accepts the connection and gives it a [place](server::places); [`server::connection`] passes its
+//!    requests on. A client that sends nothing, or takes nothing of its answer, is let go ([`server::write_timeout`]).
+//! 2. The [`layers`] around all routes, from the outside inward: [`security_headers`], [`drain_body`], [`request_id`],
+//!    [`request_log`], [`otel`], [`metrics`], [`etag::complete`], [`compression`], the path in problems
+//!    ([`error::name_instance`]), [`origin_guard`], what the request holds until its answer is sent ([`holding_body`]),
+//!    [`catch_panic`], [`admission`] of compressed bodies and their decompression.
+//! 3. The layers of a group of routes: whether JSON is accepted ([`accept::require_json`]) and what clients may keep
+//!    ([`etag::immutable`], [`etag::revalidate`]).
+//! 4. [`extract`]: the caller (key, tenant, rate), ids, query and body, each read strictly; what it takes is counted by
+//!    [`limits`].
+//! 5. The handler in [`routes`](mod@routes) asks [`Jobs`]. Parts of a result get their tag before any work is done ([`etag::Known`]).
+//! 6. The answer: a type of [`dto`] as JSON, or a form of [`render`].
+//! 7. Whatever fails becomes a [`problem`] with a kind, a status and what to do.
 
 mod contract;
 mod dto;

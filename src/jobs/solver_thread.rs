@@ -66,6 +66,13 @@ pub(super) const INTERNAL: &str = "the job could not be solved because of a faul
 
 /// Gives free pages back to the system. glibc keeps what lies between blocks that are still in use: about 100 MB after 900 motions
 /// of a creep map, whose operators come and go beside those that are kept.
+#[cfg_attr(
+    all(target_os = "linux", target_env = "gnu"),
+    expect(
+        unsafe_code,
+        reason = "a function of the C library; the only one that is called"
+    )
+)]
 fn give_memory_back() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     // SAFETY: the function takes a number, touches free memory only and locks every arena while it does.

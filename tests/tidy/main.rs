@@ -8,6 +8,7 @@ mod rules;
 mod sources;
 
 use std::fs;
+use std::path::Path;
 
 use crate::sources::{Sources, root};
 
@@ -127,6 +128,36 @@ fn every_file_says_what_it_is_for() {
         .filter(|(_, text)| !text.starts_with("//!"));
     let silent: Vec<&str> = silent.map(|(path, _)| path).collect();
     assert_eq!(silent, Vec::<&str>::new());
+}
+
+/// The targets of the relative links of a document that are not there.
+fn dead_links(document: &Path, text: &str) -> Vec<String> {
+    let folder = document.parent().expect("a folder");
+    let links = text.split("](").skip(1);
+    let targets = links.filter_map(|rest| rest.split_once(')').map(|(target, _)| target));
+    let targets = targets.filter(|target| !target.contains("://") && !target.starts_with('#'));
+    let files = targets.map(|target| target.split('#').next().unwrap_or_default());
+    files
+        .filter(|file| !folder.join(file).exists())
+        .map(|file| format!("{}: {file}", document.display()))
+        .collect()
+}
+
+#[test]
+fn links_of_the_documents_lead_somewhere() {
+    let mut dead = dead_links(&root().join("x.md"), "[a](src) [b](none.rs) [c](https://x)");
+    assert_eq!(dead.len(), 1, "{dead:?}");
+    dead.clear();
+    for folder in ["", "docs", "api", "tests/data", "docs/paper-figures"] {
+        for entry in fs::read_dir(root().join(folder)).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            if path.extension().is_some_and(|e| e == "md") {
+                let text = fs::read_to_string(&path).expect("a document");
+                dead.extend(dead_links(&path, &text));
+            }
+        }
+    }
+    assert_eq!(dead, Vec::<String>::new());
 }
 
 #[test]

@@ -39,7 +39,11 @@ macro_rules! remarks {
 
             /// The sentence with the figures of this occurrence.
             #[must_use]
-            #[allow(unused_variables, clippy::useless_format)]
+            #[allow(
+                unused_variables,
+                clippy::useless_format,
+                reason = "not every sentence names all figures, and some name none"
+            )]
             pub fn detail(&self) -> String {
                 match self { $( Remark::$name { $($figure),* } => $detail, )+ }
             }

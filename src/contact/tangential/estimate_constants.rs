@@ -17,6 +17,7 @@ pub const WITHOUT_COMPANION: f64 = 1.5;
 /// Factor on the change from a coarser level, times 1 over (ratio of cells − 1): between levels of one kind, and from the
 /// first mesh to one that is not gathered. It only lets a mesh be refused before its companions are solved; flat.
 pub const LEVELS_LIKE: f64 = 0.3;
+/// The same between levels of different kinds.
 pub const LEVELS_UNLIKE: f64 = 0.15;
 /// A level says something about one with this many times its cells at least.
 pub const LEVEL_RATIO_MIN: f64 = 1.8;
@@ -24,6 +25,7 @@ pub const LEVEL_RATIO_MIN: f64 = 1.8;
 /// meshes with spin: 0.3 median, 0.45 at 90 %), and its weight beside the differences, which see part of it (95 % of error
 /// over estimate on first meshes .87 without, .73 with it).
 pub const POLE: f64 = 0.45;
+/// The weight of that error; see [`POLE`].
 pub const POLE_WEIGHT: f64 = 0.3;
 /// With the load on fewer strips than these, counted by `(Σ load)² / Σ load²`, the estimate grows as what is missing; four
 /// strips of an ellipse count as 3.5.
@@ -32,6 +34,7 @@ pub const STRIPS_FEW: f64 = 3.5;
 /// .988, .963 and .963 covered at three targets, estimates 4.2, 3.5 and 3.6 times the error in the median; 1 and .12 cover no more and give
 /// 5.8, 4.3 and 4.0; .75 and 0 give 4.1, 3.6 and 4.1 and cover .975, .938 and .963.
 pub const SAMPLED: f64 = 0.78;
+/// The power; see [`SAMPLED`].
 pub const SAMPLED_DECAY: f64 = 0.05;
 /// Factor where the pressure jumps from one sample to the next (20 grids of the first half: .95, .85 and 1.0 covered at three
 /// targets; larger factors do not help). Ellipses and gaps need none: with 1.15 their estimates are 4.2 to 6 times the error in the
@@ -45,6 +48,7 @@ pub const DATA: f64 = 0.5;
 /// Error of the resultants from region and pressure of a gap on so many cells of the normal problem across a patch (216 gaps:
 /// change to three times as many cells .0003 at 75 %, .0006 at 90 %).
 pub const REGION: f64 = 5e-4;
+/// The cells that [`REGION`] belongs to.
 pub const REGION_CELLS: f64 = 44.0;
 /// Relative error of resultants over that of the load they are found under: 2/3 for small creepages (areas of Hertz's
 /// contacts), 1 in full slip.
@@ -56,6 +60,7 @@ pub const EXTRAPOLATED: f64 = 1.0 / 3.0;
 pub const MARGIN: f64 = 0.8;
 /// Smallest mesh for a target below `FINE_TARGET`: on fewer cells three small differences may coincide by accident.
 pub const CELLS_FINE: usize = 128;
+/// The target below which [`CELLS_FINE`] holds.
 pub const FINE_TARGET: f64 = 0.002;
 /// Stick below this share of the cells' area counts as none (.04 to .15 are alike).
 pub const STICK_NEGLIGIBLE: f64 = 0.12;
@@ -67,11 +72,14 @@ pub const SLACK: f64 = 1.0 / 6.0;
 /// Factors of an explicit mesh, where companions are not solved, on the difference of the two rules; the second where region
 /// and pressure come from samples (62 Hertz contacts, 64 to 576 cells).
 pub const RULES_ON_MESH: f64 = 2.3;
+/// The second of these factors; see [`RULES_ON_MESH`].
 pub const RULES_ON_MESH_SAMPLED: f64 = 3.45;
 /// That estimate grows as this power of the slenderness of a patch.
 pub const CAUTION: f64 = 0.4;
 /// The dense method's change between its two levels, times 1 over (ratio of cells − 1); the second where they are so near each
 /// other that this is more than `SHARE_LARGE`.
 pub const DENSE_LEVELS: f64 = 1.25;
+/// The factor for levels that are near each other; see [`DENSE_LEVELS`].
 pub const DENSE_LEVELS_NEAR: f64 = 1.9;
+/// What tells such levels; see [`DENSE_LEVELS`].
 pub const SHARE_LARGE: f64 = 1.5;
