@@ -37,6 +37,7 @@ mod pressure_samples;
 mod problem;
 mod profile_case_faults;
 mod profile_cases;
+mod profile_conforming;
 mod profile_damage;
 mod profile_faults;
 mod profile_formats;

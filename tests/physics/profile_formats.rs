@@ -47,6 +47,32 @@ fn a_line_that_cannot_be_read_is_named() {
 }
 
 #[test]
+fn decimal_commas_paths_and_other_formats_are_named_for_what_they_are() {
+    for text in [
+        "-36,4988;24,2590\n-36,3;24,1",
+        "-36,4988 24,2590\n-36,3 24,1",
+    ] {
+        let fault = read(Format::Columns, text).unwrap_err();
+        assert!(fault.starts_with("line 1:"), "{fault}");
+        assert!(fault.contains("decimal comma"), "{fault}");
+    }
+    for path in [
+        "profiles/rail.prr",
+        "C:\\profiles\\wheel.prw",
+        "./s1002.txt",
+    ] {
+        for format in [Format::Columns, Format::Simpack, Format::Miniprof] {
+            let fault = read(format, path).unwrap_err();
+            assert!(fault.contains("not its path"), "{path}: {fault}");
+        }
+    }
+    for (text, format) in [(MINIPROF.to_owned(), "miniprof"), (simpack(""), "simpack")] {
+        let fault = read(Format::Columns, &text).unwrap_err();
+        assert!(fault.contains(format), "{format}: {fault}");
+    }
+}
+
+#[test]
 fn simpack_settings_are_applied() {
     let points = |settings: &str| read(Format::Simpack, &simpack(settings)).unwrap().points;
     assert_eq!(points(""), [[1.0, 2.0], [3.0, 4.0]]);

@@ -279,6 +279,40 @@ fn a_contact_on_the_tip_of_the_flange_is_told() {
 }
 
 #[test]
+fn a_contact_near_the_end_of_a_profile_is_told_with_what_is_left() {
+    let whole = solved(&on_rail(&rail_60e1()));
+    let under = whole.patches[0].quality.clone().expect("a quality").rail;
+    let end = under.y_mm[1] + 3.0;
+    let short: Vec<_> = rail_60e1().into_iter().filter(|at| at[0] <= end).collect();
+    let found = solved(&on_rail(&short));
+    let told = found
+        .remarks
+        .iter()
+        .find(|r| r.code == "contact-at-profile-end");
+    let told = told.unwrap_or_else(|| panic!("{:?}", found.remarks));
+    assert_eq!(told.pointer.as_deref(), Some("/contact/rail"));
+    let left = serde_json::to_value(told).expect("JSON")["left_mm"].as_f64();
+    assert!((2.5..3.3).contains(&left.expect("a figure")), "{left:?}");
+    assert!(
+        whole
+            .remarks
+            .iter()
+            .all(|r| r.code != "contact-at-profile-end")
+    );
+    // Where the contact itself is cut off there is no answer.
+    let cut: Vec<_> = rail_60e1()
+        .into_iter()
+        .filter(|at| at[0] <= under.y_mm[1] - 1.0)
+        .collect();
+    let problem = check(&on_rail(&cut), &Limits::default()).expect("a case");
+    let error = solve(&problem, &Unwatched)
+        .map(|_| ())
+        .expect_err("cut off")
+        .to_string();
+    assert!(error.contains("end of a profile"), "{error}");
+}
+
+#[test]
 fn what_is_known_before_the_solve_is_in_the_check() {
     let mut random = Random(5);
     let rail = Damage::Noise(0.005).done_to(&rail_60e1(), CROWN, &mut random);

@@ -26,9 +26,10 @@ pub(super) struct Overlap {
     pub(super) near: [bool; 2],
 }
 
-/// Lowerings in mm at which overlaps are divided among gaps: this one times a power of two. Loads that lower the wheel by 0.07 to 0.14 mm,
-/// as most wheels are, share one division, so that forces do not jump along a sweep of loads or heights either.
+/// Lowerings in mm at which overlaps are divided among gaps: this one times a power of the ratio. Loads that lower the wheel by 0.05 to
+/// 0.2 mm, as all usual ones do, share one division, so that forces do not jump along a sweep of loads or heights either.
 const GROUPED_AT: f64 = 0.1;
+const GROUPED_RATIO: f64 = 4.0;
 /// Groups grow into one where the overlap between them is deeper than this part of the lobes on both sides.
 const MERGED: f64 = 0.6;
 
@@ -57,8 +58,9 @@ impl Search<'_> {
     pub fn grouped_near(self, lowering: f64) -> Self {
         // Less if the contact would reach the end of a profile there.
         const HALVINGS: i32 = 12;
-        let rung = (lowering / GROUPED_AT).log2().round();
-        let at = |halvings: i32| GROUPED_AT * 2.0_f64.powf(rung - f64::from(halvings));
+        let rung = (lowering / GROUPED_AT).log(GROUPED_RATIO).round();
+        let start = GROUPED_AT * GROUPED_RATIO.powf(rung);
+        let at = |halvings: i32| start * 0.5_f64.powi(halvings);
         let found = (0..HALVINGS).find_map(|k| self.divided(at(k), None).ok());
         let groups = |found: Vec<Overlap>| found.iter().map(|overlap| overlap.ends).collect();
         Search {

@@ -269,3 +269,108 @@ pub fn median(values: &mut [f64]) -> f64 {
     }
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chords(at: &[[f64; 2]]) -> Vec<f64> {
+        let mut along = vec![0.0];
+        for pair in at.windows(2) {
+            let chord = (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
+            along.push(along[along.len() - 1] + chord);
+        }
+        along
+    }
+
+    fn with<T>(at: &[[f64; 2]], of: impl Fn(Points, [usize; 2]) -> T) -> T {
+        let along = chords(at);
+        of(Points { at, along: &along }, [0, at.len()])
+    }
+
+    /// Points of a circle of 80 mm every 0.3 mm.
+    fn arc(count: u32) -> Vec<[f64; 2]> {
+        let angle = |k: u32| 0.3 / 80.0 * (f64::from(k) - 0.5 * f64::from(count));
+        (0..count)
+            .map(|k| [80.0 * angle(k).sin(), 80.0 * angle(k).cos()])
+            .collect()
+    }
+
+    /// Normally distributed numbers of deviation 1: sums of twelve even ones of a congruential generator (Knuth's MMIX).
+    fn normal(count: usize) -> Vec<f64> {
+        let mut state = 7_u64;
+        let mut even = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        (0..count)
+            .map(|_| (0..12).map(|_| even()).sum::<f64>() - 6.0)
+            .collect()
+    }
+
+    #[test]
+    fn the_noise_found_is_the_deviation_that_was_added_on_a_line_and_on_an_arc() {
+        for deviation in [0.0005, 0.005, 0.02] {
+            let mut points = arc(400);
+            for (at, noise) in points.iter_mut().zip(normal(400)) {
+                at[1] += deviation * noise;
+            }
+            let found = with(&points, noise).expect("enough points");
+            assert!(
+                (found / deviation - 1.0).abs() < 0.15,
+                "{deviation}: {found}"
+            );
+        }
+        let clean = with(&arc(400), noise).expect("enough points");
+        assert!(clean < 1e-7, "{clean}");
+        assert_eq!(with(&arc(8), noise), None, "too few to tell");
+    }
+
+    #[test]
+    fn one_point_off_is_an_outlier_of_its_distance_and_not_noise() {
+        let mut points = arc(200);
+        points[90][1] += 0.02;
+        let (outlier, step) = with(&points, oddities);
+        let outlier = outlier.expect("an outlier");
+        assert_eq!(outlier.point, 90);
+        assert!((outlier.distance / 0.02 - 1.0).abs() < 0.01, "{outlier:?}");
+        assert_eq!(step, None);
+        assert!(with(&points, noise).expect("enough points") < 1e-6);
+    }
+
+    #[test]
+    fn a_jump_between_two_points_is_a_step_of_its_height() {
+        let mut points = arc(200);
+        points.iter_mut().skip(101).for_each(|at| at[1] -= 0.03);
+        let (outlier, step) = with(&points, oddities);
+        assert_eq!(outlier, None);
+        let step = step.expect("a step");
+        assert_eq!(step.point, 100);
+        assert!((step.height / -0.03 - 1.0).abs() < 0.2, "{step:?}");
+    }
+
+    #[test]
+    fn points_on_chords_are_a_polygon_of_that_chord_and_points_on_an_arc_are_none() {
+        let corners: Vec<[f64; 2]> = arc(400).into_iter().step_by(8).collect();
+        let mut points = Vec::new();
+        for pair in corners.windows(2) {
+            points.extend((0..10).map(|k| {
+                let t = 0.1 * f64::from(k);
+                [0, 1].map(|part| pair[0][part] + t * (pair[1][part] - pair[0][part]))
+            }));
+        }
+        // Corners that carry nine tenths of the turning are counted; here all turn alike.
+        let chord = with(&points, polygon).expect("a polygon");
+        assert!((chord * TURNING / 2.4 - 1.0).abs() < 0.05, "{chord}");
+        assert_eq!(with(&arc(400), polygon), None);
+    }
+
+    #[test]
+    fn the_coarsest_decimal_of_all_heights_is_the_rounding() {
+        assert_eq!(rounding(&[[0.0, 1.2], [1.0, 3.4]]), Some(0.1));
+        assert_eq!(rounding(&[[0.0, 1.2], [1.0, 3.45]]), Some(0.01));
+        assert_eq!(rounding(&[[0.0, 1.2345], [1.0, 3.45]]), None);
+    }
+}

@@ -176,3 +176,92 @@ fn slopes(points: Points, part: usize) -> Vec<f64> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MODULUS: f64 = 115_000.0;
+    const CONTACT: [f64; 2] = [25.0, 35.0];
+
+    /// Points 0.25 mm apart on a circle of 300 mm with a height of their own each.
+    fn crown(height: impl Fn(f64) -> f64) -> (Vec<[f64; 2]>, Vec<f64>) {
+        let along: Vec<f64> = (0..=240).map(|k| 0.25 * f64::from(k)).collect();
+        let at = along
+            .iter()
+            .map(|s| [*s, -(s - 30.0).powi(2) / 600.0 + height(*s)])
+            .collect();
+        (at, along)
+    }
+
+    fn of(smoothing: f64, height: impl Fn(f64) -> f64) -> Roughness {
+        let (at, along) = crown(height);
+        let points = Points {
+            at: &at,
+            along: &along,
+        };
+        roughness(points, smoothing, CONTACT, MODULUS)
+    }
+
+    #[test]
+    fn a_smooth_crown_is_not_rough_by_any_reading() {
+        let found = of(0.0, |_| 0.0);
+        assert!(found.waviness < 1.0, "{found:?}");
+        assert!(found.ambiguity < 1.0, "{found:?}");
+    }
+
+    /// A spline that halves 3 mm keeps the part `1/(1+(3/L)⁴)` of a wave of length L; the rest is seen.
+    #[test]
+    fn a_wave_is_worth_the_pressure_that_flattens_it_as_far_as_the_reference_takes_it_away() {
+        let amplitude = 0.002;
+        for length in [1.0, 2.0, 3.0, 4.0] {
+            let wave = |s: f64| amplitude * (std::f64::consts::TAU * s / length).cos();
+            let found = of(0.0, wave).waviness;
+            let taken = 1.0 - 1.0 / (1.0 + (3.0 / length).powi(4));
+            let flat = std::f64::consts::PI * MODULUS * amplitude / length;
+            let expected = taken * flat / 2.0_f64.sqrt();
+            assert!(
+                (found / expected - 1.0).abs() < 0.1,
+                "{length} mm: {found} MPa, {expected} expected"
+            );
+        }
+    }
+
+    #[test]
+    fn a_single_dent_is_not_everywhere_and_a_wave_is() {
+        let dent = of(0.0, |s| 0.005 * (-(s - 30.0).powi(2) / 0.1).exp());
+        assert!(dent.everywhere < 0.1 * dent.waviness, "{dent:?}");
+        let wave = of(0.0, |s| 0.002 * (4.0 * s).cos());
+        assert!(wave.everywhere > 0.5 * wave.waviness, "{wave:?}");
+    }
+
+    #[test]
+    fn coarse_points_on_a_bend_leave_the_curve_open_and_a_smoothing_does_not_ask() {
+        let (at, along) = crown(|s| {
+            if s > 30.0 {
+                -(s - 30.0).powi(2) / 26.0
+            } else {
+                0.0
+            }
+        });
+        let every = |step: usize| -> (Vec<[f64; 2]>, Vec<f64>) {
+            let at: Vec<_> = at.iter().copied().step_by(step).collect();
+            (at, along.iter().copied().step_by(step).collect())
+        };
+        let open = |step: usize, smoothing: f64| {
+            let (at, along) = every(step);
+            let points = Points {
+                at: &at,
+                along: &along,
+            };
+            roughness(points, smoothing, CONTACT, MODULUS).ambiguity
+        };
+        assert!(
+            open(8, 0.0) > 3.0 * open(1, 0.0),
+            "{} {}",
+            open(8, 0.0),
+            open(1, 0.0)
+        );
+        assert_eq!(open(8, 3.0), 0.0);
+    }
+}

@@ -110,3 +110,67 @@ pub fn stray_ends(points: &[[f64; 2]]) -> [Option<(usize, f64)>; 2] {
         .find_map(|k| Some((k + 1, stray(count.checked_sub(k + 1)?)?)));
     [first, last]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A head of 70 mm, z up: flat on top with a fall of `y²/600`, sides that fall steeply.
+    fn head() -> Vec<[f64; 2]> {
+        (-350..=350)
+            .map(|k| 0.1 * f64::from(k))
+            .map(|y: f64| [y, -y * y / 600.0 - 3.0 * (y.abs() - 30.0).max(0.0)])
+            .collect()
+    }
+
+    /// A wheel, z up: a flange of 28 mm with a round tip of 15 mm beside a tread of 100 mm.
+    fn wheel() -> Vec<[f64; 2]> {
+        (-700..=600)
+            .map(|k| 0.1 * f64::from(k))
+            .map(|y: f64| [y, -28.0 * (-((y + 45.0) / 15.0).powi(2)).exp()])
+            .collect()
+    }
+
+    fn upside_down(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
+        points.iter().map(|[y, z]| [*y, -z]).collect()
+    }
+
+    #[test]
+    fn a_rail_looks_like_a_rail_and_a_wheel_like_a_wheel_whatever_the_sense_of_z() {
+        for (points, looks) in [(head(), Looks::Rail), (wheel(), Looks::Wheel)] {
+            assert_eq!(looks_like(&points), Some(looks));
+            assert_eq!(looks_like(&upside_down(&points)), Some(looks));
+        }
+        let line: Vec<[f64; 2]> = (0..50)
+            .map(|k| [f64::from(k), 0.2 * f64::from(k)])
+            .collect();
+        assert_eq!(looks_like(&line), None);
+    }
+
+    #[test]
+    fn the_tip_of_a_flange_is_the_piece_within_two_millimetres_of_its_lowest_point() {
+        let points = wheel();
+        let along: Vec<f64> = points.iter().map(|at| at[0]).collect();
+        let tip = flange_tip(Points {
+            at: &points,
+            along: &along,
+        });
+        let [from, to] = tip.expect("a flange");
+        // 28 exp(−(d/15)²) = 26 at d = 15 √ln(28/26).
+        let half = 15.0 * (28.0_f64 / 26.0).ln().sqrt();
+        assert!((from + 45.0 + half).abs() < 0.11, "{from}");
+        assert!((to + 45.0 - half).abs() < 0.11, "{to}");
+    }
+
+    #[test]
+    fn a_point_far_beyond_the_last_one_is_stray_and_even_points_are_not() {
+        let mut points = head();
+        assert_eq!(stray_ends(&points), [None, None]);
+        points.push([95.0, -40.0]);
+        let [first, last] = stray_ends(&points);
+        assert_eq!(first, None);
+        let (count, length) = last.expect("a stray point");
+        assert_eq!(count, 1);
+        assert!(length > 50.0, "{length}");
+    }
+}

@@ -10,7 +10,7 @@ use crate::contact::influence::coefficients::{Rectangle, rectangle};
 use crate::contact::normal::non_hertzian::grid::Grid;
 
 /// Chebyshev points per axis. Displacements differ from the exact sum by less than 5e-5 of the largest one that the other grid
-/// causes (the test below; with 6 points by 1e-4).
+/// causes (the test below; with 6 points by 1e-4). That is the error of interpolation alone: 11 points leave 2e-7.
 const ORDER: usize = 7;
 /// Distance of two boxes, relative to half their longest side, from which the kernel between them is interpolated.
 const FAR: f64 = 1.0;

@@ -1,0 +1,224 @@
+//! A wheel worn to the shape of its rail, made here: tread and gauge corner touch side by side, inclined to each other by about half a
+//! radian, where two overlaps may or may not share a gap.
+
+use railhead::contact::check;
+use railhead::contact::geometry::wheel_rail::WheelRail;
+use railhead::contact::normal::Region;
+use railhead::contact::problem::Limits;
+use railhead::contact::solution::Solution;
+use serde_json::{Value, json};
+
+use crate::profile_cases::{generated, put};
+use crate::profile_worn::{solved, worn};
+
+/// Where the wheel comes nearest to the rail, from the middle of the rail in mm, and the radius in mm of the clearance there.
+const LOBES: [(f64, f64); 2] = [(-12.0, 500.0), (-29.3, 30.0)];
+/// Clearances of two lobes blend where they differ by less than this, in mm.
+const BLEND: f64 = 0.01;
+/// Half of the rail's head that the wheel follows, from its middle in mm: beyond, the gauge face is too steep for a height over y.
+const FOLLOWED: [f64; 2] = [-35.3, 30.0];
+/// Depth of the flange's tip below the tread and slope of the flange, in mm.
+const TIP: f64 = 28.0;
+const FLANGE_SLOPE: f64 = 2.5;
+
+/// Height in mm of the worn wheel over the rail, `y` mm from the middle of the rail.
+fn clearance(y: f64) -> f64 {
+    let near =
+        |(middle, radius): (f64, f64)| (-(y - middle).powi(2) / (2.0 * radius * BLEND)).exp();
+    let sum: f64 = LOBES.into_iter().map(near).sum();
+    // Far from both lobes the sum vanishes, and the nearest lobe is what is left of it.
+    let least = LOBES
+        .into_iter()
+        .map(|(middle, radius)| (y - middle).powi(2) / (2.0 * radius))
+        .fold(f64::INFINITY, f64::min);
+    if sum > 1e-200 {
+        -BLEND * sum.ln()
+    } else {
+        least
+    }
+}
+
+/// Wheel and rail of a case in place.
+fn geometry(case: &Value) -> WheelRail {
+    let problem = check(case, &Limits::default()).expect("a case");
+    let Region::Profiles(contact) = &problem.region else {
+        unreachable!("profiles were given")
+    };
+    contact.geometry.clone()
+}
+
+/// Points of the wheel, z down: the rail's own shape with the clearance, then a straight flange with its tip.
+fn worn_wheel(case: &Value) -> Vec<[f64; 2]> {
+    let geometry = geometry(case);
+    let sign = geometry.placement.side.sign();
+    let [rail, wheel] = geometry.parameters(0.1);
+    // A wheel without yaw and roll differs from its profile by a shift and the sense of z.
+    let middle = wheel[wheel.len() / 2];
+    let at = geometry.lowest(middle).expect("no yaw");
+    let own = geometry.on_wheel(middle);
+    let shift = [sign * at[1] - own[0], at[2] + own[1]];
+    let head: Vec<[f64; 2]> = rail
+        .iter()
+        .map(|s| geometry.rail_at(*s).at)
+        .map(|[y, z]| [sign * y, z])
+        .collect();
+    let top = head.iter().map(|at| at[0]);
+    let centre =
+        0.5 * (top.clone().fold(f64::INFINITY, f64::min) + top.fold(f64::NEG_INFINITY, f64::max));
+    let mut points: Vec<[f64; 2]> = head
+        .into_iter()
+        .filter(|[y, _]| (FOLLOWED[0]..=FOLLOWED[1]).contains(&(y - centre)))
+        .map(|[y, z]| [y - shift[0], -(z + clearance(y - centre) - shift[1])])
+        .collect();
+    points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let level = points[points.len() / 2][1];
+    points.iter_mut().for_each(|at| at[1] -= level);
+    let [corner, depth] = points[0];
+    let down = |k: u32| {
+        [
+            corner - 0.2 * f64::from(k),
+            depth + 0.2 * FLANGE_SLOPE * f64::from(k),
+        ]
+    };
+    let flange: Vec<[f64; 2]> = (1..).map(down).take_while(|at| at[1] < TIP).collect();
+    let tip = flange.last().expect("a flange")[0];
+    let back = |k: u32| [tip - 0.2 * f64::from(k), TIP - f64::from(k).powi(2) * 0.004];
+    let back = (1..=50).map(back);
+    points.extend(flange.into_iter().chain(back));
+    points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    points
+}
+
+/// The worn wheel on a new rail 60E1, as it was worn.
+pub fn conforming() -> Value {
+    let case = generated();
+    let wheel = worn_wheel(&case);
+    let back = wheel[0][0];
+    put(
+        &case,
+        "contact",
+        json!({ "wheel": { "points_mm": wheel }, "flange_back_position_mm": back.min(-70.0) }),
+    )
+}
+
+/// Largest second difference of a row of values, relative to the values: a jump shows in it as a whole.
+fn bend(values: &[f64]) -> f64 {
+    let bend = |w: &[f64]| ((w[2] - 2.0 * w[1] + w[0]) / w[1]).abs();
+    values.windows(3).map(bend).fold(0.0, f64::max)
+}
+
+fn peak(solution: &Solution) -> f64 {
+    let peaks = solution.patches.iter().map(|patch| patch.pressure_max_mpa);
+    peaks.fold(0.0, f64::max)
+}
+
+/// The pairs of these tests: made here, and measured where the reference files are at hand.
+fn pairs() -> Vec<(&'static str, Value)> {
+    let shifted = |shift: f64| {
+        put(
+            &generated(),
+            "contact",
+            json!({ "lateral_shift_mm": shift }),
+        )
+    };
+    let mut pairs = vec![
+        ("conforming", conforming()),
+        ("two points", shifted(-5.4)),
+        ("one", shifted(-6.0)),
+    ];
+    for (shift, yaw) in [(-14.7, 0.005), (-14.74, 0.0), (-14.0, 0.0)] {
+        pairs.extend(worn(shift, 100e3, yaw).map(|case| ("worn", case)));
+    }
+    pairs
+}
+
+#[test]
+fn forces_rise_smoothly_as_the_wheel_is_lowered() {
+    for (name, case) in pairs() {
+        let (mut forces, mut peaks) = (Vec::new(), Vec::new());
+        for k in 0..=46 {
+            let mut case = case.clone();
+            case["load"] = json!({ "approach_mm": 0.056 + 0.002 * f64::from(k) });
+            case["solver"] = json!({ "method": "fastsim" });
+            let solution = solved(&case).expect("an answer");
+            let each = solution.patches.iter().map(|patch| patch.normal_force_n);
+            forces.push(each.sum::<f64>());
+            peaks.push(peak(&solution));
+        }
+        let rising = forces.windows(2).all(|pair| pair[1] > pair[0]);
+        assert!(rising, "{name}: {forces:?}");
+        // A power 3/2 bends by 1e-3 here at most; what is more is that of the grids. A patch that joins another gap makes 0.05.
+        assert!(
+            bend(&forces) < 0.008,
+            "{name}: {} of {forces:?}",
+            bend(&forces)
+        );
+        assert!(bend(&peaks) < 0.02, "{name}: {} of {peaks:?}", bend(&peaks));
+    }
+}
+
+#[test]
+fn forces_and_pressures_do_not_jump_with_the_load() {
+    let mut pairs = vec![("conforming", conforming())];
+    pairs.extend(worn(-14.7, 0.0, 0.005).map(|case| ("worn", case)));
+    for (name, mut case) in pairs {
+        case["motion"] = json!({ "creepage_x": 0.001, "spin_per_mm": 0.0003 });
+        let (mut lateral, mut peaks) = (Vec::new(), Vec::new());
+        for k in 0..=10 {
+            case["load"] = json!({ "vertical_force_n": 100e3 + 5e3 * f64::from(k) });
+            let solution = solved(&case).expect("an answer");
+            lateral.push(solution.total[0].force_y_n);
+            peaks.push(peak(&solution));
+        }
+        // Creepages follow the meshes of the tangential problem besides.
+        assert!(bend(&lateral) < 0.015, "{name}: {lateral:?}");
+        assert!(bend(&peaks) < 0.01, "{name}: {peaks:?}");
+    }
+}
+
+/// With yaw, from light to heavy: whatever the two overlaps do, the wheel comes to rest and carries its load.
+#[test]
+fn a_wheel_on_two_patches_side_by_side_always_comes_to_rest() {
+    let case = conforming();
+    for force in [20e3, 60e3, 95e3, 140e3] {
+        for (shift, yaw) in [(0.0, 0.0), (0.3, 0.005), (-0.2, -0.01)] {
+            let mut case = put(
+                &case,
+                "contact",
+                json!({ "lateral_shift_mm": shift, "yaw_rad": yaw, "accept_rough_profiles": true }),
+            );
+            case["load"] = json!({ "vertical_force_n": force });
+            let solution = solved(&case).unwrap_or_else(|e| panic!("{force} {shift} {yaw}: {e}"));
+            let vertical = -solution.total[0].force_z_n.expect("a vertical force");
+            assert!(
+                (vertical / force - 1.0).abs() < 1e-3,
+                "{force} {shift} {yaw}: {vertical}"
+            );
+        }
+    }
+}
+
+/// The gaps of two overlaps that lie more than 8 mm apart know nothing of each other, and the answer says what that is worth.
+#[test]
+fn patches_in_gaps_of_their_own_are_told_with_what_they_would_exchange() {
+    let mut two = put(
+        &generated(),
+        "contact",
+        json!({ "lateral_shift_mm": -6.45 }),
+    );
+    two["motion"] =
+        json!({ "wheelset": { "speed_mm_per_s": 20000, "free_rolling_radius_mm": 462 } });
+    let solution = solved(&two).expect("an answer");
+    assert!(solution.patches.len() > 1, "gauge corner and flange");
+    let told = |solution: &Solution| {
+        let code = solution
+            .remarks
+            .iter()
+            .find(|r| r.code == "patches-uncoupled");
+        code.map(|remark| remark.detail.clone())
+    };
+    let text = told(&solution).expect("a remark");
+    assert!(text.contains("% of the load"), "{text}");
+    let one = put(&generated(), "contact", json!({ "lateral_shift_mm": -1.0 }));
+    assert_eq!(told(&solved(&one).expect("an answer")), None);
+}
