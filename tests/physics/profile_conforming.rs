@@ -201,13 +201,12 @@ fn a_wheel_on_two_patches_side_by_side_always_comes_to_rest() {
 /// The gaps of two overlaps that lie more than 8 mm apart know nothing of each other, and the answer says what that is worth.
 #[test]
 fn patches_in_gaps_of_their_own_are_told_with_what_they_would_exchange() {
-    let mut two = put(
-        &generated(),
-        "contact",
-        json!({ "lateral_shift_mm": -6.45 }),
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/api/examples/wheel-rail-flange.case.json"
     );
-    two["motion"] =
-        json!({ "wheelset": { "speed_mm_per_s": 20000, "free_rolling_radius_mm": 462 } });
+    let text = std::fs::read_to_string(path).expect("an example");
+    let two: Value = serde_json::from_str(&text).expect("a case");
     let solution = solved(&two).expect("an answer");
     assert!(solution.patches.len() > 1, "gauge corner and flange");
     let told = |solution: &Solution| {
