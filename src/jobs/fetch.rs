@@ -10,11 +10,14 @@ use crate::jobs::results::Encoded;
 use crate::jobs::store::StoredResult;
 use crate::jobs::{Job, Jobs};
 
-/// The answer of a succeeded job, without fields.
-#[derive(Debug)]
+/// Solutions from this size on are read off the threads that answer requests.
+const LARGE_BYTES: usize = 64 << 10;
+
+/// The answer of a succeeded job as it is stored, without fields.
+#[derive(Debug, Clone)]
 pub struct Answer {
-    /// What was computed.
-    pub solution: Solution,
+    /// What was computed, as JSON text.
+    pub solution: Bytes,
     /// It was computed for an identical case before.
     pub cached: bool,
     /// What the case asked for.
@@ -46,24 +49,47 @@ impl Jobs {
     /// # Errors
     /// [`JobsError::NotReady`], [`JobsError::NotSucceeded`], [`JobsError::NotFound`], or a failed store.
     pub async fn solution(&self, id: Uuid) -> Result<Solution, JobsError> {
-        Ok(self.answer(id).await?.solution)
+        let text = self.answer(id).await?.solution;
+        let damaged = |error: String| JobsError::Damaged(format!("solution of job {id}: {error}"));
+        let large = text.len() >= LARGE_BYTES;
+        let read = move || serde_json::from_slice(&text);
+        let solution = match large {
+            false => read(),
+            true => tokio::task::spawn_blocking(read)
+                .await
+                .map_err(|error| damaged(error.to_string()))?,
+        };
+        solution.map_err(|error| damaged(error.to_string()))
     }
 
-    /// As [`Jobs::solution`], with what else is told of an answer.
+    /// Size of the answer of a succeeded job as it is stored, without fields.
+    ///
+    /// # Errors
+    /// As [`Jobs::solution`].
+    pub async fn answer_bytes(&self, id: Uuid) -> Result<usize, JobsError> {
+        let (_, stored) = self.stored(id).await?;
+        match &stored.key {
+            Some(key) => match self.shared.results.solution_bytes(key).await {
+                Err(error) => Err(self.gone_meanwhile(id, error).await),
+                read => read,
+            },
+            None => Ok(self.shared.options.small_result_max_bytes),
+        }
+    }
+
+    /// The answer of a succeeded job as it is stored.
     ///
     /// # Errors
     /// As [`Jobs::solution`].
     pub async fn answer(&self, id: Uuid) -> Result<Answer, JobsError> {
         let (job, stored) = self.stored(id).await?;
-        let text = match &stored.key {
+        let solution = match &stored.key {
             Some(key) => match self.shared.results.solution(key).await {
                 Ok(text) => text,
                 Err(error) => return Err(self.gone_meanwhile(id, error).await),
             },
             None => self.small(&stored).await?.solution,
         };
-        let damaged = |error| JobsError::Damaged(format!("solution of job {id}: {error}"));
-        let solution = serde_json::from_slice(&text).map_err(damaged)?;
         Ok(Answer {
             solution,
             cached: job.cached,

@@ -145,6 +145,16 @@ impl Results {
         Ok(self.blobs.get(&path).await?.bytes().await?)
     }
 
+    /// Size of a stored solution.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    pub async fn solution_bytes(&self, folder: &str) -> Result<usize, JobsError> {
+        let path = Path::from(folder).join(SOLUTION);
+        let about = self.blobs.head(&path).await?;
+        Ok(usize::try_from(about.size).unwrap_or(usize::MAX))
+    }
+
     /// Reads a whole stored result.
     ///
     /// # Errors

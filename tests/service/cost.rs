@@ -197,6 +197,8 @@ async fn what_a_client_has_is_not_made_again() {
         "zones",
         "plot.png",
         "plot.svg?width=300",
+        "resultants",
+        "resultants?format=csv",
     ] {
         let path = format!("{own}/{part}");
         let answer = server.get(&path).await;
@@ -214,4 +216,51 @@ async fn what_a_client_has_is_not_made_again() {
     let unknown = format!("/v1/jobs/{}/zones", uuid::Uuid::now_v7());
     assert_eq!(ask(&unknown, Some("\"x\"")).await, 404);
     let _: Value = server.get(&own).await.json;
+}
+
+#[tokio::test]
+async fn large_results_are_passed_on_as_they_are_stored() {
+    let mut setup = Setup::new();
+    setup.options.cache = false;
+    // As if the one motion had been thousands.
+    let server = setup
+        .solving(|problem, monitor| {
+            let (mut solution, fields) = railhead::contact::solve(problem, monitor)?;
+            let points = &mut solution.patches[0].points;
+            *points = vec![points[0].clone(); 5000];
+            solution.total = vec![solution.total[0]; 5000];
+            Ok((solution, fields))
+        })
+        .start()
+        .await;
+    let case = crate::batches::small("large");
+    let waited = server
+        .send(Method::POST, "/v1/jobs", |request| {
+            request.header("prefer", "wait=60").json(&case)
+        })
+        .await;
+    assert_eq!(
+        (waited.status, &waited.json["state"]),
+        (200, &json!("succeeded"))
+    );
+    let id = waited.json["id"].as_str().unwrap();
+    let result = server.get(&format!("/v1/jobs/{id}/result")).await;
+    assert!(result.bytes.len() > 1 << 20, "{}", result.bytes.len());
+    assert_eq!(result.json["total"].as_array().unwrap().len(), 5000);
+    assert_eq!(result.json["links"]["job"], json!(format!("/v1/jobs/{id}")));
+    assert_eq!(result.json["cached"], json!(false));
+    assert_eq!(waited.json["result"], result.json);
+    assert_eq!(
+        waited.json["links"]["result"],
+        json!(format!("/v1/jobs/{id}/result"))
+    );
+    let path = format!("/v1/jobs/{id}/resultants");
+    let resultants = server.get(&path).await;
+    assert_eq!(resultants.json["total"], result.json["total"]);
+    let lines = server.get(&format!("{path}?format=csv")).await;
+    assert_eq!(lines.text.lines().count(), 1 + 2 * 5000);
+    let one = server.get(&format!("{path}?point=4999")).await;
+    assert_eq!(one.json["total"].as_array().unwrap().len(), 1);
+    let none = server.get(&format!("{path}?point=5000")).await;
+    assert_problem(&none, 400, "bad-query", "");
 }

@@ -2,12 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use bytes::Bytes;
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::contact::remark::RemarkEntry;
 use crate::http::dto::problem::ProblemBody;
 use crate::http::dto::result::JobResult;
+use crate::http::problem::error::ApiError;
 use crate::jobs::job::{Job, QueuePlace, State as JobState};
 use crate::jobs::wishes::Priority;
 
@@ -68,7 +70,7 @@ pub struct JobAnswer {
 impl JobAnswer {
     /// Shows a job.
     #[must_use]
-    pub fn new(job: Job, result: Option<JobResult>) -> Self {
+    pub fn new(job: Job) -> Self {
         let error = job
             .failure
             .as_ref()
@@ -92,8 +94,26 @@ impl JobAnswer {
             queue: job.queue,
             remarks: job.remarks,
             error,
-            result,
+            result: None,
         }
+    }
+
+    /// Shows a job, with the text of its result.
+    ///
+    /// # Errors
+    /// It cannot be written as JSON.
+    pub fn text(job: Job, result: Option<&[Bytes]>) -> Result<Vec<u8>, ApiError> {
+        let text = serde_json::to_vec(&JobAnswer::new(job));
+        let mut text = text.map_err(|error| ApiError::internal(&error))?;
+        if let Some(result) = result {
+            text.pop();
+            text.extend_from_slice(b",\"result\":");
+            for piece in result {
+                text.extend_from_slice(piece);
+            }
+            text.push(b'}');
+        }
+        Ok(text)
     }
 }
 

@@ -2,12 +2,15 @@
 
 use std::collections::BTreeMap;
 
+use bytes::Bytes;
 use serde::Serialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
 use crate::contact::case::Output;
 use crate::contact::solution::Solution;
+use crate::http::problem::error::ApiError;
+use crate::jobs::fetch::Answer;
 
 /// The result of a job: the solution without its fields, and where to get those.
 #[derive(Debug, Serialize, ToSchema)]
@@ -21,15 +24,23 @@ pub struct JobResult {
 }
 
 impl JobResult {
-    /// The solution of a job whose case asked for these outputs.
-    #[must_use]
-    pub fn new(id: Uuid, solution: Solution, cached: bool, outputs: &[Output]) -> JobResult {
-        let outputs: Vec<&str> = outputs.iter().copied().map(name_of).collect();
-        JobResult {
-            solution,
-            cached,
-            links: JobResult::links(id, &outputs),
+    /// The text of a result, in pieces: the stored solution as it is, without reading it, and what else is told of it.
+    ///
+    /// # Errors
+    /// The stored solution is no object.
+    pub fn text(id: Uuid, answer: &Answer) -> Result<[Bytes; 2], ApiError> {
+        // An object that is continued: the closing brace makes way.
+        if !answer.solution.ends_with(b"}") {
+            return Err(ApiError::internal(&format!(
+                "the solution of job {id} is no object"
+            )));
         }
+        let open = answer.solution.slice(..answer.solution.len() - 1);
+        let outputs: Vec<&str> = answer.outputs.iter().copied().map(name_of).collect();
+        let links = serde_json::to_string(&JobResult::links(id, &outputs));
+        let links = links.map_err(|error| ApiError::internal(&error))?;
+        let tail = format!(",\"cached\":{},\"links\":{links}}}", answer.cached);
+        Ok([open, Bytes::from(tail)])
     }
 
     /// The links of the result of a job whose case asked for these outputs.

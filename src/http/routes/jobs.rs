@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use axum::body::Bytes;
 use axum::extract::State;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
@@ -12,16 +13,18 @@ use uuid::Uuid;
 
 use crate::contact::case::Case;
 use crate::http::dto::job::JobAnswer;
+use crate::http::extract::accept::Format;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::JobId;
 use crate::http::extract::json::JsonBody;
 use crate::http::extract::query::{Parameters, Reader, count, id, query, reader};
 use crate::http::extract::submit_options::SubmitQuery;
 use crate::http::limits::concurrency::ConcurrencyLimits;
-use crate::http::limits::holding_body::HeldShares;
+use crate::http::limits::holding_body::{HeldShares, hold_while_sent};
+use crate::http::limits::memory::Memory;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
-use crate::http::routes::results::result_of;
+use crate::http::routes::results::result_text;
 use crate::jobs::job::State as JobState;
 use crate::jobs::{Filter, PAGE_MAX};
 
@@ -91,6 +94,7 @@ pub async fn submit(
     Caller(jobs): Caller,
     uri: Uri,
     State(crowds): State<ConcurrencyLimits>,
+    State(memory): State<Memory>,
     Extension(held): Extension<HeldShares>,
     headers: HeaderMap,
     JsonBody { value, room }: JsonBody,
@@ -114,7 +118,7 @@ pub async fn submit(
         }
         if job.state == JobState::Succeeded {
             // The same holds for a result that cannot be read.
-            match result_of(&jobs, job.id).await {
+            match result_text(&jobs, &memory, job.id).await {
                 Ok(found) => result = Some(found),
                 Err(error) => tracing::error!(?error, job = %job.id, "a result cannot be read"),
             }
@@ -126,12 +130,14 @@ pub async fn submit(
     } else {
         StatusCode::ACCEPTED
     };
-    let mut response = (
-        status,
-        [(header::LOCATION, location)],
-        Json(JobAnswer::new(job, result)),
-    )
-        .into_response();
+    let (pieces, share) = result.unzip();
+    let head = [
+        (header::LOCATION, location.as_str()),
+        (header::CONTENT_TYPE, Format::Json.media_type()),
+    ];
+    let text = JobAnswer::text(job, pieces.as_ref().map(<[Bytes; 2]>::as_slice))?;
+    let response = (status, head, text).into_response();
+    let mut response = hold_while_sent(response, share.flatten());
     if !in_time {
         response
             .headers_mut()
@@ -270,7 +276,7 @@ pub async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Json<JobPage>, ApiEr
         jobs: page
             .jobs
             .into_iter()
-            .map(|job| JobAnswer::new(job, None))
+            .map(|job| JobAnswer::new(job))
             .collect(),
         next_cursor: page.next_cursor,
     }))
@@ -291,7 +297,7 @@ problems! {
     responses((status = 200, description = "The job", body = JobAnswer), GetProblems)
 )]
 pub async fn get(Caller(jobs): Caller, JobId(id): JobId) -> Result<Json<JobAnswer>, ApiError> {
-    Ok(Json(JobAnswer::new(jobs.look(id).await?, None)))
+    Ok(Json(JobAnswer::new(jobs.look(id).await?)))
 }
 
 /// The case of a job, as it was submitted.
@@ -328,7 +334,7 @@ pub async fn cancel(Caller(jobs): Caller, JobId(id): JobId) -> Result<Response, 
     } else {
         StatusCode::ACCEPTED
     };
-    Ok((status, Json(JobAnswer::new(job, None))).into_response())
+    Ok((status, Json(JobAnswer::new(job))).into_response())
 }
 
 problems! {

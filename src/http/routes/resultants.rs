@@ -119,20 +119,29 @@ pub async fn resultants(
         Known::Unchanged(answer) => return Ok(answer),
         Known::Tag(tag) => tag,
     };
-    let solution = jobs.solution(id).await?;
-    require_index("point", point, solution.total.len())?;
-    require_index("patch", patch, solution.patches.len())?;
-    let sums = sums(&solution);
-    let resultants = select(solution, point, patch);
-    let body = match format {
-        Format::Csv => write_csv(&resultants, &sums).map_err(|error| ApiError::internal(&error))?,
-        _ => serde_json::to_vec(&resultants).map_err(|error| ApiError::internal(&error))?,
+    // The text is read, cut to what was asked for and written again: as much work as a table.
+    let turn = memory.rendering(jobs.tenant(), 2 * jobs.answer_bytes(id).await?);
+    let turn = turn.await?;
+    let text = jobs.answer(id).await?.solution;
+    let write = move || {
+        let solution: Solution =
+            serde_json::from_slice(&text).map_err(|error| ApiError::internal(&error))?;
+        require_index("point", point, solution.total.len())?;
+        require_index("patch", patch, solution.patches.len())?;
+        let sums = sums(&solution);
+        let resultants = select(solution, point, patch);
+        match format {
+            Format::Csv => {
+                write_csv(&resultants, &sums).map_err(|error| ApiError::internal(&error))
+            }
+            _ => serde_json::to_vec(&resultants).map_err(|error| ApiError::internal(&error)),
+        }
     };
+    let (body, share) = turn.run(write, Vec::len).await?;
     let headers = [
         (header::CONTENT_TYPE, format.media_type()),
         (header::VARY, "Accept"),
     ];
-    let share = memory.ready_answer(jobs.tenant(), body.len())?;
     Ok(tagged(
         &tag,
         hold_while_sent((headers, body).into_response(), share),

@@ -1,8 +1,12 @@
 //! `/v1/jobs/{id}/result`: everything small about the answer of a job.
 
+use std::convert::Infallible;
+
+use axum::body::{Body, Bytes};
 use axum::extract::State;
 use axum::http::{HeaderMap, Uri, header};
 use axum::response::{IntoResponse, Response};
+use futures_util::stream;
 use uuid::Uuid;
 
 use crate::http::dto::result::JobResult;
@@ -12,7 +16,8 @@ use crate::http::extract::ids::JobId;
 use crate::http::extract::query::Query;
 use crate::http::layers::etag::{Known, tagged};
 use crate::http::limits::holding_body::hold_while_sent;
-use crate::http::limits::memory::Memory;
+use crate::http::limits::memory::{Memory, SMALL_BYTES};
+use crate::http::limits::shares::Share;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 use crate::jobs::Jobs;
@@ -44,26 +49,32 @@ pub async fn result(
         Known::Unchanged(answer) => return Ok(answer),
         Known::Tag(tag) => tag,
     };
-    let result = result_of(&jobs, id).await?;
-    let text = serde_json::to_vec(&result).map_err(|error| ApiError::internal(&error))?;
-    let share = memory.ready_answer(jobs.tenant(), text.len())?;
+    let (pieces, share) = result_text(&jobs, &memory, id).await?;
     let head = [(header::CONTENT_TYPE, Format::Json.media_type())];
+    let size: usize = pieces.iter().map(Bytes::len).sum();
+    let body = match size <= SMALL_BYTES {
+        true => Body::from(pieces.concat()),
+        false => Body::from_stream(stream::iter(pieces.map(Ok::<_, Infallible>))),
+    };
     Ok(tagged(
         &tag,
-        hold_while_sent((head, text).into_response(), share),
+        hold_while_sent((head, body).into_response(), share),
     ))
 }
 
-/// The result of a succeeded job with its links.
+/// The text of the result of a succeeded job in two pieces, and the memory for it.
 ///
 /// # Errors
-/// The job is unknown, has not ended or has no result.
-pub async fn result_of(jobs: &Jobs, id: Uuid) -> Result<JobResult, ApiError> {
-    let answer = jobs.answer(id).await?;
-    Ok(JobResult::new(
-        id,
-        answer.solution,
-        answer.cached,
-        &answer.outputs,
-    ))
+/// The job is unknown, has not ended or has no result; or there is no memory.
+pub async fn result_text(
+    jobs: &Jobs,
+    memory: &Memory,
+    id: Uuid,
+) -> Result<([Bytes; 2], Option<Share>), ApiError> {
+    let mut share = memory.ready_answer(jobs.tenant(), jobs.answer_bytes(id).await?)?;
+    let pieces = JobResult::text(id, &jobs.answer(id).await?)?;
+    if let Some(share) = &mut share {
+        share.keep(pieces.iter().map(Bytes::len).sum());
+    }
+    Ok((pieces, share))
 }
