@@ -44,11 +44,11 @@ use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
 use crate::http::contract::Document;
-use crate::http::extract::accept;
+use crate::http::extract::{accept, query};
 use crate::http::layers::metrics::Metrics;
 use crate::http::layers::{
-    admission, catch_panic, compression, etag, metrics, origin_guard, otel, request_id,
-    request_log, security_headers,
+    admission, catch_panic, compression, etag, final_newline, metrics, origin_guard, otel,
+    request_id, request_log, security_headers,
 };
 use crate::http::limits::holding_body;
 use crate::http::problem::error::{self, ApiError};
@@ -134,6 +134,7 @@ fn api(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> Router {
         .layer(from_fn(holding_body::hold))
         .layer(from_fn(origin_guard::admit))
         .layer(from_fn(error::name_instance))
+        .layer(from_fn(final_newline::end_line))
         .layer(compression::compression_layer())
         .layer(from_fn(etag::complete))
         .layer(from_fn_with_state(metrics.clone(), metrics::count));
@@ -152,22 +153,27 @@ fn resources() -> OpenApiRouter<AppState> {
         .routes(routes!(batches::get, batches::delete))
         .routes(routes!(methods::methods))
         .routes(routes!(remarks::remarks))
+        .route_layer(from_fn(query::refuse_parameters))
         .route_layer(from_fn(etag::revalidate));
     let changing = contract::conditional(changing);
     let finished = OpenApiRouter::new()
         .routes(routes!(jobs::case))
         .routes(routes!(results::result))
+        .route_layer(from_fn(query::refuse_parameters))
         .route_layer(from_fn(etag::immutable));
     let finished = contract::conditional(finished);
-    let v1 = changing
-        .merge(finished)
-        .routes(routes!(jobs::submit, jobs::list))
+    let plain = OpenApiRouter::new()
         .routes(routes!(jobs::cancel))
-        .routes(routes!(batches::submit))
         .routes(routes!(batches::cancel))
         .routes(routes!(cases::check))
         .routes(routes!(problems::list))
         .routes(routes!(problems::explain))
+        .route_layer(from_fn(query::refuse_parameters));
+    let v1 = changing
+        .merge(finished)
+        .merge(plain)
+        .routes(routes!(jobs::submit, jobs::list))
+        .routes(routes!(batches::submit))
         .route_layer(from_fn(accept::require_json));
     // These choose among several forms themselves.
     let parts = OpenApiRouter::new()
@@ -184,10 +190,13 @@ fn resources() -> OpenApiRouter<AppState> {
         .routes(routes!(contract::contract))
         .route_layer(from_fn(etag::revalidate));
     let contract = contract::conditional(contract);
-    v1.merge(parts)
-        .routes(routes!(batch_results::results))
+    let events = OpenApiRouter::new()
         .routes(routes!(events::job))
         .routes(routes!(events::batch))
+        .route_layer(from_fn(query::refuse_parameters));
+    v1.merge(parts)
+        .routes(routes!(batch_results::results))
+        .merge(events)
         .merge(probes())
         .merge(contract)
 }

@@ -182,11 +182,17 @@ impl Jobs {
                 {
                     while Instant::now() < until
                         && !self.shared.draining.is_cancelled()
-                        && self.get(first).await.is_ok_and(|job| !job.state.ended())
+                        && self
+                            .recent(first, LOOK_PAUSE)
+                            .await
+                            .is_ok_and(|job| !job.state.ended())
                     {
                         let look = until.min(Instant::now() + LOOK_AGAIN);
+                        // A lagging receiver may have missed the announcement, so it looks again as well.
+                        let announced =
+                            async { while ended.recv().await.is_ok_and(|ended| ended != first) {} };
                         tokio::select! {
-                            _ = timeout_at(look, ended.recv()) => {}
+                            _ = timeout_at(look, announced) => {}
                             () = self.shared.draining.cancelled() => {}
                         }
                         // Many jobs end in the same moment; one look serves all of them.

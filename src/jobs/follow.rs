@@ -25,10 +25,15 @@ impl Jobs {
     /// # Errors
     /// [`JobsError::NotFound`], or a failed database.
     pub async fn next_change(&self, id: Uuid, seen: Option<u64>) -> Result<Option<Job>, JobsError> {
+        // Subscribe first, then look: what ends in between is announced.
+        let mut ended = self.shared.ended.subscribe();
+        let mut announced = true;
         loop {
-            // Subscribe first, then look: what ends in between is announced.
-            let mut ended = self.shared.ended.subscribe();
-            let job = self.get(id).await?;
+            // A look that others had a moment ago serves, unless something was announced since.
+            let job = match announced {
+                true => self.get(id).await?,
+                false => self.recent(id, PAUSE).await?,
+            };
             if seen != Some(job.version) {
                 return Ok(Some(job));
             }
@@ -36,13 +41,13 @@ impl Jobs {
                 return Ok(None);
             }
             let again = Instant::now() + LOOK_AGAIN;
-            let announced = async {
+            let end = async {
                 sleep(PAUSE).await;
                 // A lagging receiver may have missed the announcement, so it looks again as well.
                 while ended.recv().await.is_ok_and(|ended| ended != id) {}
             };
             tokio::select! {
-                _ = timeout_at(again, announced) => {}
+                end = timeout_at(again, end) => announced = end.is_ok(),
                 () = self.shared.draining.cancelled() => return Ok(None),
             }
         }
@@ -58,8 +63,12 @@ impl Jobs {
         id: Uuid,
         seen: Option<&str>,
     ) -> Result<Option<Batch>, JobsError> {
+        let mut pause = PAUSE;
         loop {
-            let batch = self.batch(id).await?;
+            let batch = match seen {
+                None => self.batch(id).await?,
+                Some(_) => self.recent_batch(id, pause).await?,
+            };
             if seen != Some(&batch.mark()) {
                 return Ok(Some(batch));
             }
@@ -67,11 +76,36 @@ impl Jobs {
             if ended == all {
                 return Ok(None);
             }
-            let pause = PAUSE_PER_JOB.saturating_mul(batch.count).max(PAUSE);
+            pause = PAUSE_PER_JOB.saturating_mul(batch.count).max(PAUSE);
             tokio::select! {
                 () = sleep(pause) => {}
                 () = self.shared.draining.cancelled() => return Ok(None),
             }
+        }
+    }
+}
+
+impl Jobs {
+    /// As [`Jobs::get`], as the job was a moment ago: one look serves all who follow it.
+    ///
+    /// # Errors
+    /// As [`Jobs::get`].
+    pub(super) async fn recent(&self, id: Uuid, age: Duration) -> Result<Job, JobsError> {
+        let look = self.shared.store.get(id);
+        let job = self.shared.recent_jobs.at(id, age, look).await?;
+        match job.filter(|job| *job.tenant == *self.tenant) {
+            Some(job) => self.unexpired(job),
+            None => Err(self.missing(id, JobsError::NotFound).await),
+        }
+    }
+
+    /// The same of a batch.
+    async fn recent_batch(&self, id: Uuid, age: Duration) -> Result<Batch, JobsError> {
+        let look = self.shared.store.batch(id);
+        let batch = self.shared.recent_batches.at(id, age, look).await?;
+        match batch.filter(|batch| *batch.tenant == *self.tenant) {
+            Some(batch) => Ok(batch),
+            None => Err(self.missing(id, JobsError::BatchNotFound).await),
         }
     }
 }

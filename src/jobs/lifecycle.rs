@@ -19,6 +19,7 @@ use crate::jobs::error::JobsError;
 use crate::jobs::keys::ANONYMOUS;
 use crate::jobs::leaps::Leaps;
 use crate::jobs::metrics::Metrics;
+use crate::jobs::recent::RecentLooks;
 use crate::jobs::recipe::Recipe;
 use crate::jobs::results::Results;
 use crate::jobs::staging::{Staged, StagingBounds};
@@ -169,6 +170,8 @@ impl Jobs {
                 staged: Staged::default(),
                 batches: Mutex::new(underway),
                 turns: Turns::default(),
+                recent_batches: RecentLooks::default(),
+                recent_jobs: RecentLooks::default(),
                 leaps: Leaps::default(),
                 solo: Arc::default(),
                 suspects_waiting: AtomicUsize::new(0),

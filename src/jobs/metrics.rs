@@ -40,6 +40,16 @@ struct ReasonLabel {
     reason: &'static str,
 }
 
+/// A solver at work.
+#[derive(Debug)]
+pub(super) struct Working(Gauge);
+
+impl Drop for Working {
+    fn drop(&mut self) {
+        self.0.dec();
+    }
+}
+
 /// Counters of one service; clones share them.
 #[derive(Debug, Clone)]
 pub(super) struct Metrics {
@@ -55,6 +65,8 @@ pub(super) struct Metrics {
     storage_failing: Gauge,
     parked: Gauge,
     abandoned: Gauge,
+    workers: Gauge,
+    working: Gauge,
     cache_hits: Counter,
     cache_misses: Counter,
 }
@@ -74,6 +86,8 @@ impl Metrics {
             storage_failing: Gauge::default(),
             parked: Gauge::default(),
             abandoned: Gauge::default(),
+            workers: Gauge::default(),
+            working: Gauge::default(),
             cache_hits: Counter::default(),
             cache_misses: Counter::default(),
         };
@@ -85,6 +99,12 @@ impl Metrics {
             drop(metrics.failures.get_or_create(&reason_label(kind)));
         }
         metrics
+    }
+
+    /// A solver is at work as long as this is held.
+    pub(super) fn working(&self) -> Working {
+        self.working.inc();
+        Working(self.working.clone())
     }
 
     /// A case was solved in `seconds`.
@@ -178,6 +198,20 @@ impl Metrics {
             "Solver threads that did not stop when they were told to and still run",
             self.abandoned.clone(),
         );
+        self.register_solves(registry);
+    }
+
+    fn register_solves(&self, registry: &mut Registry) {
+        registry.register(
+            "workers",
+            "Workers, each with one solver at work at most",
+            self.workers.clone(),
+        );
+        registry.register(
+            "workers_busy",
+            "Workers whose solver is at work",
+            self.working.clone(),
+        );
         registry.register(
             "solve_seconds",
             "Wall time of one case on a solver thread, by the method that gave the numbers",
@@ -223,6 +257,7 @@ impl Jobs {
     /// The database failed.
     pub async fn refresh_metrics(&self) -> Result<(), JobsError> {
         let metrics = &self.shared.metrics;
+        metrics.workers.set(count(self.shared.options.workers));
         metrics.parked.set(count(self.shared.turns.parked().0));
         let abandoned = self.shared.abandoned.load(Ordering::Acquire);
         metrics.abandoned.set(count(abandoned));

@@ -25,6 +25,7 @@ mod leaps;
 pub mod lifecycle;
 mod metrics;
 mod part;
+mod recent;
 pub mod recipe;
 mod reserve;
 pub mod results;
@@ -62,12 +63,14 @@ use uuid::Uuid;
 
 use crate::contact::error::CaseError;
 use crate::contact::problem::Problem;
+use crate::jobs::batch::Batch;
 pub use crate::jobs::error::JobsError;
 pub use crate::jobs::job::{Failure, FailureKind, Job, QueuePlace, State};
 use crate::jobs::keys::Trusted;
 use crate::jobs::leaps::Leaps;
 pub use crate::jobs::lifecycle::Options;
 use crate::jobs::metrics::Metrics;
+use crate::jobs::recent::RecentLooks;
 use crate::jobs::recipe::Recipe;
 use crate::jobs::results::Results;
 use crate::jobs::staging::Staged;
@@ -124,6 +127,9 @@ struct Shared {
     staged: Staged,
     /// Batches that are being received or filled, and those of which only remains are left.
     batches: Mutex<Underway>,
+    /// Batches and jobs that somebody follows, as they were a moment ago.
+    recent_batches: RecentLooks<Option<Batch>>,
+    recent_jobs: RecentLooks<Option<Job>>,
     /// What became of the wall clock.
     leaps: Leaps,
     /// Whose turn it is, and solves that wait for theirs.
@@ -143,6 +149,12 @@ struct Shared {
 }
 
 impl Jobs {
+    /// How jobs are kept and worked on here.
+    #[must_use]
+    pub fn options(&self) -> &Options {
+        &self.shared.options
+    }
+
     /// Checks a case against the limits of this service.
     ///
     /// # Errors

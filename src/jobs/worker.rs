@@ -257,6 +257,7 @@ impl Worker {
         if !attempt.begun() {
             self.begin(attempt).await?;
         }
+        let _working = shared.metrics.working();
         attempt.keeper.solving(true);
         attempt.gate.open();
         let turn = self.until_over(attempt).await;

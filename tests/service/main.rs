@@ -24,6 +24,7 @@ mod guides;
 mod keys;
 mod leases;
 mod malformed;
+mod manners;
 #[cfg(target_os = "linux")]
 mod memory;
 mod metrics;

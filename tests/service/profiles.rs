@@ -14,6 +14,17 @@ async fn a_wheel_on_a_rail_is_submitted_and_read() {
     assert_eq!(job["state"], "succeeded", "{job}");
     let (path, result) = (path_of(&job), &job["result"]);
     let patch = &result["patches"][0];
+    // How far the profiles can be trusted, before the solve and under the patch.
+    let checked = server.post("/v1/cases/check", &case).await.json;
+    for (quality, name) in [
+        (&checked["quality"], "check"),
+        (&patch["quality"], "result"),
+    ] {
+        for side in ["rail", "wheel"] {
+            let spacing = &quality[side]["spacing_mm"];
+            assert!(spacing.is_number(), "{name}: {side}: {quality}");
+        }
+    }
     let position = &patch["position"];
     assert_eq!(position["track_mm"].as_array().map(Vec::len), Some(3));
     let radius = number(&position["rolling_radius_mm"]);

@@ -25,6 +25,7 @@ const ORDER: &[&str] = &[
     "jobs::fields",
     "jobs::gate",
     "jobs::idempotency",
+    "jobs::recent",
     "jobs::recipe",
     "jobs::reserve",
     "jobs::spool",

@@ -3,8 +3,10 @@
 
 use std::borrow::Cow;
 
-use axum::extract::Query as Pairs;
+use axum::extract::{Query as Pairs, Request};
 use axum::http::Uri;
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
 use uuid::Uuid;
 
 use crate::http::dto::problem::Fault;
@@ -43,6 +45,14 @@ impl<A: Parameters<Limits = ()>, B: Parameters<Limits = ()>> Parameters for (A, 
 
     fn take(query: &mut Query, limits: &()) -> Self {
         (A::take(query, limits), B::take(query, limits))
+    }
+}
+
+/// Layer around resources that have no parameters but their form, which was looked at before.
+pub async fn refuse_parameters(request: Request, next: Next) -> Response {
+    match Query::read(request.uri(), &["format"]).finish() {
+        Ok(()) => next.run(request).await,
+        Err(fault) => fault.into_response(),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Counts requests and their times, by route, method and status.
 
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use axum::extract::{MatchedPath, Request, State};
 use axum::http::Method;
@@ -65,7 +65,12 @@ impl Metrics {
             "Time from a request to the head of its answer, waits that the client asked for included",
             Family::clone(&seconds),
         );
-        registry.register_collector(Box::new(Process { dropped_lines }));
+        let now = SystemTime::now().duration_since(UNIX_EPOCH);
+        let started_at = now.map_or(0, |since| i64::try_from(since.as_secs()).unwrap_or(0));
+        registry.register_collector(Box::new(Process {
+            dropped_lines,
+            started_at,
+        }));
         Metrics {
             requests,
             seconds,

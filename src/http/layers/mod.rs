@@ -6,6 +6,7 @@ pub mod catch_panic;
 pub mod compression;
 pub mod cors;
 pub mod etag;
+pub mod final_newline;
 pub mod metrics;
 pub mod origin_guard;
 pub mod otel;

@@ -10,6 +10,8 @@ use prometheus_client::metrics::gauge::ConstGauge;
 pub struct Process {
     /// How many lines of the log were dropped.
     pub dropped_lines: fn() -> u64,
+    /// Start of the process in epoch seconds.
+    pub started_at: i64,
 }
 
 impl Collector for Process {
@@ -29,6 +31,11 @@ impl Collector for Process {
                 "process_open_fds",
                 "Files and connections that are open",
                 open_files(),
+            ),
+            (
+                "process_start_time_seconds",
+                "Start of the process, seconds since 1970",
+                Some(self.started_at),
             ),
         ];
         for (name, about, value) in figures {

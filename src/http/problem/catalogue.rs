@@ -68,8 +68,8 @@ macro_rules! problems {
 pub(crate) use problems;
 
 problems! {
-    /// What every route can fail with.
-    Always:
+    /// What a route that takes nothing can fail with.
+    PlainProblems: BadQuery
 }
 
 /// Adds problems that many operations can answer to the responses of one.

@@ -139,7 +139,7 @@ fn faults(draft: &Draft) -> Vec<Fault> {
 
 problems! {
     /// What asking for a batch can fail with.
-    GetBatchProblems: BatchNotFound
+    GetBatchProblems: BadQuery, BatchNotFound
 }
 
 /// Looks at a batch.
@@ -183,7 +183,7 @@ pub async fn cancel(Caller(jobs): Caller, BatchId(id): BatchId) -> Result<Respon
 
 problems! {
     /// What deleting a batch can fail with.
-    DeleteBatchProblems: BatchNotFound, BatchNotEnded
+    DeleteBatchProblems: BadQuery, BatchNotFound, BatchNotEnded
 }
 
 /// Removes a batch of which every job has ended, with its jobs, their cases and their results.

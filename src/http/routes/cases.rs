@@ -2,7 +2,6 @@
 
 use axum::Json;
 use axum::extract::State;
-use axum::http::Uri;
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -11,7 +10,6 @@ use crate::contact::profile_trust::quality::PairQuality;
 use crate::contact::remark::RemarkEntry;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::json::JsonBody;
-use crate::http::extract::query::Query;
 use crate::http::limits::memory::Memory;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
@@ -64,10 +62,8 @@ problems! {
 pub async fn check(
     Caller(jobs): Caller,
     State(memory): State<Memory>,
-    uri: Uri,
     JsonBody { value, mut room }: JsonBody,
 ) -> Result<Json<CheckReport>, ApiError> {
-    Query::read(&uri, &[]).finish()?;
     if room.turn.is_none() {
         room.turn = Some(memory.turn(0).await?);
     }

@@ -273,18 +273,14 @@ pub async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Json<JobPage>, ApiEr
         )
         .await?;
     Ok(Json(JobPage {
-        jobs: page
-            .jobs
-            .into_iter()
-            .map(|job| JobAnswer::new(job))
-            .collect(),
+        jobs: page.jobs.into_iter().map(JobAnswer::new).collect(),
         next_cursor: page.next_cursor,
     }))
 }
 
 problems! {
     /// What asking for one job can fail with.
-    GetProblems: JobNotFound
+    GetProblems: BadQuery, JobNotFound
 }
 
 /// Looks at a job.
@@ -339,7 +335,7 @@ pub async fn cancel(Caller(jobs): Caller, JobId(id): JobId) -> Result<Response, 
 
 problems! {
     /// What deleting a job can fail with.
-    DeleteProblems: JobNotFound, JobNotEnded
+    DeleteProblems: BadQuery, JobNotFound, JobNotEnded
 }
 
 /// Removes an ended job with its case and its result.

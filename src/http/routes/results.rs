@@ -13,7 +13,6 @@ use crate::http::dto::result::JobResult;
 use crate::http::extract::accept::Format;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::JobId;
-use crate::http::extract::query::Query;
 use crate::http::layers::etag::{Known, tagged};
 use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::limits::memory::{Memory, SMALL_BYTES};
@@ -43,8 +42,6 @@ pub async fn result(
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    // Its form was looked at before.
-    Query::read(&uri, &["format"]).finish()?;
     let tag = match Known::of(&jobs, id, &uri, &headers, Format::Json).await? {
         Known::Unchanged(answer) => return Ok(answer),
         Known::Tag(tag) => tag,

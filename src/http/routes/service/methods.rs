@@ -6,8 +6,9 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::contact::case::{Method, Output};
+use crate::http::extract::caller::AnyTenant;
 use crate::http::options::HttpOptions;
-use crate::http::problem::catalogue::Always;
+use crate::http::problem::catalogue::PlainProblems;
 use crate::http::routes::jobs::WAIT_MAX_SECONDS;
 use crate::jobs::PAGE_MAX;
 
@@ -77,6 +78,30 @@ pub struct RequestLimits {
     wait_max_seconds: u32,
     /// Most jobs in one page of a list.
     list_limit_max: u32,
+    /// Most motions of one case.
+    motions_max: usize,
+    /// Most samples of a grid in a case, one axis times the other.
+    samples_max: usize,
+    /// Most memory in bytes that a case may be estimated to need.
+    memory_max_bytes: u64,
+    /// Longest solver time of a case in s, also of one that names no `time_limit_s`.
+    time_limit_max_seconds: f64,
+    /// Largest body of a batch in bytes.
+    batch_max_bytes: u64,
+    /// Most cases of a batch.
+    batch_max_cases: u32,
+    /// Most queued jobs of the tenant.
+    queue_max: u64,
+    /// Most samples of a `grid` that a result is resampled on.
+    grid_max_samples: usize,
+    /// Most requests of the tenant under way, streams of events and waits aside.
+    requests_max: usize,
+    /// Most streams of events of the tenant.
+    streams_max: usize,
+    /// Most requests of the tenant that wait for the end of a job or a batch.
+    waits_max: usize,
+    /// Requests per second of one key, or of one address without a key; 0 for any number.
+    requests_per_second: u32,
 }
 
 /// The methods, contacts and outputs that a case can name.
@@ -85,9 +110,13 @@ pub struct RequestLimits {
     path = "/v1/methods",
     tag = "cases",
     operation_id = "list_methods",
-    responses((status = 200, description = "What the service can do", body = Capabilities), Always)
+    responses((status = 200, description = "What the service can do", body = Capabilities), PlainProblems)
 )]
-pub async fn methods(State(options): State<HttpOptions>) -> Json<Capabilities> {
+pub async fn methods(
+    State(options): State<HttpOptions>,
+    State(AnyTenant(jobs)): State<AnyTenant>,
+) -> Json<Capabilities> {
+    let own = jobs.options();
     Json(Capabilities {
         methods: [
             Method::Auto,
@@ -111,6 +140,18 @@ pub async fn methods(State(options): State<HttpOptions>) -> Json<Capabilities> {
             body_max_bytes: options.body_max_bytes,
             wait_max_seconds: WAIT_MAX_SECONDS,
             list_limit_max: PAGE_MAX,
+            motions_max: own.limits.motions_max,
+            samples_max: own.limits.samples_max,
+            memory_max_bytes: own.limits.memory_bytes,
+            time_limit_max_seconds: own.time_limit.as_secs_f64(),
+            batch_max_bytes: options.batch_max_bytes,
+            batch_max_cases: options.batch_max_cases,
+            queue_max: own.tenant_queue_max.min(own.queue_max),
+            grid_max_samples: options.grid_max_samples,
+            requests_max: options.tenant_requests_max,
+            streams_max: options.tenant_streams_max,
+            waits_max: options.tenant_waits_max,
+            requests_per_second: options.requests_per_second,
         },
         version: env!("CARGO_PKG_VERSION"),
     })

@@ -3,13 +3,13 @@
 use axum::Json;
 use axum::extract::Path;
 
-use crate::http::problem::catalogue::{Always, ProblemMeaning, problems};
+use crate::http::problem::catalogue::{PlainProblems, ProblemMeaning, problems};
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 
 problems! {
     /// What `GET /problems/{name}` can fail with.
-    ExplainProblems: UnknownRoute
+    ExplainProblems: BadQuery, UnknownRoute
 }
 
 /// Every kind of problem that this service knows.
@@ -18,7 +18,7 @@ problems! {
     path = "/problems",
     tag = "service",
     operation_id = "list_problems",
-    responses((status = 200, description = "All kinds of problems", body = Vec<ProblemMeaning>), Always)
+    responses((status = 200, description = "All kinds of problems", body = Vec<ProblemMeaning>), PlainProblems)
 )]
 pub async fn list() -> Json<Vec<ProblemMeaning>> {
     Json(

@@ -3,7 +3,7 @@
 use axum::Json;
 
 use crate::contact::remark::{Remark, RemarkKind};
-use crate::http::problem::catalogue::Always;
+use crate::http::problem::catalogue::PlainProblems;
 
 /// Every remark that an answer can carry: its code, what it means and what to do about it.
 #[utoipa::path(
@@ -11,7 +11,7 @@ use crate::http::problem::catalogue::Always;
     path = "/v1/remarks",
     tag = "cases",
     operation_id = "list_remarks",
-    responses((status = 200, description = "All kinds of remarks", body = Vec<RemarkKind>), Always)
+    responses((status = 200, description = "All kinds of remarks", body = Vec<RemarkKind>), PlainProblems)
 )]
 pub async fn remarks() -> Json<Vec<RemarkKind>> {
     Json(Remark::kinds())
