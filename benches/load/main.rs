@@ -3,7 +3,8 @@
 //! `cargo bench --bench load [-- PART … [workers=N] [jobs=N]]` starts the real program on loopback with a data folder of its own and
 //! prints a table. The parts: `mixed` (64 clients for a minute), `soak` (20 000 small jobs, one by one, removed after a
 //! while; `jobs=N` for another number), `batch` (20 000 cases in one request), `crowds` (silent connections, followers, large bodies,
-//! unread answers); all of them without a name. The driver runs on one thread of the same
+//! unread answers), `claims` (1 and 64 workers), `lists` (filters that match nothing among 200 000 jobs), `mixed-lengths` (a long sweep
+//! and short jobs on one worker); all of them without a name. The driver runs on one thread of the same
 //! machine. A broken promise (a wrong answer, a lost or doubled job) ends it with a panic; missed goals are printed.
 
 #[path = "../machine.rs"]
@@ -13,9 +14,11 @@ mod batch;
 mod cases;
 mod client;
 mod crowds;
+mod lengths;
 mod mixed;
 mod service;
 mod soak;
+mod table;
 
 /// One line of the table: what was measured, the figure, and the goal if there is one.
 pub struct Row(pub String, pub String, pub String);
@@ -48,7 +51,15 @@ fn main() {
     let workers = number("workers=").unwrap_or((cores - 1).max(1));
     let jobs = number("jobs=").unwrap_or(20_000);
     let wanted = |part: &str| {
-        let names = ["mixed", "soak", "batch", "crowds"];
+        let names = [
+            "mixed",
+            "soak",
+            "batch",
+            "crowds",
+            "claims",
+            "lists",
+            "mixed-lengths",
+        ];
         !arguments
             .iter()
             .any(|argument| names.contains(&argument.as_str()))
@@ -76,5 +87,14 @@ fn main() {
     }
     if wanted("crowds") {
         print(runtime.block_on(crowds::run(workers)));
+    }
+    if wanted("claims") {
+        print(runtime.block_on(table::claims()));
+    }
+    if wanted("lists") {
+        print(runtime.block_on(table::lists()));
+    }
+    if wanted("mixed-lengths") {
+        print(runtime.block_on(lengths::run()));
     }
 }

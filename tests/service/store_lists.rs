@@ -3,8 +3,11 @@
 use railhead::jobs::store::NewJob;
 use railhead::jobs::store::list::Filter;
 use railhead::jobs::{JobsError, State};
+use serde_json::{Value, json};
 use uuid::Uuid;
 
+use crate::batches::small;
+use crate::server::Server;
 use crate::store::{Table, labelled, new_job, success};
 
 #[tokio::test]
@@ -114,5 +117,51 @@ async fn a_cursor_of_another_filter_is_refused() {
     for (filter, cursor) in [(&other, cursor.as_str()), (&Filter::default(), "nonsense")] {
         let answer = table.store.list("anonymous", filter, Some(cursor), 1).await;
         assert!(matches!(answer, Err(JobsError::BadCursor)), "{answer:?}");
+    }
+}
+
+#[tokio::test]
+async fn a_label_within_a_batch_is_listed_page_by_page() {
+    let server = Server::idle().await;
+    let labelled = |line: &str| {
+        let mut case = small("one of many");
+        case["labels"] = json!({ "line": line });
+        case
+    };
+    let cases: Vec<Value> = (0..7)
+        .map(|number| labelled(if number % 2 == 0 { "a" } else { "b" }))
+        .collect();
+    let mut batches = Vec::new();
+    for _ in 0..3 {
+        let sent = server.post("/v1/batches", &json!(cases)).await;
+        batches.push(sent.json["id"].as_str().expect("an id").to_owned());
+        // Of the same label, in no batch, between the batches.
+        assert_eq!(server.post("/v1/jobs", &labelled("a")).await.status, 202);
+    }
+    for (line, expected) in [("a", 4), ("b", 3), ("c", 0)] {
+        for state in ["", "&state=queued"] {
+            let path = format!(
+                "/v1/jobs?batch={}&label=line:{line}{state}&limit=2",
+                batches[1]
+            );
+            let (mut seen, mut cursor) = (Vec::new(), String::new());
+            loop {
+                let page = server.get(&format!("{path}{cursor}")).await.json;
+                let jobs = page["jobs"].as_array().expect("jobs").clone();
+                assert!(jobs.iter().all(|job| job["batch_id"] == json!(batches[1])));
+                seen.extend(jobs.iter().map(|job| job["id"].to_string()));
+                match page["next_cursor"].as_str() {
+                    Some(next) => cursor = format!("&cursor={next}"),
+                    None => break,
+                }
+            }
+            assert_eq!(seen.len(), expected, "{path}");
+            assert!(seen.is_sorted_by(|a, b| a > b), "newest first: {seen:?}");
+        }
+    }
+    for elsewhere in ["&created_before=1970-01-01T00:00:00Z", "&state=failed"] {
+        let path = format!("/v1/jobs?batch={}&label=line:a{elsewhere}", batches[1]);
+        let page = server.get(&path).await;
+        assert_eq!(page.json["jobs"], json!([]), "{path}: {}", page.text);
     }
 }

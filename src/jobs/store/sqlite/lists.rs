@@ -85,17 +85,42 @@ fn page_query(
         };
         and(&mut query, column, state.name().to_owned());
     }
-    if let Some(first) = filter.id_from() {
-        and(&mut query, &format!("{id} >= "), first.to_string());
-    }
-    // Both bounds hold; only the lower of them is passed on, so that the index is entered at one place.
+    // Of several bounds only the closest is passed on, so that the index is entered at one place.
     let before = [after, filter.id_before()].into_iter().flatten().min();
-    if let Some(before) = before {
-        and(&mut query, &format!("{id} < "), before.to_string());
+    if let (Some(_), Some(batch)) = (&filter.label, filter.batch) {
+        within_batch(&mut query, batch, filter.id_from(), before);
+    } else {
+        if let Some(first) = filter.id_from() {
+            and(&mut query, &format!("{id} >= "), first.to_string());
+        }
+        if let Some(before) = before {
+            and(&mut query, &format!("{id} < "), before.to_string());
+        }
     }
     query.push(format!(" ORDER BY {id} DESC LIMIT "));
     query.push_bind(i64::from(limit) + 1);
     query
+}
+
+/// Ids within a batch lie between its first and its last, so no more of a label is walked than was sent meanwhile.
+fn within_batch(
+    query: &mut QueryBuilder<Sqlite>,
+    batch: Uuid,
+    from: Option<Uuid>,
+    before: Option<Uuid>,
+) {
+    let end = "(SELECT MAX(id) FROM jobs WHERE batch_id = ";
+    let last = before.map_or(Uuid::max(), |id| {
+        Uuid::from_u128(id.as_u128().saturating_sub(1))
+    });
+    query.push(" AND job_id >= MAX(");
+    query.push_bind(from.unwrap_or_default().to_string());
+    query.push(", ").push(end.replace("MAX", "MIN"));
+    query.push_bind(batch.to_string());
+    query.push(")) AND job_id <= MIN(");
+    query.push_bind(last.to_string());
+    query.push(", ").push(end).push_bind(batch.to_string());
+    query.push("))");
 }
 
 #[cfg(test)]
@@ -139,6 +164,29 @@ pub(super) mod tests {
             };
             assert!(steps[0].contains(seek), "{steps:?}");
             assert_eq!(steps.len(), 1, "{steps:?}");
+        }
+    }
+
+    #[tokio::test]
+    async fn a_label_within_a_batch_is_walked_no_further_than_the_batch_goes() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = SqliteStore::open(&folder.path().join("jobs.db"))
+            .await
+            .unwrap();
+        for (state, after) in [(None, Some(Uuid::now_v7())), (Some(State::Failed), None)] {
+            let filter = Filter {
+                state,
+                batch: Some(Uuid::now_v7()),
+                label: Some(("line".to_owned(), "A12".to_owned())),
+                ..Filter::default()
+            };
+            let query = page_query("t", &filter, after, 50);
+            let steps = plan(&store, query.sql().as_str()).await;
+            assert!(steps[0].contains("job_id>? AND job_id<?)"), "{steps:?}");
+            let ends = steps.iter().filter(|step| step.contains("(batch_id=?)"));
+            assert_eq!(ends.count(), 2, "{steps:?}");
+            let scans = |step: &String| step.starts_with("SCAN") || step.contains("TEMP B-TREE");
+            assert!(!steps.iter().any(scans), "{steps:?}");
         }
     }
 

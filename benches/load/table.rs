@@ -1,0 +1,202 @@
+//! The job table by itself, in this process: what a claim costs for one and for many workers, and lists that find nothing among
+//! 200 000 jobs.
+
+use std::collections::{BTreeMap, HashSet};
+use std::time::Instant;
+
+use bytes::Bytes;
+use railhead::jobs::State;
+use railhead::jobs::store::list::Filter;
+use railhead::jobs::store::sqlite::SqliteStore;
+use railhead::jobs::store::{ClaimRequest, NewBatch, NewJob, QueueBounds, Release, Which};
+use railhead::jobs::wishes::Wishes;
+use uuid::Uuid;
+
+use crate::Row;
+use crate::machine::{median, quantile};
+
+const QUEUED: usize = 20_000;
+const CLAIMS: usize = 200;
+const LISTED: usize = 200_000;
+const LISTS: usize = 50;
+const CHUNK: usize = 1000;
+const TENANT: &str = "anonymous";
+
+/// A claim with 1 and with 64 workers in turn, of the same queue.
+pub async fn claims() -> Vec<Row> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = SqliteStore::open(&folder.path().join("jobs.db")).await;
+    let store = store.expect("a table");
+    fill(&store, QUEUED).await;
+    let (mut one, mut many) = (Vec::new(), Vec::new());
+    for number in 0..CLAIMS {
+        for (workers, times) in [(1, &mut one), (64, &mut many)] {
+            let request = ClaimRequest {
+                worker: "w",
+                tenant: TENANT,
+                which: Which::New,
+                jobs: 256,
+                cost_us: 200_000,
+                each_slice_us: None,
+                workers,
+                lease_until: i64::MAX,
+                now: i64::try_from(number).unwrap_or(0),
+                late_before: 0,
+                skip: &HashSet::new(),
+            };
+            let start = Instant::now();
+            let claims = store.claim(&request).await.expect("a claim");
+            times.push(start.elapsed().as_secs_f64());
+            assert!(!claims.is_empty());
+            let released = store.release(&claims, Release::NotBegun, 0).await;
+            assert_eq!(released.expect("a release").len(), claims.len());
+        }
+    }
+    let ratio = median(many.clone()) / median(one.clone());
+    vec![Row::judged(
+        "claims: median, p99 of a claim among 20 000 jobs, 1 worker; 64 workers",
+        format!("{}; {} ({ratio:.2} ×)", times(&one), times(&many)),
+        "≤ 1.2 ×",
+        ratio <= 1.2,
+    )]
+}
+
+/// Lists whose filters match nothing, beside one that fills its page.
+pub async fn lists() -> Vec<Row> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = SqliteStore::open(&folder.path().join("jobs.db")).await;
+    let store = store.expect("a table");
+    let batch = fill(&store, LISTED).await;
+    let filters = filters(batch);
+    let mut rows = Vec::new();
+    for (name, filter, expected) in filters {
+        let mut seconds = Vec::new();
+        for _ in 0..LISTS {
+            let start = Instant::now();
+            let page = store.list(TENANT, &filter, None, 50).await.expect("a page");
+            seconds.push(start.elapsed().as_secs_f64());
+            assert_eq!(page.jobs.len(), expected, "{name}");
+        }
+        rows.push(Row::judged(
+            &format!("lists: median, p99 among 200 000 jobs: {name}"),
+            times(&seconds),
+            "median ≤ 5 ms",
+            median(seconds) <= 0.005,
+        ));
+    }
+    rows
+}
+
+/// Filters with the number of jobs that they find on a page of 50.
+fn filters(batch: Uuid) -> [(&'static str, Filter, usize); 7] {
+    let label = Some(("run".to_owned(), "big".to_owned()));
+    let (failed, none) = (Some(State::Failed), Some(Uuid::now_v7()));
+    let all = Filter::default();
+    [
+        ("nothing asked, a full page", all.clone(), 50),
+        (
+            "state",
+            Filter {
+                state: failed,
+                ..all.clone()
+            },
+            0,
+        ),
+        (
+            "label and state",
+            Filter {
+                label: label.clone(),
+                state: failed,
+                ..all.clone()
+            },
+            0,
+        ),
+        (
+            "batch and state",
+            Filter {
+                batch: Some(batch),
+                state: failed,
+                ..all.clone()
+            },
+            0,
+        ),
+        (
+            "label and another batch",
+            Filter {
+                label: label.clone(),
+                batch: none,
+                ..all.clone()
+            },
+            0,
+        ),
+        (
+            "label, batch and state",
+            Filter {
+                label,
+                batch: Some(batch),
+                state: failed,
+                ..all.clone()
+            },
+            0,
+        ),
+        (
+            "a time long ago",
+            Filter {
+                created_before: Some(1),
+                ..all
+            },
+            0,
+        ),
+    ]
+}
+
+fn times(seconds: &[f64]) -> String {
+    let (median, p99) = (median(seconds.to_vec()), quantile(seconds.to_vec(), 0.99));
+    format!("{:.2}, {:.2} ms", 1e3 * median, 1e3 * p99)
+}
+
+/// Queues so many small jobs with one label as a batch.
+async fn fill(store: &SqliteStore, jobs: usize) -> Uuid {
+    let batch = NewBatch {
+        id: Uuid::now_v7(),
+        tenant: TENANT.into(),
+        created_at: 0,
+        count: u32::try_from(jobs).expect("a count"),
+        rejected: 0,
+        template: None,
+        idempotency: None,
+    };
+    let id = batch.id;
+    let nobody = HashSet::new();
+    let begun = store.begin_batch(&batch, &nobody, QueueBounds::NONE);
+    begun.await.expect("a batch");
+    for start in (0..jobs).step_by(CHUNK) {
+        let some: Vec<_> = (start..start + CHUNK)
+            .map(|index| (u32::try_from(index).expect("an index"), job()))
+            .collect();
+        store.enqueue_many(id, &some).await.expect("jobs");
+    }
+    store.complete_batch(id).await.expect("the batch");
+    id
+}
+
+fn job() -> NewJob {
+    NewJob {
+        id: Uuid::now_v7(),
+        tenant: TENANT.into(),
+        created_at: 0,
+        name: None,
+        labels: BTreeMap::from([("run".to_owned(), "big".to_owned())]),
+        method: "auto".to_owned(),
+        body: Bytes::from_static(b"{}"),
+        row: false,
+        outputs: "[]".to_owned(),
+        cost_us: 1000,
+        slice_us: 1000,
+        reuse_key: None,
+        source: None,
+        idempotency: None,
+        traceparent: None,
+        wishes: Wishes::default(),
+    }
+}
