@@ -1,5 +1,5 @@
-//! Where do logs and spans go? Logs: one line per event to standard error, as text or JSON. Spans: to a collector by
-//! OTLP over HTTP, if one is named.
+//! Where do logs and spans go? Log events are lines of text or JSON on standard error; spans go to a collector by OTLP over HTTP,
+//! if one is configured.
 
 use std::io::stderr;
 use std::panic;
@@ -24,37 +24,37 @@ use tracing_appender::non_blocking::{ErrorCounter, NonBlockingBuilder, WorkerGua
 use tracing_subscriber::EnvFilter;
 use tracing_subscriber::fmt::format::FmtSpan;
 
-/// How long a collector may take for one batch of spans.
+/// Time limit for sending one batch of spans.
 const COLLECTED_WITHIN: Duration = Duration::from_secs(10);
-/// How long the last spans may take when the service stops.
+/// Time limit for sending the last spans when the service stops.
 const LAST_WITHIN: Duration = Duration::from_secs(3);
-/// More than any collector answers.
+/// Longest answer of a collector that is read, in bytes.
 const ANSWER_BYTES: usize = 1 << 20;
 
-/// How a log line looks.
+/// Format of the log lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum LogFormat {
-    /// For people.
+    /// Readable text.
     Text,
-    /// For machines: one JSON object per line.
+    /// One JSON object per line.
     Json,
 }
 
-/// Lines that wait for whoever reads the log; further ones are dropped and counted.
+/// Log lines that are buffered until they are read; beyond this number new lines are dropped and counted.
 const LINES_WAITING: usize = 50_000;
 
-/// What knows how many lines were dropped.
+/// Counter of dropped log lines.
 static DROPPED: OnceLock<ErrorCounter> = OnceLock::new();
 
-/// Log lines dropped so far because nobody read them.
+/// Number of log lines dropped so far because the reader of the log was too slow.
 #[must_use]
 pub fn dropped_lines() -> u64 {
     let dropped = DROPPED.get().map_or(0, ErrorCounter::dropped_lines);
     u64::try_from(dropped).unwrap_or(u64::MAX)
 }
 
-/// Starts logging; panics are logged too, instead of being printed between the lines. A thread of its own writes the
-/// lines, so that nothing waits for whoever reads them. Lines are written as long as the returned guard is held.
+/// Starts logging. A separate thread writes the lines, so that a slow reader of the log holds up nothing; it writes as long as the
+/// returned guard is held. Panics are logged as events instead of being printed between the lines.
 ///
 /// `filter` is a list such as `info,railhead::jobs=debug`.
 ///
@@ -62,7 +62,7 @@ pub fn dropped_lines() -> u64 {
 /// The filter cannot be read, or logging was started before.
 pub fn start(format: LogFormat, filter: &str) -> anyhow::Result<WorkerGuard> {
     let mut targets = EnvFilter::try_new(filter).context("--log")?;
-    // A client's name with signs that the font lacks is no concern of the operator.
+    // The renderer of pictures warns when a client's text has characters that the font lacks; operators need not know.
     if !filter.contains("usvg") {
         targets = targets.add_directive("usvg=error".parse()?);
     }
@@ -71,7 +71,7 @@ pub fn start(format: LogFormat, filter: &str) -> anyhow::Result<WorkerGuard> {
         .buffered_lines_limit(LINES_WAITING)
         .thread_name("railhead-log")
         .finish(stderr());
-    // Logging is started once, or fails below.
+    // A second start fails below, at `try_init`.
     let _ = DROPPED.set(writer.error_counter());
     let lines = tracing_subscriber::fmt()
         .with_env_filter(targets)
@@ -121,16 +121,16 @@ impl FromStr for Endpoint {
     }
 }
 
-/// The spans of this process on their way to a collector.
+/// Sends the spans of this process to a collector.
 #[derive(Debug)]
 pub struct Traces(SdkTracerProvider);
 
 impl Traces {
-    /// Starts sending spans, in batches and from a thread of its own; call it inside the async runtime. Sampling, size and
-    /// pace of batches, headers for the collector and attributes of the process are read from OpenTelemetry's own variables.
+    /// Starts sending spans in batches, from a separate thread; must be called inside the async runtime. Sampling, batch size and
+    /// interval, headers for the collector and resource attributes are read from OpenTelemetry's own environment variables.
     ///
     /// # Errors
-    /// One of these variables says what is not allowed.
+    /// One of these variables has a value that is not allowed.
     pub fn start(endpoint: &Endpoint) -> anyhow::Result<Traces> {
         let exporter = SpanExporter::builder()
             .with_http()
@@ -153,15 +153,15 @@ impl Traces {
         Ok(Traces(provider))
     }
 
-    /// What makes the spans.
+    /// Creates the spans.
     #[must_use]
     pub fn tracer(&self) -> SdkTracer {
         self.0.tracer(env!("CARGO_PKG_NAME"))
     }
 
-    /// Sends what is left; a collector that does not take it in time loses it.
+    /// Sends the remaining spans; those that the collector does not accept in time are lost.
     pub async fn stop(self) {
-        // The sending itself is done by the runtime, so this must not hold up one of its threads.
+        // Spans are sent by the runtime, so waiting here on one of its threads could block the sending.
         let stopped =
             tokio::task::spawn_blocking(move || self.0.shutdown_with_timeout(LAST_WITHIN));
         match stopped.await {
@@ -172,8 +172,7 @@ impl Traces {
     }
 }
 
-/// Speaks plain HTTP with a collector, one connection per batch. The thread that sends is none of the runtime's, so the
-/// runtime is named.
+/// HTTP client for a collector, one connection per batch. The exporter calls it from a thread outside the runtime, hence the handle.
 #[derive(Debug)]
 struct Collector(Handle);
 
@@ -201,7 +200,7 @@ async fn send(request: Request<Bytes>) -> Result<Response<Bytes>, HttpError> {
     let stream = TcpStream::connect((host, port)).await?;
     let name = HeaderValue::from_str(authority.as_str())?;
     head.headers.insert(HOST, name);
-    // To the server itself only the path is said (RFC 9112, section 3.2.1).
+    // The request target for an origin server is the path alone (RFC 9112, section 3.2.1).
     head.uri = head.uri.path().parse()?;
     let (mut sender, connection) = http1::handshake(TokioIo::new(stream)).await?;
     let connection = tokio::spawn(connection);

@@ -1,4 +1,4 @@
-//! A copy of the data folder, also beside a running service.
+//! `railhead backup`: copies the data folder, also while a service uses it.
 
 use std::process::ExitCode;
 
@@ -8,7 +8,7 @@ use crate::cli::commands::BackupArgs;
 use crate::cli::output::print;
 use crate::jobs::backup::backup;
 
-/// Makes the copy and names it.
+/// Makes the copy and prints its path.
 pub(super) fn run(args: &BackupArgs) -> anyhow::Result<ExitCode> {
     tokio::runtime::Builder::new_current_thread()
         .enable_all()

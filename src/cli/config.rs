@@ -1,4 +1,4 @@
-//! The settings that `serve` would run with, and where each comes from.
+//! `railhead config`: prints the settings that `serve` would run with, and where each comes from.
 
 use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Command};
@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 
 use crate::cli::serve_args::ServeArgs;
 
-/// What is shown in place of a secret.
+/// Printed instead of a secret.
 const MASK: &str = "***";
 
 /// Every setting with its value, its source (`default`, `environment`, `flag`) and its variable, as JSON. The values
@@ -19,7 +19,7 @@ pub(super) fn describe(command: &Command, given: &ArgMatches, args: &ServeArgs) 
         };
         settings.insert(flag.to_owned(), setting(arg, given));
     }
-    // The one default that depends on the machine.
+    // The only default that depends on the machine.
     if let Some(Value::Object(workers)) = settings.get_mut("workers") {
         workers.insert("value".to_owned(), json!(args.worker_count()));
     }
@@ -47,7 +47,7 @@ fn setting(arg: &Arg, given: &ArgMatches) -> Value {
     json!({ "value": value, "source": source, "variable": variable })
 }
 
-/// Numbers and truths as such, everything else as text.
+/// Numbers and booleans as JSON values, everything else as text.
 fn plain(text: &str) -> Value {
     match serde_json::from_str(text) {
         Ok(value @ (Value::Number(_) | Value::Bool(_))) => value,
@@ -63,7 +63,7 @@ mod tests {
     use crate::cli::commands::{Cli, Command as Asked};
 
     #[test]
-    fn a_secret_is_masked_and_the_rest_is_told() {
+    fn a_secret_is_masked_and_the_rest_is_printed() {
         let mut command = Command::new("x")
             .arg(
                 Arg::new("token")
@@ -82,12 +82,12 @@ mod tests {
         else {
             panic!("serve was asked for");
         };
-        let told = describe(&command, &given, &args);
-        assert!(!told.contains("hush"), "{told}");
-        let told: Value = serde_json::from_str(&told).unwrap();
-        assert_eq!(told["token"]["value"], MASK);
+        let described = describe(&command, &given, &args);
+        assert!(!described.contains("hush"), "{described}");
+        let described: Value = serde_json::from_str(&described).unwrap();
+        assert_eq!(described["token"]["value"], MASK);
         assert_eq!(
-            told["size"],
+            described["size"],
             json!({ "value": 3, "source": "default", "variable": null })
         );
     }

@@ -1,4 +1,4 @@
-//! Is a running service ready? One plain HTTP request, for containers without other tools.
+//! `railhead healthcheck`: asks a running service whether it is ready, for containers without other tools.
 
 use std::io::{Read, Write};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpStream, ToSocketAddrs};
@@ -9,9 +9,9 @@ use anyhow::{Context, bail};
 
 use crate::cli::commands::HealthcheckArgs;
 
-/// How long each step may take.
+/// Time limit of each step.
 const STEP_TIMEOUT: Duration = Duration::from_secs(3);
-/// Enough for the status line.
+/// Bytes of the answer that are read: enough for the status line.
 const ANSWER_BYTES: u64 = 1024;
 
 /// Asks whether the service is ready; succeeds if the answer is 200.
@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn hosts_ports_and_paths_are_told_apart() {
+    fn hosts_ports_and_paths_are_distinguished() {
         for (url, authority, path) in [
             ("http://127.0.0.1:8080/readyz", "127.0.0.1:8080", "/readyz"),
             ("http://localhost", "localhost:80", "/"),

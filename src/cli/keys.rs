@@ -1,4 +1,4 @@
-//! API keys of a data folder: make, list, revoke; also beside a running service.
+//! `railhead keys`: creates, lists and revokes the API keys of a data folder, also while a service uses it.
 
 use std::process::ExitCode;
 
@@ -8,7 +8,7 @@ use crate::cli::commands::{KeysAction, KeysArgs};
 use crate::cli::output::{print, print_error};
 use crate::jobs::keys::{Key, Keyring};
 
-/// Does what was asked of the keys.
+/// Runs the action on the keys.
 pub(super) fn run(args: &KeysArgs) -> anyhow::Result<ExitCode> {
     tokio::runtime::Builder::new_current_thread()
         .enable_all()
@@ -47,7 +47,7 @@ async fn act(args: &KeysArgs) -> anyhow::Result<ExitCode> {
     done
 }
 
-/// One line per key, columns parted by tabs.
+/// One line per key, columns separated by tabs.
 fn table(keys: &[Key]) -> String {
     let time = |epoch_ms: i64| {
         jiff::Timestamp::from_millisecond(epoch_ms)
@@ -61,7 +61,7 @@ fn table(keys: &[Key]) -> String {
             key.tenant,
             time(key.created_at),
             key.revoked_at.map_or_else(|| "-".to_owned(), time),
-            // Escaped: whoever named the key shall not draw on the operator's terminal.
+            // Escaped, so that a name cannot send control sequences to the operator's terminal.
             key.name.as_deref().unwrap_or("-").escape_debug()
         )
     }));

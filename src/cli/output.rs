@@ -3,7 +3,7 @@
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
-/// Writes to standard output; a reader that has gone away is no fault of ours.
+/// Writes to standard output. A closed pipe is not an error: the reader has seen enough.
 pub fn print(text: &str) -> anyhow::Result<ExitCode> {
     let mut out = std::io::stdout().lock();
     match writeln!(out, "{}", text.trim_end()).and_then(|()| out.flush()) {
@@ -12,7 +12,7 @@ pub fn print(text: &str) -> anyhow::Result<ExitCode> {
     }
 }
 
-/// An error with its causes; a cause that was told already is not told again.
+/// An error and its causes in one line; a cause that the text already contains is left out.
 pub fn reasons(error: &anyhow::Error) -> String {
     let mut text = String::new();
     for cause in error.chain() {
@@ -28,7 +28,7 @@ pub fn reasons(error: &anyhow::Error) -> String {
 
 /// Writes one line to standard error.
 pub fn print_error(text: &str) {
-    // If even standard error is closed there is nobody left to tell.
+    // If standard error is closed as well, there is nowhere left to report to.
     let _ = writeln!(std::io::stderr(), "railhead: {text}");
 }
 
@@ -37,7 +37,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_cause_is_told_once() {
+    fn a_cause_is_named_once() {
         let inner = anyhow::anyhow!("no such file");
         let error = inner.context("the folder: no such file").context("backup");
         assert_eq!(reasons(&error), "backup: the folder: no such file");

@@ -1,4 +1,4 @@
-//! The HTTP API with local workers: start and stop order.
+//! `railhead serve`: the HTTP API with workers in the same process; the order of start and stop.
 //!
 //! Start: logs, data folder (locked, jobs of a dead process taken back), workers, listener. The event
 //! `listening` with the bound address says that requests are answered.
@@ -30,11 +30,11 @@ use crate::jobs::{Jobs, Options};
 use crate::telemetry::{self, Traces};
 
 const REQUEST_THREADS_MIN: usize = 4;
-/// Files that the process opens besides connections: the table, results, logs.
+/// Files that the process opens besides connections: job table, results, logs.
 const OTHER_FILES: u64 = 256;
-/// Exit code of a process that ends because only a new one can go on (EX_TEMPFAIL).
+/// Exit code of a process that ends because it has to be restarted (EX_TEMPFAIL).
 const START_AGAIN: u8 = 75;
-/// Connections of the listener for probes.
+/// Most connections of the listener for probes.
 const PROBE_CONNECTIONS: usize = 64;
 
 /// Serves until a signal says stop.
@@ -53,14 +53,14 @@ pub(super) fn run(args: &ServeArgs) -> anyhow::Result<ExitCode> {
         .build()
         .context("the async runtime could not be started")?;
     let served = runtime.block_on(serve(args));
-    // The data folder is closed. Arithmetic that still goes on works for clients that have been cut off.
+    // The data folder is closed; computations that still run are for clients that have been cut off.
     runtime.shutdown_background();
-    // The last lines are written.
+    // Writes the last log lines.
     drop(log);
     served
 }
 
-/// Threads for requests: one per core, but not so few that one which writes a log line keeps the others waiting.
+/// Threads for requests: one per core, but at least four, so that a blocked one does not hold up all others.
 fn request_threads() -> usize {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     cores.max(REQUEST_THREADS_MIN)
@@ -140,7 +140,7 @@ async fn bind(address: SocketAddr) -> anyhow::Result<TcpListener> {
     listener.with_context(|| format!("cannot listen on {address}"))
 }
 
-/// Answers requests until `stop`, and probes on their own port, if they have one, until the process ends.
+/// Answers requests until `stop`. Probes with a port of their own are answered until the process ends.
 async fn start_listening(
     args: &ServeArgs,
     jobs: &Jobs,

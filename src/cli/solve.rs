@@ -1,4 +1,4 @@
-//! One case in, its result out; no server, no data folder.
+//! `railhead solve`: solves one case without a server or a data folder.
 
 use std::io::Read;
 use std::ops::ControlFlow;
@@ -17,10 +17,10 @@ use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::solution::{Fields, PatchCells, PatchFields, PointFields, Solution};
 use crate::contact::{check, solve_with};
 
-/// Exit code for a case that is faulty.
+/// Exit code for a faulty case.
 const FAULTY_CASE: u8 = 2;
 
-/// Measures the time of a solve and never stops it: whoever waits at a terminal stops the process.
+/// Measures the time of a solve and never stops it; a user at a terminal interrupts the process.
 struct Clock(Instant);
 
 impl Monitor for Clock {
@@ -33,7 +33,7 @@ impl Monitor for Clock {
     }
 }
 
-/// What is printed: the solution, with the values per cell beside it.
+/// The printed result: the solution, and the values per cell as its member `fields`.
 #[derive(Serialize)]
 struct Printed<'a> {
     #[serde(flatten)]

@@ -1,4 +1,4 @@
-//! The end of a service: the signals that ask for it and the time that each step may take.
+//! How a service stops: the signals, and the time that each step may take.
 //!
 //! Steps, counted from the signal: not ready (`/readyz` is 503) while connections are still accepted, so that a load
 //! balancer sees it before the port is gone; the port closes and open requests end; running jobs get what is left of
@@ -32,7 +32,7 @@ pub(super) struct Schedule {
     pub requests_end: Instant,
     /// Running jobs go back to the queue.
     pub grace_ends: Instant,
-    /// Nothing is waited for any more.
+    /// Waiting for the data folder to close ends.
     pub folder_closed: Instant,
     last_moment: Instant,
 }

@@ -1,4 +1,4 @@
-//! The values of flags that are more than a number or a text, and how they are read.
+//! Values of flags that are more than a number or a text, and how they are read.
 
 use std::net::SocketAddr;
 use std::time::Duration;

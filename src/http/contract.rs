@@ -148,7 +148,7 @@ pub fn text(mut document: utoipa::openapi::OpenApi) -> String {
     text.map(|text| text + "\n").unwrap_or_default()
 }
 
-/// Gives the text of the contract, which is made when it is asked for first.
+/// Returns the text of the contract, which is built on the first request for it.
 #[derive(Debug, Clone, Copy)]
 pub struct Document(pub fn() -> &'static str);
 

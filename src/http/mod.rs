@@ -4,7 +4,7 @@
 //! The way of a request:
 //!
 //! 1. [`server::listener`] accepts the connection and gives it a [place](server::places); [`server::connection`] passes its
-//!    requests on. A client that sends nothing, or takes nothing of its answer, is let go ([`server::write_timeout`]).
+//!    requests on. A client that sends nothing, or does not read its answer, is disconnected ([`server::write_timeout`]).
 //! 2. The [`layers`] around all routes, from the outside inward: [`security_headers`], [`drain_body`], [`request_id`],
 //!    [`request_log`], [`otel`], [`metrics`], [`etag::complete`], [`compression`], the path in problems
 //!    ([`error::name_instance`]), [`origin_guard`], what the request holds until its answer is sent ([`holding_body`]),
@@ -88,7 +88,7 @@ pub fn router(jobs: Jobs, options: HttpOptions) -> Router {
 }
 
 /// The whole API, and the probes and metrics alone for a port of their own, on which requests without a key are answered
-/// if `probes_anonymous` says so. `dropped_lines` says how many lines of the log nobody read.
+/// if `probes_anonymous` says so. `dropped_lines` returns the number of log lines that were dropped.
 pub fn routers(
     jobs: Jobs,
     options: HttpOptions,

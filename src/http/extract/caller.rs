@@ -19,21 +19,21 @@ use crate::jobs::keys::{ANONYMOUS, OPERATOR};
 #[derive(Debug, Clone)]
 pub struct Tenant(pub Arc<str>);
 
-/// The key that a request came with, to be looked at again while its answer goes on; in its extensions.
+/// The key of a request, which is checked again while its answer is being sent; in its extensions.
 #[derive(Debug, Clone)]
 pub struct Credential(Arc<str>);
 
-/// How often the key of an answer that goes on is looked at.
+/// How often the key of a long answer is checked again.
 const POLL_INTERVAL: Duration = Duration::from_secs(2);
 
-/// Ends when the key that a request came with has been revoked; never without a key.
+/// Ends when the key of a request has been revoked; never if the request has none.
 pub async fn revoked(jobs: Jobs, credential: Option<Credential>) {
     let Some(Credential(text)) = credential else {
         return std::future::pending().await;
     };
     loop {
         tokio::time::sleep(POLL_INTERVAL).await;
-        // A table that does not answer revokes nothing.
+        // A key table that does not answer does not count as a revocation.
         if matches!(jobs.key(&text).await, Ok(None)) {
             return;
         }

@@ -60,7 +60,7 @@ where
         let read = tokio::task::spawn_blocking(move || {
             let value = read_json(&bytes);
             drop((bytes, held));
-            // Kept to the end of the work, also if nobody waits for it any more.
+            // The memory is held until the work ends, even if the client has gone away.
             value.map(|value| JsonBody { value, room })
         });
         read.await.map_err(|error| ApiError::internal(&error))?

@@ -1,4 +1,4 @@
-//! What a request says, read strictly: its body, its query, its ids and the form that the client accepts.
+//! What a request contains, read strictly: caller, ids, query, body, and the formats that the client accepts.
 
 pub mod accept;
 pub mod batch;

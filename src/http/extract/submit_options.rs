@@ -11,7 +11,7 @@ use crate::jobs::wishes::{Priority, Wishes};
 const DEADLINE_MAX_SECONDS: u32 = 30 * 24 * 3600;
 
 query! {
-    /// What may be asked for jobs at their submission.
+    /// Options of a submission.
     SubmitQuery(() => ()) {
         /// Which of the queued jobs of the tenant are solved first: `high` before `normal` (when left out) before `low`. Tenants take turns whatever the priorities of their jobs
         #[param(example = "high")]
@@ -36,7 +36,7 @@ impl SubmitQuery {
     }
 }
 
-/// Does the client refuse results of earlier identical cases?
+/// Does the client refuse the result of an earlier identical case?
 fn wants_fresh(headers: &HeaderMap) -> bool {
     let values = headers.get_all(header::CACHE_CONTROL);
     let mut directives = values

@@ -1,4 +1,4 @@
-//! Compressed bodies of requests: what may be unpacked.
+//! Compressed bodies of requests: which codings are accepted, and how much a body may unpack to.
 //!
 //! The limits of a body hold before and after it is unpacked, so a small body that unpacks to a large one is given up as soon
 //! as the limit is passed, and one that unpacks to nothing cannot be sent for ever.
@@ -20,18 +20,18 @@ use crate::http::problem::kinds::ProblemKind;
 /// Bytes that a packed batch may unpack to for each of its own; tables of numbers reach some 30.
 const UNPACKED_PER_BYTE: u64 = 200;
 
-/// Bytes up to which nobody asks how small they were before.
+/// Unpacked bytes up to which the ratio to the packed bytes is not checked.
 const UNPACKED_FREE: u64 = 16 << 20;
 
 /// The codings that a body may have.
 const ACCEPTED: HeaderValue = HeaderValue::from_static("gzip, zstd");
 
-/// How much of a packed body has arrived; in the extensions of its request.
+/// Bytes of a packed body that have arrived; in the extensions of its request.
 #[derive(Debug, Clone, Default)]
 pub struct PackedLength(Arc<AtomicU64>);
 
 impl PackedLength {
-    /// Has a body that so far unpacked to so many bytes grown out of all proportion?
+    /// Has a body that unpacked to so many bytes so far grown more than any honest one does?
     #[must_use]
     pub fn is_bomb(&self, unpacked: u64) -> bool {
         let packed = self.0.load(Ordering::Relaxed);

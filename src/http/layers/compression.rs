@@ -4,14 +4,14 @@ use axum::http::{Extensions, HeaderMap, StatusCode, Version};
 use tower_http::compression::CompressionLayer;
 use tower_http::compression::predicate::{NotForContentType, Predicate, SizeAbove};
 
-/// Bodies that are smaller do not become smaller.
+/// Smaller bodies do not shrink.
 const SMALLEST: u64 = 256;
 
-/// Marks an answer whose lines are wanted as they come, which packing would hold back.
+/// Marks an answer whose lines have to be sent at once; compression would delay them.
 #[derive(Debug, Clone, Copy)]
 pub struct StreamedUnbuffered;
 
-/// Packs answers for clients that accept it; not what is packed already, and not what is sent as it comes.
+/// Compresses answers for clients that accept it, except formats that are compressed already and answers marked [`StreamedUnbuffered`].
 pub fn compression_layer() -> CompressionLayer<impl Predicate> {
     let not_live = |_: StatusCode, _: Version, _: &HeaderMap, extensions: &Extensions| {
         extensions.get::<StreamedUnbuffered>().is_none()

@@ -17,11 +17,11 @@ use crate::http::problem::error::ApiError;
 use crate::jobs::Jobs;
 use crate::jobs::job::State;
 
-/// Results never change, but they can be deleted.
+/// For results: they never change, but they can be deleted.
 const IMMUTABLE: HeaderValue = HeaderValue::from_static("private, max-age=3600");
-/// May be kept, but has to be asked for again each time.
+/// For resources that change: they may be stored, but must be revalidated for each use.
 const REVALIDATE: HeaderValue = HeaderValue::from_static("private, no-cache");
-/// Everything else.
+/// For everything else.
 const NO_STORE: HeaderValue = HeaderValue::from_static("no-store");
 
 /// Codings that a tag may end with.
@@ -37,8 +37,8 @@ pub async fn revalidate(request: Request, next: Next) -> Response {
     tag(request, next, REVALIDATE).await
 }
 
-/// Outermost of the layers here, around compression: nothing is kept unless something was said about it, and the tag of a
-/// compressed body names its coding.
+/// The outer layer, around compression: an answer without a policy of its own must not be stored, and the tag of a compressed body
+/// names its coding.
 pub async fn complete(request: Request, next: Next) -> Response {
     let mut response = next.run(request).await;
     let headers = response.headers_mut();
@@ -59,19 +59,19 @@ pub async fn complete(request: Request, next: Next) -> Response {
     response
 }
 
-/// What the result of a job, or a part of it, is known by.
+/// The tag of a result or a part of it, or the answer if the client has it already.
 #[derive(Debug)]
 pub enum Known {
-    /// The client has it: this is the answer.
+    /// The client has it already; this is the answer.
     Unchanged(Response),
-    /// It has to be made, and gets this tag.
+    /// It has to be computed, and gets this tag.
     Tag(String),
 }
 
 impl Known {
-    /// Compares what a client has with what an address stands for, before anything is loaded or made. Results never
-    /// change, so the job, the address, the form and the version of the program say all. A tag that stands for anything
-    /// (`*`) is left to [`immutable`]: whether there is something only the work itself can say.
+    /// Compares the tags that a client has with the tag of what it asks for, before anything is loaded or computed. Results never
+    /// change, so job, path, query, format and version of the program determine the tag. `If-None-Match: *` is left to
+    /// [`immutable`], since only the work itself shows whether there is an answer.
     ///
     /// # Errors
     /// There is no such job.
@@ -132,7 +132,7 @@ async fn tag(request: Request, next: Next, lifetime: HeaderValue) -> Response {
         }
         return Response::from_parts(parts, body);
     }
-    // The bodies of these resources are in memory already.
+    // These resources have small bodies, which are in memory already.
     let body = match body.collect().await {
         Ok(body) => body.to_bytes(),
         Err(error) => return ApiError::internal(&error).into_response(),
@@ -152,19 +152,18 @@ async fn tag(request: Request, next: Next, lifetime: HeaderValue) -> Response {
     Response::from_parts(parts, Body::from(body))
 }
 
-/// Does `If-None-Match` stand for whatever there is?
+/// Is `If-None-Match` the wildcard `*`?
 fn asks_for_any(headers: &HeaderMap) -> bool {
     let mut values = headers.get_all(header::IF_NONE_MATCH).iter();
     values.any(|value| value.as_bytes() == b"*")
 }
 
 fn digest(body: &[u8]) -> String {
-    // 128 bits are enough where nobody gains by a collision with an own body.
+    // 128 bits are enough: a client that finds a collision deceives only itself.
     blake3::hash(body).to_hex()[..32].to_owned()
 }
 
-/// The tag among those of `If-None-Match` that stands for this digest, in whatever coding; compared weakly (RFC 9110,
-/// section 13.1.2).
+/// The tag in `If-None-Match` that belongs to this digest, in any coding; weak comparison (RFC 9110, section 13.1.2).
 fn matching(headers: &HeaderMap, digest: &str) -> Option<HeaderValue> {
     let values = headers.get_all(header::IF_NONE_MATCH).iter();
     let given = values.filter_map(|value| value.to_str().ok());

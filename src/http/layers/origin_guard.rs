@@ -1,8 +1,8 @@
-//! Who may ask without a key? Nobody by way of a foreign web page, nobody through a proxy.
+//! Who may ask without a key? Not a web page of another origin, and not a client behind a proxy.
 //!
-//! Where no key is needed, any page open in a browser on this machine could ask too. A page whose name is made to lead
-//! here (DNS rebinding) gives itself away by `Host`, a page of another origin by `Sec-Fetch-Site` or `Origin`. And a
-//! proxy on this machine would let everybody in who reaches it: it gives itself away by what it says of its client.
+//! Where no key is needed, any page open in a browser on this machine could send requests too. `Host` reveals a page whose name
+//! was made to resolve to this machine (DNS rebinding); `Sec-Fetch-Site` and `Origin` reveal a page of another origin. A proxy on
+//! this machine would let in everybody who reaches it; the headers that it adds about its client reveal it.
 
 use std::net::IpAddr;
 use std::sync::Arc;
@@ -19,7 +19,7 @@ use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::http::server::connection::ProbesOnly;
 
-/// What proxies say of their clients.
+/// Headers that proxies add about their clients.
 static FORWARDED: [HeaderName; 5] = [
     header::FORWARDED,
     HeaderName::from_static("x-forwarded-for"),
@@ -27,13 +27,13 @@ static FORWARDED: [HeaderName; 5] = [
     HeaderName::from_static("x-forwarded-proto"),
     HeaderName::from_static("x-real-ip"),
 ];
-/// What a browser says of the page that asks.
+/// Header in which a browser describes the page that sends the request.
 const FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 
-/// Routes that are answered whatever else is under way.
+/// Routes that are answered even if every connection is busy.
 const PROBES: [&str; 3] = ["/healthz", "/readyz", "/metrics"];
 
-/// What requests without a key have to be like.
+/// Conditions for requests without a key.
 #[derive(Debug, Clone)]
 pub struct Guard {
     hosts: Arc<[String]>,

@@ -1,11 +1,11 @@
-//! Figures of the process itself: memory, files, its start, and log lines that nobody read.
+//! Metrics of the process itself: memory, open files, start time, and dropped log lines.
 
 use prometheus_client::collector::Collector;
 use prometheus_client::encoding::{DescriptorEncoder, EncodeMetric};
 use prometheus_client::metrics::counter::ConstCounter;
 use prometheus_client::metrics::gauge::ConstGauge;
 
-/// Reads the figures when they are asked for.
+/// Reads the values when the metrics are scraped.
 #[derive(Debug)]
 pub struct Process {
     /// How many lines of the log were dropped.

@@ -16,19 +16,19 @@ use crate::http::problem::kinds::ProblemKind;
 use crate::http::server::connection::Peer;
 use crate::http::server::places::network;
 
-/// Requests that a key may send at once, in seconds of its rate.
+/// Size of a burst: the requests of so many seconds.
 const BURST_SECONDS: u32 = 2;
 
-/// Senders beyond which those that have not asked for a while are forgotten.
+/// Senders that are remembered; beyond this number, those without recent requests are forgotten.
 const SENDERS_KEPT: usize = 10_000;
-/// How often that is done at most: it looks at all of them.
+/// Shortest time between two clean-ups, which visit all senders.
 const FORGET_EVERY: Duration = Duration::from_secs(10);
 
-/// Wrong keys that one address may send in [`FAILURES_WITHIN`]; each costs a look into the table.
+/// Wrong keys that one address may send within [`FAILURES_WITHIN`]; each costs a query of the key table.
 const FAILURES_MAX: u32 = 20;
 const FAILURES_WITHIN: Duration = Duration::from_secs(10);
 
-/// Whose requests are counted together.
+/// Requests with the same value are counted together.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum RateKey {
     Key(String),
@@ -36,8 +36,8 @@ pub enum RateKey {
 }
 
 impl RateKey {
-    /// The sender of a request without a key. Loopback is this machine itself, perhaps a proxy that speaks for many: not
-    /// counted.
+    /// The sender of a request without a key. Requests over loopback are not counted: they may come from a proxy on behalf of many
+    /// clients.
     pub fn at(peer: Peer) -> Option<RateKey> {
         let address = network(peer.0);
         (!address.is_loopback()).then_some(RateKey::Address(address))
@@ -106,7 +106,7 @@ impl RateLimit {
         .after(seconds.max(1)))
     }
 
-    /// Is it time again to look for senders to forget?
+    /// Is it time for another clean-up?
     fn may_forget(&self) -> bool {
         let mut last = self
             .forgotten

@@ -1,11 +1,11 @@
-//! How many requests of what kind may be under way: in all, and of one tenant.
+//! How many requests, streams and waits may be in progress: in total, and for one tenant.
 
 use crate::http::limits::shares::{Share, Shares};
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 
-/// Requests, streams and waits under way; clones share them.
+/// Requests, streams and waits in progress; clones share them.
 #[derive(Debug, Clone)]
 pub struct ConcurrencyLimits {
     requests: Shares,
@@ -24,7 +24,7 @@ impl ConcurrencyLimits {
         }
     }
 
-    /// A place for one more request of a tenant.
+    /// Counts one more request of a tenant.
     ///
     /// # Errors
     /// `too-many-requests`: there are as many as there may be.
@@ -36,7 +36,7 @@ impl ConcurrencyLimits {
         })
     }
 
-    /// A place for one more stream of events of a tenant.
+    /// Counts one more stream of events of a tenant.
     ///
     /// # Errors
     /// As [`ConcurrencyLimits::request`].
@@ -46,13 +46,13 @@ impl ConcurrencyLimits {
         })
     }
 
-    /// A place for one more request that waits. Without one it is answered at once, for a wait is a wish only.
+    /// Counts one more waiting request, if there may be one. If not, the request is answered at once: `Prefer: wait` is not binding.
     #[must_use]
     pub fn wait(&self, tenant: &str) -> Option<Share> {
         self.waits.try_take(tenant, 1)
     }
 
-    /// The same where the wait decides what is answered.
+    /// The same where the answer depends on the wait.
     ///
     /// # Errors
     /// As [`ConcurrencyLimits::request`].

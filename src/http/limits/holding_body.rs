@@ -1,4 +1,4 @@
-//! A body that holds something as long as it is read: a place, a share of memory.
+//! A body that holds a resource until it has been sent, such as a share of memory.
 
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -12,10 +12,10 @@ use hyper::body::{Frame, SizeHint};
 
 use crate::http::limits::shares::Share;
 
-/// The body with what it holds.
+/// A body and the resource that it holds.
 struct HoldingBody<T>(Body, T);
 
-/// The same answer; `held` is dropped with its body.
+/// The same answer; `held` is dropped when its body has been sent.
 pub fn hold_while_sent<T: Send + Unpin + 'static>(response: Response, held: T) -> Response {
     response.map(|body| Body::new(HoldingBody(body, held)))
 }
@@ -40,12 +40,12 @@ impl<T: Unpin> HttpBody for HoldingBody<T> {
     }
 }
 
-/// What a request holds until its answer has been handed over; in its extensions.
+/// Shares that a request holds until its answer has been sent; in its extensions.
 #[derive(Debug, Clone, Default)]
 pub struct HeldShares(Arc<Mutex<Vec<Share>>>);
 
 impl HeldShares {
-    /// Holds this too.
+    /// Holds one more share.
     pub fn add(&self, share: Share) {
         self.0
             .lock()
@@ -53,7 +53,7 @@ impl HeldShares {
             .push(share);
     }
 
-    /// Gives everything back: what the request goes on with is counted elsewhere.
+    /// Gives all shares back; the caller counts the rest of the request elsewhere.
     pub fn release(&self) {
         self.0
             .lock()

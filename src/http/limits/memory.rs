@@ -1,5 +1,5 @@
-//! What requests may hold in memory, and whose turn it is to compute: bodies, parsed cases and answers are counted in
-//! bytes before they come to be, and what takes long is done by few at a time.
+//! Memory and computing time of requests: bodies, parsed cases and answers are counted in bytes before they are allocated, and long
+//! computations (large cases, grids, pictures) run only a few at a time.
 
 use std::sync::Arc;
 use std::thread::available_parallelism;
@@ -12,27 +12,27 @@ use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 
-/// Shares are counted in units of so many bytes.
+/// Bytes of one unit, in which shares are counted.
 const UNIT: usize = 1 << 10;
-/// What is smaller is not counted: as many of it as there may be requests take little.
+/// Smaller amounts are not counted: even the largest number of requests takes little memory with them.
 pub const SMALL_BYTES: usize = 64 << 10;
-/// How long a request waits for memory or for its turn.
+/// How long a request waits for memory or for a turn to compute.
 const WITHIN: Duration = Duration::from_secs(20);
-/// What answers are called where their memory is taken.
+/// The word for the memory of answers in refusals.
 const ANSWERS: &str = "answers that clients have not taken yet";
 
-/// The memory and the turns of all requests; clones share them.
+/// Memory and turns to compute of all requests; clones share them.
 #[derive(Debug, Clone)]
 pub struct Memory {
     bodies: Shares,
     parsed: Shares,
     answers: Shares,
-    /// For large cases; half of the cores, so that small ones are not kept waiting.
+    /// Turns for large cases: half of the cores, so that small cases need not wait for large ones.
     large: Arc<Semaphore>,
     small: Arc<Semaphore>,
-    /// For large grids.
+    /// Turns for large grids.
     grids: Arc<Semaphore>,
-    /// For pictures, small grids and tables, which are not kept waiting by large grids.
+    /// Turns for pictures, small grids and tables, which therefore need not wait for large grids.
     renderings: Arc<Semaphore>,
     waiting: Shares,
 }
@@ -44,7 +44,7 @@ impl Share {
     }
 }
 
-/// A turn to make an answer, and the memory for it.
+/// A turn to compute an answer, and the memory for it.
 #[derive(Debug)]
 pub struct Rendering {
     share: Option<Share>,
@@ -53,7 +53,7 @@ pub struct Rendering {
     tenant: String,
 }
 
-/// Memory and a turn, as long as it is held.
+/// Memory and a turn to compute; given back on drop.
 #[derive(Debug, Default)]
 pub struct Room {
     /// The memory.
@@ -104,7 +104,7 @@ impl Memory {
         take(&self.parsed, tenant, bytes, "cases that are read").await
     }
 
-    /// A turn for a case that takes so much memory.
+    /// A turn to check a case of this size in memory.
     ///
     /// # Errors
     /// `overloaded`: it does not come in time.
@@ -117,7 +117,7 @@ impl Memory {
         in_turn(turns).await
     }
 
-    /// Memory for an answer that is there already, without waiting: it would be held meanwhile.
+    /// Memory for an answer that exists already. It does not wait, since the answer would be held in the meantime.
     ///
     /// # Errors
     /// `overloaded`: it is not free.
@@ -129,7 +129,7 @@ impl Memory {
         share.map(Some).ok_or_else(|| no_memory(ANSWERS, bytes))
     }
 
-    /// A turn for an answer that will take so many bytes; to be had before anything is loaded for it.
+    /// A turn and memory for an answer of so many bytes; to be taken before anything is loaded for it.
     ///
     /// # Errors
     /// `overloaded`: too many wait already, or too long.
@@ -155,8 +155,7 @@ impl Memory {
 }
 
 impl Rendering {
-    /// Does the work off the threads that answer requests. The memory of the answer, by its true size, is held as long as the
-    /// second value.
+    /// Runs the work on the pool of blocking threads. The second value holds the memory of the answer, counted by its actual size.
     ///
     /// # Errors
     /// What `work` fails with, or `overloaded` if the answer is larger than was thought and there is no memory for it.
@@ -167,7 +166,7 @@ impl Rendering {
     ) -> Result<(T, Option<Share>), ApiError> {
         let turn = self.turn;
         let work = tokio::task::spawn_blocking(move || {
-            // Kept to the end of the work, also if nobody waits for it any more.
+            // The turn is held until the work ends, even if the client has gone away.
             let _turn = turn;
             work()
         });

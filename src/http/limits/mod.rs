@@ -1,4 +1,4 @@
-//! What requests may take together and of one tenant: memory, turns to compute, requests, streams and waits under way.
+//! What all requests together, and those of one tenant, may use: memory, turns to compute, requests, streams and waits in progress.
 
 pub mod concurrency;
 pub mod holding_body;

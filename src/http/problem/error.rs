@@ -238,7 +238,7 @@ impl From<JobsError> for ApiError {
     }
 }
 
-/// The disk takes nothing; the log has the system's own words.
+/// The disk cannot be written; the log has the message of the system.
 fn troubled(trouble: Trouble, reason: &JobsError) -> ApiError {
     tracing::warn!(%reason, "a request failed for want of a disk");
     let (kind, what) = match trouble {

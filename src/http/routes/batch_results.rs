@@ -66,7 +66,7 @@ pub struct BatchLine {
 const FORMATS: &[Format] = &[Format::Ndjson, Format::Csv];
 
 query! {
-    /// How the results of a batch are asked for.
+    /// Parameters of the results of a batch.
     BatchResultsQuery(() => ()) {
         /// Wait for jobs that have not ended, at most this many seconds in all; lines are sent as soon as everything before them is there
         #[param(minimum = 0, maximum = 3600)]

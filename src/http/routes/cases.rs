@@ -69,7 +69,7 @@ pub async fn check(
     }
     // A large grid takes long enough to check that it must not hold up other requests.
     let checked = tokio::task::spawn_blocking(move || {
-        // Kept to the end of the work, also if nobody waits for it any more.
+        // Memory and turn are held until the work ends, even if the client has gone away.
         let _room = room;
         jobs.check(&value).map(|problem| {
             let cost = problem.cost();

@@ -114,7 +114,7 @@ impl Selection {
         })
     }
 
-    /// The picture of an output, if a picture is what was asked for.
+    /// The picture of an output, if the format is that of a picture.
     ///
     /// # Errors
     /// `bad-query` if there is a `grid`, else as [`picture`].
@@ -300,7 +300,7 @@ pub enum Written {
     Whole(Vec<u8>),
 }
 
-/// Builds a field in its turn and writes it in the form that was asked for.
+/// Builds a field when its turn has come, and writes it in the format of the selection.
 ///
 /// # Errors
 /// `internal` if that fails.
@@ -340,7 +340,7 @@ pub fn write_file(
     Ok(Written::Whole(bytes))
 }
 
-/// Makes an answer in its turn. Its memory is held until the client has taken it.
+/// Computes an answer when its turn has come. Its memory is held until it has been sent.
 ///
 /// # Errors
 /// What making it fails with.

@@ -1,4 +1,4 @@
-//! `/v1/jobs`: submit, list, look, cancel, delete, and the case as it was submitted.
+//! `/v1/jobs`: submit, list, get, cancel, delete, and the case as it was submitted.
 
 use std::time::Duration;
 
@@ -210,7 +210,7 @@ problems! {
 }
 
 query! {
-    /// Which jobs are listed.
+    /// Filters and page of a list of jobs.
     ListQuery(() => ()) {
         /// Only jobs in this state
         state: JobState as JobState = reader(JobState::ALL.map(JobState::name).join(", "), JobState::from_name);

@@ -1,4 +1,4 @@
-//! What can be asked; one resource is one file. Handlers read a request, call `jobs` and answer.
+//! The resources of the API, one file each. Handlers read a request, call `jobs` and answer.
 
 pub mod batch_results;
 pub mod batches;

@@ -50,7 +50,7 @@ query! {
     }
 }
 
-/// What a picture is to show.
+/// What a picture shows, and how wide it is.
 #[derive(Debug, Clone, Copy)]
 pub struct PlotOptions {
     /// The field.
@@ -131,7 +131,7 @@ async fn plot(
     }
 }
 
-/// Draws what was wished for.
+/// Draws the picture.
 ///
 /// # Errors
 /// The output was not asked for, there is no such patch or motion, or there is no result.

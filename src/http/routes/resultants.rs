@@ -77,7 +77,7 @@ problems! {
 const FORMATS: &[Format] = &[Format::Json, Format::Csv];
 
 query! {
-    /// Which resultants are asked for.
+    /// Parameters of resultants.
     ResultantsQuery(() => ()) {
         /// Only this motion, counted from 0
         point: usize as u32 = index();

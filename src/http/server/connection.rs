@@ -1,4 +1,4 @@
-//! One connection: whose it is, its requests, and how long it may be silent.
+//! One connection: its peer, its requests, and how long it may stay silent.
 
 use std::net::IpAddr;
 use std::sync::Arc;

@@ -1,8 +1,8 @@
-//! What a client still sends when its request has been answered already.
+//! Reads the rest of a body whose request has been answered already.
 //!
 //! A faulty batch is refused at its first fault, while the rest of it is on the way. The connection cannot be used again
-//! before that rest has been read, and closing it without a word breaks the client's next request. So a short rest is read
-//! away, and where more comes the answer says that the connection ends.
+//! before that rest has been read, and closing it silently breaks the client's next request. So a short rest is read and
+//! discarded; if more follows, the answer says that the connection closes.
 
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -18,19 +18,19 @@ use http_body_util::{BodyExt, Limited};
 use hyper::body::{Frame, SizeHint};
 use tokio::time::timeout;
 
-/// Longest rest that is read away, in bytes.
+/// Longest rest that is read and discarded, in bytes.
 const REST_BYTES: usize = 1 << 20;
 /// How long the client may take to send it.
 const REST_WITHIN: Duration = Duration::from_millis(500);
 
 type BodySlot = Arc<Mutex<Option<Body>>>;
 
-/// Reads away what is left of a body, or ends the connection; layer around everything that reads bodies.
+/// Layer that discards the rest of a body, or has the connection closed; it stands around everything that reads bodies.
 pub async fn drain_body(request: Request, next: Next) -> Response {
     if request.body().is_end_stream() {
         return next.run(request).await;
     }
-    // A client that asks before it sends has not begun, and reading would tell it to.
+    // With `Expect: 100-continue` the client has not begun to send, and reading would ask it to.
     let asks = request.headers().contains_key(header::EXPECT);
     let slot = BodySlot::default();
     let kept = slot.clone();
@@ -57,7 +57,7 @@ async fn ends(body: Body) -> bool {
     true
 }
 
-/// A body that goes into the slot when its reader loses interest before the end.
+/// A body that goes into the slot if it is dropped before its end.
 struct DrainableBody(Option<Body>, BodySlot);
 
 impl HttpBody for DrainableBody {

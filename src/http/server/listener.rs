@@ -1,5 +1,5 @@
-//! Accepts connections, not too many at once, lets go of clients that never finish a request's head or take nothing of
-//! their answer, and ends when told to.
+//! Accepts connections up to a limit, closes those whose client does not finish the head of a request or does not read its
+//! answer, and stops on request.
 
 use axum::Router;
 use axum::http::Request;

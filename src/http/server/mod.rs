@@ -1,4 +1,4 @@
-//! Connections: accepted, counted, kept in time, and let go.
+//! Connections: accepting, counting, time limits and closing.
 
 pub mod connection;
 pub mod drain_body;

@@ -1,5 +1,5 @@
-//! Lets go of clients that take nothing of their answer: a write that does not move for a while fails, and the connection
-//! with it. Clients that read slowly are not meant; any byte they take begins the time anew.
+//! Closes connections whose client does not read its answer: a write that makes no progress for some time fails, and the
+//! connection with it. Slow clients are not affected, since every byte that they read restarts the time.
 
 use std::io::{Error, ErrorKind, IoSlice, Result};
 use std::pin::Pin;

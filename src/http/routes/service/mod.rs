@@ -1,4 +1,4 @@
-//! What can be asked about the service itself.
+//! Resources that describe the service itself.
 
 pub mod health;
 pub mod methods;
