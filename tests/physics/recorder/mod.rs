@@ -4,7 +4,7 @@
 //! `RAILHEAD_RECORD=write cargo test --test physics recorder -- --nocapture` records the present answers in `tests/data/recorded.txt` and prints
 //! what changed; without the variable the test compares with them. Bits are compared where the arithmetic is that of the record, see
 //! [`machine`]. On another SIMD level sums are taken in another order: there only the numbers that a client reads are compared, within
-//! [`ELSEWHERE`].
+//! [`ELSEWHERE`] or [`FOUND_ELSEWHERE`].
 
 mod cases;
 mod comparison;
@@ -24,8 +24,13 @@ use crate::recorder::comparison::{Precision, compare};
 use crate::recorder::machine::arithmetic;
 use crate::recorder::record::{Record, Recording};
 
-/// Largest change with another arithmetic, relative to the scale of the quantity.
-const ELSEWHERE: f64 = 2e-6;
+/// Largest changes with another arithmetic, relative to the scale of the quantity. Kernels without SIMD moved the numbers of contacts that are
+/// given by 7e-7 at most (matrices are kept in single precision), pressures whose samples are rounded to twelve digits by 7e-5.
+const ELSEWHERE: f64 = 1e-4;
+/// The same of the resultants of gaps and wheels, of which nothing else is compared. Their regions are found by decisions about grids and heights,
+/// which the last bits can turn; answers then differ as two within the usual target do (wheels without SIMD by 5e-3 of the friction limit, a
+/// gap with its samples rounded to twelve digits by 9e-4).
+const FOUND_ELSEWHERE: f64 = 0.01;
 
 /// Every so many cases one is solved a second time, without the operators that the cases before it left.
 const ALONE_EVERY: usize = 8;
@@ -74,7 +79,10 @@ fn answers_are_those_of_the_recorder() {
     let precision = if recorded.arithmetic == present.arithmetic {
         Precision::Bits
     } else {
-        Precision::Within(ELSEWHERE)
+        Precision::Within {
+            given: ELSEWHERE,
+            found: FOUND_ELSEWHERE,
+        }
     };
     let report = compare(&recorded, &present, precision);
     if std::env::var_os("RAILHEAD_RECORD").is_some_and(|wish| wish == "write") {
