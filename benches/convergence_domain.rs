@@ -15,8 +15,8 @@ mod regions;
 
 use std::time::Instant;
 
-use railhead::contact::mesh::Grading;
-use railhead::contact::tangential::rules::Rule;
+use railhead::contact::mesh::strips::Grading;
+use railhead::contact::rolling::slip_rules::Rule;
 
 use convergence_domain::{count, motions};
 use regions::REGIONS;

@@ -7,8 +7,8 @@ mod machine;
 
 use std::hint::black_box;
 
+use railhead::contact::case::problem::Limits;
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::problem::Limits;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 

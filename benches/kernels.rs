@@ -3,10 +3,10 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use railhead::contact::influence::strips::{Differences, Precision, Scratch};
-use railhead::contact::mesh::{Chord, Grading, Mesh, equal_strips};
+use railhead::contact::case::problem::Limits;
+use railhead::contact::half_space::strip_operator::operator::{Differences, Precision, Scratch};
+use railhead::contact::mesh::strips::{Chord, Grading, Mesh, equal_strips};
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::problem::Limits;
 use railhead::contact::{check, solve};
 use serde_json::json;
 

@@ -7,9 +7,9 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use railhead::contact::case::problem::Limits;
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::problem::Limits;
-use railhead::contact::solution::Solution;
+use railhead::contact::solution::words::Solution;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 

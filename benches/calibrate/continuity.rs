@@ -1,8 +1,8 @@
 //! How much does the estimate jump along a sweep?
 
 use railhead::contact;
+use railhead::contact::case::problem::Limits;
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::problem::Limits;
 use serde_json::{Value, json};
 
 const POINTS: u32 = 81;
@@ -25,7 +25,7 @@ fn estimates(case: &Value) -> Vec<(f64, u32)> {
     let problem = contact::check(case, &Limits::default()).expect("a sound case");
     let (solution, _) = contact::solve(&problem, &Unwatched).expect("an answer");
     let points = solution.patches[0].points.iter();
-    let of = |point: &contact::solution::PointSolution| {
+    let of = |point: &contact::solution::words::PointSolution| {
         let mesh = point.solver.mesh;
         (
             point.error_estimate.expect("an estimate").force_x_n,

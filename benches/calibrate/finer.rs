@@ -3,15 +3,15 @@
 use std::sync::Arc;
 
 use railhead::contact;
+use railhead::contact::case::problem::{Limits, Problem, Resolution};
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::normal::{Patch, Region};
-use railhead::contact::outputs::resultants::Resultants;
-use railhead::contact::problem::{Limits, Problem, Resolution};
-use railhead::contact::solution::Solution;
-use railhead::contact::tangential::ladder::{Ladder, Regime};
-use railhead::contact::tangential::point::{Asked, climb};
-use railhead::contact::tangential::regime::regime;
+use railhead::contact::normal::region::{Patch, Region};
+use railhead::contact::rolling::refinement::levels::{Ladder, Regime};
+use railhead::contact::rolling::refinement::refine::{Asked, climb};
+use railhead::contact::rolling::regime::regime;
+use railhead::contact::rolling::resultants::Resultants;
+use railhead::contact::solution::words::Solution;
 use serde_json::{Value, json};
 
 use crate::population::Class;
@@ -101,7 +101,7 @@ fn two_meshes(problem: &Problem) -> Result<(Resultants, f64), SolveError> {
 /// The sum of the resultants on a mesh of so many cells, in double precision, and how many there are.
 fn one_mesh(problem: &Problem, cells: u32) -> Result<(Resultants, usize), SolveError> {
     let mut exact = problem.clone();
-    exact.resolution = Resolution::Mesh(contact::case::MeshSize {
+    exact.resolution = Resolution::Mesh(contact::case::words::MeshSize {
         strips: 8,
         cells: 8,
     });

@@ -16,8 +16,8 @@ mod truth;
 
 use cpu_time::ThreadTime;
 use railhead::contact;
+use railhead::contact::case::problem::Limits;
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::problem::Limits;
 use serde_json::json;
 
 use population::{Class, case};

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use railhead::contact::outputs::resultants::Resultants;
-use railhead::contact::solution::{PointSolution, Solution};
+use railhead::contact::rolling::resultants::Resultants;
+use railhead::contact::solution::words::{PointSolution, Solution};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 

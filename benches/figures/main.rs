@@ -7,12 +7,12 @@ mod drawing;
 
 use std::path::{Path, PathBuf};
 
-use railhead::contact::case::Motion;
+use railhead::contact::case::problem::Limits;
+use railhead::contact::case::words::Motion;
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::outputs::outline::{outlines, patch_outline};
-use railhead::contact::problem::Limits;
-use railhead::contact::solution::{Fields, PatchFields, Solution};
-use railhead::contact::zones::Zone;
+use railhead::contact::post::outlines::outline::{outlines, patch_outline};
+use railhead::contact::post::zone::Zone;
+use railhead::contact::solution::words::{Fields, PatchFields, Solution};
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 

@@ -4,11 +4,11 @@ use std::f64::consts::PI;
 use std::fmt::Write as _;
 use std::hint::black_box;
 
+use railhead::contact::case::problem::Problem;
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::normal::Region;
-use railhead::contact::normal::profiles::{Accuracy, Wanted};
-use railhead::contact::problem::Problem;
-use railhead::contact::solution::Solution;
+use railhead::contact::normal::region::Region;
+use railhead::contact::normal::wheel_height::search::{Accuracy, Wanted};
+use railhead::contact::solution::words::Solution;
 use serde_json::{Value, json};
 
 use crate::machine::{median, quantile, seconds_of};

@@ -1,8 +1,8 @@
 //! The reference cases as questions, and the errors of their answers.
 
+use railhead::contact::case::problem::{Limits, Problem};
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::problem::{Limits, Problem};
-use railhead::contact::solution::{Solution, Total};
+use railhead::contact::solution::words::{Solution, Total};
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 

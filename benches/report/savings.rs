@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 use std::hint::black_box;
 use std::sync::Arc;
 
+use railhead::contact::case::problem::Problem;
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::problem::Problem;
-use railhead::contact::tangential::operator_store::OperatorStore;
+use railhead::contact::rolling::operator_store::OperatorStore;
 use railhead::contact::{solve, solve_with};
 use serde_json::{Value, json};
 

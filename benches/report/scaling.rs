@@ -4,10 +4,12 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::Arc;
 
-use railhead::contact::influence::strips::{self, Precision};
+use railhead::contact::half_space::strip_operator::operator;
+use railhead::contact::half_space::strip_operator::operator::Precision;
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::tangential::ladder::Ladder;
-use railhead::contact::tangential::point::{self, Asked};
+use railhead::contact::rolling::refinement::levels::Ladder;
+use railhead::contact::rolling::refinement::refine;
+use railhead::contact::rolling::refinement::refine::Asked;
 use serde_json::json;
 
 use crate::plot::{Plot, Series};
@@ -43,9 +45,9 @@ pub fn section(lu: f64, pictures: &Path) -> String {
             motion: problem.motions[0],
         };
         let mut ladder = Ladder::new(&problem, &Arc::default());
-        let point = point::solve(&problem, &mut ladder, asked, &Unwatched).expect("an answer");
+        let point = refine::solve(&problem, &mut ladder, asked, &Unwatched).expect("an answer");
         let cells = (side * side) as usize;
-        let bytes = strips::bytes(cells, side as usize, true, Precision::Double) as f64;
+        let bytes = operator::bytes(cells, side as usize, true, Precision::Double) as f64;
         let size = Size {
             cells: cells as f64,
             work: bytes / 8.0 + point.work.entries as f64,

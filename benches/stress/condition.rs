@@ -3,13 +3,13 @@
 use std::fmt::Write as _;
 
 use faer::Mat;
-use railhead::contact::case::MeshSize;
+use railhead::contact::case::problem::Limits;
+use railhead::contact::case::words::MeshSize;
 use railhead::contact::check;
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::problem::Limits;
-use railhead::contact::tangential::equations::Equations;
-use railhead::contact::tangential::level::Level;
-use railhead::contact::tangential::rules::Rule;
+use railhead::contact::rolling::slip_equations::Equations;
+use railhead::contact::rolling::slip_rules::Rule;
+use railhead::contact::rolling::strip_mesh::Level;
 use serde_json::json;
 
 /// Largest over smallest singular value of the map of a rule, ν = 0.28.

@@ -2,11 +2,11 @@
 
 use std::f64::consts::TAU;
 
-use railhead::contact::geometry::formats::{Format, read};
+use railhead::contact::case::problem::Limits;
+use railhead::contact::geometry::formats::format::{Format, read};
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::problem::Limits;
-use railhead::contact::solution::Solution;
+use railhead::contact::solution::words::Solution;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 

@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 use std::time::Instant;
 
+use railhead::contact::case::problem::{Limits, Problem};
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::problem::{Limits, Problem};
-use railhead::contact::tangential::operator_store::OperatorStore;
+use railhead::contact::rolling::operator_store::OperatorStore;
 use railhead::contact::{check, solve, solve_with};
 use serde_json::{Value, json};
 
@@ -107,7 +107,7 @@ pub fn with_zones() -> String {
             "pressure",
             "slip"
         ]));
-        let met = |solution: &railhead::contact::solution::Solution| {
+        let met = |solution: &railhead::contact::solution::words::Solution| {
             let points = solution.patches[0].points.iter();
             points.filter(|p| p.target_met == Some(true)).count()
         };

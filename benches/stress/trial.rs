@@ -4,10 +4,10 @@ use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
+use railhead::contact::case::problem::Limits;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::{Monitor, Stop};
-use railhead::contact::problem::Limits;
-use railhead::contact::solution::{Fields, Solution};
+use railhead::contact::solution::words::{Fields, Solution};
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 

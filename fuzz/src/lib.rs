@@ -2,9 +2,10 @@
 //! service try those that were interesting once (`fuzz/seeds`).
 
 use railhead::contact;
-use railhead::contact::geometry::formats::{self, Format};
+use railhead::contact::case::problem::Limits;
+use railhead::contact::geometry::formats::format as formats;
+use railhead::contact::geometry::formats::format::Format;
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
-use railhead::contact::problem::Limits;
 use railhead::http::extract::batch::splitter::{Element, Layout, Splitter};
 use railhead::http::extract::batch::table::TableBody;
 use railhead::http::extract::json::read_strict;

@@ -2,8 +2,8 @@
 
 use clap::Args;
 
-use crate::contact::problem::Limits;
-use crate::contact::tangential::operator_store::{BYTES_DEFAULT, OperatorStore};
+use crate::contact::case::problem::Limits;
+use crate::contact::rolling::operator_store::{BYTES_DEFAULT, OperatorStore};
 
 /// What one case may use.
 #[derive(Debug, Clone, Copy, Args)]

@@ -14,7 +14,7 @@ use serde_json::{Map, Value, json};
 use crate::cli::commands::SolveArgs;
 use crate::cli::output::{print, print_error};
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::solution::{Fields, PatchCells, PatchFields, PointFields, Solution};
+use crate::contact::solution::words::{Fields, PatchCells, PatchFields, PointFields, Solution};
 use crate::contact::{check, solve_with};
 
 /// Exit code for a faulty case.

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::contact::case::Method;
+use crate::contact::case::words::Method;
 use crate::contact::monitor::Stop;
 
 /// One fault of a case: where it is, what was given, what is allowed.

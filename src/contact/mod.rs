@@ -3,46 +3,46 @@
 //! Units everywhere: mm, N, MPa, rad; creepages are dimensionless, spin is in 1/mm.
 
 pub mod case;
+pub mod coupling;
 pub mod error;
 pub mod geometry;
-pub mod influence;
+pub mod half_space;
 pub mod mesh;
 pub mod monitor;
 pub mod normal;
-pub mod outputs;
-pub mod problem;
+pub mod numerics;
+pub mod post;
 pub mod profile_trust;
-mod profiles;
-mod read;
 pub mod remark;
+pub mod rolling;
 pub mod slices;
 pub mod solution;
-pub mod tangential;
-pub mod zones;
 
 use std::sync::Arc;
 
 use serde_json::Value;
 
+use crate::contact::case::problem::{Limits, Problem};
+use crate::contact::case::read::draft;
 use crate::contact::error::{CaseError, SolveError};
 use crate::contact::monitor::{Monitor, Watch};
-use crate::contact::normal::Region;
-use crate::contact::outputs::assemble::Assembly;
-use crate::contact::outputs::finish::{finish, share_seconds};
-use crate::contact::problem::{Limits, Problem};
+use crate::contact::normal::region::Region;
+use crate::contact::profile_trust::trust;
+use crate::contact::rolling::force_control;
+use crate::contact::rolling::operator_store::OperatorStore;
+use crate::contact::rolling::refinement::levels::Ladder;
+use crate::contact::rolling::refinement::refine::Point;
 use crate::contact::slices::{slices, solve_slice};
-use crate::contact::solution::{Fields, Solution};
-use crate::contact::tangential::forces;
-use crate::contact::tangential::ladder::Ladder;
-use crate::contact::tangential::operator_store::OperatorStore;
-use crate::contact::tangential::point::Point;
+use crate::contact::solution::assemble::Assembly;
+use crate::contact::solution::finish::{finish, share_seconds};
+use crate::contact::solution::words::{Fields, Solution};
 
 /// Reads and checks a case.
 ///
 /// # Errors
 /// Every fault of the case at once: those of the text, and those of its sound parts against physics and limits.
 pub fn check(case: &Value, limits: &Limits) -> Result<Problem, CaseError> {
-    let (draft, mut faults) = read::draft(case);
+    let (draft, mut faults) = draft::draft(case);
     if !faults.is_empty() {
         faults.extend(draft.faults_beside(limits));
         return Err(CaseError(faults));
@@ -93,7 +93,7 @@ fn solve_whole(
 ) -> Result<(Solution, Fields), SolveError> {
     let began = monitor.elapsed();
     let answer = if let Region::Profiles(contact) = &problem.region {
-        profile_trust::solve(operators, problem, contact, monitor)?
+        trust::solve(operators, problem, contact, monitor)?
     } else {
         let watch = Watch::new(monitor, problem.time_limit, problem.motions.len());
         let pressed = problem.pressed(&watch);
@@ -124,7 +124,7 @@ fn motions(
     let mut assembly = Assembly::new(problem);
     let mut before: Option<Point> = None;
     for index in 0..problem.motions.len() {
-        let mut point = forces::solve(problem, &mut ladder, index, before.as_ref(), watch)?;
+        let mut point = force_control::solve(problem, &mut ladder, index, before.as_ref(), watch)?;
         if index == 0 {
             // What all motions share is charged to the first.
             point.seconds += problem.normal.map_or(0.0, |normal| normal.seconds);

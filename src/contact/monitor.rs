@@ -4,8 +4,8 @@ use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
+use crate::contact::case::problem::Problem;
 use crate::contact::error::SolveError;
-use crate::contact::problem::Problem;
 
 /// Why a solve was stopped from outside.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -7,13 +7,13 @@ use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 use std::time::Duration;
 
+use crate::contact::case::problem::Problem;
 use crate::contact::error::SolveError;
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::problem::Problem;
-use crate::contact::remark::merged;
-use crate::contact::solution::{Fields, Solution};
+use crate::contact::remark::entry::merged;
+use crate::contact::rolling::operator_store::OperatorStore;
+use crate::contact::solution::words::{Fields, Solution};
 use crate::contact::solve_whole;
-use crate::contact::tangential::operator_store::OperatorStore;
 
 /// Estimated time of a slice in s: short for those who wait behind it, long beside what a cut costs (a first motion without a start,
 /// and region and pressure once more).

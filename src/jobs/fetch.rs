@@ -3,8 +3,8 @@
 use bytes::Bytes;
 use uuid::Uuid;
 
-use crate::contact::case::Output;
-use crate::contact::solution::{PatchFields, Solution};
+use crate::contact::case::words::Output;
+use crate::contact::solution::words::{PatchFields, Solution};
 use crate::jobs::error::JobsError;
 use crate::jobs::results::Encoded;
 use crate::jobs::store::StoredResult;

@@ -7,7 +7,7 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use crate::contact::error::SolveError;
-use crate::contact::remark::RemarkEntry;
+use crate::contact::remark::entry::RemarkEntry;
 use crate::jobs::wishes::Priority;
 
 /// What is known of one job. Times are epoch milliseconds (UTC).

@@ -11,8 +11,8 @@ use prometheus_client::metrics::histogram::Histogram;
 use prometheus_client::metrics::info::Info;
 use prometheus_client::registry::Registry;
 
-use crate::contact::case::Method;
-use crate::contact::solution::Solution;
+use crate::contact::case::words::Method;
+use crate::contact::solution::words::Solution;
 use crate::jobs::Jobs;
 use crate::jobs::error::JobsError;
 use crate::jobs::job::{FailureKind, State};

@@ -7,12 +7,12 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use crate::contact;
+use crate::contact::case::problem::{Limits, Problem};
 use crate::contact::error::{CaseError, SolveError};
 use crate::contact::monitor::Monitor;
-use crate::contact::problem::{Limits, Problem};
+use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::slices::{slices, solve_slice};
-use crate::contact::solution::{Fields, Solution};
-use crate::contact::tangential::operator_store::OperatorStore;
+use crate::contact::solution::words::{Fields, Solution};
 
 /// Checks a case against limits.
 pub type Check = dyn Fn(&Value, &Limits) -> Result<Problem, CaseError> + Send + Sync;

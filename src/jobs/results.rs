@@ -15,7 +15,7 @@ use object_store::path::Path;
 use object_store::{ObjectStore, ObjectStoreExt, PutPayload};
 use uuid::Uuid;
 
-use crate::contact::solution::PatchFields;
+use crate::contact::solution::words::PatchFields;
 use crate::jobs::error::JobsError;
 use crate::jobs::fields::{Header, PREFIX_BYTES, header_length};
 use crate::jobs::store::Claim;

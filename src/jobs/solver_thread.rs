@@ -10,8 +10,8 @@ use bytes::Bytes;
 
 use crate::contact::error::{CaseError, SolveError};
 use crate::contact::monitor::Monitor;
-use crate::contact::remark::RemarkEntry;
-use crate::contact::solution::{Fields, PatchFields, Solution};
+use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::solution::words::{Fields, PatchFields, Solution};
 use crate::jobs::Shared;
 use crate::jobs::error::JobsError;
 use crate::jobs::fields;
@@ -322,8 +322,8 @@ mod tests {
 
     use super::*;
     use crate::contact;
+    use crate::contact::case::problem::Limits;
     use crate::contact::monitor::Unwatched;
-    use crate::contact::problem::Limits;
     use crate::jobs::recipe::Recipe;
 
     #[test]

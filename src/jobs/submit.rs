@@ -7,8 +7,8 @@ use opentelemetry::KeyValue;
 use serde_json::Value;
 use uuid::Uuid;
 
-use crate::contact::case::Output;
-use crate::contact::problem::Problem;
+use crate::contact::case::problem::Problem;
+use crate::contact::case::words::Output;
 use crate::jobs::error::JobsError;
 use crate::jobs::job::Job;
 use crate::jobs::store::{Enqueued, NewJob, QueueBounds, Refusal};

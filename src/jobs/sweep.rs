@@ -5,7 +5,7 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use crate::contact::problem::Problem;
+use crate::contact::case::problem::Problem;
 
 /// What is known of a stored slice of a sweep.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -99,7 +99,7 @@ mod tests {
 
     use super::*;
     use crate::contact;
-    use crate::contact::problem::Limits;
+    use crate::contact::case::problem::Limits;
 
     fn problem() -> Problem {
         let case = json!({

@@ -1,7 +1,7 @@
 //! What becomes of a job after an attempt: from the outcome of the solver and from what it was told, in one place.
 
 use crate::contact::error::SolveError;
-use crate::contact::remark::RemarkEntry;
+use crate::contact::remark::entry::RemarkEntry;
 use crate::jobs::job::{Failure, FailureKind};
 use crate::jobs::results::Encoded;
 use crate::jobs::solver_thread::{INTERNAL, Outcome};
@@ -92,7 +92,7 @@ mod tests {
     use super::*;
     use crate::contact::error::CaseError;
 
-    fn problem() -> crate::contact::problem::Problem {
+    fn problem() -> crate::contact::case::problem::Problem {
         let case = serde_json::json!({
             "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
             "friction": { "coefficient": 0.3 },
@@ -100,7 +100,7 @@ mod tests {
             "load": { "normal_force_n": 100_000 },
             "motion": [{ "creepage_x": 0.001 }, { "creepage_x": 0.002 }]
         });
-        crate::contact::check(&case, &crate::contact::problem::Limits::default()).unwrap()
+        crate::contact::check(&case, &crate::contact::case::problem::Limits::default()).unwrap()
     }
 
     /// What becomes of a job, as a word.

@@ -4,10 +4,10 @@
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
+use railhead::contact::case::problem::Limits;
 use railhead::contact::monitor::{Monitor, Stop, Unwatched};
-use railhead::contact::problem::Limits;
-use railhead::contact::remark::RemarkEntry;
-use railhead::contact::solution::Solution;
+use railhead::contact::remark::entry::RemarkEntry;
+use railhead::contact::solution::words::Solution;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 

@@ -1,8 +1,8 @@
 //! Valid cases to start from, and ways to change them.
 
+use railhead::contact::case::problem::{Limits, Problem};
 use railhead::contact::check;
 use railhead::contact::error::Fault;
-use railhead::contact::problem::{Limits, Problem};
 use serde_json::{Value, json};
 
 /// A complete, valid case.

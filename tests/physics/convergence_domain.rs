@@ -1,11 +1,13 @@
 //! Where `liu_hsu` converges, counted over the same motions on every region.
 
-use railhead::contact::mesh::Grading;
+use railhead::contact::mesh::strips::Grading;
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::tangential::liu_hsu::active_set::{Attempt, Exit};
-use railhead::contact::tangential::liu_hsu::initial_guess::Guess;
-use railhead::contact::tangential::liu_hsu::{coarse_pole, solve_by_upwind, solve_with};
-use railhead::contact::tangential::rules::Rule;
+use railhead::contact::rolling::methods::liu_hsu::active_set::{Attempt, Exit};
+use railhead::contact::rolling::methods::liu_hsu::initial_guess::Guess;
+use railhead::contact::rolling::methods::liu_hsu::solve::{
+    coarse_pole, solve_by_upwind, solve_with,
+};
+use railhead::contact::rolling::slip_rules::Rule;
 
 use crate::regions::{Contact, Region, motion};
 

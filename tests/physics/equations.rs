@@ -1,12 +1,12 @@
 //! The kernels and the discrete equations against stored numbers (`tests/data/kernels.json`, described in
 //! `tests/data/README.md`).
 
-use railhead::contact::influence::coefficients::{Rectangle, rectangle};
-use railhead::contact::mesh::Grading;
+use railhead::contact::half_space::kernels::{Rectangle, rectangle};
+use railhead::contact::mesh::strips::Grading;
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::tangential::liu_hsu::initial_guess::Guess;
-use railhead::contact::tangential::liu_hsu::solve_with;
-use railhead::contact::tangential::rules::Rule;
+use railhead::contact::rolling::methods::liu_hsu::initial_guess::Guess;
+use railhead::contact::rolling::methods::liu_hsu::solve::solve_with;
+use railhead::contact::rolling::slip_rules::Rule;
 use serde::Deserialize;
 
 use crate::regions::{self, Contact, REGIONS, SHEAR_MODULUS, boundary_element, on_stage};

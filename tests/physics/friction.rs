@@ -1,14 +1,14 @@
 //! Coulomb's law in every cell: the bound, complementarity, and slip along the traction.
 
 use railhead::contact;
-use railhead::contact::case::{MeshSize, Motion};
+use railhead::contact::case::problem::Limits;
+use railhead::contact::case::words::{MeshSize, Motion};
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::problem::Limits;
-use railhead::contact::tangential::boundary_element;
-use railhead::contact::tangential::boundary_element::newton::{FrictionLaw, Newton};
-use railhead::contact::tangential::equations::Equations;
-use railhead::contact::tangential::level::Level;
-use railhead::contact::tangential::rules::Rule;
+use railhead::contact::rolling::methods::boundary_element::newton::{FrictionLaw, Newton};
+use railhead::contact::rolling::methods::boundary_element::solve as boundary_element;
+use railhead::contact::rolling::slip_equations::Equations;
+use railhead::contact::rolling::slip_rules::Rule;
+use railhead::contact::rolling::strip_mesh::Level;
 
 use crate::laws::{MOTIONS, shapes};
 use crate::reference::{Ellipse, assert_none, solve};
@@ -109,7 +109,7 @@ fn answered(contact: &Ellipse, n: u32) -> Cells {
             .as_ref()
             .expect("was asked for")
             .iter()
-            .map(|z| *z == railhead::contact::zones::Zone::Slip)
+            .map(|z| *z == railhead::contact::post::zone::Zone::Slip)
             .collect(),
         largest: [
             vx.hypot(vy) + phi.abs() * contact.a_mm.max(contact.b_mm),

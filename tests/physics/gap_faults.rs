@@ -1,9 +1,10 @@
 //! A gap without a contact to show is refused, or fails with its reason.
 
+use railhead::contact;
+use railhead::contact::case::problem::Limits;
+use railhead::contact::check;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::problem::Limits;
-use railhead::contact::{self, check};
 use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, faults, good_with, with};

@@ -9,13 +9,14 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
+use railhead::contact;
+use railhead::contact::case::problem::Limits;
+use railhead::contact::check;
 use railhead::contact::error::SolveError;
-use railhead::contact::influence::coefficients::{Rectangle, rectangle};
+use railhead::contact::half_space::kernels::{Rectangle, rectangle};
 use railhead::contact::monitor::{Monitor, Stop, Unwatched};
-use railhead::contact::normal::non_hertzian::gap::Gap;
-use railhead::contact::problem::Limits;
-use railhead::contact::solution::{Fields, Solution};
-use railhead::contact::{self, check};
+use railhead::contact::normal::gap::surface::Gap;
+use railhead::contact::solution::words::{Fields, Solution};
 use serde_json::{Value, json};
 
 use crate::gap_samples::{Across, grid, profile, spread, steel};

@@ -1,8 +1,8 @@
 //! Two patches of different size in one gap: both are resolved, whatever their sizes, or the answer says that one is not.
 
 use railhead::contact::normal::hertz::{Ellipse, Pressing};
-use railhead::contact::remark::RemarkEntry;
-use railhead::contact::solution::Solution;
+use railhead::contact::remark::entry::RemarkEntry;
+use railhead::contact::solution::words::Solution;
 use serde_json::json;
 
 use crate::gap_samples::{profile, spread, steel};

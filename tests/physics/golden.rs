@@ -1,12 +1,12 @@
 //! Does the solver still give the answers that belong to its revision? Stored results are served to equal cases of the same revision, so
 //! that numbers that change without a new revision would leave stale answers in the cache of every service.
 //!
-//! When numbers were meant to change: raise `SOLVER_REVISION` in `src/contact/problem/digest.rs`, then
+//! When numbers were meant to change: raise `SOLVER_REVISION` in `src/contact/case/digest.rs`, then
 //! `RAILHEAD_GOLDEN=write cargo test --test physics golden`.
 
 use std::path::PathBuf;
 
-use railhead::contact::problem::SOLVER_REVISION;
+use railhead::contact::case::digest::SOLVER_REVISION;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 

@@ -2,8 +2,8 @@
 //! `benches/calibrate`, against meshes much finer.
 
 use railhead::contact;
+use railhead::contact::case::problem::Limits;
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::problem::Limits;
 use serde_json::json;
 
 use crate::population::{Class, case};

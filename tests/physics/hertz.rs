@@ -1,8 +1,8 @@
 //! Hertz's contact: worked cases of the literature and the laws of scaling.
 
+use railhead::contact::case::problem::Limits;
 use railhead::contact::check;
 use railhead::contact::normal::hertz::{Ellipse, Pressing};
-use railhead::contact::problem::Limits;
 use serde_json::json;
 
 /// One worked case: bodies, load, and what comes out.

@@ -1,12 +1,12 @@
 //! The embedded table of Kalker's coefficients is what the fast solver gives where nothing slips.
 //!
 //! `cargo test --test physics kalker_table -- --ignored --nocapture` computes the whole table anew, compares, and prints it as
-//! `src/contact/tangential/kalker.rs` holds it.
+//! `src/contact/rolling/linear_theory.rs` holds it.
 
 use serde_json::json;
 
 use crate::reference::{Ellipse, assert_none, solve};
-use railhead::contact::tangential::kalker::{POISSON_RATIOS, RATIOS, coefficients, ratio};
+use railhead::contact::rolling::linear_theory::{POISSON_RATIOS, RATIOS, coefficients, ratio};
 
 /// C11, C22 and C23 of an ellipse: two meshes, extrapolated to vanishing cells; C23 is the mean of what spin does to the
 /// lateral force and what lateral creepage does to the moment.

@@ -1,8 +1,8 @@
 //! What holds exactly in theory and on every symmetric mesh: symmetry, scaling, friction, power.
 
-use railhead::contact::outputs::outline::outlines;
-use railhead::contact::solution::{Fields, PatchCells};
-use railhead::contact::zones::Zone;
+use railhead::contact::post::outlines::outline::outlines;
+use railhead::contact::post::zone::Zone;
+use railhead::contact::solution::words::{Fields, PatchCells};
 
 use crate::reference::{Ellipse, assert_none, solve};
 

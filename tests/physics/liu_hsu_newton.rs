@@ -1,13 +1,13 @@
 //! The algebra inside `liu_hsu`: the elimination of the stick tractions, and the Newton–Raphson step.
 
-use railhead::contact::mesh::Grading;
+use railhead::contact::mesh::strips::Grading;
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::tangential::liu_hsu::Stage;
-use railhead::contact::tangential::liu_hsu::newton_raphson::newton_step;
-use railhead::contact::tangential::liu_hsu::stick_block::{
+use railhead::contact::rolling::methods::liu_hsu::newton_raphson::newton_step;
+use railhead::contact::rolling::methods::liu_hsu::solve::Stage;
+use railhead::contact::rolling::methods::liu_hsu::stick_block::{
     DenseProblem, SlipSystem, both_components,
 };
-use railhead::contact::tangential::rules::Rule;
+use railhead::contact::rolling::slip_rules::Rule;
 
 use crate::regions::{self, Contact, Region};
 

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
+use railhead::contact::case::problem::{Limits, Problem};
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::problem::{Limits, Problem};
-use railhead::contact::solution::Solution;
-use railhead::contact::tangential::operator_store::OperatorStore;
+use railhead::contact::rolling::operator_store::OperatorStore;
+use railhead::contact::solution::words::Solution;
 use railhead::contact::{check, solve_with};
 use serde_json::{Value, json};
 

@@ -1,7 +1,7 @@
 //! A pressure grid that cannot be read is refused with the place of the fault.
 
+use railhead::contact::case::problem::Limits;
 use railhead::contact::check;
-use railhead::contact::problem::Limits;
 use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, faults, grid_case, problem, with};

@@ -3,9 +3,9 @@
 
 use railhead::contact::check;
 use railhead::contact::geometry::wheel_rail::WheelRail;
-use railhead::contact::normal::Region;
-use railhead::contact::problem::Limits;
-use railhead::contact::solution::Solution;
+use railhead::contact::normal::region::Region;
+use railhead::contact::case::problem::Limits;
+use railhead::contact::solution::words::Solution;
 use serde_json::{Value, json};
 
 use crate::profile_cases::{generated, put};

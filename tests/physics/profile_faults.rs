@@ -1,9 +1,9 @@
 //! Are faulty profiles refused, and doubtful ones remarked on?
 
-use railhead::contact::geometry::contact_search::Search;
+use railhead::contact::geometry::contact_locus::Search;
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
 use railhead::contact::geometry::wheel_rail::WheelRail;
-use railhead::contact::remark::Remark;
+use railhead::contact::remark::list::Remark;
 
 use crate::profile_geometry::placement;
 use crate::profile_shapes::{rail_60e1, s1002};

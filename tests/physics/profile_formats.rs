@@ -1,6 +1,6 @@
 //! Do profile files say what their formats mean?
 
-use railhead::contact::geometry::formats::{Format, read};
+use railhead::contact::geometry::formats::format::{Format, read};
 
 use crate::profile_reference_files::reference_file;
 

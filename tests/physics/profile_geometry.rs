@@ -1,7 +1,8 @@
 //! Do wheel and rail touch where they should?
 
-use railhead::contact::geometry::contact_search::Search;
-use railhead::contact::geometry::formats::{self, Format};
+use railhead::contact::geometry::contact_locus::Search;
+use railhead::contact::geometry::formats::format as formats;
+use railhead::contact::geometry::formats::format::Format;
 use railhead::contact::geometry::local_gap::{Detail, LocalGap};
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
 use railhead::contact::geometry::wheel_rail::{Placement, Side, WheelRail};

@@ -1,7 +1,8 @@
 //! Do the frames and creepages of wheel and rail agree with CONTACT's? Needs the reference files beside the checkout.
 
-use railhead::contact::geometry::contact_search::Search;
-use railhead::contact::geometry::formats::{self, Format};
+use railhead::contact::geometry::contact_locus::Search;
+use railhead::contact::geometry::formats::format as formats;
+use railhead::contact::geometry::formats::format::Format;
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
 use railhead::contact::geometry::wheel_rail::{Placement, WheelRail};
 use railhead::contact::geometry::wheelset::{WheelsetMotion, creepages};

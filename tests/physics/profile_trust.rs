@@ -1,9 +1,9 @@
 //! Profiles are judged before they are trusted: what exports and instruments do to points is named in the answer, or there is none.
 
+use railhead::contact::case::problem::Limits;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::problem::Limits;
-use railhead::contact::solution::Solution;
+use railhead::contact::solution::words::Solution;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 

@@ -1,7 +1,7 @@
 //! The answer shown in the README is the one that the example has.
 
+use railhead::contact::case::problem::Limits;
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::problem::Limits;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 

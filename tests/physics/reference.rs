@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use railhead::contact;
+use railhead::contact::case::problem::Limits;
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::problem::Limits;
-use railhead::contact::solution::{Fields, PointSolution, Solution};
+use railhead::contact::solution::words::{Fields, PointSolution, Solution};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};

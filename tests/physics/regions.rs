@@ -3,14 +3,16 @@
 
 use std::f64::consts::PI;
 
-use railhead::contact::case::Motion;
-use railhead::contact::influence::strips::{Differences, Precision};
-use railhead::contact::mesh::{Chord, Grading, Mesh, equal_strips};
+use railhead::contact::case::words::Motion;
+use railhead::contact::half_space::strip_operator::operator::{Differences, Precision};
+use railhead::contact::mesh::strips::{Chord, Grading, Mesh, equal_strips};
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::tangential::boundary_element::newton::{Convergence, FrictionLaw, Newton};
-use railhead::contact::tangential::equations::Equations;
-use railhead::contact::tangential::liu_hsu::{Outcome, Stage};
-use railhead::contact::tangential::rules::Rule;
+use railhead::contact::rolling::methods::boundary_element::newton::{
+    Convergence, FrictionLaw, Newton,
+};
+use railhead::contact::rolling::methods::liu_hsu::solve::{Outcome, Stage};
+use railhead::contact::rolling::slip_equations::Equations;
+use railhead::contact::rolling::slip_rules::Rule;
 
 /// Poisson's ratio of all these contacts.
 pub const NU: f64 = 0.25;

@@ -1,8 +1,8 @@
 //! The solver ends with an answer, whatever the motion and the shape.
 
 use railhead::contact;
+use railhead::contact::case::problem::Limits;
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::problem::Limits;
 use serde_json::json;
 
 use crate::random::Random;

@@ -1,15 +1,15 @@
 //! Work that a case does not need is left out, and the answer does not move.
 
 use railhead::contact;
-use railhead::contact::influence::strips::{Differences, Precision};
+use railhead::contact::case::problem::{Limits, Problem};
+use railhead::contact::half_space::strip_operator::operator::{Differences, Precision};
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::problem::{Limits, Problem};
-use railhead::contact::solution::PointSolution;
-use railhead::contact::tangential::boundary_element;
-use railhead::contact::tangential::boundary_element::newton::{FrictionLaw, Newton};
-use railhead::contact::tangential::equations::Equations;
-use railhead::contact::tangential::level::Level;
-use railhead::contact::tangential::rules::Rule;
+use railhead::contact::rolling::methods::boundary_element::newton::{FrictionLaw, Newton};
+use railhead::contact::rolling::methods::boundary_element::solve as boundary_element;
+use railhead::contact::rolling::slip_equations::Equations;
+use railhead::contact::rolling::slip_rules::Rule;
+use railhead::contact::rolling::strip_mesh::Level;
+use railhead::contact::solution::words::PointSolution;
 
 use crate::reference::{Ellipse, solve};
 
@@ -25,7 +25,7 @@ fn answered(contact: &Ellipse) -> PointSolution {
 fn distance_to_plain_newton(contact: &Ellipse) -> f64 {
     let case = contact.case(STRIPS, CELLS);
     let problem: Problem = contact::check(&case, &Limits::default()).expect("a valid case");
-    let size = railhead::contact::case::MeshSize {
+    let size = railhead::contact::case::words::MeshSize {
         strips: STRIPS,
         cells: CELLS,
     };

@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
+use railhead::contact;
+use railhead::contact::case::problem::Limits;
+use railhead::contact::check;
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::problem::Limits;
-use railhead::contact::remark::RemarkEntry;
+use railhead::contact::remark::entry::RemarkEntry;
+use railhead::contact::rolling::operator_store::OperatorStore;
 use railhead::contact::slices::{slices, solve_slice};
-use railhead::contact::solution::{Fields, Solution};
-use railhead::contact::tangential::operator_store::OperatorStore;
-use railhead::contact::{self, check};
+use railhead::contact::solution::words::{Fields, Solution};
 use serde_json::{Value, json};
 
 use crate::reference::solve;

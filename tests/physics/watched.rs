@@ -4,9 +4,9 @@ use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
+use railhead::contact::case::problem::Limits;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::{Monitor, Stop};
-use railhead::contact::problem::Limits;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 

@@ -5,7 +5,7 @@ use std::sync::Mutex;
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
-use railhead::contact::case::Method as SolverMethod;
+use railhead::contact::case::words::Method as SolverMethod;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Stop;
 use reqwest::Method;

@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
+use railhead::contact::case::problem::Problem;
 use railhead::contact::monitor::Monitor;
-use railhead::contact::problem::Problem;
 use railhead::contact::solve;
 use railhead::jobs::{Jobs, Options, State};
 use sqlx::Connection;

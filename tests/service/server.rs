@@ -4,10 +4,10 @@ use std::io::Read;
 use std::net::SocketAddr;
 use std::path::Path;
 
+use railhead::contact::case::problem::Problem;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Monitor;
-use railhead::contact::problem::Problem;
-use railhead::contact::solution::{Fields, Solution};
+use railhead::contact::solution::words::{Fields, Solution};
 use railhead::http::{HttpOptions, router};
 use railhead::jobs::recipe::Recipe;
 use railhead::jobs::{Jobs, Options};

@@ -3,8 +3,8 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
+use railhead::contact::case::problem::Problem;
 use railhead::contact::monitor::Monitor;
-use railhead::contact::problem::Problem;
 use railhead::contact::solve;
 use railhead::jobs::store::sqlite::SqliteStore;
 use railhead::jobs::{FailureKind, Jobs, JobsError, Options, State};

@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, HashSet};
 
 use bytes::Bytes;
-use railhead::contact::remark::{Remark, RemarkEntry};
+use railhead::contact::remark::entry::RemarkEntry;
+use railhead::contact::remark::list::Remark;
 use railhead::jobs::store::list::Filter;
 use railhead::jobs::store::sqlite::SqliteStore;
 use railhead::jobs::store::{

@@ -8,10 +8,10 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::Duration;
 
+use railhead::contact::case::problem::Problem;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Monitor;
-use railhead::contact::problem::Problem;
-use railhead::contact::solution::{Fields, Solution};
+use railhead::contact::solution::words::{Fields, Solution};
 use railhead::jobs::recipe::Recipe;
 use railhead::jobs::{Jobs, Options};
 use reqwest::{Method, RequestBuilder};

@@ -5,9 +5,9 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
 use railhead::contact;
+use railhead::contact::case::problem::Limits;
 use railhead::contact::monitor::{Monitor, Unwatched};
-use railhead::contact::problem::Limits;
-use railhead::contact::solution::{PatchFields, Solution};
+use railhead::contact::solution::words::{PatchFields, Solution};
 use railhead::jobs::recipe::Recipe;
 use railhead::jobs::store::sqlite::SqliteStore;
 use railhead::jobs::{FailureKind, Jobs, Options, State};

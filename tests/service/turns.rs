@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
+use railhead::contact::case::problem::Problem;
 use railhead::contact::monitor::Monitor;
-use railhead::contact::problem::Problem;
 use railhead::contact::solve;
 use railhead::jobs::store::{QueueBounds, Release, Which};
 use railhead::jobs::{Jobs, Options, State};

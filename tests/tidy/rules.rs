@@ -268,10 +268,13 @@ mod tests {
     #[test]
     fn a_use_of_a_later_stage_breaks_the_order() {
         let planted = Sources::planted(&[
-            ("src/contact/mesh.rs", "use crate::contact::normal::Region;"),
             (
-                "src/contact/normal/mod.rs",
-                "use crate::contact::mesh::Mesh;",
+                "src/contact/mesh/strips.rs",
+                "use crate::contact::normal::region::Region;",
+            ),
+            (
+                "src/contact/normal/region.rs",
+                "use crate::contact::mesh::strips::Mesh;",
             ),
             ("src/contact/unheard_of.rs", ""),
             ("src/jobs/clock.rs", "use crate::http::Options;"),
@@ -366,7 +369,10 @@ mod tests {
                 "src/contact/level.rs",
                 "#[derive(\n    Debug,\n    Serialize,\n)]\nstruct Level;",
             ),
-            ("src/contact/mesh.rs", "#[derive(Debug)]\nstruct Mesh;"),
+            (
+                "src/contact/mesh/strips.rs",
+                "#[derive(Debug)]\nstruct Mesh;",
+            ),
             (
                 "src/contact/solution/words.rs",
                 "#[derive(Serialize)]\nstruct Words;",

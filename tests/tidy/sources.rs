@@ -57,7 +57,7 @@ impl Sources {
     }
 }
 
-/// `src/contact/normal/mod.rs` is the module `contact::normal`.
+/// `src/contact/normal/region.rs` is the module `contact::normal`.
 pub fn module(path: &str) -> String {
     let path = path.strip_prefix("src/").unwrap_or(path);
     let path = path.strip_suffix(".rs").unwrap_or(path);

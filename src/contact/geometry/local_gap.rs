@@ -1,6 +1,6 @@
 //! The gap of one patch in its own frame: the wheel as surface of revolution over the rail as cylinder.
 
-use crate::contact::geometry::contact_search::Frame;
+use crate::contact::geometry::contact_locus::Frame;
 use crate::contact::geometry::surface_exit::{SurfaceExit, SurfaceMissed};
 use crate::contact::geometry::wheel_rail::WheelRail;
 
@@ -52,7 +52,7 @@ impl LocalGap {
     ///
     /// # Errors
     /// A sentence, if the rail bends away from the plane of the frame within the window.
-    pub(super) fn new(
+    pub(crate) fn new(
         geometry: &WheelRail,
         frame: Frame,
         centre: f64,
@@ -98,7 +98,7 @@ impl LocalGap {
     }
 
     /// Do the bodies still overlap at the ends of the window along x, and at those across?
-    pub(super) fn overlaps_at_ends(&self) -> [bool; 2] {
+    pub(crate) fn overlaps_at_ends(&self) -> [bool; 2] {
         let [last_x, last_y] = [self.x.len() - 1, self.y.len() - 1];
         let overlaps = |row: &Vec<f64>| row.iter().any(|height| *height < 0.0);
         [

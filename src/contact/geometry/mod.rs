@@ -1,10 +1,10 @@
 //! Where do the bodies touch? Cross-sections of wheel and rail, their placement, and the gaps of their patches.
 
-pub mod contact_search;
-mod crossing;
+pub mod contact_locus;
+pub mod crossing;
 pub mod formats;
 pub mod local_gap;
-mod overlaps;
+pub mod overlaps;
 pub mod profile;
 pub mod profile_quality;
 pub mod smoothing;

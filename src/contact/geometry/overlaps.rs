@@ -4,7 +4,7 @@
 //! jumps while a height is sought, this is decided once, for a lowering near the one that is expected ([`Search::grouped_near`]), and
 //! holds for every height.
 
-use crate::contact::geometry::contact_search::{Line, STEP, Search};
+use crate::contact::geometry::contact_locus::{Line, STEP, Search};
 
 /// Overlaps nearer to each other than this along the rail, in mm, whose mean inclinations differ less, in rad, share one gap:
 /// there they influence each other. (CONTACT keeps apart what is 8 mm or 30° from each other.)
@@ -18,12 +18,12 @@ const THIN: f64 = 0.4;
 
 /// Lines that overlap: the first and the last one, and what lies beyond either end.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Overlap {
-    pub(super) ends: [usize; 2],
+pub(crate) struct Overlap {
+    pub(crate) ends: [usize; 2],
     /// The overlap goes on beyond this end, in another gap.
-    pub(super) cut: [bool; 2],
+    pub(crate) cut: [bool; 2],
     /// Another gap lies on this side, next to this one or farther away.
-    pub(super) near: [bool; 2],
+    pub(crate) near: [bool; 2],
 }
 
 /// Lowerings in mm at which overlaps are divided among gaps: this one times a power of the ratio. Loads that lower the wheel by 0.05 to
@@ -35,7 +35,7 @@ const MERGED: f64 = 0.6;
 
 /// Which lines share a gap, as it was decided at one height of the wheel.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Grouping {
+pub(crate) struct Grouping {
     /// First and last line of every gap, from smaller to larger y.
     groups: Vec<[usize; 2]>,
 }
@@ -72,7 +72,7 @@ impl Search<'_> {
     }
 
     /// The lines that overlap, gap by gap.
-    pub(super) fn overlaps(&self, lowering: f64) -> Result<Vec<Overlap>, String> {
+    pub(crate) fn overlaps(&self, lowering: f64) -> Result<Vec<Overlap>, String> {
         self.divided(lowering, self.grouping.as_ref())
     }
 
@@ -206,7 +206,7 @@ impl Search<'_> {
     }
 
     /// The lines of an overlap with the one on either side.
-    pub(super) fn around(&self, [first, last]: [usize; 2]) -> &[Line] {
+    pub(crate) fn around(&self, [first, last]: [usize; 2]) -> &[Line] {
         &self.lines[first - 1..=last + 1]
     }
 
@@ -222,7 +222,7 @@ impl Search<'_> {
 
     /// The lines beyond which an overlap touches nothing that belongs to its gap, toward another gap; none where there is no
     /// other gap. A cut overlap gets thin before its end, a whole one ends where the bodies do not overlap any more.
-    pub(super) fn limits(&self, overlap: Overlap, lowering: f64) -> [Option<Line>; 2] {
+    pub(crate) fn limits(&self, overlap: Overlap, lowering: f64) -> [Option<Line>; 2] {
         let (depths, main) = self.depths(overlap, lowering);
         let thin = |k: &usize| depths[*k] <= THIN * depths[main];
         let thin_ends = [

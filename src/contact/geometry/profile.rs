@@ -6,9 +6,10 @@
 use std::sync::Arc;
 
 use crate::contact::geometry::crossing;
-use crate::contact::geometry::profile_quality::{Points, noise, shape};
+use crate::contact::geometry::profile_quality::points::Points;
+use crate::contact::geometry::profile_quality::{noise, shape};
 use crate::contact::geometry::smoothing::Spline;
-use crate::contact::remark::Remark;
+use crate::contact::remark::list::Remark;
 
 /// Length of the whole curve in mm that a profile may have; anything else is in another unit.
 pub const ARC_LENGTH: [f64; 2] = [5.0, 500.0];

@@ -10,7 +10,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::contact::geometry::profile::{Place, Profile};
-use crate::contact::remark::RemarkEntry;
+use crate::contact::remark::entry::RemarkEntry;
 
 /// Left or right rail, seen along rolling.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]

@@ -6,22 +6,22 @@
 
 use std::f64::consts::PI;
 
-use crate::contact::geometry::contact_search::Frame;
+use crate::contact::geometry::contact_locus::Frame;
 
 /// One gap as far as its neighbours feel it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Neighbour {
+pub(crate) struct Neighbour {
     /// Its frame, at its load centre.
-    pub(super) frame: Frame,
+    pub(crate) frame: Frame,
     /// Normal force in N.
-    pub(super) force: f64,
+    pub(crate) force: f64,
     /// Approach in mm.
-    pub(super) approach: f64,
+    pub(crate) approach: f64,
 }
 
 /// By how much the force of a gap would change, at most, relative to the sum of all forces, if the gaps pressed on each other; with the
 /// least distance of their load centres in mm. At a kept load the wheel sinks until the sum is what it was.
-pub(super) fn neglected(
+pub(crate) fn neglected(
     gaps: &[Neighbour],
     contact_modulus: f64,
     keeps_load: bool,

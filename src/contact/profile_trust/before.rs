@@ -1,13 +1,15 @@
 //! What can be said about profiles before their contact is known: from their points alone.
 
 use crate::contact::geometry::profile::{Body, Profile};
+use crate::contact::geometry::profile_quality::noise;
+use crate::contact::geometry::profile_quality::points::{Grain, advised_smoothing};
 use crate::contact::geometry::profile_quality::shape::{Looks, looks_like};
-use crate::contact::geometry::profile_quality::{Grain, advised_smoothing, noise};
 use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::normal::profiles::ProfileContact;
+use crate::contact::normal::wheel_height::search::ProfileContact;
 use crate::contact::profile_trust::quality::{PairQuality, SectionQuality};
 use crate::contact::profile_trust::settle::PRESSURE_USUAL;
-use crate::contact::remark::{Remark, RemarkEntry};
+use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::remark::list::Remark;
 
 /// Noise and spacing of a whole profile.
 pub fn grain(profile: &Profile) -> Grain {

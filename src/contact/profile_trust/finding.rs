@@ -1,7 +1,8 @@
 //! What is wrong with a profile, in words a measuring engineer can act on.
 
 use crate::contact::geometry::profile::Body;
-use crate::contact::remark::{Remark, RemarkEntry};
+use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::remark::list::Remark;
 
 /// Waviness and ambiguity of both bodies together that are remarked on, relative to the largest pressure.
 ///

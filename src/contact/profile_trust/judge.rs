@@ -3,12 +3,13 @@
 use crate::contact::geometry::profile::{Body, Profile};
 use crate::contact::geometry::profile_quality::flattening::noise_pressure;
 use crate::contact::geometry::profile_quality::noise::{Outlier, Step};
-use crate::contact::geometry::profile_quality::{
-    Grain, UnderContact, advised_smoothing, shape, under_contact,
+use crate::contact::geometry::profile_quality::points::{
+    Grain, UnderContact, advised_smoothing, under_contact,
 };
+use crate::contact::geometry::profile_quality::shape;
 use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::normal::profiles::PressedGap;
+use crate::contact::normal::wheel_height::search::PressedGap;
 use crate::contact::profile_trust::finding::{Cause, Finding};
 use crate::contact::profile_trust::quality::{PatchQuality, ProfileQuality};
 

@@ -1,21 +1,22 @@
 //! `smoothing_mm: "auto"`: the smoothing that suits the noise of the profiles and the pressure between them.
 
+use crate::contact::case::problem::Problem;
 use crate::contact::error::SolveError;
 use crate::contact::geometry::profile::Body;
-use crate::contact::geometry::profile_quality::advised_smoothing;
+use crate::contact::geometry::profile_quality::points::advised_smoothing;
 use crate::contact::monitor::{Monitor, Watch};
-use crate::contact::normal::profiles::{Accuracy, ProfileContact, Wanted};
-use crate::contact::problem::Problem;
+use crate::contact::normal::wheel_height::search::{Accuracy, ProfileContact, Wanted};
 use crate::contact::profile_trust::before;
-use crate::contact::remark::{Remark, RemarkEntry};
+use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::remark::list::Remark;
 
 /// Pressure in MPa for the first choice.
-pub(super) const PRESSURE_USUAL: f64 = 1200.0;
+pub(crate) const PRESSURE_USUAL: f64 = 1200.0;
 /// By which part the rest for that pressure may miss the force: the length goes with its power −2/9.
 const TOLERANCE: f64 = 0.1;
 
 /// What was chosen, for the answer.
-pub(super) fn remarks(contact: &ProfileContact) -> Vec<RemarkEntry> {
+pub(crate) fn remarks(contact: &ProfileContact) -> Vec<RemarkEntry> {
     let profiles = contact
         .geometry
         .profiles()
@@ -38,7 +39,7 @@ pub(super) fn remarks(contact: &ProfileContact) -> Vec<RemarkEntry> {
 ///
 /// # Errors
 /// There is no rest of the wheel, or the monitor stopped the work.
-pub(super) fn settled(
+pub(crate) fn settled(
     problem: &Problem,
     contact: &ProfileContact,
     monitor: &dyn Monitor,

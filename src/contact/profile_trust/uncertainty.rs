@@ -8,25 +8,27 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::contact::case::Output;
+use crate::contact::case::problem::{Problem, Resolution};
+use crate::contact::case::words::Output;
+use crate::contact::coupling;
+use crate::contact::coupling::Judge;
 use crate::contact::error::SolveError;
 use crate::contact::geometry::profile::Profile;
 use crate::contact::geometry::profile_quality::flattening::noise_pressure;
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::normal::profiles::{PressedWheel, ProfileContact};
-use crate::contact::problem::{Problem, Resolution};
+use crate::contact::normal::wheel_height::search::{PressedWheel, ProfileContact};
 use crate::contact::profile_trust::quality::{ProfileQuality, ProfileUncertainty};
-use crate::contact::profiles::{self, Judge};
-use crate::contact::remark::{Remark, RemarkEntry};
-use crate::contact::solution::{PatchSolution, Solution};
-use crate::contact::tangential::operator_store::OperatorStore;
+use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::remark::list::Remark;
+use crate::contact::rolling::operator_store::OperatorStore;
+use crate::contact::solution::words::{PatchSolution, Solution};
 
 /// Companions are solved with these multiples of the smoothing.
 const COMPANIONS: [f64; 2] = [0.4, 2.0];
 /// Smoothing of a companion where there is none, in mm.
 const COMPANION_LEAST: f64 = 2.0;
 /// Waves and noise worth less than this part of the pressure need no companion.
-pub(super) const HARMLESS: f64 = 0.03;
+pub(crate) const HARMLESS: f64 = 0.03;
 /// Added to the differences: relative to the largest pressure, and to μN.
 const PRESSURE_FLOOR: f64 = 0.01;
 const FORCE_FLOOR: f64 = 0.003;
@@ -72,7 +74,7 @@ impl Judge for NoJudge {
 ///
 /// # Errors
 /// The monitor stopped the work.
-pub(super) fn add(
+pub(crate) fn add(
     operators: &Arc<OperatorStore>,
     problem: &Problem,
     contact: &ProfileContact,
@@ -93,7 +95,7 @@ pub(super) fn add(
     if suspicious || solution.patches.iter().any(noisy) {
         for smoothing in readings(contact, solution) {
             let other = contact.smoothed(smoothing);
-            match profiles::solve(
+            match coupling::solve(
                 operators,
                 &companion(problem, &chosen),
                 &other,
@@ -113,7 +115,7 @@ pub(super) fn add(
 }
 
 /// The remark on a target that is smaller than what the profiles leave open, where that was looked into.
-pub(super) fn target_below(problem: &Problem, solution: &Solution) -> Option<RemarkEntry> {
+pub(crate) fn target_below(problem: &Problem, solution: &Solution) -> Option<RemarkEntry> {
     let Resolution::Target(target) = problem.resolution else {
         return None;
     };

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::contact::remark::{Remark, Severity};
+use crate::contact::remark::kind::Severity;
+use crate::contact::remark::list::Remark;
 
 /// Motions with the same remark of which the figures are kept; the others are only numbered.
 const KEPT_MAX: usize = 4;
@@ -51,7 +52,7 @@ pub enum Figure {
 }
 
 /// What can stand in a remark as a figure.
-pub(super) trait AsFigure {
+pub(crate) trait AsFigure {
     /// The figure; nothing for a number that is not finite or not there.
     fn figure(&self) -> Option<Figure>;
 }

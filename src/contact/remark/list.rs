@@ -2,13 +2,14 @@
 //! reads about it at `/v1/remarks`.
 //!
 //! Codes never change. Figures have their unit in their name and must not be named as a member of
-//! [`RemarkEntry`](crate::contact::remark::RemarkEntry). A figure may be a number, a count, a pair, a word or optional.
+//! [`RemarkEntry`](crate::contact::remark::entry::RemarkEntry). A figure may be a number, a count, a pair, a word or optional.
 
 use std::collections::BTreeMap;
 
 use crate::contact::remark::entry::AsFigure;
+use crate::contact::remark::entry::Figure;
+use crate::contact::remark::kind::{RemarkKind, Severity};
 use crate::contact::remark::table::remarks;
-use crate::contact::remark::{Figure, RemarkKind, Severity};
 
 remarks! {
     // The case.
@@ -600,7 +601,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use crate::contact::remark::RemarkEntry;
+    use crate::contact::remark::entry::RemarkEntry;
 
     #[test]
     fn every_code_is_listed_once_and_documented() {

@@ -89,4 +89,4 @@ macro_rules! remarks {
         }
     };
 }
-pub(super) use remarks;
+pub(crate) use remarks;

@@ -3,10 +3,10 @@
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::contact::case::Output;
-use crate::contact::outputs::resample::{resample, resample_zone};
-use crate::contact::solution::{PatchCells, PointFields};
-use crate::contact::zones::Zone;
+use crate::contact::case::words::Output;
+use crate::contact::post::resample::{resample, resample_zone};
+use crate::contact::post::zone::Zone;
+use crate::contact::solution::words::{PatchCells, PointFields};
 
 /// Values per cell, strip by strip from smaller to larger y, in each strip from smaller to larger x. All arrays have
 /// the same length; those of other fields are absent.

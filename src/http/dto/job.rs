@@ -6,7 +6,7 @@ use bytes::Bytes;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::contact::remark::RemarkEntry;
+use crate::contact::remark::entry::RemarkEntry;
 use crate::http::dto::problem::ProblemBody;
 use crate::http::dto::result::JobResult;
 use crate::http::problem::error::ApiError;

@@ -7,8 +7,8 @@ use serde::Serialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::contact::case::Output;
-use crate::contact::solution::Solution;
+use crate::contact::case::words::Output;
+use crate::contact::solution::words::Solution;
 use crate::http::problem::error::ApiError;
 use crate::jobs::fetch::Answer;
 

@@ -14,8 +14,8 @@ use tokio::time::Instant;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::contact::remark::RemarkEntry;
-use crate::contact::solution::Solution;
+use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::solution::words::Solution;
 use crate::http::dto::problem::ProblemBody;
 use crate::http::dto::result::JobResult;
 use crate::http::extract::accept::{Format, choose, one_of};

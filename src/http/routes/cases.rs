@@ -5,9 +5,9 @@ use axum::extract::State;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::contact::case::{Case, Method, Output};
+use crate::contact::case::words::{Case, Method, Output};
 use crate::contact::profile_trust::quality::PairQuality;
-use crate::contact::remark::RemarkEntry;
+use crate::contact::remark::entry::RemarkEntry;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::json::JsonBody;
 use crate::http::limits::memory::Memory;

@@ -5,8 +5,8 @@ use axum::http::{HeaderMap, HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
 use uuid::Uuid;
 
-use crate::contact::case::Output;
-use crate::contact::solution::PointSolution;
+use crate::contact::case::words::Output;
+use crate::contact::solution::words::PointSolution;
 use crate::http::extract::accept::Format;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::JobId;

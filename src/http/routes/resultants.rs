@@ -6,9 +6,9 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::contact::case::Motion;
+use crate::contact::case::words::Motion;
 use crate::contact::profile_trust::quality::ProfileUncertainty;
-use crate::contact::solution::{ErrorEstimate, Origin, Solution, Total};
+use crate::contact::solution::words::{ErrorEstimate, Origin, Solution, Total};
 use crate::http::extract::accept::{Format, choose, one_of};
 use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::JobId;

@@ -2,8 +2,8 @@
 
 use uuid::Uuid;
 
-use crate::contact::case::Output;
-use crate::contact::solution::{PatchCells, PointFields};
+use crate::contact::case::words::Output;
+use crate::contact::solution::words::{PatchCells, PointFields};
 use crate::http::dto::result::name_of;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;

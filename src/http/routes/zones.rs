@@ -7,9 +7,9 @@ use serde::Serialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::contact::case::Output;
-use crate::contact::outputs::outline::{outlines, patch_outline};
-use crate::contact::zones::Zone;
+use crate::contact::case::words::Output;
+use crate::contact::post::outlines::outline::{outlines, patch_outline};
+use crate::contact::post::zone::Zone;
 use crate::http::dto::cells::{Cells, GriddedField, gridded, per_cell};
 use crate::http::extract::accept::Format;
 use crate::http::extract::caller::Caller;

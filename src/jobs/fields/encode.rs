@@ -2,8 +2,8 @@
 
 use std::io::{Cursor, Error, Result, Write};
 
-use crate::contact::solution::Fields;
-use crate::contact::zones::Zone;
+use crate::contact::post::zone::Zone;
+use crate::contact::solution::words::Fields;
 use crate::jobs::fields::{Block, Header, Kind, MAGIC, PREFIX_BYTES};
 
 const ZSTD_LEVEL: i32 = 3;

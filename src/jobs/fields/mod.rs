@@ -19,8 +19,8 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use crate::contact::solution::{PatchCells, PatchFields, PointFields};
-use crate::contact::zones::Zone;
+use crate::contact::post::zone::Zone;
+use crate::contact::solution::words::{PatchCells, PatchFields, PointFields};
 pub use crate::jobs::fields::encode::encode;
 
 const MAGIC: &[u8; 8] = b"RHFIELD2";
@@ -263,7 +263,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::contact::solution::Fields;
+    use crate::contact::solution::words::Fields;
 
     /// Any bit pattern: NaN payloads, infinities and negative zero have to survive too.
     fn values(count: usize) -> impl Strategy<Value = Vec<f64>> {

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use bytes::Bytes;
 use uuid::Uuid;
 
-use crate::contact::remark::RemarkEntry;
+use crate::contact::remark::entry::RemarkEntry;
 use crate::jobs::job::{Failure, Job, State};
 use crate::jobs::results::Encoded;
 use crate::jobs::sweep::SliceNote;

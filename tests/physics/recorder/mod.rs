@@ -15,9 +15,10 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use railhead::contact;
+use railhead::contact::case::digest::SOLVER_REVISION;
+use railhead::contact::case::problem::Limits;
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::problem::{Limits, SOLVER_REVISION};
-use railhead::contact::tangential::operator_store::OperatorStore;
+use railhead::contact::rolling::operator_store::OperatorStore;
 use serde_json::Value;
 
 use crate::recorder::comparison::{Precision, compare};

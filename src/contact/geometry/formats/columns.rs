@@ -1,9 +1,9 @@
 //! Two-column text or CSV: y and z in mm, one point per line.
 
-use crate::contact::geometry::formats::{Contents, numbers, unreadable};
+use crate::contact::geometry::formats::format::{Contents, numbers, unreadable};
 
 /// Lines that start with `#`, `!`, `%` or `"` are remarks; one line of titles may stand before the first point.
-pub(super) fn read(text: &str) -> Result<Contents, String> {
+pub(crate) fn read(text: &str) -> Result<Contents, String> {
     let mut contents = Contents::default();
     let mut title_allowed = true;
     for (k, line) in text.lines().enumerate() {

@@ -3,10 +3,12 @@
 //! Lines `Name=value`, an empty line, then one point per line in the columns that `ColumnDef` names; `X` is y and `Y`
 //! is z here. Instruments differ in the sense of both: x usually runs toward the track centre, z is told by the shape.
 
-use crate::contact::geometry::formats::{Contents, has_decimal_commas, numbers, unreadable};
+use crate::contact::geometry::formats::format::{
+    Contents, has_decimal_commas, numbers, unreadable,
+};
 
 /// Known by the header: a line with `=` that is not a point.
-pub(super) fn read(text: &str) -> Result<Contents, String> {
+pub(crate) fn read(text: &str) -> Result<Contents, String> {
     let mut contents = Contents {
         mirror_y: Some(true),
         ..Contents::default()

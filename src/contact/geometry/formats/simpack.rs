@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::contact::geometry::formats::{Contents, numbers, unreadable};
+use crate::contact::geometry::formats::format::{Contents, numbers, unreadable};
 
 #[derive(Debug, Clone, Copy)]
 struct Settings {
@@ -22,7 +22,7 @@ struct Settings {
 }
 
 /// Weights of the points are left aside.
-pub(super) fn read(text: &str) -> Result<Contents, String> {
+pub(crate) fn read(text: &str) -> Result<Contents, String> {
     let mut settings = Settings {
         wheel: None,
         in_spline: false,

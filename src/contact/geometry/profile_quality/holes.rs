@@ -1,6 +1,6 @@
 //! Stretches without points where the bodies may touch all the same.
 
-use crate::contact::geometry::contact_search::Search;
+use crate::contact::geometry::contact_locus::Search;
 use crate::contact::geometry::profile::Body;
 
 /// Shorter chords hide nothing, in mm, nor do those below this multiple of the width of the contact.

@@ -1,8 +1,8 @@
 //! Two readings of the same points: the spline in use against a smoother one, and against Akima's curve.
 
-use crate::contact::geometry::profile_quality::Points;
 use crate::contact::geometry::profile_quality::flattening::flattening;
 use crate::contact::geometry::profile_quality::noise::{MEDIAN_OF_NORMAL, median};
+use crate::contact::geometry::profile_quality::points::Points;
 use crate::contact::geometry::smoothing::Spline;
 
 /// Spacing of the comparison in mm.

@@ -2,11 +2,11 @@
 
 use std::fmt::Write;
 
-use crate::contact::case::Output;
-use crate::contact::outputs::outline::{outlines, patch_outline};
-use crate::contact::outputs::resample::resample;
-use crate::contact::solution::PatchCells;
-use crate::contact::zones::Zone;
+use crate::contact::case::words::Output;
+use crate::contact::post::outlines::outline::{outlines, patch_outline};
+use crate::contact::post::resample::resample;
+use crate::contact::post::zone::Zone;
+use crate::contact::solution::words::PatchCells;
 use crate::http::render::picture::colour::{LEVELS, SLIP, STICK, level, ramp};
 use crate::http::render::picture::frame::{Frame, exponent, ticks};
 use crate::http::render::picture::scene::{Heat, Scene, extent, zones_present};

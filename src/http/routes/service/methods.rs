@@ -5,7 +5,7 @@ use axum::extract::State;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::contact::case::{Method, Output};
+use crate::contact::case::words::{Method, Output};
 use crate::http::extract::caller::AnyTenant;
 use crate::http::options::HttpOptions;
 use crate::http::problem::catalogue::PlainProblems;

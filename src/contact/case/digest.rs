@@ -1,0 +1,82 @@
+//! Which cases have the same answer? A digest of everything that determines it, the solver's revision included.
+
+use serde::Serialize;
+
+use crate::contact::case::motions::Prescribed;
+use crate::contact::case::problem::{Elasticity, Resolution, resolution};
+use crate::contact::case::words::{
+    Case, Contact, Load, MeshSize, Method, Motion, Motions, Output, TractionBound, Wheelset,
+};
+
+/// Raised whenever a change moves numbers that clients get: equal cases share one answer, and answers of an older revision are not theirs.
+/// `tests/physics/golden.rs` fails if numbers move without it, and says how to record the new ones.
+pub const SOLVER_REVISION: u32 = 8;
+
+/// Everything that determines the answer, in a fixed order; name and labels do not.
+#[derive(Serialize)]
+struct Canonical<'a> {
+    solver_version: &'static str,
+    solver_revision: u32,
+    elasticity: [f64; 3],
+    friction: f64,
+    contact: &'a Contact,
+    load: Option<&'a Load>,
+    motions: &'a [Motion],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    forces: Option<&'a [Prescribed]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    wheelset: Option<&'a Wheelset>,
+    method: Method,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    traction_bound: Option<TractionBound>,
+    target_error: Option<f64>,
+    mesh: Option<MeshSize>,
+    time_limit_s: Option<f64>,
+    outputs: &'a [Output],
+}
+
+/// Hexadecimal BLAKE3 digest of the canonical case.
+pub(crate) fn digest(
+    case: &Case,
+    elasticity: &Elasticity,
+    motions: &[Motion],
+    forces: &[Prescribed],
+) -> String {
+    let target_error = match resolution(&case.solver) {
+        Resolution::Target(target) => Some(target),
+        Resolution::Mesh(_) => None,
+    };
+    let canonical = Canonical {
+        solver_version: env!("CARGO_PKG_VERSION"),
+        solver_revision: SOLVER_REVISION,
+        elasticity: [
+            elasticity.shear_modulus,
+            elasticity.poisson_ratio,
+            elasticity.difference,
+        ],
+        friction: case.friction.coefficient,
+        contact: &case.contact,
+        load: case.load.as_ref(),
+        motions,
+        forces: Some(forces).filter(|all| all.iter().any(|f| *f != [None; 2])),
+        wheelset: match &case.motion {
+            Motions::Wheelset { wheelset } => Some(wheelset),
+            _ => None,
+        },
+        method: case.solver.method,
+        // What is left out means the same as the default.
+        traction_bound: case
+            .solver
+            .traction_bound
+            .filter(|bound| *bound != TractionBound::default()),
+        target_error,
+        mesh: case.solver.mesh,
+        time_limit_s: case.solver.time_limit_s,
+        outputs: &case.outputs,
+    };
+    let mut hasher = blake3::Hasher::new();
+    // Writing into a hasher cannot fail, and the structure has no map with keys that are not texts.
+    let written = serde_json::to_writer(&mut hasher, &canonical);
+    debug_assert!(written.is_ok());
+    hasher.finalize().to_hex().to_string()
+}

@@ -1,0 +1,300 @@
+//! Writes out the motions of a case: sweeps become lists.
+
+use crate::contact::case::problem::Limits;
+use crate::contact::case::words::{AskedMotion, Combine, Motion, Motions, Range, Sweep};
+use crate::contact::error::Fault;
+
+/// The forces prescribed along x and across, in N, where they are.
+pub type Prescribed = [Option<f64>; 2];
+
+/// No creepage.
+const STILL: AskedMotion = AskedMotion {
+    creepage_x: None,
+    creepage_y: None,
+    spin_per_mm: 0.0,
+    force_x_n: None,
+    force_y_n: None,
+};
+
+/// The motions of a case in order, never empty.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Expanded {
+    /// Creepages are 0 where a force is prescribed.
+    pub(crate) motions: Vec<Motion>,
+    /// What is prescribed instead, motion by motion.
+    pub(crate) forces: Vec<Prescribed>,
+}
+
+/// The motions and prescribed forces of a case.
+///
+/// # Errors
+/// See [`list`].
+pub(crate) fn expand(motions: &Motions, limits: &Limits) -> Result<Expanded, Fault> {
+    let list = list(motions, limits)?;
+    let motion = |asked: &AskedMotion| Motion {
+        creepage_x: asked.creepage_x.unwrap_or(0.0),
+        creepage_y: asked.creepage_y.unwrap_or(0.0),
+        spin_per_mm: asked.spin_per_mm,
+    };
+    Ok(Expanded {
+        motions: list.iter().map(motion).collect(),
+        forces: list.iter().map(|m| [m.force_x_n, m.force_y_n]).collect(),
+    })
+}
+
+impl Expanded {
+    /// Faults of prescribed forces: more than friction can carry, where the limit μN is known, or a contact without
+    /// one common frame.
+    pub(crate) fn faults(
+        &self,
+        given: &Motions,
+        limit: Option<f64>,
+        of_profiles: bool,
+    ) -> Vec<Fault> {
+        let mut faults = Vec::new();
+        for (index, forces) in self.forces.iter().enumerate() {
+            let Some(k) = larger(forces) else { continue };
+            let pointer = pointer(given, index, ["force_x_n", "force_y_n"][k]);
+            let [x, y] = forces.map(|force| force.unwrap_or(0.0));
+            let length = x.hypot(y);
+            let detail = if of_profiles {
+                "given with profiles, whose patches have a frame each; give creepages or a wheelset"
+                    .to_owned()
+            } else if let Some(limit) = limit.filter(|limit| length > *limit) {
+                format!(
+                    "a tangential force of {length} N given; friction carries at most μN = {limit} N"
+                )
+            } else {
+                continue;
+            };
+            let fault = Fault { pointer, detail };
+            if faults.len() < FAULTS_MAX
+                && !faults.iter().any(|f: &Fault| f.pointer == fault.pointer)
+            {
+                faults.push(fault);
+            }
+        }
+        faults
+    }
+}
+
+/// Faults of forces that are named one by one.
+const FAULTS_MAX: usize = 100;
+
+/// The component with the larger prescribed force, if there is any.
+fn larger(forces: &Prescribed) -> Option<usize> {
+    match forces {
+        [None, None] => None,
+        [Some(_), None] => Some(0),
+        [None, Some(_)] => Some(1),
+        [Some(x), Some(y)] => Some(usize::from(y.abs() > x.abs())),
+    }
+}
+
+fn pointer(given: &Motions, index: usize, name: &str) -> String {
+    match given {
+        Motions::Many(_) => format!("/motion/{index}/{name}"),
+        Motions::Sweep { .. } => format!("/motion/sweep/{name}"),
+        Motions::One(_) | Motions::Wheelset { .. } => format!("/motion/{name}"),
+    }
+}
+
+/// The motions in order, never empty. In a grid the last named component varies fastest, in the fixed order
+/// `creepage_x`, `creepage_y`, `spin_per_mm`; a force stands in the place of its creepage.
+///
+/// # Errors
+/// A fault at `/motion` if there are more than the limits allow.
+fn list(motions: &Motions, limits: &Limits) -> Result<Vec<AskedMotion>, Fault> {
+    let count = match motions {
+        Motions::One(_) | Motions::Wheelset { .. } => 1,
+        Motions::Many(list) => list.len() as u128,
+        Motions::Sweep { sweep } => sweep_length(sweep),
+    };
+    if count > limits.motions_max as u128 {
+        return Err(Fault {
+            pointer: "/motion".to_owned(),
+            detail: format!(
+                "{count} motions given; at most {} are allowed in one case",
+                limits.motions_max
+            ),
+        });
+    }
+    Ok(match motions {
+        Motions::One(motion) => vec![*motion],
+        Motions::Many(list) => list.clone(),
+        Motions::Sweep { sweep } => write_out(sweep),
+        // Every patch gets its own creepages when it is found.
+        Motions::Wheelset { .. } => vec![STILL],
+    })
+}
+
+fn ranges(sweep: &Sweep) -> [Option<Range>; 3] {
+    [
+        sweep.force_x_n.or(sweep.creepage_x),
+        sweep.force_y_n.or(sweep.creepage_y),
+        sweep.spin_per_mm,
+    ]
+}
+
+fn sweep_length(sweep: &Sweep) -> u128 {
+    let points = ranges(sweep)
+        .into_iter()
+        .flatten()
+        .map(|range| u128::from(range.points));
+    match sweep.combine {
+        Combine::Together => points.max().unwrap_or(0),
+        Combine::Grid => points.product(),
+    }
+}
+
+fn write_out(sweep: &Sweep) -> Vec<AskedMotion> {
+    let values =
+        ranges(sweep).map(|range| range.map_or_else(|| vec![0.0], |range| range_values(&range)));
+    let [x, y, spin] = &values;
+    let forced = [sweep.force_x_n.is_some(), sweep.force_y_n.is_some()];
+    let motion = |i: usize, j: usize, k: usize| AskedMotion {
+        creepage_x: (!forced[0]).then_some(x[i]),
+        creepage_y: (!forced[1]).then_some(y[j]),
+        spin_per_mm: spin[k],
+        force_x_n: forced[0].then_some(x[i]),
+        force_y_n: forced[1].then_some(y[j]),
+    };
+    match sweep.combine {
+        Combine::Together => (0..sweep_length(sweep) as usize)
+            // A component that is left out has one value, which serves every point.
+            .map(|n| {
+                motion(
+                    n.min(x.len() - 1),
+                    n.min(y.len() - 1),
+                    n.min(spin.len() - 1),
+                )
+            })
+            .collect(),
+        Combine::Grid => (0..x.len())
+            .flat_map(|i| (0..y.len()).map(move |j| (i, j)))
+            .flat_map(|(i, j)| (0..spin.len()).map(move |k| (i, j, k)))
+            .map(|(i, j, k)| motion(i, j, k))
+            .collect(),
+    }
+}
+
+/// Equally spaced values; the ends are exact.
+fn range_values(range: &Range) -> Vec<f64> {
+    let last = range.points.saturating_sub(1);
+    (0..range.points)
+        .map(|n| {
+            if n == 0 {
+                range.from
+            } else if n == last {
+                range.to
+            } else {
+                let t = f64::from(n) / f64::from(last);
+                range.from * (1.0 - t) + range.to * t
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn range(from: f64, to: f64, points: u32) -> Option<Range> {
+        Some(Range { from, to, points })
+    }
+
+    fn triple(motion: &Motion) -> [f64; 3] {
+        [motion.creepage_x, motion.creepage_y, motion.spin_per_mm]
+    }
+
+    #[test]
+    fn a_sweep_together_runs_side_by_side() {
+        let sweep = Sweep {
+            creepage_x: range(0.0, 0.004, 5),
+            creepage_y: None,
+            spin_per_mm: range(1.0, -1.0, 5),
+            force_x_n: None,
+            force_y_n: None,
+            combine: Combine::Together,
+        };
+        let list = expand(&Motions::Sweep { sweep }, &Limits::default())
+            .unwrap()
+            .motions;
+        assert_eq!(list.len(), 5);
+        assert_eq!(triple(&list[0]), [0.0, 0.0, 1.0]);
+        assert_eq!(triple(&list[2]), [0.002, 0.0, 0.0]);
+        assert_eq!(triple(&list[4]), [0.004, 0.0, -1.0]);
+    }
+
+    #[test]
+    fn in_a_grid_the_last_named_component_is_fastest() {
+        let sweep = Sweep {
+            creepage_x: range(1.0, 2.0, 2),
+            creepage_y: range(5.0, 5.0, 1),
+            spin_per_mm: range(7.0, 9.0, 3),
+            force_x_n: None,
+            force_y_n: None,
+            combine: Combine::Grid,
+        };
+        let list = expand(&Motions::Sweep { sweep }, &Limits::default())
+            .unwrap()
+            .motions;
+        let expected = [
+            [1.0, 7.0],
+            [1.0, 8.0],
+            [1.0, 9.0],
+            [2.0, 7.0],
+            [2.0, 8.0],
+            [2.0, 9.0],
+        ];
+        assert_eq!(list.len(), expected.len());
+        for (motion, [x, spin]) in list.iter().zip(expected) {
+            assert_eq!(triple(motion), [x, 5.0, spin]);
+        }
+    }
+
+    #[test]
+    fn the_limit_of_motions_is_kept_on_both_sides() {
+        let limits = Limits {
+            motions_max: 100,
+            ..Limits::default()
+        };
+        let grid = |n, m| Motions::Sweep {
+            sweep: Sweep {
+                creepage_x: range(0.0, 1.0, n),
+                creepage_y: range(0.0, 1.0, m),
+                spin_per_mm: None,
+                force_x_n: None,
+                force_y_n: None,
+                combine: Combine::Grid,
+            },
+        };
+        assert_eq!(expand(&grid(10, 10), &limits).unwrap().motions.len(), 100);
+        let fault = expand(&grid(1_000_000, 1_000_000), &limits).unwrap_err();
+        assert_eq!(fault.pointer, "/motion");
+        assert!(
+            fault.detail.starts_with("1000000000000 motions"),
+            "{}",
+            fault.detail
+        );
+        assert!(expand(&grid(101, 1), &limits).is_err());
+    }
+
+    #[test]
+    fn a_swept_force_stands_in_the_place_of_its_creepage() {
+        let sweep = Sweep {
+            creepage_x: None,
+            creepage_y: range(1.0, 2.0, 2),
+            spin_per_mm: None,
+            force_x_n: range(-50.0, 50.0, 3),
+            force_y_n: None,
+            combine: Combine::Grid,
+        };
+        let found = expand(&Motions::Sweep { sweep }, &Limits::default()).unwrap();
+        let forces: Vec<Prescribed> = found.forces.clone();
+        assert_eq!(forces.len(), 6);
+        assert_eq!(forces[0], [Some(-50.0), None]);
+        assert_eq!(forces[5], [Some(50.0), None]);
+        assert_eq!(triple(&found.motions[1]), [0.0, 2.0, 0.0]);
+    }
+}

@@ -1,0 +1,120 @@
+//! Is what comes out a contact that the theory is meant for? Remarks for all kinds of contact; nothing is refused here.
+
+use crate::contact::case::words::{Contact, Motion};
+use crate::contact::normal::region::Patch;
+use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::remark::list::Remark;
+
+/// Beyond this pressure, in MPa, wheel and rail steels yield whatever their hardness (about 3 times a yield stress of 1.6 GPa).
+const PRESSURE_USUAL_MAX: f64 = 5000.0;
+/// A load beyond this, in N, is a mistake of unit: about 60 times that of a heavy wheel.
+const LOAD_USUAL_MAX: f64 = 1e7;
+/// Creepages beyond this are no small part of the rolling speed.
+const CREEPAGE_USUAL_MAX: f64 = 0.2;
+/// Half width over radius from which on half-spaces are a poor likeness of the bodies.
+const HALF_WIDTH_USUAL_MAX: f64 = 0.3;
+/// Approach over the smaller half width from which on strains are too large for linear elasticity.
+const APPROACH_USUAL_MAX: f64 = 0.15;
+
+/// The remarks on patches that are known from the case alone.
+pub(crate) fn of_case(
+    contact: &Contact,
+    patches: &[Patch],
+    motions: &[Motion],
+) -> Vec<RemarkEntry> {
+    let radii = match *contact {
+        Contact::Radii {
+            rolling_mm,
+            lateral_mm,
+        } => Some([rolling_mm, lateral_mm]),
+        _ => None,
+    };
+    let alone = patches.len() == 1;
+    let of_patches = patches.iter().enumerate().flat_map(|(k, patch)| {
+        let size = [1, 3].map(|end| 0.5 * (patch.extent[end] - patch.extent[end - 1]));
+        let large = radii.map(|radii| large(size, radii));
+        let strained = patch.approach.and_then(|depth| strained(depth, size));
+        let all = large.into_iter().flatten().chain(strained);
+        let all: Vec<Remark> = all.chain(pressure(patch.pressure_max)).collect();
+        all.into_iter().map(move |remark| placed(remark, k, alone))
+    });
+    let load = load(patches.iter().map(|patch| patch.normal_force).sum());
+    let length = patches.first().filter(|_| alone).map(|patch| patch.area);
+    let length = length.map(|area| (area / std::f64::consts::PI).sqrt());
+    let of_motions = motions.iter().enumerate().filter_map(|(k, motion)| {
+        let remark = creepage(motion, length)?;
+        Some(RemarkEntry {
+            point: Some(k),
+            ..placed(remark, 0, true)
+        })
+    });
+    let load = load.map(RemarkEntry::from);
+    of_patches.chain(load).chain(of_motions).collect()
+}
+
+/// A remark on a patch; the only one needs no number.
+fn placed(remark: Remark, patch: usize, alone: bool) -> RemarkEntry {
+    if alone {
+        remark.into()
+    } else {
+        remark.at_patch(patch)
+    }
+}
+
+fn large(half_widths: [f64; 2], radii: [f64; 2]) -> Vec<Remark> {
+    let directions = ["rolling", "lateral"].into_iter();
+    let all = directions.zip(half_widths).zip(radii);
+    all.filter(|((_, half), radius)| *half > HALF_WIDTH_USUAL_MAX * radius)
+        .map(
+            |((direction, half_width_mm), radius_mm)| Remark::PatchLarge {
+                direction,
+                half_width_mm,
+                radius_mm,
+            },
+        )
+        .collect()
+}
+
+fn strained(overlap_mm: f64, half_widths: [f64; 2]) -> Option<Remark> {
+    let half_width_mm = half_widths[0].min(half_widths[1]);
+    (overlap_mm > APPROACH_USUAL_MAX * half_width_mm).then_some(Remark::StrainsTooLarge {
+        overlap_mm,
+        half_width_mm,
+    })
+}
+
+/// The remark on a largest pressure in MPa, if it deserves one.
+pub(crate) fn pressure(pressure_max_mpa: f64) -> Option<Remark> {
+    (pressure_max_mpa > PRESSURE_USUAL_MAX).then_some(Remark::PressureImplausible {
+        pressure_max_mpa,
+        usual_max_mpa: PRESSURE_USUAL_MAX,
+    })
+}
+
+/// The remark on the normal force of all patches in N, if it deserves one.
+pub(crate) fn load(normal_force_n: f64) -> Option<Remark> {
+    (normal_force_n > LOAD_USUAL_MAX).then_some(Remark::LoadImplausible {
+        normal_force_n,
+        usual_max_n: LOAD_USUAL_MAX,
+    })
+}
+
+/// The remark on a motion over a patch of this length √(area/π) in mm, if it is known and the motion deserves one.
+pub(crate) fn creepage(motion: &Motion, length: Option<f64>) -> Option<Remark> {
+    let Motion {
+        creepage_x,
+        creepage_y,
+        spin_per_mm,
+    } = *motion;
+    let spin_times_length = length.map(|length| spin_per_mm * length);
+    let sizes = [creepage_x, creepage_y, spin_times_length.unwrap_or(0.0)];
+    let largest = sizes
+        .iter()
+        .fold(0.0_f64, |most, size| most.max(size.abs()));
+    (largest > CREEPAGE_USUAL_MAX).then_some(Remark::CreepageLarge {
+        creepage_x,
+        creepage_y,
+        spin_times_length,
+        usual_max: CREEPAGE_USUAL_MAX,
+    })
+}

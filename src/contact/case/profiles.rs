@@ -1,0 +1,210 @@
+//! From the cross-sections of a case to a wheel in place over its rail, with every fault of both.
+
+use std::sync::Arc;
+
+use crate::contact::case::problem::Problem;
+use crate::contact::case::words::{
+    Contact, CrossSection, Load, Motions, Smoothing, SmoothingWord, Wheelset,
+};
+use crate::contact::error::Fault;
+use crate::contact::geometry::contact_locus::Search;
+use crate::contact::geometry::formats::format as formats;
+use crate::contact::geometry::profile::{Body, Profile, Reading};
+use crate::contact::geometry::wheel_rail::{Placement, WheelRail};
+use crate::contact::geometry::wheelset::WheelsetMotion;
+use crate::contact::normal::region::Region;
+use crate::contact::normal::wheel_height::search::{Loading, ProfileContact};
+use crate::contact::profile_trust::before;
+use crate::contact::profile_trust::quality::PairQuality;
+use crate::contact::profile_trust::trust::Trust;
+use crate::contact::remark::entry::RemarkEntry;
+
+/// The region of a wheel on a rail, yet to be found, with its remarks; `None` without faults where the load or the contact
+/// modulus in MPa is not known.
+///
+/// # Errors
+/// Every fault of the two cross-sections; or that they cannot meet.
+pub(crate) fn region(
+    contact: &Contact,
+    load: Option<&Load>,
+    contact_modulus: Option<f64>,
+) -> Result<Option<(Region, Vec<RemarkEntry>)>, Vec<Fault>> {
+    let geometry = wheel_rail(contact)?;
+    if let Err(detail) = Search::new(&geometry) {
+        return Err(vec![fault("/contact".to_owned(), detail)]);
+    }
+    let mut remarks = geometry.remarks();
+    let [rail, wheel] = geometry.profiles();
+    remarks.extend(before::misplaced(rail, Body::Rail));
+    remarks.extend(before::misplaced(wheel, Body::Wheel));
+    let loading = load.and_then(loading);
+    let (Some(loading), Some(contact_modulus)) = (loading, contact_modulus) else {
+        return Ok(None);
+    };
+    let contact = ProfileContact {
+        geometry,
+        loading,
+        contact_modulus,
+        trust: trust(contact),
+    };
+    Ok(Some((Region::Profiles(Arc::new(contact)), remarks)))
+}
+
+impl Problem {
+    /// How far the points of the profiles can be trusted, as far as that is known without the contact; only of a wheel on a rail.
+    #[must_use]
+    pub fn quality(&self) -> Option<PairQuality> {
+        let Region::Profiles(contact) = &self.region else {
+            return None;
+        };
+        Some(before::quality(&contact.geometry, contact.contact_modulus))
+    }
+}
+
+/// The motion of the wheelset, if the case gives it instead of creepages.
+pub(crate) fn wheelset(motions: &Motions) -> Option<WheelsetMotion> {
+    let Motions::Wheelset { wheelset } = motions else {
+        return None;
+    };
+    let Wheelset {
+        speed_mm_per_s: speed,
+        angular_velocity_rad_per_s,
+        free_rolling_radius_mm,
+        lateral_velocity_mm_per_s,
+        yaw_rate_rad_per_s,
+        roll_rate_rad_per_s,
+    } = *wheelset;
+    let free = free_rolling_radius_mm.map(|radius| speed / radius);
+    Some(WheelsetMotion {
+        speed,
+        angular_velocity: angular_velocity_rad_per_s.or(free).unwrap_or(f64::NAN),
+        lateral_velocity: lateral_velocity_mm_per_s,
+        yaw_rate: yaw_rate_rad_per_s,
+        roll_rate: roll_rate_rad_per_s,
+    })
+}
+
+fn loading(load: &Load) -> Option<Loading> {
+    match (load.vertical_force_n, load.normal_force_n, load.approach_mm) {
+        (Some(force), _, _) => Some(Loading::Vertical(force)),
+        (None, Some(force), _) => Some(Loading::Normal(force)),
+        (None, None, Some(lowering)) => Some(Loading::Lowering(lowering)),
+        (None, None, None) => None,
+    }
+}
+
+fn wheel_rail(contact: &Contact) -> Result<WheelRail, Vec<Fault>> {
+    let Contact::Profiles {
+        rail,
+        wheel,
+        side,
+        rolling_radius_mm,
+        gauge_mm,
+        gauge_height_mm,
+        cant_rad,
+        flange_back_distance_mm,
+        flange_back_position_mm,
+        lateral_shift_mm,
+        yaw_rad,
+        roll_rad,
+        accept_rough_profiles,
+    } = contact
+    else {
+        return Err(vec![fault(
+            "/contact/type".to_owned(),
+            "no profiles".to_owned(),
+        )]);
+    };
+    let rail = profile(Body::Rail, rail).map_err(|fault| vec![fault]);
+    let wheel = profile(Body::Wheel, wheel).map_err(|fault| vec![fault]);
+    let (rail, wheel) = match (rail, wheel) {
+        (Ok(rail), Ok(wheel)) => (rail, wheel),
+        (Err(rail), Err(wheel)) => return Err([rail, wheel].concat()),
+        (Err(faults), Ok(_)) | (Ok(_), Err(faults)) => return Err(faults),
+    };
+    if !accept_rough_profiles {
+        exchanged(&rail, &wheel)?;
+    }
+    let placement = Placement {
+        side: *side,
+        rolling_radius: *rolling_radius_mm,
+        gauge: *gauge_mm,
+        gauge_height: *gauge_height_mm,
+        cant: *cant_rad,
+        flange_back_distance: *flange_back_distance_mm,
+        flange_back_position: *flange_back_position_mm,
+        lateral_shift: *lateral_shift_mm,
+        yaw: *yaw_rad,
+        roll: *roll_rad,
+    };
+    WheelRail::new(rail, wheel, placement)
+        .map_err(|detail| vec![fault("/contact/rolling_radius_mm".to_owned(), detail)])
+}
+
+/// Faults of two profiles that both look like the other body's; one of them alone may be an unusual shape.
+fn exchanged(rail: &Profile, wheel: &Profile) -> Result<(), Vec<Fault>> {
+    let both = before::misplaced(rail, Body::Rail).zip(before::misplaced(wheel, Body::Wheel));
+    let Some((rail, wheel)) = both else {
+        return Ok(());
+    };
+    let refused = |remark: RemarkEntry| {
+        format!(
+            "{}; to solve all the same give accept_rough_profiles: true",
+            remark.detail
+        )
+    };
+    Err(vec![
+        fault("/contact/rail".to_owned(), refused(rail)),
+        fault("/contact/wheel".to_owned(), refused(wheel)),
+    ])
+}
+
+fn trust(contact: &Contact) -> Trust {
+    let Contact::Profiles {
+        rail,
+        wheel,
+        accept_rough_profiles,
+        ..
+    } = contact
+    else {
+        return Trust::default();
+    };
+    let auto = |section: &CrossSection| matches!(section.smoothing_mm, Smoothing::ByNoise(_));
+    Trust {
+        auto: [auto(rail), auto(wheel)],
+        accept_rough: *accept_rough_profiles,
+    }
+}
+
+fn profile(body: Body, section: &CrossSection) -> Result<Profile, Fault> {
+    let name = body.name();
+    let mut reading = Reading {
+        mirror_y: section.mirror_y,
+        mirror_z: section.mirror_z,
+        smoothing: match section.smoothing_mm {
+            Smoothing::Length(length) => length,
+            Smoothing::ByNoise(SmoothingWord::Auto) => 0.0,
+        },
+    };
+    if let (Some(format), Some(text)) = (section.format, &section.text) {
+        let refuse = |detail| fault(format!("/contact/{name}/text"), detail);
+        let contents = formats::read(format, text).map_err(refuse)?;
+        let is_wheel = body == Body::Wheel;
+        if contents.wheel.is_some_and(|wheel| wheel != is_wheel) {
+            let other = if is_wheel { "rail" } else { "wheel" };
+            return Err(refuse(format!(
+                "the file says that it belongs to a {other}; that of a {name} is needed"
+            )));
+        }
+        reading.mirror_y = reading.mirror_y.or(contents.mirror_y);
+        reading.mirror_z = reading.mirror_z.or(contents.mirror_z);
+        return Profile::new(body, &contents.points, reading).map_err(refuse);
+    }
+    let points = section.points_mm.as_deref().unwrap_or_default();
+    Profile::new(body, points, reading)
+        .map_err(|detail| fault(format!("/contact/{name}/points_mm"), detail))
+}
+
+fn fault(pointer: String, detail: String) -> Fault {
+    Fault { pointer, detail }
+}

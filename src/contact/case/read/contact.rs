@@ -1,0 +1,190 @@
+//! Reads `contact` and `load`: where the bodies touch and how hard they are pressed together.
+
+use serde_json::Value;
+
+use crate::contact::case::read::object::{Interval, Object, shown};
+use crate::contact::case::read::profiles;
+use crate::contact::case::read::samples::{Quantity, axis, line, samples};
+use crate::contact::case::words::{Contact, Load};
+
+const RADIUS: Interval = Interval::positive(1e9, "mm");
+const SEMI_AXIS: Interval = Interval::positive(1e6, "mm");
+const FORCE: Interval = Interval::positive(1e12, "N");
+const APPROACH: Interval = Interval::positive(1e6, "mm");
+const APPROACH_OF_GAP: Interval = Interval::closed(-1e6, 1e6, "mm");
+/// Members of a load; the first is for profiles only.
+const LOADS: [&str; 3] = ["vertical_force_n", "normal_force_n", "approach_mm"];
+const PRESSURE: Quantity = Quantity {
+    member: "pressure_mpa",
+    word: "pressure",
+    allowed: Interval::closed(0.0, 1e12, "MPa"),
+};
+const GAP: Quantity = Quantity {
+    member: "gap_mm",
+    word: "gap",
+    allowed: Interval::closed(-1e6, 1e6, "mm"),
+};
+
+#[derive(Clone, Copy)]
+enum Kind {
+    Radii,
+    Ellipse,
+    GapProfile,
+    GapGrid,
+    PressureGrid,
+    Profiles,
+}
+
+const KINDS: [(&str, Kind); 6] = [
+    ("radii", Kind::Radii),
+    ("ellipse", Kind::Ellipse),
+    ("gap_profile", Kind::GapProfile),
+    ("gap_grid", Kind::GapGrid),
+    ("pressure_grid", Kind::PressureGrid),
+    ("profiles", Kind::Profiles),
+];
+
+/// Reads the required member `contact` of a case.
+pub(crate) fn read(case: &mut Object) -> Option<Contact> {
+    let mut block = case.child("contact")?;
+    let words = KINDS.map(|(word, _)| word).join(", ");
+    block.required("type", &format!("one of {words}"))?;
+    match block.word("type", &KINDS, &[])? {
+        Kind::Radii => {
+            block.only(&["type", "rolling_mm", "lateral_mm"], &[]);
+            let rolling_mm = block.required_number("rolling_mm", RADIUS);
+            let lateral_mm = block.required_number("lateral_mm", RADIUS);
+            Some(Contact::Radii {
+                rolling_mm: rolling_mm?,
+                lateral_mm: lateral_mm?,
+            })
+        }
+        Kind::Ellipse => {
+            block.only(&["type", "a_mm", "b_mm"], &[]);
+            let a_mm = block.required_number("a_mm", SEMI_AXIS);
+            let b_mm = block.required_number("b_mm", SEMI_AXIS);
+            Some(Contact::Ellipse {
+                a_mm: a_mm?,
+                b_mm: b_mm?,
+            })
+        }
+        Kind::GapProfile => {
+            block.only(&["type", "rolling_mm", "y_mm", "gap_mm"], &[]);
+            let rolling_mm = block.required_number("rolling_mm", RADIUS);
+            let y_mm = axis(&mut block, "y_mm");
+            let points = given(&block, "y_mm");
+            let gap_mm = line(&mut block, GAP, points);
+            Some(Contact::GapProfile {
+                rolling_mm: rolling_mm?,
+                y_mm: y_mm?,
+                gap_mm: gap_mm?,
+            })
+        }
+        Kind::GapGrid => {
+            block.only(&["type", "x_mm", "y_mm", "gap_mm"], &[]);
+            let (x_mm, y_mm, gap_mm) = grid(&mut block, GAP);
+            Some(Contact::GapGrid {
+                x_mm: x_mm?,
+                y_mm: y_mm?,
+                gap_mm: gap_mm?,
+            })
+        }
+        Kind::PressureGrid => {
+            block.only(&["type", "x_mm", "y_mm", "pressure_mpa"], &[]);
+            let (x_mm, y_mm, pressure_mpa) = grid(&mut block, PRESSURE);
+            Some(Contact::PressureGrid {
+                x_mm: x_mm?,
+                y_mm: y_mm?,
+                pressure_mpa: pressure_mpa?,
+            })
+        }
+        Kind::Profiles => profiles::read(&mut block),
+    }
+}
+
+/// Reads the member `load` of a case, which is needed or refused according to the type of the contact.
+///
+/// Where the type itself is faulty, only what is written is checked.
+pub(crate) fn read_load(case: &mut Object) -> Option<Load> {
+    let kind = case
+        .value("contact")
+        .and_then(|contact| contact.get("type"))
+        .and_then(Value::as_str);
+    if kind == Some("pressure_grid") {
+        if case.has("load") {
+            case.fault(
+                "load",
+                "given together with a pressure_grid, which carries its own load; leave it out",
+            );
+        }
+        return None;
+    }
+    let of_gap = matches!(kind, Some("gap_profile" | "gap_grid"));
+    let of_profiles = kind == Some("profiles");
+    if !case.has("load") && !of_gap && !of_profiles && !matches!(kind, Some("radii" | "ellipse")) {
+        return None;
+    }
+    let mut block = case.child("load")?;
+    let names = if of_profiles { &LOADS[..] } else { &LOADS[1..] };
+    block.only(names, &LOADS[..1]);
+    if !of_profiles && let Some(value) = block.value(LOADS[0]) {
+        let value = shown(value);
+        block.fault(
+            LOADS[0],
+            format!("{value} given; a vertical force belongs to the contact type profiles, give a normal_force_n"),
+        );
+        return None;
+    }
+    let vertical_force_n = block.number("vertical_force_n", FORCE);
+    let normal_force_n = block.number("normal_force_n", FORCE);
+    let approach_mm = block.number(
+        "approach_mm",
+        if of_gap { APPROACH_OF_GAP } else { APPROACH },
+    );
+    let given: Vec<&str> = names
+        .iter()
+        .copied()
+        .filter(|name| block.has(name))
+        .collect();
+    match given.as_slice() {
+        [] => {
+            block.fault_here(format!(
+                "empty; exactly one of {} is needed",
+                names.join(", ")
+            ));
+            return None;
+        }
+        [_] => {}
+        [first, second, ..] => {
+            block.fault(
+                second,
+                format!(
+                    "given together with {first}; exactly one of {} is allowed",
+                    names.join(", ")
+                ),
+            );
+            return None;
+        }
+    }
+    vertical_force_n.or(normal_force_n).or(approach_mm)?;
+    Some(Load {
+        normal_force_n,
+        vertical_force_n,
+        approach_mm,
+    })
+}
+
+type Grid = (Option<Vec<f64>>, Option<Vec<f64>>, Option<Vec<Vec<f64>>>);
+
+/// Both axes of a grid and its samples.
+fn grid(block: &mut Object, quantity: Quantity) -> Grid {
+    let x_mm = axis(block, "x_mm");
+    let y_mm = axis(block, "y_mm");
+    let (nx, ny) = (given(block, "x_mm"), given(block, "y_mm"));
+    (x_mm, y_mm, samples(block, quantity, nx, ny))
+}
+
+/// Number of elements of an array, sound or not.
+fn given(block: &Object, name: &str) -> Option<usize> {
+    block.value(name).and_then(Value::as_array).map(Vec::len)
+}

@@ -1,0 +1,196 @@
+//! Reads a case from JSON and says everything that is wrong with it, at once.
+//!
+//! A member that is absent, of the wrong type, out of range, unknown or contradictory gets a fault with its JSON
+//! pointer (RFC 6901), the value received and what is allowed. Nothing is repaired.
+
+use crate::contact::case::words::read::contact;
+use crate::contact::case::words::read::material;
+use crate::contact::case::words::read::motion;
+use crate::contact::case::words::read::solver;
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+
+use crate::contact::case::words::problem;
+use crate::contact::case::words::problem::{Given, Limits};
+use crate::contact::case::words::read::object::{Faults, Interval, Object, has_controls, join, shown};
+use crate::contact::case::words::words::{Case, Contact, Friction, Load, Material, Motions, Output, Solver};
+use crate::contact::error::{CaseError, Fault};
+
+const NAME_LENGTH_MAX: usize = 200;
+const LABELS_MAX: usize = 32;
+const LABEL_KEY_LENGTH_MAX: usize = 64;
+const LABEL_VALUE_LENGTH_MAX: usize = 256;
+const FRICTION: Interval = Interval::closed(0.0, 100.0, "");
+/// Less friction than this is none, and dimensionless motions would not be numbers.
+const FRICTION_LEAST: f64 = 1e-12;
+
+/// What could be read of a case: the parts without a fault.
+///
+/// `None` in a required part means that it is faulty or absent; the fault is in the list that came with the draft.
+#[derive(Debug, Default)]
+pub(crate) struct Draft {
+    name: Option<String>,
+    labels: BTreeMap<String, String>,
+    material: Option<Material>,
+    friction: Option<Friction>,
+    contact: Option<Contact>,
+    load: Option<Load>,
+    motion: Option<Motions>,
+    solver: Option<Solver>,
+    outputs: Option<Vec<Output>>,
+}
+
+impl Case {
+    /// Reads a case from JSON.
+    ///
+    /// Left-out `solver` and `outputs` get their defaults; `outputs` are sorted and named once.
+    ///
+    /// # Errors
+    /// Every fault of the text, at most the first hundred one by one.
+    pub fn read(value: &Value) -> Result<Case, CaseError> {
+        let (draft, faults) = draft(value);
+        draft
+            .complete()
+            .filter(|_| faults.is_empty())
+            .ok_or(CaseError(faults))
+    }
+}
+
+/// Reads what can be read, and lists the faults of the rest.
+pub(crate) fn draft(value: &Value) -> (Draft, Vec<Fault>) {
+    let mut faults = Faults::default();
+    let draft = Object::open(value, String::new(), &mut faults)
+        .map(|mut case| read(&mut case))
+        .unwrap_or_default();
+    (draft, faults.into_list())
+}
+
+impl Draft {
+    /// Faults against physics and limits of the parts that could be read.
+    pub(crate) fn faults_beside(&self, limits: &Limits) -> Vec<Fault> {
+        let given = Given {
+            material: self.material.as_ref(),
+            friction: self.friction.as_ref().map(|f| f.coefficient),
+            contact: self.contact.as_ref(),
+            load: self.load.as_ref(),
+            motion: self.motion.as_ref(),
+            solver: self.solver.as_ref(),
+            outputs: self.outputs.as_deref().unwrap_or_default(),
+        };
+        problem::faults_of(given, limits)
+    }
+
+    /// The case, if every required part could be read.
+    pub(crate) fn complete(self) -> Option<Case> {
+        Some(Case {
+            name: self.name,
+            labels: self.labels,
+            material: self.material?,
+            friction: self.friction?,
+            contact: self.contact?,
+            load: self.load,
+            motion: self.motion?,
+            solver: self.solver?,
+            outputs: self.outputs?,
+        })
+    }
+}
+
+fn read(case: &mut Object) -> Draft {
+    case.only(
+        &[
+            "name", "labels", "material", "friction", "contact", "load", "motion", "solver",
+            "outputs",
+        ],
+        &[],
+    );
+    let name = case.line("name", NAME_LENGTH_MAX);
+    let labels = labels(case);
+    let material = material::read(case);
+    let friction = friction(case);
+    let contact = contact::read(case);
+    let load = contact::read_load(case);
+    let motion = motion::read(case);
+    let solver = solver::read(case);
+    let outputs = solver::read_outputs(case);
+    Draft {
+        name,
+        labels,
+        material,
+        friction,
+        contact,
+        load,
+        motion,
+        solver,
+        outputs,
+    }
+}
+
+fn friction(case: &mut Object) -> Option<Friction> {
+    let mut block = case.child("friction")?;
+    block.only(&["coefficient"], &[]);
+    let coefficient = block.required_number("coefficient", FRICTION)?;
+    if coefficient > 0.0 && coefficient < FRICTION_LEAST {
+        let detail = format!("{coefficient:e} given; 0 or at least {FRICTION_LEAST:e} is needed");
+        block.fault("coefficient", detail);
+        return None;
+    }
+    Some(Friction { coefficient })
+}
+
+fn labels(case: &mut Object) -> BTreeMap<String, String> {
+    let mut labels = BTreeMap::new();
+    let Some(value) = case.value("labels") else {
+        return labels;
+    };
+    let pointer = case.pointer_to("labels");
+    let Value::Object(members) = value else {
+        case.fault(
+            "labels",
+            format!("{} given; an object of texts is needed", shown(value)),
+        );
+        return labels;
+    };
+    if members.len() > LABELS_MAX {
+        case.fault(
+            "labels",
+            format!(
+                "{} labels given; at most {LABELS_MAX} are allowed",
+                members.len()
+            ),
+        );
+        return labels;
+    }
+    for (key, value) in members {
+        let length = key.chars().count();
+        if length == 0 || length > LABEL_KEY_LENGTH_MAX {
+            case.faults().add(
+                join(&pointer, key),
+                format!(
+                    "a key of {length} characters given; 1 to {LABEL_KEY_LENGTH_MAX} are allowed"
+                ),
+            );
+        } else if has_controls(key) || key.contains(':') {
+            case.faults().add(
+                join(&pointer, key),
+                format!("the key {key:?} given; a key has neither colons nor control characters"),
+            );
+        }
+        match value.as_str() {
+            Some(text)
+                if text.chars().count() <= LABEL_VALUE_LENGTH_MAX && !has_controls(text) =>
+            {
+                labels.insert(key.clone(), text.to_owned());
+            }
+            _ => case.faults().add(
+                join(&pointer, key),
+                format!(
+                    "{} given; a text of at most {LABEL_VALUE_LENGTH_MAX} characters without control characters is needed",
+                    shown(value)
+                ),
+            ),
+        }
+    }
+    labels
+}

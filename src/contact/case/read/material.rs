@@ -1,0 +1,58 @@
+//! Reads `material`: one set of elastic constants, or one for each body.
+
+use crate::contact::case::read::object::{Interval, Object};
+use crate::contact::case::words::{Elastic, Material};
+
+const MODULUS: Interval = Interval::positive(1e12, "MPa");
+const POISSON_RATIO: Interval = Interval::closed(0.0, 0.5, "");
+
+/// Reads the required member `material` of a case.
+pub(crate) fn read(case: &mut Object) -> Option<Material> {
+    let mut block = case.child("material")?;
+    if !block.has("lower") && !block.has("upper") {
+        return elastic(&mut block).map(Material::Same);
+    }
+    block.only(&["lower", "upper"], &[]);
+    let lower = block.child("lower").and_then(|mut body| elastic(&mut body));
+    let upper = block.child("upper").and_then(|mut body| elastic(&mut body));
+    Some(Material::Pair {
+        lower: lower?,
+        upper: upper?,
+    })
+}
+
+fn elastic(block: &mut Object) -> Option<Elastic> {
+    block.only(
+        &["shear_modulus_mpa", "young_modulus_mpa", "poisson_ratio"],
+        &[],
+    );
+    let shear_modulus_mpa = block.number("shear_modulus_mpa", MODULUS);
+    let young_modulus_mpa = block.number("young_modulus_mpa", MODULUS);
+    let poisson_ratio = block.required_number("poisson_ratio", POISSON_RATIO);
+    match (
+        block.has("shear_modulus_mpa"),
+        block.has("young_modulus_mpa"),
+    ) {
+        (false, false) => {
+            block.fault(
+                "shear_modulus_mpa",
+                format!("missing; {MODULUS} is needed here or as young_modulus_mpa"),
+            );
+            return None;
+        }
+        (true, true) => {
+            block.fault(
+                "young_modulus_mpa",
+                "given together with shear_modulus_mpa; exactly one of the two is allowed",
+            );
+            return None;
+        }
+        _ => {}
+    }
+    shear_modulus_mpa.or(young_modulus_mpa)?;
+    Some(Elastic {
+        shear_modulus_mpa,
+        young_modulus_mpa,
+        poisson_ratio: poisson_ratio?,
+    })
+}

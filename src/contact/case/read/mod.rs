@@ -1,0 +1,10 @@
+//! From JSON text to a case, with every fault of the text.
+
+pub mod contact;
+pub mod draft;
+pub mod material;
+pub mod motion;
+pub mod object;
+pub mod profiles;
+pub mod samples;
+pub mod solver;

@@ -1,0 +1,254 @@
+//! Reads `motion`: one motion, a list of motions, or a sweep.
+
+use serde_json::Value;
+
+use crate::contact::case::read::object::{Faults, Interval, Object, join, shown};
+use crate::contact::case::words::{AskedMotion, Combine, Motions, Range, Sweep, Wheelset};
+
+const CREEPAGE: Interval = Interval::closed(-1e6, 1e6, "");
+const SPIN: Interval = Interval::closed(-1e6, 1e6, "1/mm");
+const SPEED: Interval = Interval::positive(1e9, "mm/s");
+const VELOCITY: Interval = Interval::closed(-1e9, 1e9, "mm/s");
+const RATE: Interval = Interval::closed(-1e6, 1e6, "rad/s");
+const RADIUS: Interval = Interval::positive(1e9, "mm");
+const POINTS_MAX: u32 = 1_000_000;
+const FORCE: Interval = Interval::closed(-1e15, 1e15, "N");
+/// The forces stand in the order of the creepages they replace.
+const COMPONENTS: [&str; 5] = [
+    "creepage_x",
+    "creepage_y",
+    "spin_per_mm",
+    "force_x_n",
+    "force_y_n",
+];
+const SPIN_AT: usize = 2;
+const FORCES_FROM: usize = 3;
+
+/// Reads the required member `motion` of a case.
+pub(crate) fn read(case: &mut Object) -> Option<Motions> {
+    let what = "an object with at least one of creepage_x, creepage_y, spin_per_mm, force_x_n, force_y_n, an array of such objects, or {\"sweep\": …}";
+    let value = case.required("motion", what)?;
+    let kind = case
+        .value("contact")
+        .and_then(|contact| contact.get("type"));
+    let of_profiles = kind.and_then(Value::as_str) == Some("profiles");
+    let pointer = case.pointer_to("motion");
+    let faults = case.faults();
+    match value {
+        Value::Object(members) if members.contains_key("sweep") => {
+            let mut block = Object::open(value, pointer, faults)?;
+            block.only(&["sweep"], &[]);
+            let sweep = sweep(&mut block.child("sweep")?)?;
+            Some(Motions::Sweep { sweep })
+        }
+        Value::Object(members) if members.contains_key("wheelset") => {
+            let mut block = Object::open(value, pointer, faults)?;
+            block.only(&["wheelset"], &[]);
+            if !of_profiles {
+                block.fault(
+                    "wheelset",
+                    "given without profiles; the motion of a wheelset belongs to the contact type profiles, give creepages",
+                );
+                return None;
+            }
+            let wheelset = wheelset(&mut block.child("wheelset")?)?;
+            Some(Motions::Wheelset { wheelset })
+        }
+        Value::Object(_) => motion(value, pointer, faults).map(Motions::One),
+        Value::Array(elements) if !elements.is_empty() => {
+            let motions: Vec<Option<AskedMotion>> = elements
+                .iter()
+                .enumerate()
+                .map(|(k, element)| motion(element, join(&pointer, k), faults))
+                .collect();
+            motions
+                .into_iter()
+                .collect::<Option<_>>()
+                .map(Motions::Many)
+        }
+        _ => {
+            faults.add(pointer, format!("{} given; {what} is needed", shown(value)));
+            None
+        }
+    }
+}
+
+fn motion(value: &Value, pointer: String, faults: &mut Faults) -> Option<AskedMotion> {
+    let mut block = Object::open(value, pointer, faults)?;
+    let mut read = [None; COMPONENTS.len()];
+    components(&mut block, &[], |block, k, name| {
+        read[k] = Some(block.number(name, interval(k)));
+    })?;
+    // A faulty number has left its fault behind and ends the reading here.
+    if read.contains(&Some(None)) {
+        return None;
+    }
+    let [x, y, spin, force_x_n, force_y_n] = read.map(Option::flatten);
+    let left_out = |force: Option<f64>| force.is_none().then_some(0.0);
+    Some(AskedMotion {
+        creepage_x: x.or(left_out(force_x_n)),
+        creepage_y: y.or(left_out(force_y_n)),
+        spin_per_mm: spin.unwrap_or(0.0),
+        force_x_n,
+        force_y_n,
+    })
+}
+
+fn wheelset(block: &mut Object) -> Option<Wheelset> {
+    const SPINS: [&str; 2] = ["angular_velocity_rad_per_s", "free_rolling_radius_mm"];
+    const RATES: [(&str, Interval); 3] = [
+        ("lateral_velocity_mm_per_s", VELOCITY),
+        ("yaw_rate_rad_per_s", RATE),
+        ("roll_rate_rad_per_s", RATE),
+    ];
+    let names = ["speed_mm_per_s"].into_iter().chain(SPINS);
+    let names: Vec<&str> = names.chain(RATES.map(|(name, _)| name)).collect();
+    block.only(&names, &[]);
+    let speed_mm_per_s = block.required_number("speed_mm_per_s", SPEED);
+    let angular_velocity_rad_per_s = block.number(SPINS[0], RATE);
+    let free_rolling_radius_mm = block.number(SPINS[1], RADIUS);
+    let rates = RATES.map(|(name, allowed)| {
+        if block.has(name) {
+            block.number(name, allowed)
+        } else {
+            Some(0.0)
+        }
+    });
+    match SPINS.map(|name| block.has(name)) {
+        [true, true] => {
+            block.fault(
+                SPINS[1],
+                format!(
+                    "given together with {}; exactly one of the two is allowed",
+                    SPINS[0]
+                ),
+            );
+            return None;
+        }
+        [false, false] => {
+            block.fault(
+                SPINS[0],
+                format!("missing; {RATE} is needed here, or a {}", SPINS[1]),
+            );
+            return None;
+        }
+        _ => {}
+    }
+    angular_velocity_rad_per_s.or(free_rolling_radius_mm)?;
+    let [lateral, yaw, roll] = rates;
+    Some(Wheelset {
+        speed_mm_per_s: speed_mm_per_s?,
+        angular_velocity_rad_per_s,
+        free_rolling_radius_mm,
+        lateral_velocity_mm_per_s: lateral?,
+        yaw_rate_rad_per_s: yaw?,
+        roll_rate_rad_per_s: roll?,
+    })
+}
+
+fn sweep(block: &mut Object) -> Option<Sweep> {
+    let mut read = [None; COMPONENTS.len()];
+    components(block, &["combine"], |block, k, name| {
+        read[k] = Some(range(block, k, name));
+    })?;
+    let combine = block.word(
+        "combine",
+        &[("together", Combine::Together), ("grid", Combine::Grid)],
+        &[],
+    );
+    if block.has("combine") {
+        combine?;
+    }
+    // A faulty range has left its fault behind and ends the reading here.
+    let mut ranges = [None; COMPONENTS.len()];
+    for (range, read) in ranges.iter_mut().zip(read) {
+        *range = match read {
+            Some(None) => return None,
+            Some(range) => range,
+            None => None,
+        };
+    }
+    let [creepage_x, creepage_y, spin_per_mm, force_x_n, force_y_n] = ranges;
+    let combine = combine.unwrap_or_default();
+    if combine == Combine::Together {
+        let points: Vec<u32> = ranges
+            .iter()
+            .flatten()
+            .map(|range: &Range| range.points)
+            .collect();
+        if points.iter().any(|n| *n != points[0]) {
+            block.fault_here(format!(
+                "ranges with {} points given; ranges that run together need equally many (or use \"combine\": \"grid\")",
+                points.iter().map(u32::to_string).collect::<Vec<_>>().join(", ")
+            ));
+            return None;
+        }
+    }
+    Some(Sweep {
+        creepage_x,
+        creepage_y,
+        spin_per_mm,
+        force_x_n,
+        force_y_n,
+        combine,
+    })
+}
+
+/// Visits the components that are written and refuses everything else; `None` if no motion is described.
+fn components(
+    block: &mut Object,
+    beside: &[&str],
+    mut visit: impl FnMut(&mut Object, usize, &'static str),
+) -> Option<()> {
+    let allowed: Vec<&str> = COMPONENTS.iter().chain(beside).copied().collect();
+    block.only(&allowed, &[]);
+    let (creepages, forces) = (&COMPONENTS[..SPIN_AT], &COMPONENTS[FORCES_FROM..]);
+    let mut both = false;
+    for (creepage, force) in creepages.iter().zip(forces) {
+        if block.has(creepage) && block.has(force) {
+            block.fault(
+                force,
+                format!("given together with {creepage}; exactly one of the two is allowed"),
+            );
+            both = true;
+        }
+    }
+    for (k, name) in COMPONENTS.into_iter().enumerate() {
+        if block.has(name) {
+            visit(block, k, name);
+        }
+    }
+    if !COMPONENTS.iter().any(|name| block.has(name)) {
+        block.fault_here(format!(
+            "no motion given; at least one of {} is needed (write out zeros)",
+            COMPONENTS.join(", ")
+        ));
+        return None;
+    }
+    (!both).then_some(())
+}
+
+fn range(block: &mut Object, k: usize, name: &str) -> Option<Range> {
+    let mut block = block.child(name)?;
+    block.only(&["from", "to", "points"], &[]);
+    let from = block.required_number("from", interval(k));
+    let to = block.required_number("to", interval(k));
+    let points = block.required_count("points", 1, POINTS_MAX);
+    let (from, to, points) = (from?, to?, points?);
+    if points == 1 && from.to_bits() != to.to_bits() {
+        block.fault(
+            "points",
+            format!("1 given for a range from {from} to {to}; at least 2 points are needed unless from equals to"),
+        );
+        return None;
+    }
+    Some(Range { from, to, points })
+}
+
+fn interval(component: usize) -> Interval {
+    match component {
+        SPIN_AT => SPIN,
+        FORCES_FROM.. => FORCE,
+        _ => CREEPAGE,
+    }
+}

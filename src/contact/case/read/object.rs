@@ -1,0 +1,431 @@
+//! A JSON object under examination: typed members, ranges, and a list of everything that is wrong.
+
+use std::fmt;
+
+use serde_json::{Map, Value};
+
+use crate::contact::error::Fault;
+
+/// Faults listed one by one before the rest is only counted.
+const FAULTS_MAX: usize = 100;
+/// Characters of a received value that a fault repeats.
+const SHOWN_MAX: usize = 60;
+
+/// The faults found so far, in the order of the examination.
+#[derive(Debug, Default)]
+pub(crate) struct Faults {
+    listed: Vec<Fault>,
+    unlisted: usize,
+}
+
+impl Faults {
+    /// Notes one fault; beyond the first hundred only their number is kept.
+    pub(crate) fn add(&mut self, pointer: impl Into<String>, detail: impl Into<String>) {
+        if self.listed.len() < FAULTS_MAX {
+            self.listed.push(Fault {
+                pointer: pointer.into(),
+                detail: detail.into(),
+            });
+        } else {
+            self.unlisted += 1;
+        }
+    }
+
+    /// The list, with a last entry that counts what did not fit.
+    pub(crate) fn into_list(self) -> Vec<Fault> {
+        let mut listed = self.listed;
+        if self.unlisted > 0 {
+            listed.push(Fault {
+                pointer: String::new(),
+                detail: format!("{} more faults are not listed", self.unlisted),
+            });
+        }
+        listed
+    }
+}
+
+/// The numbers a member may have.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Interval {
+    low: f64,
+    low_excluded: bool,
+    high: f64,
+    unit: &'static str,
+}
+
+impl Interval {
+    /// `low <= value <= high`.
+    pub(crate) const fn closed(low: f64, high: f64, unit: &'static str) -> Self {
+        Interval {
+            low,
+            low_excluded: false,
+            high,
+            unit,
+        }
+    }
+
+    /// `0 < value <= high`.
+    pub(crate) const fn positive(high: f64, unit: &'static str) -> Self {
+        Interval {
+            low: 0.0,
+            low_excluded: true,
+            high,
+            unit,
+        }
+    }
+
+    /// Is the number allowed?
+    pub(crate) fn contains(&self, number: f64) -> bool {
+        let above = if self.low_excluded {
+            number > self.low
+        } else {
+            number >= self.low
+        };
+        above && number <= self.high
+    }
+}
+
+impl fmt::Display for Interval {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (low, high) = (plain(self.low), plain(self.high));
+        if self.low_excluded {
+            write!(f, "a number more than {low} and at most {high}")?;
+        } else {
+            write!(f, "a number from {low} to {high}")?;
+        }
+        if self.unit.is_empty() {
+            Ok(())
+        } else {
+            write!(f, " {}", self.unit)
+        }
+    }
+}
+
+/// An object, where it stands in the case, and the list its faults go to.
+///
+/// A reading method returns `None` both for an absent and for a faulty member; the latter leaves a fault behind, so
+/// that the case as a whole is refused.
+pub(crate) struct Object<'v, 'f> {
+    members: &'v Map<String, Value>,
+    pointer: String,
+    faults: &'f mut Faults,
+}
+
+impl<'v, 'f> Object<'v, 'f> {
+    /// Opens a value that has to be an object.
+    pub(crate) fn open(value: &'v Value, pointer: String, faults: &'f mut Faults) -> Option<Self> {
+        if let Value::Object(members) = value {
+            Some(Object {
+                members,
+                pointer,
+                faults,
+            })
+        } else {
+            faults.add(
+                pointer,
+                format!("{} given; an object is needed", shown(value)),
+            );
+            None
+        }
+    }
+
+    /// Is the member written at all?
+    pub(crate) fn has(&self, name: &str) -> bool {
+        self.members.contains_key(name)
+    }
+
+    /// The member as it is, if it is written.
+    pub(crate) fn value(&self, name: &str) -> Option<&'v Value> {
+        self.members.get(name)
+    }
+
+    /// JSON pointer of a member.
+    pub(crate) fn pointer_to(&self, name: &str) -> String {
+        join(&self.pointer, name)
+    }
+
+    /// The list of faults.
+    pub(crate) fn faults(&mut self) -> &mut Faults {
+        self.faults
+    }
+
+    /// Notes a fault of a member.
+    pub(crate) fn fault(&mut self, name: &str, detail: impl Into<String>) {
+        let pointer = self.pointer_to(name);
+        self.faults.add(pointer, detail);
+    }
+
+    /// Notes a fault of the object as a whole.
+    pub(crate) fn fault_here(&mut self, detail: impl Into<String>) {
+        self.faults.add(self.pointer.clone(), detail);
+    }
+
+    /// Refuses every member that is not in `allowed`; members in `reserved` are left to the caller.
+    pub(crate) fn only(&mut self, allowed: &[&str], reserved: &[&str]) {
+        let members = self.members;
+        for (name, value) in members {
+            if !allowed.contains(&name.as_str()) && !reserved.contains(&name.as_str()) {
+                self.fault(
+                    name,
+                    format!(
+                        "unknown member with the value {}; allowed here: {}",
+                        shown(value),
+                        allowed.join(", ")
+                    ),
+                );
+            }
+        }
+    }
+
+    /// The member, or a fault that says what is missing.
+    pub(crate) fn required(&mut self, name: &str, what: &str) -> Option<&'v Value> {
+        let value = self.members.get(name);
+        if value.is_none() {
+            self.fault(name, format!("missing; {what} is needed"));
+        }
+        value
+    }
+
+    /// A number that may be left out.
+    pub(crate) fn number(&mut self, name: &str, allowed: Interval) -> Option<f64> {
+        let value = self.members.get(name)?;
+        let pointer = self.pointer_to(name);
+        number(value, &pointer, allowed, self.faults)
+    }
+
+    /// A number that has to be there.
+    pub(crate) fn required_number(&mut self, name: &str, allowed: Interval) -> Option<f64> {
+        self.required(name, &allowed.to_string())?;
+        self.number(name, allowed)
+    }
+
+    /// A whole number that has to be there; `3.0` counts as whole.
+    pub(crate) fn required_count(&mut self, name: &str, low: u32, high: u32) -> Option<u32> {
+        let what = format!("a whole number from {low} to {high}");
+        let value = self.required(name, &what)?;
+        let number = value.as_f64().filter(|n| n.fract() == 0.0);
+        match number {
+            Some(n) if f64::from(low) <= n && n <= f64::from(high) => Some(n as u32),
+            _ => {
+                self.fault(name, format!("{} given; {what} is needed", shown(value)));
+                None
+            }
+        }
+    }
+
+    /// A text of at most `length_max` characters that may be left out.
+    pub(crate) fn text(&mut self, name: &str, length_max: usize) -> Option<String> {
+        let value = self.members.get(name)?;
+        match value.as_str() {
+            Some(text) if text.chars().count() <= length_max => Some(text.to_owned()),
+            _ => {
+                self.fault(
+                    name,
+                    format!(
+                        "{} given; a text of at most {length_max} characters is needed",
+                        shown(value)
+                    ),
+                );
+                None
+            }
+        }
+    }
+
+    /// The same without line breaks and other control characters.
+    pub(crate) fn line(&mut self, name: &str, length_max: usize) -> Option<String> {
+        let text = self.text(name, length_max)?;
+        if !has_controls(&text) {
+            return Some(text);
+        }
+        self.fault(
+            name,
+            format!("{text:?} given; control characters are not allowed"),
+        );
+        None
+    }
+
+    /// A word out of a table that may be left out; `later` lists words that the contract knows but this version
+    /// does not offer.
+    pub(crate) fn word<T: Copy>(
+        &mut self,
+        name: &str,
+        table: &[(&str, T)],
+        later: &[&str],
+    ) -> Option<T> {
+        let value = self.members.get(name)?;
+        let pointer = self.pointer_to(name);
+        word(value, &pointer, table, later, self.faults)
+    }
+
+    /// A member that has to be an object, opened.
+    pub(crate) fn child(&mut self, name: &str) -> Option<Object<'v, '_>> {
+        let value = self.required(name, "an object")?;
+        let pointer = self.pointer_to(name);
+        Object::open(value, pointer, self.faults)
+    }
+}
+
+/// A number within an interval; negative zero becomes zero, so that equal cases have equal digests.
+pub(crate) fn number(
+    value: &Value,
+    pointer: &str,
+    allowed: Interval,
+    faults: &mut Faults,
+) -> Option<f64> {
+    match value.as_f64() {
+        Some(number) if allowed.contains(number) => Some(number + 0.0),
+        _ => {
+            faults.add(
+                pointer,
+                format!("{} given; {allowed} is needed", shown(value)),
+            );
+            None
+        }
+    }
+}
+
+/// A word out of a table, see [`Object::word`].
+pub(crate) fn word<T: Copy>(
+    value: &Value,
+    pointer: &str,
+    table: &[(&str, T)],
+    later: &[&str],
+    faults: &mut Faults,
+) -> Option<T> {
+    let offered = || {
+        table
+            .iter()
+            .map(|(word, _)| *word)
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    let text = value.as_str();
+    if let Some((_, meaning)) = table.iter().find(|(word, _)| Some(*word) == text) {
+        return Some(*meaning);
+    }
+    if text.is_some_and(|text| later.contains(&text)) {
+        faults.add(
+            pointer,
+            format!(
+                "{} is not offered by this version; offered: {}",
+                shown(value),
+                offered()
+            ),
+        );
+    } else {
+        faults.add(
+            pointer,
+            format!("{} given; allowed: {}", shown(value), offered()),
+        );
+    }
+    None
+}
+
+/// Appends a reference token to a JSON pointer, escaped as RFC 6901, section 3, asks.
+pub(crate) fn join(pointer: &str, token: impl fmt::Display) -> String {
+    let token = token.to_string().replace('~', "~0").replace('/', "~1");
+    format!("{pointer}/{token}")
+}
+
+/// A received value, short enough for a sentence.
+pub(crate) fn shown(value: &Value) -> String {
+    match value {
+        Value::Array(elements) if elements.is_empty() => "an empty array".to_owned(),
+        Value::Array(elements) => format!("an array of length {}", elements.len()),
+        Value::Object(members) if members.is_empty() => "an empty object".to_owned(),
+        Value::Object(members) => {
+            let names: Vec<&str> = members.keys().map(String::as_str).collect();
+            format!("an object with {}", cut(&names.join(", ")))
+        }
+        Value::String(text) => Value::String(cut(text)).to_string(),
+        scalar => scalar.to_string(),
+    }
+}
+
+fn cut(text: &str) -> String {
+    let mut short: String = text.chars().take(SHOWN_MAX).collect();
+    if short.len() < text.len() {
+        short.push('…');
+    }
+    short
+}
+
+/// A limit as people write it: `1e9` rather than `1000000000`.
+fn plain(number: f64) -> String {
+    if number.abs() >= 1e5 {
+        format!("{number:e}")
+    } else {
+        format!("{number}")
+    }
+}
+
+/// Line breaks, tabs and the like: they tear tables and lines of logs apart.
+pub(crate) fn has_controls(text: &str) -> bool {
+    text.chars().any(char::is_control)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn pointers_escape_slashes_and_tildes() {
+        assert_eq!(join("/labels", "a/b~c"), "/labels/a~1b~0c");
+        assert_eq!(
+            json!({"labels": {"a/b~c": 1}}).pointer("/labels/a~1b~0c"),
+            Some(&json!(1))
+        );
+    }
+
+    #[test]
+    fn both_sides_of_an_interval_are_kept() {
+        let open = Interval::positive(2.0, "mm");
+        let closed = Interval::closed(0.0, 0.5, "");
+        assert!(!open.contains(0.0) && open.contains(f64::MIN_POSITIVE) && open.contains(2.0));
+        assert!(
+            !open.contains(2.0_f64.next_up()) && !open.contains(-1.0) && !open.contains(f64::NAN)
+        );
+        assert!(
+            closed.contains(0.0) && closed.contains(0.5) && !closed.contains(0.5_f64.next_up())
+        );
+        assert_eq!(open.to_string(), "a number more than 0 and at most 2 mm");
+        assert_eq!(
+            Interval::closed(-1e6, 1e6, "").to_string(),
+            "a number from -1e6 to 1e6"
+        );
+    }
+
+    #[test]
+    fn a_flood_of_faults_is_listed_up_to_a_limit_and_counted() {
+        let mut faults = Faults::default();
+        for k in 0..250 {
+            faults.add(format!("/{k}"), "no");
+        }
+        let list = faults.into_list();
+        assert_eq!(list.len(), FAULTS_MAX + 1);
+        assert_eq!(
+            list.last().unwrap().detail,
+            "150 more faults are not listed"
+        );
+    }
+
+    #[test]
+    fn long_values_are_shortened() {
+        let text = shown(&Value::String("é".repeat(500)));
+        assert_eq!(text.chars().count(), SHOWN_MAX + 3);
+        assert_eq!(shown(&json!([[1], [2]])), "an array of length 2");
+    }
+
+    #[test]
+    fn whole_floats_count_as_whole() {
+        let value = json!({"a": 3.0, "b": 3.5, "c": 0, "d": 5, "e": "3"});
+        let mut faults = Faults::default();
+        let mut object = Object::open(&value, String::new(), &mut faults).unwrap();
+        assert_eq!(object.required_count("a", 1, 4), Some(3));
+        for name in ["b", "c", "d", "e", "f"] {
+            assert_eq!(object.required_count(name, 1, 4), None, "{name}");
+        }
+        assert_eq!(faults.into_list().len(), 5);
+    }
+}

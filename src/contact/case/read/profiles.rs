@@ -1,0 +1,243 @@
+//! Reads a contact of the type `profiles`: two cross-sections and how they lie.
+
+use serde_json::Value;
+
+use crate::contact::case::read::object::{Interval, Object, join, number, shown};
+use crate::contact::case::words::{Contact, CrossSection, Smoothing, SmoothingWord};
+use crate::contact::geometry::formats::format::Format;
+use crate::contact::geometry::profile::{POINTS_MAX, POINTS_MIN};
+use crate::contact::geometry::wheel_rail::Side;
+
+const SIDES: [(&str, Side); 2] = [("left", Side::Left), ("right", Side::Right)];
+const FORMATS: [(&str, Format); 3] = [
+    ("columns", Format::Columns),
+    ("simpack", Format::Simpack),
+    ("miniprof", Format::Miniprof),
+];
+const ROLLING_RADIUS: Interval = Interval::positive(1e5, "mm");
+const DISTANCE: Interval = Interval::positive(1e5, "mm");
+const PLACE: Interval = Interval::closed(-1e3, 1e3, "mm");
+const DEPTH: Interval = Interval::closed(0.0, 100.0, "mm");
+const CANT: Interval = Interval::closed(-0.5, 0.5, "rad");
+const ANGLE: Interval = Interval::closed(-0.3, 0.3, "rad");
+const COORDINATE: Interval = Interval::closed(-1e6, 1e6, "mm");
+const SMOOTHING: Interval = Interval::closed(0.0, 50.0, "mm");
+/// Characters of a file.
+const TEXT_MAX: usize = 4_000_000;
+/// Faulty points of one cross-section that are listed one by one.
+const POINT_FAULTS_MAX: usize = 5;
+const MEMBERS: [&str; 14] = [
+    "type",
+    "rail",
+    "wheel",
+    "side",
+    "rolling_radius_mm",
+    "gauge_mm",
+    "gauge_height_mm",
+    "cant_rad",
+    "flange_back_distance_mm",
+    "flange_back_position_mm",
+    "lateral_shift_mm",
+    "yaw_rad",
+    "roll_rad",
+    "accept_rough_profiles",
+];
+
+/// Reads the members of the contact; whether the cross-sections are sound is told when they are laid over each other.
+pub(crate) fn read(block: &mut Object) -> Option<Contact> {
+    block.only(&MEMBERS, &[]);
+    let rail = section(block, "rail");
+    let wheel = section(block, "wheel");
+    let what = "left or right";
+    let side = block
+        .required("side", what)
+        .and_then(|_| block.word("side", &SIDES, &[]));
+    let rolling_radius_mm = block.required_number("rolling_radius_mm", ROLLING_RADIUS);
+    let mut or = |name: &str, allowed: Interval, default: f64| {
+        if block.has(name) {
+            block.number(name, allowed)
+        } else {
+            Some(default)
+        }
+    };
+    let gauge_mm = or("gauge_mm", DISTANCE, 1435.0);
+    let gauge_height_mm = or("gauge_height_mm", DEPTH, 14.0);
+    let cant_rad = or("cant_rad", CANT, 0.0);
+    let flange_back_distance_mm = or("flange_back_distance_mm", DISTANCE, 1360.0);
+    let flange_back_position_mm = or("flange_back_position_mm", PLACE, -70.0);
+    let lateral_shift_mm = or("lateral_shift_mm", PLACE, 0.0);
+    let yaw_rad = or("yaw_rad", ANGLE, 0.0);
+    let roll_rad = or("roll_rad", ANGLE, 0.0);
+    let accept_rough_profiles = flag(block, "accept_rough_profiles");
+    Some(Contact::Profiles {
+        rail: Box::new(rail?),
+        wheel: Box::new(wheel?),
+        side: side?,
+        rolling_radius_mm: rolling_radius_mm?,
+        gauge_mm: gauge_mm?,
+        gauge_height_mm: gauge_height_mm?,
+        cant_rad: cant_rad?,
+        flange_back_distance_mm: flange_back_distance_mm?,
+        flange_back_position_mm: flange_back_position_mm?,
+        lateral_shift_mm: lateral_shift_mm?,
+        yaw_rad: yaw_rad?,
+        roll_rad: roll_rad?,
+        accept_rough_profiles: accept_rough_profiles?.unwrap_or(false),
+    })
+}
+
+fn section(contact: &mut Object, name: &str) -> Option<CrossSection> {
+    let mut block = contact.child(name)?;
+    block.only(
+        &[
+            "points_mm",
+            "format",
+            "text",
+            "mirror_y",
+            "mirror_z",
+            "smoothing_mm",
+        ],
+        &[],
+    );
+    let mirror_y = flag(&mut block, "mirror_y");
+    let mirror_z = flag(&mut block, "mirror_z");
+    let smoothing_mm = smoothing(&mut block);
+    let (points_mm, format, text) = match (block.has("points_mm"), block.has("text")) {
+        (true, false) => {
+            if block.has("format") {
+                block.fault(
+                    "format",
+                    "given together with points_mm; it belongs to the text of a file",
+                );
+                return None;
+            }
+            (Some(points(&mut block)?), None, None)
+        }
+        (false, true) => {
+            let words = FORMATS.map(|(word, _)| word).join(", ");
+            block.required("format", &format!("one of {words}"))?;
+            let format = block.word("format", &FORMATS, &[]);
+            let text = block.text("text", TEXT_MAX);
+            (None, Some(format?), Some(text?))
+        }
+        (false, false) => {
+            block.fault(
+                "points_mm",
+                "missing; an array of points [y, z] in mm is needed here, or the text of a file as text with its format",
+            );
+            return None;
+        }
+        (true, true) => {
+            block.fault(
+                "text",
+                "given together with points_mm; exactly one of the two is allowed",
+            );
+            return None;
+        }
+    };
+    Some(CrossSection {
+        points_mm,
+        format,
+        text,
+        mirror_y: mirror_y?,
+        mirror_z: mirror_z?,
+        smoothing_mm: smoothing_mm?,
+    })
+}
+
+/// A length, or the word `auto`.
+fn smoothing(block: &mut Object) -> Option<Smoothing> {
+    let Some(value) = block.value("smoothing_mm") else {
+        return Some(Smoothing::Length(0.0));
+    };
+    if value.as_str() == Some("auto") {
+        return Some(Smoothing::ByNoise(SmoothingWord::Auto));
+    }
+    if !value.is_number() {
+        let given = shown(value);
+        block.fault(
+            "smoothing_mm",
+            format!("{given} given; {SMOOTHING} is allowed, or \"auto\""),
+        );
+        return None;
+    }
+    block
+        .number("smoothing_mm", SMOOTHING)
+        .map(Smoothing::Length)
+}
+
+/// A truth value that may be left out; the outer `None` is a fault.
+fn flag(block: &mut Object, name: &str) -> Option<Option<bool>> {
+    let Some(value) = block.value(name) else {
+        return Some(None);
+    };
+    let pointer = block.pointer_to(name);
+    let read = value.as_bool();
+    if read.is_none() {
+        block.faults().add(
+            pointer,
+            format!("{} given; true or false is needed", shown(value)),
+        );
+    }
+    read.map(Some)
+}
+
+fn points(block: &mut Object) -> Option<Vec<[f64; 2]>> {
+    let what = format!("an array of {POINTS_MIN} to {POINTS_MAX} points [y, z] in mm");
+    let value = block.value("points_mm")?;
+    let elements = value
+        .as_array()
+        .filter(|elements| (POINTS_MIN..=POINTS_MAX).contains(&elements.len()));
+    let Some(elements) = elements else {
+        block.fault(
+            "points_mm",
+            format!("{} given; {what} is needed", shown(value)),
+        );
+        return None;
+    };
+    let pointer = block.pointer_to("points_mm");
+    let mut read = Vec::with_capacity(elements.len());
+    let mut refused = 0;
+    for (k, element) in elements.iter().enumerate() {
+        if let Some(point) = point(element) {
+            read.push(point);
+            continue;
+        }
+        refused += 1;
+        if refused <= POINT_FAULTS_MAX {
+            fault_of_point(element, &join(&pointer, k), block);
+        }
+    }
+    if refused > POINT_FAULTS_MAX {
+        block.faults().add(
+            pointer,
+            format!(
+                "{} more points here are not allowed; a pair [y, z] is needed, each {COORDINATE}",
+                refused - POINT_FAULTS_MAX
+            ),
+        );
+    }
+    (refused == 0).then_some(read)
+}
+
+fn point(element: &Value) -> Option<[f64; 2]> {
+    let [y, z] = element.as_array()?.as_slice() else {
+        return None;
+    };
+    let part = |value: &Value| value.as_f64().filter(|number| COORDINATE.contains(*number));
+    Some([part(y)? + 0.0, part(z)? + 0.0])
+}
+
+fn fault_of_point(element: &Value, pointer: &str, block: &mut Object) {
+    match element.as_array().map(Vec::as_slice) {
+        Some(pair @ [_, _]) => {
+            for (k, value) in pair.iter().enumerate() {
+                number(value, &join(pointer, k), COORDINATE, block.faults());
+            }
+        }
+        _ => block.faults().add(
+            pointer,
+            format!("{} given; a pair [y, z] in mm is needed", shown(element)),
+        ),
+    }
+}

@@ -1,0 +1,206 @@
+//! Reads samples over one or two axes, and the axes.
+
+use serde_json::Value;
+
+use crate::contact::case::read::object::{Faults, Interval, Object, join, number, shown};
+
+const COORDINATE: Interval = Interval::closed(-1e6, 1e6, "mm");
+/// Points of one axis of a grid.
+const AXIS_POINTS: std::ops::RangeInclusive<usize> = 2..=1000;
+/// Neighbouring coordinates of an axis are at least this far apart, relative to the length of the axis and to the
+/// largest coordinate: closer ones cannot be told apart in the arithmetic.
+const SPACING_MIN: f64 = 1e-9;
+const SPACING_TO_COORDINATE_MIN: f64 = 1e-12;
+/// Neighbouring spacings differ by at most this factor; the edge of the contact cannot be told from more uneven samples.
+const SPACING_RATIO_MAX: f64 = 1000.0;
+/// Faulty values of one grid that are listed one by one.
+const GRID_FAULTS_MAX: usize = 5;
+
+/// An axis of a grid: strictly increasing coordinates.
+pub(crate) fn axis(block: &mut Object, name: &str) -> Option<Vec<f64>> {
+    let (low, high) = (AXIS_POINTS.start(), AXIS_POINTS.end());
+    let what = format!("an array of {low} to {high} strictly increasing coordinates in mm");
+    let value = block.required(name, &what)?;
+    let elements = value
+        .as_array()
+        .filter(|elements| AXIS_POINTS.contains(&elements.len()));
+    let Some(elements) = elements else {
+        block.fault(name, format!("{} given; {what} is needed", shown(value)));
+        return None;
+    };
+    let pointer = block.pointer_to(name);
+    let mut refused = 0;
+    let axis = numbers(elements, &pointer, COORDINATE, &mut refused, block.faults());
+    count_rest(&pointer, COORDINATE, refused, block.faults());
+    let axis = axis?;
+    let (first, last) = (axis[0], axis[axis.len() - 1]);
+    let largest = first.abs().max(last.abs());
+    let least = (SPACING_MIN * (last - first).abs()).max(SPACING_TO_COORDINATE_MIN * largest);
+    let late = (1..axis.len()).find(|&i| axis[i] - axis[i - 1] <= least);
+    if let Some(i) = late {
+        block.faults().add(
+            join(&pointer, i),
+            format!(
+                "{} given after {}; coordinates have to increase strictly, here by more than {least:e} mm",
+                axis[i],
+                axis[i - 1]
+            ),
+        );
+        return None;
+    }
+    let uneven = axis.windows(3).position(|at| {
+        let (before, after) = (at[1] - at[0], at[2] - at[1]);
+        before.max(after) > SPACING_RATIO_MAX * before.min(after)
+    });
+    if let Some(i) = uneven {
+        block.faults().add(
+            join(&pointer, i + 2),
+            format!(
+                "{} given after {} and {}; neighbouring spacings may differ by a factor of at most {SPACING_RATIO_MAX}",
+                axis[i + 2],
+                axis[i],
+                axis[i + 1]
+            ),
+        );
+        return None;
+    }
+    Some(axis)
+}
+
+/// What the samples of a grid or line are called, and the values allowed.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Quantity {
+    /// The member that holds them.
+    pub(crate) member: &'static str,
+    /// One of them in words.
+    pub(crate) word: &'static str,
+    pub(crate) allowed: Interval,
+}
+
+/// The samples of a line with `n` points, where the axis is known.
+pub(crate) fn line(block: &mut Object, quantity: Quantity, n: Option<usize>) -> Option<Vec<f64>> {
+    let Quantity {
+        member,
+        word,
+        allowed,
+    } = quantity;
+    let what = format!("an array with one {word} per y_mm");
+    let value = block.required(member, &what)?;
+    let Some(elements) = value.as_array() else {
+        block.fault(member, format!("{} given; {what} is needed", shown(value)));
+        return None;
+    };
+    let n = n.unwrap_or(elements.len());
+    if elements.len() != n {
+        block.fault(
+            member,
+            format!(
+                "{} values given; {what} is needed, which are {n}",
+                elements.len()
+            ),
+        );
+        return None;
+    }
+    let pointer = block.pointer_to(member);
+    let mut refused = 0;
+    let read = numbers(elements, &pointer, allowed, &mut refused, block.faults());
+    count_rest(&pointer, allowed, refused, block.faults());
+    read
+}
+
+/// The samples of a grid with `nx` by `ny` points, where the axes are known.
+pub(crate) fn samples(
+    block: &mut Object,
+    quantity: Quantity,
+    nx: Option<usize>,
+    ny: Option<usize>,
+) -> Option<Vec<Vec<f64>>> {
+    let Quantity {
+        member,
+        word,
+        allowed,
+    } = quantity;
+    let order = format!("{member}[j][i] belongs to (x_mm[i], y_mm[j])");
+    let what = format!("an array of rows, one per y_mm, each with one {word} per x_mm ({order})");
+    let value = block.required(member, &what)?;
+    let rows: Option<Vec<&Vec<Value>>> = value
+        .as_array()
+        .and_then(|rows| rows.iter().map(Value::as_array).collect());
+    let Some(rows) = rows.filter(|rows| !rows.is_empty()) else {
+        block.fault(member, format!("{} given; {what} is needed", shown(value)));
+        return None;
+    };
+    let pointer = block.pointer_to(member);
+    let faults = block.faults();
+    let width = rows[0].len();
+    if let Some(j) = rows.iter().position(|row| row.len() != width) {
+        faults.add(
+            join(&pointer, j),
+            format!(
+                "a row of {} given after rows of {width}; all rows need the same length, one value per x_mm ({order})",
+                rows[j].len()
+            ),
+        );
+        return None;
+    }
+    let (nx, ny) = (nx.unwrap_or(width), ny.unwrap_or(rows.len()));
+    if (rows.len(), width) != (ny, nx) {
+        let swapped = if (rows.len(), width) == (nx, ny) {
+            "; the grid looks transposed"
+        } else {
+            ""
+        };
+        faults.add(
+            pointer,
+            format!(
+                "{} rows of {width} values given; {order}, so {ny} rows of {nx} values are needed{swapped}",
+                rows.len()
+            ),
+        );
+        return None;
+    }
+    let mut refused = 0;
+    let read: Vec<Option<Vec<f64>>> = rows
+        .iter()
+        .enumerate()
+        .map(|(j, row)| numbers(row, &join(&pointer, j), allowed, &mut refused, faults))
+        .collect();
+    count_rest(&pointer, allowed, refused, faults);
+    read.into_iter().collect()
+}
+
+/// Numbers of an array; faulty ones are counted in `refused`, and listed as long as they are few.
+fn numbers(
+    elements: &[Value],
+    pointer: &str,
+    allowed: Interval,
+    refused: &mut usize,
+    faults: &mut Faults,
+) -> Option<Vec<f64>> {
+    let mut read = Vec::with_capacity(elements.len());
+    for (i, value) in elements.iter().enumerate() {
+        let good = value.as_f64().filter(|number| allowed.contains(*number));
+        if let Some(good) = good {
+            read.push(good + 0.0);
+            continue;
+        }
+        *refused += 1;
+        if *refused <= GRID_FAULTS_MAX {
+            number(value, &join(pointer, i), allowed, faults);
+        }
+    }
+    (read.len() == elements.len()).then_some(read)
+}
+
+/// Says how many faulty numbers were not listed.
+fn count_rest(pointer: &str, allowed: Interval, refused: usize, faults: &mut Faults) {
+    if refused > GRID_FAULTS_MAX {
+        faults.add(
+            pointer,
+            format!(
+                "{} more values here are not allowed; {allowed} is needed",
+                refused - GRID_FAULTS_MAX
+            ),
+        );
+    }
+}

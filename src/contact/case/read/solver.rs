@@ -1,0 +1,145 @@
+//! Reads `solver` and `outputs`: how to solve, how exactly, and what to answer.
+
+use crate::contact::case::problem::TARGET_ERROR_DEFAULT;
+use crate::contact::case::read::object::{Interval, Object, join, shown, word};
+use crate::contact::case::words::{MeshSize, Method, Output, Solver, TractionBound};
+
+const TARGET_ERROR: Interval = Interval::closed(1e-4, 0.5, "");
+const TIME_LIMIT: Interval = Interval::positive(86_400.0, "s");
+const MESH_SIDE_MAX: u32 = 1000;
+
+const METHODS: [(&str, Method); 4] = [
+    ("auto", Method::Auto),
+    ("boundary_element", Method::BoundaryElement),
+    ("liu_hsu", Method::LiuHsu),
+    ("fastsim", Method::Fastsim),
+];
+const TRACTION_BOUNDS: [(&str, TractionBound); 2] = [
+    ("elliptic", TractionBound::Elliptic),
+    ("parabolic", TractionBound::Parabolic),
+];
+const OUTPUTS: [(&str, Output); 5] = [
+    ("resultants", Output::Resultants),
+    ("zones", Output::Zones),
+    ("tractions", Output::Tractions),
+    ("pressure", Output::Pressure),
+    ("slip", Output::Slip),
+];
+const OUTPUTS_LATER: [&str; 2] = ["subsurface", "damage"];
+
+/// Reads the member `solver` of a case; left out, it is `auto` with the default target.
+pub(crate) fn read(case: &mut Object) -> Option<Solver> {
+    if !case.has("solver") {
+        return Some(Solver {
+            method: Method::Auto,
+            target_error: Some(TARGET_ERROR_DEFAULT),
+            mesh: None,
+            traction_bound: None,
+            time_limit_s: None,
+        });
+    }
+    let mut block = case.child("solver")?;
+    block.only(
+        &[
+            "method",
+            "target_error",
+            "mesh",
+            "traction_bound",
+            "time_limit_s",
+        ],
+        &[],
+    );
+    let method = block.word("method", &METHODS, &[]);
+    let target_error = block.number("target_error", TARGET_ERROR);
+    let mesh = if block.has("mesh") {
+        mesh(&mut block)
+    } else {
+        None
+    };
+    let traction_bound = block.word("traction_bound", &TRACTION_BOUNDS, &[]);
+    let another = !block.has("method") || method.is_some_and(|method| method != Method::Fastsim);
+    if traction_bound.is_some() && another {
+        block.fault(
+            "traction_bound",
+            "given for a method that has no choice of bounds; only \"method\": \"fastsim\" has it",
+        );
+    }
+    let time_limit_s = block.number("time_limit_s", TIME_LIMIT);
+    if block.has("target_error") && block.has("mesh") {
+        block.fault(
+            "mesh",
+            "given together with target_error; exactly one of the two is allowed",
+        );
+    }
+    for (name, read) in [
+        ("method", method.is_some()),
+        ("target_error", target_error.is_some()),
+        ("mesh", mesh.is_some()),
+        ("traction_bound", traction_bound.is_some()),
+        ("time_limit_s", time_limit_s.is_some()),
+    ] {
+        if block.has(name) && !read {
+            return None;
+        }
+    }
+    let method = method.unwrap_or_default();
+    // The simplified theory has one mesh and a stated error, which no target changes: it has none of its own.
+    let wanted = mesh.is_none() && method != Method::Fastsim;
+    let default = wanted.then_some(TARGET_ERROR_DEFAULT);
+    Some(Solver {
+        method,
+        target_error: target_error.or(default),
+        mesh,
+        traction_bound,
+        time_limit_s,
+    })
+}
+
+/// Reads the member `outputs` of a case: sorted, each once; left out, resultants and zones.
+pub(crate) fn read_outputs(case: &mut Object) -> Option<Vec<Output>> {
+    let Some(value) = case.value("outputs") else {
+        return Some(vec![Output::Resultants, Output::Zones]);
+    };
+    let elements = value.as_array().filter(|elements| !elements.is_empty());
+    let Some(elements) = elements else {
+        let words = OUTPUTS.map(|(word, _)| word).join(", ");
+        case.fault(
+            "outputs",
+            format!(
+                "{} given; an array with at least one of {words} is needed",
+                shown(value)
+            ),
+        );
+        return None;
+    };
+    let pointer = case.pointer_to("outputs");
+    let faults = case.faults();
+    let read: Vec<Option<Output>> = elements
+        .iter()
+        .enumerate()
+        .map(|(k, element)| {
+            word(
+                element,
+                &join(&pointer, k),
+                &OUTPUTS,
+                &OUTPUTS_LATER,
+                faults,
+            )
+        })
+        .collect();
+    let mut outputs: Vec<Output> = read.into_iter().collect::<Option<_>>()?;
+    outputs.sort_unstable();
+    outputs.dedup();
+    Some(outputs)
+}
+
+fn mesh(block: &mut Object) -> Option<MeshSize> {
+    let mut block = block.child("mesh")?;
+    block.only(&["strips", "cells"], &[]);
+    let strips = block.required_count("strips", 1, MESH_SIDE_MAX);
+    let cells = block.required_count("cells", 1, MESH_SIDE_MAX);
+    Some(MeshSize {
+        strips: strips?,
+        cells: cells?,
+    })
+}

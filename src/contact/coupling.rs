@@ -1,0 +1,425 @@
+//! Solves a wheel on a rail: brings the wheel to rest, solves the patches one after the other, and lets friction share
+//! in the vertical load.
+
+use std::sync::Arc;
+
+use crate::contact::answer;
+use crate::contact::case::problem::{Problem, Resolution};
+use crate::contact::case::words::{Motion, Output};
+use crate::contact::error::SolveError;
+use crate::contact::geometry::contact_locus::Search;
+use crate::contact::geometry::surface_exit::SurfaceMissed;
+use crate::contact::geometry::wheel_rail::WheelRail;
+use crate::contact::geometry::wheelset::{WheelsetMotion, creepages};
+use crate::contact::monitor::{Monitor, Watch};
+use crate::contact::normal::region::Region;
+use crate::contact::normal::wheel_height::search::{
+    Accuracy, Loading, PressedGap, PressedWheel, ProfileContact, Wanted,
+};
+use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::remark::list::Remark;
+use crate::contact::rolling::operator_store::OperatorStore;
+use crate::contact::solution::track_axes::merge;
+use crate::contact::solution::words::{Fields, NormalReport, Solution};
+
+/// The vertical force may be missed by this part of it, and by this part of the target error if that is less; the bound for
+/// a change of friction's share in one round.
+const BALANCE: f64 = 5e-4;
+const BALANCE_OF_TARGET: f64 = 0.1;
+/// When the rounds are used up, a share that still changes by no more than this is answered with a remark.
+const BALANCE_POOR: f64 = 5e-3;
+/// Rounds of the balance; each leaves about a tenth of the difference before, on steep flanges a third, less by the secant.
+const ROUNDS_MAX: u32 = 12;
+/// Slopes of the friction found over the friction counted on that a secant step believes.
+const SLOPES: [f64; 2] = [-0.9, 0.6];
+/// Part of its normal forces' vertical part that a wheel carries at least; on a steep flange friction may take away all of it.
+const CARRIED_MIN: f64 = 0.1;
+/// Allowed error of the resultants in the first round, relative to μN.
+const TARGET_FIRST: f64 = 0.05;
+/// What patches may do to each other without a remark where no target is given, relative to the load.
+const UNCOUPLED: f64 = 0.01;
+/// By which part the first rest may miss the force: friction's share hardly depends on it.
+const TOLERANCE_FIRST: f64 = 0.1;
+
+/// Solves a problem whose region is a wheel on a rail.
+///
+/// A vertical force is balanced by the normal and the tangential forces together if the case has one motion: friction's share
+/// is found on a coarse mesh, the wheel brought to rest again, and so on until the share is what it was taken for. Several
+/// motions share their patches, so that only normal forces balance then; a remark says so.
+///
+/// # Errors
+/// A named reason why there is no answer, with what `judge` says of it.
+pub(crate) fn solve(
+    operators: &Arc<OperatorStore>,
+    problem: &Problem,
+    contact: &ProfileContact,
+    judge: &dyn Judge,
+    monitor: &dyn Monitor,
+) -> Result<Found, SolveError> {
+    let search = contact
+        .search()
+        .map_err(|reason| SolveError::NormalProblem { reason })?;
+    let vertical = matches!(contact.loading, Loading::Vertical(_)) && problem.friction > 0.0;
+    let solve = WheelSolve {
+        operators,
+        problem,
+        contact,
+        search,
+        balanced: vertical && problem.part.all == 1,
+        judge,
+        monitor,
+    };
+    if solve.balanced {
+        return solve.balance();
+    }
+    let mut at_rest = solve.rest(solve.exactly(0.0), None)?;
+    let answers = solve.answers(&at_rest, problem)?;
+    if vertical {
+        let remark = Remark::NormalForcesAloneBalance {};
+        at_rest.wheel.remarks.push(remark.into());
+    }
+    Ok(at_rest.found(problem, contact, answers))
+}
+
+/// Who judges a wheel at rest before and after its motions are solved.
+pub(crate) trait Judge {
+    /// Is there any point in solving its motions?
+    ///
+    /// # Errors
+    /// There is none, and why.
+    fn before(&self, wheel: &PressedWheel) -> Result<(), SolveError>;
+
+    /// The error of a motion that was not solved, with what the wheel at rest says of its cause.
+    fn explain(&self, wheel: &PressedWheel, error: SolveError) -> SolveError;
+}
+
+/// One wheel on its rail.
+struct WheelSolve<'a> {
+    operators: &'a Arc<OperatorStore>,
+    problem: &'a Problem,
+    contact: &'a ProfileContact,
+    search: Search<'a>,
+    balanced: bool,
+    judge: &'a dyn Judge,
+    monitor: &'a dyn Monitor,
+}
+
+impl WheelSolve<'_> {
+    fn exactly(&self, friction_share: f64) -> Wanted {
+        Wanted {
+            friction_share,
+            accuracy: Accuracy::For(self.problem.target()),
+        }
+    }
+
+    fn rest(&self, wanted: Wanted, before: Option<&PressedWheel>) -> Result<Rest, SolveError> {
+        let watch = Watch::new(self.monitor, self.problem.time_limit, 1);
+        let began = self.monitor.elapsed();
+        let wheel = self.contact.press(&self.search, wanted, before, &watch);
+        let wheel = wheel.map_err(|failure| watch.explained(failure.into(), self.problem))?;
+        if matches!(wanted.accuracy, Accuracy::For(_)) {
+            self.judge.before(&wheel)?;
+        }
+        let seconds = (self.monitor.elapsed() - began).as_secs_f64();
+        let unbalanced = if self.balanced { BALANCE } else { 0.0 };
+        Ok(Rest {
+            wheel,
+            seconds,
+            unbalanced,
+        })
+    }
+
+    fn answers(
+        &self,
+        at_rest: &Rest,
+        problem: &Problem,
+    ) -> Result<Vec<(Solution, Fields)>, SolveError> {
+        at_rest
+            .answers(self.operators, problem, self.contact, self.monitor)
+            .map_err(|error| self.judge.explain(&at_rest.wheel, error))
+    }
+
+    /// Brings normal and tangential forces to balance the vertical force together.
+    fn balance(&self) -> Result<Found, SolveError> {
+        let WheelSolve {
+            problem, contact, ..
+        } = *self;
+        let coarse = Problem {
+            resolution: match problem.resolution {
+                Resolution::Target(target) => Resolution::Target(target.max(TARGET_FIRST)),
+                mesh @ Resolution::Mesh(_) => mesh,
+            },
+            outputs: vec![Output::Resultants],
+            ..problem.clone()
+        };
+        let about = Wanted {
+            friction_share: 0.0,
+            accuracy: Accuracy::About(TOLERANCE_FIRST),
+        };
+        let mut at_rest = self.rest(about, None)?;
+        let answers = self.answers(&at_rest, &coarse)?;
+        let mut share = friction_share(&at_rest.wheel, &answers);
+        let mut counted = share;
+        let mut previous = None;
+        let tolerance = tolerance(problem.resolution);
+        let mut exit = BalanceExit::NothingCarried;
+        let mut last = None;
+        for _ in 0..ROUNDS_MAX {
+            if 1.0 + counted < CARRIED_MIN {
+                exit = BalanceExit::NothingCarried;
+                break;
+            }
+            at_rest = at_rest.again(self.rest(self.exactly(counted), Some(&at_rest.wheel))?);
+            let answers = self.answers(&at_rest, problem)?;
+            share = friction_share(&at_rest.wheel, &answers);
+            let before = previous.replace((counted, share));
+            last = Some(answers);
+            let change = ((1.0 + share) / (1.0 + counted) - 1.0).abs();
+            exit = BalanceExit::RoundsUsedUp { change };
+            if change <= tolerance {
+                exit = BalanceExit::Balanced;
+                break;
+            }
+            counted = next_share((counted, share), before);
+        }
+        let answers = exit.judged(last, tolerance, share, &mut at_rest.wheel)?;
+        Ok(at_rest.found(problem, contact, answers))
+    }
+}
+
+/// How the rounds of friction end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum BalanceExit {
+    /// Friction's share is what it was taken for.
+    Balanced,
+    /// In the last round the vertical force changed by this part.
+    RoundsUsedUp { change: f64 },
+    /// Friction takes nearly all that the normal forces carry.
+    NothingCarried,
+}
+
+impl BalanceExit {
+    /// The answers of the last round, if they are good enough: with a remark where they are not quite.
+    fn judged<A>(
+        self,
+        last: Option<A>,
+        tolerance: f64,
+        share: f64,
+        wheel: &mut PressedWheel,
+    ) -> Result<A, SolveError> {
+        match (self, last) {
+            (BalanceExit::Balanced, Some(answers)) => Ok(answers),
+            (BalanceExit::RoundsUsedUp { change }, Some(answers)) if change <= BALANCE_POOR => {
+                let remark = Remark::IterationInexact {
+                    iteration: "balance of friction and the vertical force",
+                    reason: "the rounds were used up",
+                    residual: change,
+                    tolerance,
+                };
+                wheel.remarks.push(remark.into());
+                Ok(answers)
+            }
+            _ => Err(SolveError::NormalProblem {
+                reason: format!(
+                    "normal and tangential forces do not come to balance the vertical force in {ROUNDS_MAX} rounds; \
+                     friction carries {share:+.3} of what the normal forces do. Give a normal_force_n or an approach_mm"
+                ),
+            }),
+        }
+    }
+}
+
+/// The friction to count on next, after rounds that counted on the first of two numbers and found the second: a secant step
+/// where two rounds tell the slope, because friction found may swing about friction counted on where a flange is steep.
+fn next_share((counted, found): (f64, f64), before: Option<(f64, f64)>) -> f64 {
+    let slope = match before {
+        Some((at, was)) if (counted - at).abs() > f64::EPSILON => (found - was) / (counted - at),
+        _ => 0.0,
+    };
+    counted + (found - counted) / (1.0 - slope.clamp(SLOPES[0], SLOPES[1]))
+}
+
+/// By which part the vertical force may be missed.
+fn tolerance(resolution: Resolution) -> f64 {
+    match resolution {
+        Resolution::Target(target) => BALANCE.min(BALANCE_OF_TARGET * target),
+        Resolution::Mesh(_) => BALANCE,
+    }
+}
+
+/// The same error with the place of the gap whose coordinates it speaks of.
+fn of_gap(error: SolveError, gap: &PressedGap, geometry: &WheelRail) -> SolveError {
+    match error {
+        SolveError::NotConverged {
+            method,
+            point,
+            iterations,
+            residual,
+            tolerance,
+            advice,
+        } => SolveError::NotConverged {
+            method,
+            point,
+            iterations,
+            residual,
+            tolerance,
+            advice: format!(
+                "{advice}; in the coordinates of the contact at y = {:.2} mm on the rail",
+                geometry.on_rail(gap.frame.rail)[0]
+            ),
+        },
+        other => other,
+    }
+}
+
+/// Vertical part of the tangential forces on the wheel, relative to that of the normal ones.
+fn friction_share(wheel: &PressedWheel, answers: &[(Solution, Fields)]) -> f64 {
+    let lifted = |(gap, (answer, _)): (&PressedGap, &(Solution, Fields))| {
+        -answer.total[0].force_y_n * gap.frame.angle.sin()
+    };
+    let lifted: f64 = wheel.patches.iter().zip(answers).map(lifted).sum();
+    lifted / wheel.vertical_force()
+}
+
+/// The wheel at rest with the answers for all its patches.
+pub(crate) struct Found {
+    /// The wheel.
+    pub(crate) wheel: PressedWheel,
+    /// The answer.
+    pub(crate) solution: Solution,
+    /// The values per cell.
+    pub(crate) fields: Fields,
+}
+
+/// The wheel at rest, and the time that took.
+struct Rest {
+    wheel: PressedWheel,
+    seconds: f64,
+    /// By which part of it friction may leave a vertical force unbalanced.
+    unbalanced: f64,
+}
+
+impl Rest {
+    fn found(
+        mut self,
+        problem: &Problem,
+        contact: &ProfileContact,
+        answers: Vec<(Solution, Fields)>,
+    ) -> Found {
+        let part = match problem.resolution {
+            Resolution::Target(target) => target,
+            Resolution::Mesh(_) => UNCOUPLED,
+        };
+        let remark = contact.uncoupled(&self.wheel, part);
+        self.wheel.remarks.extend(remark.map(RemarkEntry::from));
+        let (solution, fields) = merge(problem, &contact.geometry, &self.wheel, answers);
+        Found {
+            wheel: self.wheel,
+            solution,
+            fields,
+        }
+    }
+
+    /// A later rest, with the work of both.
+    fn again(&self, later: Rest) -> Rest {
+        let mut wheel = later.wheel;
+        wheel.heights += self.wheel.heights;
+        Rest {
+            wheel,
+            seconds: self.seconds + later.seconds,
+            unbalanced: later.unbalanced,
+        }
+    }
+
+    /// Solves every motion on every part.
+    fn answers(
+        &self,
+        operators: &Arc<OperatorStore>,
+        problem: &Problem,
+        contact: &ProfileContact,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<(Solution, Fields)>, SolveError> {
+        let parts = self.wheel.patches.len();
+        let watch = Watch::new(monitor, problem.time_limit, parts * problem.motions.len());
+        let mut answers = Vec::with_capacity(parts);
+        for (k, gap) in self.wheel.patches.iter().enumerate() {
+            // What all parts share is charged to the first.
+            let normal = NormalReport {
+                force_residual: self.wheel.force_residual,
+                ..gap
+                    .report
+                    .with_time(if k == 0 { self.seconds } else { 0.0 })
+            };
+            let motions = match &problem.wheelset {
+                None => problem.motions.clone(),
+                Some(wheelset) => vec![self.motion(gap, &contact.geometry, wheelset)?],
+            };
+            let region = Region::Grid(gap.field.clone());
+            let load_error = self.wheel.load_error.hypot(self.unbalanced);
+            let part = problem.of_part(region, motions, normal, load_error)?;
+            let answered = answer(operators, &part, &watch);
+            answers.push(answered.map_err(|error| of_gap(error, gap, &contact.geometry))?);
+        }
+        Ok(answers)
+    }
+
+    /// Creepages and spin about the origin of a gap: those at its patches, weighted with their forces. Between patches
+    /// that share a gap the surfaces do not touch, so that the origin itself says nothing.
+    fn motion(
+        &self,
+        gap: &PressedGap,
+        geometry: &WheelRail,
+        wheelset: &WheelsetMotion,
+    ) -> Result<Motion, SolveError> {
+        let force = gap.normal_force();
+        let mut motion = Motion {
+            creepage_x: 0.0,
+            creepage_y: 0.0,
+            spin_per_mm: 0.0,
+        };
+        for (k, patch) in gap.field.patches().iter().enumerate() {
+            let [x, y] = gap.field.load_centre(Some(k));
+            let place = geometry.moved(&gap.frame, [x, y], self.wheel.centre)?;
+            let [along, across, spin] = creepages(geometry, &place, self.wheel.centre, wheelset)?;
+            let share = patch.normal_force / force;
+            motion.creepage_x += share * (along + spin * y);
+            motion.creepage_y += share * (across - spin * x);
+            motion.spin_per_mm += share * spin;
+        }
+        Ok(motion)
+    }
+}
+
+impl From<SurfaceMissed> for SolveError {
+    fn from(miss: SurfaceMissed) -> SolveError {
+        SolveError::NormalProblem {
+            reason: miss.to_string(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_second_round_hits_the_balance_of_a_straight_line_however_it_swings() {
+        for slope in [-0.8, -0.3, 0.2, 0.5] {
+            let found = |counted: f64| 0.1 + slope * counted;
+            let first = (0.3, found(0.3));
+            let counted = next_share(first, None);
+            assert!(
+                (counted - first.1).abs() < 1e-12,
+                "nothing is known of the slope yet"
+            );
+            let balanced = next_share((counted, found(counted)), Some(first));
+            assert!((found(balanced) - balanced).abs() < 1e-12, "{slope}");
+        }
+    }
+
+    #[test]
+    fn a_slope_beyond_belief_makes_no_wild_step() {
+        let step = next_share((0.2, 0.3), Some((0.2 - 1e-6, 0.1))) - 0.2;
+        assert!((step - 0.25).abs() < 1e-9, "{step}");
+    }
+}

@@ -1,0 +1,323 @@
+//! Finds where a wheel touches its rail, and the gap of every patch in the patch's own frame.
+//!
+//! The rail is straight along x, so that the wheel meets it where its normal has no part along x: the wheel is
+//! replaced by the curve of those points, and the search is one in the plane across. Patches are the intervals in which the
+//! undeformed bodies overlap (see `overlaps.rs`); the frame of a patch lies at the mean of its overlap, weighted with its square over the
+//! area (power 5/2 on a line), with the mean inclination of the rail. In that frame the gap is taken along the normal, exactly: the
+//! wheel as surface of revolution, the rail as cylinder.
+
+use crate::contact::geometry::local_gap::{Detail, LocalGap};
+use crate::contact::geometry::overlaps::{Grouping, Overlap};
+use crate::contact::geometry::wheel_rail::WheelRail;
+
+/// Spacing of the search across and along the curves, in mm.
+pub(crate) const STEP: f64 = 0.01;
+const CURVE_STEP: f64 = 0.02;
+/// The window of a gap is larger than the overlap by this part and this length.
+const MARGIN: f64 = 0.15;
+const MARGIN_MM: f64 = 0.1;
+/// A window that is too short along x is made longer by this factor, so many times.
+const WIDENING: f64 = 1.5;
+const WIDENINGS_MAX: usize = 5;
+/// Slope with which surfaces are bent apart beyond a cut.
+const APART: f64 = 0.5;
+/// No wheel is lowered farther than this, in mm.
+const LOWERING_MAX: f64 = 16.0;
+
+/// Wheel and rail over each other, line by line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Search<'g> {
+    pub(crate) geometry: &'g WheelRail,
+    pub(crate) lines: Vec<Line>,
+    /// Which lines share a gap, if that is decided for all heights.
+    pub(crate) grouping: Option<Grouping>,
+    /// Height of the wheel's centre in mm at which the bodies just touch.
+    pub touch: f64,
+}
+
+/// One line along x: its y, the upper edge of the rail, and the clearance above first touch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Line {
+    pub(crate) y: f64,
+    pub(crate) clearance: f64,
+    pub(crate) rail: f64,
+    pub(crate) wheel: f64,
+}
+
+/// The frame of a patch in track axes: z of the frame is the normal out of the rail.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// Origin on the rail's surface, `[x, y, z]` in mm.
+    pub origin: [f64; 3],
+    /// Turn about x from the track's axes, in rad.
+    pub angle: f64,
+    /// Parameter of the origin on the rail's curve.
+    pub rail: f64,
+    /// Parameter of the opposite point on the wheel's curve.
+    pub wheel: f64,
+}
+
+impl Frame {
+    /// Unit vectors in track axes: tangent (y of the frame) and normal (z of the frame), as `[y, z]`.
+    #[must_use]
+    pub fn axes(&self) -> [[f64; 2]; 2] {
+        let (sin, cos) = self.angle.sin_cos();
+        [[cos, sin], [-sin, cos]]
+    }
+
+    /// Coordinates across and along the normal of a point of the rail's curve.
+    pub(crate) fn across(&self, geometry: &WheelRail, rail: f64) -> [f64; 2] {
+        let [y, z] = geometry.rail_at(rail).at;
+        let from = [y - self.origin[1], z - self.origin[2]];
+        self.axes()
+            .map(|axis| axis[0] * from[0] + axis[1] * from[1])
+    }
+}
+
+impl<'g> Search<'g> {
+    /// Lays the wheel over the rail and finds the height of first touch.
+    ///
+    /// # Errors
+    /// A sentence, if no part of the wheel lies above the rail.
+    pub fn new(geometry: &'g WheelRail) -> Result<Search<'g>, String> {
+        let [rail, wheel] = geometry.parameters(CURVE_STEP);
+        let rail: Vec<_> = rail
+            .into_iter()
+            .map(|s| {
+                let [y, z] = geometry.rail_at(s).at;
+                Some([y, z, s])
+            })
+            .collect();
+        let wheel: Vec<_> = wheel
+            .into_iter()
+            .map(|s| geometry.lowest(s).map(|[_, y, z]| [y, -z, s]))
+            .collect();
+        let (rail, wheel) = (envelope(&rail), envelope(&wheel));
+        let first = rail.first.max(wheel.first);
+        let last =
+            (rail.first + rail.points.len() as i64).min(wheel.first + wheel.points.len() as i64);
+        let mut lines = Vec::new();
+        for k in first..last {
+            let (below, above) = (
+                rail.points[(k - rail.first) as usize],
+                wheel.points[(k - wheel.first) as usize],
+            );
+            if let (Some([z, rail]), Some([depth, wheel])) = (below, above) {
+                lines.push(Line {
+                    y: k as f64 * STEP,
+                    clearance: -depth - z,
+                    rail,
+                    wheel,
+                });
+            }
+        }
+        let least = lines
+            .iter()
+            .map(|line| line.clearance)
+            .fold(f64::INFINITY, f64::min);
+        if lines.len() < 3 {
+            return Err(
+                "no part of the wheel lies above the rail; check gauge, flange-back distance and position, lateral shift".to_owned(),
+            );
+        }
+        for line in &mut lines {
+            line.clearance -= least;
+        }
+        Ok(Search {
+            geometry,
+            lines,
+            grouping: None,
+            touch: -least,
+        })
+    }
+
+    /// The frames of the patches when the wheel is lowered by `lowering` mm below first touch, from smaller to larger y.
+    ///
+    /// # Errors
+    /// A sentence, if an overlap reaches the end of a profile.
+    pub fn frames(&self, lowering: f64) -> Result<Vec<Frame>, String> {
+        self.overlaps(lowering)?
+            .into_iter()
+            .map(|overlap| Ok(self.frame(self.around(overlap.ends), lowering)))
+            .collect()
+    }
+
+    /// The gaps of the patches at the same height, each in its own frame.
+    ///
+    /// # Errors
+    /// A sentence, if an overlap reaches the end of a profile.
+    pub fn gaps(&self, lowering: f64, detail: Detail) -> Result<Vec<LocalGap>, String> {
+        self.overlaps(lowering)?
+            .into_iter()
+            .map(|overlap| self.gap(overlap, lowering, detail))
+            .collect()
+    }
+
+    /// About how far below first touch the wheel comes to rest under a vertical force, given in mm² as the force divided by
+    /// the contact modulus.
+    ///
+    /// Every patch is taken for a circle of the area that half the lowering makes overlap, pressed by a sphere, as if
+    /// horizontal: `N = 4/3 E* √(A/π) δ`, exact for paraboloids.
+    #[must_use]
+    pub fn estimated_lowering(&self, force: f64) -> f64 {
+        let (mut low, mut high) = (0.0_f64, 1e-3);
+        while self.estimated_force(high) < force && high < LOWERING_MAX {
+            (low, high) = (high, 2.0 * high);
+        }
+        for _ in 0..30 {
+            let middle = 0.5 * (low + high);
+            if self.estimated_force(middle) < force {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        0.5 * (low + high)
+    }
+
+    fn estimated_force(&self, lowering: f64) -> f64 {
+        let inside = |line: &Line| line.clearance < 0.5 * lowering;
+        let runs = self.lines.chunk_by(|a, b| inside(a) == inside(b));
+        let length = |line: &Line| {
+            let radius = self.geometry.placement.rolling_radius;
+            2.0 * (2.0 * radius * (0.5 * lowering - line.clearance)).sqrt()
+        };
+        let carried = |run: &[Line]| {
+            let area: f64 = run.iter().map(|line| length(line) * STEP).sum();
+            4.0 / 3.0 * (area / std::f64::consts::PI).sqrt() * lowering
+        };
+        runs.filter(|run| inside(&run[0])).map(carried).sum()
+    }
+
+    pub(crate) fn frame(&self, lines: &[Line], lowering: f64) -> Frame {
+        let (mut weight, mut y, mut angle) = (0.0, 0.0, 0.0);
+        for line in lines {
+            let own = (lowering - line.clearance).max(0.0).powf(2.5);
+            weight += own;
+            y += own * line.y;
+            angle += own * self.inclination(line.rail);
+        }
+        let y = y / weight;
+        let k = lines
+            .partition_point(|line| line.y < y)
+            .clamp(1, lines.len() - 1);
+        let t = ((y - lines[k - 1].y) / (lines[k].y - lines[k - 1].y)).clamp(0.0, 1.0);
+        let between = |of: fn(&Line) -> f64| of(&lines[k - 1]) * (1.0 - t) + of(&lines[k]) * t;
+        let (rail, wheel) = (between(|line| line.rail), between(|line| line.wheel));
+        let [y, z] = self.geometry.rail_at(rail).at;
+        let x = self.geometry.lowest(wheel).map_or(0.0, |point| point[0]);
+        Frame {
+            origin: [x, y, z],
+            angle: angle / weight,
+            rail,
+            wheel,
+        }
+    }
+
+    /// Clearance on a line along the rail's normal, with the wheel lowered below first touch; in mm.
+    pub(crate) fn clearance(&self, line: &Line, lowering: f64) -> f64 {
+        (line.clearance - lowering) * self.inclination(line.rail).cos()
+    }
+
+    /// Turn about x that lays the track's y along the rail's surface.
+    pub(crate) fn inclination(&self, rail: f64) -> f64 {
+        let [y, z] = self.geometry.rail_at(rail).tangent();
+        (z / y).atan()
+    }
+
+    fn gap(&self, overlap: Overlap, lowering: f64, detail: Detail) -> Result<LocalGap, String> {
+        let lines = self.around(overlap.ends);
+        let frame = self.frame(lines, lowering);
+        let mut across = [f64::INFINITY, f64::NEG_INFINITY];
+        let mut along = [0.0_f64; 2];
+        for line in lines {
+            let v = frame.across(self.geometry, line.rail)[0];
+            across = [across[0].min(v), across[1].max(v)];
+            let overlap = (lowering - line.clearance).max(0.0);
+            let half = (2.0 * self.geometry.meridian(line.wheel).radius * overlap).sqrt();
+            let middle = self
+                .geometry
+                .lowest(line.wheel)
+                .map_or(0.0, |point| point[0] - frame.origin[0]);
+            along = [along[0].min(middle - half), along[1].max(middle + half)];
+        }
+        let limits = self
+            .limits(overlap, lowering)
+            .map(|line| line.map(|line| frame.across(self.geometry, line.rail)[0]));
+        let widen = |[low, high]: [f64; 2]| {
+            let margin = MARGIN * (high - low) + MARGIN_MM;
+            [low - margin, high + margin]
+        };
+        let sampled = |along: [f64; 2], across: [f64; 2]| {
+            let window = [widen(along), widen(across)];
+            let centre = self.touch - lowering;
+            let gap = LocalGap::new(self.geometry, frame, centre, window, detail)?;
+            Ok::<_, String>(apart(gap, limits))
+        };
+        let mut gap = sampled(along, across)?;
+        // With yaw a hollow flange root follows the rail farther than a circle would, and seen along the normal an overlap may
+        // be wider than along the vertical.
+        for _ in 0..WIDENINGS_MAX {
+            let overlaps = gap.overlaps_at_ends();
+            if overlaps == [false; 2] {
+                break;
+            }
+            if overlaps[0] {
+                along = along.map(|end| WIDENING * end);
+            }
+            if overlaps[1] {
+                let grown = 0.5 * (WIDENING - 1.0) * (across[1] - across[0]);
+                across = [across[0] - grown, across[1] + grown];
+            }
+            gap = sampled(along, across)?;
+        }
+        Ok(gap)
+    }
+}
+
+/// The gap with its surfaces bent apart beyond the limits toward other gaps, `[lower, upper]` across in mm: what touches there
+/// belongs to those, in frames of their own.
+fn apart(mut gap: LocalGap, [lower, upper]: [Option<f64>; 2]) -> LocalGap {
+    for (v, row) in gap.y.iter().zip(&mut gap.gap) {
+        let below = lower.map_or(0.0, |end| end - v);
+        let above = upper.map_or(0.0, |end| v - end);
+        let beyond = below.max(above).max(0.0);
+        row.iter_mut().for_each(|height| *height += APART * beyond);
+    }
+    gap
+}
+
+/// Upper edge of a curve on the lines `k STEP`: height and parameter.
+struct Envelope {
+    first: i64,
+    points: Vec<Option<[f64; 2]>>,
+}
+
+/// `curve` lists `[y, height, parameter]`; lines over a part without points have none.
+fn envelope(curve: &[Option<[f64; 3]>]) -> Envelope {
+    let y = || curve.iter().flatten().map(|point| point[0] / STEP);
+    let first = y().fold(f64::INFINITY, f64::min).ceil() as i64;
+    let last = y().fold(f64::NEG_INFINITY, f64::max).floor() as i64;
+    let mut points: Vec<Option<[f64; 2]>> =
+        vec![None; usize::try_from(last - first + 1).unwrap_or(0)];
+    for pair in curve.windows(2) {
+        let [Some(from), Some(to)] = pair else {
+            continue;
+        };
+        let (low, high) = (from[0].min(to[0]) / STEP, from[0].max(to[0]) / STEP);
+        for k in low.ceil() as i64..=high.floor() as i64 {
+            let span = to[0] - from[0];
+            let t = if span == 0.0 {
+                0.0
+            } else {
+                (k as f64 * STEP - from[0]) / span
+            };
+            let at = [1, 2].map(|part| from[part] + t * (to[part] - from[part]));
+            let place = &mut points[(k - first) as usize];
+            if place.is_none_or(|highest| at[0] > highest[0]) {
+                *place = Some(at);
+            }
+        }
+    }
+    Envelope { first, points }
+}

@@ -1,0 +1,462 @@
+//! Normal influence between equal rectangles on a regular grid, applied as a padded convolution.
+
+use std::cell::RefCell;
+use std::sync::Arc;
+
+use realfft::{ComplexToReal, FftNum, RealFftPlanner, RealToComplex};
+use rustfft::num_complex::Complex;
+use rustfft::{Fft, FftPlanner};
+
+/// Rows that are moved to the columns together, so that whole cache lines are used.
+const BLOCK: usize = 8;
+
+/// A width of numbers in which transforms are done.
+pub trait Width: FftNum + Into<f64> {
+    /// The nearest number of this width.
+    fn of(value: f64) -> Self;
+    /// Plans for a padded grid of `width` by `height`; those of the same thread share what they can.
+    fn plans(width: usize, height: usize) -> Plans<Self>;
+}
+
+/// How rows and columns are transformed.
+pub struct Plans<T> {
+    forward: Arc<dyn RealToComplex<T>>,
+    backward: Arc<dyn ComplexToReal<T>>,
+    columns_forward: Arc<dyn Fft<T>>,
+    columns_backward: Arc<dyn Fft<T>>,
+}
+
+/// Planners of one thread: there are few padded sizes, and their plans cost as much as several products.
+struct Planners<T: FftNum> {
+    real: RealFftPlanner<T>,
+    complex: FftPlanner<T>,
+}
+
+impl<T: FftNum> Planners<T> {
+    fn new() -> Self {
+        Planners {
+            real: RealFftPlanner::new(),
+            complex: FftPlanner::new(),
+        }
+    }
+
+    fn plans(&mut self, width: usize, height: usize) -> Plans<T> {
+        Plans {
+            forward: self.real.plan_fft_forward(width),
+            backward: self.real.plan_fft_inverse(width),
+            columns_forward: self.complex.plan_fft_forward(height),
+            columns_backward: self.complex.plan_fft_inverse(height),
+        }
+    }
+}
+
+macro_rules! width {
+    ($float:ty, $planners:ident) => {
+        thread_local! {
+            static $planners: RefCell<Planners<$float>> = RefCell::new(Planners::new());
+        }
+
+        impl Width for $float {
+            fn of(value: f64) -> Self {
+                value as $float
+            }
+
+            fn plans(width: usize, height: usize) -> Plans<Self> {
+                $planners.with_borrow_mut(|planners| planners.plans(width, height))
+            }
+        }
+    };
+}
+
+width!(f32, SINGLE);
+width!(f64, DOUBLE);
+
+/// Normal displacement at the centres of `nx` by `ny` equal rectangles caused by uniform pressures on them, both bodies
+/// together.
+///
+/// With `E* = G/(1−ν)` the displacement is `1/(πE*) Σ p [[ q asinh(p/|q|) + p asinh(q/|p|) ]]` (Boussinesq; Love 1929),
+/// the coefficient [`rectangle`](crate::contact::half_space::kernels::rectangle) calls `zz`. Values are stored at
+/// `j * nx + i`, i along x. The grid is padded to twice its size, so that the product is that of the dense matrix, to about
+/// 1e-14 (`f64`) or 1e-6 (`f32`) of the largest displacement.
+pub struct Convolution<T> {
+    nx: usize,
+    ny: usize,
+    /// Padded length along x.
+    width: usize,
+    /// Padded length along y.
+    height: usize,
+    /// Coefficient of a cell's own pressure.
+    own: f64,
+    /// Coefficients at the distance of (i, j) cells, i from `1 − nx` to `nx − 1` and j from 0, row by row.
+    lines: Vec<f64>,
+    /// Transform of the coefficients over the own one (real, as they are even), divided by the size of the padded grid;
+    /// column by column.
+    spectrum: Vec<T>,
+    plans: Plans<T>,
+    row: Vec<T>,
+    /// Spectra of a block of rows.
+    spectra: Vec<Complex<T>>,
+    columns: Vec<Complex<T>>,
+    scratch: Vec<Complex<T>>,
+}
+
+impl<T: Width> Convolution<T> {
+    /// Prepares the influence for rectangles of `dx` by `dy` mm and the contact modulus `E*` in MPa.
+    #[must_use]
+    pub fn new(nx: usize, ny: usize, dx: f64, dy: f64, contact_modulus: f64) -> Self {
+        let (width, height) = (smooth_even(2 * nx), smooth_even(2 * ny));
+        let plans = T::plans(width, height);
+        let scratch = [
+            plans.forward.get_scratch_len(),
+            plans.backward.get_scratch_len(),
+            plans.columns_forward.get_inplace_scratch_len(),
+            plans.columns_backward.get_inplace_scratch_len(),
+        ];
+        let zero = Complex::new(T::zero(), T::zero());
+        let half = width / 2 + 1;
+        let coefficients = coefficients(nx, ny, dx, dy, contact_modulus);
+        let mut convolution = Convolution {
+            nx,
+            ny,
+            width,
+            height,
+            own: coefficients[0],
+            lines: lines(nx, &coefficients),
+            spectrum: vec![T::zero(); half * height],
+            plans,
+            row: vec![T::zero(); width],
+            spectra: vec![zero; half * BLOCK],
+            columns: vec![zero; half * height],
+            scratch: vec![zero; scratch.into_iter().max().unwrap_or(0)],
+        };
+        convolution.transform_coefficients(&coefficients);
+        convolution
+    }
+
+    /// Displacement at the centre of a cell per unit of its own pressure, in mm/MPa.
+    #[must_use]
+    pub fn own(&self) -> f64 {
+        self.own
+    }
+
+    /// Displacement in mm at every centre for pressures in MPa.
+    pub fn apply(&mut self, pressure: &[f64], displacement: &mut [f64]) {
+        let nx = self.nx;
+        let largest = pressure.iter().fold(0.0_f64, |m, p| m.max(p.abs()));
+        if largest == 0.0 {
+            displacement.fill(0.0);
+            return;
+        }
+        let (down, up) = (1.0 / largest, largest * self.own);
+        for (block, rows) in pressure.chunks(nx * BLOCK).enumerate() {
+            for (k, values) in rows.chunks_exact(nx).enumerate() {
+                for (to, from) in self.row.iter_mut().zip(values) {
+                    *to = T::of(from * down);
+                }
+                self.row[nx..].fill(T::zero());
+                self.transform_row(k);
+            }
+            self.store_rows(block * BLOCK, rows.len() / nx);
+        }
+        self.clear_rows_from(self.ny);
+        self.transform_columns(&self.plans.columns_forward.clone());
+        for (value, factor) in self.columns.iter_mut().zip(&self.spectrum) {
+            *value = *value * *factor;
+        }
+        self.transform_columns(&self.plans.columns_backward.clone());
+        for (block, rows) in displacement.chunks_mut(nx * BLOCK).enumerate() {
+            self.fetch_rows(block * BLOCK, rows.len() / nx);
+            for (k, values) in rows.chunks_exact_mut(nx).enumerate() {
+                self.transform_row_back(k);
+                for (to, from) in values.iter_mut().zip(&self.row) {
+                    let from: f64 = (*from).into();
+                    *to = up * from;
+                }
+            }
+        }
+    }
+
+    /// Adds the displacement in mm at every centre for one more pressure in MPa, at cell `cell`.
+    pub fn add(&self, cell: usize, pressure: f64, displacement: &mut [f64]) {
+        let (nx, stride) = (self.nx, 2 * self.nx - 1);
+        let (i, j) = (cell % nx, cell / nx);
+        for (row, values) in displacement.chunks_exact_mut(nx).enumerate() {
+            let first = row.abs_diff(j) * stride + nx - 1 - i;
+            for (u, coefficient) in values.iter_mut().zip(&self.lines[first..first + nx]) {
+                *u += pressure * coefficient;
+            }
+        }
+    }
+
+    /// Transforms the row in work into spectrum `k` of the block.
+    fn transform_row(&mut self, k: usize) {
+        let half = self.width / 2 + 1;
+        let spectrum = &mut self.spectra[k * half..(k + 1) * half];
+        let done =
+            self.plans
+                .forward
+                .process_with_scratch(&mut self.row, spectrum, &mut self.scratch);
+        debug_assert!(done.is_ok());
+    }
+
+    /// Transforms spectrum `k` of the block into the row in work.
+    fn transform_row_back(&mut self, k: usize) {
+        let half = self.width / 2 + 1;
+        let spectrum = &mut self.spectra[k * half..(k + 1) * half];
+        // The transform of real values has no imaginary part there, except for rounding.
+        (spectrum[0].im, spectrum[half - 1].im) = (T::zero(), T::zero());
+        let done =
+            self.plans
+                .backward
+                .process_with_scratch(spectrum, &mut self.row, &mut self.scratch);
+        debug_assert!(done.is_ok());
+    }
+
+    /// Stores `count` spectra of the block as lines of the columns from `first` on.
+    fn store_rows(&mut self, first: usize, count: usize) {
+        let half = self.width / 2 + 1;
+        for (i, column) in self.columns.chunks_exact_mut(self.height).enumerate() {
+            for k in 0..count {
+                column[first + k] = self.spectra[k * half + i];
+            }
+        }
+    }
+
+    /// The reverse of [`Convolution::store_rows`].
+    fn fetch_rows(&mut self, first: usize, count: usize) {
+        let half = self.width / 2 + 1;
+        for (i, column) in self.columns.chunks_exact(self.height).enumerate() {
+            for k in 0..count {
+                self.spectra[k * half + i] = column[first + k];
+            }
+        }
+    }
+
+    fn clear_rows_from(&mut self, first: usize) {
+        for column in self.columns.chunks_exact_mut(self.height) {
+            column[first..].fill(Complex::new(T::zero(), T::zero()));
+        }
+    }
+
+    fn transform_columns(&mut self, plan: &Arc<dyn Fft<T>>) {
+        plan.process_with_scratch(&mut self.columns, &mut self.scratch);
+    }
+
+    /// Fills the spectrum; `coefficients[j * nx + i]` belongs to the distance of i and j cells.
+    fn transform_coefficients(&mut self, coefficients: &[f64]) {
+        let (nx, ny, height) = (self.nx, self.ny, self.height);
+        self.clear_rows_from(0);
+        for j in 0..ny {
+            self.row.fill(T::zero());
+            for i in 0..nx {
+                let value = T::of(coefficients[j * nx + i] / self.own);
+                self.row[i] = value;
+                if i > 0 {
+                    self.row[self.width - i] = value;
+                }
+            }
+            self.transform_row(0);
+            self.store_rows(j, 1);
+        }
+        for column in self.columns.chunks_exact_mut(height) {
+            for j in 1..ny {
+                column[height - j] = column[j];
+            }
+        }
+        self.transform_columns(&self.plans.columns_forward.clone());
+        let scale = T::of(1.0 / (self.width * height) as f64);
+        for (factor, value) in self.spectrum.iter_mut().zip(&self.columns) {
+            *factor = scale * value.re;
+        }
+    }
+}
+
+/// Displacement at the distance of (i, j) cells from a cell with unit pressure, stored at `j * nx + i`.
+fn coefficients(nx: usize, ny: usize, dx: f64, dy: f64, contact_modulus: f64) -> Vec<f64> {
+    let factor = 1.0 / (std::f64::consts::PI * contact_modulus);
+    // The corners lie half a cell before and after the centres; neighbouring cells share them, and the two before and
+    // after the first centre differ in sign only.
+    let places = |n: usize, d: f64| -> Vec<[f64; 2]> {
+        let at = |i: usize| (i as f64 + 0.5) * d;
+        (0..n).map(|i| [at(i), at(i).ln()]).collect()
+    };
+    let (x, y) = (places(nx, dx), places(ny, dy));
+    // p asinh(q/p) + q asinh(p/q)
+    let corner = |[p, ln_p]: [f64; 2], [q, ln_q]: [f64; 2]| {
+        let r = (p * p + q * q).sqrt();
+        p * ((q + r).ln() - ln_p) + q * ((p + r).ln() - ln_q)
+    };
+    let line = |q: [f64; 2]| -> Vec<f64> {
+        let mut before = -corner(x[0], q);
+        x.iter()
+            .map(|p| {
+                let here = corner(*p, q);
+                let between = here - before;
+                before = here;
+                between
+            })
+            .collect()
+    };
+    let mut out = Vec::with_capacity(nx * ny);
+    let mut below: Vec<f64> = line(y[0]).into_iter().map(|value| -value).collect();
+    for q in y {
+        let above = line(q);
+        out.extend(
+            above
+                .iter()
+                .zip(&below)
+                .map(|(above, below)| factor * (above - below)),
+        );
+        below = above;
+    }
+    out
+}
+
+/// The coefficients with their mirror images along x, row by row.
+fn lines(nx: usize, coefficients: &[f64]) -> Vec<f64> {
+    let both = |row: &[f64]| -> Vec<f64> {
+        let images = row[1..].iter().rev().copied();
+        images.chain(row.iter().copied()).collect()
+    };
+    coefficients.chunks_exact(nx).flat_map(both).collect()
+}
+
+/// The least even number from `n` on without prime factors beyond 5, for which transforms are fast.
+fn smooth_even(n: usize) -> usize {
+    let smooth = |mut n: usize| {
+        for factor in [2, 3, 5] {
+            while n.is_multiple_of(factor) {
+                n /= factor;
+            }
+        }
+        n == 1
+    };
+    let mut n = n.next_multiple_of(2).max(2);
+    while !smooth(n) {
+        n += 2;
+    }
+    n
+}
+
+impl<T> std::fmt::Debug for Convolution<T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.debug_struct("Convolution")
+            .field("nx", &self.nx)
+            .field("ny", &self.ny)
+            .finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::half_space::kernels::{Rectangle, rectangle};
+
+    /// Displacements by the closed form, cell by cell, for G = E*(1 − ν) = 1.
+    fn dense(nx: usize, ny: usize, dx: f64, dy: f64, nu: f64, pressure: &[f64]) -> Vec<f64> {
+        let cell = Rectangle {
+            x0: -0.5 * dx,
+            x1: 0.5 * dx,
+            y0: -0.5 * dy,
+            y1: 0.5 * dy,
+        };
+        let place = |k: usize| ((k % nx) as f64 * dx, (k / nx) as f64 * dy);
+        (0..nx * ny)
+            .map(|k| {
+                let (x, y) = place(k);
+                (0..nx * ny)
+                    .map(|m| {
+                        let (xm, ym) = place(m);
+                        rectangle(x - xm, y - ym, cell, nu).zz * pressure[m]
+                    })
+                    .sum()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_product_is_that_of_the_dense_closed_form() {
+        for (nx, ny, dx, dy) in [(1, 1, 0.3, 0.2), (7, 5, 0.3, 0.2), (16, 23, 0.11, 0.4)] {
+            let nu = 0.28;
+            let pressure: Vec<f64> = (0..nx * ny)
+                .map(|k| ((k * 37 + 11) % 101) as f64 - 30.0)
+                .collect();
+            let expected = dense(nx, ny, dx, dy, nu, &pressure);
+            let modulus = 1.0 / (1.0 - nu);
+            compare(
+                &mut Convolution::<f64>::new(nx, ny, dx, dy, modulus),
+                &pressure,
+                &expected,
+                1e-12,
+            );
+            compare(
+                &mut Convolution::<f32>::new(nx, ny, dx, dy, modulus),
+                &pressure,
+                &expected,
+                2e-6,
+            );
+        }
+    }
+
+    fn compare<T: Width>(
+        convolution: &mut Convolution<T>,
+        pressure: &[f64],
+        expected: &[f64],
+        allowed: f64,
+    ) {
+        let mut found = vec![f64::NAN; pressure.len()];
+        let largest = expected.iter().fold(0.0_f64, |m, u| m.max(u.abs()));
+        // The second product must not see anything of the first.
+        for _ in 0..2 {
+            convolution.apply(pressure, &mut found);
+            for (a, b) in found.iter().zip(expected) {
+                assert!((a - b).abs() < allowed * largest, "{a} {b}");
+            }
+        }
+        let mut summed = vec![0.0; pressure.len()];
+        for (cell, p) in pressure.iter().enumerate() {
+            convolution.add(cell, *p, &mut summed);
+        }
+        for (a, b) in summed.iter().zip(expected) {
+            assert!((a - b).abs() < 1e-12 * largest, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn a_cell_acts_on_itself_as_the_closed_form_says() {
+        let own = Convolution::<f32>::new(3, 2, 0.3, 0.2, 2.0).own();
+        let cell = Rectangle {
+            x0: -0.15,
+            x1: 0.15,
+            y0: -0.1,
+            y1: 0.1,
+        };
+        assert!((own - 0.5 * rectangle(0.0, 0.0, cell, 0.0).zz).abs() < 1e-15);
+    }
+
+    #[test]
+    fn any_size_of_pressures_is_multiplied_alike() {
+        let pressure = [3.0, 0.0, 1.0, 2.0, 0.0, 5.0];
+        let product = |size: f64| {
+            let mut found = [f64::NAN; 6];
+            let scaled = pressure.map(|p| size * p);
+            Convolution::<f32>::new(3, 2, 0.3, 0.2, 2.0).apply(&scaled, &mut found);
+            found.map(|u| u / size)
+        };
+        let plain = product(1.0);
+        for size in [1e-200, 1e60, 1e200] {
+            for (a, b) in product(size).iter().zip(plain) {
+                assert!((a / b - 1.0).abs() < 1e-6, "{size}: {a} {b}");
+            }
+        }
+        let mut none = [f64::NAN; 6];
+        Convolution::<f32>::new(3, 2, 0.3, 0.2, 2.0).apply(&[0.0; 6], &mut none);
+        assert_eq!(none, [0.0; 6]);
+    }
+
+    #[test]
+    fn padded_sizes_are_even_and_smooth() {
+        let sizes = [1, 2, 14, 62, 97, 101, 128].map(smooth_even);
+        assert_eq!(sizes, [2, 2, 16, 64, 100, 108, 128]);
+    }
+}

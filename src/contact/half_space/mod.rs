@@ -1,0 +1,5 @@
+//! The elastic half-space: influence of tractions and pressures on displacements.
+
+pub mod grid_operator;
+pub mod kernels;
+pub mod strip_operator;

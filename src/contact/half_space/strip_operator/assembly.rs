@@ -1,0 +1,238 @@
+//! Rows of the operator between strips: corner sums of the closed forms over all cell edges, differenced.
+
+use std::ops::ControlFlow;
+
+use pulp::{Arch, NullaryFnOnce};
+
+use crate::contact::half_space::strip_operator::operator::observation_points;
+use crate::contact::mesh::strips::Mesh;
+use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::numerics::simd_ln::Number;
+
+/// All cell edges of a mesh, as seen from the mid-line of one strip.
+pub(crate) struct Edges<T> {
+    /// x of every edge, segment by segment.
+    x: Vec<T>,
+    /// Distance in y from the strip's smaller-y side, and its logarithm (0 for distance 0).
+    q1: Vec<T>,
+    q2: Vec<T>,
+    ln_q1: Vec<T>,
+    ln_q2: Vec<T>,
+    /// Per edge, at the point in work and at the one before: the three corner sums over the two y.
+    now: [Vec<T>; 3],
+    before: [Vec<T>; 3],
+    /// One row over all cells: xx, xy, yy.
+    row: [Vec<T>; 3],
+}
+
+impl<T: Number> Edges<T> {
+    pub(crate) fn new(mesh: &Mesh) -> Edges<T> {
+        let mut x: Vec<T> = Vec::with_capacity(mesh.cells() + mesh.segments.len());
+        for segment in &mesh.segments {
+            x.extend(mesh.left[segment.cells.clone()].iter().map(|x| T::of(*x)));
+            x.push(T::of(mesh.right[segment.cells.end - 1]));
+        }
+        let edges = || vec![T::ZERO; x.len()];
+        let cells = || vec![T::ZERO; mesh.cells()];
+        Edges {
+            q1: edges(),
+            q2: edges(),
+            ln_q1: edges(),
+            ln_q2: edges(),
+            now: [edges(), edges(), edges()],
+            before: [edges(), edges(), edges()],
+            row: [cells(), cells(), cells()],
+            x,
+        }
+    }
+
+    pub(crate) fn look_from(&mut self, mesh: &Mesh, y: f64) {
+        let ln_or_zero = |q: f64| if q == 0.0 { 0.0 } else { q.abs().ln() };
+        let mut start = 0;
+        for segment in &mesh.segments {
+            let end = start + segment.cells.len() + 1;
+            let (middle, half) = (y - segment.chord.y, 0.5 * segment.chord.dy);
+            for (values, value) in [
+                (&mut self.q1, middle + half),
+                (&mut self.q2, middle - half),
+                (&mut self.ln_q1, ln_or_zero(middle + half)),
+                (&mut self.ln_q2, ln_or_zero(middle - half)),
+            ] {
+                values[start..end].fill(T::of(value));
+            }
+            start = end;
+        }
+    }
+
+    /// Corner sums over the two y at every edge: `[q asinh(p/|q|)]`, `[p asinh(q/|p|)]`, `[r]`, each the value at `q1`
+    /// less that at `q2`. The differences of `asinh` are logarithms of one ratio, so nothing cancels for small strips.
+    #[inline(always)]
+    fn corner_sums(&mut self, x: f64) {
+        let x = T::of(x);
+        let n = self.x.len();
+        let (xe, q1s, q2s) = (&self.x[..n], &self.q1[..n], &self.q2[..n]);
+        let (ln_q1s, ln_q2s) = (&self.ln_q1[..n], &self.ln_q2[..n]);
+        let [out_a, out_b, out_r] = &mut self.now;
+        let (out_a, out_b, out_r) = (&mut out_a[..n], &mut out_b[..n], &mut out_r[..n]);
+        for e in 0..n {
+            let (q1, q2) = (q1s[e], q2s[e]);
+            let p = x - xe[e];
+            let distance = p.abs();
+            let pp = p * p;
+            let (r1, r2) = ((pp + q1 * q1).sqrt(), (pp + q2 * q2).sqrt());
+            let along1 = q1 * ((distance + r1 + T::TINY).ln() - ln_q1s[e]);
+            let along2 = q2 * ((distance + r2 + T::TINY).ln() - ln_q2s[e]);
+            out_a[e] = if p < T::ZERO {
+                along2 - along1
+            } else {
+                along1 - along2
+            };
+            let (g1, g2) = (q1.abs() + r1, q2.abs() + r2);
+            let (above, below) = if q2 >= T::ZERO {
+                (g1, g2)
+            } else if q1 <= T::ZERO {
+                (g2, g1)
+            } else {
+                (g1 * g2, pp)
+            };
+            out_b[e] = p * ((above + T::TINY) / (below + T::TINY)).ln();
+            out_r[e] = r1 - r2;
+        }
+    }
+
+    /// Turns the change of the corner sums since the point before into a row over all cells.
+    #[inline(always)]
+    fn row(&mut self, mesh: &Mesh, nu: f64) {
+        use std::f64::consts::FRAC_1_PI;
+        let (one, other) = (T::of(FRAC_1_PI), T::of(FRAC_1_PI * (1.0 - nu)));
+        let cross = T::of(-FRAC_1_PI * nu);
+        let mut edge = 0;
+        for segment in &mesh.segments {
+            let cells = segment.cells.clone();
+            let n = cells.len();
+            let change = |k: usize| {
+                let (now, before) = (
+                    &self.now[k][edge..=edge + n],
+                    &self.before[k][edge..=edge + n],
+                );
+                move |i: usize| (now[i] - before[i]) - (now[i + 1] - before[i + 1])
+            };
+            let (a, b, r) = (change(0), change(1), change(2));
+            let [xx, xy, yy] = &mut self.row;
+            let (xx, xy, yy) = (
+                &mut xx[cells.clone()],
+                &mut xy[cells.clone()],
+                &mut yy[cells],
+            );
+            for i in 0..n {
+                let (a, b) = (a(i), b(i));
+                xx[i] = one * a + other * b;
+                xy[i] = cross * r(i);
+                yy[i] = one * b + other * a;
+            }
+            edge += n + 1;
+        }
+    }
+}
+
+/// A matrix to compute.
+pub(crate) struct Assembly<'a> {
+    pub(crate) mesh: &'a Mesh,
+    pub(crate) nu: f64,
+    pub(crate) folded: bool,
+    /// Length of a block of a row.
+    pub(crate) stride: usize,
+    pub(crate) row_length: usize,
+    /// First row of each stored segment, and one more.
+    pub(crate) first_row: &'a [usize],
+}
+
+impl Assembly<'_> {
+    /// All rows, one after the other.
+    pub(crate) fn rows<T: Number>(&self, monitor: &dyn Monitor) -> Result<Vec<T>, Stop> {
+        let rows = self.first_row[self.first_row.len() - 1];
+        let mut matrix = vec![T::ZERO; rows * self.row_length];
+        let mut edges = Edges::new(self.mesh);
+        let arch = Arch::new();
+        let places = self.first_row.windows(2);
+        for (place, segment) in places.zip(&self.mesh.segments) {
+            if let ControlFlow::Break(stop) = monitor.tick(0.0) {
+                return Err(stop);
+            }
+            let points = observation_points(self.mesh, segment);
+            edges.look_from(self.mesh, segment.chord.y);
+            arch.dispatch(SegmentRows {
+                edges: &mut edges,
+                points: &points,
+                mesh: self.mesh,
+                nu: self.nu,
+                folded: self.folded,
+                stride: self.stride,
+                target: &mut matrix[place[0] * self.row_length..place[1] * self.row_length],
+            });
+        }
+        Ok(matrix)
+    }
+}
+
+/// Computes all rows of one segment.
+pub(crate) struct SegmentRows<'a, T> {
+    pub(crate) edges: &'a mut Edges<T>,
+    pub(crate) points: &'a [f64],
+    pub(crate) mesh: &'a Mesh,
+    pub(crate) nu: f64,
+    pub(crate) folded: bool,
+    pub(crate) stride: usize,
+    pub(crate) target: &'a mut [T],
+}
+
+impl<T: Number> NullaryFnOnce for SegmentRows<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let SegmentRows {
+            edges,
+            points,
+            mesh,
+            nu,
+            folded,
+            stride,
+            target,
+        } = self;
+        edges.corner_sums(points[0]);
+        let row_length = if folded { 6 * stride } else { 3 * stride };
+        for (point, out) in points[1..].iter().zip(target.chunks_exact_mut(row_length)) {
+            std::mem::swap(&mut edges.now, &mut edges.before);
+            edges.corner_sums(*point);
+            edges.row(mesh, nu);
+            for (k, values) in edges.row.iter().enumerate() {
+                if folded {
+                    let (plus, minus) =
+                        out[2 * k * stride..2 * (k + 1) * stride].split_at_mut(stride);
+                    fold(mesh, values, plus, minus);
+                } else {
+                    out[k * stride..k * stride + values.len()].copy_from_slice(values);
+                }
+            }
+        }
+    }
+}
+
+/// Adds and subtracts the value of the mirrored cell for the first half of the segments.
+#[inline(always)]
+fn fold<T: Number>(mesh: &Mesh, values: &[T], plus: &mut [T], minus: &mut [T]) {
+    let m = mesh.segments.len();
+    for (here, there) in mesh.segments[..m / 2]
+        .iter()
+        .zip(mesh.segments.iter().rev())
+    {
+        let here = here.cells.clone();
+        let (own, image) = (&values[here.clone()], &values[there.cells.clone()]);
+        let (plus, minus) = (&mut plus[here.clone()], &mut minus[here]);
+        for i in 0..own.len() {
+            plus[i] = own[i] + image[i];
+            minus[i] = own[i] - image[i];
+        }
+    }
+}

@@ -1,0 +1,5 @@
+//! Differences of displacement along strips, by tractions of their cells.
+
+pub mod assembly;
+pub mod operator;
+pub mod product;

@@ -1,0 +1,441 @@
+//! The operator between strips: how much the surface displacement changes from one observation point of a segment
+//! to the next, per unit traction on every cell.
+//!
+//! Every segment with `n` cells has `n + 3` observation points in the order of x: its `n` nodes, its leading edge, and
+//! the images of its last two nodes behind that edge. Their `n + 2` consecutive differences are all that the
+//! discretisation rules need, and differences, unlike displacements, do not lose digits when they are combined.
+//! The matrix depends on the mesh and Poisson's ratio only. Tractions are in any unit, displacement differences come
+//! out in (that unit / G) × (length unit of the mesh).
+
+use pulp::Arch;
+
+use crate::contact::half_space::strip_operator::assembly::Assembly;
+use crate::contact::half_space::strip_operator::product::{Matrix, Product};
+use crate::contact::mesh::strips::{Mesh, Segment};
+use crate::contact::monitor::{Monitor, Stop};
+
+/// Values per cell are padded to a multiple of this, so that products need no remainder loop.
+const LANES: usize = 16;
+
+/// Which part of a mirror-symmetric problem the unknowns belong to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Parity {
+    /// T_x is the same and T_y the opposite at the mirrored cell: longitudinal creepage.
+    Longitudinal,
+    /// T_x is the opposite and T_y the same at the mirrored cell: lateral creepage and spin.
+    Lateral,
+}
+
+/// Width of the numbers of the matrix, in its computation and its products.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Precision {
+    /// Four bytes: half the memory and twice the speed; forces move by less than 1e-5 of μN.
+    Single,
+    /// Eight bytes.
+    Double,
+}
+
+impl Precision {
+    /// Bytes of one number.
+    #[must_use]
+    pub fn bytes(self) -> u64 {
+        match self {
+            Precision::Single => 4,
+            Precision::Double => 8,
+        }
+    }
+}
+
+/// How the matrix is laid out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Layout {
+    /// Row `[xx | xy | yy]` over all cells.
+    Full,
+    /// Rows of the first half of the segments only, `[xx+ | xx− | xy+ | xy− | yy+ | yy−]` over the cells of that half,
+    /// where `±` adds or subtracts the influence of the mirrored cell.
+    Folded,
+}
+
+/// Displacement differences of all segments, see the module's text.
+#[derive(Debug, Clone)]
+pub struct Differences {
+    layout: Layout,
+    /// Cells of the whole mesh.
+    cells: usize,
+    /// Length of a block of a row.
+    stride: usize,
+    /// First row of each stored segment, and one more.
+    first_row: Vec<usize>,
+    /// First cell of each stored segment, and one more.
+    first_cell: Vec<usize>,
+    matrix: Matrix,
+}
+
+/// What a product needs beside its arguments; the caller keeps it, so that a product allocates nothing and the matrix can be
+/// shared by threads.
+#[derive(Debug, Clone, Default)]
+pub struct Scratch {
+    /// Tractions in single precision.
+    narrow: [Vec<f32>; 2],
+    /// Tractions, then displacement differences of the two parities.
+    halves: [Vec<f64>; 2],
+}
+
+/// Number of difference rows of a segment with `cells` cells.
+#[must_use]
+pub fn rows_of(cells: usize) -> usize {
+    cells + 2
+}
+
+/// Bytes of the matrix of a mesh.
+#[must_use]
+pub fn bytes(cells: usize, segments: usize, folded: bool, precision: Precision) -> u64 {
+    let rows = (cells + 2 * segments) as u64;
+    let stride = |cells: usize| cells.next_multiple_of(LANES) as u64;
+    let numbers = if folded {
+        6 * (rows / 2) * stride(cells / 2)
+    } else {
+        3 * rows * stride(cells)
+    };
+    precision.bytes() * numbers
+}
+
+/// The observation points of a segment, see the module's text.
+#[must_use]
+pub fn observation_points(mesh: &Mesh, segment: &Segment) -> Vec<f64> {
+    let nodes = &mesh.node[segment.cells.clone()];
+    let edge = segment.chord.right;
+    let n = nodes.len();
+    let last = nodes[n - 1];
+    let before = if n > 1 {
+        nodes[n - 2]
+    } else {
+        segment.chord.left
+    };
+    let mut points = nodes.to_vec();
+    points.extend([edge, 2.0 * edge - last, 2.0 * edge - before]);
+    points
+}
+
+impl Differences {
+    /// Computes the matrix; with `folded`, the mesh must have a mirror line.
+    ///
+    /// # Errors
+    /// The monitor is asked once per segment and may stop the work.
+    pub fn new(
+        mesh: &Mesh,
+        nu: f64,
+        folded: bool,
+        precision: Precision,
+        monitor: &dyn Monitor,
+    ) -> Result<Differences, Stop> {
+        debug_assert!(!folded || mesh.mirror_line().is_some());
+        let stored = if folded {
+            mesh.segments.len() / 2
+        } else {
+            mesh.segments.len()
+        };
+        let cells_stored = mesh.segments[..stored]
+            .iter()
+            .map(|s| s.cells.len())
+            .sum::<usize>();
+        let stride = cells_stored.next_multiple_of(LANES);
+        let mut first_row = vec![0];
+        let mut first_cell = vec![0];
+        for segment in &mesh.segments[..stored] {
+            first_row.push(first_row[first_row.len() - 1] + rows_of(segment.cells.len()));
+            first_cell.push(segment.cells.end);
+        }
+        let blocks = if folded { 6 } else { 3 };
+        let assembly = Assembly {
+            mesh,
+            nu,
+            folded,
+            stride,
+            row_length: blocks * stride,
+            first_row: &first_row,
+        };
+        let matrix = match precision {
+            Precision::Single => Matrix::Single(assembly.rows(monitor)?),
+            Precision::Double => Matrix::Double(assembly.rows(monitor)?),
+        };
+        let layout = if folded { Layout::Folded } else { Layout::Full };
+        Ok(Differences {
+            layout,
+            cells: mesh.cells(),
+            stride,
+            first_row,
+            first_cell,
+            matrix,
+        })
+    }
+
+    /// Bytes of the matrix.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.matrix.bytes()
+    }
+
+    /// Number of segments whose rows are stored: all, or half of them if folded.
+    #[must_use]
+    pub fn segments(&self) -> usize {
+        self.first_row.len() - 1
+    }
+
+    /// Is only one half of a mirror-symmetric mesh stored?
+    #[must_use]
+    pub fn is_folded(&self) -> bool {
+        self.layout == Layout::Folded
+    }
+
+    /// Rows of segment `j`.
+    #[must_use]
+    pub fn rows(&self, j: usize) -> std::ops::Range<usize> {
+        self.first_row[j]..self.first_row[j + 1]
+    }
+
+    /// Number of stored rows.
+    #[must_use]
+    pub fn row_count(&self) -> usize {
+        self.first_row[self.segments()]
+    }
+
+    /// Cells of segment `j`.
+    #[must_use]
+    pub fn cells(&self, j: usize) -> std::ops::Range<usize> {
+        self.first_cell[j]..self.first_cell[j + 1]
+    }
+
+    /// Number of entries that one product with the given parity touches.
+    #[must_use]
+    pub fn entries(&self, parity: Option<Parity>) -> usize {
+        let blocks = match (self.layout, parity) {
+            (Layout::Full, _) => 3,
+            (Layout::Folded, None) => 6,
+            (Layout::Folded, Some(_)) => 4,
+        };
+        blocks * self.row_count() * self.stride
+    }
+
+    /// Length of a vector of values per cell: the cells of the unknowns, padded with zeros.
+    #[must_use]
+    pub fn padded(&self, parity: Option<Parity>) -> usize {
+        match (self.layout, parity) {
+            (Layout::Folded, None) => self.cells.next_multiple_of(LANES),
+            _ => self.stride,
+        }
+    }
+
+    /// Where a block of a row begins in the matrix.
+    fn place(&self, row: usize, block: usize) -> usize {
+        let blocks = if self.is_folded() { 6 } else { 3 };
+        (row * blocks + block) * self.stride
+    }
+
+    fn stored(&self, row: usize, block: usize, cell: usize) -> f64 {
+        self.matrix.at(self.place(row, block) + cell)
+    }
+
+    /// The blocks that act as (xx, u_x from T_y, u_y from T_x, yy).
+    fn roles(&self, parity: Option<Parity>) -> [usize; 4] {
+        match (self.layout, parity) {
+            (Layout::Full, _) => [0, 1, 1, 2],
+            (Layout::Folded, Some(Parity::Lateral)) => [1, 2, 3, 4],
+            (Layout::Folded, _) => [0, 3, 2, 5],
+        }
+    }
+
+    /// Entry of the segment's own block: the change of u_x per T_x (or u_y per T_y) in row `row` of the matrix from
+    /// cell `cell`. Own blocks have no cross terms in a full matrix; in a folded one they are left out.
+    #[must_use]
+    pub fn own(&self, row: usize, cell: usize, parity: Option<Parity>) -> (f64, f64) {
+        if self.is_folded() && parity.is_none() {
+            let half = |k: usize| 0.5 * (self.stored(row, k, cell) + self.stored(row, k + 1, cell));
+            return (half(0), half(4));
+        }
+        let [xx, _, _, yy] = self.roles(parity);
+        (self.stored(row, xx, cell), self.stored(row, yy, cell))
+    }
+
+    /// Any entry of the matrix that [`apply`](Self::apply) stands for, as `[xx, xy, yx, yy]`: the change of u_x per T_x
+    /// and per T_y, then of u_y. Without parity, rows and cells are counted over the whole mesh.
+    #[must_use]
+    pub fn entry(&self, parity: Option<Parity>, row: usize, cell: usize) -> [f64; 4] {
+        if self.is_folded() && parity.is_none() {
+            return self.unfolded_entry(row, cell);
+        }
+        self.roles(parity)
+            .map(|block| self.stored(row, block, cell))
+    }
+
+    /// An entry of the whole mesh from the stored half: a mirrored row sees the mirrored cell with `T_y` turned round.
+    fn unfolded_entry(&self, row: usize, cell: usize) -> [f64; 4] {
+        let (row, cell, side) = if row < self.row_count() {
+            (row, cell, 1.0)
+        } else {
+            let row = mirror_image(&self.first_row, row);
+            (row, mirror_image(&self.first_cell, cell), -1.0)
+        };
+        let (cell, sign) = if cell < self.first_cell[self.segments()] {
+            (cell, 0.5)
+        } else {
+            (mirror_image(&self.first_cell, cell), -0.5)
+        };
+        let part =
+            |k: usize| 0.5 * self.stored(row, k, cell) + sign * self.stored(row, k + 1, cell);
+        let cross = side * part(2);
+        [part(0), cross, cross, part(4)]
+    }
+
+    /// Displacement differences `out_x`, `out_y` (one value per row) caused by tractions `tx`, `ty`.
+    ///
+    /// Without parity, vectors cover the whole mesh: rows of the mirrored half follow in the order of their segments.
+    pub fn apply(
+        &self,
+        parity: Option<Parity>,
+        tx: &[f64],
+        ty: &[f64],
+        out_x: &mut [f64],
+        out_y: &mut [f64],
+        scratch: &mut Scratch,
+    ) {
+        if self.is_folded() && parity.is_none() {
+            self.apply_both(tx, ty, out_x, out_y, scratch);
+        } else {
+            let roles = self.roles(parity);
+            self.product(roles, tx, ty, out_x, out_y, &mut scratch.narrow);
+        }
+    }
+
+    /// `out_x = xx tx + a ty`, `out_y = b tx + yy ty` row by row, for the blocks with these roles.
+    fn product(
+        &self,
+        roles: [usize; 4],
+        tx: &[f64],
+        ty: &[f64],
+        out_x: &mut [f64],
+        out_y: &mut [f64],
+        narrow: &mut [Vec<f32>; 2],
+    ) {
+        let (tx, ty) = (&tx[..self.stride], &ty[..self.stride]);
+        let blocks = if self.is_folded() { 6 } else { 3 };
+        let (stride, arch) = (self.stride, Arch::new());
+        match &self.matrix {
+            Matrix::Single(matrix) => {
+                for (narrow, values) in narrow.iter_mut().zip([tx, ty]) {
+                    narrow.clear();
+                    narrow.extend(values.iter().map(|v| *v as f32));
+                }
+                let [tx, ty] = narrow;
+                arch.dispatch(Product {
+                    matrix,
+                    blocks,
+                    stride,
+                    roles,
+                    tx,
+                    ty,
+                    out_x,
+                    out_y,
+                });
+            }
+            Matrix::Double(matrix) => {
+                arch.dispatch(Product {
+                    matrix,
+                    blocks,
+                    stride,
+                    roles,
+                    tx,
+                    ty,
+                    out_x,
+                    out_y,
+                });
+            }
+        }
+    }
+
+    /// Splits the tractions into their two parities, applies each part, and puts the halves together again.
+    fn apply_both(
+        &self,
+        tx: &[f64],
+        ty: &[f64],
+        out_x: &mut [f64],
+        out_y: &mut [f64],
+        scratch: &mut Scratch,
+    ) {
+        let (stride, rows) = (self.stride, self.row_count());
+        let Scratch { narrow, halves } = scratch;
+        let [parts, sums] = halves;
+        parts.resize(4 * stride, 0.0);
+        sums.resize(4 * rows, 0.0);
+        let (x_parts, y_parts) = parts.split_at_mut(2 * stride);
+        self.split(tx, x_parts);
+        self.split(ty, y_parts);
+        let ((x_same, x_opposite), (y_same, y_opposite)) =
+            (x_parts.split_at(stride), y_parts.split_at(stride));
+        let (first, second) = sums.split_at_mut(2 * rows);
+        let ((ux_same, uy_opposite), (ux_opposite, uy_same)) =
+            (first.split_at_mut(rows), second.split_at_mut(rows));
+        for (parity, tx, ty, out_x, out_y) in [
+            (
+                Parity::Longitudinal,
+                x_same,
+                y_opposite,
+                &mut *ux_same,
+                &mut *uy_opposite,
+            ),
+            (
+                Parity::Lateral,
+                x_opposite,
+                y_same,
+                &mut *ux_opposite,
+                &mut *uy_same,
+            ),
+        ] {
+            let roles = self.roles(Some(parity));
+            self.product(roles, tx, ty, out_x, out_y, narrow);
+        }
+        self.join(ux_same, ux_opposite, out_x);
+        self.join(uy_same, uy_opposite, out_y);
+    }
+
+    /// Halves of the sum and of the difference of a cell's value and its mirror image's.
+    fn split(&self, values: &[f64], parts: &mut [f64]) {
+        let (same, opposite) = parts.split_at_mut(self.stride);
+        for j in 0..self.segments() {
+            let cells = self.cells(j);
+            let image = self.cells - cells.end;
+            for (k, i) in cells.enumerate() {
+                let (here, there) = (values[i], values[image + k]);
+                same[i] = 0.5 * (here + there);
+                opposite[i] = 0.5 * (here - there);
+            }
+        }
+    }
+
+    fn join(&self, same: &[f64], opposite: &[f64], out: &mut [f64]) {
+        let total = 2 * self.row_count();
+        for j in 0..self.segments() {
+            let rows = self.rows(j);
+            let image = total - rows.end;
+            for (k, i) in rows.enumerate() {
+                out[i] = same[i] + opposite[i];
+                out[image + k] = same[i] - opposite[i];
+            }
+        }
+    }
+}
+
+/// The place of `i` in the mirrored segment; `first` has the starts of the first half of the segments, and its end.
+fn mirror_image(first: &[usize], i: usize) -> usize {
+    let half = first[first.len() - 1];
+    if i < half {
+        let j = first.partition_point(|start| *start <= i) - 1;
+        2 * half - first[j + 1] + i - first[j]
+    } else {
+        let j = first.partition_point(|start| *start < 2 * half - i) - 1;
+        first[j] + first[j + 1] + i - 2 * half
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,3 @@
+//! Strips along rolling and their cells.
+
+pub mod strips;

@@ -1,0 +1,109 @@
+//! Pressures near the edge of the contact, freed from the steps of the grid.
+
+/// How far outward a piecewise constant pressure places the edge of the contact, by the distance from the edge it tells:
+/// `(distance, displacement)`, both in cells along the normal.
+///
+/// Near an edge the square of the pressure falls linearly, so that a pressure and its gradient tell the distance of the
+/// edge. Measured on Hertz's contact (a/b 0.25 to 1.4, 20 to 42 cells across, all positions and directions of the edge);
+/// the scatter is 0.02 up to a distance of 1.2, then 0.005 and less.
+const DISPLACEMENT: [(f64, f64); 18] = [
+    (0.00, 0.090),
+    (0.05, 0.020),
+    (0.10, -0.030),
+    (0.15, -0.060),
+    (0.25, -0.070),
+    (0.35, -0.065),
+    (0.45, -0.050),
+    (0.55, -0.035),
+    (0.65, -0.014),
+    (0.75, 0.012),
+    (0.85, 0.027),
+    (0.95, 0.036),
+    (1.15, 0.034),
+    (1.35, 0.029),
+    (1.55, 0.020),
+    (1.75, 0.016),
+    (2.25, 0.010),
+    (4.00, 0.007),
+];
+
+/// The squared pressures as they would be without the grid: moved back by [`DISPLACEMENT`], so that they vanish at the
+/// edge. Cells without pressure keep 0; others may come out negative, where the edge leaves out their centre.
+///
+/// `pressure` belongs to a grid with `nx` cells along x.
+pub(crate) fn squares(nx: usize, pressure: &[f64]) -> Vec<f64> {
+    let square = |k: usize| pressure[k].powi(2);
+    let ny = pressure.len() / nx;
+    let moved = |k: usize| {
+        if pressure[k] <= 0.0 {
+            return 0.0;
+        }
+        let along = |i: usize| square(k - k % nx + i);
+        let across = |j: usize| square(k % nx + j * nx);
+        let slope = slope(k % nx, nx, along).hypot(slope(k / nx, ny, across));
+        if slope > 0.0 {
+            square(k) - slope * displacement(square(k) / slope)
+        } else {
+            square(k)
+        }
+    };
+    (0..pressure.len()).map(moved).collect()
+}
+
+/// Change per cell at cell `i` of a line of `n`, from cells in contact only; a cell at the edge takes that between its
+/// two inner neighbours, as its own value is not sound.
+fn slope(i: usize, n: usize, square: impl Fn(usize) -> f64) -> f64 {
+    let value = |k: Option<usize>| k.filter(|k| *k < n).map_or(0.0, &square);
+    let [before2, before, after, after2] =
+        [i.checked_sub(2), i.checked_sub(1), Some(i + 1), Some(i + 2)].map(value);
+    match (before > 0.0, after > 0.0) {
+        (true, true) => 0.5 * (after - before),
+        (true, false) if before2 > 0.0 => before - before2,
+        (false, true) if after2 > 0.0 => after2 - after,
+        _ => 0.0,
+    }
+}
+
+fn displacement(distance: f64) -> f64 {
+    let next = DISPLACEMENT.partition_point(|(at, _)| *at <= distance);
+    if next == DISPLACEMENT.len() {
+        return DISPLACEMENT[next - 1].1;
+    }
+    let ((x0, y0), (x1, y1)) = (DISPLACEMENT[next - 1], DISPLACEMENT[next]);
+    y0 + (y1 - y0) * (distance - x0) / (x1 - x0)
+}
+
+/// The squares with values below 0 in the cells next to the contact: the mean of what two cells inside in a row say, in
+/// all eight directions; of one alone the opposite.
+pub(crate) fn continued(nx: usize, squares: Vec<f64>) -> Vec<f64> {
+    let (nx, ny) = (nx as isize, (squares.len() / nx) as isize);
+    let value = |i: isize, j: isize| {
+        let inside = (0..nx).contains(&i) && (0..ny).contains(&j);
+        let value = if inside {
+            squares[(j * nx + i) as usize]
+        } else {
+            0.0
+        };
+        (value > 0.0).then_some(value)
+    };
+    let beyond = |i: isize, j: isize| {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (di, dj) in (-1..=1).flat_map(|dj| (-1..=1).map(move |di| (di, dj))) {
+            if let Some(near) = value(i + di, j + dj) {
+                let far = value(i + 2 * di, j + 2 * dj);
+                sum += far.map_or(-near, |far| 2.0 * near - far).min(0.0);
+                count += 1.0;
+            }
+        }
+        if count > 0.0 { sum / count } else { 0.0 }
+    };
+    let each = squares.iter().enumerate();
+    each.map(|(k, square)| {
+        if *square == 0.0 {
+            beyond(k as isize % nx, k as isize / nx)
+        } else {
+            *square
+        }
+    })
+    .collect()
+}

@@ -1,0 +1,364 @@
+//! Equal rectangles over a box of the contact plane, and what the contact looks like on them.
+
+use std::f64::consts::PI;
+
+use crate::contact::half_space::grid_operator::Convolution;
+use crate::contact::normal::gap::conjugate_gradients::Pressed;
+use crate::contact::normal::gap::edges;
+use crate::contact::normal::gap::search_box::Reach;
+use crate::contact::normal::gap::surface::{Gap, Window};
+
+/// Most cells along either axis.
+const CELLS_MAX: usize = 200;
+/// A box that turned out too small grows by this part of its length.
+const GROWTH: f64 = 0.25;
+
+/// Cells of a box; cell (i, j) is stored at `j * cells[0] + i`.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Grid {
+    /// Middle of the box in mm.
+    middle: [f64; 2],
+    /// Size of a cell in mm.
+    pub(crate) step: [f64; 2],
+    /// Number of cells along x and y.
+    pub(crate) cells: [usize; 2],
+    /// The gap is its own mirror image about x = 0 or y = 0, and so is the grid.
+    pub(crate) mirrored: [bool; 2],
+}
+
+/// One of the four sides of a box.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Side {
+    axis: usize,
+    /// The end of larger coordinates.
+    upper: bool,
+}
+
+/// How fine the next grid should be, and where.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Wanted {
+    pub(crate) window: Window,
+    pub(crate) cells: [usize; 2],
+    /// So many cells are not allowed: some patch will be too coarse.
+    pub(crate) capped: bool,
+}
+
+/// How many cells are wanted across what.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Resolution {
+    /// Across everything in contact.
+    pub(crate) contact: f64,
+    /// Across the smallest patch that counts.
+    pub(crate) patch: f64,
+    /// Patches with a smaller part of the load do not count.
+    pub(crate) share_min: f64,
+}
+
+impl Side {
+    /// The side in words, with its coordinate in the limits of the data.
+    pub(crate) fn place(self, limits: Window) -> String {
+        let name = ["x", "y"][self.axis];
+        format!("{name} = {} mm", limits[self.axis][usize::from(self.upper)])
+    }
+}
+
+impl Grid {
+    /// The grid of so many cells (at most 200 along either axis) over a window; made symmetric about
+    /// x = 0 and y = 0 where `mirrored`.
+    pub(crate) fn new(window: Window, cells: [usize; 2], mirrored: [bool; 2]) -> Grid {
+        let cells = cells.map(|n| n.clamp(4, CELLS_MAX));
+        let mut middle = window.map(|[low, high]| 0.5 * (low + high));
+        let mut length = window.map(|[low, high]| high - low);
+        for k in (0..2).filter(|k| mirrored[*k]) {
+            let [low, high] = window[k];
+            (middle[k], length[k]) = (0.0, 2.0 * high.max(-low));
+        }
+        Grid {
+            middle,
+            step: [0, 1].map(|k| length[k] / cells[k] as f64),
+            cells,
+            mirrored,
+        }
+    }
+
+    /// Coordinates of the centres along an axis.
+    pub(crate) fn centres(&self, axis: usize) -> Vec<f64> {
+        let n = self.cells[axis] as f64;
+        // Written so that a middle of 0 gives exact mirror images.
+        (0..self.cells[axis])
+            .map(|i| self.middle[axis] + (i as f64 + 0.5 - 0.5 * n) * self.step[axis])
+            .collect()
+    }
+
+    /// The ends of the box along an axis.
+    pub(crate) fn range(&self, axis: usize) -> [f64; 2] {
+        let half = 0.5 * self.cells[axis] as f64 * self.step[axis];
+        [self.middle[axis] - half, self.middle[axis] + half]
+    }
+
+    /// Single precision does for the violations of the contact conditions that are asked for.
+    pub(crate) fn influence(&self, contact_modulus: f64) -> Convolution<f32> {
+        let ([nx, ny], [dx, dy]) = (self.cells, self.step);
+        Convolution::new(nx, ny, dx, dy, contact_modulus)
+    }
+
+    /// The gap at the centres.
+    pub(crate) fn gap(&self, gap: &Gap) -> Vec<f64> {
+        let mut values = gap.on(&self.centres(0), &self.centres(1));
+        for [image, cell] in self.images() {
+            values[image] = values[cell];
+        }
+        values
+    }
+
+    /// Replaces a value and its mirror image by their mean.
+    pub(crate) fn symmetrise(&self, values: &mut [f64]) {
+        for [image, cell] in self.images() {
+            let mean = 0.5 * (values[image] + values[cell]);
+            (values[image], values[cell]) = (mean, mean);
+        }
+    }
+
+    /// Cells with their mirror images: first those about x = 0, then those about y = 0.
+    fn images(&self) -> impl Iterator<Item = [usize; 2]> + use<> {
+        let ([width, rows], [along, across]) = (self.cells, self.mirrored);
+        let half = if along { width / 2 } else { 0 };
+        let about_x = (0..rows)
+            .flat_map(move |j| (0..half).map(move |i| [j * width + width - 1 - i, j * width + i]));
+        let half = if across { rows / 2 } else { 0 };
+        let about_y = (0..half).flat_map(move |j| {
+            (0..width).map(move |i| [(rows - 1 - j) * width + i, j * width + i])
+        });
+        about_x.chain(about_y)
+    }
+
+    /// A pressure to start from: Hertz's law over the region that overlaps by more than half of the approach.
+    pub(crate) fn first_pressure(&self, gap: &[f64], reach: &Reach, modulus: f64) -> Vec<f64> {
+        let least = gap.iter().copied().fold(f64::INFINITY, f64::min);
+        let depth = (reach.level - least).max(1e-3 * (reach.level - reach.least));
+        let part = |h: &f64| (1.0 - 2.0 * (h - least) / depth).max(0.0);
+        let inside = gap.iter().filter(|h| part(h) > 0.0).count();
+        let radius = (inside as f64 * self.step[0] * self.step[1] / PI).sqrt();
+        let largest = 2.0 * modulus * depth / (PI * radius);
+        gap.iter().map(|h| largest * part(h).sqrt()).collect()
+    }
+
+    /// Pressures of another grid at the centres of this one: the root of their squares, which fall linearly to 0 at the
+    /// edge and are continued beyond it, interpolated bilinearly.
+    pub(crate) fn interpolate(&self, other: &Grid, pressure: &[f64], gap: &[f64]) -> Vec<f64> {
+        let largest = pressure.iter().copied().fold(0.0, f64::max);
+        self.never_empty(self.interpolated(other, pressure), largest, gap)
+    }
+
+    /// Pressures, or the largest one at the deepest cell if they are 0 everywhere.
+    pub(crate) fn never_empty(&self, mut out: Vec<f64>, largest: f64, gap: &[f64]) -> Vec<f64> {
+        if out.iter().all(|p| *p == 0.0) {
+            let deepest = (0..gap.len()).min_by(|a, b| gap[*a].total_cmp(&gap[*b]));
+            out[deepest.unwrap_or(0)] = largest;
+        }
+        out
+    }
+
+    /// The same, 0 everywhere if the other grid presses nothing here.
+    pub(crate) fn interpolated(&self, other: &Grid, pressure: &[f64]) -> Vec<f64> {
+        let squares = edges::continued(other.cells[0], edges::squares(other.cells[0], pressure));
+        let places = [0, 1].map(|axis| -> Vec<(isize, f64)> {
+            let first = other.range(axis)[0] + 0.5 * other.step[axis];
+            self.centres(axis)
+                .into_iter()
+                .map(|x| {
+                    let at = (x - first) / other.step[axis];
+                    (at.floor() as isize, at - at.floor())
+                })
+                .collect()
+        });
+        let value = |i: isize, j: isize| {
+            let inside = |k: isize, axis: usize| (0..other.cells[axis] as isize).contains(&k);
+            if inside(i, 0) && inside(j, 1) {
+                squares[j as usize * other.cells[0] + i as usize]
+            } else {
+                0.0
+            }
+        };
+        let mut out = Vec::with_capacity(self.cells[0] * self.cells[1]);
+        for &(j, v) in &places[1] {
+            for &(i, u) in &places[0] {
+                let row = |j: isize| (1.0 - u) * value(i, j) + u * value(i + 1, j);
+                let square = (1.0 - v) * row(j) + v * row(j + 1);
+                out.push(square.max(0.0).sqrt());
+            }
+        }
+        out
+    }
+
+    /// Sides whose outermost cells are in contact.
+    pub(crate) fn sides_in_contact(&self, pressure: &[f64]) -> Vec<Side> {
+        let [nx, ny] = self.cells;
+        let touches = |side: &Side| {
+            let last = if side.upper {
+                self.cells[side.axis] - 1
+            } else {
+                0
+            };
+            (0..nx * ny).any(|k| pressure[k] > 0.0 && [k % nx, k / nx][side.axis] == last)
+        };
+        let all = [(0, false), (0, true), (1, false), (1, true)];
+        let sides = all.map(|(axis, upper)| Side { axis, upper });
+        sides.into_iter().filter(touches).collect()
+    }
+
+    /// Does this side lie at the limit of the data?
+    pub(crate) fn ends_at(&self, side: Side, limits: Window) -> bool {
+        let end = usize::from(side.upper);
+        (self.range(side.axis)[end] - limits[side.axis][end]).abs() < 0.5 * self.step[side.axis]
+    }
+
+    /// A grid that reaches farther out on some sides, with cells of about the same size.
+    pub(crate) fn enlarged(&self, sides: &[Side], limits: Window) -> Grid {
+        let mut window = [self.range(0), self.range(1)];
+        for side in sides {
+            let end = usize::from(side.upper);
+            let growth = GROWTH * self.cells[side.axis] as f64 * self.step[side.axis];
+            window[side.axis][end] += if side.upper { growth } else { -growth };
+        }
+        let window = within(window, limits);
+        let cells = [0, 1].map(|k| {
+            let [low, high] = window[k];
+            ((high - low) / self.step[k]).round() as usize
+        });
+        Grid::new(window, cells, self.mirrored)
+    }
+
+    /// The box around all cells that touch or nearly do (closer than `near`), and the cells that resolve what is in it.
+    pub(crate) fn wanted(
+        &self,
+        pressed: &Pressed,
+        near: f64,
+        resolution: Resolution,
+        limits: Window,
+    ) -> Wanted {
+        let width = self.cells[0];
+        let cell = |k: usize| [k % width, k / width];
+        let mut whole = Extent::default();
+        for k in (0..pressed.pressure.len()).filter(|k| pressed.distance[*k] < near) {
+            whole.add(cell(k));
+        }
+        let mut contact = Extent::default();
+        let total: f64 = pressed.pressure.iter().sum();
+        let mut steps = [f64::INFINITY; 2];
+        for patch in self.patches(&pressed.pressure) {
+            let extent = self.extent(&patch);
+            patch.iter().for_each(|k| contact.add(cell(*k)));
+            let load: f64 = patch.iter().map(|k| pressed.pressure[*k]).sum();
+            if load >= resolution.share_min * total {
+                for (k, step) in steps.iter_mut().enumerate() {
+                    *step = step.min(extent.length(k) * self.step[k] / resolution.patch);
+                }
+            }
+        }
+        let window = [0, 1].map(|k| {
+            steps[k] = steps[k].min(contact.length(k) * self.step[k] / resolution.contact);
+            let margin = (0.3 * self.step[k]).max(1.5 * steps[k]);
+            let low = self.range(k)[0];
+            let [first, last] = whole.0[k].map(|i| i as f64);
+            [
+                low + first * self.step[k] - margin,
+                low + (last + 1.0) * self.step[k] + margin,
+            ]
+        });
+        let window = within(window, limits);
+        let needed = [0, 1].map(|k| ((window[k][1] - window[k][0]) / steps[k]).ceil() as usize);
+        Wanted {
+            window,
+            cells: needed.map(|cells| cells.clamp(4, CELLS_MAX)),
+            capped: needed.iter().any(|cells| *cells > CELLS_MAX),
+        }
+    }
+
+    /// Cells along either axis from the first to the last of some.
+    pub(crate) fn extent_of(&self, cells: &[usize]) -> [f64; 2] {
+        let extent = self.extent(cells);
+        [0, 1].map(|k| extent.length(k))
+    }
+
+    /// The box of some cells in mm.
+    pub(crate) fn window_of(&self, cells: &[usize]) -> Window {
+        let Extent(ranges) = self.extent(cells);
+        [0, 1].map(|k| {
+            let [first, last] = ranges[k].map(|i| i as f64);
+            [first, last + 1.0].map(|i| self.range(k)[0] + i * self.step[k])
+        })
+    }
+
+    fn extent(&self, cells: &[usize]) -> Extent {
+        let mut extent = Extent::default();
+        for k in cells {
+            extent.add([k % self.cells[0], k / self.cells[0]]);
+        }
+        extent
+    }
+
+    /// Cells in contact, patch by patch; cells hang together over edges and corners.
+    pub(crate) fn patches(&self, pressure: &[f64]) -> Vec<Vec<usize>> {
+        let [nx, ny] = self.cells;
+        let mut seen = vec![false; nx * ny];
+        let mut patches = Vec::new();
+        for start in 0..nx * ny {
+            if seen[start] || pressure[start] <= 0.0 {
+                continue;
+            }
+            seen[start] = true;
+            let mut patch = vec![start];
+            let mut next = 0;
+            while let Some(&k) = patch.get(next) {
+                next += 1;
+                let (i, j) = (k % nx, k / nx);
+                for j in j.saturating_sub(1)..(j + 2).min(ny) {
+                    for i in i.saturating_sub(1)..(i + 2).min(nx) {
+                        let neighbour = j * nx + i;
+                        if !seen[neighbour] && pressure[neighbour] > 0.0 {
+                            seen[neighbour] = true;
+                            patch.push(neighbour);
+                        }
+                    }
+                }
+            }
+            patches.push(patch);
+        }
+        patches
+    }
+}
+
+/// First and last cell along both axes.
+#[derive(Debug, Clone, Copy)]
+struct Extent([[usize; 2]; 2]);
+
+impl Default for Extent {
+    fn default() -> Extent {
+        Extent([[usize::MAX, 0]; 2])
+    }
+}
+
+impl Extent {
+    fn add(&mut self, cell: [usize; 2]) {
+        for (range, i) in self.0.iter_mut().zip(cell) {
+            *range = [range[0].min(i), range[1].max(i)];
+        }
+    }
+
+    /// Cells from the first to the last.
+    fn length(&self, axis: usize) -> f64 {
+        let [first, last] = self.0[axis];
+        (last + 1).saturating_sub(first) as f64
+    }
+}
+
+/// The part of a window within limits.
+pub(crate) fn within(window: Window, limits: Window) -> Window {
+    [0, 1].map(|k| {
+        [
+            window[k][0].max(limits[k][0]),
+            window[k][1].min(limits[k][1]),
+        ]
+    })
+}

@@ -1,0 +1,13 @@
+//! Region and pressure of a given gap.
+
+pub mod conjugate_gradients;
+pub mod coupling;
+pub mod edges;
+pub mod grid;
+pub mod outcome;
+pub mod search_box;
+pub mod solve;
+pub mod summits;
+pub mod surface;
+pub mod tiles;
+pub mod tiles_influence;

@@ -1,0 +1,163 @@
+//! The answer of a gap: pressures of the last grids as a field, and what is to be said of them.
+
+use crate::contact::normal::gap::edges;
+use crate::contact::normal::gap::solve::{Failure, Found, GapContact, Report};
+use crate::contact::normal::gap::surface::Gap;
+use crate::contact::normal::gap::tiles::Tile;
+use crate::contact::normal::pressure_field::field::PressureField;
+use crate::contact::normal::pressure_field::given::GridPressure;
+use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::remark::list::Remark;
+
+/// A patch longer than this part of the rolling radius (half against whole) is no half-space contact.
+const HALF_LENGTH_USUAL_MAX: f64 = 0.3;
+/// Nor is one whose approach is more than this part of its smaller half width.
+const APPROACH_USUAL_MAX: f64 = 0.15;
+/// A patch with at least this part of the load and fewer cells across is not resolved: with so many cells, Hertz's width and
+/// pressure come out within 1 %.
+const SHARE_MIN: f64 = 0.02;
+const CELLS_ACROSS_MIN: f64 = 11.0;
+
+/// Pressures on the last grids.
+pub(crate) struct Outcome {
+    /// The grids with their pressures: one, or one per patch.
+    pub(crate) tiles: Vec<Tile>,
+    /// Iterations over all grids.
+    pub(crate) iterations: u32,
+    /// Nothing changes any more with the grids.
+    pub(crate) settled: bool,
+    /// See [`Report`].
+    pub(crate) pressure_change: f64,
+    /// The least gap in mm.
+    pub(crate) least: f64,
+}
+
+/// A patch with too few cells.
+struct Coarse {
+    /// Where it is, `[x, y]` in mm.
+    middle: [f64; 2],
+    /// Cells across its narrower side.
+    cells: f64,
+    /// Its part of the load.
+    share: f64,
+}
+
+impl GapContact {
+    /// Field, report and remarks.
+    pub(crate) fn found(&self, outcome: Outcome) -> Result<Found, Failure> {
+        let loads = outcome.tiles.iter().map(Tile::load);
+        let heaviest = loads
+            .zip(&outcome.tiles)
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, tile)| tile);
+        let Some(Tile { grid, pressed }) = heaviest else {
+            unreachable!("at least one grid is tried")
+        };
+        let report = Report {
+            cells: grid.cells,
+            grids: outcome.tiles.len(),
+            iterations: outcome.iterations,
+            residual: pressed.residual,
+            pressure_change: outcome.pressure_change,
+        };
+        let field = field(&outcome.tiles).map_err(Failure::NoAnswer)?;
+        let coarse = coarse(&outcome.tiles);
+        let mut remarks = Vec::new();
+        for Coarse {
+            middle,
+            cells,
+            share,
+        } in &coarse
+        {
+            let remark = Remark::PatchCoarse {
+                cells_across: *cells,
+                load_share: *share,
+            };
+            remarks.push(match field.patch_at(*middle) {
+                Some(patch) => remark.at_patch(patch),
+                None => remark.into(),
+            });
+        }
+        if !outcome.settled && coarse.is_empty() {
+            remarks.push(Remark::GapRough {}.into());
+        }
+        remarks.extend(self.remarks(&field, pressed.approach - outcome.least));
+        Ok(Found {
+            field,
+            report,
+            remarks,
+        })
+    }
+
+    /// Remarks on contacts for which a half-space is a poor likeness of the bodies; the patch that carries most decides.
+    fn remarks(&self, field: &PressureField, depth: f64) -> Vec<RemarkEntry> {
+        let patches = field.patches();
+        let heaviest = patches
+            .iter()
+            .enumerate()
+            .max_by(|(_, a), (_, b)| a.normal_force.total_cmp(&b.normal_force));
+        let Some((patch, extent)) = heaviest.map(|(k, patch)| (k, patch.extent)) else {
+            return Vec::new();
+        };
+        let [x_min, x_max, y_min, y_max] = extent;
+        let (a, b) = (0.5 * (x_max - x_min), 0.5 * (y_max - y_min));
+        let mut remarks = Vec::new();
+        if let Gap::Profile { rolling, .. } = self.gap
+            && a > HALF_LENGTH_USUAL_MAX * rolling
+        {
+            let remark = Remark::NearlyConformal {
+                length_mm: 2.0 * a,
+                rolling_radius_mm: rolling,
+            };
+            remarks.push(remark.at_patch(patch));
+        }
+        if depth > APPROACH_USUAL_MAX * a.min(b) {
+            let remark = Remark::StrainsTooLarge {
+                overlap_mm: depth,
+                half_width_mm: a.min(b),
+            };
+            remarks.push(remark.at_patch(patch));
+        }
+        remarks
+    }
+}
+
+/// Patches that matter and are not resolved, from the heaviest on.
+fn coarse(tiles: &[Tile]) -> Vec<Coarse> {
+    let total: f64 = tiles.iter().map(Tile::load).sum();
+    let mut found = Vec::new();
+    for Tile { grid, pressed } in tiles {
+        let area = grid.step[0] * grid.step[1];
+        for patch in grid.patches(&pressed.pressure) {
+            let load: f64 = patch.iter().map(|k| pressed.pressure[*k]).sum();
+            let share = load * area / total;
+            let [along, across] = grid.extent_of(&patch);
+            let cells = along.min(across);
+            if share >= SHARE_MIN && cells < CELLS_ACROSS_MIN {
+                let middle = grid.window_of(&patch).map(|[low, high]| 0.5 * (low + high));
+                found.push(Coarse {
+                    middle,
+                    cells,
+                    share,
+                });
+            }
+        }
+    }
+    found.sort_by(|a, b| b.share.total_cmp(&a.share));
+    found
+}
+
+/// The pressures of the grids as a field with edges between their cells.
+fn field(tiles: &[Tile]) -> Result<PressureField, String> {
+    let pressing = tiles.iter().filter(|tile| tile.largest() > 0.0);
+    let grids = pressing.map(|Tile { grid, pressed }| {
+        GridPressure::of_solution(
+            &grid.centres(0),
+            &grid.centres(1),
+            &edges::squares(grid.cells[0], &pressed.pressure),
+            &pressed.pressure,
+            pressed.approach,
+        )
+    });
+    PressureField::of_grids(grids.collect::<Result<_, _>>()?)
+}

@@ -1,0 +1,307 @@
+//! The gap between the undeformed bodies: samples, and a smooth surface through them.
+
+use crate::contact::numerics::cubic::{Cubic, interval, sober_slopes};
+
+/// Distance of the undeformed surfaces in mm, both bodies together, over the contact plane.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Gap {
+    /// `h = x²/(2 rolling) + across(y)`.
+    Profile {
+        /// Relative radius in the rolling direction in mm.
+        rolling: f64,
+        /// The gap at x = 0.
+        across: Curve,
+    },
+    /// Any surface, given on a rectangular grid.
+    Grid(Surface),
+}
+
+/// A curve with a continuous derivative through samples; parabolas are reproduced exactly.
+///
+/// Beyond the first and the last sample there is nothing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve {
+    axis: Vec<f64>,
+    values: Vec<f64>,
+    slopes: Vec<f64>,
+}
+
+/// A surface with continuous derivatives through samples on a rectangular grid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Surface {
+    x: Vec<f64>,
+    y: Vec<f64>,
+    /// Sample (i, j) at `j * x.len() + i`.
+    values: Vec<f64>,
+    /// Slopes along y, stored alike.
+    slopes: Vec<f64>,
+}
+
+/// Where the gap is known, `[low, high]` in mm along x and y; infinite where it is given by a formula.
+pub type Window = [[f64; 2]; 2];
+
+impl Gap {
+    /// The gap of a cross-section `(y, gap)` that rolls on a circle; at least 2 samples, y increasing.
+    #[must_use]
+    pub fn profile(rolling: f64, y: &[f64], gap: &[f64]) -> Gap {
+        Gap::Profile {
+            rolling,
+            across: Curve::new(y, gap),
+        }
+    }
+
+    /// The gap `gap[j][i]` at `(x[i], y[j])`; at least 2 samples along either axis, axes increasing.
+    #[must_use]
+    pub fn grid(x: &[f64], y: &[f64], gap: &[Vec<f64>]) -> Gap {
+        Gap::Grid(Surface::new(x, y, gap))
+    }
+
+    /// Where the gap is known.
+    #[must_use]
+    pub fn window(&self) -> Window {
+        match self {
+            Gap::Profile { across, .. } => {
+                [[f64::NEG_INFINITY, f64::INFINITY], range(&across.axis)]
+            }
+            Gap::Grid(surface) => [range(&surface.x), range(&surface.y)],
+        }
+    }
+
+    /// Coordinates of the samples along x and y; none where a formula holds.
+    #[must_use]
+    pub fn samples(&self) -> [&[f64]; 2] {
+        match self {
+            Gap::Profile { across, .. } => [&[], &across.axis],
+            Gap::Grid(surface) => [&surface.x, &surface.y],
+        }
+    }
+
+    /// Values at all `(x[i], y[j])`, stored at `j * x.len() + i`. All points lie in the window.
+    #[must_use]
+    pub fn on(&self, x: &[f64], y: &[f64]) -> Vec<f64> {
+        match self {
+            Gap::Profile { rolling, across } => {
+                let along: Vec<f64> = x.iter().map(|x| 0.5 * x * x / rolling).collect();
+                y.iter()
+                    .flat_map(|y| {
+                        let across = across.at(*y);
+                        along.iter().map(move |along| along + across)
+                    })
+                    .collect()
+            }
+            Gap::Grid(surface) => surface.on(x, y),
+        }
+    }
+
+    /// The least and the largest sample; along x = 0 for a profile.
+    #[must_use]
+    pub fn extremes(&self) -> [f64; 2] {
+        let values = match self {
+            Gap::Profile { across, .. } => &across.values,
+            Gap::Grid(surface) => &surface.values,
+        };
+        let start = [f64::INFINITY, f64::NEG_INFINITY];
+        values.iter().fold(start, |[low, high], value| {
+            [low.min(*value), high.max(*value)]
+        })
+    }
+
+    /// Where the least sample lies, if none inside the data is as small.
+    #[must_use]
+    pub fn least_at_edge(&self) -> Option<String> {
+        let place = |name: &str, at: f64| format!("{name} = {at} mm");
+        let least = self.extremes()[0];
+        match self {
+            Gap::Profile { across, .. } => {
+                let last = across.values.len() - 1;
+                let inside = (1..last).any(|k| across.values[k] <= least);
+                let at = if across.values[0] <= least { 0 } else { last };
+                (!inside).then(|| place("y", across.axis[at]))
+            }
+            Gap::Grid(Surface { x, y, values, .. }) => {
+                let low = |k: usize| values[k] <= least;
+                let at_edge = |k: usize, n: usize| k == 0 || k + 1 == n;
+                let cell = |k: usize| (k % x.len(), k / x.len());
+                let inside =
+                    |k: usize| !at_edge(cell(k).0, x.len()) && !at_edge(cell(k).1, y.len());
+                if (0..values.len()).any(|k| low(k) && inside(k)) {
+                    return None;
+                }
+                let (i, j) = (0..values.len()).find(|k| low(*k)).map(cell)?;
+                Some(if at_edge(i, x.len()) {
+                    place("x", x[i])
+                } else {
+                    place("y", y[j])
+                })
+            }
+        }
+    }
+
+    /// Is the gap its own mirror image about x = 0 and about y = 0, sample by sample?
+    #[must_use]
+    pub fn is_mirrored(&self) -> [bool; 2] {
+        let mirrored = |axis: &[f64]| axis.iter().zip(axis.iter().rev()).all(|(a, b)| *a == -b);
+        let alike = |values: &[f64]| values.iter().zip(values.iter().rev()).all(|(a, b)| a == b);
+        match self {
+            Gap::Profile { across, .. } => [true, mirrored(&across.axis) && alike(&across.values)],
+            Gap::Grid(surface) => {
+                let mut rows = surface.values.chunks_exact(surface.x.len());
+                let images = rows.clone().zip(rows.clone().rev());
+                [
+                    mirrored(&surface.x) && rows.all(alike),
+                    mirrored(&surface.y) && images.into_iter().all(|(a, b)| a == b),
+                ]
+            }
+        }
+    }
+}
+
+impl Curve {
+    fn new(axis: &[f64], values: &[f64]) -> Curve {
+        Curve {
+            slopes: sober_slopes(axis, values),
+            axis: axis.to_vec(),
+            values: values.to_vec(),
+        }
+    }
+
+    fn at(&self, at: f64) -> f64 {
+        value_on(&self.axis, &self.values, &self.slopes, at)
+    }
+}
+
+impl Surface {
+    fn new(x: &[f64], y: &[f64], samples: &[Vec<f64>]) -> Surface {
+        let mut slopes = vec![0.0; x.len() * y.len()];
+        for i in 0..x.len() {
+            let column: Vec<f64> = samples.iter().map(|row| row[i]).collect();
+            for (j, slope) in sober_slopes(y, &column).into_iter().enumerate() {
+                slopes[j * x.len() + i] = slope;
+            }
+        }
+        Surface {
+            x: x.to_vec(),
+            y: y.to_vec(),
+            values: samples.concat(),
+            slopes,
+        }
+    }
+
+    fn on(&self, x: &[f64], y: &[f64]) -> Vec<f64> {
+        let width = self.x.len();
+        let mut out = Vec::with_capacity(x.len() * y.len());
+        for y in y {
+            let j = interval(&self.y, *y);
+            let (here, next) = (j * width, (j + 1) * width);
+            let line: Vec<f64> = (0..width)
+                .map(|i| {
+                    let values = [here, next].map(|row| self.values[row + i]);
+                    let slopes = [here, next].map(|row| self.slopes[row + i]);
+                    Cubic::with_slopes(&self.y, j, values, slopes).at(*y)
+                })
+                .collect();
+            let slopes = sober_slopes(&self.x, &line);
+            out.extend(x.iter().map(|x| value_on(&self.x, &line, &slopes, *x)));
+        }
+        out
+    }
+}
+
+fn range(axis: &[f64]) -> [f64; 2] {
+    [axis[0], axis[axis.len() - 1]]
+}
+
+/// Value of the curve with these values and slopes at the nodes of the axis.
+fn value_on(axis: &[f64], values: &[f64], slopes: &[f64], at: f64) -> f64 {
+    let i = interval(axis, at);
+    Cubic::with_slopes(
+        axis,
+        i,
+        [values[i], values[i + 1]],
+        [slopes[i], slopes[i + 1]],
+    )
+    .at(at)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn paraboloid(x: f64, y: f64) -> f64 {
+        0.01 * x * x + 0.02 * y * y + 0.003 * x * y - 0.1 * x + 0.05
+    }
+
+    fn sampled(x: &[f64], y: &[f64]) -> Gap {
+        let rows: Vec<Vec<f64>> = y
+            .iter()
+            .map(|y| x.iter().map(|x| paraboloid(*x, *y)).collect())
+            .collect();
+        Gap::grid(x, y, &rows)
+    }
+
+    #[test]
+    fn parabolas_are_reproduced_up_to_the_edge_of_the_window() {
+        let x = [-4.0, -2.5, 0.1, 1.0, 3.0];
+        let y = [-3.0, 0.0, 2.0];
+        let gap = sampled(&x, &y);
+        assert_eq!(gap.window(), [[-4.0, 3.0], [-3.0, 2.0]]);
+        let at = [-4.0, -3.9, -1.0, 0.5, 2.99, 3.0];
+        let across = [-3.0, -1.0, 0.7, 2.0];
+        let values = gap.on(&at, &across);
+        for (j, y) in across.iter().enumerate() {
+            for (i, x) in at.iter().enumerate() {
+                let found = values[j * at.len() + i];
+                assert!(
+                    (found - paraboloid(*x, *y)).abs() < 1e-14,
+                    "{x} {y} {found}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn two_samples_make_a_line() {
+        let gap = Gap::profile(500.0, &[1.0, 3.0], &[0.2, 0.6]);
+        let found = gap.on(&[0.0, 10.0], &[2.5]);
+        assert!((found[0] - 0.5).abs() < 1e-15 && (found[1] - 0.6).abs() < 1e-15);
+        assert_eq!(gap.extremes(), [0.2, 0.6]);
+    }
+
+    #[test]
+    fn a_jump_does_not_make_the_curve_swing_below_the_samples() {
+        let y: Vec<f64> = (-20..=20).map(|k| 0.25 * f64::from(k)).collect();
+        let gap: Vec<f64> = y
+            .iter()
+            .map(|y| if *y > 2.0 { 1e3 } else { 0.002 * y * y })
+            .collect();
+        let curve = Gap::profile(500.0, &y, &gap);
+        for k in 0..=1000 {
+            let at = -5.0 + 0.01 * f64::from(k);
+            let found = curve.on(&[0.0], &[at])[0];
+            let parabola = 0.002 * at * at;
+            if at <= 1.75 {
+                assert!((found - parabola).abs() < 1e-12, "{at} {found}");
+            } else {
+                assert!(found > parabola - 1e-3, "{at} {found}");
+            }
+        }
+    }
+
+    #[test]
+    fn mirror_images_are_recognised_sample_by_sample() {
+        let y = [-2.0, -0.5, 0.5, 2.0];
+        let profile = |y: &[f64], gap: &[f64]| Gap::profile(1.0, y, gap).is_mirrored();
+        assert_eq!(profile(&y, &[1.0, 0.0, 0.0, 1.0]), [true, true]);
+        assert_eq!(profile(&y, &[1.0, 0.0, 1e-9, 1.0]), [true, false]);
+        let askew = [-2.0, -0.5, 0.6, 2.0];
+        assert_eq!(profile(&askew, &[1.0, 0.0, 0.0, 1.0]), [true, false]);
+        let x = [0.0, 1.0];
+        let rows = |last: f64| vec![vec![3.0, 1.0], vec![0.0, 0.5], vec![3.0, last]];
+        let grid =
+            |x: &[f64], rows: &[Vec<f64>]| Gap::grid(x, &[-1.0, 0.0, 1.0], rows).is_mirrored();
+        assert_eq!(grid(&x, &rows(1.0)), [false, true]);
+        assert_eq!(grid(&x, &rows(1.1)), [false, false]);
+        let even = vec![vec![2.0, 2.0], vec![0.0, 0.0], vec![3.0, 3.0]];
+        assert_eq!(grid(&[-1.0, 1.0], &even), [true, false]);
+    }
+}

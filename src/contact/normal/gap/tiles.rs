@@ -1,0 +1,378 @@
+//! One grid per patch, where one grid for all patches would be too coarse for some of them.
+//!
+//! Patches are taken from a solution on one grid. Each gets a grid of its own, sized by its own width, and patches whose boxes
+//! overlap share one. The pressures of all grids are the unknowns of one conjugate gradient iteration: within a grid the
+//! influence is a convolution, between grids see `coupling.rs`. Every grid is refined, moved or enlarged until its own patch
+//! is settled.
+
+use std::ops::Range;
+
+use crate::contact::monitor::Monitor;
+use crate::contact::normal::gap::conjugate_gradients::{Pressed, press};
+use crate::contact::normal::gap::grid::{Grid, Resolution, within};
+use crate::contact::normal::gap::outcome::Outcome;
+use crate::contact::normal::gap::solve::{
+    APPROACH_CHANGE, COARSER_MAX, Failure, GRIDS_MAX, GapContact, NEAR, PRESSURE_CHANGE,
+    REFINEMENT, edge_reached,
+};
+use crate::contact::normal::gap::tiles_influence::TilesInfluence;
+
+/// More grids than this are not coupled: such a gap is rough, not a few patches of different size.
+const TILES_MAX: usize = 6;
+/// Cells of all grids together.
+const CELLS_MAX: usize = 60_000;
+/// Cells along either axis of a grid whose patch is hardly known yet, at least and at most.
+const CELLS_FIRST: [f64; 2] = [24.0, 56.0];
+/// Violation of the contact conditions relative to the deepest overlap. Small patches yield less than large ones: a quarter of
+/// what serves for one grid.
+const TOLERANCE: f64 = 5e-5;
+/// A patch with less than this part of the load needs fewer cells.
+const SHARE_LARGE: f64 = 0.25;
+const RESOLUTION_SMALL: f64 = 0.7;
+/// Cells across a patch with less of the load than counts.
+const CELLS_TINY: f64 = 10.0;
+
+/// A grid with its part of the solution; distances and pressures are its own, the rest belongs to all.
+#[derive(Debug, Clone)]
+pub(crate) struct Tile {
+    pub(crate) grid: Grid,
+    pub(crate) pressed: Pressed,
+}
+
+/// What follows the grid of a patch.
+enum Next {
+    Keep,
+    Rough,
+    Change(Grid),
+}
+
+impl Tile {
+    /// Load over the area of a cell of 1 mm².
+    pub(crate) fn load(&self) -> f64 {
+        self.pressed.pressure.iter().sum::<f64>() * self.grid.step[0] * self.grid.step[1]
+    }
+
+    pub(crate) fn largest(&self) -> f64 {
+        self.pressed.largest()
+    }
+}
+
+impl GapContact {
+    /// Goes on from a solution on one grid with one grid per patch; none if there is only one patch, or too many.
+    pub(crate) fn solve_on_tiles(
+        &self,
+        whole: Tile,
+        least: f64,
+        resolution: Resolution,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Outcome>, Failure> {
+        let limits = self.gap.window();
+        let mut grids = boxes(&whole, limits);
+        if !(2..=TILES_MAX).contains(&grids.len()) {
+            return Ok(None);
+        }
+        let mut found = Outcome {
+            tiles: vec![whole],
+            iterations: 0,
+            settled: false,
+            pressure_change: 0.0,
+            least,
+        };
+        for _ in 0..GRIDS_MAX {
+            let tiles = self.press_tiles(grids, &found.tiles, monitor)?;
+            let before = std::mem::replace(&mut found.tiles, tiles);
+            found.iterations += found.tiles[0].pressed.iterations;
+            let peak = |tiles: &[Tile]| tiles.iter().map(Tile::largest).fold(0.0, f64::max);
+            found.pressure_change = peak(&before) / peak(&found.tiles) - 1.0;
+            let depth = found.tiles[0].pressed.approach - least;
+            let total: f64 = found.tiles.iter().map(Tile::load).sum();
+            let (mut next, mut changed, mut rough) = (Vec::new(), false, false);
+            for tile in &found.tiles {
+                let resolution = own_resolution(resolution, tile.load() / total);
+                match self.next_tile(tile, &before, depth, resolution)? {
+                    Next::Keep => next.push(tile.grid.clone()),
+                    Next::Rough => {
+                        rough = true;
+                        next.push(tile.grid.clone());
+                    }
+                    Next::Change(grid) => {
+                        changed = true;
+                        next.push(grid);
+                    }
+                }
+            }
+            if !changed {
+                let missed = self.missed(&found.tiles, depth);
+                if missed.is_empty() {
+                    found.settled = !rough;
+                    break;
+                }
+                next.extend(missed);
+            }
+            grids = merged(next);
+            if grids.len() > TILES_MAX || cells(&grids) > CELLS_MAX {
+                break;
+            }
+        }
+        Ok(Some(found))
+    }
+
+    fn press_tiles(
+        &self,
+        grids: Vec<Grid>,
+        before: &[Tile],
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Tile>, Failure> {
+        let mut influence = TilesInfluence::new(&grids, self.contact_modulus);
+        let (mut gap, mut start) = (Vec::new(), Vec::new());
+        for grid in &grids {
+            let own = grid.gap(&self.gap);
+            start.extend(start_on(grid, before, &own));
+            gap.extend(own);
+        }
+        let cell = grids[0].step[0] * grids[0].step[1];
+        let pressed = press(
+            &mut influence,
+            &gap,
+            cell,
+            self.pressing,
+            start,
+            TOLERANCE,
+            monitor,
+        )?;
+        let parts = grids.into_iter().zip(influence.ranges);
+        let tile = |(grid, range): (Grid, Range<usize>)| {
+            let mut pressure = pressed.pressure[range.clone()].to_vec();
+            grid.symmetrise(&mut pressure);
+            let pressed = Pressed {
+                pressure,
+                distance: pressed.distance[range].to_vec(),
+                ..pressed
+            };
+            Tile { grid, pressed }
+        };
+        Ok(parts.map(tile).collect())
+    }
+
+    /// What to do after the grid of a patch: enlarge it, refine it, or be content. See `GapContact::next_grid`.
+    fn next_tile(
+        &self,
+        tile: &Tile,
+        before: &[Tile],
+        depth: f64,
+        resolution: Resolution,
+    ) -> Result<Next, Failure> {
+        let limits = self.gap.window();
+        let Tile { grid, pressed } = tile;
+        let (cut, short): (Vec<_>, Vec<_>) = grid
+            .sides_in_contact(&pressed.pressure)
+            .into_iter()
+            .partition(|side| grid.ends_at(*side, limits));
+        if !short.is_empty() {
+            return Ok(Next::Change(grid.enlarged(&short, limits)));
+        }
+        if tile.largest() <= 0.0 {
+            return Ok(Next::Keep);
+        }
+        let wanted = grid.wanted(pressed, NEAR * depth, resolution, limits);
+        let finer = Grid::new(wanted.window, wanted.cells, grid.mirrored);
+        if (0..2).any(|k| finer.step[k] < COARSER_MAX * grid.step[k]) {
+            return Ok(Next::Change(finer));
+        }
+        if let Some(side) = cut.first() {
+            return Err(edge_reached(*side, limits));
+        }
+        let middle = [0, 1].map(|k| 0.5 * (grid.range(k)[0] + grid.range(k)[1]));
+        let holds = |other: &&Tile| {
+            (0..2).all(|k| (other.grid.range(k)[0]..other.grid.range(k)[1]).contains(&middle[k]))
+        };
+        let Some(coarse) = before.iter().find(holds) else {
+            return Ok(Next::Keep);
+        };
+        if resolution.patch <= CELLS_TINY || coarse.grid == *grid {
+            return Ok(Next::Keep);
+        }
+        let ratio = |k: usize| coarse.grid.step[k] / grid.step[k];
+        let ratio = ratio(0).max(ratio(1));
+        // The largest pressure of one grid for all may be that of another patch.
+        let alone = coarse.grid.patches(&coarse.pressed.pressure).len() == 1;
+        let moved = (pressed.approach - coarse.pressed.approach).abs();
+        if moved <= APPROACH_CHANGE * ratio * depth
+            && alone
+            && (coarse.largest() / tile.largest() - 1.0).abs() <= PRESSURE_CHANGE * ratio
+        {
+            return Ok(Next::Keep);
+        }
+        let cells = grid.cells.map(|n| (n as f64 * REFINEMENT) as usize);
+        let finer = Grid::new(wanted.window, cells, grid.mirrored);
+        if (0..2).all(|k| finer.step[k] > COARSER_MAX * grid.step[k]) {
+            return Ok(Next::Rough);
+        }
+        Ok(Next::Change(finer))
+    }
+
+    /// Grids around samples of the gap outside all grids at which the deformed surfaces overlap: patches that were too small to
+    /// be seen before.
+    fn missed(&self, tiles: &[Tile], depth: f64) -> Vec<Grid> {
+        let approach = tiles[0].pressed.approach;
+        let limits = self.gap.window();
+        let samples = self.gap.samples();
+        let x = if samples[0].is_empty() {
+            &[0.0][..]
+        } else {
+            samples[0]
+        };
+        let y = samples[1];
+        let values = self.gap.on(x, y);
+        let sources: Vec<[f64; 3]> = tiles.iter().flat_map(point_loads).collect();
+        let inside = |at: [f64; 2]| {
+            tiles.iter().any(|tile| {
+                (0..2).all(|k| {
+                    let [low, high] = tile.grid.range(k);
+                    at[k] >= low && at[k] <= high
+                })
+            })
+        };
+        let factor = 1.0 / (std::f64::consts::PI * self.contact_modulus);
+        let mut found = Vec::new();
+        for (k, value) in values.iter().enumerate().filter(|(_, h)| **h < approach) {
+            let at = [x[k % x.len()], y[k / x.len()]];
+            if inside(at) {
+                continue;
+            }
+            let down: f64 = sources
+                .iter()
+                .map(|[u, v, force]| force / (at[0] - u).hypot(at[1] - v))
+                .sum();
+            if value + factor * down - approach < -NEAR * depth {
+                let spacing = |axis: &[f64], i: usize| {
+                    let [low, high] = [i.saturating_sub(1), (i + 1).min(axis.len() - 1)];
+                    axis[high] - axis[low]
+                };
+                let across = spacing(y, k / x.len());
+                let along = if samples[0].is_empty() {
+                    across
+                } else {
+                    spacing(x, k % x.len())
+                };
+                let window = [along, across].into_iter().zip(at);
+                let mut window = window.map(|(half, at)| [at - half, at + half]);
+                let window = [window.next(), window.next()].map(Option::unwrap_or_default);
+                let mirrored = [self.gap.is_mirrored()[0] && samples[0].is_empty(), false];
+                let cells = [CELLS_FIRST[0] as usize; 2];
+                found.push(Grid::new(within(window, limits), cells, mirrored));
+            }
+        }
+        found
+    }
+}
+
+/// Pressures of a tile as point loads `[x, y, N]`, several cells in one.
+fn point_loads(tile: &Tile) -> Vec<[f64; 3]> {
+    const PARTS: usize = 10;
+    let grid = &tile.grid;
+    let [x, y] = [grid.centres(0), grid.centres(1)];
+    let area = grid.step[0] * grid.step[1];
+    let mut sums = vec![[0.0; 3]; PARTS * PARTS];
+    for (k, p) in tile.pressed.pressure.iter().enumerate() {
+        let [i, j] = [k % grid.cells[0], k / grid.cells[0]];
+        let part = (j * PARTS / grid.cells[1]) * PARTS + i * PARTS / grid.cells[0];
+        let force = p * area;
+        let sum = &mut sums[part];
+        *sum = [sum[0] + force * x[i], sum[1] + force * y[j], sum[2] + force];
+    }
+    let pressing = sums.into_iter().filter(|sum| sum[2] > 0.0);
+    pressing
+        .map(|[x, y, force]| [x / force, y / force, force])
+        .collect()
+}
+
+/// The resolution that a part of the load asks for.
+fn own_resolution(resolution: Resolution, share: f64) -> Resolution {
+    if share < resolution.share_min {
+        Resolution {
+            contact: CELLS_TINY,
+            patch: CELLS_TINY,
+            ..resolution
+        }
+    } else if share < SHARE_LARGE {
+        Resolution {
+            contact: RESOLUTION_SMALL * resolution.contact,
+            ..resolution
+        }
+    } else {
+        resolution
+    }
+}
+
+/// A box around every patch of a grid, those that overlap in one.
+fn boxes(whole: &Tile, limits: [[f64; 2]; 2]) -> Vec<Grid> {
+    let grid = &whole.grid;
+    let boxes = grid.patches(&whole.pressed.pressure).into_iter();
+    let boxes = boxes.map(|patch| {
+        let window = grid.window_of(&patch);
+        let window = [0, 1].map(|k| {
+            let [low, high] = window[k];
+            let margin = (1.5 * grid.step[k]).max(0.15 * (high - low));
+            [low - margin, high + margin]
+        });
+        let window = within(window, limits);
+        let cells = [0, 1].map(|k| {
+            let [low, high] = window[k];
+            ((high - low) / grid.step[k]).clamp(CELLS_FIRST[0], CELLS_FIRST[1]) as usize
+        });
+        let middle = window[1][0] + window[1][1];
+        let straddles = middle.abs() < 1e-9 * (window[1][1] - window[1][0]);
+        let mirrored = [grid.mirrored[0], grid.mirrored[1] && straddles];
+        Grid::new(window, cells, mirrored)
+    });
+    merged(boxes.collect())
+}
+
+/// The grids, those that overlap replaced by one over both with the finer cells.
+fn merged(mut grids: Vec<Grid>) -> Vec<Grid> {
+    let overlap = |a: &Grid, b: &Grid| {
+        (0..2).all(|k| a.range(k)[0] < b.range(k)[1] && b.range(k)[0] < a.range(k)[1])
+    };
+    let mut k = 0;
+    while k < grids.len() {
+        let other = (k + 1..grids.len()).find(|m| overlap(&grids[k], &grids[*m]));
+        let Some(other) = other else {
+            k += 1;
+            continue;
+        };
+        let (a, b) = (grids[k].clone(), grids.swap_remove(other));
+        let window = [0, 1].map(|k| {
+            let [a, b] = [a.range(k), b.range(k)];
+            [a[0].min(b[0]), a[1].max(b[1])]
+        });
+        let cells = [0, 1].map(|k| {
+            let [low, high] = window[k];
+            ((high - low) / a.step[k].min(b.step[k])).ceil() as usize
+        });
+        let mirrored = [0, 1].map(|k| a.mirrored[k] && b.mirrored[k]);
+        grids[k] = Grid::new(window, cells, mirrored);
+        k = 0;
+    }
+    grids
+}
+
+fn cells(grids: &[Grid]) -> usize {
+    grids.iter().map(|grid| grid.cells[0] * grid.cells[1]).sum()
+}
+
+/// Pressures to start from on a grid: those of all earlier grids that reach into it.
+fn start_on(grid: &Grid, before: &[Tile], gap: &[f64]) -> Vec<f64> {
+    let mut start = vec![0.0_f64; gap.len()];
+    for tile in before {
+        if tile.grid == *grid {
+            return tile.pressed.pressure.clone();
+        }
+        let found = grid.interpolated(&tile.grid, &tile.pressed.pressure);
+        for (p, other) in start.iter_mut().zip(found) {
+            *p = p.max(other);
+        }
+    }
+    let largest = before.iter().map(Tile::largest).fold(0.0, f64::max);
+    grid.never_empty(start, largest, gap)
+}

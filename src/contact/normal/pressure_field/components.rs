@@ -1,0 +1,69 @@
+//! Finds the separate patches of a grid: which positive samples hang together.
+
+use crate::contact::normal::pressure_field::given::{Grid, PATCHES_MAX};
+
+/// Label of samples and cells that belong to no patch.
+pub(crate) const NOWHERE: u8 = u8::MAX;
+
+/// Label of every sample, from 0 in order of the smallest y (then x), and the number of patches.
+///
+/// Samples hang together over edges and corners: a slender patch that lies askew in the grid would fall apart
+/// otherwise, and the interpolated region between two diagonal samples belongs to both.
+///
+/// # Errors
+/// The number of patches, if there are more than [`PATCHES_MAX`].
+pub(crate) fn label_samples(grid: &Grid, q: &[f64]) -> Result<(Vec<u8>, usize), usize> {
+    let (nx, ny) = (grid.x.len(), grid.y.len());
+    let mut labels = vec![NOWHERE; nx * ny];
+    let mut seen = vec![false; nx * ny];
+    let mut stack = Vec::new();
+    let mut count = 0;
+    // The order of storage is that of y, so patches are met in the order wanted.
+    for start in 0..nx * ny {
+        if seen[start] || q[start] <= 0.0 {
+            continue;
+        }
+        seen[start] = true;
+        stack.push(start);
+        while let Some(k) = stack.pop() {
+            if count < PATCHES_MAX {
+                labels[k] = count as u8;
+            }
+            let (i, j) = (k % nx, k / nx);
+            for j in j.saturating_sub(1)..(j + 2).min(ny) {
+                for i in i.saturating_sub(1)..(i + 2).min(nx) {
+                    let neighbour = j * nx + i;
+                    if !seen[neighbour] && q[neighbour] > 0.0 {
+                        seen[neighbour] = true;
+                        stack.push(neighbour);
+                    }
+                }
+            }
+        }
+        count += 1;
+    }
+    if count > PATCHES_MAX {
+        Err(count)
+    } else {
+        Ok((labels, count))
+    }
+}
+
+/// Label of every cell between four samples, stored like the samples at its corner of smallest x and y: that of its
+/// corners, of which no two belong to different patches.
+pub(crate) fn label_cells(grid: &Grid, samples: &[u8]) -> Vec<u8> {
+    let (nx, ny) = (grid.x.len(), grid.y.len());
+    let mut labels = vec![NOWHERE; nx * ny];
+    for j in 0..ny - 1 {
+        for i in 0..nx - 1 {
+            let k = j * nx + i;
+            let corners = [k, k + 1, k + nx, k + nx + 1];
+            labels[k] = corners
+                .map(|k| samples[k])
+                .into_iter()
+                .min()
+                .unwrap_or(NOWHERE);
+        }
+    }
+    labels
+}

@@ -1,0 +1,154 @@
+//! The pressure of a whole contact: on one grid, or on a grid per patch where patches differ much in size.
+
+use crate::contact::mesh::strips::Chord;
+use crate::contact::normal::pressure_field::given::{GridPressure, PATCHES_MAX};
+use crate::contact::normal::pressure_field::jumps::Jump;
+use crate::contact::normal::region::Patch;
+use crate::contact::remark::entry::RemarkEntry;
+
+/// Pressures on one grid or several, and the patches they form.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PressureField {
+    grids: Vec<GridPressure>,
+    /// Grid of every patch, and the patch's number there; in order of the smallest y.
+    places: Vec<[usize; 2]>,
+}
+
+impl PressureField {
+    /// Finds the patches of a pressure; `pressure[j][i]` in MPa belongs to `(x[i], y[j])` in mm.
+    ///
+    /// Axes increase strictly and have at least 2 points; pressures are finite and not negative. Returns the field and
+    /// remarks for the answer.
+    ///
+    /// # Errors
+    /// A sentence, if no pressure is positive or there are more than 64 patches.
+    pub fn new(
+        x: &[f64],
+        y: &[f64],
+        pressure: &[Vec<f64>],
+    ) -> Result<(PressureField, Vec<RemarkEntry>), String> {
+        let (grid, remarks) = GridPressure::new(x, y, pressure)?;
+        Ok((PressureField::of_grids(vec![grid])?, remarks))
+    }
+
+    /// The field of pressures on grids that do not overlap.
+    ///
+    /// # Errors
+    /// A sentence, if there are more than 64 patches.
+    pub fn of_grids(grids: Vec<GridPressure>) -> Result<PressureField, String> {
+        let mut places: Vec<[usize; 2]> = (0..grids.len())
+            .flat_map(|g| (0..grids[g].patches().len()).map(move |k| [g, k]))
+            .collect();
+        if places.len() > PATCHES_MAX {
+            return Err(format!(
+                "{} separate patches found; at most {PATCHES_MAX} are allowed",
+                places.len()
+            ));
+        }
+        if grids.len() > 1 {
+            let low = |[g, k]: &[usize; 2]| grids[*g].patches()[*k].extent[2];
+            places.sort_by(|a, b| low(a).total_cmp(&low(b)));
+        }
+        Ok(PressureField { grids, places })
+    }
+
+    /// The patches, in order of their smallest y: force, extent, area and largest pressure.
+    #[must_use]
+    pub fn patches(&self) -> Vec<Patch> {
+        let patches: Vec<Vec<Patch>> = self.grids.iter().map(GridPressure::patches).collect();
+        self.places.iter().map(|[g, k]| patches[*g][*k]).collect()
+    }
+
+    /// The patch whose extent holds a place `[x, y]` in mm, if there is one.
+    #[must_use]
+    pub fn patch_at(&self, [x, y]: [f64; 2]) -> Option<usize> {
+        self.patches().iter().position(|patch| {
+            let [x_min, x_max, y_min, y_max] = patch.extent;
+            (x_min..=x_max).contains(&x) && (y_min..=y_max).contains(&y)
+        })
+    }
+
+    /// Spacings of the grid across each patch, along the axis that has fewer.
+    #[must_use]
+    pub fn cells_across(&self) -> Vec<f64> {
+        let cells: Vec<Vec<f64>> = self.grids.iter().map(GridPressure::cells_across).collect();
+        self.places.iter().map(|[g, k]| cells[*g][*k]).collect()
+    }
+
+    /// The largest jump of a given pressure, if it has any.
+    #[must_use]
+    pub fn jump(&self) -> Option<Jump> {
+        self.grids.iter().find_map(GridPressure::jump)
+    }
+
+    /// How far a given pressure is from smooth, see [`GridPressure::surprise`].
+    #[must_use]
+    pub fn surprise(&self) -> f64 {
+        let each = self.grids.iter().map(GridPressure::surprise);
+        each.fold(0.0, f64::max)
+    }
+
+    /// Segments that a strip has on average, for each patch.
+    #[must_use]
+    pub fn segments_per_strip(&self) -> Vec<f64> {
+        let segments: Vec<Vec<f64>> = self
+            .grids
+            .iter()
+            .map(GridPressure::segments_per_strip)
+            .collect();
+        self.places.iter().map(|[g, k]| segments[*g][*k]).collect()
+    }
+
+    /// Chords of one patch on the given strips, each `(y, dy)` with its mid-line at y: none where the strip misses the
+    /// patch, several from smaller to larger x where the patch is hollow or bent.
+    #[must_use]
+    pub fn chords(&self, patch: usize, strips: &[(f64, f64)]) -> Vec<Chord> {
+        let [grid, label] = self.places[patch];
+        let chords = self.grids[grid].chords(label, strips).into_iter();
+        chords.map(|chord| Chord { patch, ..chord }).collect()
+    }
+
+    /// Mean of the interpolated pressure in MPa over `x0 < x < x1` on the line of a chord; 0 outside the chord. For
+    /// `x0 = x1` the pressure there. See [`GridPressure::mean_pressure`].
+    #[must_use]
+    pub fn mean_pressure(&self, chord: &Chord, x0: f64, x1: f64) -> f64 {
+        let [grid, _] = self.places[chord.patch];
+        self.grids[grid].mean_pressure(chord, x0, x1)
+    }
+
+    /// Load centre `[x, y]` in mm of one patch, or of all of them: the mean place weighted with the pressure.
+    #[must_use]
+    pub fn load_centre(&self, patch: Option<usize>) -> [f64; 2] {
+        if let Some(patch) = patch {
+            let [grid, label] = self.places[patch];
+            return self.grids[grid].load_centre(Some(label));
+        }
+        if let [grid] = &self.grids[..] {
+            return grid.load_centre(None);
+        }
+        let (mut weight, mut sum) = (0.0, [0.0; 2]);
+        for (patch, known) in self.patches().iter().enumerate() {
+            let at = self.load_centre(Some(patch));
+            weight += known.normal_force;
+            sum = [0, 1].map(|k| sum[k] + known.normal_force * at[k]);
+        }
+        sum.map(|sum| sum / weight)
+    }
+
+    /// The same pressure with its coordinates counted from another origin, in mm.
+    #[must_use]
+    pub fn from_origin(mut self, origin: [f64; 2]) -> PressureField {
+        let grids = self.grids.into_iter();
+        self.grids = grids.map(|grid| grid.from_origin(origin)).collect();
+        self
+    }
+
+    /// The same contact under a force times a factor near 1, with approaches larger by so much in mm: lengths from the origin
+    /// and pressures grow with the cube root of the force, as in Hertz's contacts.
+    #[must_use]
+    pub fn corrected(mut self, factor: f64, approach: f64) -> PressureField {
+        let grids = self.grids.into_iter();
+        self.grids = grids.map(|grid| grid.corrected(factor, approach)).collect();
+        self
+    }
+}

@@ -1,0 +1,354 @@
+//! A pressure given by the client on a grid, brought onto strips without losing load.
+//!
+//! The contact is where the interpolated square of the pressure is positive: squared pressure falls linearly at the
+//! edge, so that edges are found well inside a grid spacing (see `level_set.rs`), and Hertz's pressure is reproduced
+//! exactly. The force of a patch is the sum of its samples times their share of the grid; the mesh scales the
+//! pressures on its strips to carry just that.
+
+use crate::contact::mesh::strips::Chord;
+use crate::contact::normal::pressure_field::components;
+use crate::contact::normal::pressure_field::level_set;
+use crate::contact::normal::pressure_field::line;
+use crate::contact::normal::region::Patch;
+use crate::contact::numerics::cubic::{interval, weights};
+use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::remark::list::Remark;
+
+use crate::contact::normal::pressure_field::jumps::Jump;
+use crate::contact::normal::pressure_field::level_set::State;
+use crate::contact::normal::pressure_field::line::Line;
+use crate::contact::normal::pressure_field::patch_shape::Shape;
+
+/// Patches of one grid.
+pub(crate) const PATCHES_MAX: usize = 64;
+/// Of so many intervals on a chord, three points of quadrature in each do.
+const INTERVALS_MANY: f64 = 24.0;
+/// Grid lines added on each side: the contact may reach half a spacing beyond the grid, the interpolation needs more.
+pub(crate) const PADDING: usize = 4;
+
+/// Coordinates of a rectangular grid in mm; the value at `(x[i], y[j])` is stored at `j * x.len() + i`.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Grid {
+    pub(crate) x: Vec<f64>,
+    pub(crate) y: Vec<f64>,
+}
+
+/// Pressure samples on one rectangular grid and the patches they form.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GridPressure {
+    /// The given grid with [`PADDING`] more lines on each side.
+    pub(crate) grid: Grid,
+    /// Squared pressure relative to its largest value, continued below 0 outside the contact.
+    pub(crate) q: Vec<f64>,
+    /// Samples that are positive or continued by a parabola.
+    smooth: Vec<bool>,
+    /// Patch of every cell of the grid that touches one of its samples.
+    pub(crate) cells: Vec<u8>,
+    /// Largest pressure in MPa.
+    pub(crate) pressure_max: f64,
+    pub(crate) shapes: Vec<Shape>,
+    /// The patch that is the mirror image about y = 0 of each one; empty if the pressure has no such symmetry.
+    pub(crate) images: Vec<usize>,
+    /// The largest jump from one given sample to the next.
+    pub(crate) jump: Option<Jump>,
+    pub(crate) surprise: f64,
+}
+
+impl GridPressure {
+    /// Finds the patches of a pressure; `pressure[j][i]` in MPa belongs to `(x[i], y[j])` in mm.
+    ///
+    /// Axes increase strictly and have at least 2 points; pressures are finite and not negative. Returns the field and
+    /// remarks for the answer.
+    ///
+    /// # Errors
+    /// A sentence, if no pressure is positive or there are more than 64 patches.
+    pub fn new(
+        x: &[f64],
+        y: &[f64],
+        pressure: &[Vec<f64>],
+    ) -> Result<(GridPressure, Vec<RemarkEntry>), String> {
+        let pressure_max = pressure.iter().flatten().copied().fold(0.0, f64::max);
+        let grid = Grid {
+            x: padded(x),
+            y: padded(y),
+        };
+        let mut q = vec![0.0; grid.x.len() * grid.y.len()];
+        for (j, row) in pressure.iter().enumerate() {
+            for (i, p) in row.iter().enumerate() {
+                q[(j + PADDING) * grid.x.len() + i + PADDING] = (p / pressure_max).powi(2);
+            }
+        }
+        if !q.iter().any(|q| *q > 0.0) {
+            return Err(
+                "no pressure more than 0 given; at least one is needed for a contact".to_owned(),
+            );
+        }
+        let (mut field, samples) = GridPressure::from_squares(grid, q, pressure_max)?;
+        let mut remarks = field.remarks(&samples, &field.shapes);
+        (field.surprise, field.jump) = field.find_jump();
+        if let Some(jump) = field.jump {
+            let remark = Remark::PressureJumps {
+                x_mm: jump.at[0],
+                y_mm: jump.at[1],
+                share_of_largest: jump.fall,
+            };
+            remarks.push(remark.into());
+        }
+        field.find_edges();
+        Ok((field, remarks))
+    }
+
+    /// A field whose patches have no region yet, and the patch of every sample; `q` is as in [`GridPressure::q`] with 0
+    /// outside the contact.
+    pub(crate) fn from_squares(
+        grid: Grid,
+        q: Vec<f64>,
+        pressure_max: f64,
+    ) -> Result<(GridPressure, Vec<u8>), String> {
+        let (samples, count) = components::label_samples(&grid, &q).map_err(|count| {
+            format!("{count} separate patches found; at most {PATCHES_MAX} are allowed")
+        })?;
+        let cells = components::label_cells(&grid, &samples);
+        let mut field = GridPressure {
+            grid,
+            q,
+            smooth: Vec::new(),
+            cells,
+            pressure_max,
+            shapes: Vec::new(),
+            images: Vec::new(),
+            jump: None,
+            surprise: 0.0,
+        };
+        field.shapes = field.shapes_from_samples(&samples, count);
+        field.images = field.find_images(&samples);
+        Ok((field, samples))
+    }
+
+    /// Continues the squared pressures beyond the contact and measures the region of every patch.
+    pub(crate) fn find_edges(&mut self) {
+        let states = level_set::extend(&self.grid, &mut self.q);
+        self.smooth = states
+            .into_iter()
+            .map(|state| state == State::Smooth)
+            .collect();
+        for label in 0..self.shapes.len() {
+            let (extent, area) = self.measure(label, &self.shapes[label]);
+            let patch = &mut self.shapes[label].patch;
+            (patch.extent, patch.area) = (extent, area);
+        }
+        self.make_images_alike();
+    }
+
+    /// The patches found, in order of the smallest y of their samples.
+    ///
+    /// `normal_force` is the sum of the samples' pressures times the areas they stand for, which reach half-way to the
+    /// neighbouring samples; `area` is that of the interpolated region, `pressure_max` the largest sample.
+    #[must_use]
+    pub fn patches(&self) -> Vec<Patch> {
+        self.shapes.iter().map(|shape| shape.patch).collect()
+    }
+
+    /// Segments that a strip has on average, for each patch.
+    #[must_use]
+    pub fn segments_per_strip(&self) -> Vec<f64> {
+        self.shapes
+            .iter()
+            .map(|shape| shape.segments_per_strip)
+            .collect()
+    }
+
+    /// Chords of one patch on the given strips, each `(y, dy)` with its mid-line at y: none where the strip misses the
+    /// patch, several from smaller to larger x where the patch is hollow or bent.
+    #[must_use]
+    pub fn chords(&self, patch: usize, strips: &[(f64, f64)]) -> Vec<Chord> {
+        let [x_min, x_max, ..] = self.shapes[patch].patch.extent;
+        let mut chords = Vec::new();
+        for (strip, &(y, dy)) in strips.iter().enumerate() {
+            // Between the lines that told the extent, rough data may reach a little farther; the extent is kept to.
+            let within = |(left, right): (f64, f64)| (left.max(x_min), right.min(x_max));
+            let segments = self.segments(patch, y).into_iter().map(within);
+            let segments = segments.filter(|(left, right)| right > left);
+            chords.extend(segments.map(|(left, right)| Chord {
+                patch,
+                strip,
+                y,
+                dy,
+                left,
+                right,
+            }));
+        }
+        chords
+    }
+
+    /// Mean of the interpolated pressure in MPa over `x0 < x < x1` on the line of a chord; 0 outside the chord. For
+    /// `x0 = x1` the pressure there.
+    ///
+    /// Gauss–Legendre quadrature of order 10 per grid interval (6 where intervals are many) in the root of the distance from the nearer end of the
+    /// chord, in which the pressure is smooth; exact to about 1e-9 for Hertz's pressure.
+    #[must_use]
+    pub fn mean_pressure(&self, chord: &Chord, x0: f64, x1: f64) -> f64 {
+        let (low, high) = (x0.max(chord.left), x1.min(chord.right));
+        if low > high {
+            return 0.0;
+        }
+        let x = &self.grid.x;
+        let y = if self.images.is_empty() {
+            chord.y
+        } else {
+            chord.y.abs()
+        };
+        let j = self.row_interval(y);
+        let weights = weights(&self.grid.y, j, y);
+        let (first, last) = (self.column_interval(low), self.column_interval(high));
+        let value = |i: usize| self.value_on_column(i, j, weights);
+        let mut values: [f64; 4] = std::array::from_fn(|k| value(first - 1 + k));
+        if x0 == x1 {
+            let cubic = line::cubic(x, first, values);
+            return self.pressure_max * cubic.at(low).sqrt();
+        }
+        let centre = 0.5 * (chord.right + chord.left);
+        let three = |from: f64, to: f64| (to - from) * INTERVALS_MANY < chord.right - chord.left;
+        let mut integral = 0.0;
+        for i in first..=last {
+            if i > first {
+                values = [values[1], values[2], values[3], value(i + 2)];
+            }
+            let cubic = line::cubic(x, i, values);
+            let (from, to) = (low.max(x[i]), high.min(x[i + 1]));
+            let pressure = |x: f64| cubic.at(x).sqrt();
+            if from < centre.min(to) {
+                let s = [from, centre.min(to)].map(|x| (x - chord.left).max(0.0).sqrt());
+                integral += gauss(s, three(from, to), |s| {
+                    2.0 * s * pressure(chord.left + s * s)
+                });
+            }
+            if to > centre.max(from) {
+                let s = [to, centre.max(from)].map(|x| (chord.right - x).max(0.0).sqrt());
+                integral += gauss(s, three(from, to), |s| {
+                    2.0 * s * pressure(chord.right - s * s)
+                });
+            }
+        }
+        self.pressure_max * integral / (x1 - x0)
+    }
+
+    /// Where the line at y lies in a patch: segments from smaller to larger x.
+    pub(crate) fn segments(&self, label: usize, y: f64) -> Vec<(f64, f64)> {
+        let (label, y) = match self.images.get(label) {
+            Some(image) if y < 0.0 => (*image, -y),
+            _ => (label, y),
+        };
+        let shape = &self.shapes[label];
+        let Grid { x, y: rows } = &self.grid;
+        let j = interval(rows, y);
+        if rows[j] > y || rows[j + 1] < y || !shape.rows.contains(&j) {
+            return Vec::new();
+        }
+        let t = (y - rows[j]) / (rows[j + 1] - rows[j]);
+        let weights = weights(rows, j, y);
+        // One more node on either side for the tangents.
+        let nodes = shape.columns.start() - 1..=shape.columns.end() + 2;
+        let line = Line {
+            axis: x,
+            first: *nodes.start(),
+            values: nodes.map(|i| self.value_on_column(i, j, weights)).collect(),
+            smooth: shape
+                .columns
+                .clone()
+                .map(|i| self.is_smooth(i, j))
+                .collect(),
+            allowed: shape
+                .columns
+                .clone()
+                .map(|i| self.allowed(label, i, j, t))
+                .collect(),
+        };
+        line.segments()
+    }
+
+    /// The part of cell (i, j) along x that may belong to a patch, on the line at the fraction t of its width.
+    ///
+    /// Cells that touch a sample of the patch belong to it as a whole. The edge may bulge out of them by a little where
+    /// it is smooth and runs nearly parallel to the grid (by an eighth of the squared spacing over the radius); farther
+    /// out the curve is not to be trusted.
+    fn allowed(&self, label: usize, i: usize, j: usize, t: f64) -> [f64; 2] {
+        const BULGE: f64 = 0.125;
+        let nx = self.grid.x.len();
+        let cell = j * nx + i;
+        let touches = |cell: usize| usize::from(self.cells[cell]) == label;
+        if touches(cell) {
+            return [0.0, 1.0];
+        }
+        if !self.is_smooth(i, j) {
+            return [0.0, 0.0];
+        }
+        if (touches(cell - nx) && t <= BULGE) || (touches(cell + nx) && t >= 1.0 - BULGE) {
+            return [0.0, 1.0];
+        }
+        match (touches(cell - 1), touches(cell + 1)) {
+            (true, false) => [0.0, BULGE],
+            (false, true) => [1.0 - BULGE, 1.0],
+            _ => [0.0, 0.0],
+        }
+    }
+
+    /// Are the four corners of cell (i, j) smooth?
+    fn is_smooth(&self, i: usize, j: usize) -> bool {
+        let nx = self.grid.x.len();
+        let k = j * nx + i;
+        [k, k + 1, k + nx, k + nx + 1]
+            .iter()
+            .all(|k| self.smooth[*k])
+    }
+
+    /// Value on column i between the rows j and j + 1.
+    fn value_on_column(&self, i: usize, j: usize, weights: [f64; 4]) -> f64 {
+        let nx = self.grid.x.len();
+        let k = j * nx + i;
+        let nodes = [k - nx, k, k + nx, k + 2 * nx];
+        let value: f64 = weights
+            .iter()
+            .zip(nodes)
+            .map(|(weight, k)| weight * self.q[k])
+            .sum();
+        let smooth = self.smooth[k] && self.smooth[k + nx];
+        let [low, high] = line::bounds(self.q[k], self.q[k + nx], smooth);
+        value.clamp(low, high)
+    }
+
+    fn row_interval(&self, y: f64) -> usize {
+        interval(&self.grid.y, y).clamp(1, self.grid.y.len() - 3)
+    }
+
+    fn column_interval(&self, x: f64) -> usize {
+        interval(&self.grid.x, x).clamp(1, self.grid.x.len() - 3)
+    }
+}
+
+/// An axis with [`PADDING`] more points on each side, spaced like the outermost ones.
+pub(crate) fn padded(axis: &[f64]) -> Vec<f64> {
+    let n = axis.len();
+    let (first, last) = (axis[1] - axis[0], axis[n - 1] - axis[n - 2]);
+    let before = (1..=PADDING).rev().map(|k| axis[0] - first * k as f64);
+    let after = (1..=PADDING).map(|k| axis[n - 1] + last * k as f64);
+    before.chain(axis.iter().copied()).chain(after).collect()
+}
+
+/// Gauss–Legendre quadrature with five points, or three where they do (Abramowitz and Stegun 1964, table 25.4).
+fn gauss([from, to]: [f64; 2], three: bool, f: impl Fn(f64) -> f64) -> f64 {
+    const THREE: [(f64, f64); 2] = [
+        (0.0, 0.888_888_888_888_889),
+        (0.774_596_669_241_483_4, 0.555_555_555_555_555_6),
+    ];
+    const FIVE: [(f64, f64); 3] = [
+        (0.0, 0.568_888_888_888_888_9),
+        (0.538_469_310_105_683_1, 0.478_628_670_499_366_47),
+        (0.906_179_845_938_664, 0.236_926_885_056_189_08),
+    ];
+    let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
+    let points = if three { &THREE[..] } else { &FIVE[..] };
+    let pair = |(at, weight): &(f64, f64)| weight * (f(middle - half * at) + f(middle + half * at));
+    let outer: f64 = points[1..].iter().map(pair).sum();
+    half * (points[0].1 * f(middle) + outer)
+}

@@ -1,0 +1,78 @@
+//! How well samples resolve a pressure: cells across a patch, and jumps from one sample to the next.
+
+use crate::contact::normal::pressure_field::given::{GridPressure, PADDING};
+
+/// A fall of the squared pressure over one interval beyond what the interval before lets expect, relative to the largest
+/// squared pressure, from which on it is a jump. An edge of Hertz's kind expects all of its fall; powers of a lens from 0.5
+/// to 1.5 reach 0.21 on 12 samples a side, a hole 0.9.
+const JUMP: f64 = 0.35;
+
+/// A place where a pressure falls from one sample to the next as no edge of a contact does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Jump {
+    /// Coordinates in mm, halfway between the two samples.
+    pub at: [f64; 2],
+    /// The fall over the largest pressure.
+    pub fall: f64,
+}
+
+impl GridPressure {
+    /// Spacings of the grid across each patch, along the axis that has fewer.
+    #[must_use]
+    pub fn cells_across(&self) -> Vec<f64> {
+        let axes = [&self.grid.x, &self.grid.y];
+        let spacing = axes.map(|axis| (axis[axis.len() - 1] - axis[0]) / (axis.len() - 1) as f64);
+        let across = |extent: [f64; 4]| {
+            let along = [0, 1].map(|k| (extent[2 * k + 1] - extent[2 * k]) / spacing[k]);
+            along[0].min(along[1])
+        };
+        self.patches()
+            .iter()
+            .map(|patch| across(patch.extent))
+            .collect()
+    }
+
+    /// The largest surprise from one sample to the next, before edges are found (squared pressures are then 0 outside the contact),
+    /// and the jump there, if it is one.
+    pub(crate) fn find_jump(&self) -> (f64, Option<Jump>) {
+        let (nx, ny) = (self.grid.x.len(), self.grid.y.len());
+        let mut largest: (f64, Option<Jump>) = (0.0, None);
+        for j in PADDING..ny - PADDING {
+            for i in PADDING..nx - PADDING {
+                for (di, dj) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
+                    let index = |steps: isize| {
+                        let column = i as isize + steps * di;
+                        let row = j as isize + steps * dj;
+                        (row as usize) * nx + column as usize
+                    };
+                    let [before, here, next] = [-1, 0, 1].map(|steps| self.q[index(steps)]);
+                    // What the two samples before continue to, less what is there.
+                    let surprise = 2.0 * here - before.max(here) - next;
+                    if here > 0.0 && surprise > largest.0 {
+                        let middle = |axis: &[f64], k: usize, d: isize| {
+                            0.5 * (axis[k] + axis[(k as isize + d) as usize])
+                        };
+                        let at = [middle(&self.grid.x, i, di), middle(&self.grid.y, j, dj)];
+                        let fall = here.sqrt() - next.max(0.0).sqrt();
+                        largest = (surprise, Some(Jump { at, fall }));
+                    }
+                }
+            }
+        }
+        let (surprise, jump) = largest;
+        (surprise, jump.filter(|_| surprise > JUMP))
+    }
+
+    /// The largest jump of the pressure, if it has any.
+    #[must_use]
+    pub fn jump(&self) -> Option<Jump> {
+        self.jump
+    }
+
+    /// The largest fall of the squared pressure over one interval that the interval before does not let expect, relative to the largest
+    /// squared pressure: up to 0.2 on smooth pressures.
+    #[must_use]
+    pub fn surprise(&self) -> f64 {
+        self.surprise
+    }
+}

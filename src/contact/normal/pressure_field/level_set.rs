@@ -1,0 +1,231 @@
+//! Continues squared pressure beyond the edge of the contact, so that the edge is where it passes through 0.
+//!
+//! At the edge of a smooth contact the pressure falls like the root of the distance, its square q like the distance
+//! itself. Samples outside the contact (where only `p = 0` is known) therefore get negative values extrapolated from
+//! inside. For Hertz's pressure q is a parabola and the continuation is exact.
+
+use crate::contact::normal::pressure_field::given::Grid;
+
+/// Samples outside that get a value, counted from the nearest one inside along either axis.
+const RINGS: usize = 3;
+/// Value of samples farther out; the largest inside is 1.
+const FAR: f64 = -1.0;
+/// What is known of a sample, from least to best.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum State {
+    /// Nothing.
+    Unknown,
+    /// Continued beyond a jump of pressure by repetition; a curve through the jump would fall without end.
+    Step,
+    /// Continued from fewer than three samples, or limited.
+    Rough,
+    /// Positive, or continued by a parabola through smooth samples.
+    Smooth,
+}
+
+/// Replaces the zeros of `q` near positive samples by extrapolated values, none of them positive; `q` is scaled to at
+/// most 1 and stored as [`Grid`] says. Returns how each sample is known.
+pub(crate) fn extend(grid: &Grid, q: &mut [f64]) -> Vec<State> {
+    let state_of = |q: &f64| {
+        if *q > 0.0 {
+            State::Smooth
+        } else {
+            State::Unknown
+        }
+    };
+    let mut states: Vec<State> = q.iter().map(state_of).collect();
+    let mut missing: Vec<usize> = near_positive(grid, q)
+        .into_iter()
+        .enumerate()
+        .filter_map(|(k, near)| (near && states[k] == State::Unknown).then_some(k))
+        .collect();
+    // A sample diagonally three away is reached after six steps along the axes.
+    for pass in 0..2 * RINGS {
+        let found: Vec<_> = missing
+            .iter()
+            .map(|k| continued(grid, q, &states, *k, pass == 0))
+            .collect();
+        let mut left = Vec::new();
+        for (k, found) in missing.into_iter().zip(found) {
+            if let Some((value, state)) = found {
+                (q[k], states[k]) = (value, state);
+            } else {
+                left.push(k);
+            }
+        }
+        missing = left;
+    }
+    for (q, state) in q.iter_mut().zip(&states) {
+        if *state == State::Unknown {
+            *q = FAR;
+        }
+    }
+    states
+}
+
+/// Which samples have a positive one at most [`RINGS`] away along x and along y.
+fn near_positive(grid: &Grid, q: &[f64]) -> Vec<bool> {
+    let (nx, ny) = (grid.x.len(), grid.y.len());
+    let reach = |k: usize, n: usize| k.saturating_sub(RINGS)..(k + RINGS + 1).min(n);
+    let along: Vec<bool> = (0..nx * ny)
+        .map(|k| reach(k % nx, nx).any(|i| q[k / nx * nx + i] > 0.0))
+        .collect();
+    (0..nx * ny)
+        .map(|k| reach(k / nx, ny).any(|j| along[j * nx + k % nx]))
+        .collect()
+}
+
+/// Value of the unknown sample `k` from the best extrapolations along the axes, if there is any: their harmonic mean,
+/// so that a weak patch is not squeezed by the steep end of a strong one beside it.
+fn continued(
+    grid: &Grid,
+    q: &[f64],
+    states: &[State],
+    k: usize,
+    first_pass: bool,
+) -> Option<(f64, State)> {
+    let nx = grid.x.len();
+    let directions = [
+        (&grid.x, k % nx, 1, -1),
+        (&grid.x, k % nx, 1, 1),
+        (&grid.y, k / nx, nx as isize, -1),
+        (&grid.y, k / nx, nx as isize, 1),
+    ];
+    let (mut best, mut inverse_sum, mut count, mut state) = (0, 0.0, 0.0, State::Smooth);
+    for (axis, at, stride, sign) in directions {
+        // Up to three known samples in this direction, nearest first, as (coordinate, value).
+        let mut known = [(0.0, 0.0); 3];
+        let mut order = 0;
+        let mut worst = State::Smooth;
+        while let Some(index) = at.checked_add_signed(sign * (order as isize + 1))
+            && order < 3
+            && index < axis.len()
+        {
+            let sample = k.wrapping_add_signed(sign * stride * (order as isize + 1));
+            if states[sample] == State::Unknown {
+                break;
+            }
+            known[order] = (axis[index], q[sample]);
+            worst = worst.min(states[sample]);
+            order += 1;
+        }
+        if order == 0 || order < best {
+            continue;
+        }
+        if order > best {
+            (best, inverse_sum, count, state) = (order, 0.0, 0.0, State::Smooth);
+        }
+        let known = &known[..order];
+        let nearest = states[k.wrapping_add_signed(sign * stride)];
+        let (value, how) = match nearest {
+            State::Step => (known[0].1, State::Step),
+            _ if first_pass => edge_value(axis[at], known),
+            _ => outward_value(axis[at], known),
+        };
+        // Zero stays zero.
+        inverse_sum += 1.0 / value.min(-1e-300);
+        count += 1.0;
+        state = state.min(how).min(worst.max(State::Rough));
+    }
+    (best > 0).then_some((count / inverse_sum, state))
+}
+
+/// Value of the first sample outside, from one to three samples inside, and how it is known.
+///
+/// The value is never positive, so the edge lies between the last sample inside and the first outside. Where the
+/// pressure jumps (extrapolation stays well above 0) the edge is put half-way; in between the rule changes over
+/// smoothly.
+fn edge_value(at: f64, inside: &[(f64, f64)]) -> (f64, State) {
+    const EDGE_AT_SAMPLE: f64 = 0.25;
+    const JUMP: f64 = 0.75;
+    let last = inside[0].1;
+    if inside.len() == 1 {
+        return (-last, State::Step);
+    }
+    let value = extrapolate(at, inside);
+    if value <= 0.0 {
+        return (
+            value,
+            if inside.len() == 3 {
+                State::Smooth
+            } else {
+                State::Rough
+            },
+        );
+    }
+    let value = value.min(extrapolate(at, &inside[..2]));
+    if value <= EDGE_AT_SAMPLE * last {
+        return (value.min(0.0), State::Rough);
+    }
+    let jump = (value / last - EDGE_AT_SAMPLE) / (JUMP - EDGE_AT_SAMPLE);
+    (-last * jump.min(1.0), State::Step)
+}
+
+/// Value of a sample farther out, from one to three known ones; it does not rise outward.
+fn outward_value(at: f64, known: &[(f64, f64)]) -> (f64, State) {
+    let value = extrapolate(at, known);
+    let smooth = known.len() == 3 && value <= known[0].1;
+    (
+        value.min(known[0].1),
+        if smooth { State::Smooth } else { State::Rough },
+    )
+}
+
+/// Value at `at` of the polynomial of least degree through the points (Lagrange).
+fn extrapolate(at: f64, points: &[(f64, f64)]) -> f64 {
+    let mut value = 0.0;
+    for (k, (xk, qk)) in points.iter().enumerate() {
+        let mut weight = 1.0;
+        for (m, (xm, _)) in points.iter().enumerate() {
+            if m != k {
+                weight *= (at - xm) / (xk - xm);
+            }
+        }
+        value += weight * qk;
+    }
+    value
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parabola_is_continued_exactly() {
+        let axis: Vec<f64> = (0..24)
+            .map(|k| -1.4 + 0.12 * f64::from(k) + 0.001 * f64::from(k * k))
+            .collect();
+        let grid = Grid {
+            x: axis.clone(),
+            y: axis,
+        };
+        let exact = |k: usize| {
+            let (x, y) = (grid.x[k % 24], grid.y[k / 24]);
+            1.0 - x * x - 0.3 * x * y - 1.3 * y * y
+        };
+        let mut q: Vec<f64> = (0..24 * 24).map(|k| exact(k).max(0.0)).collect();
+        let near = near_positive(&grid, &q);
+        extend(&grid, &mut q);
+        let worst = (0..24 * 24)
+            .filter(|k| near[*k])
+            .map(|k| (q[k] - exact(k)).abs())
+            .fold(0.0, f64::max);
+        assert!(worst < 1e-11, "{worst}");
+        assert!(near.iter().any(|near| !near) && q.iter().all(|q| *q <= 1.0));
+    }
+
+    #[test]
+    fn the_edge_stays_between_inside_and_outside() {
+        let last = 0.5;
+        for next in [0.0, 0.2, 0.5, 0.6, 1.0, 5.0] {
+            let (value, _) = edge_value(2.0, &[(1.0, last), (0.0, next)]);
+            assert!(value <= 0.0, "{next}: {value}");
+        }
+        assert_eq!(edge_value(2.0, &[(1.0, last)]), (-last, State::Step));
+        let flat = [(1.0, last), (0.0, last), (-1.0, last)];
+        assert_eq!(edge_value(2.0, &flat), (-last, State::Step));
+        // A parabola that reaches 0 just at the sample keeps its edge there in spite of rounding.
+        let hertz = [(1.0, 3.0), (0.0, 4.0), (-1.0, 3.0 + 1e-15)];
+        assert_eq!(edge_value(2.0, &hertz), (0.0, State::Rough));
+    }
+}

@@ -1,0 +1,125 @@
+//! Squared pressure along a straight grid-parallel line: where it is positive.
+
+use crate::contact::numerics::cubic::Cubic;
+
+/// Values at the nodes of an axis, and the intervals that may belong to a patch.
+#[derive(Debug)]
+pub(crate) struct Line<'f> {
+    pub(crate) axis: &'f [f64],
+    /// Node of the axis that `values` starts with.
+    pub(crate) first: usize,
+    pub(crate) values: Vec<f64>,
+    /// For each interval from the second node on: are the samples around it smooth?
+    pub(crate) smooth: Vec<bool>,
+    /// For each interval from the second node on: which part of it may belong to the patch, from 0 at its start to 1
+    /// at its end; nothing if the part is empty.
+    pub(crate) allowed: Vec<[f64; 2]>,
+}
+
+/// A cubic kept within the bounds that its ends suggest.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Bounded {
+    cubic: Cubic,
+    bounds: [f64; 2],
+}
+
+impl Line<'_> {
+    /// The segments where the curve is positive, from smaller to larger coordinate.
+    pub(crate) fn segments(&self) -> Vec<(f64, f64)> {
+        let mut segments: Vec<(f64, f64)> = Vec::new();
+        for (k, [from, to]) in self
+            .allowed
+            .iter()
+            .enumerate()
+            .filter(|(_, [from, to])| to > from)
+        {
+            let node = self.first + 1 + k;
+            let (low, high) = (self.axis[node], self.axis[node + 1]);
+            // The ends of a whole interval are its nodes to the last digit, so that segments join there.
+            let part = |s: f64, end: f64| {
+                if s == 0.0 || s == 1.0 {
+                    end
+                } else {
+                    low + s * (high - low)
+                }
+            };
+            let (from, to) = (part(*from, low), part(*to, high));
+            self.positive_parts(k, |left, right| {
+                let (left, right) = (left.max(from), right.min(to));
+                match segments.last_mut() {
+                    _ if left >= right => {}
+                    Some(last) if last.1 == left => last.1 = right,
+                    _ => segments.push((left, right)),
+                }
+            });
+        }
+        segments
+    }
+
+    /// Tells where the curve is positive in one interval, part by part.
+    fn positive_parts(&self, k: usize, mut tell: impl FnMut(f64, f64)) {
+        let node = self.first + 1 + k;
+        let (low, high) = (self.axis[node], self.axis[node + 1]);
+        let values = [0, 1, 2, 3].map(|m| self.values[k + m]);
+        let [_, here, next, _] = values;
+        // Between two positive nodes the contact is whole: a gap there is not in the data.
+        if here > 0.0 && next > 0.0 {
+            tell(low, high);
+            return;
+        }
+        // Between two others a bulge is believed where it continues a smooth edge.
+        if here <= 0.0 && next <= 0.0 && !self.smooth[k] {
+            return;
+        }
+        let mut start = (here > 0.0).then_some(low);
+        for (at, positive) in Cubic::between(self.axis, node, values).sign_changes() {
+            if positive {
+                start = Some(at);
+            } else if let Some(start) = start.take() {
+                tell(start, at);
+            }
+        }
+        if let Some(start) = start {
+            tell(start, high);
+        }
+    }
+}
+
+/// The curve between nodes `i` and `i + 1` of the axis; `values` belong to the nodes `i − 1` to `i + 2`.
+pub(crate) fn cubic(axis: &[f64], i: usize, values: [f64; 4]) -> Bounded {
+    Bounded {
+        cubic: Cubic::between(axis, i, values),
+        bounds: bounds(values[1], values[2], true),
+    }
+}
+
+/// Least and largest value of the curve between two nodes.
+///
+/// If both are positive it stays above a quarter of the lower one; if none is and they are not smooth, below a quarter
+/// of the higher one, so not positive. It never exceeds twice the largest sample, which is 1: pressure between samples
+/// is larger than on them by some per cent, more comes from very unequal spacing.
+pub(crate) fn bounds(left: f64, right: f64, smooth: bool) -> [f64; 2] {
+    const LARGEST: f64 = 2.0;
+    let (lower, higher) = (left.min(right), left.max(right));
+    let low = if lower > 0.0 {
+        0.25 * lower
+    } else {
+        f64::NEG_INFINITY
+    };
+    let high = if higher > 0.0 || smooth {
+        LARGEST
+    } else {
+        0.25 * higher
+    };
+    [low, high]
+}
+
+impl Bounded {
+    /// Value at x, never negative.
+    pub(crate) fn at(&self, x: f64) -> f64 {
+        self.cubic
+            .at(x)
+            .clamp(self.bounds[0], self.bounds[1])
+            .max(0.0)
+    }
+}

@@ -1,0 +1,11 @@
+//! Pressures on a grid of samples: given by the client, or computed from a gap.
+
+pub mod components;
+pub mod computed;
+pub mod field;
+pub mod given;
+pub mod jumps;
+pub mod level_set;
+pub mod line;
+pub mod moments;
+pub mod patch_shape;

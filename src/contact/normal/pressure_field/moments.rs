@@ -1,0 +1,151 @@
+//! The load centre of a pressure, and the same pressure moved or corrected.
+
+use crate::contact::normal::pressure_field::given::GridPressure;
+
+impl GridPressure {
+    /// Load centre `[x, y]` in mm of one patch, or of all of them: the mean place weighted with the pressure.
+    #[must_use]
+    pub fn load_centre(&self, patch: Option<usize>) -> [f64; 2] {
+        let width = self.grid.x.len();
+        let share = |axis: &[f64], k: usize| 0.5 * (axis[k + 1] - axis[k - 1]);
+        let (mut weight, mut sum) = (0.0, [0.0; 2]);
+        for (k, q) in self.q.iter().enumerate().filter(|(_, q)| **q > 0.0) {
+            let [i, j] = [k % width, k / width];
+            // Continued values outside the contact are not positive, so that these are samples, away from the border.
+            if patch.is_some_and(|patch| usize::from(self.cells[k]) != patch) {
+                continue;
+            }
+            let own = q.sqrt() * share(&self.grid.x, i) * share(&self.grid.y, j);
+            weight += own;
+            sum = [sum[0] + own * self.grid.x[i], sum[1] + own * self.grid.y[j]];
+        }
+        sum.map(|sum| sum / weight)
+    }
+
+    /// The same pressure with its coordinates counted from another origin, in mm.
+    #[must_use]
+    pub fn from_origin(mut self, origin: [f64; 2]) -> GridPressure {
+        self.grid.x.iter_mut().for_each(|x| *x -= origin[0]);
+        self.grid.y.iter_mut().for_each(|y| *y -= origin[1]);
+        for shape in &mut self.shapes {
+            let [x_min, x_max, y_min, y_max] = shape.patch.extent;
+            shape.patch.extent = [
+                x_min - origin[0],
+                x_max - origin[0],
+                y_min - origin[1],
+                y_max - origin[1],
+            ];
+        }
+        if origin[1] != 0.0 {
+            self.images.clear();
+        }
+        self
+    }
+
+    /// The same contact under a force times a factor near 1, with approaches larger by so much in mm: lengths from the origin
+    /// and pressures grow with the cube root of the force, as in Hertz's contacts.
+    #[must_use]
+    pub fn corrected(mut self, factor: f64, approach: f64) -> GridPressure {
+        let root = factor.cbrt();
+        self.pressure_max *= root;
+        let axes = [&mut self.grid.x, &mut self.grid.y];
+        axes.into_iter().flatten().for_each(|at| *at *= root);
+        for shape in &mut self.shapes {
+            let patch = &mut shape.patch;
+            patch.normal_force *= factor;
+            patch.pressure_max *= root;
+            patch.area *= root * root;
+            patch.extent = patch.extent.map(|at| root * at);
+            patch.approach = patch.approach.map(|before| before + approach);
+        }
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn two_bumps() -> GridPressure {
+        let x: Vec<f64> = (-20..=20).map(|k| 0.2 * f64::from(k)).collect();
+        let y: Vec<f64> = (-50..=50).map(|k| 0.2 * f64::from(k)).collect();
+        let bump = |x: f64, y: f64, y0: f64, size: f64| {
+            size * (1.0 - (x - 0.3).powi(2) / 4.0 - (y - y0).powi(2) / 9.0)
+                .max(0.0)
+                .sqrt()
+        };
+        let rows: Vec<Vec<f64>> = y
+            .iter()
+            .map(|y| {
+                x.iter()
+                    .map(|x| bump(*x, *y, -5.0, 600.0) + bump(*x, *y, 4.0, 300.0))
+                    .collect()
+            })
+            .collect();
+        GridPressure::new(&x, &y, &rows).unwrap().0
+    }
+
+    #[test]
+    fn every_patch_has_its_load_centre_and_all_have_the_weighted_mean() {
+        let field = two_bumps();
+        let patches = field.patches();
+        assert_eq!(patches.len(), 2);
+        let centres = [0, 1].map(|k| field.load_centre(Some(k)));
+        for (centre, y) in centres.iter().zip([-5.0, 4.0]) {
+            assert!(
+                (centre[0] - 0.3).abs() < 5e-3 && (centre[1] - y).abs() < 5e-3,
+                "{centre:?}"
+            );
+        }
+        let all = field.load_centre(None);
+        let force = patches[0].normal_force + patches[1].normal_force;
+        let mean = (patches[0].normal_force * centres[0][1]
+            + patches[1].normal_force * centres[1][1])
+            / force;
+        assert!((all[1] - mean).abs() < 1e-9, "{all:?} {mean}");
+    }
+
+    #[test]
+    fn moving_changes_coordinates_only() {
+        let field = two_bumps();
+        let moved = field.clone().from_origin([0.3, -5.0]);
+        let centre = moved.load_centre(Some(0));
+        assert!(
+            centre[0].abs() < 5e-3 && centre[1].abs() < 5e-3,
+            "{centre:?}"
+        );
+        for (before, after) in field.patches().iter().zip(moved.patches()) {
+            assert!((after.normal_force / before.normal_force - 1.0).abs() < 1e-12);
+            assert!((after.extent[0] - before.extent[0] + 0.3).abs() < 1e-12);
+            assert!((after.extent[3] - before.extent[3] - 5.0).abs() < 1e-12);
+            assert_eq!(after.area, before.area);
+        }
+        let chord = |field: &GridPressure, y: f64| field.chords(0, &[(y, 0.1)])[0];
+        let (here, there) = (chord(&field, -4.2), chord(&moved, 0.8));
+        assert!((here.left - there.left - 0.3).abs() < 1e-12);
+    }
+
+    #[test]
+    fn correcting_grows_the_contact_as_hertz_does() {
+        let field = two_bumps();
+        let corrected = field.clone().corrected(1.03, 0.002);
+        let root = 1.03_f64.cbrt();
+        for (before, after) in field.patches().iter().zip(corrected.patches()) {
+            assert!((after.normal_force / before.normal_force - 1.03).abs() < 1e-12);
+            assert!((after.pressure_max / before.pressure_max - root).abs() < 1e-12);
+            assert!((after.area / before.area - root * root).abs() < 1e-12);
+        }
+        // The pressures on the cells carry just that force: a line's load times its width grows with the third power.
+        let load = |field: &GridPressure, y: f64| {
+            let chord = field.chords(0, &[(y, 0.1)])[0];
+            let length = chord.right - chord.left;
+            (
+                length,
+                length * field.mean_pressure(&chord, chord.left, chord.right),
+            )
+        };
+        let (before, after) = (load(&field, -4.2), load(&corrected, -4.2 * root));
+        assert!((after.0 / before.0 - root).abs() < 1e-9);
+        assert!((after.1 / before.1 - root * root).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,4 @@
+//! The height of a wheel above the rail at which normal forces carry its load.
+
+pub mod bracket;
+pub mod search;

@@ -1,0 +1,484 @@
+//! A wheel on a rail by their cross-sections: the height of the wheel at which its patches carry the load.
+//!
+//! At one height every patch has a gap of its own, in its own frame, and is pressed by the overlap there. The height is
+//! sought by secant steps in `N^(2/3)`, which for Hertz's contacts is proportional to the lowering; the first slope comes
+//! from the stiffness of flat punches of the same areas, `dN/dδ = 2 E* √(A/π)`. Until the height is nearly found, gaps are sampled
+//! and solved coarsely.
+
+use std::f64::consts::PI;
+
+use crate::contact::geometry::contact_locus::{Frame, Search};
+use crate::contact::geometry::local_gap::{Detail, LocalGap};
+use crate::contact::geometry::surface_exit::SurfaceExit;
+use crate::contact::geometry::wheel_rail::WheelRail;
+use crate::contact::monitor::Monitor;
+use crate::contact::normal::gap::solve::{Failure, GapContact, Report};
+use crate::contact::normal::gap::surface::Gap;
+use crate::contact::normal::hertz::Pressing;
+use crate::contact::normal::neighbours::{Neighbour, neglected};
+use crate::contact::normal::pressure_field::field::PressureField;
+use crate::contact::normal::wheel_height::bracket::{Bracket, HeightExit};
+use crate::contact::profile_trust::trust::Trust;
+use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::remark::list::Remark;
+
+/// Heights looked at before giving up.
+const HEIGHTS_MAX: u32 = 40;
+/// The force found may differ from the one wanted by the target of the resultants' error, but by no more and no less than this; the
+/// contact is then grown to the force as Hertz's would be. What is left is of second order for Hertz's contacts, about a third
+/// of this part in pressures and lengths at worst. Below the lower bound heights differ by no more than their grids do.
+const FORCE_TOLERANCE: [f64; 2] = [5e-4, 5e-3];
+/// That third, as an error of the load.
+const CORRECTED: f64 = 1.0 / 3.0;
+/// A coarse look that misses the force by no more than this is followed by a fine one.
+const NEAR: f64 = 0.02;
+/// A patch that overlaps by less than this part of the deepest overlap carries nothing to speak of (about its power 3/2).
+const DEPTH_SHARE_MIN: f64 = 2e-3;
+
+/// What presses the wheel on the rail.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Loading {
+    /// Vertical force in N.
+    Vertical(f64),
+    /// Sum of the normal forces of all patches in N.
+    Normal(f64),
+    /// The wheel is lowered by so many mm below first touch.
+    Lowering(f64),
+}
+
+/// A wheel over its rail, and what presses them together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ProfileContact {
+    /// Wheel and rail in place.
+    pub geometry: WheelRail,
+    /// The load.
+    pub loading: Loading,
+    /// Contact modulus `E* = G/(1−ν)` in MPa.
+    pub contact_modulus: f64,
+    /// What the case says about the trust in the profiles.
+    pub trust: Trust,
+}
+
+/// The wheel at rest on its rail.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PressedWheel {
+    /// How far the wheel is below first touch, in mm.
+    pub lowering: f64,
+    /// The force that is prescribed, in N, as it came out at the last height, and its derivative by the lowering.
+    found: [f64; 2],
+    /// By how much, relatively, the load of region and pressure may differ from the one wanted.
+    pub load_error: f64,
+    /// By which part the prescribed force was missed at the last height, before the contact was corrected to it.
+    pub force_residual: f64,
+    /// Height of the wheel's centre over the top of the rail, in mm.
+    pub centre: f64,
+    /// Heights looked at.
+    pub heights: u32,
+    /// What presses, from smaller to larger y of the track; never empty.
+    pub patches: Vec<PressedGap>,
+    /// Remarks for the answer.
+    pub remarks: Vec<RemarkEntry>,
+}
+
+/// The contact in one gap: usually one patch, several where they lie near each other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PressedGap {
+    /// Frame of the coordinates, with its origin at the load centre.
+    pub frame: Frame,
+    /// Deepest overlap of the undeformed bodies in mm.
+    approach: f64,
+    /// Region and pressure.
+    pub field: PressureField,
+    /// How it was found.
+    pub report: Report,
+    /// Remarks for the answer.
+    pub remarks: Vec<RemarkEntry>,
+}
+
+impl PressedGap {
+    /// Sum of the normal forces in N.
+    #[must_use]
+    pub fn normal_force(&self) -> f64 {
+        let patches = self.field.patches();
+        patches.iter().map(|patch| patch.normal_force).sum()
+    }
+
+    /// Force per mm of approach of flat punches of the same areas (exact for circles), divided by `2 E*`.
+    fn stiffness(&self) -> f64 {
+        let patches = self.field.patches();
+        patches.iter().map(|patch| (patch.area / PI).sqrt()).sum()
+    }
+}
+
+/// How a wheel should come to rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wanted {
+    /// Of a vertical force the normal forces carry the part `1 / (1 + friction_share)`.
+    pub friction_share: f64,
+    /// How exactly.
+    pub accuracy: Accuracy,
+}
+
+/// How exactly a force is to be carried.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Accuracy {
+    /// It may be missed by this part, by coarse gaps: a place to go on from.
+    About(f64),
+    /// As resultants with this error relative to μN need it; the contact is corrected to the force.
+    For(f64),
+}
+
+impl Accuracy {
+    fn tolerance(self) -> f64 {
+        let [low, high] = FORCE_TOLERANCE;
+        match self {
+            Accuracy::About(part) => part,
+            Accuracy::For(target) => target.clamp(low, high),
+        }
+    }
+}
+
+/// How finely the wheel is solved at one height.
+#[derive(Debug, Clone, Copy)]
+struct Fineness {
+    detail: Detail,
+    /// Target of the resultants' error relative to μN.
+    target: f64,
+}
+
+impl Fineness {
+    fn fine(wanted: Wanted) -> Fineness {
+        let target = match wanted.accuracy {
+            Accuracy::About(_) => f64::INFINITY,
+            Accuracy::For(target) => target,
+        };
+        Fineness {
+            detail: Detail::Fine,
+            target,
+        }
+    }
+}
+
+impl PressedWheel {
+    /// The wheel at the height where the search ended, corrected to the force that was wanted.
+    fn at_rest(mut self, exit: HeightExit, wanted: f64) -> PressedWheel {
+        let [carried, slope] = self.found;
+        // Where the force jumps, its slope says nothing of the height.
+        let lower = if exit.converged() {
+            (wanted - carried) / slope
+        } else {
+            0.0
+        };
+        self.force_residual = exit.missed();
+        self.load_error = match exit {
+            HeightExit::Jump { .. } => exit.missed(),
+            _ => CORRECTED * exit.missed(),
+        };
+        self.remarks.extend(exit.remark().map(RemarkEntry::from));
+        self.correct(wanted / carried, lower);
+        self
+    }
+
+    /// Forces times a factor near 1, and the wheel lower by so much in mm.
+    fn correct(&mut self, factor: f64, lower: f64) {
+        self.found[0] *= factor;
+        self.lowering += lower;
+        self.centre -= lower;
+        for gap in &mut self.patches {
+            let approach = lower * gap.frame.angle.cos();
+            gap.approach += approach;
+            gap.field = gap.field.clone().corrected(factor, approach);
+        }
+    }
+
+    /// Vertical part of the normal forces in N.
+    #[must_use]
+    pub fn vertical_force(&self) -> f64 {
+        let part = |gap: &PressedGap| gap.normal_force() * gap.frame.angle.cos();
+        self.patches.iter().map(part).sum()
+    }
+}
+
+impl ProfileContact {
+    /// The same with other smoothings of rail and wheel, in mm.
+    #[must_use]
+    pub fn smoothed(&self, smoothing: [f64; 2]) -> ProfileContact {
+        ProfileContact {
+            geometry: self.geometry.smoothed(smoothing),
+            ..self.clone()
+        }
+    }
+
+    /// The search for the places of contact, with its overlaps divided among gaps as near the height that is expected.
+    ///
+    /// # Errors
+    /// As [`Search::new`].
+    pub fn search(&self) -> Result<Search<'_>, String> {
+        let search = Search::new(&self.geometry)?;
+        let expected = match self.loading {
+            Loading::Vertical(force) | Loading::Normal(force) => {
+                search.estimated_lowering(force / self.contact_modulus)
+            }
+            Loading::Lowering(lowering) => lowering,
+        };
+        Ok(search.grouped_near(expected))
+    }
+
+    /// Brings the wheel to rest, from an earlier rest under a similar load if there is one.
+    ///
+    /// # Errors
+    /// A reason why there is no answer; or the monitor stopped the work.
+    pub fn press(
+        &self,
+        search: &Search,
+        wanted: Wanted,
+        before: Option<&PressedWheel>,
+        monitor: &dyn Monitor,
+    ) -> Result<PressedWheel, Failure> {
+        let target = match self.loading {
+            Loading::Vertical(force) => force / (1.0 + wanted.friction_share),
+            Loading::Normal(force) => force,
+            Loading::Lowering(lowering) => {
+                return self.lowered(search, lowering, Fineness::fine(wanted), monitor);
+            }
+        };
+        let near = |force: f64| (force / target - 1.0).abs() <= NEAR;
+        let tolerance = wanted.accuracy.tolerance();
+        let exact = matches!(wanted.accuracy, Accuracy::For(_));
+        let mut bracket = Bracket::default();
+        let mut fineness = Fineness {
+            detail: Detail::Coarse,
+            ..Fineness::fine(wanted)
+        };
+        let mut lowering = match before {
+            Some(before) => {
+                if near(before.found[0]) && exact {
+                    fineness.detail = Detail::Fine;
+                }
+                let [carried, slope] = before.found;
+                bracket.next(before.lowering, carried, target, slope)
+            }
+            None => search.estimated_lowering(target / self.contact_modulus),
+        };
+        for heights in 1..=HEIGHTS_MAX {
+            let mut found = match self.looked_at(search, lowering, fineness, monitor) {
+                Ok(found) => found,
+                Err(Failure::NoAnswer(reason)) => {
+                    // Too deep, perhaps; the load may be carried higher up.
+                    lowering = bracket
+                        .refuse(lowering, reason)
+                        .map_err(Failure::NoAnswer)?;
+                    continue;
+                }
+                Err(stopped) => return Err(stopped),
+            };
+            let [carried, slope] = found.found;
+            let known = bracket.slope;
+            let next = bracket.next(lowering, carried, target, slope);
+            found.found[1] = bracket.slope.or(known).unwrap_or(slope);
+            found.heights = heights;
+            let missed = (carried / target - 1.0).abs();
+            if missed <= tolerance && !exact {
+                return Ok(found);
+            }
+            let fine = fineness.detail == Detail::Fine;
+            if missed <= tolerance && fine {
+                return Ok(found.at_rest(HeightExit::Met { missed }, target));
+            }
+            if let Some(reason) = bracket.closed_on_refusal(lowering) {
+                return Err(Failure::NoAnswer(reason));
+            }
+            let closed = bracket.is_closed(lowering);
+            if closed && fine {
+                let exit = HeightExit::closed(target / carried, tolerance);
+                return Ok(found.at_rest(exit, target));
+            }
+            lowering = if closed { found.lowering } else { next };
+            if closed || !fine && near(carried) {
+                // What coarse looks said of the forces on either side is not sharp enough to go on from, the slope is.
+                fineness.detail = Detail::Fine;
+                bracket = bracket.opened(found.found[1]);
+            }
+        }
+        Err(Failure::NoAnswer(format!(
+            "no height of the wheel carries the load after {HEIGHTS_MAX} tries"
+        )))
+    }
+
+    /// The wheel at one height; where a coarse look has no answer, a fine one may.
+    fn looked_at(
+        &self,
+        search: &Search,
+        lowering: f64,
+        fineness: Fineness,
+        monitor: &dyn Monitor,
+    ) -> Result<PressedWheel, Failure> {
+        match self.lowered(search, lowering, fineness, monitor) {
+            Err(Failure::NoAnswer(_)) if fineness.detail == Detail::Coarse => {
+                let fine = Fineness {
+                    detail: Detail::Fine,
+                    ..fineness
+                };
+                self.lowered(search, lowering, fine, monitor)
+            }
+            found => found,
+        }
+    }
+
+    /// The wheel at one height.
+    fn lowered(
+        &self,
+        search: &Search,
+        lowering: f64,
+        fineness: Fineness,
+        monitor: &dyn Monitor,
+    ) -> Result<PressedWheel, Failure> {
+        let centre = search.touch - lowering;
+        let gaps = search
+            .gaps(lowering, fineness.detail)
+            .map_err(Failure::NoAnswer)?;
+        let depths: Vec<f64> = gaps.iter().map(depth).collect();
+        let least = DEPTH_SHARE_MIN * depths.iter().copied().fold(0.0, f64::max);
+        let touching = gaps.iter().zip(&depths).filter(|(_, d)| **d > least);
+        let patches = touching
+            .map(|(gap, depth)| self.pressed(gap, *depth, centre, fineness, monitor))
+            .collect::<Result<Vec<_>, _>>()?;
+        if patches.is_empty() {
+            return Err(Failure::NoAnswer(
+                "wheel and rail do not overlap at this height of the wheel".to_owned(),
+            ));
+        }
+        let mut wheel = PressedWheel {
+            lowering,
+            found: [0.0; 2],
+            load_error: 0.0,
+            force_residual: 0.0,
+            centre,
+            heights: 1,
+            patches,
+            remarks: Vec::new(),
+        };
+        let carried = self.carried(&wheel);
+        wheel.found = [carried, self.slope(&wheel, carried)];
+        Ok(wheel)
+    }
+
+    /// One gap under the overlap it has; approaches count from the first touch of its patch along the normal.
+    fn pressed(
+        &self,
+        gap: &LocalGap,
+        depth: f64,
+        centre: f64,
+        fineness: Fineness,
+        monitor: &dyn Monitor,
+    ) -> Result<PressedGap, Failure> {
+        if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.0) {
+            return Err(Failure::Stopped(stop));
+        }
+        let above: Vec<Vec<f64>> = gap
+            .gap
+            .iter()
+            .map(|row| row.iter().map(|height| height + depth).collect())
+            .collect();
+        let contact = GapContact {
+            gap: Gap::grid(&gap.x, &gap.y, &above),
+            pressing: Pressing::Approach(depth),
+            contact_modulus: self.contact_modulus,
+        };
+        let found = match fineness.detail {
+            Detail::Coarse => contact.estimate(monitor)?,
+            Detail::Fine => contact.solve_for(fineness.target, monitor)?,
+        };
+        let mut remarks = found.remarks;
+        remarks.extend(missed_beside(gap, &found.field));
+        let moved = |to: [f64; 2]| {
+            let place = self.geometry.moved(&gap.frame, to, centre);
+            place.map_err(|miss| Failure::NoAnswer(miss.to_string()))
+        };
+        if fineness.detail == Detail::Fine {
+            for patch in 0..found.field.patches().len() {
+                moved(found.field.load_centre(Some(patch)))?;
+            }
+        }
+        let middle = found.field.load_centre(None);
+        Ok(PressedGap {
+            frame: moved(middle)?,
+            approach: depth,
+            field: found.field.from_origin(middle),
+            report: found.report,
+            remarks,
+        })
+    }
+
+    /// A remark if the patches in gaps of their own would change each other's forces by more than a part of the load.
+    #[must_use]
+    pub fn uncoupled(&self, wheel: &PressedWheel, part: f64) -> Option<Remark> {
+        let gaps = wheel.patches.iter().map(|gap| Neighbour {
+            frame: gap.frame,
+            force: gap.normal_force(),
+            approach: gap.approach,
+        });
+        let keeps_load = !matches!(self.loading, Loading::Lowering(_));
+        let gaps: Vec<Neighbour> = gaps.collect();
+        let [share, distance_mm] = neglected(&gaps, self.contact_modulus, keeps_load)?;
+        (share > part).then_some(Remark::PatchesUncoupled { share, distance_mm })
+    }
+
+    /// The force that is prescribed, as it came out.
+    fn carried(&self, found: &PressedWheel) -> f64 {
+        match self.loading {
+            Loading::Vertical(_) => found.vertical_force(),
+            Loading::Normal(_) | Loading::Lowering(_) => {
+                found.patches.iter().map(PressedGap::normal_force).sum()
+            }
+        }
+    }
+
+    /// Estimated derivative of that force by the lowering.
+    fn slope(&self, found: &PressedWheel, carried: f64) -> f64 {
+        let part = |gap: &PressedGap| {
+            let cos = gap.frame.angle.cos();
+            let own = 2.0 * self.contact_modulus * gap.stiffness() * cos;
+            match self.loading {
+                Loading::Vertical(_) => own * cos,
+                Loading::Normal(_) | Loading::Lowering(_) => own,
+            }
+        };
+        let slope: f64 = found.patches.iter().map(part).sum();
+        // The power 3/2 of Hertz's contacts is a bound for anything that grows as it is pressed.
+        slope.max(carried / found.lowering)
+    }
+}
+
+/// A remark on samples of a gap over which the wheel's surface was not found, if some lie in a patch or next to it: elsewhere
+/// the bodies are apart all the same.
+fn missed_beside(gap: &LocalGap, field: &PressureField) -> Option<RemarkEntry> {
+    let spacing = |axis: &[f64]| axis[1] - axis[0];
+    let [along, across] = [spacing(&gap.x), spacing(&gap.y)];
+    let patches = field.patches();
+    let beside = |[x, y]: &[f64; 2]| {
+        patches.iter().any(|patch| {
+            let [x_min, x_max, y_min, y_max] = patch.extent;
+            (x_min - along..=x_max + along).contains(x)
+                && (y_min - across..=y_max + across).contains(y)
+        })
+    };
+    let count = gap.missed.iter().filter(|place| beside(place)).count();
+    let share = count as f64 / (gap.x.len() * gap.y.len()) as f64;
+    let remark = Remark::IterationInexact {
+        iteration: "samples of the wheel's surface over the plane of contact",
+        reason: SurfaceExit::StepsUsedUp.reason(),
+        residual: share,
+        tolerance: 0.0,
+    };
+    (count > 0).then(|| remark.into())
+}
+
+/// Deepest overlap of a gap in mm.
+fn depth(gap: &LocalGap) -> f64 {
+    -gap.gap
+        .iter()
+        .flatten()
+        .copied()
+        .fold(f64::INFINITY, f64::min)
+}

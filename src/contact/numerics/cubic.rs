@@ -1,0 +1,274 @@
+//! Smooth interpolation on an axis with unequal spacing: one cubic per interval, its roots and extremes.
+//!
+//! Tangents at the nodes are those of the parabola through the node and its two neighbours, so the curve has a
+//! continuous derivative and reproduces parabolas exactly (Catmull and Rom 1974, for unequal spacing).
+
+/// A cubic `c0 + c1 s + c2 s² + c3 s³` on an interval, with s from 0 at its start to 1 at its end.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Cubic {
+    start: f64,
+    length: f64,
+    coefficients: [f64; 4],
+    /// The value at s = 1, which the sum of the coefficients meets only up to rounding: neighbouring intervals have to
+    /// agree on its sign.
+    end: f64,
+}
+
+impl Cubic {
+    /// The curve between nodes `i` and `i + 1` of the axis; `values` belong to the nodes `i − 1` to `i + 2`, which all
+    /// have to exist.
+    pub(crate) fn between(axis: &[f64], i: usize, values: [f64; 4]) -> Cubic {
+        let [before, length, after] = [
+            axis[i] - axis[i - 1],
+            axis[i + 1] - axis[i],
+            axis[i + 2] - axis[i + 1],
+        ];
+        let [v0, v1, v2, v3] = values;
+        let rise = v2 - v1;
+        let tangent_start = length * tangent(before, length, v1 - v0, rise);
+        let tangent_end = length * tangent(length, after, rise, v3 - v2);
+        Cubic {
+            start: axis[i],
+            length,
+            coefficients: [
+                v1,
+                tangent_start,
+                3.0 * rise - 2.0 * tangent_start - tangent_end,
+                tangent_start + tangent_end - 2.0 * rise,
+            ],
+            end: v2,
+        }
+    }
+
+    /// The curve between nodes `i` and `i + 1` of the axis with the given values and slopes at them.
+    pub(crate) fn with_slopes(axis: &[f64], i: usize, values: [f64; 2], slopes: [f64; 2]) -> Cubic {
+        let length = axis[i + 1] - axis[i];
+        let rise = values[1] - values[0];
+        let [start, end] = slopes.map(|slope| length * slope);
+        Cubic {
+            start: axis[i],
+            length,
+            coefficients: [
+                values[0],
+                start,
+                3.0 * rise - 2.0 * start - end,
+                start + end - 2.0 * rise,
+            ],
+            end: values[1],
+        }
+    }
+
+    /// Value at x.
+    pub(crate) fn at(&self, x: f64) -> f64 {
+        self.value((x - self.start) / self.length)
+    }
+
+    /// Points where the sign changes from or to positive, from smaller to larger x, each with the sign after it
+    /// (`true` is positive). Accurate to a few units in the last place of x.
+    pub(crate) fn sign_changes(&self) -> impl Iterator<Item = (f64, bool)> + use<> {
+        let cubic = *self;
+        let [first, second] = self.turning_points();
+        let pieces = [(0.0, first), (first, second), (second, 1.0)];
+        pieces.into_iter().filter_map(move |(low, high)| {
+            let (at_low, at_high) = (cubic.value(low) > 0.0, cubic.value(high) > 0.0);
+            (at_low != at_high)
+                .then(|| (cubic.start + cubic.length * cubic.root(low, high), at_high))
+        })
+    }
+
+    fn value(&self, s: f64) -> f64 {
+        let [c0, c1, c2, c3] = self.coefficients;
+        if s == 1.0 {
+            return self.end;
+        }
+        c0 + s * (c1 + s * (c2 + s * c3))
+    }
+
+    /// The two points in 0..=1 between which the cubic is monotone, in order; ends stand in for those outside.
+    fn turning_points(&self) -> [f64; 2] {
+        let [_, c1, c2, c3] = self.coefficients;
+        let discriminant = c2 * c2 - 3.0 * c1 * c3;
+        if discriminant <= 0.0 {
+            return [0.0, 1.0];
+        }
+        // The stable form of the quadratic formula for 3 c3 s² + 2 c2 s + c1 = 0.
+        let w = -(c2 + discriminant.sqrt().copysign(c2));
+        let inside = |s: f64| if s > 0.0 && s < 1.0 { s } else { f64::NAN };
+        let [first, second] = [inside(w / (3.0 * c3)), inside(c1 / w)];
+        match (first.is_nan(), second.is_nan()) {
+            (true, true) => [0.0, 1.0],
+            (true, false) => [0.0, second],
+            (false, true) => [first, 1.0],
+            (false, false) => [first.min(second), first.max(second)],
+        }
+    }
+
+    /// The root in a monotone piece with a change of sign: Newton's steps, and halving where they leave the bracket, so
+    /// that it cannot be misled.
+    fn root(&self, mut low: f64, mut high: f64) -> f64 {
+        const STEPS: usize = 60;
+        const CLOSE: f64 = 4.0 * f64::EPSILON;
+        let [_, c1, c2, c3] = self.coefficients;
+        let positive_at_high = self.value(high) > 0.0;
+        let mut at = 0.5 * (low + high);
+        for _ in 0..STEPS {
+            let value = self.value(at);
+            if (value > 0.0) == positive_at_high {
+                high = at;
+            } else {
+                low = at;
+            }
+            let next = at - value / (c1 + at * (2.0 * c2 + 3.0 * at * c3));
+            let next = if next > low && next < high {
+                next
+            } else {
+                0.5 * (low + high)
+            };
+            let step = (next - at).abs();
+            at = next;
+            if step <= CLOSE || high - low <= CLOSE {
+                break;
+            }
+        }
+        at
+    }
+}
+
+/// Weights of the nodes `i − 1` to `i + 2` in the value of the curve at x between nodes `i` and `i + 1`.
+pub(crate) fn weights(axis: &[f64], i: usize, x: f64) -> [f64; 4] {
+    std::array::from_fn(|k| {
+        let mut values = [0.0; 4];
+        values[k] = 1.0;
+        Cubic::between(axis, i, values).at(x)
+    })
+}
+
+/// Index i of the interval from node `i` to `i + 1` that holds x; the first or last one for points outside.
+pub(crate) fn interval(axis: &[f64], x: f64) -> usize {
+    axis.partition_point(|node| *node <= x)
+        .clamp(1, axis.len() - 1)
+        - 1
+}
+
+/// Slopes at the nodes of a curve through at least 2 values.
+///
+/// Those of the parabola through a node and its neighbours, unless this bends more than a fixed number of times as much as
+/// the ones at both neighbouring nodes: then there is a jump or a kink, and the slope goes over to a mean in which the
+/// less steep side has the greater weight, so that the curve does not swing beyond the values. At the ends the
+/// parabola of the next node is continued.
+pub(crate) fn sober_slopes(axis: &[f64], values: &[f64]) -> Vec<f64> {
+    const BEND_MAX: f64 = 8.0;
+    let n = axis.len();
+    let rises: Vec<f64> = (1..n)
+        .map(|k| (values[k] - values[k - 1]) / (axis[k] - axis[k - 1]))
+        .collect();
+    if n == 2 {
+        return vec![rises[0]; 2];
+    }
+    let bend = |k: usize| 2.0 * (rises[k] - rises[k - 1]) / (axis[k + 1] - axis[k - 1]);
+    let bends: Vec<f64> = (0..n).map(|k| bend(k.clamp(1, n - 2))).collect();
+    let allowed = |k: usize| {
+        BEND_MAX
+            * bends[k.saturating_sub(1)]
+                .abs()
+                .min(bends[(k + 1).min(n - 1)].abs())
+    };
+    // Share of the parabola in a slope.
+    let trust = |k: usize| {
+        let (bend, allowed) = (bends[k].abs(), allowed(k));
+        if bend <= allowed { 1.0 } else { allowed / bend }
+    };
+    let slope = |k: usize| {
+        let (before, after) = (rises[k - 1], rises[k]);
+        let parabola = tangent(
+            axis[k] - axis[k - 1],
+            axis[k + 1] - axis[k],
+            values[k] - values[k - 1],
+            values[k + 1] - values[k],
+        );
+        let trust = trust(k);
+        if trust == 1.0 {
+            return parabola;
+        }
+        let steepness = before.abs() + after.abs();
+        let mean = (before * after.abs() + after * before.abs()) / steepness;
+        trust * parabola + (1.0 - trust) * mean
+    };
+    let mut slopes: Vec<f64> = vec![0.0; n];
+    for (k, value) in slopes.iter_mut().enumerate().take(n - 1).skip(1) {
+        *value = slope(k);
+    }
+    slopes[0] = rises[0] - 0.5 * trust(1) * bends[1] * (axis[1] - axis[0]);
+    slopes[n - 1] = rises[n - 2] + 0.5 * trust(n - 2) * bends[n - 2] * (axis[n - 1] - axis[n - 2]);
+    slopes
+}
+
+/// Slope at a node of the parabola through it and its neighbours at distances `before` and `after`, over which the
+/// value rises by `rise_before` and `rise_after`.
+fn tangent(before: f64, after: f64, rise_before: f64, rise_after: f64) -> f64 {
+    (rise_before / before * after + rise_after / after * before) / (before + after)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const AXIS: [f64; 6] = [-1.0, -0.7, 0.1, 0.25, 1.5, 1.6];
+
+    fn parabola(x: f64) -> f64 {
+        1.0 - 3.0 * x + 2.0 * x * x
+    }
+
+    fn cubic(i: usize, f: impl Fn(f64) -> f64) -> Cubic {
+        Cubic::between(&AXIS, i, std::array::from_fn(|k| f(AXIS[i - 1 + k])))
+    }
+
+    #[test]
+    fn parabolas_are_reproduced_on_unequal_spacing() {
+        for i in 1..=3 {
+            for x in [AXIS[i], 0.3 * AXIS[i] + 0.7 * AXIS[i + 1], AXIS[i + 1]] {
+                assert!((cubic(i, parabola).at(x) - parabola(x)).abs() < 1e-14);
+                let weights = weights(&AXIS, i, x);
+                let sum: f64 = (0..4).map(|k| weights[k] * parabola(AXIS[i - 1 + k])).sum();
+                assert!((sum - parabola(x)).abs() < 1e-14);
+            }
+        }
+    }
+
+    #[test]
+    fn both_roots_in_one_interval_are_found() {
+        // 2 x² − 3 x + 1 has its roots at ½ and 1, between the nodes 0.25 and 1.5.
+        let changes: Vec<(f64, bool)> = cubic(3, parabola).sign_changes().collect();
+        assert_eq!(changes.len(), 2);
+        assert!((changes[0].0 - 0.5).abs() < 1e-14 && !changes[0].1);
+        assert!((changes[1].0 - 1.0).abs() < 1e-14 && changes[1].1);
+        assert_eq!(cubic(1, parabola).sign_changes().count(), 0);
+        assert_eq!(cubic(3, |x| x - 0.75).sign_changes().count(), 1);
+        assert_eq!(cubic(3, |_| 0.0).sign_changes().count(), 0);
+    }
+
+    #[test]
+    fn roots_are_exact_where_the_curve_is_flat_too() {
+        for root in [0.25 + 1e-6, 0.3, 0.9, 1.5 - 1e-6] {
+            let curve = |x: f64| (x - root).powi(3) + 1e-3 * (x - root);
+            let slope = |x: f64| 3.0 * (x - root).powi(2) + 1e-3;
+            let ends = [0.25, 1.5];
+            let cubic = Cubic::with_slopes(&AXIS, 3, ends.map(curve), ends.map(slope));
+            let changes: Vec<(f64, bool)> = cubic.sign_changes().collect();
+            assert_eq!(changes.len(), 1, "{root}");
+            assert!(
+                (changes[0].0 - root).abs() < 1e-11 && changes[0].1,
+                "{changes:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn intervals_hold_their_points() {
+        assert_eq!(interval(&AXIS, -5.0), 0);
+        assert_eq!(interval(&AXIS, -0.7), 1);
+        assert_eq!(interval(&AXIS, 0.2), 2);
+        assert_eq!(interval(&AXIS, 1.6), 4);
+        assert_eq!(interval(&AXIS, 9.0), 4);
+    }
+}

@@ -1,0 +1,6 @@
+//! Derived from stored cell fields: zones, outlines, samples on a grid.
+
+pub mod outlines;
+pub mod resample;
+pub mod strip_segments;
+pub mod zone;

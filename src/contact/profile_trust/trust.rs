@@ -1,0 +1,243 @@
+//! Solves a wheel on a rail and says how far its profiles can be trusted: their quality under every patch, what is wrong with them and
+//! what the measurement leaves open. Where an answer would mislead there is none.
+
+use crate::contact::profile_trust::settle;
+use crate::contact::profile_trust::uncertainty;
+use std::sync::Arc;
+
+use crate::contact::case::problem::Problem;
+use crate::contact::coupling;
+use crate::contact::coupling::{Found, Judge};
+use crate::contact::error::SolveError;
+use crate::contact::geometry::contact_locus::Search;
+use crate::contact::geometry::profile::{Body, Profile};
+use crate::contact::geometry::profile_quality::holes::{Hole, holes};
+use crate::contact::monitor::Monitor;
+use crate::contact::normal::wheel_height::search::{PressedWheel, ProfileContact};
+use crate::contact::profile_trust::finding::{Cause, Finding};
+use crate::contact::profile_trust::judge::{FoundPatch, judge};
+use crate::contact::profile_trust::quality::{PatchQuality, ProfileQuality};
+use crate::contact::rolling::operator_store::OperatorStore;
+use crate::contact::solution::words::{Fields, Solution};
+
+/// What a case says about the trust in its profiles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Trust {
+    /// The smoothing of rail and wheel follows from their noise.
+    pub auto: [bool; 2],
+    /// Profiles are solved that are too rough or too coarse for an answer that can be relied on.
+    pub accept_rough: bool,
+}
+
+/// Solves a problem whose region is a wheel on a rail, and judges its profiles.
+///
+/// # Errors
+/// A named reason why there is no answer; [`SolveError::RoughProfile`] where the points of a profile allow none and rough ones are not
+/// accepted.
+pub(crate) fn solve(
+    operators: &Arc<OperatorStore>,
+    problem: &Problem,
+    contact: &ProfileContact,
+    monitor: &dyn Monitor,
+) -> Result<(Solution, Fields), SolveError> {
+    let settled = settle::settled(problem, contact, monitor)?;
+    let contact = settled.as_ref().unwrap_or(contact);
+    let judgement = Judgement { contact };
+    let found = coupling::solve(operators, problem, contact, &judgement, monitor)?;
+    let (qualities, findings) = judgement.of(&found.wheel)?;
+    let Found {
+        mut solution,
+        fields,
+        ..
+    } = found;
+    for (patch, quality) in solution.patches.iter_mut().zip(qualities) {
+        patch.quality = Some(quality);
+    }
+    let suspicious = findings.iter().any(|finding| {
+        finding.of_roughness() && finding.has_evidence() && finding.share > uncertainty::HARMLESS
+    });
+    let changes = uncertainty::add(
+        operators,
+        problem,
+        contact,
+        suspicious,
+        &mut solution,
+        monitor,
+    )?;
+    let told = findings
+        .into_iter()
+        .filter(|finding| finding.is_told(changes[finding.patch]));
+    let told = worst_of_each(told);
+    solution.remarks.extend(settle::remarks(contact));
+    solution.remarks.extend(told.iter().map(Finding::remark));
+    solution
+        .remarks
+        .extend(uncertainty::target_below(problem, &solution));
+    Ok((solution, fields))
+}
+
+/// A rough profile makes dozens of patches; of what is wrong with a body in the same way the worst place is enough.
+fn worst_of_each(findings: impl Iterator<Item = Finding>) -> Vec<Finding> {
+    let mut worst: Vec<Finding> = Vec::new();
+    for finding in findings {
+        let same = |other: &&mut Finding| finding.is_like(other);
+        match worst.iter_mut().find(same) {
+            None => worst.push(finding),
+            Some(other) if finding.worse_than(other) => *other = finding,
+            Some(_) => {}
+        }
+    }
+    worst
+}
+
+/// Judges the profiles under the patches of a wheel at rest.
+struct Judgement<'a> {
+    contact: &'a ProfileContact,
+}
+
+impl Judge for Judgement<'_> {
+    /// Where an answer would mislead none is sought: a tangential problem on the ridge under an outlier would fail for reasons that say
+    /// nothing of the outlier.
+    fn before(&self, wheel: &PressedWheel) -> Result<(), SolveError> {
+        if self.contact.trust.accept_rough {
+            return Ok(());
+        }
+        let (_, findings) = self.of(wheel)?;
+        let refused = findings.iter().find(|finding| finding.refused);
+        refused.map_or(Ok(()), |finding| Err(rough(finding, ACCEPT)))
+    }
+
+    fn explain(&self, wheel: &PressedWheel, error: SolveError) -> SolveError {
+        if !matches!(
+            error,
+            SolveError::NotConverged { .. } | SolveError::Unmeshable { .. }
+        ) {
+            return error;
+        }
+        let Ok((_, findings)) = self.of(wheel) else {
+            return error;
+        };
+        let worst = findings
+            .iter()
+            .filter(|finding| finding.refused || finding.is_told(false))
+            .reduce(|worst, other| {
+                if other.worse_than(worst) {
+                    other
+                } else {
+                    worst
+                }
+            });
+        match worst {
+            Some(finding) => rough(finding, &format!("; {error}")),
+            None => error,
+        }
+    }
+}
+
+/// What may be done about a profile that is refused.
+const ACCEPT: &str = "; to solve all the same give accept_rough_profiles: true";
+
+/// The failure that a finding explains, with what else there is to say.
+fn rough(finding: &Finding, more: &str) -> SolveError {
+    SolveError::RoughProfile {
+        pointer: finding.pointer().to_owned(),
+        reason: finding.remark().detail + more,
+    }
+}
+
+impl Judgement<'_> {
+    /// The quality of the profiles under every patch, and what is wrong with them.
+    fn of(&self, wheel: &PressedWheel) -> Result<(Vec<PatchQuality>, Vec<Finding>), SolveError> {
+        let contact = self.contact;
+        let (mut qualities, mut findings) = (Vec::new(), Vec::new());
+        let mut width: f64 = 0.0;
+        for gap in &wheel.patches {
+            for patch in gap.field.patches() {
+                let [.., from, to] = patch.extent;
+                let place = FoundPatch {
+                    gap,
+                    centre: wheel.centre,
+                    across: [from, to],
+                    pressure: patch.pressure_max,
+                    number: qualities.len(),
+                };
+                let (quality, own) = judge(&contact.geometry, place, contact.contact_modulus)?;
+                width = width.max(to - from);
+                qualities.push(quality);
+                findings.extend(own);
+            }
+        }
+        let hidden = self.hidden(wheel, width, &mut qualities);
+        findings.extend(hidden);
+        Ok((qualities, findings))
+    }
+
+    /// Stretches without points where the bodies may touch beside the patches that were found, the widest of which has the width given
+    /// in mm.
+    fn hidden(
+        &self,
+        wheel: &PressedWheel,
+        width: f64,
+        qualities: &mut [PatchQuality],
+    ) -> Vec<Finding> {
+        let geometry = &self.contact.geometry;
+        let longest = geometry.profiles().map(Profile::longest_chord);
+        if longest[0].max(longest[1]) < Hole::least(width) {
+            return Vec::new();
+        }
+        // The search is a good part of a solve; few profiles have chords so long.
+        let Ok(search) = Search::new(geometry) else {
+            return Vec::new();
+        };
+        holes(&search, wheel.lowering, width)
+            .into_iter()
+            .filter_map(|hole| self.beside(&hole, width, qualities))
+            .collect()
+    }
+
+    /// A hole that lies under no patch, noted at the nearest one.
+    fn beside(&self, hole: &Hole, width: f64, qualities: &mut [PatchQuality]) -> Option<Finding> {
+        let [rail, wheel] = self.contact.geometry.profiles();
+        let profile = match hole.body {
+            Body::Rail => rail,
+            Body::Wheel => wheel,
+        };
+        let own = |quality: &PatchQuality| match hole.body {
+            Body::Rail => quality.rail,
+            Body::Wheel => quality.wheel,
+        };
+        let y = hole.chord.map(|s| profile.at(s).at[0]);
+        let under = |own: ProfileQuality| own.y_mm[0] < y[1] && own.y_mm[1] > y[0];
+        if qualities.iter().any(|quality| under(own(quality))) {
+            return None;
+        }
+        let distance = |quality: &PatchQuality| {
+            let [from, to] = own(quality).y_mm;
+            (from + to - y[0] - y[1]).abs()
+        };
+        let nearest = (0..qualities.len())
+            .min_by(|a, b| distance(&qualities[*a]).total_cmp(&distance(&qualities[*b])))?;
+        let length = hole.chord[1] - hole.chord[0];
+        let quality = match hole.body {
+            Body::Rail => &mut qualities[nearest].rail,
+            Body::Wheel => &mut qualities[nearest].wheel,
+        };
+        quality.hole_mm = Some(quality.hole_mm.unwrap_or(0.0).max(length));
+        Some(Finding {
+            body: hole.body,
+            patch: nearest,
+            y,
+            pressure: 0.0,
+            share: 0.0,
+            left: 0.0,
+            everywhere: 0.0,
+            chord: y,
+            chord_length: length,
+            over_width: length / width,
+            smoothing: profile.smoothing(),
+            advised: 0.0,
+            refused: hole.wide,
+            cause: Cause::Hole,
+        })
+    }
+}

@@ -1,0 +1,410 @@
+//! Which creepages give the tangential forces that were asked for?
+//!
+//! The law of friction is monotone: a force grows with its creepage, the other components kept. So one force is found
+//! between two creepages that give too little and too much, and of two the first inside the second. Creepages are searched as
+//! *places*: the place r stands for the creepage that gives the force r μN by Vermeulen and Johnson's cubic law with
+//! Kalker's coefficients (Vermeulen & Johnson 1964; Kalker 1990, §2.2.3), so that forces are nearly the places themselves.
+
+use std::time::Duration;
+
+use crate::contact::case::motions::Prescribed;
+use crate::contact::case::problem::{Problem, Resolution};
+use crate::contact::case::words::{Method, Motion};
+use crate::contact::error::SolveError;
+use crate::contact::monitor::Monitor;
+use crate::contact::numerics::bracketed_root::{PLACE_MAX, RootExit, zero};
+use crate::contact::remark::list::Remark;
+use crate::contact::rolling::answer::Work;
+use crate::contact::rolling::linear_theory;
+use crate::contact::rolling::refinement::levels::{Ladder, Plan};
+use crate::contact::rolling::refinement::refine;
+use crate::contact::rolling::refinement::refine::{Asked, Point};
+use crate::contact::rolling::resultants::Resultants;
+
+/// A prescribed force may be missed by this part of the target error.
+const SHARE_OF_TARGET: f64 = 0.02;
+/// The least of this, relative to μN: ten times the residual that tractions are solved to, since a start that meets it is left as it
+/// is.
+const MISSED_FOR_TARGET: f64 = 1e-5;
+/// The same on an explicit mesh and for the simplified theory.
+const MISSED: f64 = 1e-6;
+/// Near μN the creepage hangs on what is left to it: that may be missed by so much more only.
+const NEAR_LIMIT: f64 = 10.0;
+/// Where everything slips, elastic slip still turns the tractions by this much. No force is found more closely than this, relative to μN or to the forces of the first motion tried if they are smaller.
+const MISSED_LEAST: f64 = 2e-7;
+/// From this place on the cubic law is continued by its tangent.
+const KNEE: f64 = 0.9;
+/// Motions tried for two forces at once.
+const TRIALS_AT_ONCE: u32 = 14;
+/// Longest step of two places at once, and trials in a row that may be worse.
+const STEP_MAX: f64 = 0.4;
+const WORSE_MAX: u32 = 3;
+/// How often a found motion may turn out to need other levels.
+const CLIMBS_MAX: u32 = 3;
+/// How far the last motion's places may correct those of the next.
+const CORRECTION_MAX: f64 = 0.3;
+
+/// Solves motion `index` of a problem; where forces are prescribed, finds the creepages that give them. `before` is the answer to
+/// the motion before.
+///
+/// # Errors
+/// Why there is no answer.
+pub fn solve(
+    problem: &Problem,
+    ladder: &mut Ladder,
+    index: usize,
+    before: Option<&Point>,
+    monitor: &dyn Monitor,
+) -> Result<Point, SolveError> {
+    let motion = problem.motions[index];
+    if problem.forces[index] == [None; 2] || problem.friction == 0.0 {
+        return refine::solve(problem, ladder, Asked { index, motion }, monitor);
+    }
+    let began = monitor.elapsed();
+    let mut search = Search::new(problem, ladder, index, monitor);
+    let mut place = search.start(before);
+    for _ in 0..CLIMBS_MAX {
+        // A climb chooses the levels; on them the force is one function of the creepage.
+        search.path.clear();
+        search.best = None;
+        place = search.find(place)?;
+        if search.met() || search.saturated {
+            break;
+        }
+    }
+    search.finish(place, began)
+}
+
+/// The cubic law of a problem.
+#[derive(Debug, Clone, Copy)]
+struct Law {
+    /// Force of linear theory over μN and creepage, along x and across.
+    stiffness: [f64; 2],
+}
+
+impl Law {
+    fn new(problem: &Problem, limit: f64) -> Law {
+        let mut stiffness = [0.0; 2];
+        for patch in problem.region.patches() {
+            let extent = patch.extent;
+            let box_ratio = (extent[1] - extent[0]) / (extent[3] - extent[2]);
+            let a_over_b = patch.semi_axes.map_or(box_ratio, |[a, b]| a / b);
+            let c = linear_theory::coefficients(a_over_b, problem.elasticity.poisson_ratio);
+            let unit = problem.elasticity.shear_modulus * patch.area / std::f64::consts::PI;
+            for (k, stiffness) in stiffness.iter_mut().enumerate() {
+                *stiffness += unit * c[k] / limit;
+            }
+        }
+        Law { stiffness }
+    }
+
+    /// The linear force over μN that the cubic law brings down to `place`.
+    fn linear(place: f64) -> f64 {
+        let inside = place.abs().min(KNEE);
+        let slope = (1.0 - KNEE).powf(-2.0 / 3.0);
+        let beyond = slope * (place.abs() - inside);
+        (3.0 * (1.0 - (1.0 - inside).cbrt()) + beyond).copysign(place)
+    }
+
+    fn creepage(&self, k: usize, place: f64) -> f64 {
+        Law::linear(place) / self.stiffness[k]
+    }
+
+    fn place(&self, k: usize, creepage: f64) -> f64 {
+        let linear = (creepage * self.stiffness[k]).abs();
+        let knee = Law::linear(KNEE);
+        let inside = 1.0 - (1.0 - linear.min(knee) / 3.0).powi(3);
+        let beyond = (linear - knee).max(0.0) * (1.0 - KNEE).powf(2.0 / 3.0);
+        (inside + beyond).min(PLACE_MAX).copysign(creepage)
+    }
+
+    fn places(&self, motion: &Motion) -> [f64; 2] {
+        [
+            self.place(0, motion.creepage_x),
+            self.place(1, motion.creepage_y),
+        ]
+    }
+}
+
+/// One motion on its way to the prescribed forces.
+struct Search<'a, 'p> {
+    problem: &'a Problem,
+    ladder: &'a mut Ladder<'p>,
+    index: usize,
+    monitor: &'a dyn Monitor,
+    forces: Prescribed,
+    /// μN of all patches in N.
+    limit: f64,
+    law: Law,
+    /// The levels to climb; chosen by the next trial if empty.
+    path: Vec<Plan>,
+    /// The answer nearest to the forces, and how far it is from them, relative to μN.
+    best: Option<(f64, Point)>,
+    /// Largest force of the first trial, relative to μN.
+    first: Option<f64>,
+    saturated: bool,
+    /// How the last search ended.
+    exit: RootExit,
+    work: Work,
+}
+
+impl<'a, 'p> Search<'a, 'p> {
+    fn new(
+        problem: &'a Problem,
+        ladder: &'a mut Ladder<'p>,
+        index: usize,
+        monitor: &'a dyn Monitor,
+    ) -> Search<'a, 'p> {
+        let patches = problem.region.patches();
+        let limit = problem.friction * patches.iter().map(|p| p.normal_force).sum::<f64>();
+        Search {
+            problem,
+            ladder,
+            index,
+            monitor,
+            forces: problem.forces[index],
+            limit,
+            law: Law::new(problem, limit),
+            path: Vec::new(),
+            best: None,
+            first: None,
+            saturated: false,
+            exit: RootExit::Found,
+            work: Work::default(),
+        }
+    }
+
+    /// Places to begin at: those of the cubic law, corrected by as much as the motion before was off it.
+    fn start(&self, before: Option<&Point>) -> [f64; 2] {
+        let wanted = self.forces.map(|f| f.unwrap_or(0.0) / self.limit);
+        let mut place = self.guess(wanted);
+        if let Some(before) = before.filter(|point| !point.saturated) {
+            let sum = total(before);
+            let forces = [sum.force_x / self.limit, sum.force_y / self.limit];
+            let had = [0, 1].map(|k| self.forces[k].map_or(0.0, |_| forces[k]));
+            let (guess, found) = (self.guess(had), self.law.places(&before.motion));
+            for k in 0..2 {
+                let correction = found[k] - guess[k];
+                if correction.abs() < CORRECTION_MAX {
+                    place[k] += correction;
+                }
+            }
+        }
+        place
+    }
+
+    /// Places of the creepages that give forces by the cubic law without spin.
+    fn guess(&self, force: [f64; 2]) -> [f64; 2] {
+        let length = force[0].hypot(force[1]);
+        if length == 0.0 {
+            return [0.0; 2];
+        }
+        let linear = Law::linear(length.min(1.0)) / length;
+        [0, 1].map(|k| self.law.place(k, linear * force[k] / self.law.stiffness[k]))
+    }
+
+    /// Finds the places where the forces are as prescribed, or the nearest that can be had.
+    fn find(&mut self, start: [f64; 2]) -> Result<[f64; 2], SolveError> {
+        match self.forces {
+            [Some(_), Some(_)] => {
+                if let Some(place) = self.both_at_once(start)? {
+                    return Ok(place);
+                }
+                self.one_in_the_other(start)
+            }
+            forces => {
+                let k = usize::from(forces[0].is_none());
+                let mut place = start;
+                let root = zero(start[k], |at, tolerance| {
+                    place[k] = at;
+                    let off = self.trial(place)?[k];
+                    *tolerance = self.tolerance();
+                    Ok(off)
+                })?;
+                place[k] = root.place;
+                self.end(root.exit);
+                Ok(place)
+            }
+        }
+    }
+
+    /// Broyden's iteration; nothing if it does not settle.
+    fn both_at_once(&mut self, start: [f64; 2]) -> Result<Option<[f64; 2]>, SolveError> {
+        let (mut place, mut off) = (start, self.trial(start)?);
+        let mut inverse = [[1.0, 0.0], [0.0, 1.0]];
+        let mut worse = 0;
+        for _ in 0..TRIALS_AT_ONCE {
+            if length(off) <= self.tolerance() {
+                self.end(RootExit::Found);
+                return Ok(Some(place));
+            }
+            let mut step = times(&inverse, off).map(|s| -s);
+            let factor = (STEP_MAX / length(step)).min(1.0);
+            step = step.map(|s| factor * s);
+            let next = [place[0] + step[0], place[1] + step[1]];
+            let found = self.trial(next)?;
+            let change = times(&inverse, [found[0] - off[0], found[1] - off[1]]);
+            let denominator = step[0] * change[0] + step[1] * change[1];
+            if denominator.abs() > 1e-12 * length(step).powi(2) {
+                let row = [0, 1].map(|j| step[0] * inverse[0][j] + step[1] * inverse[1][j]);
+                for i in 0..2 {
+                    for j in 0..2 {
+                        inverse[i][j] += (step[i] - change[i]) * row[j] / denominator;
+                    }
+                }
+            }
+            if length(found) < length(off) {
+                (place, off, worse) = (next, found, 0);
+            } else {
+                worse += 1;
+                if worse == WORSE_MAX {
+                    break;
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// For every place across, the place along x that gives the force along x: between bounds both, and slow.
+    fn one_in_the_other(&mut self, start: [f64; 2]) -> Result<[f64; 2], SolveError> {
+        let mut along = start[0];
+        let mut exit_along = RootExit::Found;
+        let root = zero(start[1], |across, tolerance| {
+            let mut off = [0.0; 2];
+            let inner = zero(along, |at, tolerance| {
+                off = self.trial([at, across])?;
+                *tolerance = 0.3 * self.tolerance();
+                Ok(off[0])
+            })?;
+            (along, exit_along) = (inner.place, inner.exit);
+            *tolerance = self.tolerance();
+            Ok(off[1])
+        })?;
+        // What keeps its sign is out of reach, however the other search ended.
+        let exits = [root.exit, exit_along];
+        let worse = exits.into_iter().find(|exit| *exit == RootExit::SignKept);
+        self.end(worse.unwrap_or(if root.exit.converged() {
+            exit_along
+        } else {
+            root.exit
+        }));
+        Ok([along, root.place])
+    }
+
+    fn end(&mut self, exit: RootExit) {
+        self.saturated = exit == RootExit::SignKept;
+        self.exit = exit;
+    }
+
+    /// The remark on forces that are neither met nor out of reach.
+    fn inexact(&self) -> Option<Remark> {
+        let (residual, _) = self.best.as_ref()?;
+        let tolerance = self.tolerance();
+        (!self.saturated && *residual > tolerance).then(|| Remark::IterationInexact {
+            iteration: "the search for the creepages of the prescribed force",
+            reason: self.exit.reason(),
+            residual: *residual,
+            tolerance,
+        })
+    }
+
+    /// Solves the motion of two places; how far its forces are from those prescribed, relative to μN.
+    fn trial(&mut self, place: [f64; 2]) -> Result<[f64; 2], SolveError> {
+        let asked = Asked {
+            index: self.index,
+            motion: self.motion(place),
+        };
+        let found = refine::along(self.problem, self.ladder, asked, &self.path, self.monitor)?;
+        let point = match found {
+            Some(point) => point,
+            None => refine::solve(self.problem, self.ladder, asked, self.monitor)?,
+        };
+        if self.path.is_empty() {
+            let plan = |number: &usize| self.ladder.get(*number).plan;
+            self.path = self.ladder.path.iter().map(plan).collect();
+        }
+        self.work.add(point.work);
+        let sum = total(&point);
+        let forces = [sum.force_x / self.limit, sum.force_y / self.limit];
+        self.first.get_or_insert(length(forces));
+        let off = [0, 1].map(|k| self.forces[k].map_or(0.0, |f| forces[k] - f / self.limit));
+        if self
+            .best
+            .as_ref()
+            .is_none_or(|(least, _)| length(off) <= *least)
+        {
+            self.best = Some((length(off), point));
+        }
+        Ok(off)
+    }
+
+    /// By how much forces may be missed, relative to μN.
+    fn tolerance(&self) -> f64 {
+        let most = match self.problem.resolution {
+            Resolution::Target(target) if self.problem.method != Method::Fastsim => {
+                (SHARE_OF_TARGET * target).max(MISSED_FOR_TARGET)
+            }
+            _ => MISSED,
+        };
+        let wanted = length(self.forces.map(|f| f.unwrap_or(0.0) / self.limit));
+        let scale = self.first.unwrap_or(1.0).max(wanted).min(1.0);
+        let left = (NEAR_LIMIT * (1.0 - wanted)).max(0.0);
+        (most * scale.min(left)).max(MISSED_LEAST * scale)
+    }
+
+    fn motion(&self, place: [f64; 2]) -> Motion {
+        let given = self.problem.motions[self.index];
+        let creepage = |k: usize, given: f64| match self.forces[k] {
+            Some(_) => self.law.creepage(k, place[k]),
+            None => given,
+        };
+        Motion {
+            creepage_x: creepage(0, given.creepage_x),
+            creepage_y: creepage(1, given.creepage_y),
+            ..given
+        }
+    }
+
+    /// Does the best answer meet the target, as far as its method can?
+    fn met(&self) -> bool {
+        let Resolution::Target(target) = self.problem.resolution else {
+            return true;
+        };
+        let chosen = matches!(self.problem.method, Method::Auto | Method::BoundaryElement);
+        let error = self.best.as_ref().and_then(|(_, point)| point.error());
+        !chosen || error.is_some_and(|error| error <= target)
+    }
+
+    fn finish(mut self, place: [f64; 2], began: Duration) -> Result<Point, SolveError> {
+        if self.best.is_none() {
+            self.trial(place)?;
+        }
+        let asked = Asked {
+            index: self.index,
+            motion: self.motion(place),
+        };
+        let inexact = self.inexact();
+        let mut point = match self.best.take() {
+            Some((_, point)) => point,
+            None => refine::solve(self.problem, self.ladder, asked, self.monitor)?,
+        };
+        point.tangential.remarks.extend(inexact);
+        point.work = self.work;
+        point.saturated = self.saturated;
+        point.seconds = (self.monitor.elapsed() - began).as_secs_f64();
+        Ok(point)
+    }
+}
+
+fn total(point: &Point) -> Resultants {
+    let sum = Resultants::default();
+    point.resultants.iter().fold(sum, |sum, r| sum.plus(*r))
+}
+
+fn length([x, y]: [f64; 2]) -> f64 {
+    x.hypot(y)
+}
+
+fn times(matrix: &[[f64; 2]; 2], [x, y]: [f64; 2]) -> [f64; 2] {
+    matrix.map(|[a, b]| a * x + b * y)
+}

@@ -1,0 +1,5 @@
+//! Semismooth Newton iteration on strips.
+
+pub mod newton;
+pub mod preconditioner;
+pub mod solve;

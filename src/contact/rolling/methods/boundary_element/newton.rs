@@ -1,0 +1,460 @@
+//! Semismooth Newton on the projected friction law `T = Π(T + r s(T))`, Π the projection on the disc of radius g.
+//!
+//! With `z = T + r s`: a cell sticks where `|z| ≤ g` (both components unknown, `s = 0`), and slips where `|z| > g`
+//! (`T = g d + τ t`, `d = z/|z|`, `t ⟂ d`, one unknown τ, one equation `t·s = D τ`, `D = (|z| − g)/(g r)`). Each step
+//! solves that linear system by GMRES with the segments' own blocks as preconditioner (Alart & Curnier 1991 for the
+//! projection form; `r = 0.3/M_ii` because larger values can cycle on fine meshes).
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::numerics::gmres::{Gmres, LinearSystem};
+use crate::contact::rolling::methods::boundary_element::preconditioner::{OwnBlocks, StripBlocks};
+use crate::contact::rolling::slip_equations::Equations;
+
+/// Projection parameter times `M_ii`.
+const PROJECTION: f64 = 0.3;
+/// Newton steps before giving up.
+const ITERATIONS_MAX: u32 = 60;
+/// The first steps are never halved: far from the solution the residual may grow for a step or two.
+const FREE_STEPS: u32 = 8;
+/// A step is halved at most this often.
+const HALVINGS_MAX: u32 = 5;
+/// Tractions this close to the tangents of their discs, relative to the residual, are left where they are.
+const LIFT_NEGLIGIBLE: f64 = 0.1;
+/// A linear system is solved at most this exactly, and at least that.
+const INNER_TOLERANCE: (f64, f64) = (1e-4, 1e-1);
+/// The residual may grow by this factor against the largest of the last steps before a step is halved.
+const GROWTH_ALLOWED: f64 = 1.5;
+
+/// What a solve needs besides the equations, all per cell, padded like the equations' vectors.
+#[derive(Debug, Clone, Copy)]
+pub struct FrictionLaw<'a> {
+    /// Rigid slip, x then y.
+    pub rigid: &'a [f64],
+    /// Friction bound g = μp.
+    pub bound: &'a [f64],
+    /// Area of every cell, the weight of its residual.
+    pub area: &'a [f64],
+    /// Traction scale of the case: residuals are relative to it.
+    pub scale: f64,
+    /// Residual to reach.
+    pub tolerance: f64,
+}
+
+/// How a solve ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Convergence {
+    /// Did the residual reach the tolerance?
+    pub converged: bool,
+    /// Newton steps.
+    pub iterations: u32,
+    /// Products of the influence with a vector.
+    pub products: u32,
+    /// Area-weighted root mean square of `T − Π(T + r s)`, relative to the scale of the case.
+    pub residual: f64,
+    /// Steps whose linear system was not solved to its tolerance; harmless if the residual still came down.
+    pub inexact_steps: u32,
+}
+
+/// The state of one Newton step: which cells slip, and in which direction.
+#[derive(Debug, Default)]
+pub struct Linearisation {
+    /// `(1, 0)` where a cell sticks, the unit tangent where it slips.
+    direction: Vec<(f64, f64)>,
+    /// D where a cell slips, −1 where it sticks.
+    stiffness: Vec<f64>,
+}
+
+impl Linearisation {
+    /// Does the cell slip?
+    #[must_use]
+    pub fn slips(&self, cell: usize) -> bool {
+        self.stiffness[cell] >= 0.0
+    }
+
+    /// Direction of the cell's first unknown.
+    #[must_use]
+    pub fn direction(&self, cell: usize) -> (f64, f64) {
+        self.direction[cell]
+    }
+
+    /// D of a slipping cell, 0 of a sticking one.
+    #[must_use]
+    pub fn stiffness(&self, cell: usize) -> f64 {
+        self.stiffness[cell].max(0.0)
+    }
+}
+
+/// Solver for one rule on one mesh; keeps its factors and buffers between solves.
+pub struct Newton<'a> {
+    equations: &'a Equations<'a>,
+    own: Arc<OwnBlocks>,
+    /// Projection parameter r of every cell.
+    parameter: Vec<f64>,
+    blocks: StripBlocks,
+    gmres: Gmres,
+    linear: Linearisation,
+    /// What brings each slipping cell from its traction to the tangent of its disc.
+    lift: Vec<(f64, f64)>,
+    slip: Vec<f64>,
+    scratch: Vec<f64>,
+    expanded: Vec<f64>,
+    steps: Steps,
+}
+
+/// Vectors that one Newton step after the other uses.
+#[derive(Debug, Default)]
+struct Steps {
+    step: Vec<f64>,
+    rhs: Vec<f64>,
+    best: Vec<f64>,
+    before: Vec<f64>,
+    candidate: Vec<f64>,
+}
+
+impl<'a> Newton<'a> {
+    /// Prepares the own blocks and the buffers.
+    #[must_use]
+    pub fn new(equations: &'a Equations<'a>) -> Newton<'a> {
+        Newton::with_blocks(equations, Arc::new(OwnBlocks::new(equations)))
+    }
+
+    /// Prepares the buffers; the own blocks are those of the equations.
+    #[must_use]
+    pub fn with_blocks(equations: &'a Equations<'a>, own: Arc<OwnBlocks>) -> Newton<'a> {
+        let diagonal = own.diagonal(equations);
+        let length = 2 * equations.padded();
+        Newton {
+            equations,
+            parameter: diagonal.iter().map(|m| PROJECTION / m.abs()).collect(),
+            own,
+            blocks: StripBlocks::default(),
+            gmres: Gmres::default(),
+            linear: Linearisation::default(),
+            lift: vec![(0.0, 0.0); equations.cells()],
+            slip: vec![0.0; length],
+            scratch: vec![0.0; 2 * equations.row_count()],
+            expanded: vec![0.0; length],
+            steps: Steps::default(),
+        }
+    }
+
+    /// A typical `1/M_ii`: the traction that one unit of slip causes on a cell.
+    #[must_use]
+    pub fn compliance(&self) -> f64 {
+        let sum: f64 = self.parameter.iter().sum();
+        sum / (PROJECTION * self.parameter.len().max(1) as f64)
+    }
+
+    /// Entries of the influence that one product touches.
+    #[must_use]
+    pub fn entries(&self) -> usize {
+        self.equations.entries()
+    }
+
+    /// Number of cells with unknowns.
+    #[must_use]
+    pub fn cells(&self) -> usize {
+        self.equations.cells()
+    }
+
+    /// Solves for the tractions, starting from those in `t`. Without convergence `t` holds the best iterate.
+    ///
+    /// # Errors
+    /// Only if the monitor stops the work.
+    pub fn solve(
+        &mut self,
+        law: &FrictionLaw,
+        t: &mut [f64],
+        monitor: &dyn Monitor,
+    ) -> Result<Convergence, Stop> {
+        let mut report = Convergence {
+            converged: false,
+            iterations: 0,
+            products: 0,
+            residual: f64::INFINITY,
+            inexact_steps: 0,
+        };
+        let Steps {
+            mut step,
+            mut rhs,
+            mut best,
+            mut before,
+            mut candidate,
+        } = std::mem::take(&mut self.steps);
+        for values in [&mut step, &mut rhs, &mut best, &mut before, &mut candidate] {
+            values.clear();
+            values.extend_from_slice(t);
+        }
+        let mut least = f64::INFINITY;
+        let mut recent = [0.0_f64; 3];
+        let mut last = f64::INFINITY;
+        report.residual = self.evaluate(law, t, &mut report);
+        while report.iterations < ITERATIONS_MAX {
+            if report.residual < least {
+                least = report.residual;
+                best.copy_from_slice(t);
+            }
+            if report.residual <= law.tolerance {
+                report.converged = true;
+                break;
+            }
+            recent[report.iterations as usize % 3] = report.residual;
+            before.copy_from_slice(t);
+            self.linearise(law, t, &mut rhs, &mut report);
+            self.blocks.factor(&self.own, self.equations, &self.linear);
+            let inner = inner_tolerance(report.residual, last, law.tolerance);
+            self.linear_step(&rhs, inner, &mut step, monitor, &mut report)?;
+            last = report.residual;
+            self.candidate(law, t, &step, &mut candidate);
+            t.copy_from_slice(&candidate);
+            report.residual = self.evaluate(law, t, &mut report);
+            let allowed = if report.iterations < FREE_STEPS {
+                f64::INFINITY
+            } else {
+                GROWTH_ALLOWED * recent.iter().copied().fold(0.0, f64::max)
+            };
+            let mut halvings = 0;
+            while report.residual > allowed && halvings < HALVINGS_MAX {
+                halvings += 1;
+                let share = 0.5_f64.powi(halvings as i32);
+                for i in 0..t.len() {
+                    t[i] = before[i] + share * (candidate[i] - before[i]);
+                }
+                report.residual = self.evaluate(law, t, &mut report);
+            }
+            report.iterations += 1;
+        }
+        if !report.converged {
+            report.residual = least;
+            t.copy_from_slice(&best);
+        }
+        self.steps = Steps {
+            step,
+            rhs,
+            best,
+            before,
+            candidate,
+        };
+        Ok(report)
+    }
+
+    /// The slips `q + M T` of the last evaluated iterate, x then y.
+    #[must_use]
+    pub fn slip(&self) -> &[f64] {
+        &self.slip
+    }
+
+    /// Does a cell of the last evaluated iterate slip?
+    #[must_use]
+    pub fn slips(&self, bound: &[f64], t: &[f64], cell: usize) -> bool {
+        let padded = self.equations.padded();
+        let r = self.parameter[cell];
+        let (zx, zy) = (
+            t[cell] + r * self.slip[cell],
+            t[padded + cell] + r * self.slip[padded + cell],
+        );
+        (zx * zx + zy * zy).sqrt() > bound[cell]
+    }
+
+    /// Computes the slips of `t` and the residual of the projected law.
+    pub fn evaluate(&mut self, law: &FrictionLaw, t: &[f64], report: &mut Convergence) -> f64 {
+        let padded = self.equations.padded();
+        self.equations.elastic(t, &mut self.slip, &mut self.scratch);
+        report.products += 1;
+        for (s, q) in self.slip.iter_mut().zip(law.rigid) {
+            *s += q;
+        }
+        let (mut sum, mut weight) = (0.0, 0.0);
+        for i in 0..self.equations.cells() {
+            let (tx, ty, r) = (t[i], t[padded + i], self.parameter[i]);
+            let (zx, zy) = (tx + r * self.slip[i], ty + r * self.slip[padded + i]);
+            let length = (zx * zx + zy * zy).sqrt();
+            let shrink = if length > law.bound[i] {
+                law.bound[i] / length
+            } else {
+                1.0
+            };
+            sum += law.area[i] * ((tx - shrink * zx).powi(2) + (ty - shrink * zy).powi(2));
+            weight += law.area[i];
+        }
+        (sum / weight).sqrt() / law.scale
+    }
+
+    /// Sorts the cells into stick and slip by the last slips, moves `t` of slipping cells to the tangent of the disc,
+    /// and sets up the right-hand side there.
+    fn linearise(
+        &mut self,
+        law: &FrictionLaw,
+        t: &mut [f64],
+        rhs: &mut [f64],
+        report: &mut Convergence,
+    ) {
+        let residual = report.residual;
+        let (padded, cells) = (self.equations.padded(), self.equations.cells());
+        self.linear.direction.clear();
+        self.linear.stiffness.clear();
+        let (mut lifted, mut weight) = (0.0, 0.0);
+        for i in 0..cells {
+            let r = self.parameter[i];
+            let (zx, zy) = (
+                t[i] + r * self.slip[i],
+                t[padded + i] + r * self.slip[padded + i],
+            );
+            let (length, bound) = ((zx * zx + zy * zy).sqrt(), law.bound[i]);
+            weight += law.area[i];
+            if length <= bound {
+                self.linear.direction.push((1.0, 0.0));
+                self.linear.stiffness.push(-1.0);
+                self.lift[i] = (0.0, 0.0);
+                continue;
+            }
+            let (dx, dy) = (zx / length, zy / length);
+            self.linear.direction.push((-dy, dx));
+            // A cell without pressure has no freedom: an infinite stiffness would spoil the factors, a large one serves.
+            let stiffness = if bound > 0.0 {
+                (length - bound) / (bound * r)
+            } else {
+                1e12 / r
+            };
+            self.linear.stiffness.push(stiffness.min(1e12 / r));
+            let lift = bound - (dx * t[i] + dy * t[padded + i]);
+            self.lift[i] = (lift * dx, lift * dy);
+            lifted += law.area[i] * lift * lift;
+        }
+        // Near the solution the tangent differs from the circle by less than the step will leave over.
+        if (lifted / weight).sqrt() > LIFT_NEGLIGIBLE * residual * law.scale {
+            for (i, (x, y)) in self.lift[..cells].iter().enumerate() {
+                t[i] += x;
+                t[padded + i] += y;
+            }
+            self.equations.elastic(t, &mut self.slip, &mut self.scratch);
+            report.products += 1;
+            for (s, q) in self.slip.iter_mut().zip(law.rigid) {
+                *s += q;
+            }
+        }
+        rhs.fill(0.0);
+        for i in 0..cells {
+            let (sx, sy) = (self.slip[i], self.slip[padded + i]);
+            if self.linear.slips(i) {
+                let (ux, uy) = self.linear.direction[i];
+                let along = ux * t[i] + uy * t[padded + i];
+                rhs[i] = self.linear.stiffness[i] * along - (ux * sx + uy * sy);
+            } else {
+                rhs[i] = -sx;
+                rhs[padded + i] = -sy;
+            }
+        }
+    }
+
+    /// Solves the linear system to a relative tolerance.
+    fn linear_step(
+        &mut self,
+        rhs: &[f64],
+        tolerance: f64,
+        step: &mut [f64],
+        monitor: &dyn Monitor,
+        report: &mut Convergence,
+    ) -> Result<(), Stop> {
+        let mut system = NewtonSystem {
+            equations: self.equations,
+            linear: &self.linear,
+            blocks: &mut self.blocks,
+            scratch: &mut self.scratch,
+            expanded: &mut self.expanded,
+            slip: &mut self.slip,
+            monitor,
+        };
+        let linear = self.gmres.solve(&mut system, rhs, tolerance, step)?;
+        report.products += linear.products;
+        report.inexact_steps += u32::from(!linear.exit.converged());
+        Ok(())
+    }
+
+    /// `next` is `t` plus the step, slipping cells brought back to the circle.
+    fn candidate(&self, law: &FrictionLaw, t: &[f64], step: &[f64], next: &mut [f64]) {
+        let padded = self.equations.padded();
+        next.copy_from_slice(t);
+        for i in 0..self.equations.cells() {
+            if self.linear.slips(i) {
+                let (ux, uy) = self.linear.direction[i];
+                let (x, y) = (t[i] + ux * step[i], t[padded + i] + uy * step[i]);
+                let length = x.hypot(y);
+                let factor = if length > 0.0 {
+                    law.bound[i] / length
+                } else {
+                    0.0
+                };
+                next[i] = factor * x;
+                next[padded + i] = factor * y;
+            } else {
+                next[i] += step[i];
+                next[padded + i] += step[padded + i];
+            }
+        }
+    }
+}
+
+/// How exactly a linear system deserves to be solved: loosely while the zones still move, then as the squared progress
+/// of the residual (Eisenstat & Walker 1996, choice 2), never beyond what the end needs.
+fn inner_tolerance(residual: f64, last: f64, goal: f64) -> f64 {
+    let progress = if last.is_finite() {
+        0.5 * (residual / last).powi(2)
+    } else {
+        1.0
+    };
+    progress
+        .max(0.3 * goal / residual)
+        .clamp(INNER_TOLERANCE.0, INNER_TOLERANCE.1)
+}
+
+/// The linearised equations as GMRES sees them.
+struct NewtonSystem<'a> {
+    equations: &'a Equations<'a>,
+    linear: &'a Linearisation,
+    blocks: &'a mut StripBlocks,
+    scratch: &'a mut [f64],
+    expanded: &'a mut [f64],
+    slip: &'a mut [f64],
+    monitor: &'a dyn Monitor,
+}
+
+impl LinearSystem for NewtonSystem<'_> {
+    fn product(&mut self, x: &[f64], out: &mut [f64]) {
+        let (padded, cells) = (self.equations.padded(), self.equations.cells());
+        for i in 0..cells {
+            if self.linear.slips(i) {
+                let (ux, uy) = self.linear.direction[i];
+                self.expanded[i] = ux * x[i];
+                self.expanded[padded + i] = uy * x[i];
+            } else {
+                self.expanded[i] = x[i];
+                self.expanded[padded + i] = x[padded + i];
+            }
+        }
+        self.equations
+            .elastic(self.expanded, self.slip, self.scratch);
+        out.fill(0.0);
+        for i in 0..cells {
+            let (sx, sy) = (self.slip[i], self.slip[padded + i]);
+            if self.linear.slips(i) {
+                let (ux, uy) = self.linear.direction[i];
+                out[i] = ux * sx + uy * sy - self.linear.stiffness[i] * x[i];
+            } else {
+                out[i] = sx;
+                out[padded + i] = sy;
+            }
+        }
+    }
+
+    fn precondition(&mut self, x: &mut [f64]) {
+        self.blocks.apply(x);
+    }
+
+    fn tick(&mut self) -> ControlFlow<Stop> {
+        self.monitor.tick(0.0)
+    }
+}

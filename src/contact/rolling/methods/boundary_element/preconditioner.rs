@@ -1,0 +1,296 @@
+//! The preconditioner: every segment's own block of the Newton matrix, factored on its own.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::lu::partial_pivoting::factor;
+use faer::{MatMut, Par};
+use pulp::{Arch, NullaryFnOnce};
+
+use crate::contact::half_space::strip_operator::operator::Parity;
+use crate::contact::rolling::methods::boundary_element::newton::Linearisation;
+use crate::contact::rolling::slip_equations::Equations;
+use crate::contact::rolling::slip_rules::Rule;
+
+/// Own blocks of the operator, fixed for a rule and mesh.
+#[derive(Debug)]
+pub struct OwnBlocks {
+    /// `M_xx` and `M_yy` of every segment, column by column.
+    blocks: Vec<(Vec<f64>, Vec<f64>)>,
+}
+
+impl OwnBlocks {
+    /// Collects the blocks.
+    #[must_use]
+    pub fn new(equations: &Equations) -> OwnBlocks {
+        OwnBlocks {
+            blocks: (0..equations.segments())
+                .map(|j| equations.own_block(j))
+                .collect(),
+        }
+    }
+
+    /// Bytes of the blocks.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let numbers = self.blocks.iter().map(|(xx, yy)| xx.len() + yy.len());
+        8 * numbers.sum::<usize>() as u64
+    }
+
+    /// `−(M_xx + M_yy)/2` on the diagonal, cell by cell.
+    #[must_use]
+    pub fn diagonal(&self, equations: &Equations) -> Vec<f64> {
+        let mut diagonal = vec![0.0; equations.cells()];
+        for (j, (xx, yy)) in self.blocks.iter().enumerate() {
+            let n = equations.segment(j).len();
+            for (k, i) in equations.segment(j).enumerate() {
+                diagonal[i] = -0.5 * (xx[k * n + k] + yy[k * n + k]);
+            }
+        }
+        diagonal
+    }
+}
+
+/// Bytes of all own blocks that an operator may get, of segments with these numbers of cells: three rules, and if half of the
+/// influence is enough, two parities of one half each beside both together.
+#[must_use]
+pub fn bytes_max(lengths: impl Iterator<Item = usize>, folded: bool) -> u64 {
+    let one: usize = lengths.map(|n| 2 * n * n).sum();
+    let parities = if folded { 2 } else { 1 };
+    8 * 3 * parities * one as u64
+}
+
+/// The own blocks of one rule and parity.
+type Made = (Rule, Option<Parity>, Arc<OwnBlocks>);
+
+/// The own blocks of a level, made once for each rule and parity.
+#[derive(Debug, Default)]
+pub struct SharedBlocks {
+    made: Mutex<Vec<Made>>,
+}
+
+impl SharedBlocks {
+    /// The blocks of a rule and parity; `make` is called if they are not there.
+    pub fn get(
+        &self,
+        rule: Rule,
+        parity: Option<Parity>,
+        make: impl FnOnce() -> OwnBlocks,
+    ) -> Arc<OwnBlocks> {
+        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, _, blocks)) = made.iter().find(|m| (m.0, m.1) == (rule, parity)) {
+            return Arc::clone(blocks);
+        }
+        let blocks = Arc::new(make());
+        made.push((rule, parity, Arc::clone(&blocks)));
+        blocks
+    }
+}
+
+/// Factored blocks of one Newton step.
+#[derive(Debug, Default)]
+pub struct StripBlocks {
+    factors: Vec<f64>,
+    /// Position in a full vector of every unknown of every block, in the order of the block's pivot rows.
+    pivot_places: Vec<usize>,
+    /// Position of every unknown in its own order.
+    places: Vec<usize>,
+    /// Start of each block in `places`, and one more.
+    starts: Vec<usize>,
+    /// Start of each block's matrix in `factors`.
+    offsets: Vec<usize>,
+    gathered: Vec<f64>,
+    /// Cells of the newest block that stick.
+    stick: Vec<usize>,
+    scratch: Scratch,
+}
+
+/// Buffers of the factorisation.
+#[derive(Default)]
+struct Scratch {
+    pivots: Vec<usize>,
+    pivots_inverse: Vec<usize>,
+    stack: Option<(usize, MemBuffer)>,
+}
+
+impl std::fmt::Debug for Scratch {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Scratch")
+    }
+}
+
+impl StripBlocks {
+    /// Builds and factors the blocks of a linearisation: one block per segment, or one for each component where
+    /// nothing slips (sticking x and y do not touch each other inside a segment).
+    pub fn factor(&mut self, own: &OwnBlocks, equations: &Equations, linear: &Linearisation) {
+        self.places.clear();
+        self.pivot_places.clear();
+        self.starts.clear();
+        self.offsets.clear();
+        self.factors.clear();
+        let padded = equations.padded();
+        for (j, (xx, yy)) in own.blocks.iter().enumerate() {
+            let cells = equations.segment(j);
+            if cells.clone().any(|i| linear.slips(i)) {
+                let start = self.open_block();
+                self.places.extend(cells.clone());
+                self.places.extend(
+                    cells
+                        .clone()
+                        .filter(|i| !linear.slips(*i))
+                        .map(|i| padded + i),
+                );
+                let size = self.places.len() - start;
+                self.fill_block(xx, yy, cells.start, cells.len(), linear, size);
+                self.close_block(start);
+            } else {
+                for (matrix, shift) in [(xx, 0), (yy, padded)] {
+                    let start = self.open_block();
+                    self.places.extend(cells.clone().map(|i| shift + i));
+                    self.factors.extend_from_slice(matrix);
+                    self.close_block(start);
+                }
+            }
+        }
+        self.starts.push(self.places.len());
+    }
+
+    fn open_block(&mut self) -> usize {
+        let start = self.places.len();
+        self.starts.push(start);
+        self.offsets.push(self.factors.len());
+        start
+    }
+
+    /// Factors the newest block, whose matrix is complete.
+    fn close_block(&mut self, start: usize) {
+        let size = self.places.len() - start;
+        let scratch = &mut self.scratch;
+        scratch.pivots.resize(size, 0);
+        scratch.pivots_inverse.resize(size, 0);
+        if scratch
+            .stack
+            .as_ref()
+            .is_none_or(|(largest, _)| *largest < size)
+        {
+            let request =
+                factor::lu_in_place_scratch::<usize, f64>(size, size, Par::Seq, Default::default());
+            scratch.stack = Some((size, MemBuffer::new(request)));
+        }
+        let Some((_, stack)) = scratch.stack.as_mut() else {
+            return;
+        };
+        let offset = self.offsets[self.offsets.len() - 1];
+        factor::lu_in_place(
+            MatMut::from_column_major_slice_mut(&mut self.factors[offset..], size, size),
+            &mut scratch.pivots[..size],
+            &mut scratch.pivots_inverse[..size],
+            Par::Seq,
+            MemStack::new(stack),
+            Default::default(),
+        );
+        self.pivot_places
+            .extend(scratch.pivots.iter().map(|row| self.places[start + row]));
+        self.gathered.resize(self.gathered.len().max(size), 0.0);
+    }
+
+    /// Fills one block: first one unknown per cell (T_x where it sticks, the tangential change where it slips), then
+    /// T_y of the cells that stick.
+    fn fill_block(
+        &mut self,
+        xx: &[f64],
+        yy: &[f64],
+        first: usize,
+        n: usize,
+        linear: &Linearisation,
+        size: usize,
+    ) {
+        let base = self.factors.len();
+        self.factors.resize(base + size * size, 0.0);
+        let block = &mut self.factors[base..];
+        self.stick.clear();
+        self.stick
+            .extend((0..n).filter(|k| !linear.slips(first + k)));
+        let stick = &self.stick;
+        for column in 0..n {
+            let (xx, yy) = (
+                &xx[column * n..(column + 1) * n],
+                &yy[column * n..(column + 1) * n],
+            );
+            let (ux, uy) = linear.direction(first + column);
+            let out = &mut block[column * size..(column + 1) * size];
+            for row in 0..n {
+                let (vx, vy) = linear.direction(first + row);
+                out[row] = vx * ux * xx[row] + vy * uy * yy[row];
+            }
+            out[column] -= linear.stiffness(first + column);
+            for (k, row) in stick.iter().enumerate() {
+                out[n + k] = uy * yy[*row];
+            }
+        }
+        for (c, column) in stick.iter().enumerate() {
+            let yy = &yy[column * n..(column + 1) * n];
+            let out = &mut block[(n + c) * size..(n + c + 1) * size];
+            for (row, value) in yy.iter().enumerate() {
+                out[row] = linear.direction(first + row).1 * value;
+            }
+            for (k, row) in stick.iter().enumerate() {
+                out[n + k] = yy[*row];
+            }
+        }
+    }
+
+    /// `x ← P⁻¹ x`, block by block.
+    pub fn apply(&mut self, x: &mut [f64]) {
+        Arch::new().dispatch(Substitution { blocks: self, x });
+    }
+}
+
+/// Forward and backward substitution in all blocks, column by column: each step is one update of contiguous values.
+struct Substitution<'a> {
+    blocks: &'a mut StripBlocks,
+    x: &'a mut [f64],
+}
+
+impl NullaryFnOnce for Substitution<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Substitution { blocks, x } = self;
+        for j in 0..blocks.offsets.len() {
+            let range = blocks.starts[j]..blocks.starts[j + 1];
+            let size = range.len();
+            let matrix = &blocks.factors[blocks.offsets[j]..blocks.offsets[j] + size * size];
+            let values = &mut blocks.gathered[..size];
+            for (to, place) in values.iter_mut().zip(&blocks.pivot_places[range.clone()]) {
+                *to = x[*place];
+            }
+            for column in 0..size {
+                let (head, below) = values.split_at_mut(column + 1);
+                subtract(
+                    below,
+                    head[column],
+                    &matrix[column * size + column + 1..(column + 1) * size],
+                );
+            }
+            for column in (0..size).rev() {
+                let (above, rest) = values.split_at_mut(column);
+                let value = rest[0] / matrix[column * size + column];
+                rest[0] = value;
+                subtract(above, value, &matrix[column * size..column * size + column]);
+            }
+            for (from, place) in values.iter().zip(&blocks.places[range]) {
+                x[*place] = *from;
+            }
+        }
+    }
+}
+
+/// `values −= factor × column`.
+#[inline(always)]
+fn subtract(values: &mut [f64], factor: f64, column: &[f64]) {
+    for (value, entry) in values.iter_mut().zip(column) {
+        *value -= factor * entry;
+    }
+}

@@ -1,0 +1,340 @@
+//! The fast solver: projection form, semismooth Newton, strip-preconditioned GMRES.
+//!
+//! Every level is solved twice: with the three-point rule from the given start, then with the trapezoid rule from
+//! that solution. Tractions, zones and forces come from the trapezoid, whose resultants are the more exact; the size of
+//! the slip from the three-point rule, whose slips are smooth, along the traction as Coulomb's law demands; the
+//! difference of the two rules is a second opinion on the error.
+
+use crate::contact::case::words::Motion;
+use crate::contact::half_space::strip_operator::operator::Parity;
+use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::numerics::gmres::GmresExit;
+use crate::contact::remark::list::Remark;
+use crate::contact::rolling::answer::{Failure, Tangential, Work, obey_coulomb};
+use crate::contact::rolling::methods::boundary_element::newton::{
+    Convergence, FrictionLaw, Newton,
+};
+use crate::contact::rolling::methods::boundary_element::preconditioner::OwnBlocks;
+use crate::contact::rolling::methods::full_slip;
+use crate::contact::rolling::operator_store::LevelOperator;
+use crate::contact::rolling::refinement::warm_start::Start;
+use crate::contact::rolling::slip_equations::Equations;
+use crate::contact::rolling::slip_rules::Rule;
+use crate::contact::rolling::strip_mesh::Level;
+
+/// Residual of the friction law that ends a solve on an explicit mesh, relative to the traction scale of the case.
+pub const TOLERANCE: f64 = 1e-6;
+
+/// Solves one motion (dimensionless, about the level's origin) on one level, from a start or from zero tractions.
+///
+/// # Errors
+/// [`Failure::NotConverged`] if no start leads to a solution of the three-point rule; [`Failure::Stopped`] if the
+/// monitor stops the work. If only the trapezoid rule fails, the three-point tractions serve and a remark says so.
+pub fn solve(
+    level: &Level,
+    motion: &Motion,
+    start: Option<&Start>,
+    tolerance: f64,
+    monitor: &dyn Monitor,
+) -> Result<Tangential, Failure> {
+    if let Some(answer) = full_slip::rigid_answer(level, motion) {
+        return Ok(answer);
+    }
+    let operator = level.operator(monitor)?;
+    let parity = level.parity(motion);
+    let mut solve = Solve::new(level, motion, &operator, parity, tolerance, monitor);
+    let mut skipped = Vec::new();
+    if parity.is_some() {
+        skipped.push("mirror symmetry of patch and motion: half the cells".to_owned());
+    } else if level.is_mirrored() {
+        skipped.push("mirror symmetry of the patch: half the influence".to_owned());
+    }
+    let mut t = solve.start(start.map(|start| &start.mirror));
+    let mirror = solve.mirror(&mut t, start.is_some())?;
+    if mirror.by_fixed_point {
+        skipped.push("everything slips: fixed point instead of Newton".to_owned());
+    }
+    let by_mirror = solve.expand(&t);
+    let mut remarks = Vec::new();
+    let warm = start.and_then(|start| start.trapezoid.as_ref());
+    let warm = warm.map(|warm| solve.start(Some(warm)));
+    let (slips, second) = match solve.trapezoid(&mut t, warm)? {
+        Some(slips) => (slips, Some(by_mirror)),
+        None => {
+            remarks.push(Remark::SecondRuleFailed {});
+            (mirror.slips, None)
+        }
+    };
+    let mut traction = solve.expand(&t);
+    let slip = obey_coulomb(&level.bound, &slips, &mut traction, &mirror.slip);
+    Ok(Tangential {
+        traction,
+        second,
+        slip,
+        slips,
+        work: solve.work,
+        skipped,
+        remarks,
+    })
+}
+
+/// Tractions of the trapezoid rule alone, from a start that is near: what a companion of a mesh is asked for.
+///
+/// # Errors
+/// [`Failure::NotConverged`] if neither the start nor the upwind solution leads to a solution; [`Failure::Stopped`] if the
+/// monitor stops the work.
+pub fn trapezoid(
+    level: &Level,
+    motion: &Motion,
+    start: &[Vec<f64>; 2],
+    tolerance: f64,
+    monitor: &dyn Monitor,
+) -> Result<([Vec<f64>; 2], Work), Failure> {
+    if let Some(answer) = full_slip::rigid_answer(level, motion) {
+        return Ok((answer.traction, answer.work));
+    }
+    let operator = level.operator(monitor)?;
+    let parity = level.parity(motion);
+    let mut solve = Solve::new(level, motion, &operator, parity, tolerance, monitor);
+    let mut t = solve.start(Some(start));
+    let Some(slips) = solve.trapezoid(&mut t, None)? else {
+        return Err(Failure::NotConverged {
+            work: solve.work,
+            tolerance,
+            advice: "try another mesh".to_owned(),
+        });
+    };
+    let mut traction = solve.expand(&t);
+    let none = [0, 1].map(|_| vec![0.0; slips.len()]);
+    obey_coulomb(&level.bound, &slips, &mut traction, &none);
+    Ok((traction, solve.work))
+}
+
+/// Why there is no answer, as far as is known, and what to do, as a clause.
+fn advice(report: &Convergence) -> String {
+    let linear = match report.inexact_steps {
+        0 => String::new(),
+        steps => {
+            let reason = GmresExit::RestartsUsedUp.reason();
+            format!("in {steps} steps {reason}; ")
+        }
+    };
+    format!("{linear}try another mesh, with cells and strips of similar width")
+}
+
+/// What the three-point rule gave besides tractions.
+struct MirrorAnswer {
+    slip: [Vec<f64>; 2],
+    slips: Vec<bool>,
+    by_fixed_point: bool,
+}
+
+/// One motion on one level.
+struct Solve<'a> {
+    level: &'a Level,
+    motion: &'a Motion,
+    operator: &'a LevelOperator,
+    parity: Option<Parity>,
+    bound: Vec<f64>,
+    area: Vec<f64>,
+    tolerance: f64,
+    work: Work,
+    monitor: &'a dyn Monitor,
+}
+
+impl<'a> Solve<'a> {
+    fn new(
+        level: &'a Level,
+        motion: &'a Motion,
+        operator: &'a LevelOperator,
+        parity: Option<Parity>,
+        tolerance: f64,
+        monitor: &'a dyn Monitor,
+    ) -> Solve<'a> {
+        let padded = operator.influence.padded(parity);
+        let resized = |values: &[f64]| {
+            let mut values = values.to_vec();
+            values.resize(padded.max(values.len()), 0.0);
+            values
+        };
+        Solve {
+            level,
+            motion,
+            operator,
+            parity,
+            bound: resized(&level.bound),
+            area: resized(&level.normalised.areas()),
+            tolerance,
+            work: Work::default(),
+            monitor,
+        }
+    }
+
+    fn equations(&self, rule: Rule) -> Equations<'a> {
+        Equations::new(
+            rule,
+            &self.level.normalised,
+            &self.operator.influence,
+            self.parity,
+        )
+    }
+
+    /// A solver that shares its own blocks with the other motions of the level.
+    fn newton<'e>(&self, equations: &'e Equations<'e>) -> Newton<'e> {
+        let own = self
+            .operator
+            .own_blocks
+            .get(equations.rule, self.parity, || OwnBlocks::new(equations));
+        Newton::with_blocks(equations, own)
+    }
+
+    /// The start brought onto the unknowns, or zero tractions.
+    fn start(&self, start: Option<&[Vec<f64>; 2]>) -> Vec<f64> {
+        let padded = self.operator.influence.padded(self.parity);
+        let mut t = vec![0.0; 2 * padded];
+        if let Some([x, y]) = start {
+            let unknowns = self.equations(Rule::Upwind).cells();
+            t[..unknowns].copy_from_slice(&x[..unknowns]);
+            t[padded..padded + unknowns].copy_from_slice(&y[..unknowns]);
+        }
+        t
+    }
+
+    /// Solves one rule from `t`; `shortcut` allows the fixed point.
+    fn rule(
+        &mut self,
+        newton: &mut Newton,
+        rigid: &[f64],
+        t: &mut [f64],
+        shortcut: bool,
+    ) -> Result<(Convergence, bool), Stop> {
+        let largest = rigid.iter().fold(0.0_f64, |m, w| m.max(w.abs()));
+        let law = FrictionLaw {
+            rigid,
+            bound: &self.bound,
+            area: &self.area,
+            scale: (largest * newton.compliance()).min(1.0),
+            tolerance: self.tolerance,
+        };
+        let settled = if shortcut {
+            full_slip::fixed_point(newton, &law, t, self.monitor)?
+        } else {
+            None
+        };
+        let by_fixed_point = settled.is_some();
+        let report = match settled {
+            Some(report) => report,
+            None => newton.solve(&law, t, self.monitor)?,
+        };
+        self.work.add(Work {
+            iterations: report.iterations,
+            products: report.products,
+            entries: u64::from(report.products) * newton.entries() as u64,
+            residual: report.residual,
+        });
+        Ok((report, by_fixed_point))
+    }
+
+    /// The three-point rule: from the start, else from zero, else from the upwind solution.
+    fn mirror(&mut self, t: &mut [f64], started: bool) -> Result<MirrorAnswer, Failure> {
+        let equations = self.equations(Rule::Mirror);
+        let rigid = equations.rigid(self.motion);
+        let mut newton = self.newton(&equations);
+        let (mut report, by_fixed_point) = self.rule(&mut newton, &rigid, t, true)?;
+        if !report.converged && started {
+            t.fill(0.0);
+            report = self.rule(&mut newton, &rigid, t, false)?.0;
+        }
+        if !report.converged {
+            t.fill(0.0);
+            self.upwind(t)?;
+            report = self.rule(&mut newton, &rigid, t, false)?.0;
+        }
+        if !report.converged {
+            return Err(Failure::NotConverged {
+                work: self.work,
+                tolerance: self.tolerance,
+                advice: advice(&report),
+            });
+        }
+        Ok(MirrorAnswer {
+            slip: self.expand(newton.slip()),
+            slips: self.zones(&newton, t),
+            by_fixed_point,
+        })
+    }
+
+    /// Which cells of the whole mesh slip, by the last iterate of `newton`.
+    fn zones(&self, newton: &Newton, t: &[f64]) -> Vec<bool> {
+        let slips: Vec<f64> = (0..newton.cells())
+            .map(|i| f64::from(u8::from(newton.slips(&self.bound, t, i))))
+            .collect();
+        let slips = if self.parity.is_some() {
+            self.level.unfold(&slips, 1.0)
+        } else {
+            slips
+        };
+        slips.into_iter().map(|v| v > 0.5).collect()
+    }
+
+    fn upwind(&mut self, t: &mut [f64]) -> Result<bool, Stop> {
+        let equations = self.equations(Rule::Upwind);
+        let rigid = equations.rigid(self.motion);
+        let mut newton = self.newton(&equations);
+        Ok(self.rule(&mut newton, &rigid, t, false)?.0.converged)
+    }
+
+    /// The trapezoid rule from a start of its own if there is one, else from the three-point solution in `t`, else from the
+    /// upwind solution; returns which cells slip. If no start leads to a solution `t` is as it was.
+    fn trapezoid(
+        &mut self,
+        t: &mut [f64],
+        warm: Option<Vec<f64>>,
+    ) -> Result<Option<Vec<bool>>, Stop> {
+        let equations = self.equations(Rule::Trapezoid);
+        let rigid = equations.rigid(self.motion);
+        let mut newton = self.newton(&equations);
+        let residual = self.work.residual;
+        let mut converged = false;
+        let mut found = t.to_vec();
+        if let Some(warm) = warm {
+            found.copy_from_slice(&warm);
+            converged = self
+                .rule(&mut newton, &rigid, &mut found, true)?
+                .0
+                .converged;
+            if !converged {
+                found.copy_from_slice(t);
+            }
+        }
+        if !converged
+            && !self
+                .rule(&mut newton, &rigid, &mut found, true)?
+                .0
+                .converged
+        {
+            found.fill(0.0);
+            self.upwind(&mut found)?;
+            if !self
+                .rule(&mut newton, &rigid, &mut found, false)?
+                .0
+                .converged
+            {
+                self.work.residual = residual;
+                return Ok(None);
+            }
+        }
+        t.copy_from_slice(&found);
+        Ok(Some(self.zones(&newton, t)))
+    }
+
+    /// Values of the unknowns (x then y) as two vectors over the whole mesh.
+    fn expand(&self, values: &[f64]) -> [Vec<f64>; 2] {
+        let (x, y) = values.split_at(values.len() / 2);
+        match self.parity {
+            None => [x, y].map(|v| v[..self.level.mesh.cells()].to_vec()),
+            Some(Parity::Longitudinal) => [self.level.unfold(x, 1.0), self.level.unfold(y, -1.0)],
+            Some(Parity::Lateral) => [self.level.unfold(x, -1.0), self.level.unfold(y, 1.0)],
+        }
+    }
+}

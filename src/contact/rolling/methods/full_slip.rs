@@ -1,0 +1,176 @@
+//! States that need no Newton iteration: nothing slips because nothing moves, or everything slips.
+
+use crate::contact::case::words::Motion;
+use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::rolling::answer::{Tangential, Work};
+use crate::contact::rolling::methods::boundary_element::newton::{
+    Convergence, FrictionLaw, Newton,
+};
+use crate::contact::rolling::strip_mesh::Level;
+
+/// No elastic slip of a patch in full slip was seen above a third of this, in units of (μ p_max)/G, for a/b from
+/// 1/50 to 50 and any ν.
+const ELASTIC_SLIP_MAX: f64 = 10.0;
+/// Rigid slip must be this many times larger for the elastic slip to be left out: the direction of the traction then
+/// changes by less than the inverse.
+const NEGLIGIBLE: f64 = 1e6;
+/// Rigid slip above this, in the same units, makes the fixed point worth trying.
+const FIXED_POINT_FROM: f64 = 30.0;
+/// Sweeps of the fixed point before Newton takes over.
+const SWEEPS_MAX: u32 = 12;
+
+/// Tractions at the bound along the rigid slip of a dimensionless motion, on every cell.
+#[must_use]
+pub fn along_rigid_slip(level: &Level, motion: &Motion) -> [Vec<f64>; 2] {
+    along(level, &rigid_slip(level, motion))
+}
+
+fn rigid_slip(level: &Level, motion: &Motion) -> [Vec<f64>; 2] {
+    let normalised = &level.normalised;
+    let x = normalised.rows();
+    let x = x.iter().map(|y| motion.creepage_x - motion.spin_per_mm * y);
+    let y = normalised.node.iter();
+    let y = y.map(|x| motion.creepage_y + motion.spin_per_mm * x);
+    [x.collect(), y.collect()]
+}
+
+/// Tractions at the bound in the directions of the slips.
+fn along(level: &Level, slip: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
+    let lengths: Vec<f64> = slip[0]
+        .iter()
+        .zip(&slip[1])
+        .map(|(x, y)| x.hypot(*y))
+        .collect();
+    [0, 1].map(|k| {
+        let cells = slip[k].iter().zip(&lengths).zip(&level.bound);
+        cells
+            .map(|((s, length), bound)| {
+                if *length > 0.0 {
+                    bound * s / length
+                } else {
+                    0.0
+                }
+            })
+            .collect()
+    })
+}
+
+/// The answer if the rigid slip decides everything: no motion, no friction, or a rigid slip so large that elastic
+/// slip cannot turn it (relative change of the tractions below 1e-6).
+#[must_use]
+pub fn rigid_answer(level: &Level, motion: &Motion) -> Option<Tangential> {
+    let cells = level.mesh.cells();
+    let slip = rigid_slip(level, motion);
+    let sizes = slip[0].iter().zip(&slip[1]).map(|(x, y)| x.hypot(*y));
+    let smallest = sizes.fold(f64::INFINITY, f64::min);
+    let still = motion.creepage_x == 0.0 && motion.creepage_y == 0.0 && motion.spin_per_mm == 0.0;
+    let reason = if still {
+        "no creepage and no spin: nothing to solve"
+    } else if smallest > ELASTIC_SLIP_MAX * NEGLIGIBLE && !pole_inside(level, motion) {
+        "rigid slip exceeds any elastic slip a million times: everything slips along it"
+    } else {
+        return None;
+    };
+    let traction = along(level, &slip);
+    Some(Tangential {
+        traction,
+        second: None,
+        slips: vec![!still; cells],
+        slip,
+        work: Work::default(),
+        skipped: vec![reason.to_owned()],
+        remarks: Vec::new(),
+    })
+}
+
+/// Without friction there are no tractions, and the slip is the rigid one.
+#[must_use]
+pub fn frictionless_answer(level: &Level, motion: &Motion) -> Tangential {
+    let cells = level.mesh.cells();
+    let rows = level.mesh.rows();
+    let still = motion.creepage_x == 0.0 && motion.creepage_y == 0.0 && motion.spin_per_mm == 0.0;
+    Tangential {
+        traction: [vec![0.0; cells], vec![0.0; cells]],
+        second: None,
+        slip: [
+            rows.iter()
+                .map(|y| motion.creepage_x - motion.spin_per_mm * y)
+                .collect(),
+            level
+                .mesh
+                .node
+                .iter()
+                .map(|x| motion.creepage_y + motion.spin_per_mm * x)
+                .collect(),
+        ],
+        slips: vec![!still; cells],
+        work: Work::default(),
+        skipped: vec!["no friction: no tractions".to_owned()],
+        remarks: Vec::new(),
+    }
+}
+
+/// Does the rigid slip vanish somewhere in the box around the patches?
+fn pole_inside(level: &Level, motion: &Motion) -> bool {
+    if motion.spin_per_mm == 0.0 {
+        return false;
+    }
+    let (x, y) = (
+        -motion.creepage_y / motion.spin_per_mm,
+        motion.creepage_x / motion.spin_per_mm,
+    );
+    level.normalised.segments.iter().any(|s| {
+        let half = 0.5 * s.chord.dy;
+        s.chord.left <= x && x <= s.chord.right && (s.chord.y - y).abs() <= half
+    })
+}
+
+/// Tries `T ← g s/|s|` where the rigid slip is large on every cell: each sweep costs one product, and what it finds is
+/// accepted only by the residual that Newton's iterates are held to. Returns nothing where it does not settle; `t`
+/// is then still a fair start.
+///
+/// # Errors
+/// Only if the monitor stops the work.
+pub fn fixed_point(
+    newton: &mut Newton,
+    law: &FrictionLaw,
+    t: &mut [f64],
+    monitor: &dyn Monitor,
+) -> Result<Option<Convergence>, Stop> {
+    let padded = t.len() / 2;
+    let cells = newton.cells();
+    let smallest = (0..cells)
+        .map(|i| law.rigid[i].hypot(law.rigid[padded + i]))
+        .fold(f64::INFINITY, f64::min);
+    if smallest < FIXED_POINT_FROM {
+        return Ok(None);
+    }
+    let mut report = Convergence {
+        converged: false,
+        iterations: 0,
+        products: 0,
+        residual: f64::INFINITY,
+        inexact_steps: 0,
+    };
+    let follow = |t: &mut [f64], slip: &[f64]| {
+        for i in 0..cells {
+            let factor = law.bound[i] / slip[i].hypot(slip[padded + i]);
+            t[i] = factor * slip[i];
+            t[padded + i] = factor * slip[padded + i];
+        }
+    };
+    follow(t, law.rigid);
+    for _ in 0..SWEEPS_MAX {
+        if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.0) {
+            return Err(stop);
+        }
+        report.residual = newton.evaluate(law, t, &mut report);
+        report.iterations += 1;
+        if report.residual <= law.tolerance {
+            report.converged = (0..cells).all(|i| newton.slips(law.bound, t, i));
+            return Ok(report.converged.then_some(report));
+        }
+        follow(t, newton.slip());
+    }
+    Ok(None)
+}

@@ -1,0 +1,258 @@
+//! The outer iteration: which cells stick and which slip.
+
+use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::rolling::methods::liu_hsu::initial_guess::Guess;
+use crate::contact::rolling::methods::liu_hsu::newton_raphson;
+use crate::contact::rolling::methods::liu_hsu::newton_raphson::Steps;
+use crate::contact::rolling::methods::liu_hsu::stick_block::{
+    DenseProblem, SlipSystem, both_components,
+};
+use crate::contact::rolling::slip_rules::Rule;
+
+/// Divisions tried before giving up.
+const DIVISIONS_MAX: u32 = 60;
+/// A stick cell slips when its traction exceeds its bound by this share, so that rounding does not decide.
+const STICK_MARGIN: f64 = 1e-9;
+/// A cell of given tractions counts as slipping when they miss its bound by no more than this share.
+const START_MARGIN: f64 = 1e-6;
+
+/// How the outer iteration ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Exit {
+    /// The division into zones agrees with the tractions and slips that follow from it.
+    Converged,
+    /// Newton–Raphson found no tractions for a division.
+    NewtonDiverged,
+    /// A division came up for the second time: the iteration would go round for ever.
+    ZonesRepeat,
+    /// Too many divisions.
+    IterationLimit,
+    /// The zones agree, but rounding keeps the residual above the tolerance.
+    Inexact,
+}
+
+impl Exit {
+    /// A clause for messages.
+    #[must_use]
+    pub fn reason(self) -> &'static str {
+        match self {
+            Exit::Converged => "converged",
+            Exit::NewtonDiverged => "Newton-Raphson diverged",
+            Exit::ZonesRepeat => "the division into stick and slip repeats itself",
+            Exit::IterationLimit => "too many divisions into stick and slip",
+            Exit::Inexact => "the residual stays above the tolerance",
+        }
+    }
+}
+
+/// One run of the outer iteration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Attempt {
+    /// The discretisation rule.
+    pub rule: Rule,
+    /// The initial guess used.
+    pub guess: Guess,
+    /// How it ended.
+    pub exit: Exit,
+    /// Divisions into stick and slip that were solved.
+    pub outer_iterations: u32,
+    /// Newton–Raphson steps over all divisions.
+    pub newton_iterations: u32,
+}
+
+/// Tractions and zones, over the cells without padding.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Division {
+    /// Tractions, x of all cells before y.
+    pub tractions: Vec<f64>,
+    /// Does the cell slip?
+    pub slips: Vec<bool>,
+}
+
+/// Runs the outer iteration from all cells sticking, or from the zones of given tractions.
+///
+/// A stick cell whose traction reaches its bound and a slip cell whose traction opposes its slip (eq. 10) change their
+/// zones in the same pass.
+///
+/// # Errors
+/// Only if the monitor stops the work.
+pub fn run(
+    problem: &DenseProblem,
+    guess: Guess,
+    start: Option<&[f64]>,
+    monitor: &dyn Monitor,
+) -> Result<(Attempt, Division), Stop> {
+    let mut attempt = Attempt {
+        rule: problem.rule,
+        guess,
+        exit: Exit::IterationLimit,
+        outer_iterations: 0,
+        newton_iterations: 0,
+    };
+    let mut division = first_division(problem, start);
+    let mut seen: Vec<Vec<bool>> = Vec::new();
+    while attempt.outer_iterations < DIVISIONS_MAX {
+        attempt.outer_iterations += 1;
+        seen.push(division.slips.clone());
+        let system = SlipSystem::new(problem, &division.slips, monitor)?;
+        if !solve_division(problem, &system, &mut attempt, &mut division, monitor)? {
+            attempt.exit = Exit::NewtonDiverged;
+            break;
+        }
+        let misplaced = misplaced(problem, &system, &division.tractions);
+        if misplaced.is_empty() {
+            attempt.exit = Exit::Converged;
+            break;
+        }
+        let mut next = division.slips.clone();
+        for cell in misplaced {
+            next[cell] = !next[cell];
+        }
+        if seen.contains(&next) {
+            attempt.exit = Exit::ZonesRepeat;
+            break;
+        }
+        division.slips = next;
+    }
+    Ok((attempt, division))
+}
+
+/// All cells stick, or those slip that `start` loads up to their bound. A cell without pressure cannot stick.
+fn first_division(problem: &DenseProblem, start: Option<&[f64]>) -> Division {
+    let n = problem.cells;
+    let tractions = start.map_or_else(|| vec![0.0; 2 * n], <[f64]>::to_vec);
+    let slips = (0..n)
+        .map(|i| tractions[i].hypot(tractions[n + i]) >= problem.bound[i] * (1.0 - START_MARGIN))
+        .collect();
+    Division { tractions, slips }
+}
+
+/// Tractions for one division into zones; `false` if Newton–Raphson finds none.
+fn solve_division(
+    problem: &DenseProblem,
+    system: &SlipSystem,
+    attempt: &mut Attempt,
+    division: &mut Division,
+    monitor: &dyn Monitor,
+) -> Result<bool, Stop> {
+    let bound = system.slip_cells.iter().map(|i| problem.bound[*i]);
+    let mut roots = Roots {
+        system,
+        bound: bound.collect(),
+        iterations: 0,
+        monitor,
+    };
+    let start = |guess| start_tractions(problem, system, guess, &division.tractions);
+    let found = match attempt.guess {
+        Guess::Continued => roots.along_slip(start(Guess::Continued), start(Guess::RigidSlip))?,
+        guess => roots.find(start(guess), Steps::Full)?,
+    };
+    attempt.newton_iterations += roots.iterations;
+    let Some(t) = found else {
+        return Ok(false);
+    };
+    division.tractions.fill(0.0);
+    let on_stick = both_components(&system.stick_cells, problem.cells);
+    for (place, value) in on_stick.iter().zip(system.stick_tractions(&t)) {
+        division.tractions[*place] = value;
+    }
+    let on_slip = both_components(&system.slip_cells, problem.cells);
+    for (place, value) in on_slip.iter().zip(&t) {
+        division.tractions[*place] = *value;
+    }
+    Ok(true)
+}
+
+/// The search for roots of eq. 8 and 9 with one division.
+struct Roots<'a> {
+    system: &'a SlipSystem,
+    bound: Vec<f64>,
+    iterations: u32,
+    monitor: &'a dyn Monitor,
+}
+
+impl Roots<'_> {
+    /// The root that Newton–Raphson finds from a start, if any.
+    fn find(&mut self, mut t: Vec<f64>, steps: Steps) -> Result<Option<Vec<f64>>, Stop> {
+        let end = newton_raphson::solve(self.system, &self.bound, steps, &mut t, self.monitor)?;
+        self.iterations += end.iterations;
+        Ok(end.converged.then_some(t))
+    }
+
+    /// A root with as few cells as possible that pull against their slip. Eq. 9 has a root for every choice of such
+    /// cells; the one found from `first` is tried again with those cells turned round, then from `second`.
+    fn along_slip(&mut self, first: Vec<f64>, second: Vec<f64>) -> Result<Option<Vec<f64>>, Stop> {
+        let mut best = self.find(first, Steps::OnCircles)?;
+        let turned = best.as_ref().map(|t| turned(self.system, t));
+        for start in turned.into_iter().chain([second]) {
+            let count = |t: &Vec<f64>| opposed(self.system, t).len();
+            let least = best.as_ref().map_or(usize::MAX, count);
+            if least == 0 {
+                break;
+            }
+            if let Some(t) = self.find(start, Steps::OnCircles)?
+                && opposed(self.system, &t).len() < least
+            {
+                best = Some(t);
+            }
+        }
+        Ok(best)
+    }
+}
+
+/// The slip cells, counted among themselves, whose tractions oppose their slips (eq. 10).
+fn opposed(system: &SlipSystem, t: &[f64]) -> Vec<usize> {
+    let count = system.slip_cells.len();
+    let slip = system.slip(t);
+    (0..count)
+        .filter(|k| slip[*k] * t[*k] + slip[count + k] * t[count + k] < 0.0)
+        .collect()
+}
+
+/// The tractions with those that oppose their slips turned round.
+fn turned(system: &SlipSystem, t: &[f64]) -> Vec<f64> {
+    let count = system.slip_cells.len();
+    let mut next = t.to_vec();
+    for k in opposed(system, t) {
+        next[k] = -next[k];
+        next[count + k] = -next[count + k];
+    }
+    next
+}
+
+/// The guess on all slip cells, x before y.
+fn start_tractions(
+    problem: &DenseProblem,
+    system: &SlipSystem,
+    guess: Guess,
+    before: &[f64],
+) -> Vec<f64> {
+    let count = system.slip_cells.len();
+    let mut t = vec![0.0; 2 * count];
+    for (k, &i) in system.slip_cells.iter().enumerate() {
+        let before = [before[i], before[problem.cells + i]];
+        let at = [problem.x[i], problem.y[i]];
+        let [x, y] = guess.direction(&problem.motion, at, before);
+        t[k] = problem.bound[i] * x;
+        t[count + k] = problem.bound[i] * y;
+    }
+    t
+}
+
+/// The cells that disagree with their zones.
+fn misplaced(problem: &DenseProblem, system: &SlipSystem, t: &[f64]) -> Vec<usize> {
+    let n = problem.cells;
+    let mut found: Vec<usize> = system
+        .stick_cells
+        .iter()
+        .copied()
+        .filter(|i| t[*i].hypot(t[n + i]) >= problem.bound[*i] * (1.0 + STICK_MARGIN))
+        .collect();
+    let t_slip: Vec<f64> = both_components(&system.slip_cells, n)
+        .into_iter()
+        .map(|place| t[place])
+        .collect();
+    let opposed = opposed(system, &t_slip);
+    found.extend(opposed.into_iter().map(|k| system.slip_cells[k]));
+    found
+}

@@ -1,0 +1,139 @@
+//! The method on a mesh level of a case, as the recipe calls it.
+
+use crate::contact::case::words::Motion;
+use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::rolling::answer::{Failure, Tangential, Work, obey_coulomb};
+use crate::contact::rolling::methods::boundary_element::newton::{FrictionLaw, Newton};
+use crate::contact::rolling::methods::full_slip;
+use crate::contact::rolling::methods::liu_hsu::solve::{Outcome, Stage, solve_by_upwind};
+use crate::contact::rolling::operator_store::LevelOperator;
+use crate::contact::rolling::slip_equations::Equations;
+use crate::contact::rolling::slip_rules::Rule;
+use crate::contact::rolling::strip_mesh::Level;
+
+/// Solves one motion (about the origin of the case) with the trapezoid rule, the spin pole from the level `coarse`
+/// (without it, guess 2 is left out).
+///
+/// # Errors
+/// [`Failure::NotConverged`] with the residual of the tractions it ended on; [`Failure::Stopped`].
+pub fn solve(
+    level: &Level,
+    coarse: Option<&Level>,
+    motion: &Motion,
+    tolerance: f64,
+    monitor: &dyn Monitor,
+) -> Result<Tangential, Failure> {
+    let here = level.scale.motion(motion);
+    if let Some(answer) = full_slip::rigid_answer(level, &here) {
+        return Ok(answer);
+    }
+    let operator = level.operator(monitor)?;
+    let coarse = coarse.map(|coarse| Ok::<_, Stop>((coarse, coarse.operator(monitor)?)));
+    let coarse = coarse.transpose()?;
+    let fine = Prepared::new(level, &operator, Rule::Trapezoid, &here);
+    let upwind = Prepared::new(level, &operator, Rule::Upwind, &here);
+    let coarse = coarse.as_ref().map(|(level, operator)| {
+        let motion = level.scale.motion(motion);
+        Prepared::new(level, operator, Rule::Trapezoid, &motion)
+    });
+    let mut t = vec![0.0; 2 * fine.equations.padded()];
+    let outcome = solve_by_upwind(
+        &fine.stage(tolerance),
+        &upwind.stage(tolerance),
+        coarse.as_ref().map(|c| c.stage(tolerance)).as_ref(),
+        &mut t,
+        monitor,
+    )?;
+    let work = work(&outcome);
+    if !outcome.converged {
+        return Err(Failure::NotConverged {
+            work,
+            tolerance,
+            advice: outcome.advice(),
+        });
+    }
+    let cells = level.mesh.cells();
+    let padded = fine.equations.padded();
+    let halves = |v: &[f64]| [v[..cells].to_vec(), v[padded..padded + cells].to_vec()];
+    let mut traction = halves(&t);
+    let slip = obey_coulomb(
+        &level.bound,
+        &outcome.slips,
+        &mut traction,
+        &halves(&outcome.slip),
+    );
+    Ok(Tangential {
+        traction,
+        second: None,
+        slip,
+        slips: outcome.slips,
+        work,
+        skipped: Vec::new(),
+        remarks: Vec::new(),
+    })
+}
+
+fn work(outcome: &Outcome) -> Work {
+    Work {
+        iterations: outcome.newton_iterations(),
+        products: 0,
+        entries: 0,
+        residual: outcome.residual,
+    }
+}
+
+/// The equations of one rule on a level with everything a [`Stage`] borrows.
+struct Prepared<'a> {
+    level: &'a Level,
+    equations: Equations<'a>,
+    motion: Motion,
+    rigid: Vec<f64>,
+    bound: Vec<f64>,
+    area: Vec<f64>,
+    y: Vec<f64>,
+    scale: f64,
+}
+
+impl<'a> Prepared<'a> {
+    fn new(
+        level: &'a Level,
+        operator: &'a LevelOperator,
+        rule: Rule,
+        motion: &Motion,
+    ) -> Prepared<'a> {
+        let equations = Equations::new(rule, &level.normalised, &operator.influence, None);
+        let padded = equations.padded();
+        let resized = |mut values: Vec<f64>| {
+            values.resize(padded, 0.0);
+            values
+        };
+        let rigid = equations.rigid(motion);
+        let largest = rigid.iter().fold(0.0_f64, |m, w| m.max(w.abs()));
+        let compliance = Newton::new(&equations).compliance();
+        Prepared {
+            bound: resized(level.bound.clone()),
+            area: resized(level.normalised.areas()),
+            y: level.normalised.rows(),
+            scale: (largest * compliance).min(1.0),
+            motion: *motion,
+            level,
+            equations,
+            rigid,
+        }
+    }
+
+    fn stage(&self, tolerance: f64) -> Stage<'_> {
+        Stage {
+            equations: &self.equations,
+            law: FrictionLaw {
+                rigid: &self.rigid,
+                bound: &self.bound,
+                area: &self.area,
+                scale: self.scale,
+                tolerance,
+            },
+            nodes: (&self.level.normalised.node, &self.y),
+            motion: self.motion,
+        }
+    }
+}

@@ -1,0 +1,6 @@
+//! Methods that solve one motion on one mesh.
+
+pub mod boundary_element;
+pub mod fastsim;
+pub mod full_slip;
+pub mod liu_hsu;

@@ -1,0 +1,421 @@
+//! The operators of a process: bounded in bytes, shared by all cases and threads.
+//!
+//! Meshes are dimensionless, so that patches of one shape share their operator whatever their size and load. The store decides how
+//! long an operator is kept, never what an answer is: an operator that is computed again is the same to the last bit.
+
+use std::collections::hash_map::DefaultHasher;
+use std::collections::{BTreeMap, HashMap};
+use std::hash::{Hash, Hasher};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use crate::contact::half_space::strip_operator::operator;
+use crate::contact::half_space::strip_operator::operator::{Differences, Precision};
+use crate::contact::mesh::strips::{Mesh, Segment};
+use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::rolling::methods::boundary_element::preconditioner;
+use crate::contact::rolling::methods::boundary_element::preconditioner::SharedBlocks;
+
+/// Bytes of a store when nothing else is asked for: two of the largest operators that targets from 0.0005 on lead to (52 MB each
+/// without mirror symmetry) or some hundred usual ones. A creep map of 900 motions at fixed spin takes the same time with 0, 64, 128 and
+/// 256 MiB (`cargo bench --bench stress -- --only creep-map`); what is kept pays for batches of one shape (`cargo bench --bench report`).
+pub const BYTES_DEFAULT: u64 = 128 << 20;
+/// An operator larger than this part of the bound is not kept: it would push out all others.
+const LARGEST_PART: u64 = 2;
+
+/// What the fast solver prepares for a mesh, whatever the motion, friction and load.
+#[derive(Debug)]
+pub struct LevelOperator {
+    /// The influence of the mesh.
+    pub influence: Differences,
+    /// Own blocks of its strips.
+    pub own_blocks: SharedBlocks,
+}
+
+/// What an operator depends on beside its mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OperatorKind {
+    /// Poisson's ratio.
+    pub poisson_ratio: f64,
+    /// Only one half of a mirror-symmetric mesh is stored.
+    pub folded: bool,
+    /// Width of its numbers.
+    pub precision: Precision,
+}
+
+impl OperatorKind {
+    /// Bytes of an operator with all own blocks that it may get, of equal strips with so many cells each.
+    #[must_use]
+    pub fn bytes(self, segments: usize, cells_each: usize) -> u64 {
+        let lengths = std::iter::repeat_n(cells_each, segments);
+        self.bytes_of(segments * cells_each, lengths)
+    }
+
+    fn bytes_of(self, cells: usize, lengths: impl ExactSizeIterator<Item = usize>) -> u64 {
+        operator::bytes(cells, lengths.len(), self.folded, self.precision)
+            + preconditioner::bytes_max(lengths, self.folded)
+    }
+}
+
+/// Operators, the least recently used of which leave first.
+#[derive(Debug)]
+pub struct OperatorStore {
+    bytes_max: u64,
+    kept: Mutex<Shelf>,
+}
+
+/// What is kept, by digest, and in which order it was used last.
+#[derive(Debug, Default)]
+struct Shelf {
+    operators: HashMap<u64, Kept>,
+    /// Digests by the time of last use, counted in uses.
+    order: BTreeMap<u64, u64>,
+    uses: u64,
+    bytes: u64,
+}
+
+#[derive(Debug, Clone)]
+struct Kept {
+    kind: OperatorKind,
+    mesh: Mesh,
+    bytes: u64,
+    used: u64,
+    operator: Arc<LevelOperator>,
+}
+
+impl Kept {
+    fn is_of(&self, mesh: &Mesh, kind: OperatorKind) -> bool {
+        self.kind == kind && alike(&self.mesh, mesh)
+    }
+}
+
+impl Default for OperatorStore {
+    fn default() -> Self {
+        OperatorStore::new(BYTES_DEFAULT)
+    }
+}
+
+impl OperatorStore {
+    /// A store of at most so many bytes; 0 keeps nothing, which changes no answer.
+    #[must_use]
+    pub fn new(bytes_max: u64) -> OperatorStore {
+        OperatorStore {
+            bytes_max,
+            kept: Mutex::default(),
+        }
+    }
+
+    /// The operator of a mesh: kept from an equal mesh, else computed outside the lock. Two threads that miss the same operator at once
+    /// both compute it, and one result is dropped: a solve that is stopped cannot hold up another.
+    ///
+    /// # Errors
+    /// The monitor may stop the work.
+    pub fn get(
+        &self,
+        mesh: &Mesh,
+        kind: OperatorKind,
+        monitor: &dyn Monitor,
+    ) -> Result<Arc<LevelOperator>, Stop> {
+        let digest = digest(mesh, kind);
+        if let Some(found) = self.shelf().find(digest, mesh, kind) {
+            return Ok(found);
+        }
+        let OperatorKind {
+            poisson_ratio,
+            folded,
+            precision,
+        } = kind;
+        let influence = Differences::new(mesh, poisson_ratio, folded, precision, monitor)?;
+        let operator = Arc::new(LevelOperator {
+            influence,
+            own_blocks: SharedBlocks::default(),
+        });
+        let lengths = mesh.segments.iter().map(|segment| segment.cells.len());
+        let bytes = kind.bytes_of(mesh.cells(), lengths);
+        if bytes <= self.bytes_max / LARGEST_PART {
+            let kept = Kept {
+                kind,
+                mesh: mesh.clone(),
+                bytes,
+                used: 0,
+                operator: Arc::clone(&operator),
+            };
+            self.shelf().keep(digest, kept, self.bytes_max);
+        }
+        Ok(operator)
+    }
+
+    /// Bytes of what is kept, with all own blocks that it may get.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.shelf().bytes
+    }
+
+    /// What the process needs for this store at most.
+    #[must_use]
+    pub fn bytes_max(&self) -> u64 {
+        self.bytes_max
+    }
+
+    fn shelf(&self) -> MutexGuard<'_, Shelf> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Shelf {
+    fn find(&mut self, digest: u64, mesh: &Mesh, kind: OperatorKind) -> Option<Arc<LevelOperator>> {
+        let found = self.operators.get_mut(&digest)?;
+        if !found.is_of(mesh, kind) {
+            return None;
+        }
+        self.uses += 1;
+        self.order.remove(&found.used);
+        found.used = self.uses;
+        self.order.insert(found.used, digest);
+        Some(Arc::clone(&found.operator))
+    }
+
+    fn keep(&mut self, digest: u64, mut new: Kept, bytes_max: u64) {
+        self.drop_one(digest);
+        while self.bytes + new.bytes > bytes_max {
+            let Some((_, oldest)) = self.order.first_key_value() else {
+                break;
+            };
+            let oldest = *oldest;
+            self.drop_one(oldest);
+        }
+        self.uses += 1;
+        new.used = self.uses;
+        self.order.insert(new.used, digest);
+        self.bytes += new.bytes;
+        self.operators.insert(digest, new);
+    }
+
+    fn drop_one(&mut self, digest: u64) {
+        if let Some(gone) = self.operators.remove(&digest) {
+            self.order.remove(&gone.used);
+            self.bytes -= gone.bytes;
+        }
+    }
+}
+
+/// Where the levels of one case get their operators: the store, and the operator used last, so that one which is too large for
+/// the store is not computed for every motion.
+#[derive(Debug)]
+pub struct CaseOperators {
+    store: Arc<OperatorStore>,
+    last: Mutex<Option<Held>>,
+}
+
+#[derive(Debug)]
+struct Held {
+    kind: OperatorKind,
+    mesh: Mesh,
+    operator: Arc<LevelOperator>,
+}
+
+impl CaseOperators {
+    /// Those of a case whose store is this.
+    #[must_use]
+    pub fn new(store: &Arc<OperatorStore>) -> Arc<CaseOperators> {
+        Arc::new(CaseOperators {
+            store: Arc::clone(store),
+            last: Mutex::default(),
+        })
+    }
+
+    /// As [`OperatorStore::get`].
+    ///
+    /// # Errors
+    /// The monitor may stop the work.
+    pub fn get(
+        &self,
+        mesh: &Mesh,
+        kind: OperatorKind,
+        monitor: &dyn Monitor,
+    ) -> Result<Arc<LevelOperator>, Stop> {
+        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        let same = |held: &&Held| held.kind == kind && alike(&held.mesh, mesh);
+        if let Some(held) = last.as_ref().filter(same) {
+            return Ok(Arc::clone(&held.operator));
+        }
+        // The last one goes before the next is computed: a case needs one at a time.
+        *last = None;
+        let operator = self.store.get(mesh, kind, monitor)?;
+        *last = Some(Held {
+            kind,
+            mesh: mesh.clone(),
+            operator: Arc::clone(&operator),
+        });
+        Ok(operator)
+    }
+}
+
+/// The numbers of a segment that the influence depends on, beside its cells.
+fn across(segment: &Segment) -> [f64; 2] {
+    [segment.chord.y, segment.chord.dy]
+}
+
+fn digest(mesh: &Mesh, kind: OperatorKind) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    (kind.poisson_ratio.to_bits(), kind.folded).hash(&mut hasher);
+    (kind.precision == Precision::Single).hash(&mut hasher);
+    for segment in &mesh.segments {
+        across(segment).map(f64::to_bits).hash(&mut hasher);
+        segment.cells.hash(&mut hasher);
+    }
+    let edges = mesh.left.iter().chain(&mesh.right);
+    for place in edges {
+        place.to_bits().hash(&mut hasher);
+    }
+    hasher.finish()
+}
+
+/// Have two meshes the same influence, to the last digit?
+fn alike(a: &Mesh, b: &Mesh) -> bool {
+    let segments = a.segments.iter().zip(&b.segments);
+    (a.segments.len(), a.cells()) == (b.segments.len(), b.cells())
+        && (&a.left, &a.right, &a.node) == (&b.left, &b.right, &b.node)
+        && segments
+            .into_iter()
+            .all(|(a, b)| across(a) == across(b) && a.cells == b.cells)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::mesh::strips::{Chord, Grading, equal_strips};
+    use crate::contact::monitor::Unwatched;
+
+    fn mesh(half_width: f64) -> Mesh {
+        let chords: Vec<Chord> = equal_strips(-half_width, half_width, 4)
+            .into_iter()
+            .enumerate()
+            .map(|(strip, (y, dy))| Chord {
+                patch: 0,
+                strip,
+                y,
+                dy,
+                left: -1.0,
+                right: 1.0,
+            })
+            .collect();
+        Mesh::new(&chords, &Grading::cosine(6))
+    }
+
+    const KIND: OperatorKind = OperatorKind {
+        poisson_ratio: 0.3,
+        folded: false,
+        precision: Precision::Single,
+    };
+
+    fn get(store: &OperatorStore, half_width: f64, kind: OperatorKind) -> Arc<LevelOperator> {
+        store.get(&mesh(half_width), kind, &Unwatched).unwrap()
+    }
+
+    #[test]
+    fn an_equal_mesh_is_not_computed_again() {
+        let store = OperatorStore::default();
+        let first = get(&store, 1.0, KIND);
+        assert!(Arc::ptr_eq(&first, &get(&store, 1.0, KIND)));
+        let others = [
+            OperatorKind {
+                poisson_ratio: 0.2,
+                ..KIND
+            },
+            OperatorKind {
+                precision: Precision::Double,
+                ..KIND
+            },
+            OperatorKind {
+                folded: true,
+                ..KIND
+            },
+        ];
+        for other in others {
+            assert!(!Arc::ptr_eq(&first, &get(&store, 1.0, other)));
+        }
+        assert!(!Arc::ptr_eq(&first, &get(&store, 1.1, KIND)));
+    }
+
+    #[test]
+    fn the_bound_holds_and_the_last_used_stay() {
+        let bytes = KIND.bytes(4, 6);
+        let store = OperatorStore::new(5 * bytes);
+        let first = get(&store, 1.0, KIND);
+        for k in 1..20 {
+            get(&store, 1.0 + 0.1 * f64::from(k), KIND);
+            assert!(Arc::ptr_eq(&first, &get(&store, 1.0, KIND)));
+            assert!(store.bytes() <= 5 * bytes);
+        }
+        assert_eq!(store.bytes(), 5 * bytes);
+        let last = get(&store, 2.9, KIND);
+        assert!(Arc::ptr_eq(&last, &get(&store, 2.9, KIND)));
+    }
+
+    #[test]
+    fn the_bytes_counted_are_those_of_the_matrix_and_all_its_own_blocks() {
+        use crate::contact::rolling::methods::boundary_element::preconditioner::OwnBlocks;
+        use crate::contact::rolling::slip_equations::Equations;
+        use crate::contact::rolling::slip_rules::Rule;
+        for folded in [false, true] {
+            let kind = OperatorKind { folded, ..KIND };
+            let (mesh, store) = (mesh(1.0), OperatorStore::default());
+            let operator = store.get(&mesh, kind, &Unwatched).unwrap();
+            let parities: &[_] = if folded {
+                &[
+                    None,
+                    Some(operator::Parity::Lateral),
+                    Some(operator::Parity::Longitudinal),
+                ]
+            } else {
+                &[None]
+            };
+            let mut blocks = 0;
+            for rule in [Rule::Upwind, Rule::Mirror, Rule::Trapezoid] {
+                for parity in parities {
+                    let equations = Equations::new(rule, &mesh, &operator.influence, *parity);
+                    blocks += OwnBlocks::new(&equations).bytes();
+                }
+            }
+            assert_eq!(store.bytes(), operator.influence.bytes() as u64 + blocks);
+        }
+    }
+
+    #[test]
+    fn threads_share_one_store_within_its_bound() {
+        let bytes = KIND.bytes(4, 6);
+        let store = OperatorStore::new(4 * bytes);
+        std::thread::scope(|scope| {
+            for thread in 0..8_u32 {
+                let store = &store;
+                scope.spawn(move || {
+                    for k in 0..40_u32 {
+                        let shape = f64::from((thread + k) % 9);
+                        get(store, 1.0 + 0.1 * shape, KIND);
+                        assert!(store.bytes() <= 4 * bytes);
+                    }
+                });
+            }
+        });
+        assert_eq!(store.bytes(), 4 * bytes);
+    }
+
+    #[test]
+    fn without_room_nothing_is_kept() {
+        let store = OperatorStore::new(0);
+        get(&store, 1.0, KIND);
+        assert_eq!(store.bytes(), 0);
+    }
+
+    #[test]
+    fn what_a_case_used_last_is_at_hand_though_the_store_has_no_room() {
+        let operators = CaseOperators::new(&Arc::new(OperatorStore::new(0)));
+        let first = operators.get(&mesh(1.0), KIND, &Unwatched).unwrap();
+        let again = operators.get(&mesh(1.0), KIND, &Unwatched).unwrap();
+        assert!(Arc::ptr_eq(&first, &again));
+        drop((first, again));
+        let last = Arc::downgrade(&operators.get(&mesh(1.0), KIND, &Unwatched).unwrap());
+        operators.get(&mesh(1.1), KIND, &Unwatched).unwrap();
+        assert!(last.upgrade().is_none());
+    }
+}

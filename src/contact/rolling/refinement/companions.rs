@@ -1,0 +1,103 @@
+//! Companions of a mesh: the same motion on half the strips, and on half the cells. Their differences to the mesh tell its
+//! error across and along the strips apart.
+
+use crate::contact::case::problem::Problem;
+use crate::contact::case::words::{MeshSize, Motion};
+use crate::contact::error::SolveError;
+use crate::contact::monitor::Monitor;
+use crate::contact::rolling::answer::{Failure, Tangential, Work};
+use crate::contact::rolling::methods::boundary_element::solve as boundary_element;
+use crate::contact::rolling::refinement::levels::{Ladder, Plan};
+use crate::contact::rolling::refinement::refine::{nested_tractions, tolerance};
+use crate::contact::rolling::resultants::Resultants;
+
+/// Which side of a mesh is halved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Companion {
+    /// Half the strips.
+    Across,
+    /// Half the cells in each.
+    Along,
+}
+
+/// What is known of the error from a companion.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum Seen {
+    /// Nobody looked.
+    #[default]
+    Untried,
+    /// It cannot be had: the mesh is too small to be halved, or the iteration did not converge.
+    Missing,
+    /// Resultants of every patch on the companion, and by how much their change from the mesh would be larger on exactly half the
+    /// strips or cells if errors are of second order.
+    Found(Vec<Resultants>, f64),
+}
+
+impl Companion {
+    /// The plan of the companion: same regime and pole, an even number of strips that is about half.
+    fn plan(self, plan: Plan) -> Option<Plan> {
+        let MeshSize { strips, cells } = plan.size;
+        let size = match self {
+            Companion::Across => MeshSize {
+                strips: 2 * ((strips + 2) / 4),
+                cells,
+            },
+            Companion::Along => MeshSize {
+                strips,
+                cells: cells.div_ceil(2),
+            },
+        };
+        let halved = size.strips >= 2 && size.cells >= 2 && size != plan.size;
+        halved.then_some(Plan { size, ..plan })
+    }
+
+    /// See [`Seen::Found`]; six strips have four for a half.
+    fn reach(self, fine: MeshSize, halved: MeshSize) -> f64 {
+        let (fine, halved) = match self {
+            Companion::Across => (fine.strips, halved.strips),
+            Companion::Along => (fine.cells, halved.cells),
+        };
+        3.0 / ((f64::from(fine) / f64::from(halved)).powi(2) - 1.0)
+    }
+
+    /// Solves the companion of level `number` for a motion with the trapezoid rule alone, started from the level's `answer`.
+    ///
+    /// # Errors
+    /// The monitor may stop the work.
+    pub(crate) fn solve(
+        self,
+        problem: &Problem,
+        ladder: &mut Ladder,
+        number: usize,
+        answer: &Tangential,
+        motion: &Motion,
+        monitor: &dyn Monitor,
+    ) -> Result<(Seen, Work), SolveError> {
+        let missing = (Seen::Missing, Work::default());
+        let Some(plan) = self.plan(ladder.get(number).plan) else {
+            return Ok(missing);
+        };
+        let companion = match ladder.level(plan) {
+            Ok(companion) => companion,
+            // Half the strips may miss a patch.
+            Err(SolveError::Unmeshable { .. }) => return Ok(missing),
+            Err(error) => return Err(error),
+        };
+        let (fine, level) = (ladder.get(number), ladder.get(companion));
+        let start = nested_tractions(fine, &answer.traction, level);
+        let motion = level.scale.motion(motion);
+        let tolerance = tolerance(problem);
+        match boundary_element::trapezoid(level, &motion, &start, tolerance, monitor) {
+            Ok((traction, work)) => {
+                let patches = problem.region.patches().len();
+                let found = (0..patches)
+                    .map(|p| Resultants::of_patch(level, &traction, p))
+                    .collect();
+                let reach = self.reach(fine.plan.size, plan.size);
+                Ok((Seen::Found(found, reach), work))
+            }
+            Err(Failure::NotConverged { work, .. }) => Ok((Seen::Missing, work)),
+            Err(Failure::Stopped(stop)) => Err(stop.into()),
+        }
+    }
+}

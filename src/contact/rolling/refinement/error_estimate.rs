@@ -1,0 +1,426 @@
+//! How wrong are the resultants? From two rules, two companion meshes, the level before, and the cell that holds the spin
+//! pole.
+
+use crate::contact::case::problem::{Problem, Resolution};
+use crate::contact::case::words::{Method, Motion};
+use crate::contact::normal::region::{Patch, Region};
+use crate::contact::rolling::answer::Tangential;
+use crate::contact::rolling::methods::{fastsim, full_slip};
+use crate::contact::rolling::refinement::companions::Seen;
+use crate::contact::rolling::refinement::constants::{
+    CAUTION, DATA, DECAY, DENSE_LEVELS, DENSE_LEVELS_NEAR, DIFFERENCES, JUMPING, LEVELS_LIKE,
+    LEVELS_UNLIKE, LOAD, POLE_WEIGHT, REGION, REGION_CELLS, RULES_ON_MESH, RULES_ON_MESH_SAMPLED,
+    SAMPLED, SAMPLED_DECAY, SHARE_LARGE, STRIPS_FEW, SURPRISES, WITHOUT_COMPANION,
+};
+use crate::contact::rolling::refinement::levels::{CELLS_FIRST, Regime};
+use crate::contact::rolling::regime::pole_error;
+use crate::contact::rolling::resultants::Resultants;
+use crate::contact::rolling::strip_mesh::Level;
+
+/// Relative error where everything slips along the rigid slip.
+const RIGID: f64 = 1e-6;
+/// Relative errors of every patch, then of the sum over them; nothing where there is no second opinion.
+pub type Errors = Vec<Option<f64>>;
+
+/// The level before on the climb, as far as it says something.
+#[derive(Debug, Clone, Copy)]
+pub struct Before<'a> {
+    /// Its resultants.
+    pub summed: &'a [Resultants],
+    /// What it was made for.
+    pub regime: Regime,
+    /// 1 over (ratio of cells − 1).
+    pub share: f64,
+}
+
+/// What an estimate depends on beside the answer on its level.
+#[derive(Debug, Clone, Copy)]
+pub struct Circumstances<'a> {
+    /// The motion in mm.
+    pub motion: &'a Motion,
+    /// The level before.
+    pub before: Option<Before<'a>>,
+    /// A finer level, where everything slips or the pressure jumps.
+    pub finer: Option<&'a Level>,
+    /// How many times more slender the patch is than the factors of an explicit mesh were found for; at least 1.
+    pub slenderness: f64,
+    /// Residual of the solve.
+    pub tolerance: f64,
+}
+
+/// What the error of one solved level is judged by, relative to μN (moment: μN√(A/π)): of every patch, then of the sum.
+/// Distances are the largest component, since single ones cross zero.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Indicators {
+    /// Nothing is left to find out.
+    Known(Errors),
+    /// Differences that a factor turns into an error.
+    Measured(Box<Measured>),
+}
+
+/// Differences that stand for the error of a level.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measured {
+    /// Between the two rules; nothing if one of them did not converge.
+    rules: Option<Vec<f64>>,
+    /// To the level before, weighted.
+    before: Option<Vec<f64>>,
+    /// To half the strips and to half the cells.
+    companions: [Option<Vec<f64>>; 2],
+    /// A companion that was tried cannot be had.
+    missing: bool,
+    /// From sampling the vortex of the tractions, weighted.
+    pole: f64,
+    /// Of the sums over cells, where everything slips.
+    sums: Vec<f64>,
+    /// Of region and pressure.
+    normal: Vec<f64>,
+    /// Of the iteration.
+    tolerance: f64,
+    /// The factor.
+    scale: f64,
+}
+
+impl Indicators {
+    /// Reads a solved level; `found` are the resultants of `answer` on it, not extrapolated.
+    #[must_use]
+    pub fn of_level(
+        problem: &Problem,
+        level: &Level,
+        answer: &Tangential,
+        found: &[Resultants],
+        circumstances: Circumstances,
+    ) -> Indicators {
+        let Circumstances { motion, finer, .. } = circumstances;
+        let patches = problem.region.patches();
+        let none = vec![0.0; patches.len() + 1];
+        let all = |value| Indicators::Known(vec![value; patches.len() + 1]);
+        if problem.friction == 0.0 {
+            return all(Some(0.0));
+        }
+        let slides = answer.slips.iter().all(|slips| *slips);
+        let sums = finer.filter(|_| slides).map_or_else(
+            || none.clone(),
+            |finer| sum_errors(problem, &patches, [level, finer], motion),
+        );
+        if answer.second.is_none() && answer.work.products == 0 && answer.work.iterations == 0 {
+            if !answer.slips.iter().any(|s| *s) {
+                return all(Some(0.0));
+            }
+            return Indicators::Known(sums.iter().map(|e| Some(e.max(RIGID))).collect());
+        }
+        if problem.method == Method::Fastsim {
+            // No mesh tells what the theory leaves out.
+            return all(Some(fastsim::error_class(
+                problem.traction_bound,
+                level.plan.size,
+            )));
+        }
+        if problem.method == Method::LiuHsu {
+            return Indicators::Known(dense_errors(problem, &patches, found, circumstances));
+        }
+        let rules = answer.second.as_ref().map(|second| {
+            let second: Vec<Resultants> = (0..patches.len())
+                .map(|p| Resultants::of_patch(level, second, p))
+                .collect();
+            distances(problem, &patches, found, &second)
+        });
+        let pole = if motion.spin_per_mm == 0.0 {
+            0.0
+        } else {
+            pole_error(problem, level, answer)
+        };
+        if matches!(problem.resolution, Resolution::Mesh(_)) {
+            let errors = mesh_errors(problem, level, rules.as_deref(), &sums, pole, circumstances);
+            return Indicators::Known(errors);
+        }
+        let sticking = matches!(level.plan.regime, Regime::Sticking { .. });
+        Indicators::Measured(Box::new(Measured {
+            rules,
+            before: circumstances
+                .before
+                .map(|before| change(problem, &patches, level, found, before)),
+            companions: [None, None],
+            missing: false,
+            pole: if sticking { 0.0 } else { POLE_WEIGHT * pole },
+            sums,
+            normal: match finer.filter(|_| jumps(problem)) {
+                Some(finer) => data_errors(&patches, [level, finer]),
+                None => normal_errors(problem, &patches),
+            },
+            tolerance: circumstances.tolerance,
+            scale: scale(problem, level, patches.len()),
+        }))
+    }
+
+    /// Takes in what companion `k` (0: half the strips, 1: half the cells) says of the resultants that were `found`.
+    pub fn see(&mut self, problem: &Problem, k: usize, found: &[Resultants], seen: &Seen) {
+        let Indicators::Measured(measured) = self else {
+            return;
+        };
+        match seen {
+            Seen::Untried => {}
+            Seen::Missing => measured.missing = true,
+            Seen::Found(other, reach) => {
+                let patches = problem.region.patches();
+                let mut apart = distances(problem, &patches, found, other);
+                apart.iter_mut().for_each(|d| *d *= reach);
+                measured.companions[k] = Some(apart);
+            }
+        }
+    }
+
+    /// The estimates, see `error`.
+    #[must_use]
+    pub fn errors(&self) -> Errors {
+        match self {
+            Indicators::Known(errors) => errors.clone(),
+            Indicators::Measured(measured) => (0..measured.sums.len())
+                .map(|k| measured.error(k))
+                .collect(),
+        }
+    }
+}
+
+impl Measured {
+    /// The estimate for patch `k`, or for the sum: the root of the sum of the squares of all indicators, with one factor for
+    /// all regimes, shapes and motions. Without companions it is a lower bound, by which a mesh can be refused.
+    fn error(&self, k: usize) -> Option<f64> {
+        let rules = DIFFERENCES * self.rules.as_ref()?[k];
+        let rules = if self.missing {
+            WITHOUT_COMPANION * rules
+        } else {
+            rules
+        };
+        let of = |values: &Option<Vec<f64>>| values.as_ref().map_or(0.0, |values| values[k]);
+        let [across, along] = [0, 1].map(|c| DIFFERENCES * of(&self.companions[c]));
+        let parts = [
+            rules,
+            of(&self.before),
+            across,
+            along,
+            self.pole,
+            self.sums[k],
+            self.normal[k],
+            self.tolerance,
+        ];
+        let squares: f64 = parts.iter().map(|part| part * part).sum();
+        Some(self.scale * squares.sqrt())
+    }
+}
+
+/// The factor on the root of the squares.
+fn scale(problem: &Problem, level: &Level, patches: usize) -> f64 {
+    let cells = level.mesh.cells() as f64 / patches.max(1) as f64;
+    let finer = (CELLS_FIRST / cells).min(1.0);
+    let (samples, decay) = match (&problem.region, problem.normal) {
+        (Region::Grid(field), None) => {
+            let [smooth, jumping] = SURPRISES;
+            let between = ((field.surprise() - smooth) / (jumping - smooth)).clamp(0.0, 1.0);
+            let mixed = |smooth: f64, jumping: f64| smooth + between * (jumping - smooth);
+            (mixed(SAMPLED, JUMPING), mixed(SAMPLED_DECAY, DECAY))
+        }
+        _ => (1.0, DECAY),
+    };
+    samples * finer.powf(decay) * few_strips(level).sqrt()
+}
+
+/// Is the pressure one that was given with jumps?
+#[must_use]
+pub fn jumps(problem: &Problem) -> bool {
+    matches!(&problem.region, Region::Grid(field) if field.jump().is_some())
+}
+
+/// Errors of region and pressure that were found from a gap, and of the load they carry.
+///
+/// The first falls as the power 3/2 of the cells of the normal problem across a patch.
+fn normal_errors(problem: &Problem, patches: &[Patch]) -> Vec<f64> {
+    let (Region::Grid(field), Some(_)) = (&problem.region, problem.normal) else {
+        return vec![0.0; patches.len() + 1];
+    };
+    let of = |cells: f64| {
+        let region = REGION * (REGION_CELLS / cells.max(1.0)).powf(1.5);
+        region.hypot(LOAD * problem.load_error)
+    };
+    weighted(patches, field.cells_across().into_iter().map(of).collect())
+}
+
+/// Errors of sampling a pressure that jumps: the change of its moments to a level of twice as many strips and cells.
+fn data_errors(patches: &[Patch], levels: [&Level; 2]) -> Vec<f64> {
+    let moments = |level: &Level, k: usize| {
+        let [x0, x1, y0, y1] = patches[k].extent;
+        let (a, b) = (0.5 * (x1 - x0), 0.5 * (y1 - y0));
+        let (x, y) = (0.5 * (x0 + x1), 0.5 * (y0 + y1));
+        let rows = level.mesh.rows();
+        let mut sums = [0.0; 2];
+        for i in level.patch_cells(k) {
+            let load = level.pressure[i] * level.area[i] / patches[k].normal_force;
+            let centre = 0.5 * (level.mesh.left[i] + level.mesh.right[i]);
+            sums[0] += load * (centre - x).abs() / a;
+            sums[1] += load * ((rows[i] - y) / b).powi(2);
+        }
+        sums
+    };
+    let errors = (0..patches.len()).map(|k| {
+        let [here, finer] = levels.map(|level| moments(level, k));
+        DATA * (here[0] - finer[0]).abs().max((here[1] - finer[1]).abs())
+    });
+    weighted(patches, errors.collect())
+}
+
+/// Errors of the patches, and of their sum by their loads.
+fn weighted(patches: &[Patch], mut errors: Vec<f64>) -> Vec<f64> {
+    let load: f64 = patches.iter().map(|patch| patch.normal_force).sum();
+    let pairs = errors.iter().zip(patches);
+    let sum: f64 = pairs
+        .map(|(error, patch)| error * patch.normal_force / load)
+        .sum();
+    errors.push(sum);
+    errors
+}
+
+/// The weighted change from the level before.
+fn change(
+    problem: &Problem,
+    patches: &[Patch],
+    level: &Level,
+    found: &[Resultants],
+    before: Before,
+) -> Vec<f64> {
+    let factor = match (before.regime, level.plan.regime) {
+        (Regime::Sticking { .. }, Regime::Sticking { .. })
+        | (Regime::Spinning(_), Regime::Spinning(_)) => LEVELS_LIKE,
+        (_, Regime::Sticking { .. }) => LEVELS_UNLIKE,
+        _ => 0.0,
+    };
+    let mut change = distances(problem, patches, found, before.summed);
+    change.iter_mut().for_each(|d| *d *= factor * before.share);
+    change
+}
+
+/// The dense method has one rule; the change between its levels is all there is.
+fn dense_errors(
+    problem: &Problem,
+    patches: &[Patch],
+    found: &[Resultants],
+    circumstances: Circumstances,
+) -> Errors {
+    let Some(Before { summed, share, .. }) = circumstances.before else {
+        return vec![None; patches.len() + 1];
+    };
+    let factor = if share > SHARE_LARGE {
+        DENSE_LEVELS_NEAR
+    } else {
+        DENSE_LEVELS
+    };
+    let factor = factor * share * circumstances.slenderness.powf(CAUTION);
+    distances(problem, patches, found, summed)
+        .iter()
+        .map(|d| Some((factor * d).max(circumstances.tolerance)))
+        .collect()
+}
+
+/// Errors on a mesh of the client's, which has no companions: from the difference of the two rules, the sums, and the vortex.
+fn mesh_errors(
+    problem: &Problem,
+    level: &Level,
+    rules: Option<&[f64]>,
+    sums: &[f64],
+    pole: f64,
+    circumstances: Circumstances,
+) -> Errors {
+    let factor = if problem.region.is_ellipse() {
+        RULES_ON_MESH
+    } else {
+        RULES_ON_MESH_SAMPLED
+    };
+    let factor = factor * circumstances.slenderness.powf(CAUTION) * few_strips(level);
+    let Some(rules) = rules else {
+        return vec![None; sums.len()];
+    };
+    let least = pole.max(circumstances.tolerance);
+    let errors = rules.iter().zip(sums);
+    errors
+        .map(|(rule, sum)| Some((factor * rule).max(*sum).max(least)))
+        .collect()
+}
+
+/// Errors of the sums over cells, which both rules share: where everything slips along the rigid slip, those sums are all there is.
+/// The change to a level of four times as many cells tells them.
+fn sum_errors(
+    problem: &Problem,
+    patches: &[Patch],
+    levels: [&Level; 2],
+    motion: &Motion,
+) -> Vec<f64> {
+    let [here, finer] = levels.map(|level| -> Vec<Resultants> {
+        let traction = full_slip::along_rigid_slip(level, &level.scale.motion(motion));
+        (0..patches.len())
+            .map(|p| Resultants::of_patch(level, &traction, p))
+            .collect()
+    });
+    let mut errors = distances(problem, patches, &here, &finer);
+    errors.iter_mut().for_each(|e| *e *= 4.0 / 3.0);
+    errors
+}
+
+/// A factor for a patch whose load lies on few of its strips.
+fn few_strips(level: &Level) -> f64 {
+    let mut loads: Vec<(usize, usize, f64)> = Vec::new();
+    for segment in &level.mesh.segments {
+        let load = |i: usize| level.pressure[i] * level.area[i];
+        let load: f64 = segment.cells.clone().map(load).sum();
+        let (patch, strip) = (segment.chord.patch, segment.chord.strip);
+        match loads.last_mut() {
+            Some(last) if (last.0, last.1) == (patch, strip) => last.2 += load,
+            _ => loads.push((patch, strip, load)),
+        }
+    }
+    let counted = |patch: &[(usize, usize, f64)]| {
+        let sum = |power: i32| patch.iter().map(|(.., load)| load.powi(power)).sum::<f64>();
+        let (load, squares) = (sum(1), sum(2));
+        if squares > 0.0 {
+            load * load / squares
+        } else {
+            STRIPS_FEW
+        }
+    };
+    let fewest = loads
+        .chunk_by(|a, b| a.0 == b.0)
+        .map(counted)
+        .fold(STRIPS_FEW, f64::min);
+    (STRIPS_FEW / fewest).powi(2)
+}
+
+/// Distances of two sets of resultants: every patch relative to its own μN with moments about its middle, then the sums.
+fn distances(
+    problem: &Problem,
+    patches: &[Patch],
+    found: &[Resultants],
+    other: &[Resultants],
+) -> Vec<f64> {
+    let mut distances = Vec::with_capacity(patches.len() + 1);
+    let (mut sum, mut sum_other) = (Resultants::default(), Resultants::default());
+    let (mut force, mut area, mut centre) = (0.0, 0.0, [0.0, 0.0]);
+    for ((patch, found), other) in patches.iter().zip(found).zip(other) {
+        let bound = problem.friction * patch.normal_force;
+        let at = [
+            0.5 * (patch.extent[0] + patch.extent[1]),
+            0.5 * (patch.extent[2] + patch.extent[3]),
+        ];
+        let length = (patch.area / std::f64::consts::PI).sqrt();
+        distances.push(found.about(at).distance(&other.about(at), bound, length));
+        sum = sum.plus(*found);
+        sum_other = sum_other.plus(*other);
+        force += bound;
+        area += patch.area;
+        centre = [centre[0] + bound * at[0], centre[1] + bound * at[1]];
+    }
+    let centre = centre.map(|c| c / force);
+    let length = (area / std::f64::consts::PI).sqrt();
+    distances.push(
+        sum.about(centre)
+            .distance(&sum_other.about(centre), force, length),
+    );
+    distances
+}

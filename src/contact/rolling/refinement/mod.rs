@@ -1,0 +1,10 @@
+//! From coarse to fine meshes until the estimate of the error meets the target.
+
+pub mod companions;
+pub mod constants;
+pub mod error_estimate;
+pub mod interpolate;
+pub mod levels;
+pub mod mesh_policy;
+pub mod refine;
+pub mod warm_start;

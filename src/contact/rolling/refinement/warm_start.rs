@@ -1,0 +1,121 @@
+//! What the last motions left on each level: the start of the next motion of a sweep.
+
+use crate::contact::case::words::Motion;
+use crate::contact::rolling::answer::Tangential;
+use crate::contact::rolling::strip_mesh::Level;
+
+/// A motion that leaves the line of the last two by more than this share of its step is not extrapolated.
+const STRAIGHT: f64 = 1e-6;
+/// Longest step that is extrapolated, in steps between the last two motions.
+const STEP_MAX: f64 = 1.5;
+/// Longest step, relative to the motion, over which the last tractions serve as they are.
+const NEAR: f64 = 0.25;
+
+/// First iterates of both rules, dimensionless, one value per cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Start {
+    /// For the three-point rule.
+    pub mirror: [Vec<f64>; 2],
+    /// For the trapezoid rule, where there is a better one than the three-point solution.
+    pub trapezoid: Option<[Vec<f64>; 2]>,
+}
+
+/// The answers of the last two motions on every level.
+#[derive(Debug, Default)]
+pub struct Trail {
+    steps: Vec<Step>,
+}
+
+#[derive(Debug)]
+struct Step {
+    level: usize,
+    /// Dimensionless, about the level's origin.
+    motion: Motion,
+    mirror: [Vec<f64>; 2],
+    trapezoid: [Vec<f64>; 2],
+}
+
+impl Trail {
+    /// Remembers an answer; the last but one on the level is forgotten.
+    pub fn leave(&mut self, number: usize, motion: Motion, answer: &Tangential) {
+        let Some(second) = &answer.second else {
+            return;
+        };
+        if self.steps.iter().filter(|s| s.level == number).count() == 2
+            && let Some(oldest) = self.steps.iter().position(|s| s.level == number)
+        {
+            self.steps.remove(oldest);
+        }
+        self.steps.push(Step {
+            level: number,
+            motion,
+            mirror: second.clone(),
+            trapezoid: answer.traction.clone(),
+        });
+    }
+
+    /// Forgets a level.
+    pub fn forget(&mut self, number: usize) {
+        self.steps.retain(|step| step.level != number);
+    }
+
+    /// A start for a motion on a level: the line through the last two answers continued, or the last answer itself if the
+    /// motion is near.
+    #[must_use]
+    pub fn start(&self, number: usize, level: &Level, motion: &Motion) -> Option<Start> {
+        let mut steps = self.steps.iter().rev().filter(|s| s.level == number);
+        let last = steps.next()?;
+        let to_go = difference(motion, &last.motion);
+        let line = steps.next().and_then(|before| {
+            let step = difference(&last.motion, &before.motion);
+            let along = dot(to_go, step) / dot(step, step);
+            let aside = [0, 1, 2].map(|k| to_go[k] - along * step[k]);
+            let straight = dot(aside, aside).sqrt() <= STRAIGHT * dot(to_go, to_go).sqrt();
+            (straight && along > 0.0 && along <= STEP_MAX).then_some((before, along))
+        });
+        if let Some((before, along)) = line {
+            let beyond = |here: &[Vec<f64>; 2], past: &[Vec<f64>; 2]| {
+                let mut values = [0, 1].map(|k| -> Vec<f64> {
+                    let pairs = here[k].iter().zip(&past[k]);
+                    pairs.map(|(h, p)| h + along * (h - p)).collect()
+                });
+                shrink(&mut values, &level.bound);
+                values
+            };
+            return Some(Start {
+                mirror: beyond(&last.mirror, &before.mirror),
+                trapezoid: Some(beyond(&last.trapezoid, &before.trapezoid)),
+            });
+        }
+        let whole = components(motion);
+        (dot(to_go, to_go) <= NEAR * NEAR * dot(whole, whole)).then(|| Start {
+            mirror: last.mirror.clone(),
+            trapezoid: Some(last.trapezoid.clone()),
+        })
+    }
+}
+
+/// Brings tractions into their discs.
+fn shrink(traction: &mut [Vec<f64>; 2], bound: &[f64]) {
+    let [x, y] = traction;
+    for ((x, y), bound) in x.iter_mut().zip(y.iter_mut()).zip(bound) {
+        let length = x.hypot(*y);
+        if length > *bound {
+            *x *= bound / length;
+            *y *= bound / length;
+        }
+    }
+}
+
+fn components(motion: &Motion) -> [f64; 3] {
+    [motion.creepage_x, motion.creepage_y, motion.spin_per_mm]
+}
+
+fn difference(a: &Motion, b: &Motion) -> [f64; 3] {
+    let (a, b) = (components(a), components(b));
+    [0, 1, 2].map(|k| a[k] - b[k])
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}

@@ -1,0 +1,105 @@
+//! What do the tractions of a level look like, as far as the next mesh should know: how much sticks, and about which pole they turn.
+
+use crate::contact::case::problem::Problem;
+use crate::contact::mesh::strips::Segment;
+use crate::contact::rolling::answer::Tangential;
+use crate::contact::rolling::refinement::constants::{POLE, STICK_NEGLIGIBLE, STICK_UNCERTAIN};
+use crate::contact::rolling::refinement::levels::Regime;
+use crate::contact::rolling::strip_mesh::Level;
+use crate::contact::rolling::vortex::vortex_centre;
+
+/// A pole this far out, relative to the half axes of the box around the patches, is outside.
+const POLE_INSIDE: f64 = 0.9;
+/// Cells gather no farther out than here.
+const POLE_OUTMOST: f64 = 0.95;
+
+/// Which mesh the next level should have, seen from this one.
+#[must_use]
+pub fn regime(level: &Level, answer: &Tangential, spinning: bool) -> Regime {
+    if !spinning || stick_share(level, answer) >= STICK_NEGLIGIBLE {
+        return Regime::Sticking { spinning };
+    }
+    pole(level, answer)
+        .and_then(|at| place_inside(level, at))
+        .map_or(Regime::Sticking { spinning }, Regime::Spinning)
+}
+
+/// Share of the cells' area that sticks.
+fn stick_share(level: &Level, answer: &Tangential) -> f64 {
+    let (mut stick, mut total) = (0.0, 0.0);
+    for (slips, area) in answer.slips.iter().zip(&level.area) {
+        total += area;
+        stick += if *slips { 0.0 } else { *area };
+    }
+    stick / total
+}
+
+/// A point inside the box about the patches as a place along the nearest chord and across, each from −1 to 1.
+fn place_inside(level: &Level, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+    let mesh = &level.normalised;
+    let side = |sign: f64| {
+        let sides = mesh
+            .segments
+            .iter()
+            .map(|s| sign * s.chord.y + 0.5 * s.chord.dy);
+        sign * sides.fold(f64::NEG_INFINITY, f64::max)
+    };
+    let (bottom, top) = (side(-1.0), side(1.0));
+    let across = (2.0 * y - bottom - top) / (top - bottom);
+    let reach = mesh.node.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    if (x / reach).hypot(across) >= POLE_INSIDE {
+        return None;
+    }
+    let distance = |s: &Segment| (s.chord.y - y).abs();
+    let nearest = mesh
+        .segments
+        .iter()
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+    let (left, right) = (nearest.chord.left, nearest.chord.right);
+    let along = (2.0 * x - left - right) / (right - left);
+    Some([along.clamp(-POLE_OUTMOST, POLE_OUTMOST), across])
+}
+
+/// Centre of the traction vortex, in the level's dimensionless coordinates.
+fn pole(level: &Level, answer: &Tangential) -> Option<[f64; 2]> {
+    let rows = level.normalised.rows();
+    let load = |i: usize| {
+        if answer.slips[i] {
+            level.pressure[i] * level.area[i]
+        } else {
+            0.0
+        }
+    };
+    let weight: Vec<f64> = (0..rows.len()).map(load).collect();
+    let t: Vec<f64> = answer.traction.concat();
+    vortex_centre(&t, &level.normalised.node, &rows, &weight)
+}
+
+/// Error of sampling the vortex, relative to the whole load; 0 where the cell that holds the centre surely
+/// sticks.
+pub(crate) fn pole_error(problem: &Problem, level: &Level, answer: &Tangential) -> f64 {
+    let Some([x, y]) = pole(level, answer) else {
+        return 0.0;
+    };
+    let load: f64 = problem
+        .region
+        .patches()
+        .iter()
+        .map(|p| p.normal_force)
+        .sum();
+    let uncertain =
+        level.plan.regime == Regime::Unknown && stick_share(level, answer) < STICK_UNCERTAIN;
+    for (segment, here) in level.mesh.segments.iter().zip(&level.normalised.segments) {
+        if (here.chord.y - y).abs() > 0.5 * here.chord.dy {
+            continue;
+        }
+        for i in segment.cells.clone() {
+            let holds = level.normalised.left[i] <= x && x <= level.normalised.right[i];
+            if holds && (answer.slips[i] || uncertain) {
+                let longer = (level.mesh.right[i] - level.mesh.left[i]).max(segment.chord.dy);
+                return POLE * level.pressure[i] * longer * longer / load;
+            }
+        }
+    }
+    0.0
+}

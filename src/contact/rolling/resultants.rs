@@ -1,0 +1,103 @@
+//! Forces and moment of tractions over a patch.
+
+use crate::contact::rolling::strip_mesh::Level;
+
+/// Forces in N and moment about z in N·mm, on the lower body.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Resultants {
+    /// Longitudinal force.
+    pub force_x: f64,
+    /// Lateral force.
+    pub force_y: f64,
+    /// Moment about the point it was asked for.
+    pub moment_z: f64,
+}
+
+impl Resultants {
+    /// `F_x = Σ T_x A`, `F_y = Σ T_y A`, `M_z = Σ (x T_y − y T_x) A` over the cells of one patch, with x in the
+    /// middle of the cell (there the moment of its constant traction is exact; at the node the error of M_z is about
+    /// twice as large) and y
+    /// halfway between the mid-line and the load's centre (at the one, moments of a vortex are too large, at the other too
+    /// small: the mean of `y²` over the strip is larger than the square of the mean); `traction` is dimensionless as the level's, the moment is about the
+    /// origin of the case.
+    #[must_use]
+    pub fn of_patch(level: &Level, traction: &[Vec<f64>; 2], patch: usize) -> Resultants {
+        let mut sum = Resultants::default();
+        let mesh = &level.mesh;
+        let segments = mesh.segments.iter().zip(&mesh.arm);
+        for (segment, arm) in segments.filter(|(s, _)| s.chord.patch == patch) {
+            let arm = 0.5 * (segment.chord.y + arm);
+            for i in segment.cells.clone() {
+                let weight = level.area[i] * level.scale.traction;
+                let (x, y) = (weight * traction[0][i], weight * traction[1][i]);
+                sum.force_x += x;
+                sum.force_y += y;
+                let centre = 0.5 * (mesh.left[i] + mesh.right[i]);
+                sum.moment_z += centre * y - arm * x;
+            }
+        }
+        sum
+    }
+
+    /// Sum of two resultants about the same point.
+    #[must_use]
+    pub fn plus(self, other: Resultants) -> Resultants {
+        Resultants {
+            force_x: self.force_x + other.force_x,
+            force_y: self.force_y + other.force_y,
+            moment_z: self.moment_z + other.moment_z,
+        }
+    }
+
+    /// Richardson's extrapolation of errors that fall as 1/N: these resultants plus `share` of their change from a coarser
+    /// mesh, with a force no larger than `bound`.
+    #[must_use]
+    pub fn beyond(self, coarser: Resultants, share: f64, bound: f64) -> Resultants {
+        let past = |here: f64, before: f64| here + share * (here - before);
+        let [x, y] = [
+            past(self.force_x, coarser.force_x),
+            past(self.force_y, coarser.force_y),
+        ];
+        let force = x.hypot(y);
+        let factor = if force > bound { bound / force } else { 1.0 };
+        Resultants {
+            force_x: factor * x,
+            force_y: factor * y,
+            moment_z: past(self.moment_z, coarser.moment_z),
+        }
+    }
+
+    /// These resultants plus a share each of their changes from two coarser meshes, with a force no larger than `bound`.
+    #[must_use]
+    pub fn beyond_all(self, coarser: [(Resultants, f64); 2], bound: f64) -> Resultants {
+        let [(first, share), (second, other)] = coarser;
+        let middle = |of: fn(&Resultants) -> f64| {
+            (share * of(&first) + other * of(&second)) / (share + other)
+        };
+        let mean = Resultants {
+            force_x: middle(|r| r.force_x),
+            force_y: middle(|r| r.force_y),
+            moment_z: middle(|r| r.moment_z),
+        };
+        self.beyond(mean, share + other, bound)
+    }
+
+    /// The same resultants with the moment about `point` instead of the origin.
+    #[must_use]
+    pub fn about(self, point: [f64; 2]) -> Resultants {
+        Resultants {
+            moment_z: self.moment_z - point[0] * self.force_y + point[1] * self.force_x,
+            ..self
+        }
+    }
+
+    /// Largest component of the difference to `other`: forces relative to `force`, moments to `force × length`; the
+    /// moments should be about a point in the patch.
+    #[must_use]
+    pub fn distance(&self, other: &Resultants, force: f64, length: f64) -> f64 {
+        let x = (self.force_x - other.force_x).abs();
+        let y = (self.force_y - other.force_y).abs();
+        let z = (self.moment_z - other.moment_z).abs() / length;
+        x.max(y).max(z) / force
+    }
+}

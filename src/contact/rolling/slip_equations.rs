@@ -1,0 +1,269 @@
+//! The discrete equations that every tangential method solves: `s = q + M T` with `|T| ≤ g` on every cell.
+//!
+//! Everything is dimensionless: lengths by the scale of the patch, tractions by a reference traction P, slips by P/G.
+//! Vectors hold all x components, then all y components, each padded with zeros to the operator's length.
+
+use std::cell::RefCell;
+use std::ops::ControlFlow;
+
+use crate::contact::case::words::Motion;
+use crate::contact::half_space::strip_operator::operator::{Differences, Parity, Scratch};
+use crate::contact::mesh::strips::Mesh;
+use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::rolling::slip_rules::{Rule, Stencil};
+
+/// A rule on a mesh with its influence: the linear map from tractions to slips.
+#[derive(Debug)]
+pub struct Equations<'a> {
+    /// The rule in use.
+    pub rule: Rule,
+    differences: &'a Differences,
+    parity: Option<Parity>,
+    stencils: Vec<Stencil>,
+    /// Cells and rows of every segment that has unknowns.
+    cells: Vec<std::ops::Range<usize>>,
+    rows: Vec<std::ops::Range<usize>>,
+    padded: usize,
+    row_count: usize,
+    /// y of every segment, for the rigid slip.
+    y: Vec<f64>,
+    /// Of the products.
+    scratch: RefCell<Scratch>,
+}
+
+impl<'a> Equations<'a> {
+    /// Sets up a rule for a mesh and its influence; with a parity, only the first half of the segments has unknowns.
+    #[must_use]
+    pub fn new(
+        rule: Rule,
+        mesh: &Mesh,
+        differences: &'a Differences,
+        parity: Option<Parity>,
+    ) -> Equations<'a> {
+        let parity = if differences.is_folded() {
+            parity
+        } else {
+            None
+        };
+        let count = if parity.is_some() {
+            differences.segments()
+        } else {
+            mesh.segments.len()
+        };
+        let mut row = 0;
+        let mut equations = Equations {
+            rule,
+            differences,
+            parity,
+            stencils: Vec::with_capacity(count),
+            cells: Vec::with_capacity(count),
+            rows: Vec::with_capacity(count),
+            padded: differences.padded(parity),
+            row_count: 0,
+            y: Vec::with_capacity(count),
+            scratch: RefCell::default(),
+        };
+        for (segment, y) in mesh.segments[..count].iter().zip(&mesh.arm) {
+            let stencil = Stencil::new(rule, mesh, segment);
+            let rows = stencil.cells() + 2;
+            equations.rows.push(row..row + rows);
+            row += rows;
+            equations.stencils.push(stencil);
+            equations.cells.push(segment.cells.clone());
+            equations.y.push(*y);
+        }
+        equations.row_count = row;
+        equations
+    }
+
+    /// Number of cells with unknowns.
+    #[must_use]
+    pub fn cells(&self) -> usize {
+        self.cells.last().map_or(0, |c| c.end)
+    }
+
+    /// Length of one component of a vector.
+    #[must_use]
+    pub fn padded(&self) -> usize {
+        self.padded
+    }
+
+    /// Number of segments with unknowns.
+    #[must_use]
+    pub fn segments(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// Cells of a segment.
+    #[must_use]
+    pub fn segment(&self, j: usize) -> std::ops::Range<usize> {
+        self.cells[j].clone()
+    }
+
+    /// Number of displacement differences, for scratch space.
+    #[must_use]
+    pub fn row_count(&self) -> usize {
+        self.row_count
+    }
+
+    /// Elastic slip `M T` of tractions `t`; `scratch` has twice [`row_count`](Self::row_count) values.
+    pub fn elastic(&self, t: &[f64], slip: &mut [f64], scratch: &mut [f64]) {
+        let (tx, ty) = t.split_at(self.padded);
+        let (sx, sy) = slip.split_at_mut(self.padded);
+        let (dx, dy) = scratch.split_at_mut(self.row_count);
+        let mut of_product = self.scratch.borrow_mut();
+        self.differences
+            .apply(self.parity, tx, ty, dx, dy, &mut of_product);
+        for ((stencil, cells), rows) in self.stencils.iter().zip(&self.cells).zip(&self.rows) {
+            stencil.elastic(&dx[rows.clone()], &mut sx[cells.clone()]);
+            stencil.elastic(&dy[rows.clone()], &mut sy[cells.clone()]);
+        }
+    }
+
+    /// Rigid slip `q` of a motion, in the units of the motion: `(ν_x − φ y, ν_y + φ x)` as the rule samples it.
+    #[must_use]
+    pub fn rigid(&self, motion: &Motion) -> Vec<f64> {
+        let mut slip = vec![0.0; 2 * self.padded];
+        let (sx, sy) = slip.split_at_mut(self.padded);
+        for ((stencil, cells), y) in self.stencils.iter().zip(&self.cells).zip(&self.y) {
+            stencil.rigid(
+                |_| motion.creepage_x - motion.spin_per_mm * y,
+                &mut sx[cells.clone()],
+            );
+            stencil.rigid(
+                |x| motion.creepage_y + motion.spin_per_mm * x,
+                &mut sy[cells.clone()],
+            );
+        }
+        slip
+    }
+
+    /// The own block of segment `j`: `M_xx` and `M_yy` between its cells, column by column. (`M_xy` is 0 there.)
+    #[must_use]
+    pub fn own_block(&self, j: usize) -> (Vec<f64>, Vec<f64>) {
+        let n = self.stencils[j].cells();
+        // A mirrored segment has the same own block as its image.
+        let stored = if j < self.differences.segments() {
+            j
+        } else {
+            self.segments() - 1 - j
+        };
+        let (rows, cells) = (
+            self.differences.rows(stored),
+            self.differences.cells(stored),
+        );
+        let mut blocks = (vec![0.0; n * n], vec![0.0; n * n]);
+        let (mut dx, mut dy) = (vec![0.0; n + 2], vec![0.0; n + 2]);
+        for (column, cell) in cells.enumerate() {
+            for (k, row) in rows.clone().enumerate() {
+                (dx[k], dy[k]) = self.differences.own(row, cell, self.parity);
+            }
+            self.stencils[j].elastic(&dx, &mut blocks.0[column * n..(column + 1) * n]);
+            self.stencils[j].elastic(&dy, &mut blocks.1[column * n..(column + 1) * n]);
+        }
+        blocks
+    }
+
+    /// The whole map `M` as a matrix over the cells without padding, column by column: the x components of all cells
+    /// come before the y components, in rows and in columns. For small meshes: it has `(2 × cells)²` values.
+    ///
+    /// # Errors
+    /// The monitor is asked every few columns and may stop the work.
+    pub fn dense(&self, monitor: &dyn Monitor) -> Result<Vec<f64>, Stop> {
+        let n = self.cells();
+        let mut matrix = vec![0.0; 4 * n * n];
+        let (from_x, from_y) = matrix.split_at_mut(2 * n * n);
+        let columns = from_x
+            .chunks_exact_mut(2 * n)
+            .zip(from_y.chunks_exact_mut(2 * n));
+        let mut differences: [Vec<f64>; 4] = Default::default();
+        for (cell, (from_x, from_y)) in columns.enumerate() {
+            if cell % 64 == 0
+                && let ControlFlow::Break(stop) = monitor.tick(0.0)
+            {
+                return Err(stop);
+            }
+            let ((xx, yx), (xy, yy)) = (from_x.split_at_mut(n), from_y.split_at_mut(n));
+            for ((stencil, cells), rows) in self.stencils.iter().zip(&self.cells).zip(&self.rows) {
+                differences.iter_mut().for_each(Vec::clear);
+                for row in rows.clone() {
+                    let entry = self.differences.entry(self.parity, row, cell);
+                    for (list, value) in differences.iter_mut().zip(entry) {
+                        list.push(value);
+                    }
+                }
+                for (list, slip) in differences
+                    .iter()
+                    .zip([&mut *xx, &mut *xy, &mut *yx, &mut *yy])
+                {
+                    stencil.elastic(list, &mut slip[cells.clone()]);
+                }
+            }
+        }
+        Ok(matrix)
+    }
+
+    /// Entries of the influence that one product touches.
+    #[must_use]
+    pub fn entries(&self) -> usize {
+        self.differences.entries(self.parity)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::half_space::strip_operator::operator::Precision;
+    use crate::contact::mesh::strips::{Chord, Grading, equal_strips};
+    use crate::contact::monitor::Unwatched;
+
+    #[test]
+    fn the_dense_matrix_acts_like_the_map_in_every_storage() {
+        let chords: Vec<Chord> = equal_strips(-0.6, 0.6, 4)
+            .into_iter()
+            .enumerate()
+            .map(|(strip, (y, dy))| Chord {
+                patch: 0,
+                strip,
+                y,
+                dy,
+                left: -1.0 + y * y,
+                right: 0.8 - y * y,
+            })
+            .collect();
+        let mesh = Mesh::new(&chords, &Grading::cosine(5));
+        for folded in [false, true] {
+            let differences =
+                Differences::new(&mesh, 0.3, folded, Precision::Double, &Unwatched).unwrap();
+            for (rule, parity) in [
+                (Rule::Upwind, None),
+                (Rule::Mirror, None),
+                (Rule::Trapezoid, None),
+                (Rule::Trapezoid, Some(Parity::Longitudinal)),
+                (Rule::Trapezoid, Some(Parity::Lateral)),
+            ] {
+                let equations = Equations::new(rule, &mesh, &differences, parity);
+                let (n, padded) = (equations.cells(), equations.padded());
+                let place = |i: usize| if i < n { i } else { padded + i - n };
+                let matrix = equations.dense(&Unwatched).unwrap();
+                let mut t = vec![0.0; 2 * padded];
+                for i in 0..2 * n {
+                    t[place(i)] = (1.0 + 3.7 * i as f64).sin();
+                }
+                let mut slip = vec![0.0; 2 * padded];
+                let mut scratch = vec![0.0; 2 * equations.row_count()];
+                equations.elastic(&t, &mut slip, &mut scratch);
+                for row in 0..2 * n {
+                    let product: f64 = (0..2 * n)
+                        .map(|column| matrix[column * 2 * n + row] * t[place(column)])
+                        .sum();
+                    assert!(
+                        (product - slip[place(row)]).abs() < 1e-12,
+                        "{rule:?} {parity:?} {row}: {product} {}",
+                        slip[place(row)]
+                    );
+                }
+            }
+        }
+    }
+}

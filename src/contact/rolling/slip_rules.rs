@@ -1,0 +1,218 @@
+//! Discretisation rules: how slip on a cell follows from displacement differences along its segment.
+//!
+//! Steady rolling asks for `s = w + ∂u/∂x` (Johnson 1985, §8.1; Liu & Hsu, eq. 2). All rules difference toward the
+//! leading edge: that is what selects the solution that vanishes there and keeps the problem well posed. Slip is in
+//! units of G⁻¹ × traction, lengths in the unit of the mesh.
+
+use crate::contact::half_space::strip_operator::operator::observation_points;
+use crate::contact::mesh::strips::{Mesh, Segment};
+
+/// The rules offered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rule {
+    /// Mean slip between a node and the next (the leading edge for the last node). First order, monotone.
+    Upwind,
+    /// One-sided three-point derivative at the node; behind the leading edge the nodes are mirrored. Second order,
+    /// smooth slips.
+    Mirror,
+    /// The seed's eq. 6 with `x_U` at the leading edge and half weight for the own cell, differenced along the strip:
+    /// slips of neighbouring cells average to the mean slip between their nodes. Second order, best forces, but its
+    /// slips oscillate next to the stick zone.
+    Trapezoid,
+}
+
+impl Rule {
+    /// A word for logs and answers.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Rule::Upwind => "upwind",
+            Rule::Mirror => "mirror",
+            Rule::Trapezoid => "trapezoid",
+        }
+    }
+}
+
+/// A rule made ready for one segment: `t_i = Σ_k band_i[k] (d_{i+k} + W_{i+k})`, then, from the leading cell
+/// backwards, `s_i = t_i − carry_i s_{i+1}`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stencil {
+    band: Vec<[f64; 3]>,
+    carry: Vec<f64>,
+    /// Where the rigid slip of each cell is taken, along x; a carried rule adds the neighbour's as for `s`.
+    rigid_at: Vec<f64>,
+    /// Sum that multiplies the rigid slip at `rigid_at`.
+    rigid_weight: Vec<f64>,
+}
+
+impl Stencil {
+    /// Prepares a rule for a segment.
+    #[must_use]
+    pub fn new(rule: Rule, mesh: &Mesh, segment: &Segment) -> Stencil {
+        let points = observation_points(mesh, segment);
+        let n = segment.cells.len();
+        let mut stencil = Stencil {
+            band: vec![[0.0; 3]; n],
+            carry: vec![0.0; n],
+            rigid_at: vec![0.0; n],
+            rigid_weight: vec![1.0; n],
+        };
+        for i in 0..n {
+            let (x, next) = (points[i], points[i + 1]);
+            match rule {
+                Rule::Upwind => {
+                    stencil.band[i] = [1.0 / (next - x), 0.0, 0.0];
+                    stencil.rigid_at[i] = 0.5 * (x + next);
+                }
+                Rule::Mirror => {
+                    stencil.band[i] = three_point(&points, i, n);
+                    stencil.rigid_at[i] = if n == 1 { 0.5 * (x + next) } else { x };
+                }
+                Rule::Trapezoid => {
+                    let share = if i + 1 < n { 0.5 } else { 1.0 };
+                    stencil.band[i] = [1.0 / (share * (next - x)), 0.0, 0.0];
+                    stencil.carry[i] = if i + 1 < n { 1.0 } else { 0.0 };
+                    stencil.rigid_at[i] = 0.5 * (x + next);
+                    stencil.rigid_weight[i] = 1.0 / share;
+                }
+            }
+        }
+        stencil
+    }
+
+    /// Number of cells.
+    #[must_use]
+    pub fn cells(&self) -> usize {
+        self.band.len()
+    }
+
+    /// Slip from displacement differences: `differences` has `cells + 2` values, `slip` has `cells`.
+    #[inline]
+    pub fn elastic(&self, differences: &[f64], slip: &mut [f64]) {
+        let n = self.band.len();
+        let (d, band, carry, slip) = (
+            &differences[..n + 2],
+            &self.band[..n],
+            &self.carry[..n],
+            &mut slip[..n],
+        );
+        let mut ahead = 0.0;
+        for i in (0..n).rev() {
+            let [c0, c1, c2] = band[i];
+            ahead = c0 * d[i] + c1 * d[i + 1] + c2 * d[i + 2] - carry[i] * ahead;
+            slip[i] = ahead;
+        }
+    }
+
+    /// Rigid slip of every cell for `w(x)`, which must be linear in x.
+    pub fn rigid(&self, w: impl Fn(f64) -> f64, slip: &mut [f64]) {
+        let mut ahead = 0.0;
+        for i in (0..self.band.len()).rev() {
+            ahead = self.rigid_weight[i] * w(self.rigid_at[i]) - self.carry[i] * ahead;
+            slip[i] = ahead;
+        }
+    }
+}
+
+/// Weights of the three-point derivative at node `i` on the differences `d_i`, `d_{i+1}`, `d_{i+2}`.
+///
+/// The observation points are the `n` nodes, the leading edge and the images of the last two nodes; the derivative
+/// skips the edge, so that the difference across it is the sum of two stored ones.
+fn three_point(points: &[f64], i: usize, n: usize) -> [f64; 3] {
+    if n == 1 {
+        return [1.0 / (points[1] - points[0]), 0.0, 0.0];
+    }
+    let beyond = |k: usize| if k < n { points[k] } else { points[k + 1] };
+    let (a, b) = (beyond(i + 1) - points[i], beyond(i + 2) - points[i]);
+    let (w1, w2) = (b / (a * (b - a)), -a / (b * (b - a)));
+    match n - i {
+        1 => [w1 + w2, w1 + w2, w2],
+        2 => [w1 + w2, w2, w2],
+        _ => [w1 + w2, w2, 0.0],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::mesh::strips::{Chord, Grading};
+
+    fn mesh(n: usize) -> Mesh {
+        let chord = Chord {
+            patch: 0,
+            strip: 0,
+            y: 0.0,
+            dy: 1.0,
+            left: -2.0,
+            right: 1.0,
+        };
+        Mesh::new(&[chord], &Grading::cosine(n))
+    }
+
+    fn slips(rule: Rule, n: usize, u: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
+        let mesh = mesh(n);
+        let segment = &mesh.segments[0];
+        let points = observation_points(&mesh, segment);
+        let differences: Vec<f64> = points.windows(2).map(|p| u(p[1]) - u(p[0])).collect();
+        let mut slip = vec![0.0; n];
+        Stencil::new(rule, &mesh, segment).elastic(&differences, &mut slip);
+        mesh.node.iter().copied().zip(slip).collect()
+    }
+
+    #[test]
+    fn every_rule_is_exact_for_a_uniform_strain() {
+        for rule in [Rule::Upwind, Rule::Mirror, Rule::Trapezoid] {
+            for n in [1, 2, 3, 9] {
+                for (_, s) in slips(rule, n, |x| 0.7 * x - 3.0) {
+                    assert!((s - 0.7).abs() < 1e-12, "{rule:?} {n} {s}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_three_point_rule_is_exact_for_a_parabola() {
+        for n in [2, 3, 9] {
+            for (x, s) in slips(Rule::Mirror, n, |x| x * x) {
+                assert!((s - 2.0 * x).abs() < 1e-12, "{n} {x} {s}");
+            }
+        }
+    }
+
+    #[test]
+    fn neighbouring_slips_of_the_trapezoid_average_to_the_mean_strain() {
+        let found = slips(Rule::Trapezoid, 8, |x| x.powi(3));
+        for pair in found.windows(2) {
+            let ((x0, s0), (x1, s1)) = (pair[0], pair[1]);
+            assert!((0.5 * (s0 + s1) - (x1.powi(3) - x0.powi(3)) / (x1 - x0)).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn rigid_slip_enters_every_rule_like_a_displacement_of_that_slope() {
+        for rule in [Rule::Upwind, Rule::Mirror, Rule::Trapezoid] {
+            for n in [1, 2, 7] {
+                let mesh = mesh(n);
+                let segment = &mesh.segments[0];
+                let points = observation_points(&mesh, segment);
+                let displaced = |x: f64| 0.3 * x + 0.2 * x * x;
+                let differences: Vec<f64> = points
+                    .windows(2)
+                    .map(|p| displaced(p[1]) - displaced(p[0]))
+                    .collect();
+                let stencil = Stencil::new(rule, &mesh, segment);
+                let (mut elastic, mut rigid) = (vec![0.0; n], vec![0.0; n]);
+                stencil.elastic(&differences, &mut elastic);
+                stencil.rigid(|x| 0.3 + 0.4 * x, &mut rigid);
+                for i in 0..n {
+                    assert!(
+                        (elastic[i] - rigid[i]).abs() < 1e-12,
+                        "{rule:?} {n} {i}: {} {}",
+                        elastic[i],
+                        rigid[i]
+                    );
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,310 @@
+//! One mesh level of a contact: cells and pressures, shared by all motions and methods, and where its operator comes from.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use crate::contact::case::problem::{Elasticity, Problem, Resolution};
+use crate::contact::case::words::Motion;
+use crate::contact::error::SolveError;
+use crate::contact::half_space::strip_operator::operator::{Parity, Precision};
+use crate::contact::mesh::strips::{Chord, Grading, Mesh, equal_strips, strips_about};
+use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::normal::region::Region;
+use crate::contact::rolling::operator_store::{
+    CaseOperators, LevelOperator, OperatorKind, OperatorStore,
+};
+use crate::contact::rolling::refinement::levels::Plan;
+use crate::contact::rolling::strip_chords;
+use crate::contact::rolling::strip_chords::Fitted;
+
+/// Targets from here on are met with a matrix in single precision.
+const SINGLE_PRECISION_FROM: f64 = 5e-4;
+
+/// Dimensionless coordinates in single precision are multiples of this: patches of one shape get the same mesh, to the last
+/// digit, whatever their size.
+const COORDINATE_STEP: f64 = 1.0 / (1_u64 << 34) as f64;
+
+/// The contact made dimensionless: lengths by `length`, tractions by `traction`, slips by `traction / G`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale {
+    /// Unit of length in mm: √(A/π) with A the area of all patches.
+    pub length: f64,
+    /// Unit of traction in MPa: μ times the largest pressure.
+    pub traction: f64,
+    /// Combined shear modulus in MPa.
+    pub shear_modulus: f64,
+    /// Where the dimensionless coordinates are 0, in mm: on the mirror line if there is one.
+    pub origin: [f64; 2],
+}
+
+impl Scale {
+    /// Unit of slip: traction / G, or 1 without friction, where slips are the rigid ones.
+    #[must_use]
+    pub fn slip(&self) -> f64 {
+        if self.traction > 0.0 {
+            self.traction / self.shear_modulus
+        } else {
+            1.0
+        }
+    }
+
+    /// A motion about the origin of the case becomes one about [`Scale::origin`], in units of rigid slip.
+    #[must_use]
+    pub fn motion(&self, motion: &Motion) -> Motion {
+        let unit = self.shear_modulus / self.traction;
+        Motion {
+            creepage_x: (motion.creepage_x - motion.spin_per_mm * self.origin[1]) * unit,
+            creepage_y: (motion.creepage_y + motion.spin_per_mm * self.origin[0]) * unit,
+            spin_per_mm: motion.spin_per_mm * self.length * unit,
+        }
+    }
+}
+
+/// A mesh with its pressures; its operator lies in the store of the process.
+#[derive(Debug)]
+pub struct Level {
+    /// What it was made from.
+    pub plan: Plan,
+    /// The mesh in mm.
+    pub mesh: Mesh,
+    /// Pressure of every cell in MPa; the cells of a patch carry its normal force exactly.
+    pub pressure: Vec<f64>,
+    /// Area of every cell in mm².
+    pub area: Vec<f64>,
+    /// Units of the dimensionless problem.
+    pub scale: Scale,
+    /// The dimensionless mesh.
+    pub normalised: Mesh,
+    /// Friction bound of every cell, dimensionless.
+    pub bound: Vec<f64>,
+    poisson_ratio: f64,
+    precision: Precision,
+    mirrored: bool,
+    operators: Arc<CaseOperators>,
+}
+
+impl Level {
+    /// Meshes every patch of the problem's region: equal strips and cosine-graded cells, or both gathered about the
+    /// plan's pole.
+    ///
+    /// # Errors
+    /// [`SolveError::Unmeshable`] if no strip meets a patch.
+    pub fn new(problem: &Problem, plan: impl Into<Plan>) -> Result<Level, SolveError> {
+        let store = Arc::new(OperatorStore::new(0));
+        Level::with_operators(problem, plan, CaseOperators::new(&store))
+    }
+
+    /// The same, with the operators of a case to take its own from.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn with_operators(
+        problem: &Problem,
+        plan: impl Into<Plan>,
+        operators: Arc<CaseOperators>,
+    ) -> Result<Level, SolveError> {
+        let plan: Plan = plan.into();
+        let size = plan.size;
+        let (region, friction) = (&problem.region, problem.friction);
+        let Elasticity {
+            shear_modulus,
+            poisson_ratio,
+            ..
+        } = problem.elasticity;
+        let patches = region.patches();
+        let mut fitted: Vec<Fitted> = Vec::new();
+        for (k, patch) in patches.iter().enumerate() {
+            let [low, high] = [patch.extent[2], patch.extent[3]];
+            let strips = match plan.pole() {
+                Some([_, y]) => strips_about(y, low, high, size.strips as usize),
+                None => equal_strips(low, high, size.strips as usize),
+            };
+            let chords = strip_chords::chords(region, k, &strips);
+            if chords.is_empty() {
+                return Err(SolveError::Unmeshable {
+                    patch: k,
+                    strips: size.strips,
+                });
+            }
+            fitted.extend(chords);
+        }
+        let chords: Vec<Chord> = fitted.iter().map(|f| f.chord).collect();
+        let grading = match plan.pole() {
+            Some([x, _]) => Grading::about(x, size.cells as usize),
+            None => Grading::cosine(size.cells as usize),
+        };
+        let mut mesh = Mesh::new(&chords, &grading);
+        if plan.pole().is_some() {
+            // Where all slips, tractions turn with the slip at the load's centre; sticking strips go with their mid-lines.
+            mesh.arm = fitted.iter().map(|f| f.load_y).collect();
+        }
+        let area = mesh.areas();
+        let pressure = cell_pressures(region, &fitted, &mesh, &area);
+        let mirror = mesh
+            .mirror_line()
+            .filter(|_| pressures_mirror(&mesh, &pressure));
+        let [x, y] = middle(&patches.iter().map(|p| p.extent).collect::<Vec<_>>());
+        let largest = patches.iter().map(|p| p.pressure_max).fold(0.0, f64::max);
+        let scale = Scale {
+            length: (patches.iter().map(|p| p.area).sum::<f64>() / PI).sqrt(),
+            traction: friction * largest,
+            shear_modulus,
+            origin: [x, mirror.unwrap_or(y)],
+        };
+        let precision = precision_of(problem.resolution);
+        let mut normalised = mesh.normalised(scale.origin, 1.0 / scale.length);
+        if precision == Precision::Single {
+            normalised.round(COORDINATE_STEP);
+        }
+        let bound = pressure.iter().map(|p| p / largest).collect();
+        Ok(Level {
+            plan,
+            mesh,
+            pressure,
+            area,
+            scale,
+            normalised,
+            bound,
+            poisson_ratio,
+            precision,
+            mirrored: mirror.is_some(),
+            operators,
+        })
+    }
+
+    /// The operator of the dimensionless mesh; from the store, or computed.
+    ///
+    /// # Errors
+    /// The monitor may stop the work.
+    pub fn operator(&self, monitor: &dyn Monitor) -> Result<Arc<LevelOperator>, Stop> {
+        let kind = OperatorKind {
+            poisson_ratio: self.poisson_ratio,
+            folded: self.mirrored,
+            precision: self.precision,
+        };
+        self.operators.get(&self.normalised, kind, monitor)
+    }
+
+    /// Which half of the unknowns a dimensionless motion moves, if the level has a mirror line and the motion only
+    /// one of the two.
+    #[must_use]
+    pub fn parity(&self, motion: &Motion) -> Option<Parity> {
+        if !self.mirrored {
+            return None;
+        }
+        let lateral = motion.creepage_y != 0.0 || motion.spin_per_mm != 0.0;
+        match (motion.creepage_x != 0.0, lateral) {
+            (_, false) => Some(Parity::Longitudinal),
+            (false, true) => Some(Parity::Lateral),
+            (true, true) => None,
+        }
+    }
+
+    /// Is half of the influence enough because patch and pressure are mirror-symmetric?
+    #[must_use]
+    pub fn is_mirrored(&self) -> bool {
+        self.mirrored
+    }
+
+    /// Cells of one patch.
+    #[must_use]
+    pub fn patch_cells(&self, patch: usize) -> std::ops::Range<usize> {
+        let mut cells = self
+            .mesh
+            .segments
+            .iter()
+            .filter(|s| s.chord.patch == patch)
+            .map(|s| s.cells.clone());
+        let Some(first) = cells.next() else {
+            return 0..0;
+        };
+        first.start..cells.next_back().map_or(first.end, |c| c.end)
+    }
+
+    /// Values of the first half of the segments continued to the mirrored half: `sign` is that of the image.
+    #[must_use]
+    pub fn unfold(&self, half: &[f64], sign: f64) -> Vec<f64> {
+        let cells = self.mesh.cells();
+        let mut values = vec![0.0; cells];
+        for segment in &self.mesh.segments[..self.mesh.segments.len() / 2] {
+            let image = cells - segment.cells.end;
+            for (k, i) in segment.cells.clone().enumerate() {
+                values[i] = half[i];
+                values[image + k] = sign * half[i];
+            }
+        }
+        values
+    }
+}
+
+/// Single precision serves any target that the residuals of single precision can meet.
+#[must_use]
+pub fn precision_of(resolution: Resolution) -> Precision {
+    match resolution {
+        Resolution::Target(target) if target >= SINGLE_PRECISION_FROM => Precision::Single,
+        _ => Precision::Double,
+    }
+}
+
+/// Mean pressures of the cells, scaled so that the cells carry the load of their strip where the region is not Hertz's
+/// ellipse (its line loads are smooth enough), then the patch's normal force.
+fn cell_pressures(region: &Region, fitted: &[Fitted], mesh: &Mesh, area: &[f64]) -> Vec<f64> {
+    let patches = region.patches();
+    let mut load = vec![0.0; patches.len()];
+    let mut pressure = vec![0.0; mesh.cells()];
+    for (segment, fitted) in mesh.segments.iter().zip(fitted) {
+        let mut carried = 0.0;
+        for i in segment.cells.clone() {
+            pressure[i] = fitted.mean_pressure(region, mesh.left[i], mesh.right[i]);
+            carried += pressure[i] * area[i];
+        }
+        if let Some(strip) = fitted.load
+            && !region.is_ellipse()
+            && carried > 0.0
+        {
+            let strip = strip * segment.chord.dy;
+            scale(&mut pressure[segment.cells.clone()], strip / carried);
+            carried = strip;
+        }
+        load[segment.chord.patch] += carried;
+    }
+    for segment in &mesh.segments {
+        let patch = segment.chord.patch;
+        if load[patch] > 0.0 {
+            let factor = patches[patch].normal_force / load[patch];
+            scale(&mut pressure[segment.cells.clone()], factor);
+        }
+    }
+    pressure
+}
+
+fn scale(values: &mut [f64], factor: f64) {
+    values.iter_mut().for_each(|value| *value *= factor);
+}
+
+/// Are the pressures mirror images to 1e-9 of the largest?
+fn pressures_mirror(mesh: &Mesh, pressure: &[f64]) -> bool {
+    let tolerance = 1e-9 * pressure.iter().copied().fold(0.0, f64::max);
+    let m = mesh.segments.len();
+    mesh.segments[..m / 2]
+        .iter()
+        .zip(mesh.segments.iter().rev())
+        .all(|(here, there)| {
+            let pairs = pressure[here.cells.clone()]
+                .iter()
+                .zip(&pressure[there.cells.clone()]);
+            pairs.into_iter().all(|(a, b)| (a - b).abs() <= tolerance)
+        })
+}
+
+/// Middle of the box around all patches.
+fn middle(extents: &[[f64; 4]]) -> [f64; 2] {
+    let low = |k: usize| extents.iter().map(|e| e[k]).fold(f64::INFINITY, f64::min);
+    let high = |k: usize| {
+        extents
+            .iter()
+            .map(|e| e[k])
+            .fold(f64::NEG_INFINITY, f64::max)
+    };
+    [0.5 * (low(0) + high(1)), 0.5 * (low(2) + high(3))]
+}

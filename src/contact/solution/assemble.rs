@@ -1,0 +1,390 @@
+//! From stage results to the answer a client reads: units put back, only what was asked for.
+
+use crate::contact::case::problem::{Problem, Resolution};
+use crate::contact::case::words::{Motion, Output};
+use crate::contact::normal::region::{Patch, Region};
+use crate::contact::post::zone::Zone;
+use crate::contact::remark::entry::{RemarkEntry, merged};
+use crate::contact::remark::list::Remark;
+use crate::contact::rolling::refinement::levels::Ladder;
+use crate::contact::rolling::refinement::refine::Point;
+use crate::contact::rolling::resultants::Resultants;
+use crate::contact::rolling::strip_mesh::Level;
+use crate::contact::solution::words::{
+    CombinedMaterial, ErrorEstimate, Fields, MeshReport, NormalisedMotion, Origin, PatchCells,
+    PatchFields, PatchSolution, PointFields, PointSolution, Solution, SolverReport, Total,
+};
+
+/// Remarks that are gathered before repetitions are dropped.
+const REMARKS_AT_ONCE: usize = 1000;
+/// Axes, origin and signs in one sentence.
+const FRAME: &str = "x along rolling (leading edge at larger x), y to the left, z up out of the lower body; forces, moments \
+                     and tractions act on the lower body, slip is that of the upper body relative to the lower one";
+
+/// The answer of a problem, motion by motion; of each only what the answer holds is kept.
+#[derive(Debug)]
+pub struct Assembly<'a> {
+    problem: &'a Problem,
+    patches: Vec<Patch>,
+    /// Motion by motion, for every patch.
+    points: Vec<Vec<PointSolution>>,
+    total: Vec<Total>,
+    remarks: Vec<RemarkEntry>,
+    fields: Fields,
+    /// Numbers of the levels whose cells are in the fields.
+    levels: Vec<usize>,
+}
+
+impl<'a> Assembly<'a> {
+    /// No motion yet.
+    #[must_use]
+    pub fn new(problem: &'a Problem) -> Assembly<'a> {
+        let patches = problem.region.patches();
+        Assembly {
+            problem,
+            points: vec![Vec::new(); patches.len()],
+            patches,
+            total: Vec::new(),
+            remarks: problem.remarks.clone(),
+            fields: Fields::default(),
+            levels: Vec::new(),
+        }
+    }
+
+    /// Adds the next motion.
+    pub fn add(&mut self, ladder: &Ladder, point: &Point) {
+        let (problem, level) = (self.problem, ladder.get(point.level));
+        self.remarks
+            .extend(remarks(problem, self.total.len(), point));
+        if self.remarks.len() > REMARKS_AT_ONCE {
+            self.remarks = merged(std::mem::take(&mut self.remarks));
+        }
+        for (index, patch) in self.patches.iter().enumerate() {
+            self.points[index].push(point_solution(problem, level, patch, index, point));
+        }
+        self.total.push(total(problem, &self.patches, point));
+        if wants_fields(problem) {
+            self.add_fields(level, point);
+        }
+    }
+
+    /// Values per cell of the next motion; motions that were solved on one level share its cells.
+    fn add_fields(&mut self, level: &Level, point: &Point) {
+        let problem = self.problem;
+        let patches = self.patches.len();
+        self.fields
+            .patches
+            .resize_with(patches, PatchFields::default);
+        let known = self.levels.iter().rposition(|known| *known == point.level);
+        let mesh = known.unwrap_or(self.levels.len());
+        if known.is_none() {
+            self.levels.push(point.level);
+        }
+        for (index, fields) in self.fields.patches.iter_mut().enumerate() {
+            if known.is_none() {
+                fields.meshes.push(patch_cells(problem, level, index));
+            }
+            let values = point_fields(problem, level, level.patch_cells(index), point);
+            fields.points.push(PointFields { mesh, ..values });
+        }
+    }
+
+    /// The answer.
+    #[must_use]
+    pub fn finish(self) -> (Solution, Fields) {
+        let problem = self.problem;
+        let patches = self.patches.iter().zip(self.points);
+        let solution = Solution {
+            patches: patches.map(patch_solution).collect(),
+            total: self.total,
+            remarks: merged(self.remarks),
+            normal: problem.normal,
+            wheel_lowering_mm: None,
+            origin: Origin {
+                x_mm: 0.0,
+                y_mm: 0.0,
+                meaning: match problem.region {
+                    Region::Ellipse(_) => "centre of the contact ellipse",
+                    Region::Gap(_) | Region::Profiles(_) | Region::Grid(_) => {
+                        "origin of the given coordinates, for all patches"
+                    }
+                }
+                .to_owned(),
+            },
+            frame: FRAME.to_owned(),
+            material: CombinedMaterial {
+                shear_modulus_mpa: problem.elasticity.shear_modulus,
+                poisson_ratio: problem.elasticity.poisson_ratio,
+                difference_parameter: problem.elasticity.difference,
+            },
+            solver_version: env!("CARGO_PKG_VERSION").to_owned(),
+            case_digest: problem.digest.clone(),
+        };
+        (solution, self.fields)
+    }
+}
+
+/// Is anything asked for that has a value per cell?
+#[must_use]
+pub fn wants_fields(problem: &Problem) -> bool {
+    problem.outputs.iter().any(|o| *o != Output::Resultants)
+}
+
+fn patch_solution((patch, points): (&Patch, Vec<PointSolution>)) -> PatchSolution {
+    PatchSolution {
+        normal_force_n: patch.normal_force,
+        approach_mm: patch.approach,
+        area_mm2: patch.area,
+        pressure_max_mpa: patch.pressure_max,
+        semi_axes_mm: patch.semi_axes,
+        extent_mm: patch.extent,
+        position: None,
+        quality: None,
+        points,
+    }
+}
+
+fn point_solution(
+    problem: &Problem,
+    level: &Level,
+    patch: &Patch,
+    index: usize,
+    point: &Point,
+) -> PointSolution {
+    let motion = &point.motion;
+    let found = point.resultants[index];
+    let cells = level.patch_cells(index);
+    let traction = &point.tangential.traction;
+    let largest = cells
+        .clone()
+        .map(|i| traction[0][i].hypot(traction[1][i]))
+        .fold(0.0, f64::max);
+    let areas = problem
+        .wants(Output::Zones)
+        .then(|| zone_areas(level, patch, cells, &point.tangential.slips));
+    let power_x = motion.creepage_x * found.force_x;
+    let power_y = motion.creepage_y * found.force_y;
+    PointSolution {
+        motion: *motion,
+        normalised: normalised(problem, patch, motion),
+        force_x_n: found.force_x,
+        force_y_n: found.force_y,
+        moment_z_n_mm: found.moment_z,
+        profile_uncertainty: None,
+        error_estimate: point.errors[index]
+            .map(|e| absolute(problem, std::slice::from_ref(patch), e)),
+        stick_area_mm2: areas.map(|a| a.stick_area),
+        slip_area_mm2: areas.map(|a| a.slip_area),
+        stick_cells: areas.map(|a| a.stick_cells),
+        slip_cells: areas.map(|a| a.slip_cells),
+        traction_max_mpa: largest * level.scale.traction,
+        friction_power_n: power_x + power_y + motion.spin_per_mm * found.moment_z,
+        friction_power_without_spin_n: power_x.abs() + power_y.abs(),
+        solver: SolverReport {
+            method: point.method,
+            mesh: MeshReport {
+                strips: level.plan.size.strips,
+                cells: level.plan.size.cells,
+            },
+            iterations: point.work.iterations,
+            products: point.work.products,
+            residual: point.work.residual,
+            skipped: point.tangential.skipped.clone(),
+            seconds: point.seconds,
+        },
+        target_met: target_met(problem, point),
+        saturated: point.saturated,
+    }
+}
+
+/// Does the estimate of the sum over the patches stay within the target?
+fn target_met(problem: &Problem, point: &Point) -> Option<bool> {
+    let Resolution::Target(target) = problem.resolution else {
+        return None;
+    };
+    Some(
+        point
+            .errors
+            .last()
+            .copied()
+            .flatten()
+            .is_some_and(|e| e <= target),
+    )
+}
+
+#[derive(Clone, Copy)]
+struct ZoneAreas {
+    stick_cells: u32,
+    slip_cells: u32,
+    stick_area: f64,
+    slip_area: f64,
+}
+
+/// Counts and areas of the zones; areas are the cells' shares of the patch's area, so that they add up to it.
+fn zone_areas(
+    level: &Level,
+    patch: &Patch,
+    cells: std::ops::Range<usize>,
+    slips: &[bool],
+) -> ZoneAreas {
+    let mut zones = ZoneAreas {
+        stick_cells: 0,
+        slip_cells: 0,
+        stick_area: 0.0,
+        slip_area: 0.0,
+    };
+    for i in cells {
+        if slips[i] {
+            zones.slip_cells += 1;
+            zones.slip_area += level.area[i];
+        } else {
+            zones.stick_cells += 1;
+            zones.stick_area += level.area[i];
+        }
+    }
+    let factor = patch.area / (zones.stick_area + zones.slip_area);
+    zones.stick_area *= factor;
+    zones.slip_area *= factor;
+    zones
+}
+
+/// Creepages made dimensionless with E = 2G(1+ν) and c = √(A/π) (Kalker 1990; the seed uses half the longest strip).
+fn normalised(problem: &Problem, patch: &Patch, motion: &Motion) -> NormalisedMotion {
+    let c = (patch.area / std::f64::consts::PI).sqrt();
+    let bound = problem.friction * patch.normal_force;
+    let unit =
+        2.0 * problem.elasticity.shear_modulus / (1.0 - problem.elasticity.poisson_ratio) * c * c
+            / bound;
+    let scaled = |value: f64| (bound > 0.0).then_some(value * unit);
+    NormalisedMotion {
+        creepage_x: scaled(motion.creepage_x),
+        creepage_y: scaled(motion.creepage_y),
+        spin: scaled(motion.spin_per_mm * c),
+        length_mm: c,
+    }
+}
+
+/// A relative error as absolute ones. The moment's grows with the distance of the patches from the origin.
+fn absolute(problem: &Problem, patches: &[Patch], relative: f64) -> ErrorEstimate {
+    let (mut force, mut area, mut reach) = (0.0, 0.0, 0.0_f64);
+    for patch in patches {
+        force += problem.friction * patch.normal_force;
+        area += patch.area;
+        let middle = (0.5 * (patch.extent[0] + patch.extent[1]))
+            .hypot(0.5 * (patch.extent[2] + patch.extent[3]));
+        reach = reach.max(middle);
+    }
+    let length = (area / std::f64::consts::PI).sqrt();
+    ErrorEstimate {
+        force_x_n: relative * force,
+        force_y_n: relative * force,
+        moment_z_n_mm: relative * force * (length + reach),
+    }
+}
+
+fn total(problem: &Problem, patches: &[Patch], point: &Point) -> Total {
+    let sum = point
+        .resultants
+        .iter()
+        .fold(Resultants::default(), |sum, r| sum.plus(*r));
+    Total {
+        force_x_n: sum.force_x,
+        force_y_n: sum.force_y,
+        force_z_n: None,
+        moment_z_n_mm: sum.moment_z,
+        profile_uncertainty: None,
+        error_estimate: point
+            .errors
+            .last()
+            .copied()
+            .flatten()
+            .map(|e| absolute(problem, patches, e)),
+    }
+}
+
+/// Remarks on motion `index` of the problem, with its number in the case.
+fn remarks(problem: &Problem, index: usize, point: &Point) -> impl Iterator<Item = RemarkEntry> {
+    let own = point.tangential.remarks.iter().cloned();
+    let missed = target_missed(problem, point);
+    let number = problem.part.before + index;
+    own.chain(unreachable(problem, index, point))
+        .chain(missed)
+        .map(move |remark| remark.at_point(number))
+}
+
+fn unreachable(problem: &Problem, index: usize, point: &Point) -> Option<Remark> {
+    let [wanted_x_n, wanted_y_n] = problem.forces[index];
+    let sum = Resultants::default();
+    let found = point.resultants.iter().fold(sum, |sum, r| sum.plus(*r));
+    point.saturated.then_some(Remark::ForceUnreachable {
+        wanted_x_n,
+        wanted_y_n,
+        found_x_n: found.force_x,
+        found_y_n: found.force_y,
+    })
+}
+
+fn target_missed(problem: &Problem, point: &Point) -> Option<Remark> {
+    let Resolution::Target(target) = problem.resolution else {
+        return None;
+    };
+    let estimate = point.error();
+    (target_met(problem, point) == Some(false)).then_some(Remark::TargetMissed { estimate, target })
+}
+
+fn patch_cells(problem: &Problem, level: &Level, patch: usize) -> PatchCells {
+    let cells = level.patch_cells(patch);
+    let mesh = &level.mesh;
+    let mut fields = PatchCells::default();
+    for segment in mesh.segments.iter().filter(|s| s.chord.patch == patch) {
+        for i in segment.cells.clone() {
+            fields.x_mm.push(0.5 * (mesh.left[i] + mesh.right[i]));
+            fields.y_mm.push(segment.chord.y);
+            fields.dx_mm.push(mesh.right[i] - mesh.left[i]);
+            fields.dy_mm.push(segment.chord.dy);
+            fields
+                .strip
+                .push(u32::try_from(segment.chord.strip).unwrap_or(u32::MAX));
+        }
+    }
+    fields.pressure_mpa = problem
+        .wants(Output::Pressure)
+        .then(|| level.pressure[cells].to_vec());
+    fields
+}
+
+fn point_fields(
+    problem: &Problem,
+    level: &Level,
+    cells: std::ops::Range<usize>,
+    point: &Point,
+) -> PointFields {
+    let answer = &point.tangential;
+    let scaled = |values: &[f64], factor: f64| {
+        values[cells.clone()]
+            .iter()
+            .map(|v| v * factor)
+            .collect::<Vec<_>>()
+    };
+    let traction = |k: usize| {
+        problem
+            .wants(Output::Tractions)
+            .then(|| scaled(&answer.traction[k], level.scale.traction))
+    };
+    let slip = |k: usize| {
+        problem
+            .wants(Output::Slip)
+            .then(|| scaled(&answer.slip[k], level.scale.slip()))
+    };
+    let zone = |slips: &bool| if *slips { Zone::Slip } else { Zone::Stick };
+    PointFields {
+        mesh: 0,
+        zone: problem
+            .wants(Output::Zones)
+            .then(|| answer.slips[cells.clone()].iter().map(zone).collect()),
+        traction_x_mpa: traction(0),
+        traction_y_mpa: traction(1),
+        slip_x: slip(0),
+        slip_y: slip(1),
+    }
+}

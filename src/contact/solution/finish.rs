@@ -1,0 +1,133 @@
+//! The last look at an answer, whatever it came from: shares of time, dust, remarks on implausible numbers, and that every
+//! number is one.
+
+use std::f64::consts::PI;
+use std::time::Duration;
+
+use crate::contact::case::plausibility;
+use crate::contact::case::problem::Problem;
+use crate::contact::error::SolveError;
+use crate::contact::remark::entry::{RemarkEntry, merged};
+use crate::contact::remark::list::Remark;
+use crate::contact::solution::finite;
+use crate::contact::solution::words::{Fields, PatchSolution, PointSolution, Solution};
+
+/// What is smaller than this part of its scale is rounding, and reported as 0.
+const DUST: f64 = 1e-14;
+
+/// Finishes the answer to a whole problem that took so long.
+///
+/// # Errors
+/// [`SolveError::NotFinite`] if the answer holds something that is no number.
+pub fn finish(
+    problem: &Problem,
+    (mut solution, fields): (Solution, Fields),
+    took: Duration,
+) -> Result<(Solution, Fields), SolveError> {
+    finite::require(&solution, &fields)?;
+    clear_dust(problem, &mut solution);
+    scale_seconds(&mut solution, took.as_secs_f64());
+    let said = implausible(&solution, problem.part.before);
+    solution.remarks = merged(solution.remarks.into_iter().chain(said));
+    Ok((solution, fields))
+}
+
+/// Divides the wall time of each motion, which stands in each of its patches, among them by their areas.
+pub fn share_seconds(solution: &mut Solution) {
+    let area: f64 = solution.patches.iter().map(|patch| patch.area_mm2).sum();
+    for patch in &mut solution.patches {
+        for point in &mut patch.points {
+            point.solver.seconds *= patch.area_mm2 / area;
+        }
+    }
+}
+
+/// Scales shares of time so that they add up to the time that the whole answer took: what belongs to no motion is shared as
+/// they are.
+fn scale_seconds(solution: &mut Solution, took: f64) {
+    let points = |patch: &PatchSolution| patch.points.len();
+    let count: usize = solution.patches.iter().map(points).sum();
+    let of_point = |point: &PointSolution| point.solver.seconds;
+    let of_patch = |patch: &PatchSolution| patch.points.iter().map(of_point).sum::<f64>();
+    let sum: f64 = solution.patches.iter().map(of_patch).sum();
+    for patch in &mut solution.patches {
+        for point in &mut patch.points {
+            let seconds = &mut point.solver.seconds;
+            *seconds = if sum > 0.0 {
+                *seconds * (took / sum)
+            } else {
+                took / count as f64
+            };
+        }
+    }
+}
+
+/// Sets what is rounding of larger numbers to 0.
+fn clear_dust(problem: &Problem, solution: &mut Solution) {
+    let (mut limit_all, mut moment_all) = (0.0, 0.0);
+    let mut length_all = 0.0_f64;
+    for patch in &mut solution.patches {
+        let length = (patch.area_mm2 / PI).sqrt();
+        let limit = problem.friction * patch.normal_force_n;
+        for point in &mut patch.points {
+            clear(&mut point.force_x_n, limit);
+            clear(&mut point.force_y_n, limit);
+            clear(&mut point.moment_z_n_mm, limit * length);
+            let motion = &point.motion;
+            let creepage = motion.creepage_x.hypot(motion.creepage_y);
+            let speed = creepage.hypot(motion.spin_per_mm * length);
+            clear(&mut point.friction_power_n, limit * speed);
+            clear(&mut point.friction_power_without_spin_n, limit * speed);
+        }
+        patch
+            .extent_mm
+            .iter_mut()
+            .for_each(|end| clear(end, length));
+        if let Some(position) = &mut patch.position {
+            let places = [&mut position.track_mm, &mut position.origin_track_mm];
+            for place in places {
+                place.iter_mut().for_each(|part| clear(part, length));
+            }
+        }
+        limit_all += limit;
+        moment_all += limit * length;
+        length_all = length_all.max(length);
+    }
+    for total in &mut solution.total {
+        clear(&mut total.force_x_n, limit_all);
+        clear(&mut total.force_y_n, limit_all);
+        clear(&mut total.moment_z_n_mm, moment_all);
+    }
+    clear(&mut solution.origin.x_mm, length_all);
+    clear(&mut solution.origin.y_mm, length_all);
+}
+
+/// 0 in place of a number that is dust on its scale, and of −0.
+fn clear(value: &mut f64, scale: f64) {
+    if value.abs() <= DUST * scale {
+        *value = 0.0;
+    }
+}
+
+/// Remarks on numbers that no wheel and rail have; `before` motions of the case come before the first of these.
+fn implausible(solution: &Solution, before: usize) -> Vec<RemarkEntry> {
+    let alone = solution.patches.len() == 1;
+    let force = solution.patches.iter().map(|patch| patch.normal_force_n);
+    let mut said: Vec<RemarkEntry> = Vec::new();
+    for (k, patch) in solution.patches.iter().enumerate() {
+        let number = (!alone).then_some(k);
+        let at = |remark: Remark, point| RemarkEntry {
+            patch: number,
+            point,
+            ..remark.into()
+        };
+        let length = Some((patch.area_mm2 / PI).sqrt());
+        said.extend(plausibility::pressure(patch.pressure_max_mpa).map(|remark| at(remark, None)));
+        for (motion, point) in patch.points.iter().enumerate() {
+            let remark = plausibility::creepage(&point.motion, length);
+            said.extend(remark.map(|remark| at(remark, Some(before + motion))));
+        }
+    }
+    said.extend(plausibility::load(force.sum()).map(RemarkEntry::from));
+    said
+}

@@ -1,0 +1,7 @@
+//! The answer, in the words that clients read.
+
+pub mod assemble;
+pub mod finish;
+pub mod finite;
+pub mod track_axes;
+pub mod words;

@@ -1,0 +1,306 @@
+//! The answer as the client reads it: everything small in [`Solution`], the values per cell in [`Fields`].
+//!
+//! Forces and tractions act on the lower body (body 2, the rail). Frame: x along rolling (the leading edge is at the
+//! larger x), y to the left, z up; moments and spin refer to [`Solution::origin`].
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::contact::case::words::{Method, Motion};
+use crate::contact::post::zone::Zone;
+use crate::contact::profile_trust::quality::{PatchQuality, ProfileUncertainty};
+use crate::contact::remark::entry::RemarkEntry;
+
+/// The answer to one case, without fields.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Solution {
+    /// One entry per contact patch.
+    pub patches: Vec<PatchSolution>,
+    /// One entry per motion: plain sums over the patches.
+    pub total: Vec<Total>,
+    /// What the client should know before using the numbers.
+    #[serde(default)]
+    pub remarks: Vec<RemarkEntry>,
+    /// How region and pressure were found; absent where they were known beforehand.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub normal: Option<NormalReport>,
+    /// How far the wheel is below the height of first touch, vertically, in mm; only for `profiles`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub wheel_lowering_mm: Option<f64>,
+    /// The point that rigid slip and moments refer to, and where it is.
+    pub origin: Origin,
+    /// The frame in words.
+    pub frame: String,
+    /// Combined elastic constants that were used.
+    pub material: CombinedMaterial,
+    /// Version of the solver that computed this.
+    pub solver_version: String,
+    /// Digest of the canonical case; equal cases have equal digests.
+    pub case_digest: String,
+}
+
+/// How the normal problem of a gap was solved.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct NormalReport {
+    /// Cells of the finest grid along x and y; of several grids, of the one that carries most.
+    pub cells: [u32; 2],
+    /// Grids: one per gap, or one per patch where patches of a gap differ much in size.
+    pub grids: u32,
+    /// Iterations over all grids.
+    pub iterations: u32,
+    /// Largest violation of the contact conditions on the finest grid (distance in the contact, overlap outside), relative
+    /// to the deepest overlap of the undeformed surfaces.
+    pub residual: f64,
+    /// Largest pressure on the last grid but one, relative to that on the last, less 1; 0 if there was only one.
+    pub pressure_change: f64,
+    /// For a wheel on a rail: by which part the prescribed force was missed at the last height, before the contact was grown to it
+    /// as Hertz's would be; 0 where no height is sought.
+    pub force_residual: f64,
+    /// Wall time in s.
+    pub seconds: f64,
+}
+
+/// Origin of moments and rigid slip.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Origin {
+    /// x in mm, in the coordinates of the answer.
+    pub x_mm: f64,
+    /// y in mm.
+    pub y_mm: f64,
+    /// What this point is.
+    pub meaning: String,
+}
+
+/// Elastic constants of the pair: 1/G = ½(1/G₁ + 1/G₂), ν/G = ½(ν₁/G₁ + ν₂/G₂), K as Kalker 1990, eq. 1.44.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct CombinedMaterial {
+    /// Combined shear modulus G in MPa.
+    pub shear_modulus_mpa: f64,
+    /// Combined Poisson's ratio ν.
+    pub poisson_ratio: f64,
+    /// Difference parameter K; 0 for like bodies.
+    pub difference_parameter: f64,
+}
+
+/// One contact patch with its answers for every motion.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct PatchSolution {
+    /// Normal force in N.
+    pub normal_force_n: f64,
+    /// Approach of distant points in mm; absent where the pressure was given.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub approach_mm: Option<f64>,
+    /// Contact area in mm².
+    pub area_mm2: f64,
+    /// Largest pressure in MPa.
+    pub pressure_max_mpa: f64,
+    /// Semi-axes along and across rolling in mm; only for elliptic patches.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub semi_axes_mm: Option<[f64; 2]>,
+    /// Extent of the patch `[x_min, x_max, y_min, y_max]` in mm.
+    pub extent_mm: [f64; 4],
+    /// Where the patch lies on wheel and rail; only for `profiles`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub position: Option<Position>,
+    /// How far the points of the profiles can be trusted here; only for `profiles`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub quality: Option<PatchQuality>,
+    /// One entry per motion, in the order of the case.
+    pub points: Vec<PointSolution>,
+}
+
+/// Place of a patch of wheel and rail, that of its load centre, and the frame of its coordinates.
+///
+/// Track axes: x along rolling, y to the left from the middle of the track, z up from the top of the rail.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Position {
+    /// The load centre in track axes, `[x, y, z]` in mm.
+    pub track_mm: [f64; 3],
+    /// The load centre on the rail's cross-section, `[y, z]` in mm, y to the field side and z down.
+    pub rail_mm: [f64; 2],
+    /// The same on the wheel's cross-section.
+    pub wheel_mm: [f64; 2],
+    /// Turn about x from the track's axes to those of the patch, in rad: its normal is `(0, −sin, cos)` of this angle.
+    pub contact_angle_rad: f64,
+    /// Radius of the wheel at the load centre in mm.
+    pub rolling_radius_mm: f64,
+    /// Origin of the coordinates of the patch in track axes, `[x, y, z]` in mm: the load centre of the patches that share
+    /// these coordinates because they lie near each other; usually the patch is alone.
+    pub origin_track_mm: [f64; 3],
+}
+
+/// The tangential answer of one patch for one motion.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct PointSolution {
+    /// The motion this belongs to.
+    pub motion: Motion,
+    /// The same motion in the dimensionless form of the literature.
+    pub normalised: NormalisedMotion,
+    /// Longitudinal force on the lower body in N.
+    pub force_x_n: f64,
+    /// Lateral force on the lower body in N.
+    pub force_y_n: f64,
+    /// Moment about the origin on the lower body in N·mm.
+    pub moment_z_n_mm: f64,
+    /// Estimated absolute errors of the three resultants; null where there is nothing to estimate them from.
+    pub error_estimate: Option<ErrorEstimate>,
+    /// What the measurement of the profiles leaves open; only for `profiles`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub profile_uncertainty: Option<ProfileUncertainty>,
+    /// Area that sticks in mm²; absent unless zones were asked for.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub stick_area_mm2: Option<f64>,
+    /// Area that slips in mm²; absent unless zones were asked for.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub slip_area_mm2: Option<f64>,
+    /// Number of cells that stick; absent unless zones were asked for.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub stick_cells: Option<u32>,
+    /// Number of cells that slip; absent unless zones were asked for.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub slip_cells: Option<u32>,
+    /// Largest tangential traction in MPa.
+    pub traction_max_mpa: f64,
+    /// Tγ: dissipated power divided by rolling speed, ν_x F_x + ν_y F_y + φ M_z, in N (J/m).
+    pub friction_power_n: f64,
+    /// |ν_x F_x| + |ν_y F_y| in N, the form damage models use.
+    pub friction_power_without_spin_n: f64,
+    /// How this point was computed.
+    pub solver: SolverReport,
+    /// The error estimate is not larger than the target; absent with an explicit mesh.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub target_met: Option<bool>,
+    /// A prescribed force could not be reached.
+    pub saturated: bool,
+}
+
+/// Creepages and spin made dimensionless with c = √(A/π) of the patch (√(ab) for an ellipse).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct NormalisedMotion {
+    /// E c² ν_x / (μN(1−ν²)); absent without friction.
+    pub creepage_x: Option<f64>,
+    /// E c² ν_y / (μN(1−ν²)); absent without friction.
+    pub creepage_y: Option<f64>,
+    /// E c³ φ / (μN(1−ν²)); absent without friction.
+    pub spin: Option<f64>,
+    /// The length c in mm.
+    pub length_mm: f64,
+}
+
+/// Absolute errors, each in the unit of its quantity.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+pub struct ErrorEstimate {
+    /// Of `force_x_n`, in N.
+    pub force_x_n: f64,
+    /// Of `force_y_n`, in N.
+    pub force_y_n: f64,
+    /// Of `moment_z_n_mm`, in N·mm.
+    pub moment_z_n_mm: f64,
+}
+
+/// How a point was computed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct SolverReport {
+    /// The method that gave the numbers.
+    pub method: Method,
+    /// The finest mesh: strips of this patch, cells along x in each.
+    pub mesh: MeshReport,
+    /// Newton iterations over all levels and rules.
+    pub iterations: u32,
+    /// Products of the influence matrix with a vector, over all levels and rules.
+    pub products: u32,
+    /// Last residual of the contact law, relative to the traction scale of the case.
+    pub residual: f64,
+    /// Work that was recognised as unnecessary, in words; empty if none.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub skipped: Vec<String>,
+    /// Wall time of this point's share, in s.
+    pub seconds: f64,
+}
+
+/// The mesh that was used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct MeshReport {
+    /// Strips across the patch.
+    pub strips: u32,
+    /// Cells along x in each strip.
+    pub cells: u32,
+}
+
+/// Sums over all patches for one motion; for `profiles` in track axes, normal forces included.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Total {
+    /// Longitudinal force on the lower body in N.
+    pub force_x_n: f64,
+    /// Lateral force on the lower body in N.
+    pub force_y_n: f64,
+    /// Vertical force on the lower body in N, z up, so that a wheel's load is negative; only for `profiles`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub force_z_n: Option<f64>,
+    /// Moment about the origin on the lower body in N·mm.
+    pub moment_z_n_mm: f64,
+    /// Estimated absolute errors; null where there is nothing to estimate them from.
+    pub error_estimate: Option<ErrorEstimate>,
+    /// What the measurement of the profiles leaves open; only for `profiles`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub profile_uncertainty: Option<ProfileUncertainty>,
+}
+
+/// The values per cell of all patches: what was asked for, nothing else.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Fields {
+    /// One entry per patch, in the order of [`Solution::patches`].
+    pub patches: Vec<PatchFields>,
+}
+
+/// The values per cell of one patch, motion by motion, each on the mesh that served it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PatchFields {
+    /// The meshes that the motions were solved on; several motions may share one.
+    pub meshes: Vec<PatchCells>,
+    /// One entry per motion.
+    pub points: Vec<PointFields>,
+}
+
+impl PatchFields {
+    /// The cells that the values of a motion belong to.
+    #[must_use]
+    pub fn cells(&self, point: usize) -> &PatchCells {
+        &self.meshes[self.points[point].mesh]
+    }
+}
+
+/// Cells of one patch, strip by strip from smaller to larger y, in each strip from smaller to larger x.
+/// All vectors have one value per cell.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PatchCells {
+    /// Centre of the cell along x in mm.
+    pub x_mm: Vec<f64>,
+    /// Centre of the cell across in mm.
+    pub y_mm: Vec<f64>,
+    /// Width of the cell along x in mm.
+    pub dx_mm: Vec<f64>,
+    /// Width of the cell across in mm.
+    pub dy_mm: Vec<f64>,
+    /// Number of the strip, counted from 0; segments of one strip share it.
+    pub strip: Vec<u32>,
+    /// Pressure in MPa, if asked for.
+    pub pressure_mpa: Option<Vec<f64>>,
+}
+
+/// Values per cell for one motion; absent where not asked for.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PointFields {
+    /// Which of the patch's meshes they belong to.
+    pub mesh: usize,
+    /// Stick or slip.
+    pub zone: Option<Vec<Zone>>,
+    /// Traction on the lower body along x in MPa.
+    pub traction_x_mpa: Option<Vec<f64>>,
+    /// Traction on the lower body across in MPa.
+    pub traction_y_mpa: Option<Vec<f64>>,
+    /// Slip of the upper body relative to the lower along x, divided by rolling speed.
+    pub slip_x: Option<Vec<f64>>,
+    /// Slip across, divided by rolling speed.
+    pub slip_y: Option<Vec<f64>>,
+}
