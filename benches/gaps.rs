@@ -7,7 +7,7 @@ mod machine;
 
 use std::hint::black_box;
 
-use railhead::contact::case::problem::Limits;
+use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::Unwatched;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};

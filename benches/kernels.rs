@@ -3,8 +3,9 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use railhead::contact::case::problem::Limits;
-use railhead::contact::half_space::strip_operator::operator::{Differences, Precision, Scratch};
+use railhead::contact::case::limits::Limits;
+use railhead::contact::half_space::strip_operator::kind::Precision;
+use railhead::contact::half_space::strip_operator::operator::{Differences, Scratch};
 use railhead::contact::mesh::strips::{Chord, Grading, Mesh, equal_strips};
 use railhead::contact::monitor::Unwatched;
 use railhead::contact::{check, solve};

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use railhead::contact::case::problem::Limits;
+use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::Unwatched;
 use railhead::contact::solution::words::Solution;
 use railhead::contact::{check, solve};

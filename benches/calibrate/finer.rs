@@ -3,12 +3,16 @@
 use std::sync::Arc;
 
 use railhead::contact;
-use railhead::contact::case::problem::{Limits, Problem, Resolution};
+use railhead::contact::case::limits::Limits;
+use railhead::contact::case::problem::Problem;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::normal::region::{Patch, Region};
-use railhead::contact::rolling::refinement::levels::{Ladder, Regime};
-use railhead::contact::rolling::refinement::refine::{Asked, climb};
+use railhead::contact::normal::patch::Patch;
+use railhead::contact::normal::region::Region;
+use railhead::contact::rolling::mesh_plan::Regime;
+use railhead::contact::rolling::refinement::level_solve::{Asked, climb};
+use railhead::contact::rolling::refinement::levels::Ladder;
+use railhead::contact::rolling::refinement::resolution::Resolution;
 use railhead::contact::rolling::regime::regime;
 use railhead::contact::rolling::resultants::Resultants;
 use railhead::contact::solution::words::Solution;
@@ -101,7 +105,7 @@ fn two_meshes(problem: &Problem) -> Result<(Resultants, f64), SolveError> {
 /// The sum of the resultants on a mesh of so many cells, in double precision, and how many there are.
 fn one_mesh(problem: &Problem, cells: u32) -> Result<(Resultants, usize), SolveError> {
     let mut exact = problem.clone();
-    exact.resolution = Resolution::Mesh(contact::case::words::MeshSize {
+    exact.resolution = Resolution::Mesh(contact::mesh::size::MeshSize {
         strips: 8,
         cells: 8,
     });
@@ -109,16 +113,18 @@ fn one_mesh(problem: &Problem, cells: u32) -> Result<(Resultants, usize), SolveE
         index: 0,
         motion: problem.motions[0],
     };
-    let mut ladder = Ladder::new(&exact, &Arc::default());
-    let plan = ladder.plan(64, Regime::Unknown);
-    let mut solved = climb(&exact, &mut ladder, asked, plan, None, &Unwatched)?;
+    let footprint = exact.footprint();
+    let task = exact.rolling_task(&footprint);
+    let mut ladder = Ladder::new(&task, &Arc::default());
+    let plan = ladder.policy.plan(64, Regime::Unknown);
+    let mut solved = climb(&task, &mut ladder, asked, plan, None, &Unwatched)?;
     for cells in [256, cells] {
         let level = ladder.get(solved.point.level);
         let spinning = asked.motion.spin_per_mm != 0.0;
         let found = regime(level, &solved.point.tangential, spinning);
-        let plan = ladder.plan(cells, found);
+        let plan = ladder.policy.plan(cells, found);
         solved = climb(
-            &exact,
+            &task,
             &mut ladder,
             asked,
             plan,

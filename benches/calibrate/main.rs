@@ -16,7 +16,7 @@ mod truth;
 
 use cpu_time::ThreadTime;
 use railhead::contact;
-use railhead::contact::case::problem::Limits;
+use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::Unwatched;
 use serde_json::json;
 

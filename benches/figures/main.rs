@@ -7,11 +7,11 @@ mod drawing;
 
 use std::path::{Path, PathBuf};
 
-use railhead::contact::case::problem::Limits;
-use railhead::contact::case::words::Motion;
+use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::Unwatched;
 use railhead::contact::post::outlines::outline::{outlines, patch_outline};
 use railhead::contact::post::zone::Zone;
+use railhead::contact::rolling::motion::Motion;
 use railhead::contact::solution::words::{Fields, PatchFields, Solution};
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
@@ -85,7 +85,7 @@ impl Figure {
 
     fn motions(&self) -> Vec<Motion> {
         let points = self.solution.patches[0].points.iter();
-        points.map(|point| point.motion).collect()
+        points.map(|point| point.motion.into()).collect()
     }
 
     /// The paper's Φ of a motion.

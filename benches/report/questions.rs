@@ -1,6 +1,7 @@
 //! The reference cases as questions, and the errors of their answers.
 
-use railhead::contact::case::problem::{Limits, Problem};
+use railhead::contact::case::limits::Limits;
+use railhead::contact::case::problem::Problem;
 use railhead::contact::monitor::Unwatched;
 use railhead::contact::solution::words::{Solution, Total};
 use railhead::contact::{check, solve};

@@ -4,12 +4,12 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::Arc;
 
+use railhead::contact::half_space::strip_operator::kind::Precision;
 use railhead::contact::half_space::strip_operator::operator;
-use railhead::contact::half_space::strip_operator::operator::Precision;
 use railhead::contact::monitor::Unwatched;
+use railhead::contact::rolling::refinement::level_solve::Asked;
 use railhead::contact::rolling::refinement::levels::Ladder;
 use railhead::contact::rolling::refinement::refine;
-use railhead::contact::rolling::refinement::refine::Asked;
 use serde_json::json;
 
 use crate::plot::{Plot, Series};
@@ -44,8 +44,10 @@ pub fn section(lu: f64, pictures: &Path) -> String {
             index: 0,
             motion: problem.motions[0],
         };
-        let mut ladder = Ladder::new(&problem, &Arc::default());
-        let point = refine::solve(&problem, &mut ladder, asked, &Unwatched).expect("an answer");
+        let footprint = problem.footprint();
+        let task = problem.rolling_task(&footprint);
+        let mut ladder = Ladder::new(&task, &Arc::default());
+        let point = refine::solve(&task, &mut ladder, asked, &Unwatched).expect("an answer");
         let cells = (side * side) as usize;
         let bytes = operator::bytes(cells, side as usize, true, Precision::Double) as f64;
         let size = Size {

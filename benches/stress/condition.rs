@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 
 use faer::Mat;
-use railhead::contact::case::problem::Limits;
-use railhead::contact::case::words::MeshSize;
+use railhead::contact::case::limits::Limits;
 use railhead::contact::check;
+use railhead::contact::mesh::size::MeshSize;
 use railhead::contact::monitor::Unwatched;
 use railhead::contact::rolling::slip_equations::Equations;
 use railhead::contact::rolling::slip_rules::Rule;
@@ -23,7 +23,12 @@ fn condition(a_over_b: f64, strips: u32, cells: u32, rule: Rule) -> f64 {
         "solver": { "mesh": { "strips": strips, "cells": cells } },
     });
     let problem = check(&case, &Limits::default()).expect("a valid case");
-    let level = Level::new(&problem, MeshSize { strips, cells }).expect("a mesh");
+    let footprint = problem.footprint();
+    let level = Level::new(
+        &problem.rolling_task(&footprint),
+        MeshSize { strips, cells },
+    )
+    .expect("a mesh");
     let operator = level.operator(&Unwatched).expect("never stopped");
     let equations = Equations::new(rule, &level.normalised, &operator.influence, None);
     let values = equations.dense(&Unwatched).expect("never stopped");

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use railhead::contact::case::problem::Limits;
+use railhead::contact::case::limits::Limits;
 use railhead::contact::geometry::formats::format::{Format, read};
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
 use railhead::contact::monitor::Unwatched;

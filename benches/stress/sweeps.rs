@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 use std::time::Instant;
 
-use railhead::contact::case::problem::{Limits, Problem};
+use railhead::contact::case::limits::Limits;
+use railhead::contact::case::problem::Problem;
 use railhead::contact::monitor::Unwatched;
 use railhead::contact::rolling::operator_store::OperatorStore;
 use railhead::contact::{check, solve, solve_with};

@@ -2,7 +2,7 @@
 //! service try those that were interesting once (`fuzz/seeds`).
 
 use railhead::contact;
-use railhead::contact::case::problem::Limits;
+use railhead::contact::case::limits::Limits;
 use railhead::contact::geometry::formats::format as formats;
 use railhead::contact::geometry::formats::format::Format;
 use railhead::contact::geometry::profile::{Body, Profile, Reading};

@@ -4,23 +4,26 @@
 use std::sync::Arc;
 
 use crate::contact::answer;
-use crate::contact::case::problem::{Problem, Resolution};
-use crate::contact::case::words::{Motion, Output};
+use crate::contact::case::problem::Problem;
+use crate::contact::case::words::Output;
 use crate::contact::error::SolveError;
 use crate::contact::geometry::contact_locus::Search;
 use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::geometry::wheelset::{WheelsetMotion, creepages};
-use crate::contact::monitor::{Monitor, Watch};
+use crate::contact::monitor::Monitor;
 use crate::contact::normal::region::Region;
 use crate::contact::normal::wheel_height::search::{
     Accuracy, Loading, PressedGap, PressedWheel, ProfileContact, Wanted,
 };
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
+use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::OperatorStore;
+use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::solution::track_axes::merge;
 use crate::contact::solution::words::{Fields, NormalReport, Solution};
+use crate::contact::time_limit::Watch;
 
 /// The vertical force may be missed by this part of it, and by this part of the target error if that is less; the bound for
 /// a change of friction's share in one round.

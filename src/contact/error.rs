@@ -2,8 +2,8 @@
 
 use thiserror::Error;
 
-use crate::contact::case::words::Method;
 use crate::contact::monitor::Stop;
+use crate::contact::rolling::methods::method::Method;
 
 /// One fault of a case: where it is, what was given, what is allowed.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -107,17 +107,4 @@ fn reached(limit_s: Option<f64>, motions: Option<[usize; 2]>) -> String {
         format!(" with {done} of {asked} motions done")
     });
     limit + &far
-}
-
-impl Method {
-    /// The word a client uses for this method.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Method::Auto => "auto",
-            Method::BoundaryElement => "boundary_element",
-            Method::LiuHsu => "liu_hsu",
-            Method::Fastsim => "fastsim",
-        }
-    }
 }

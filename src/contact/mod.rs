@@ -5,6 +5,7 @@
 pub mod case;
 pub mod coupling;
 pub mod error;
+pub mod friction;
 pub mod geometry;
 pub mod half_space;
 pub mod mesh;
@@ -22,20 +23,22 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
-use crate::contact::case::problem::{Limits, Problem};
+use crate::contact::case::limits::Limits;
+use crate::contact::case::problem::Problem;
 use crate::contact::case::read::draft;
 use crate::contact::error::{CaseError, SolveError};
-use crate::contact::monitor::{Monitor, Watch};
+use crate::contact::monitor::Monitor;
 use crate::contact::normal::region::Region;
 use crate::contact::profile_trust::trust;
 use crate::contact::rolling::force_control;
 use crate::contact::rolling::operator_store::OperatorStore;
+use crate::contact::rolling::refinement::level_solve::Point;
 use crate::contact::rolling::refinement::levels::Ladder;
-use crate::contact::rolling::refinement::refine::Point;
 use crate::contact::slices::{slices, solve_slice};
 use crate::contact::solution::assemble::Assembly;
 use crate::contact::solution::finish::{finish, share_seconds};
 use crate::contact::solution::words::{Fields, Solution};
+use crate::contact::time_limit::Watch;
 
 /// Reads and checks a case.
 ///
@@ -120,11 +123,13 @@ fn motions(
     problem: &Problem,
     watch: &Watch,
 ) -> Result<(Solution, Fields), SolveError> {
-    let mut ladder = Ladder::new(problem, operators);
+    let footprint = problem.footprint();
+    let task = problem.rolling_task(&footprint);
+    let mut ladder = Ladder::new(&task, operators);
     let mut assembly = Assembly::new(problem);
     let mut before: Option<Point> = None;
     for index in 0..problem.motions.len() {
-        let mut point = force_control::solve(problem, &mut ladder, index, before.as_ref(), watch)?;
+        let mut point = force_control::solve(&task, &mut ladder, index, before.as_ref(), watch)?;
         if index == 0 {
             // What all motions share is charged to the first.
             point.seconds += problem.normal.map_or(0.0, |normal| normal.seconds);
@@ -136,3 +141,4 @@ fn motions(
     }
     Ok(assembly.finish())
 }
+pub mod time_limit;

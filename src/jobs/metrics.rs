@@ -11,7 +11,7 @@ use prometheus_client::metrics::histogram::Histogram;
 use prometheus_client::metrics::info::Info;
 use prometheus_client::registry::Registry;
 
-use crate::contact::case::words::Method;
+use crate::contact::case::words::MethodName;
 use crate::contact::solution::words::Solution;
 use crate::jobs::Jobs;
 use crate::jobs::error::JobsError;
@@ -108,7 +108,7 @@ impl Metrics {
     }
 
     /// A case was solved in `seconds`.
-    pub(super) fn solved(&self, asked: Method, solution: &Solution, seconds: f64) {
+    pub(super) fn solved(&self, asked: MethodName, solution: &Solution, seconds: f64) {
         let points = || solution.patches.iter().flat_map(|patch| &patch.points);
         let used = points().next().map_or(asked, |point| point.solver.method);
         let used = MethodLabel {

@@ -7,7 +7,8 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use crate::contact;
-use crate::contact::case::problem::{Limits, Problem};
+use crate::contact::case::limits::Limits;
+use crate::contact::case::problem::Problem;
 use crate::contact::error::{CaseError, SolveError};
 use crate::contact::monitor::Monitor;
 use crate::contact::rolling::operator_store::OperatorStore;

@@ -238,7 +238,7 @@ fn whole(
     fields: &Fields,
 ) -> Outcome {
     let seconds = spent.as_secs_f64();
-    let method = sweep.problem.method;
+    let method = sweep.problem.method_asked;
     shared.metrics.solved(method, &solution, seconds);
     match encoded(&solution, fields) {
         Ok(result) => Outcome::Solved {
@@ -322,7 +322,7 @@ mod tests {
 
     use super::*;
     use crate::contact;
-    use crate::contact::case::problem::Limits;
+    use crate::contact::case::limits::Limits;
     use crate::contact::monitor::Unwatched;
     use crate::jobs::recipe::Recipe;
 

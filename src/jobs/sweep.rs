@@ -99,7 +99,7 @@ mod tests {
 
     use super::*;
     use crate::contact;
-    use crate::contact::case::problem::Limits;
+    use crate::contact::case::limits::Limits;
 
     fn problem() -> Problem {
         let case = json!({

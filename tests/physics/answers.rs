@@ -4,7 +4,7 @@
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-use railhead::contact::case::problem::Limits;
+use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::{Monitor, Stop, Unwatched};
 use railhead::contact::remark::entry::RemarkEntry;
 use railhead::contact::solution::words::Solution;

@@ -1,6 +1,7 @@
 //! Valid cases to start from, and ways to change them.
 
-use railhead::contact::case::problem::{Limits, Problem};
+use railhead::contact::case::limits::Limits;
+use railhead::contact::case::problem::Problem;
 use railhead::contact::check;
 use railhead::contact::error::Fault;
 use serde_json::{Value, json};

@@ -1,20 +1,22 @@
 //! Coulomb's law in every cell: the bound, complementarity, and slip along the traction.
 
 use railhead::contact;
-use railhead::contact::case::problem::Limits;
-use railhead::contact::case::words::{MeshSize, Motion};
+use railhead::contact::case::limits::Limits;
+use railhead::contact::mesh::size::MeshSize;
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::rolling::methods::boundary_element::newton::{FrictionLaw, Newton};
-use railhead::contact::rolling::methods::boundary_element::solve as boundary_element;
+use railhead::contact::rolling::methods::boundary_element::newton::Newton;
+use railhead::contact::rolling::methods::boundary_element::task::FrictionLaw;
+use railhead::contact::rolling::motion::Motion;
 use railhead::contact::rolling::slip_equations::Equations;
 use railhead::contact::rolling::slip_rules::Rule;
 use railhead::contact::rolling::strip_mesh::Level;
+use railhead::contact::rolling::task::TOLERANCE_LEAST;
 
 use crate::laws::{MOTIONS, shapes};
 use crate::reference::{Ellipse, assert_none, solve};
 
 /// What one cell may leave of a law when the root mean square of the residuals is at the solver's tolerance.
-const CELL: f64 = 10.0 * boundary_element::TOLERANCE;
+const CELL: f64 = 10.0 * TOLERANCE_LEAST;
 
 /// Tractions, slips, bounds and zones of a patch.
 struct Cells {
@@ -51,7 +53,8 @@ fn one_rule(contact: &Ellipse, rule: Rule) -> Cells {
         strips: 12,
         cells: 12,
     };
-    let level = Level::new(&problem, size).expect("a mesh");
+    let footprint = problem.footprint();
+    let level = Level::new(&problem.rolling_task(&footprint), size).expect("a mesh");
     let motion: Motion = level.scale.motion(&problem.motions[0]);
     let operator = level.operator(&Unwatched).expect("never stopped");
     let equations = Equations::new(rule, &level.normalised, &operator.influence, None);
@@ -70,7 +73,7 @@ fn one_rule(contact: &Ellipse, rule: Rule) -> Cells {
         area: &area,
         scale: 1.0,
         // The trapezoid passes the residual of a cell on to its neighbours.
-        tolerance: 0.01 * boundary_element::TOLERANCE,
+        tolerance: 0.01 * TOLERANCE_LEAST,
     };
     let mut t = vec![0.0; 2 * padded];
     let report = newton.solve(&law, &mut t, &Unwatched);

@@ -10,7 +10,7 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use railhead::contact;
-use railhead::contact::case::problem::Limits;
+use railhead::contact::case::limits::Limits;
 use railhead::contact::check;
 use railhead::contact::error::SolveError;
 use railhead::contact::half_space::kernels::{Rectangle, rectangle};

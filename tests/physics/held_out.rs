@@ -2,7 +2,7 @@
 //! `benches/calibrate`, against meshes much finer.
 
 use railhead::contact;
-use railhead::contact::case::problem::Limits;
+use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::Unwatched;
 use serde_json::json;
 

@@ -4,15 +4,16 @@ use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use railhead::contact::case::words::Motion;
 use railhead::contact::mesh::strips::Grading;
 use railhead::contact::monitor::{Monitor, Stop, Unwatched};
-use railhead::contact::rolling::methods::boundary_element::newton::{Convergence, Newton};
+use railhead::contact::rolling::methods::boundary_element::newton::Newton;
+use railhead::contact::rolling::methods::boundary_element::task::Convergence;
 use railhead::contact::rolling::methods::liu_hsu::active_set::Exit;
 use railhead::contact::rolling::methods::liu_hsu::initial_guess::Guess;
 use railhead::contact::rolling::methods::liu_hsu::solve::{
     Outcome, coarse_pole, solve, solve_by_upwind, solve_with,
 };
+use railhead::contact::rolling::motion::Motion;
 use railhead::contact::rolling::slip_rules::Rule;
 
 use crate::convergence_domain::{count, motions};

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use railhead::contact::case::problem::{Limits, Problem};
+use railhead::contact::case::limits::Limits;
+use railhead::contact::case::problem::Problem;
 use railhead::contact::monitor::Unwatched;
 use railhead::contact::rolling::operator_store::OperatorStore;
 use railhead::contact::solution::words::Solution;

@@ -1,6 +1,6 @@
 //! The answer shown in the README is the one that the example has.
 
-use railhead::contact::case::problem::Limits;
+use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::Unwatched;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use railhead::contact;
-use railhead::contact::case::problem::Limits;
+use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::Unwatched;
 use railhead::contact::solution::words::{Fields, PointSolution, Solution};
 use serde::Deserialize;

@@ -3,14 +3,15 @@
 
 use std::f64::consts::PI;
 
-use railhead::contact::case::words::Motion;
-use railhead::contact::half_space::strip_operator::operator::{Differences, Precision};
+use railhead::contact::half_space::strip_operator::kind::Precision;
+use railhead::contact::half_space::strip_operator::operator::Differences;
 use railhead::contact::mesh::strips::{Chord, Grading, Mesh, equal_strips};
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::rolling::methods::boundary_element::newton::{
-    Convergence, FrictionLaw, Newton,
-};
-use railhead::contact::rolling::methods::liu_hsu::solve::{Outcome, Stage};
+use railhead::contact::rolling::methods::boundary_element::newton::Newton;
+use railhead::contact::rolling::methods::boundary_element::task::{Convergence, FrictionLaw};
+use railhead::contact::rolling::methods::liu_hsu::dense_task::Stage;
+use railhead::contact::rolling::methods::liu_hsu::solve::Outcome;
+use railhead::contact::rolling::motion::Motion;
 use railhead::contact::rolling::slip_equations::Equations;
 use railhead::contact::rolling::slip_rules::Rule;
 

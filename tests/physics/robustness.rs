@@ -1,7 +1,7 @@
 //! The solver ends with an answer, whatever the motion and the shape.
 
 use railhead::contact;
-use railhead::contact::case::problem::Limits;
+use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::Unwatched;
 use serde_json::json;
 

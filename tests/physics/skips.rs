@@ -1,11 +1,14 @@
 //! Work that a case does not need is left out, and the answer does not move.
 
 use railhead::contact;
-use railhead::contact::case::problem::{Limits, Problem};
-use railhead::contact::half_space::strip_operator::operator::{Differences, Precision};
+use railhead::contact::case::limits::Limits;
+use railhead::contact::case::problem::Problem;
+use railhead::contact::half_space::strip_operator::kind::Precision;
+use railhead::contact::half_space::strip_operator::operator::Differences;
 use railhead::contact::monitor::Unwatched;
-use railhead::contact::rolling::methods::boundary_element::newton::{FrictionLaw, Newton};
+use railhead::contact::rolling::methods::boundary_element::newton::Newton;
 use railhead::contact::rolling::methods::boundary_element::solve as boundary_element;
+use railhead::contact::rolling::methods::boundary_element::task::FrictionLaw;
 use railhead::contact::rolling::slip_equations::Equations;
 use railhead::contact::rolling::slip_rules::Rule;
 use railhead::contact::rolling::strip_mesh::Level;
@@ -25,11 +28,12 @@ fn answered(contact: &Ellipse) -> PointSolution {
 fn distance_to_plain_newton(contact: &Ellipse) -> f64 {
     let case = contact.case(STRIPS, CELLS);
     let problem: Problem = contact::check(&case, &Limits::default()).expect("a valid case");
-    let size = railhead::contact::case::words::MeshSize {
+    let size = railhead::contact::mesh::size::MeshSize {
         strips: STRIPS,
         cells: CELLS,
     };
-    let level = Level::new(&problem, size).expect("a mesh");
+    let footprint = problem.footprint();
+    let level = Level::new(&problem.rolling_task(&footprint), size).expect("a mesh");
     let motion = level.scale.motion(&problem.motions[0]);
     let shortened =
         boundary_element::solve(&level, &motion, None, 1e-9, &Unwatched).expect("a solution");

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use railhead::contact;
-use railhead::contact::case::problem::Limits;
+use railhead::contact::case::limits::Limits;
 use railhead::contact::check;
 use railhead::contact::monitor::Unwatched;
 use railhead::contact::remark::entry::RemarkEntry;

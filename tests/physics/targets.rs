@@ -1,6 +1,6 @@
 //! A target is met, and the estimate of the error is honest.
 
-use railhead::contact::remark::entry::Figure;
+use railhead::contact::remark::figure::Figure;
 use serde_json::json;
 
 use crate::reference::{HERTZ_CLASSES, ReferenceCase, cases, median, solve};

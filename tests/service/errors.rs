@@ -5,9 +5,9 @@ use std::sync::Mutex;
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
-use railhead::contact::case::words::Method as SolverMethod;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Stop;
+use railhead::contact::rolling::methods::method::Method as SolverMethod;
 use reqwest::Method;
 use serde_json::{Value, json};
 

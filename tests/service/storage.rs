@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use railhead::contact::case::problem::Limits;
+use railhead::contact::case::limits::Limits;
 use reqwest::Method;
 use serde_json::{Value, json};
 use sqlx::Connection;

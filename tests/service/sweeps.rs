@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
 use railhead::contact;
-use railhead::contact::case::problem::Limits;
+use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::{Monitor, Unwatched};
 use railhead::contact::solution::words::{PatchFields, Solution};
 use railhead::jobs::recipe::Recipe;

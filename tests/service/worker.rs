@@ -4,9 +4,9 @@ use std::sync::{Mutex, mpsc};
 use std::time::Duration;
 
 use railhead::contact::case::problem::Problem;
-use railhead::contact::case::words::Method;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Monitor;
+use railhead::contact::rolling::methods::method::Method;
 use railhead::contact::solve;
 use railhead::jobs::{FailureKind, JobsError, Options, State};
 use serde_json::json;

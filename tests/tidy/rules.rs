@@ -283,7 +283,7 @@ mod tests {
         assert_eq!(
             names(&order(&planted)),
             [
-                "contact::mesh uses contact::normal",
+                "contact::mesh::strips uses contact::normal::region",
                 "contact::unheard_of has no place in the order",
                 "jobs::clock uses http",
             ]

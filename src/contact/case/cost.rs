@@ -1,15 +1,19 @@
 //! What a case will cost, estimated from its finest mesh before it is queued.
 
-use crate::contact::case::motions::Prescribed;
-use crate::contact::case::problem::{Cost, Limits, Problem, Resolution};
-use crate::contact::case::words::{Method, Output};
+use crate::contact::case::limits::Limits;
+use crate::contact::case::problem::Problem;
+use crate::contact::case::words::Output;
 use crate::contact::error::Fault;
-use crate::contact::half_space::strip_operator::operator::Precision;
+use crate::contact::half_space::strip_operator::kind::Precision;
 use crate::contact::normal::region::Region;
 use crate::contact::profile_trust::before;
+use crate::contact::rolling::methods::method::Method;
+use crate::contact::rolling::motion::PrescribedForces;
 use crate::contact::rolling::operator_store::OperatorKind;
-use crate::contact::rolling::refinement::levels::{CELLS_MAX, LEVELS_KEPT, Ladder};
-use crate::contact::rolling::strip_mesh::precision_of;
+use crate::contact::rolling::refinement::levels::LEVELS_KEPT;
+use crate::contact::rolling::refinement::mesh_policy::{CELLS_MAX, MeshPolicy};
+use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::rolling::task::precision_of;
 
 /// Cells of the finest mesh for a target of 0.02, on average, and how they grow as it falls.
 const TARGET_CELLS: f64 = 160.0;
@@ -62,7 +66,7 @@ pub(crate) struct Size {
     /// Values per cell are kept motion by motion.
     pub(crate) fields: bool,
     /// Forces prescribed in place of creepages, motion by motion.
-    pub(crate) forces: Vec<Prescribed>,
+    pub(crate) forces: Vec<PrescribedForces>,
     /// Length over width of an ellipse; nothing for other regions.
     pub(crate) ellipse: Option<f64>,
     /// Time to find region and pressure, in s.
@@ -144,10 +148,10 @@ impl Size {
     /// Time of a solve in s that others of the same sweep came before.
     fn solve_seconds(&self, cells: f64) -> f64 {
         match (self.method, self.resolution) {
-            (Method::Auto | Method::BoundaryElement, Resolution::Target(target)) => {
+            (Method::BoundaryElement, Resolution::Target(target)) => {
                 SWEEP_SHARE * self.target_seconds(target, cells)
             }
-            (Method::Auto | Method::BoundaryElement, Resolution::Mesh(_)) => {
+            (Method::BoundaryElement, Resolution::Mesh(_)) => {
                 // Large matrices come from slower memory.
                 let cache_misses = (cells / MESH_CELLS_SLOW).min(1.0);
                 1e-9 * cells * cells * (15.0 + 60.0 * cache_misses)
@@ -160,10 +164,10 @@ impl Size {
     /// Time in s that the first solve takes beside what every solve takes.
     fn first_seconds(&self, cells: f64) -> f64 {
         match (self.method, self.resolution) {
-            (Method::Auto | Method::BoundaryElement, Resolution::Target(target)) => {
+            (Method::BoundaryElement, Resolution::Target(target)) => {
                 (1.0 - SWEEP_SHARE) * self.target_seconds(target, cells)
             }
-            (Method::Auto | Method::BoundaryElement, Resolution::Mesh(_)) => 1e-8 * cells * cells,
+            (Method::BoundaryElement, Resolution::Mesh(_)) => 1e-8 * cells * cells,
             (Method::LiuHsu, _) => 4e-8 * cells * cells,
             (Method::Fastsim, _) => 1e-7 * cells,
         }
@@ -192,7 +196,7 @@ impl Size {
         let motions = self.motions as f64;
         let operator = match self.method {
             Method::Fastsim => 0.0,
-            Method::Auto | Method::BoundaryElement | Method::LiuHsu => {
+            Method::BoundaryElement | Method::LiuHsu => {
                 let kind = OperatorKind {
                     poisson_ratio: 0.0,
                     // Cells that gather about a pole are not.
@@ -206,7 +210,7 @@ impl Size {
         };
         let solve = match self.method {
             // Factored blocks of two unknowns per cell.
-            Method::Auto | Method::BoundaryElement => 32.0 * cells * cells / segments.max(1.0),
+            Method::BoundaryElement => 32.0 * cells * cells / segments.max(1.0),
             Method::LiuHsu => (2.0 * cells).powi(2) * 8.0 * LIU_HSU_MATRICES,
             Method::Fastsim => 0.0,
         };
@@ -242,7 +246,7 @@ impl Size {
                 ),
             });
         }
-        let fast = matches!(self.method, Method::Auto | Method::BoundaryElement);
+        let fast = matches!(self.method, Method::BoundaryElement);
         if let Some(ratio) = self
             .ellipse
             .filter(|ratio| fast && *ratio > LENGTH_OVER_WIDTH_MAX)
@@ -275,7 +279,7 @@ impl Size {
     /// Cells and segments of the finest mesh over all patches.
     fn finest(&self) -> (f64, f64) {
         let per_strip: f64 = self.segments.iter().sum();
-        let fixed = Ladder::fixed_sizes(self.resolution, self.method);
+        let fixed = MeshPolicy::fixed_sizes(self.resolution, self.method);
         let size = match (self.resolution, fixed.as_deref().and_then(<[_]>::last)) {
             (_, Some(size)) => *size,
             (Resolution::Mesh(size), None) => size,
@@ -293,10 +297,19 @@ impl Size {
     /// Cells that set the time: those of the mesh, or what the target costs on average.
     fn usual_cells(&self, finest: f64) -> f64 {
         match (self.resolution, self.method) {
-            (Resolution::Target(target), Method::Auto | Method::BoundaryElement) => {
+            (Resolution::Target(target), Method::BoundaryElement) => {
                 finest.min(TARGET_CELLS * (0.02 / target).powf(TARGET_GROWTH))
             }
             _ => finest,
         }
     }
+}
+
+/// What a case will cost, estimated before it is queued.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cost {
+    /// Peak memory in bytes.
+    pub bytes: u64,
+    /// Solve time in s on one core of the machine the figures were taken on; rough.
+    pub seconds: f64,
 }

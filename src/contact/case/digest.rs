@@ -2,11 +2,14 @@
 
 use serde::Serialize;
 
-use crate::contact::case::motions::Prescribed;
-use crate::contact::case::problem::{Elasticity, Resolution, resolution};
+use crate::contact::case::resolution::resolution;
 use crate::contact::case::words::{
-    Case, Contact, Load, MeshSize, Method, Motion, Motions, Output, TractionBound, Wheelset,
+    Case, Contact, Load, MeshSizeWords, MethodName, MotionWords, Motions, Output,
+    TractionBoundName, Wheelset,
 };
+use crate::contact::half_space::elasticity::Elasticity;
+use crate::contact::rolling::motion::{Motion, PrescribedForces};
+use crate::contact::rolling::refinement::resolution::Resolution;
 
 /// Raised whenever a change moves numbers that clients get: equal cases share one answer, and answers of an older revision are not theirs.
 /// `tests/physics/golden.rs` fails if numbers move without it, and says how to record the new ones.
@@ -21,16 +24,16 @@ struct Canonical<'a> {
     friction: f64,
     contact: &'a Contact,
     load: Option<&'a Load>,
-    motions: &'a [Motion],
+    motions: Vec<MotionWords>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    forces: Option<&'a [Prescribed]>,
+    forces: Option<&'a [PrescribedForces]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     wheelset: Option<&'a Wheelset>,
-    method: Method,
+    method: MethodName,
     #[serde(skip_serializing_if = "Option::is_none")]
-    traction_bound: Option<TractionBound>,
+    traction_bound: Option<TractionBoundName>,
     target_error: Option<f64>,
-    mesh: Option<MeshSize>,
+    mesh: Option<MeshSizeWords>,
     time_limit_s: Option<f64>,
     outputs: &'a [Output],
 }
@@ -40,7 +43,7 @@ pub(crate) fn digest(
     case: &Case,
     elasticity: &Elasticity,
     motions: &[Motion],
-    forces: &[Prescribed],
+    forces: &[PrescribedForces],
 ) -> String {
     let target_error = match resolution(&case.solver) {
         Resolution::Target(target) => Some(target),
@@ -57,7 +60,7 @@ pub(crate) fn digest(
         friction: case.friction.coefficient,
         contact: &case.contact,
         load: case.load.as_ref(),
-        motions,
+        motions: motions.iter().map(|motion| (*motion).into()).collect(),
         forces: Some(forces).filter(|all| all.iter().any(|f| *f != [None; 2])),
         wheelset: match &case.motion {
             Motions::Wheelset { wheelset } => Some(wheelset),
@@ -68,7 +71,7 @@ pub(crate) fn digest(
         traction_bound: case
             .solver
             .traction_bound
-            .filter(|bound| *bound != TractionBound::default()),
+            .filter(|bound| *bound != TractionBoundName::default()),
         target_error,
         mesh: case.solver.mesh,
         time_limit_s: case.solver.time_limit_s,

@@ -1,8 +1,8 @@
 //! Combines the elastic constants of two bodies into those of the pair.
 
-use crate::contact::case::problem::Elasticity;
 use crate::contact::case::words::{Elastic, Material};
 use crate::contact::error::Fault;
+use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::remark::list::Remark;
 
 /// Largest |K| for which the tangential and the normal problem may be solved one after the other.
@@ -49,12 +49,6 @@ impl Elasticity {
             poisson_ratio: nu.clamp(0.0, 0.5),
             difference: if k.abs() < DIFFERENCE_NOISE { 0.0 } else { k },
         })
-    }
-
-    /// Contact modulus `E* = G/(1−ν)` in MPa, that is `1/E* = (1−ν₁²)/E₁ + (1−ν₂²)/E₂`.
-    #[must_use]
-    pub fn contact_modulus(&self) -> f64 {
-        self.shear_modulus / (1.0 - self.poisson_ratio)
     }
 
     /// The remark an answer carries if the bodies differ.

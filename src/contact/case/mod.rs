@@ -1,12 +1,15 @@
 //! The question: the words a client writes, how they are read, and what they become once checked.
 
+pub mod checks;
 pub mod cost;
 pub mod digest;
 pub mod elasticity;
+pub mod limits;
 pub mod motions;
 pub mod plausibility;
 pub mod press;
 pub mod problem;
 pub mod profiles;
 pub mod read;
+pub mod resolution;
 pub mod words;

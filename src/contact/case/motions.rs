@@ -1,11 +1,9 @@
 //! Writes out the motions of a case: sweeps become lists.
 
-use crate::contact::case::problem::Limits;
-use crate::contact::case::words::{AskedMotion, Combine, Motion, Motions, Range, Sweep};
+use crate::contact::case::limits::Limits;
+use crate::contact::case::words::{AskedMotion, Combine, Motions, Range, Sweep};
 use crate::contact::error::Fault;
-
-/// The forces prescribed along x and across, in N, where they are.
-pub type Prescribed = [Option<f64>; 2];
+use crate::contact::rolling::motion::{Motion, PrescribedForces};
 
 /// No creepage.
 const STILL: AskedMotion = AskedMotion {
@@ -22,7 +20,7 @@ pub(crate) struct Expanded {
     /// Creepages are 0 where a force is prescribed.
     pub(crate) motions: Vec<Motion>,
     /// What is prescribed instead, motion by motion.
-    pub(crate) forces: Vec<Prescribed>,
+    pub(crate) forces: Vec<PrescribedForces>,
 }
 
 /// The motions and prescribed forces of a case.
@@ -82,7 +80,7 @@ impl Expanded {
 const FAULTS_MAX: usize = 100;
 
 /// The component with the larger prescribed force, if there is any.
-fn larger(forces: &Prescribed) -> Option<usize> {
+fn larger(forces: &PrescribedForces) -> Option<usize> {
     match forces {
         [None, None] => None,
         [Some(_), None] => Some(0),
@@ -291,7 +289,7 @@ mod tests {
             combine: Combine::Grid,
         };
         let found = expand(&Motions::Sweep { sweep }, &Limits::default()).unwrap();
-        let forces: Vec<Prescribed> = found.forces.clone();
+        let forces: Vec<PrescribedForces> = found.forces.clone();
         assert_eq!(forces.len(), 6);
         assert_eq!(forces[0], [Some(-50.0), None]);
         assert_eq!(forces[5], [Some(50.0), None]);

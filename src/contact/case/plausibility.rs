@@ -1,9 +1,10 @@
 //! Is what comes out a contact that the theory is meant for? Remarks for all kinds of contact; nothing is refused here.
 
-use crate::contact::case::words::{Contact, Motion};
-use crate::contact::normal::region::Patch;
+use crate::contact::case::words::Contact;
+use crate::contact::normal::patch::Patch;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
+use crate::contact::rolling::motion::Motion;
 
 /// Beyond this pressure, in MPa, wheel and rail steels yield whatever their hardness (about 3 times a yield stress of 1.6 GPa).
 const PRESSURE_USUAL_MAX: f64 = 5000.0;

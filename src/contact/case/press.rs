@@ -2,12 +2,16 @@
 
 use std::borrow::Cow;
 
-use crate::contact::case::problem::{Problem, Resolution};
-use crate::contact::case::words::Motion;
+use crate::contact::case::problem::Problem;
 use crate::contact::error::SolveError;
+use crate::contact::friction::law::FrictionLaw;
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::gap::solve::{Failure, Report};
+use crate::contact::normal::answer::{Failure, Report};
+use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::region::Region;
+use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::rolling::task::RollingTask;
 use crate::contact::solution::words::NormalReport;
 
 impl Problem {
@@ -28,6 +32,39 @@ impl Problem {
         problem.normal = Some(found.report.with_time(seconds));
         problem.fits()?;
         Ok(Cow::Owned(problem))
+    }
+
+    /// The solved normal problem.
+    ///
+    /// # Panics
+    /// If region and pressure are not known yet.
+    #[must_use]
+    pub fn footprint(&self) -> Footprint {
+        match &self.region {
+            Region::Ellipse(ellipse) => Footprint::hertz(*ellipse),
+            Region::Grid(field) if self.normal.is_some() => {
+                Footprint::computed(field.clone(), self.load_error)
+            }
+            Region::Grid(field) => Footprint::given(field.clone()),
+            Region::Gap(_) | Region::Profiles(_) => unreachable!("the normal problem is solved"),
+        }
+    }
+
+    /// What is asked of the tangential problem on a footprint.
+    #[must_use]
+    pub fn rolling_task<'a>(&'a self, footprint: &'a Footprint) -> RollingTask<'a> {
+        RollingTask {
+            footprint,
+            elasticity: &self.elasticity,
+            friction: FrictionLaw::Constant(self.friction),
+            motions: &self.motions,
+            forces: &self.forces,
+            first_motion: self.part.before,
+            single_motion: self.part.all == 1,
+            method: self.method,
+            traction_bound: self.traction_bound,
+            resolution: self.resolution,
+        }
     }
 
     /// Target of the resultants' error relative to μN; infinite where a mesh is given.

@@ -3,13 +3,15 @@
 //! A [`Case`] is only ever made by [`Case::read`](crate::contact::case::words::Case::read), which collects every fault of the
 //! JSON text at once. Lengths in mm, forces in N, stresses in MPa, creepages dimensionless, spin in 1/mm.
 
+use crate::contact::geometry::formats::format::Format;
+use crate::contact::geometry::wheel_rail::Side;
+use crate::contact::mesh::size::MeshSize;
+use crate::contact::rolling::methods::method::{Method, TractionBound};
+use crate::contact::rolling::motion::Motion;
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
-
-use crate::contact::geometry::formats::format::Format;
-use crate::contact::geometry::wheel_rail::Side;
 
 /// One contact case: two bodies, how they are pressed together and how they roll.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -34,7 +36,7 @@ pub struct Case {
     pub load: Option<Load>,
     /// One motion, a list of motions, or a sweep.
     pub motion: Motions,
-    /// Method and accuracy; `{"method": "auto", "target_error": 0.005}` when left out.
+    /// MethodName and accuracy; `{"method": "auto", "target_error": 0.005}` when left out.
     #[schema(required = false)]
     pub solver: Solver,
     /// What to compute; `["resultants", "zones"]` when left out.
@@ -253,7 +255,8 @@ pub struct Load {
 
 /// Rolling motion of the upper body relative to the lower one, divided by the rolling speed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct Motion {
+#[schema(as = Motion)]
+pub struct MotionWords {
     /// Longitudinal creepage, dimensionless.
     #[schema(required = false)]
     pub creepage_x: f64,
@@ -306,7 +309,7 @@ pub enum Motions {
     },
 }
 
-/// Motion of a wheelset. Exactly one of `angular_velocity_rad_per_s` and `free_rolling_radius_mm` is given.
+/// MotionWords of a wheelset. Exactly one of `angular_velocity_rad_per_s` and `free_rolling_radius_mm` is given.
 ///
 /// With the speed V, the axle e, the angular velocity ω = Ω e + (roll rate, 0, yaw rate) and r from the wheelset's centre to the
 /// patch, the wheel's material moves with v = (V, lateral velocity, 0) + ω × r; the creepages of a patch with the tangent t and the
@@ -392,7 +395,7 @@ pub struct Range {
 pub struct Solver {
     /// The method.
     #[schema(required = false)]
-    pub method: Method,
+    pub method: MethodName,
     /// Allowed error of the resultants relative to μN (moment: μN√(A/π)), 1e-4 to 0.5. Excludes `mesh`.
     ///
     /// Most cases reach 0.001, few 1e-4: one that ends above its target has `target_met: false` and the remark `target-missed`.
@@ -403,21 +406,22 @@ pub struct Solver {
     /// An explicit mesh instead of a target.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
-    pub mesh: Option<MeshSize>,
+    pub mesh: Option<MeshSizeWords>,
     /// How much traction `fastsim` lets friction carry where; `elliptic` when left out. For no other method.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
-    pub traction_bound: Option<TractionBound>,
+    pub traction_bound: Option<TractionBoundName>,
     /// Give up after this many seconds of solving.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub time_limit_s: Option<f64>,
 }
 
-/// The methods a client can choose; each is a file of that name in `contact/tangential`.
+/// The methods a client can choose; each is a file of that name in `contact/rolling/methods`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Method {
+#[schema(as = Method)]
+pub enum MethodName {
     /// The best method for the case (today always `boundary_element`).
     #[default]
     Auto,
@@ -432,7 +436,8 @@ pub enum Method {
 /// Where `fastsim` lets tractions slip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum TractionBound {
+#[schema(as = TractionBound)]
+pub enum TractionBoundName {
     /// At μ times the pressure, for an ellipse Hertz's semi-ellipsoid.
     #[default]
     Elliptic,
@@ -442,7 +447,8 @@ pub enum TractionBound {
 
 /// An explicit mesh: equal strips, cosine-graded cells along x, no clustering.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-pub struct MeshSize {
+#[schema(as = MeshSize)]
+pub struct MeshSizeWords {
     /// Strips across each patch.
     #[schema(minimum = 1)]
     pub strips: u32,
@@ -465,4 +471,73 @@ pub enum Output {
     Pressure,
     /// Slip per cell.
     Slip,
+}
+
+impl From<MotionWords> for Motion {
+    fn from(words: MotionWords) -> Motion {
+        Motion {
+            creepage_x: words.creepage_x,
+            creepage_y: words.creepage_y,
+            spin_per_mm: words.spin_per_mm,
+        }
+    }
+}
+
+impl From<Motion> for MotionWords {
+    fn from(motion: Motion) -> MotionWords {
+        MotionWords {
+            creepage_x: motion.creepage_x,
+            creepage_y: motion.creepage_y,
+            spin_per_mm: motion.spin_per_mm,
+        }
+    }
+}
+
+impl From<MeshSizeWords> for MeshSize {
+    fn from(words: MeshSizeWords) -> MeshSize {
+        MeshSize {
+            strips: words.strips,
+            cells: words.cells,
+        }
+    }
+}
+
+impl MethodName {
+    /// The word itself.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            MethodName::Auto => "auto",
+            named => Method::from(named).name(),
+        }
+    }
+}
+
+impl From<MethodName> for Method {
+    fn from(name: MethodName) -> Method {
+        match name {
+            MethodName::Auto | MethodName::BoundaryElement => Method::BoundaryElement,
+            MethodName::LiuHsu => Method::LiuHsu,
+            MethodName::Fastsim => Method::Fastsim,
+        }
+    }
+}
+
+impl From<Method> for MethodName {
+    fn from(method: Method) -> MethodName {
+        match method {
+            Method::BoundaryElement => MethodName::BoundaryElement,
+            Method::LiuHsu => MethodName::LiuHsu,
+            Method::Fastsim => MethodName::Fastsim,
+        }
+    }
+}
+
+impl From<TractionBoundName> for TractionBound {
+    fn from(name: TractionBoundName) -> TractionBound {
+        match name {
+            TractionBoundName::Elliptic => TractionBound::Elliptic,
+            TractionBoundName::Parabolic => TractionBound::Parabolic,
+        }
+    }
 }

@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use crate::contact::geometry::crossing;
-use crate::contact::geometry::profile_quality::points::Points;
+use crate::contact::geometry::profile_quality::samples::Points;
 use crate::contact::geometry::profile_quality::{noise, shape};
 use crate::contact::geometry::smoothing::Spline;
 use crate::contact::remark::list::Remark;

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::contact::mesh::strips::Chord;
-use crate::contact::normal::region::Patch;
+use crate::contact::normal::patch::Patch;
 
 /// An elliptic patch with Hertz's pressure `p0 √(1 − x²/a² − y²/b²)`, centred at the origin.
 #[derive(Debug, Clone, Copy, PartialEq)]

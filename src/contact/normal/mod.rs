@@ -1,8 +1,11 @@
 //! The normal problem: which patches touch, and with what pressure.
 
+pub mod answer;
+pub mod footprint;
 pub mod gap;
 pub mod hertz;
 pub mod neighbours;
+pub mod patch;
 pub mod pressure_field;
 pub mod region;
 pub mod wheel_height;

@@ -5,9 +5,10 @@ use std::sync::Arc;
 use crate::contact::case::words::{Contact, Load};
 use crate::contact::error::Fault;
 use crate::contact::mesh::strips::Chord;
-use crate::contact::normal::gap::solve::GapContact;
 use crate::contact::normal::gap::surface::Gap;
+use crate::contact::normal::gap::task::GapContact;
 use crate::contact::normal::hertz::{Ellipse, Pressing};
+use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::normal::wheel_height::search::ProfileContact;
 use crate::contact::remark::entry::RemarkEntry;
@@ -30,23 +31,6 @@ pub enum Region {
     Gap(Box<GapContact>),
     /// A wheel on a rail: patches have to be found first, each in a frame of its own, until then there are none.
     Profiles(Arc<ProfileContact>),
-}
-
-/// What is known of one patch before anything is meshed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Patch {
-    /// Normal force in N.
-    pub normal_force: f64,
-    /// Approach in mm, where it is known.
-    pub approach: Option<f64>,
-    /// Area in mm².
-    pub area: f64,
-    /// Largest pressure in MPa.
-    pub pressure_max: f64,
-    /// Semi-axes along and across rolling in mm, for ellipses.
-    pub semi_axes: Option<[f64; 2]>,
-    /// `[x_min, x_max, y_min, y_max]` in mm.
-    pub extent: [f64; 4],
 }
 
 impl Region {

@@ -1,7 +1,6 @@
 //! Cell values brought onto a regular grid, for pictures and for programs that want arrays.
 
-use crate::contact::post::strip_segments::Segment;
-use crate::contact::post::strip_segments::Strips;
+use crate::contact::post::strip_segments::{Segment, Strips};
 use crate::contact::post::zone::Zone;
 use crate::contact::solution::words::PatchCells;
 

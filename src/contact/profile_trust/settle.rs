@@ -4,11 +4,12 @@ use crate::contact::case::problem::Problem;
 use crate::contact::error::SolveError;
 use crate::contact::geometry::profile::Body;
 use crate::contact::geometry::profile_quality::points::advised_smoothing;
-use crate::contact::monitor::{Monitor, Watch};
+use crate::contact::monitor::Monitor;
 use crate::contact::normal::wheel_height::search::{Accuracy, ProfileContact, Wanted};
 use crate::contact::profile_trust::before;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
+use crate::contact::time_limit::Watch;
 
 /// Pressure in MPa for the first choice.
 pub(crate) const PRESSURE_USUAL: f64 = 1200.0;

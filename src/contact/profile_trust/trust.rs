@@ -1,10 +1,6 @@
 //! Solves a wheel on a rail and says how far its profiles can be trusted: their quality under every patch, what is wrong with them and
 //! what the measurement leaves open. Where an answer would mislead there is none.
 
-use crate::contact::profile_trust::settle;
-use crate::contact::profile_trust::uncertainty;
-use std::sync::Arc;
-
 use crate::contact::case::problem::Problem;
 use crate::contact::coupling;
 use crate::contact::coupling::{Found, Judge};
@@ -17,8 +13,10 @@ use crate::contact::normal::wheel_height::search::{PressedWheel, ProfileContact}
 use crate::contact::profile_trust::finding::{Cause, Finding};
 use crate::contact::profile_trust::judge::{FoundPatch, judge};
 use crate::contact::profile_trust::quality::{PatchQuality, ProfileQuality};
+use crate::contact::profile_trust::{settle, uncertainty};
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::solution::words::{Fields, Solution};
+use std::sync::Arc;
 
 /// What a case says about the trust in its profiles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -8,7 +8,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::contact::case::problem::{Problem, Resolution};
+use crate::contact::case::problem::Problem;
 use crate::contact::case::words::Output;
 use crate::contact::coupling;
 use crate::contact::coupling::Judge;
@@ -21,6 +21,7 @@ use crate::contact::profile_trust::quality::{ProfileQuality, ProfileUncertainty}
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::operator_store::OperatorStore;
+use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::solution::words::{PatchSolution, Solution};
 
 /// Companions are solved with these multiples of the smoothing.

@@ -1,12 +1,12 @@
 //! A remark in the words of the answer, with its place; and how the remarks of one answer are merged.
 
+use crate::contact::remark::figure::{AsFigure, Figure};
+use crate::contact::remark::kind::Severity;
+use crate::contact::remark::list::Remark;
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
-
-use crate::contact::remark::kind::Severity;
-use crate::contact::remark::list::Remark;
 
 /// Motions with the same remark of which the figures are kept; the others are only numbered.
 const KEPT_MAX: usize = 4;
@@ -39,24 +39,6 @@ pub struct RemarkEntry {
     pub figures: BTreeMap<String, Figure>,
 }
 
-/// A number or a word in a remark.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(untagged)]
-pub enum Figure {
-    /// A finite number.
-    Number(f64),
-    /// Several numbers.
-    Numbers(Vec<f64>),
-    /// A word.
-    Word(String),
-}
-
-/// What can stand in a remark as a figure.
-pub(crate) trait AsFigure {
-    /// The figure; nothing for a number that is not finite or not there.
-    fn figure(&self) -> Option<Figure>;
-}
-
 impl AsFigure for f64 {
     fn figure(&self) -> Option<Figure> {
         self.is_finite().then_some(Figure::Number(*self))
@@ -66,19 +48,6 @@ impl AsFigure for f64 {
 impl AsFigure for usize {
     fn figure(&self) -> Option<Figure> {
         Some(Figure::Number(*self as f64))
-    }
-}
-
-impl AsFigure for [f64; 2] {
-    fn figure(&self) -> Option<Figure> {
-        let finite = self.iter().all(|part| part.is_finite());
-        finite.then(|| Figure::Numbers(self.to_vec()))
-    }
-}
-
-impl AsFigure for &'static str {
-    fn figure(&self) -> Option<Figure> {
-        Some(Figure::Word((*self).to_owned()))
     }
 }
 

@@ -2,12 +2,11 @@
 //! reads about it at `/v1/remarks`.
 //!
 //! Codes never change. Figures have their unit in their name and must not be named as a member of
-//! [`RemarkEntry`](crate::contact::remark::entry::RemarkEntry). A figure may be a number, a count, a pair, a word or optional.
+//! `RemarkEntry`. A figure may be a number, a count, a pair, a word or optional.
 
 use std::collections::BTreeMap;
 
-use crate::contact::remark::entry::AsFigure;
-use crate::contact::remark::entry::Figure;
+use crate::contact::remark::figure::{AsFigure, Figure};
 use crate::contact::remark::kind::{RemarkKind, Severity};
 use crate::contact::remark::table::remarks;
 

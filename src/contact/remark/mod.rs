@@ -4,6 +4,7 @@
 //! the motion is added when the solution is put together. `list` holds them all: adding one means adding it there.
 
 pub mod entry;
+pub mod figure;
 pub mod kind;
 pub mod list;
 pub mod table;

@@ -7,19 +7,21 @@
 
 use std::time::Duration;
 
-use crate::contact::case::motions::Prescribed;
-use crate::contact::case::problem::{Problem, Resolution};
-use crate::contact::case::words::{Method, Motion};
 use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
 use crate::contact::numerics::bracketed_root::{PLACE_MAX, RootExit, zero};
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::answer::Work;
 use crate::contact::rolling::linear_theory;
-use crate::contact::rolling::refinement::levels::{Ladder, Plan};
+use crate::contact::rolling::mesh_plan::Plan;
+use crate::contact::rolling::methods::method::Method;
+use crate::contact::rolling::motion::{Motion, PrescribedForces};
+use crate::contact::rolling::refinement::level_solve::{Asked, Point};
+use crate::contact::rolling::refinement::levels::Ladder;
 use crate::contact::rolling::refinement::refine;
-use crate::contact::rolling::refinement::refine::{Asked, Point};
+use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
+use crate::contact::rolling::task::RollingTask;
 
 /// A prescribed force may be missed by this part of the target error.
 const SHARE_OF_TARGET: f64 = 0.02;
@@ -50,18 +52,18 @@ const CORRECTION_MAX: f64 = 0.3;
 /// # Errors
 /// Why there is no answer.
 pub fn solve(
-    problem: &Problem,
+    task: &RollingTask,
     ladder: &mut Ladder,
     index: usize,
     before: Option<&Point>,
     monitor: &dyn Monitor,
 ) -> Result<Point, SolveError> {
-    let motion = problem.motions[index];
-    if problem.forces[index] == [None; 2] || problem.friction == 0.0 {
-        return refine::solve(problem, ladder, Asked { index, motion }, monitor);
+    let motion = task.motions[index];
+    if task.forces[index] == [None; 2] || task.friction.is_frictionless() {
+        return refine::solve(task, ladder, Asked { index, motion }, monitor);
     }
     let began = monitor.elapsed();
-    let mut search = Search::new(problem, ladder, index, monitor);
+    let mut search = Search::new(task, ladder, index, monitor);
     let mut place = search.start(before);
     for _ in 0..CLIMBS_MAX {
         // A climb chooses the levels; on them the force is one function of the creepage.
@@ -83,14 +85,14 @@ struct Law {
 }
 
 impl Law {
-    fn new(problem: &Problem, limit: f64) -> Law {
+    fn new(task: &RollingTask, limit: f64) -> Law {
         let mut stiffness = [0.0; 2];
-        for patch in problem.region.patches() {
+        for patch in task.footprint.patches() {
             let extent = patch.extent;
             let box_ratio = (extent[1] - extent[0]) / (extent[3] - extent[2]);
             let a_over_b = patch.semi_axes.map_or(box_ratio, |[a, b]| a / b);
-            let c = linear_theory::coefficients(a_over_b, problem.elasticity.poisson_ratio);
-            let unit = problem.elasticity.shear_modulus * patch.area / std::f64::consts::PI;
+            let c = linear_theory::coefficients(a_over_b, task.elasticity.poisson_ratio);
+            let unit = task.elasticity.shear_modulus * patch.area / std::f64::consts::PI;
             for (k, stiffness) in stiffness.iter_mut().enumerate() {
                 *stiffness += unit * c[k] / limit;
             }
@@ -128,11 +130,11 @@ impl Law {
 
 /// One motion on its way to the prescribed forces.
 struct Search<'a, 'p> {
-    problem: &'a Problem,
+    task: &'a RollingTask<'a>,
     ladder: &'a mut Ladder<'p>,
     index: usize,
     monitor: &'a dyn Monitor,
-    forces: Prescribed,
+    forces: PrescribedForces,
     /// μN of all patches in N.
     limit: f64,
     law: Law,
@@ -150,21 +152,21 @@ struct Search<'a, 'p> {
 
 impl<'a, 'p> Search<'a, 'p> {
     fn new(
-        problem: &'a Problem,
+        task: &'a RollingTask<'a>,
         ladder: &'a mut Ladder<'p>,
         index: usize,
         monitor: &'a dyn Monitor,
     ) -> Search<'a, 'p> {
-        let patches = problem.region.patches();
-        let limit = problem.friction * patches.iter().map(|p| p.normal_force).sum::<f64>();
+        let patches = task.footprint.patches();
+        let limit = task.friction.limit_of_all(patches);
         Search {
-            problem,
+            task,
             ladder,
             index,
             monitor,
-            forces: problem.forces[index],
+            forces: task.forces[index],
             limit,
-            law: Law::new(problem, limit),
+            law: Law::new(task, limit),
             path: Vec::new(),
             best: None,
             first: None,
@@ -314,10 +316,10 @@ impl<'a, 'p> Search<'a, 'p> {
             index: self.index,
             motion: self.motion(place),
         };
-        let found = refine::along(self.problem, self.ladder, asked, &self.path, self.monitor)?;
+        let found = refine::along(self.task, self.ladder, asked, &self.path, self.monitor)?;
         let point = match found {
             Some(point) => point,
-            None => refine::solve(self.problem, self.ladder, asked, self.monitor)?,
+            None => refine::solve(self.task, self.ladder, asked, self.monitor)?,
         };
         if self.path.is_empty() {
             let plan = |number: &usize| self.ladder.get(*number).plan;
@@ -340,8 +342,8 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// By how much forces may be missed, relative to μN.
     fn tolerance(&self) -> f64 {
-        let most = match self.problem.resolution {
-            Resolution::Target(target) if self.problem.method != Method::Fastsim => {
+        let most = match self.task.resolution {
+            Resolution::Target(target) if self.task.method != Method::Fastsim => {
                 (SHARE_OF_TARGET * target).max(MISSED_FOR_TARGET)
             }
             _ => MISSED,
@@ -353,7 +355,7 @@ impl<'a, 'p> Search<'a, 'p> {
     }
 
     fn motion(&self, place: [f64; 2]) -> Motion {
-        let given = self.problem.motions[self.index];
+        let given = self.task.motions[self.index];
         let creepage = |k: usize, given: f64| match self.forces[k] {
             Some(_) => self.law.creepage(k, place[k]),
             None => given,
@@ -367,10 +369,10 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// Does the best answer meet the target, as far as its method can?
     fn met(&self) -> bool {
-        let Resolution::Target(target) = self.problem.resolution else {
+        let Resolution::Target(target) = self.task.resolution else {
             return true;
         };
-        let chosen = matches!(self.problem.method, Method::Auto | Method::BoundaryElement);
+        let chosen = self.task.method == Method::BoundaryElement;
         let error = self.best.as_ref().and_then(|(_, point)| point.error());
         !chosen || error.is_some_and(|error| error <= target)
     }
@@ -386,7 +388,7 @@ impl<'a, 'p> Search<'a, 'p> {
         let inexact = self.inexact();
         let mut point = match self.best.take() {
             Some((_, point)) => point,
-            None => refine::solve(self.problem, self.ladder, asked, self.monitor)?,
+            None => refine::solve(self.task, self.ladder, asked, self.monitor)?,
         };
         point.tangential.remarks.extend(inexact);
         point.work = self.work;

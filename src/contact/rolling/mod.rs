@@ -3,8 +3,11 @@
 pub mod answer;
 pub mod force_control;
 pub mod linear_theory;
+pub mod mesh_plan;
 pub mod methods;
+pub mod motion;
 pub mod operator_store;
+pub mod own_blocks;
 pub mod refinement;
 pub mod regime;
 pub mod resultants;
@@ -12,4 +15,5 @@ pub mod slip_equations;
 pub mod slip_rules;
 pub mod strip_chords;
 pub mod strip_mesh;
+pub mod task;
 pub mod vortex;

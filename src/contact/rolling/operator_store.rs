@@ -8,12 +8,13 @@ use std::collections::{BTreeMap, HashMap};
 use std::hash::{Hash, Hasher};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use crate::contact::half_space::strip_operator::kind::Precision;
 use crate::contact::half_space::strip_operator::operator;
-use crate::contact::half_space::strip_operator::operator::{Differences, Precision};
+use crate::contact::half_space::strip_operator::operator::Differences;
 use crate::contact::mesh::strips::{Mesh, Segment};
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::rolling::methods::boundary_element::preconditioner;
-use crate::contact::rolling::methods::boundary_element::preconditioner::SharedBlocks;
+use crate::contact::rolling::own_blocks;
+use crate::contact::rolling::own_blocks::SharedBlocks;
 
 /// Bytes of a store when nothing else is asked for: two of the largest operators that targets from 0.0005 on lead to (52 MB each
 /// without mirror symmetry) or some hundred usual ones. A creep map of 900 motions at fixed spin takes the same time with 0, 64, 128 and
@@ -52,7 +53,7 @@ impl OperatorKind {
 
     fn bytes_of(self, cells: usize, lengths: impl ExactSizeIterator<Item = usize>) -> u64 {
         operator::bytes(cells, lengths.len(), self.folded, self.precision)
-            + preconditioner::bytes_max(lengths, self.folded)
+            + own_blocks::bytes_max(lengths, self.folded)
     }
 }
 
@@ -283,6 +284,7 @@ fn alike(a: &Mesh, b: &Mesh) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::half_space::strip_operator::kind;
     use crate::contact::mesh::strips::{Chord, Grading, equal_strips};
     use crate::contact::monitor::Unwatched;
 
@@ -354,7 +356,7 @@ mod tests {
 
     #[test]
     fn the_bytes_counted_are_those_of_the_matrix_and_all_its_own_blocks() {
-        use crate::contact::rolling::methods::boundary_element::preconditioner::OwnBlocks;
+        use crate::contact::rolling::own_blocks::OwnBlocks;
         use crate::contact::rolling::slip_equations::Equations;
         use crate::contact::rolling::slip_rules::Rule;
         for folded in [false, true] {
@@ -364,8 +366,8 @@ mod tests {
             let parities: &[_] = if folded {
                 &[
                     None,
-                    Some(operator::Parity::Lateral),
-                    Some(operator::Parity::Longitudinal),
+                    Some(kind::Parity::Lateral),
+                    Some(kind::Parity::Longitudinal),
                 ]
             } else {
                 &[None]

@@ -1,11 +1,11 @@
 //! What do the tractions of a level look like, as far as the next mesh should know: how much sticks, and about which pole they turn.
 
-use crate::contact::case::problem::Problem;
 use crate::contact::mesh::strips::Segment;
 use crate::contact::rolling::answer::Tangential;
+use crate::contact::rolling::mesh_plan::Regime;
 use crate::contact::rolling::refinement::constants::{POLE, STICK_NEGLIGIBLE, STICK_UNCERTAIN};
-use crate::contact::rolling::refinement::levels::Regime;
 use crate::contact::rolling::strip_mesh::Level;
+use crate::contact::rolling::task::RollingTask;
 use crate::contact::rolling::vortex::vortex_centre;
 
 /// A pole this far out, relative to the half axes of the box around the patches, is outside.
@@ -77,12 +77,12 @@ fn pole(level: &Level, answer: &Tangential) -> Option<[f64; 2]> {
 
 /// Error of sampling the vortex, relative to the whole load; 0 where the cell that holds the centre surely
 /// sticks.
-pub(crate) fn pole_error(problem: &Problem, level: &Level, answer: &Tangential) -> f64 {
+pub(crate) fn pole_error(task: &RollingTask, level: &Level, answer: &Tangential) -> f64 {
     let Some([x, y]) = pole(level, answer) else {
         return 0.0;
     };
-    let load: f64 = problem
-        .region
+    let load: f64 = task
+        .footprint
         .patches()
         .iter()
         .map(|p| p.normal_force)

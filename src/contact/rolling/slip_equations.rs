@@ -6,10 +6,11 @@
 use std::cell::RefCell;
 use std::ops::ControlFlow;
 
-use crate::contact::case::words::Motion;
-use crate::contact::half_space::strip_operator::operator::{Differences, Parity, Scratch};
+use crate::contact::half_space::strip_operator::kind::Parity;
+use crate::contact::half_space::strip_operator::operator::{Differences, Scratch};
 use crate::contact::mesh::strips::Mesh;
 use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::slip_rules::{Rule, Stencil};
 
 /// A rule on a mesh with its influence: the linear map from tractions to slips.
@@ -213,7 +214,7 @@ impl<'a> Equations<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::half_space::strip_operator::operator::Precision;
+    use crate::contact::half_space::strip_operator::kind::Precision;
     use crate::contact::mesh::strips::{Chord, Grading, equal_strips};
     use crate::contact::monitor::Unwatched;
 

@@ -4,7 +4,7 @@
 //! leading edge: that is what selects the solution that vanishes there and keeps the problem well posed. Slip is in
 //! units of G⁻¹ × traction, lengths in the unit of the mesh.
 
-use crate::contact::half_space::strip_operator::operator::observation_points;
+use crate::contact::mesh::observation::observation_points;
 use crate::contact::mesh::strips::{Mesh, Segment};
 
 /// The rules offered.

@@ -1,7 +1,7 @@
 //! Chords that stand for their whole strip, not only for its mid-line.
 
 use crate::contact::mesh::strips::Chord;
-use crate::contact::normal::region::Region;
+use crate::contact::normal::footprint::Footprint;
 
 /// Gauss–Legendre points and weights on −1 … 1 for the mean length over a strip.
 const GAUSS: [(f64, f64); 4] = [
@@ -29,11 +29,11 @@ impl Fitted {
     /// Mean pressure in MPa over `x0 < x < x1` of the chord: the pressure of the line, stretched and scaled with the
     /// length so that its profile keeps its form (exact for Hertz's semi-ellipse).
     #[must_use]
-    pub fn mean_pressure(&self, region: &Region, x0: f64, x1: f64) -> f64 {
+    pub fn mean_pressure(&self, footprint: &Footprint, x0: f64, x1: f64) -> f64 {
         let ratio = (self.chord.right - self.chord.left) / (self.line.right - self.line.left);
         let middle = 0.5 * (self.line.left + self.line.right);
         let stretched = |x: f64| middle + (x - middle) / ratio;
-        ratio * region.mean_pressure(&self.line, stretched(x0), stretched(x1))
+        ratio * footprint.mean_pressure(&self.line, stretched(x0), stretched(x1))
     }
 }
 
@@ -44,8 +44,8 @@ impl Fitted {
 /// width b of the patch, lowers the errors of the resultants on 62 Hertz cases by a third and Kalker's C33 with it.
 /// Where a strip has several chords the mid-line's are kept.
 #[must_use]
-pub fn chords(region: &Region, patch: usize, strips: &[(f64, f64)]) -> Vec<Fitted> {
-    let lines = region.chords(patch, strips);
+pub fn chords(footprint: &Footprint, patch: usize, strips: &[(f64, f64)]) -> Vec<Fitted> {
+    let lines = footprint.chords(patch, strips);
     let alone = |line: &Chord| {
         lines
             .iter()
@@ -60,7 +60,7 @@ pub fn chords(region: &Region, patch: usize, strips: &[(f64, f64)]) -> Vec<Fitte
     let width: f64 = strips.iter().map(|(_, dy)| dy).sum();
     let share = 0.5 / (1.0 + 0.5 * (longest / width).powi(2));
     let fit = |line: &Chord| {
-        let strip = alone(line).then(|| Strip::of(region, patch, line));
+        let strip = alone(line).then(|| Strip::of(footprint, patch, line));
         let mean = strip.and_then(|strip| strip.length);
         let length = line.right - line.left;
         let half = 0.5 * ((1.0 - share) * length + share * mean.unwrap_or(length));
@@ -92,17 +92,17 @@ struct Strip {
 
 impl Strip {
     /// The strip about a line.
-    fn of(region: &Region, patch: usize, line: &Chord) -> Strip {
+    fn of(footprint: &Footprint, patch: usize, line: &Chord) -> Strip {
         let (mut length, mut load, mut moment) = (Some(0.0), 0.0, 0.0);
         for (place, weight) in GAUSS {
             let y = line.y + 0.5 * line.dy * place;
-            let across = region.chords(patch, &[(y, line.dy)]);
+            let across = footprint.chords(patch, &[(y, line.dy)]);
             if across.len() > 1 {
                 length = None;
             }
             for chord in across {
                 let long = 0.5 * weight * (chord.right - chord.left);
-                let share = long * region.mean_pressure(&chord, chord.left, chord.right);
+                let share = long * footprint.mean_pressure(&chord, chord.left, chord.right);
                 length = length.map(|sum: f64| sum + long);
                 load += share;
                 moment += share * (y - line.y);
@@ -124,24 +124,12 @@ impl Strip {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::case::words::{Contact, Load};
     use crate::contact::mesh::strips::equal_strips;
+    use crate::contact::normal::hertz::{Ellipse, Pressing};
 
-    fn circle() -> Region {
-        let load = Load {
-            normal_force_n: Some(2.0 * std::f64::consts::PI / 3.0),
-            vertical_force_n: None,
-            approach_mm: None,
-        };
-        Region::hertz(
-            &Contact::Ellipse {
-                a_mm: 1.0,
-                b_mm: 1.0,
-            },
-            &load,
-            1.0,
-        )
-        .unwrap()
+    fn circle() -> Footprint {
+        let force = Pressing::Force(2.0 * std::f64::consts::PI / 3.0);
+        Footprint::hertz(Ellipse::of_semi_axes(1.0, 1.0, force, 1.0))
     }
 
     fn area(strips: usize) -> (f64, f64) {
@@ -167,11 +155,11 @@ mod tests {
 
     #[test]
     fn the_pressure_still_ends_at_the_ends_of_the_chord() {
-        let region = circle();
-        for fitted in chords(&region, 0, &equal_strips(-1.0, 1.0, 6)) {
+        let footprint = circle();
+        for fitted in chords(&footprint, 0, &equal_strips(-1.0, 1.0, 6)) {
             let Chord { left, right, .. } = fitted.chord;
-            let near = fitted.mean_pressure(&region, right - 1e-6 * (right - left), right);
-            let middle = fitted.mean_pressure(&region, -1e-6, 1e-6);
+            let near = fitted.mean_pressure(&footprint, right - 1e-6 * (right - left), right);
+            let middle = fitted.mean_pressure(&footprint, -1e-6, 1e-6);
             assert!(near < 2e-3 * middle && near > 0.0, "{near} {middle}");
         }
     }

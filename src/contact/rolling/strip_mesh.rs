@@ -3,22 +3,20 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use crate::contact::case::problem::{Elasticity, Problem, Resolution};
-use crate::contact::case::words::Motion;
 use crate::contact::error::SolveError;
-use crate::contact::half_space::strip_operator::operator::{Parity, Precision};
+use crate::contact::half_space::elasticity::Elasticity;
+use crate::contact::half_space::strip_operator::kind::{Parity, Precision};
 use crate::contact::mesh::strips::{Chord, Grading, Mesh, equal_strips, strips_about};
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::normal::region::Region;
+use crate::contact::normal::footprint::Footprint;
+use crate::contact::rolling::mesh_plan::Plan;
+use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::{
     CaseOperators, LevelOperator, OperatorKind, OperatorStore,
 };
-use crate::contact::rolling::refinement::levels::Plan;
 use crate::contact::rolling::strip_chords;
 use crate::contact::rolling::strip_chords::Fitted;
-
-/// Targets from here on are met with a matrix in single precision.
-const SINGLE_PRECISION_FROM: f64 = 5e-4;
+use crate::contact::rolling::task::RollingTask;
 
 /// Dimensionless coordinates in single precision are multiples of this: patches of one shape get the same mesh, to the last
 /// digit, whatever their size.
@@ -89,9 +87,9 @@ impl Level {
     ///
     /// # Errors
     /// [`SolveError::Unmeshable`] if no strip meets a patch.
-    pub fn new(problem: &Problem, plan: impl Into<Plan>) -> Result<Level, SolveError> {
+    pub fn new(task: &RollingTask, plan: impl Into<Plan>) -> Result<Level, SolveError> {
         let store = Arc::new(OperatorStore::new(0));
-        Level::with_operators(problem, plan, CaseOperators::new(&store))
+        Level::with_operators(task, plan, CaseOperators::new(&store))
     }
 
     /// The same, with the operators of a case to take its own from.
@@ -99,19 +97,18 @@ impl Level {
     /// # Errors
     /// The same.
     pub fn with_operators(
-        problem: &Problem,
+        task: &RollingTask,
         plan: impl Into<Plan>,
         operators: Arc<CaseOperators>,
     ) -> Result<Level, SolveError> {
         let plan: Plan = plan.into();
         let size = plan.size;
-        let (region, friction) = (&problem.region, problem.friction);
         let Elasticity {
             shear_modulus,
             poisson_ratio,
             ..
-        } = problem.elasticity;
-        let patches = region.patches();
+        } = *task.elasticity;
+        let (footprint, patches) = (task.footprint, task.footprint.patches());
         let mut fitted: Vec<Fitted> = Vec::new();
         for (k, patch) in patches.iter().enumerate() {
             let [low, high] = [patch.extent[2], patch.extent[3]];
@@ -119,7 +116,7 @@ impl Level {
                 Some([_, y]) => strips_about(y, low, high, size.strips as usize),
                 None => equal_strips(low, high, size.strips as usize),
             };
-            let chords = strip_chords::chords(region, k, &strips);
+            let chords = strip_chords::chords(footprint, k, &strips);
             if chords.is_empty() {
                 return Err(SolveError::Unmeshable {
                     patch: k,
@@ -139,7 +136,7 @@ impl Level {
             mesh.arm = fitted.iter().map(|f| f.load_y).collect();
         }
         let area = mesh.areas();
-        let pressure = cell_pressures(region, &fitted, &mesh, &area);
+        let pressure = cell_pressures(footprint, &fitted, &mesh, &area);
         let mirror = mesh
             .mirror_line()
             .filter(|_| pressures_mirror(&mesh, &pressure));
@@ -147,16 +144,19 @@ impl Level {
         let largest = patches.iter().map(|p| p.pressure_max).fold(0.0, f64::max);
         let scale = Scale {
             length: (patches.iter().map(|p| p.area).sum::<f64>() / PI).sqrt(),
-            traction: friction * largest,
+            traction: task.friction.largest() * largest,
             shear_modulus,
             origin: [x, mirror.unwrap_or(y)],
         };
-        let precision = precision_of(problem.resolution);
+        let precision = task.precision();
         let mut normalised = mesh.normalised(scale.origin, 1.0 / scale.length);
         if precision == Precision::Single {
             normalised.round(COORDINATE_STEP);
         }
-        let bound = pressure.iter().map(|p| p / largest).collect();
+        let pairs = pressure.iter().zip(mesh.rows());
+        let bound = pairs
+            .map(|(p, y)| task.friction.relative(y) * p / largest)
+            .collect();
         Ok(Level {
             plan,
             mesh,
@@ -237,29 +237,20 @@ impl Level {
     }
 }
 
-/// Single precision serves any target that the residuals of single precision can meet.
-#[must_use]
-pub fn precision_of(resolution: Resolution) -> Precision {
-    match resolution {
-        Resolution::Target(target) if target >= SINGLE_PRECISION_FROM => Precision::Single,
-        _ => Precision::Double,
-    }
-}
-
 /// Mean pressures of the cells, scaled so that the cells carry the load of their strip where the region is not Hertz's
 /// ellipse (its line loads are smooth enough), then the patch's normal force.
-fn cell_pressures(region: &Region, fitted: &[Fitted], mesh: &Mesh, area: &[f64]) -> Vec<f64> {
-    let patches = region.patches();
+fn cell_pressures(footprint: &Footprint, fitted: &[Fitted], mesh: &Mesh, area: &[f64]) -> Vec<f64> {
+    let patches = footprint.patches();
     let mut load = vec![0.0; patches.len()];
     let mut pressure = vec![0.0; mesh.cells()];
     for (segment, fitted) in mesh.segments.iter().zip(fitted) {
         let mut carried = 0.0;
         for i in segment.cells.clone() {
-            pressure[i] = fitted.mean_pressure(region, mesh.left[i], mesh.right[i]);
+            pressure[i] = fitted.mean_pressure(footprint, mesh.left[i], mesh.right[i]);
             carried += pressure[i] * area[i];
         }
         if let Some(strip) = fitted.load
-            && !region.is_ellipse()
+            && !footprint.is_closed_form()
             && carried > 0.0
         {
             let strip = strip * segment.chord.dy;

@@ -1,13 +1,16 @@
 //! From stage results to the answer a client reads: units put back, only what was asked for.
 
-use crate::contact::case::problem::{Problem, Resolution};
-use crate::contact::case::words::{Motion, Output};
-use crate::contact::normal::region::{Patch, Region};
+use crate::contact::case::problem::Problem;
+use crate::contact::case::words::Output;
+use crate::contact::normal::patch::Patch;
+use crate::contact::normal::region::Region;
 use crate::contact::post::zone::Zone;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
+use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::refinement::level_solve::Point;
 use crate::contact::rolling::refinement::levels::Ladder;
-use crate::contact::rolling::refinement::refine::Point;
+use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::strip_mesh::Level;
 use crate::contact::solution::words::{
@@ -165,7 +168,7 @@ fn point_solution(
     let power_x = motion.creepage_x * found.force_x;
     let power_y = motion.creepage_y * found.force_y;
     PointSolution {
-        motion: *motion,
+        motion: (*motion).into(),
         normalised: normalised(problem, patch, motion),
         force_x_n: found.force_x,
         force_y_n: found.force_y,
@@ -181,7 +184,7 @@ fn point_solution(
         friction_power_n: power_x + power_y + motion.spin_per_mm * found.moment_z,
         friction_power_without_spin_n: power_x.abs() + power_y.abs(),
         solver: SolverReport {
-            method: point.method,
+            method: point.method.into(),
             mesh: MeshReport {
                 strips: level.plan.size.strips,
                 cells: level.plan.size.cells,

@@ -124,7 +124,7 @@ fn implausible(solution: &Solution, before: usize) -> Vec<RemarkEntry> {
         let length = Some((patch.area_mm2 / PI).sqrt());
         said.extend(plausibility::pressure(patch.pressure_max_mpa).map(|remark| at(remark, None)));
         for (motion, point) in patch.points.iter().enumerate() {
-            let remark = plausibility::creepage(&point.motion, length);
+            let remark = plausibility::creepage(&point.motion.into(), length);
             said.extend(remark.map(|remark| at(remark, Some(before + motion))));
         }
     }

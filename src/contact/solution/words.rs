@@ -6,7 +6,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::contact::case::words::{Method, Motion};
+use crate::contact::case::words::{MethodName, MotionWords};
 use crate::contact::post::zone::Zone;
 use crate::contact::profile_trust::quality::{PatchQuality, ProfileUncertainty};
 use crate::contact::remark::entry::RemarkEntry;
@@ -133,7 +133,7 @@ pub struct Position {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct PointSolution {
     /// The motion this belongs to.
-    pub motion: Motion,
+    pub motion: MotionWords,
     /// The same motion in the dimensionless form of the literature.
     pub normalised: NormalisedMotion,
     /// Longitudinal force on the lower body in N.
@@ -202,7 +202,7 @@ pub struct ErrorEstimate {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct SolverReport {
     /// The method that gave the numbers.
-    pub method: Method,
+    pub method: MethodName,
     /// The finest mesh: strips of this patch, cells along x in each.
     pub mesh: MeshReport,
     /// Newton iterations over all levels and rules.

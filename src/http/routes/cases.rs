@@ -5,7 +5,7 @@ use axum::extract::State;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::{Case, Method, Output};
+use crate::contact::case::words::{Case, MethodName, Output};
 use crate::contact::profile_trust::quality::PairQuality;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::http::extract::caller::Caller;
@@ -21,7 +21,7 @@ pub struct CheckReport {
     /// Digest of everything that determines the answer; cases with equal digests have equal answers.
     digest: String,
     /// The method the case asks for.
-    method: Method,
+    method: MethodName,
     /// What will be computed.
     outputs: Vec<Output>,
     /// Number of motions.
@@ -75,7 +75,7 @@ pub async fn check(
             let cost = problem.cost();
             CheckReport {
                 digest: problem.digest.clone(),
-                method: problem.method,
+                method: problem.method_asked,
                 outputs: problem.outputs.clone(),
                 motions: problem.motions.len(),
                 estimate: Estimate {

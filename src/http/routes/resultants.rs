@@ -6,7 +6,7 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::Motion;
+use crate::contact::case::words::MotionWords;
 use crate::contact::profile_trust::quality::ProfileUncertainty;
 use crate::contact::solution::words::{ErrorEstimate, Origin, Solution, Total};
 use crate::http::extract::accept::{Format, choose, one_of};
@@ -48,7 +48,7 @@ pub struct PointResultants {
     /// Number of the motion, counted from 0.
     point: usize,
     /// The motion.
-    motion: Motion,
+    motion: MotionWords,
     /// Longitudinal force in N.
     force_x_n: f64,
     /// Lateral force in N.
@@ -193,7 +193,7 @@ fn select(solution: Solution, point: Option<usize>, patch: Option<usize>) -> Res
 /// What a line of CSV holds besides forces and their errors.
 #[derive(Debug, Clone, Copy)]
 struct Sum {
-    motion: Motion,
+    motion: MotionWords,
     normal_force_n: f64,
     friction_power_n: f64,
     friction_power_without_spin_n: f64,

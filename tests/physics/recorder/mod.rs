@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 use railhead::contact;
 use railhead::contact::case::digest::SOLVER_REVISION;
-use railhead::contact::case::problem::Limits;
+use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::Unwatched;
 use railhead::contact::rolling::operator_store::OperatorStore;
 use serde_json::Value;

@@ -3,19 +3,17 @@
 //! A member that is absent, of the wrong type, out of range, unknown or contradictory gets a fault with its JSON
 //! pointer (RFC 6901), the value received and what is allowed. Nothing is repaired.
 
-use crate::contact::case::words::read::contact;
-use crate::contact::case::words::read::material;
-use crate::contact::case::words::read::motion;
-use crate::contact::case::words::read::solver;
+use crate::contact::case::checks::{Given, faults_of};
+use crate::contact::case::limits::Limits;
+use crate::contact::case::read::object::{Faults, Interval, Object, has_controls, join, shown};
+use crate::contact::case::read::{contact, material, motion, solver};
+use crate::contact::case::words::{
+    Case, Contact, Friction, Load, Material, Motions, Output, Solver,
+};
+use crate::contact::error::{CaseError, Fault};
 use std::collections::BTreeMap;
 
 use serde_json::Value;
-
-use crate::contact::case::words::problem;
-use crate::contact::case::words::problem::{Given, Limits};
-use crate::contact::case::words::read::object::{Faults, Interval, Object, has_controls, join, shown};
-use crate::contact::case::words::words::{Case, Contact, Friction, Load, Material, Motions, Output, Solver};
-use crate::contact::error::{CaseError, Fault};
 
 const NAME_LENGTH_MAX: usize = 200;
 const LABELS_MAX: usize = 32;
@@ -78,7 +76,7 @@ impl Draft {
             solver: self.solver.as_ref(),
             outputs: self.outputs.as_deref().unwrap_or_default(),
         };
-        problem::faults_of(given, limits)
+        faults_of(given, limits)
     }
 
     /// The case, if every required part could be read.

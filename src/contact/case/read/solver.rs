@@ -1,22 +1,22 @@
 //! Reads `solver` and `outputs`: how to solve, how exactly, and what to answer.
 
-use crate::contact::case::problem::TARGET_ERROR_DEFAULT;
 use crate::contact::case::read::object::{Interval, Object, join, shown, word};
-use crate::contact::case::words::{MeshSize, Method, Output, Solver, TractionBound};
+use crate::contact::case::resolution::TARGET_ERROR_DEFAULT;
+use crate::contact::case::words::{MeshSizeWords, MethodName, Output, Solver, TractionBoundName};
 
 const TARGET_ERROR: Interval = Interval::closed(1e-4, 0.5, "");
 const TIME_LIMIT: Interval = Interval::positive(86_400.0, "s");
 const MESH_SIDE_MAX: u32 = 1000;
 
-const METHODS: [(&str, Method); 4] = [
-    ("auto", Method::Auto),
-    ("boundary_element", Method::BoundaryElement),
-    ("liu_hsu", Method::LiuHsu),
-    ("fastsim", Method::Fastsim),
+const METHODS: [(&str, MethodName); 4] = [
+    ("auto", MethodName::Auto),
+    ("boundary_element", MethodName::BoundaryElement),
+    ("liu_hsu", MethodName::LiuHsu),
+    ("fastsim", MethodName::Fastsim),
 ];
-const TRACTION_BOUNDS: [(&str, TractionBound); 2] = [
-    ("elliptic", TractionBound::Elliptic),
-    ("parabolic", TractionBound::Parabolic),
+const TRACTION_BOUNDS: [(&str, TractionBoundName); 2] = [
+    ("elliptic", TractionBoundName::Elliptic),
+    ("parabolic", TractionBoundName::Parabolic),
 ];
 const OUTPUTS: [(&str, Output); 5] = [
     ("resultants", Output::Resultants),
@@ -31,7 +31,7 @@ const OUTPUTS_LATER: [&str; 2] = ["subsurface", "damage"];
 pub(crate) fn read(case: &mut Object) -> Option<Solver> {
     if !case.has("solver") {
         return Some(Solver {
-            method: Method::Auto,
+            method: MethodName::Auto,
             target_error: Some(TARGET_ERROR_DEFAULT),
             mesh: None,
             traction_bound: None,
@@ -57,7 +57,8 @@ pub(crate) fn read(case: &mut Object) -> Option<Solver> {
         None
     };
     let traction_bound = block.word("traction_bound", &TRACTION_BOUNDS, &[]);
-    let another = !block.has("method") || method.is_some_and(|method| method != Method::Fastsim);
+    let another =
+        !block.has("method") || method.is_some_and(|method| method != MethodName::Fastsim);
     if traction_bound.is_some() && another {
         block.fault(
             "traction_bound",
@@ -84,7 +85,7 @@ pub(crate) fn read(case: &mut Object) -> Option<Solver> {
     }
     let method = method.unwrap_or_default();
     // The simplified theory has one mesh and a stated error, which no target changes: it has none of its own.
-    let wanted = mesh.is_none() && method != Method::Fastsim;
+    let wanted = mesh.is_none() && method != MethodName::Fastsim;
     let default = wanted.then_some(TARGET_ERROR_DEFAULT);
     Some(Solver {
         method,
@@ -133,12 +134,12 @@ pub(crate) fn read_outputs(case: &mut Object) -> Option<Vec<Output>> {
     Some(outputs)
 }
 
-fn mesh(block: &mut Object) -> Option<MeshSize> {
+fn mesh(block: &mut Object) -> Option<MeshSizeWords> {
     let mut block = block.child("mesh")?;
     block.only(&["strips", "cells"], &[]);
     let strips = block.required_count("strips", 1, MESH_SIDE_MAX);
     let cells = block.required_count("cells", 1, MESH_SIDE_MAX);
-    Some(MeshSize {
+    Some(MeshSizeWords {
         strips: strips?,
         cells: cells?,
     })

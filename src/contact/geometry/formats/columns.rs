@@ -1,6 +1,6 @@
 //! Two-column text or CSV: y and z in mm, one point per line.
 
-use crate::contact::geometry::formats::format::{Contents, numbers, unreadable};
+use crate::contact::geometry::formats::profile_file::{Contents, numbers, unreadable};
 
 /// Lines that start with `#`, `!`, `%` or `"` are remarks; one line of titles may stand before the first point.
 pub(crate) fn read(text: &str) -> Result<Contents, String> {

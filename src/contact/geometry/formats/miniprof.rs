@@ -3,7 +3,7 @@
 //! Lines `Name=value`, an empty line, then one point per line in the columns that `ColumnDef` names; `X` is y and `Y`
 //! is z here. Instruments differ in the sense of both: x usually runs toward the track centre, z is told by the shape.
 
-use crate::contact::geometry::formats::format::{
+use crate::contact::geometry::formats::profile_file::{
     Contents, has_decimal_commas, numbers, unreadable,
 };
 

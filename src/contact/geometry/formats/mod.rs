@@ -3,4 +3,5 @@
 pub mod columns;
 pub mod format;
 pub mod miniprof;
+pub mod profile_file;
 pub mod simpack;

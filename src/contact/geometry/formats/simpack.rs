@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::contact::geometry::formats::format::{Contents, numbers, unreadable};
+use crate::contact::geometry::formats::profile_file::{Contents, numbers, unreadable};
 
 #[derive(Debug, Clone, Copy)]
 struct Settings {

@@ -8,4 +8,5 @@ pub mod holes;
 pub mod noise;
 pub mod points;
 pub mod readings;
+pub mod samples;
 pub mod shape;

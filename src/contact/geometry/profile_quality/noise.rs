@@ -1,6 +1,6 @@
 //! What the points of a profile say about how they were made: noise, single outliers, steps, polygons, rounding.
 
-use crate::contact::geometry::profile_quality::points::Points;
+use crate::contact::geometry::profile_quality::samples::Points;
 
 /// Chords of one window of the noise, and its greatest length in mm: over longer ones the shape itself is not a cubic.
 const NOISE_CHORDS: usize = 4;

@@ -7,6 +7,7 @@ use crate::contact::geometry::profile_quality::flattening::noise_pressure;
 use crate::contact::geometry::profile_quality::noise;
 use crate::contact::geometry::profile_quality::noise::{Outlier, Step};
 use crate::contact::geometry::profile_quality::readings::{Roughness, roughness};
+use crate::contact::geometry::profile_quality::samples::Points;
 
 /// Smoothing lengths that are advised, in mm: shorter ones leave the noise of neighbouring points, longer ones take away the shape of
 /// gauge corners and flange roots (radii of 13 to 20 mm; at 5 mm 2 % of the largest pressure, at 10 mm 27 % in one of ten).
@@ -21,41 +22,6 @@ const CHORDS: f64 = 2.0;
 /// Outliers and steps count up to this distance from the contact, in its half widths, and what noise is by this in mm beyond.
 const NEAR: f64 = 2.0;
 const AROUND: f64 = 10.0;
-
-/// Points of a profile with their distance along it, both in mm.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Points<'a> {
-    /// `[y, z]` in mm, z up.
-    pub at: &'a [[f64; 2]],
-    /// Length of the chords up to each point.
-    pub along: &'a [f64],
-}
-
-impl<'a> Points<'a> {
-    /// Numbers of the points in a range of the length, first and one past the last.
-    #[must_use]
-    pub fn numbers(&self, range: [f64; 2]) -> [usize; 2] {
-        let first = self.along.partition_point(|s| *s < range[0]);
-        let last = self.along.partition_point(|s| *s <= range[1]);
-        [first, last.max(first)]
-    }
-
-    /// The points in a range of the length and one beyond on either side, at least four of them where there are as many.
-    #[must_use]
-    pub fn within(&self, range: [f64; 2]) -> Points<'a> {
-        let [first, last] = self.numbers(range);
-        let (first, last) = (first.saturating_sub(2), (last + 2).min(self.at.len()));
-        Points {
-            at: &self.at[first..last],
-            along: &self.along[first..last],
-        }
-    }
-
-    /// Length of the chord from a point to the next.
-    fn chord(&self, k: usize) -> f64 {
-        self.along[k + 1] - self.along[k]
-    }
-}
 
 /// What the points of one body are like under one contact.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,7 +2,7 @@
 
 use crate::contact::geometry::profile_quality::flattening::flattening;
 use crate::contact::geometry::profile_quality::noise::{MEDIAN_OF_NORMAL, median};
-use crate::contact::geometry::profile_quality::points::Points;
+use crate::contact::geometry::profile_quality::samples::Points;
 use crate::contact::geometry::smoothing::Spline;
 
 /// Spacing of the comparison in mm.

@@ -1,7 +1,7 @@
 //! What the shape of a profile tells: is it a rail or a wheel, where is the tip of the flange, which chord leads astray?
 
 use crate::contact::geometry::profile_quality::noise::median;
-use crate::contact::geometry::profile_quality::points::Points;
+use crate::contact::geometry::profile_quality::samples::Points;
 
 /// How far below the highest point the head of a rail is measured, and above the lowest one the tip of a flange, in mm.
 const PIECE: f64 = 2.0;

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use pulp::{Arch, NullaryFnOnce};
 
-use crate::contact::half_space::strip_operator::operator::observation_points;
+use crate::contact::mesh::observation::observation_points;
 use crate::contact::mesh::strips::Mesh;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::simd_ln::Number;

@@ -7,44 +7,12 @@
 //! The matrix depends on the mesh and Poisson's ratio only. Tractions are in any unit, displacement differences come
 //! out in (that unit / G) × (length unit of the mesh).
 
-use pulp::Arch;
-
 use crate::contact::half_space::strip_operator::assembly::Assembly;
+use crate::contact::half_space::strip_operator::kind::{LANES, Parity, Precision};
 use crate::contact::half_space::strip_operator::product::{Matrix, Product};
-use crate::contact::mesh::strips::{Mesh, Segment};
+use crate::contact::mesh::strips::Mesh;
 use crate::contact::monitor::{Monitor, Stop};
-
-/// Values per cell are padded to a multiple of this, so that products need no remainder loop.
-const LANES: usize = 16;
-
-/// Which part of a mirror-symmetric problem the unknowns belong to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Parity {
-    /// T_x is the same and T_y the opposite at the mirrored cell: longitudinal creepage.
-    Longitudinal,
-    /// T_x is the opposite and T_y the same at the mirrored cell: lateral creepage and spin.
-    Lateral,
-}
-
-/// Width of the numbers of the matrix, in its computation and its products.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Precision {
-    /// Four bytes: half the memory and twice the speed; forces move by less than 1e-5 of μN.
-    Single,
-    /// Eight bytes.
-    Double,
-}
-
-impl Precision {
-    /// Bytes of one number.
-    #[must_use]
-    pub fn bytes(self) -> u64 {
-        match self {
-            Precision::Single => 4,
-            Precision::Double => 8,
-        }
-    }
-}
+use pulp::Arch;
 
 /// How the matrix is laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -98,23 +66,6 @@ pub fn bytes(cells: usize, segments: usize, folded: bool, precision: Precision) 
         3 * rows * stride(cells)
     };
     precision.bytes() * numbers
-}
-
-/// The observation points of a segment, see the module's text.
-#[must_use]
-pub fn observation_points(mesh: &Mesh, segment: &Segment) -> Vec<f64> {
-    let nodes = &mesh.node[segment.cells.clone()];
-    let edge = segment.chord.right;
-    let n = nodes.len();
-    let last = nodes[n - 1];
-    let before = if n > 1 {
-        nodes[n - 2]
-    } else {
-        segment.chord.left
-    };
-    let mut points = nodes.to_vec();
-    points.extend([edge, 2.0 * edge - last, 2.0 * edge - before]);
-    points
 }
 
 impl Differences {

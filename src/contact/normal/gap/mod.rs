@@ -1,6 +1,7 @@
 //! Region and pressure of a given gap.
 
 pub mod conjugate_gradients;
+pub mod constants;
 pub mod coupling;
 pub mod edges;
 pub mod grid;
@@ -9,5 +10,7 @@ pub mod search_box;
 pub mod solve;
 pub mod summits;
 pub mod surface;
+pub mod task;
+pub mod tile;
 pub mod tiles;
 pub mod tiles_influence;

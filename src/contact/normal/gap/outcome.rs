@@ -1,11 +1,12 @@
 //! The answer of a gap: pressures of the last grids as a field, and what is to be said of them.
 
+use crate::contact::normal::answer::{Failure, Found, Report};
 use crate::contact::normal::gap::edges;
-use crate::contact::normal::gap::solve::{Failure, Found, GapContact, Report};
 use crate::contact::normal::gap::surface::Gap;
-use crate::contact::normal::gap::tiles::Tile;
+use crate::contact::normal::gap::task::GapContact;
+use crate::contact::normal::gap::tile::{Outcome, Tile};
 use crate::contact::normal::pressure_field::field::PressureField;
-use crate::contact::normal::pressure_field::given::GridPressure;
+use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 
@@ -17,20 +18,6 @@ const APPROACH_USUAL_MAX: f64 = 0.15;
 /// pressure come out within 1 %.
 const SHARE_MIN: f64 = 0.02;
 const CELLS_ACROSS_MIN: f64 = 11.0;
-
-/// Pressures on the last grids.
-pub(crate) struct Outcome {
-    /// The grids with their pressures: one, or one per patch.
-    pub(crate) tiles: Vec<Tile>,
-    /// Iterations over all grids.
-    pub(crate) iterations: u32,
-    /// Nothing changes any more with the grids.
-    pub(crate) settled: bool,
-    /// See [`Report`].
-    pub(crate) pressure_change: f64,
-    /// The least gap in mm.
-    pub(crate) least: f64,
-}
 
 /// A patch with too few cells.
 struct Coarse {

@@ -4,109 +4,18 @@
 //! conjugate gradients, each grid started from the one before and shrunk to the contact. Where one grid cannot resolve all
 //! patches, each gets a grid of its own (see `tiles.rs`). At the end the edges are placed between the cells.
 
-use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::normal::gap::conjugate_gradients;
+use crate::contact::monitor::Monitor;
+use crate::contact::normal::answer::{Failure, Found, edge_reached, no_touch};
 use crate::contact::normal::gap::conjugate_gradients::{Pressed, press};
+use crate::contact::normal::gap::constants::{
+    APPROACH_CHANGE, CELLS_FIRST, COARSER_MAX, GRIDS_MAX, NEAR, PRESSURE_CHANGE, REFINEMENT,
+    RESOLUTION, RESOLUTION_COARSE, TARGET_POWER, TARGET_USUAL, TOLERANCE, TOLERANCE_FIRST,
+};
 use crate::contact::normal::gap::grid::{Grid, Resolution, Side};
-use crate::contact::normal::gap::outcome::Outcome;
 use crate::contact::normal::gap::search_box::{Reach, reach, reach_of_level};
-use crate::contact::normal::gap::surface::Gap;
-use crate::contact::normal::gap::surface::Window;
-use crate::contact::normal::gap::tiles::Tile;
+use crate::contact::normal::gap::task::GapContact;
+use crate::contact::normal::gap::tile::{Outcome, Tile};
 use crate::contact::normal::hertz::Pressing;
-use crate::contact::normal::pressure_field::field::PressureField;
-use crate::contact::remark::entry::RemarkEntry;
-
-/// Cells of the first grid along either axis.
-const CELLS_FIRST: usize = 32;
-/// How fine the last grid is at least.
-const RESOLUTION: Resolution = Resolution {
-    contact: 44.0,
-    patch: 24.0,
-    share_min: 0.02,
-};
-/// The same where only forces are asked for, to some tenths of a per cent.
-const RESOLUTION_COARSE: Resolution = Resolution {
-    contact: 22.0,
-    patch: 12.0,
-    share_min: 0.05,
-};
-/// Below this target of the resultants' error (relative to μN) grids are finer: the error of a normal problem falls with the
-/// power 3/2 of its cells' size.
-const TARGET_USUAL: f64 = 0.002;
-const TARGET_POWER: f64 = -2.0 / 3.0;
-/// A grid with cells larger than wanted by less than this factor (inverse) will do.
-pub(crate) const COARSER_MAX: f64 = 0.8;
-/// A rough gap is looked at more closely until neither the approach nor the largest pressure change by more than this,
-/// times the ratio of the cells' sizes.
-pub(crate) const APPROACH_CHANGE: f64 = 0.002;
-pub(crate) const PRESSURE_CHANGE: f64 = 0.015;
-/// How much finer the next grid is.
-pub(crate) const REFINEMENT: f64 = 1.6;
-/// Violation of the contact conditions relative to the deepest overlap, on the first grid and on the others.
-const TOLERANCE_FIRST: f64 = 2e-3;
-const TOLERANCE: f64 = 2e-4;
-/// Grids tried; each is larger, shifted or finer than the one before.
-pub(crate) const GRIDS_MAX: usize = 12;
-/// Cells outside the contact that nearly touch, relative to the deepest overlap, belong to the next grid.
-pub(crate) const NEAR: f64 = 0.03;
-/// Two bodies with a gap between them, pressed together.
-#[derive(Debug, Clone, PartialEq)]
-pub struct GapContact {
-    /// The gap of the undeformed bodies.
-    pub gap: Gap,
-    /// Force, or approach counted from gap = 0.
-    pub pressing: Pressing,
-    /// Contact modulus `E* = G/(1−ν)` in MPa.
-    pub contact_modulus: f64,
-}
-
-/// The contact of a gap.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Found {
-    /// Region and pressure.
-    pub field: PressureField,
-    /// How it was found.
-    pub report: Report,
-    /// Remarks for the answer.
-    pub remarks: Vec<RemarkEntry>,
-}
-
-/// How a normal problem was solved.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Report {
-    /// Cells of the last grid along x and y, of the one that carries most if there are several.
-    pub cells: [usize; 2],
-    /// Grids: 1, or one per patch where patches differ much in size.
-    pub grids: usize,
-    /// Iterations over all grids.
-    pub iterations: u32,
-    /// Largest violation of the contact conditions on the last grid, relative to the deepest overlap of the undeformed
-    /// surfaces: distance in the contact, overlap outside.
-    pub residual: f64,
-    /// Largest pressure on the last grid but one, relative to that on the last, less 1; 0 if there was only one grid.
-    pub pressure_change: f64,
-}
-
-/// Why a gap has no contact to show.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Failure {
-    /// A reason, as a sentence.
-    NoAnswer(String),
-    /// The caller stopped the work.
-    Stopped(Stop),
-}
-
-impl From<conjugate_gradients::Failure> for Failure {
-    fn from(failure: conjugate_gradients::Failure) -> Failure {
-        match failure {
-            conjugate_gradients::Failure::Stopped(stop) => Failure::Stopped(stop),
-            conjugate_gradients::Failure::NotConverged(residual) => Failure::NoAnswer(format!(
-                "the pressure did not converge: the contact conditions are violated by {residual:.1e} of the overlap"
-            )),
-        }
-    }
-}
 
 impl GapContact {
     /// What is wrong with the gap, as far as its samples tell without solving.
@@ -297,19 +206,6 @@ impl GapContact {
         }
         Ok(Next::Grid(finer))
     }
-}
-
-fn no_touch(approach: f64, least: f64) -> String {
-    format!(
-        "the bodies do not touch: the approach of {approach} mm is not more than the least gap of {least} mm"
-    )
-}
-
-pub(crate) fn edge_reached(side: Side, limits: Window) -> Failure {
-    Failure::NoAnswer(format!(
-        "the contact reaches the edge {} of the given gap, so that the true contact is cut off; give the gap farther out",
-        side.place(limits)
-    ))
 }
 
 /// What follows a grid.

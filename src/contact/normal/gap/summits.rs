@@ -1,6 +1,6 @@
 //! About how many patches will a rough gap fall apart into? A look at the samples, before anything is solved.
 
-use crate::contact::normal::gap::solve::GapContact;
+use crate::contact::normal::gap::task::GapContact;
 use crate::contact::normal::hertz::{Ellipse, Pressing};
 
 /// Valleys less deep than this part of the approach are pressed flat.

@@ -5,17 +5,17 @@
 //! influence is a convolution, between grids see `coupling.rs`. Every grid is refined, moved or enlarged until its own patch
 //! is settled.
 
-use std::ops::Range;
-
 use crate::contact::monitor::Monitor;
+use crate::contact::normal::answer::{Failure, edge_reached};
 use crate::contact::normal::gap::conjugate_gradients::{Pressed, press};
-use crate::contact::normal::gap::grid::{Grid, Resolution, within};
-use crate::contact::normal::gap::outcome::Outcome;
-use crate::contact::normal::gap::solve::{
-    APPROACH_CHANGE, COARSER_MAX, Failure, GRIDS_MAX, GapContact, NEAR, PRESSURE_CHANGE,
-    REFINEMENT, edge_reached,
+use crate::contact::normal::gap::constants::{
+    APPROACH_CHANGE, COARSER_MAX, GRIDS_MAX, NEAR, PRESSURE_CHANGE, REFINEMENT,
 };
+use crate::contact::normal::gap::grid::{Grid, Resolution, within};
+use crate::contact::normal::gap::task::GapContact;
+use crate::contact::normal::gap::tile::{Outcome, Tile};
 use crate::contact::normal::gap::tiles_influence::TilesInfluence;
+use std::ops::Range;
 
 /// More grids than this are not coupled: such a gap is rough, not a few patches of different size.
 const TILES_MAX: usize = 6;
@@ -32,29 +32,11 @@ const RESOLUTION_SMALL: f64 = 0.7;
 /// Cells across a patch with less of the load than counts.
 const CELLS_TINY: f64 = 10.0;
 
-/// A grid with its part of the solution; distances and pressures are its own, the rest belongs to all.
-#[derive(Debug, Clone)]
-pub(crate) struct Tile {
-    pub(crate) grid: Grid,
-    pub(crate) pressed: Pressed,
-}
-
 /// What follows the grid of a patch.
 enum Next {
     Keep,
     Rough,
     Change(Grid),
-}
-
-impl Tile {
-    /// Load over the area of a cell of 1 mm².
-    pub(crate) fn load(&self) -> f64 {
-        self.pressed.pressure.iter().sum::<f64>() * self.grid.step[0] * self.grid.step[1]
-    }
-
-    pub(crate) fn largest(&self) -> f64 {
-        self.pressed.largest()
-    }
 }
 
 impl GapContact {

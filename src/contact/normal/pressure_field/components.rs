@@ -1,6 +1,6 @@
 //! Finds the separate patches of a grid: which positive samples hang together.
 
-use crate::contact::normal::pressure_field::given::{Grid, PATCHES_MAX};
+use crate::contact::normal::pressure_field::sample_grid::{Grid, PATCHES_MAX};
 
 /// Label of samples and cells that belong to no patch.
 pub(crate) const NOWHERE: u8 = u8::MAX;

@@ -1,7 +1,8 @@
 //! A pressure computed on equal cells, and mirror symmetry about y = 0.
 
 use crate::contact::normal::pressure_field::components::NOWHERE;
-use crate::contact::normal::pressure_field::given::{Grid, GridPressure, PADDING, padded};
+use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
+use crate::contact::normal::pressure_field::sample_grid::{Grid, PADDING, padded};
 
 impl GridPressure {
     /// The field of a pressure computed on equal cells with the centres `(x[i], y[j])` in mm, stored at

@@ -6,53 +6,18 @@
 //! pressures on its strips to carry just that.
 
 use crate::contact::mesh::strips::Chord;
-use crate::contact::normal::pressure_field::components;
-use crate::contact::normal::pressure_field::level_set;
-use crate::contact::normal::pressure_field::line;
-use crate::contact::normal::region::Patch;
+use crate::contact::normal::patch::Patch;
+use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
+use crate::contact::normal::pressure_field::level_set::State;
+use crate::contact::normal::pressure_field::line::Line;
+use crate::contact::normal::pressure_field::sample_grid::{Grid, PADDING, PATCHES_MAX, padded};
+use crate::contact::normal::pressure_field::{components, level_set, line};
 use crate::contact::numerics::cubic::{interval, weights};
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 
-use crate::contact::normal::pressure_field::jumps::Jump;
-use crate::contact::normal::pressure_field::level_set::State;
-use crate::contact::normal::pressure_field::line::Line;
-use crate::contact::normal::pressure_field::patch_shape::Shape;
-
-/// Patches of one grid.
-pub(crate) const PATCHES_MAX: usize = 64;
 /// Of so many intervals on a chord, three points of quadrature in each do.
 const INTERVALS_MANY: f64 = 24.0;
-/// Grid lines added on each side: the contact may reach half a spacing beyond the grid, the interpolation needs more.
-pub(crate) const PADDING: usize = 4;
-
-/// Coordinates of a rectangular grid in mm; the value at `(x[i], y[j])` is stored at `j * x.len() + i`.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Grid {
-    pub(crate) x: Vec<f64>,
-    pub(crate) y: Vec<f64>,
-}
-
-/// Pressure samples on one rectangular grid and the patches they form.
-#[derive(Debug, Clone, PartialEq)]
-pub struct GridPressure {
-    /// The given grid with [`PADDING`] more lines on each side.
-    pub(crate) grid: Grid,
-    /// Squared pressure relative to its largest value, continued below 0 outside the contact.
-    pub(crate) q: Vec<f64>,
-    /// Samples that are positive or continued by a parabola.
-    smooth: Vec<bool>,
-    /// Patch of every cell of the grid that touches one of its samples.
-    pub(crate) cells: Vec<u8>,
-    /// Largest pressure in MPa.
-    pub(crate) pressure_max: f64,
-    pub(crate) shapes: Vec<Shape>,
-    /// The patch that is the mirror image about y = 0 of each one; empty if the pressure has no such symmetry.
-    pub(crate) images: Vec<usize>,
-    /// The largest jump from one given sample to the next.
-    pub(crate) jump: Option<Jump>,
-    pub(crate) surprise: f64,
-}
 
 impl GridPressure {
     /// Finds the patches of a pressure; `pressure[j][i]` in MPa belongs to `(x[i], y[j])` in mm.
@@ -324,15 +289,6 @@ impl GridPressure {
     fn column_interval(&self, x: f64) -> usize {
         interval(&self.grid.x, x).clamp(1, self.grid.x.len() - 3)
     }
-}
-
-/// An axis with [`PADDING`] more points on each side, spaced like the outermost ones.
-pub(crate) fn padded(axis: &[f64]) -> Vec<f64> {
-    let n = axis.len();
-    let (first, last) = (axis[1] - axis[0], axis[n - 1] - axis[n - 2]);
-    let before = (1..=PADDING).rev().map(|k| axis[0] - first * k as f64);
-    let after = (1..=PADDING).map(|k| axis[n - 1] + last * k as f64);
-    before.chain(axis.iter().copied()).chain(after).collect()
 }
 
 /// Gauss–Legendre quadrature with five points, or three where they do (Abramowitz and Stegun 1964, table 25.4).

@@ -1,6 +1,7 @@
 //! How well samples resolve a pressure: cells across a patch, and jumps from one sample to the next.
 
-use crate::contact::normal::pressure_field::given::{GridPressure, PADDING};
+use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
+use crate::contact::normal::pressure_field::sample_grid::PADDING;
 
 /// A fall of the squared pressure over one interval beyond what the interval before lets expect, relative to the largest
 /// squared pressure, from which on it is a jump. An edge of Hertz's kind expects all of its fall; powers of a lens from 0.5

@@ -4,7 +4,7 @@
 //! itself. Samples outside the contact (where only `p = 0` is known) therefore get negative values extrapolated from
 //! inside. For Hertz's pressure q is a parabola and the continuation is exact.
 
-use crate::contact::normal::pressure_field::given::Grid;
+use crate::contact::normal::pressure_field::sample_grid::Grid;
 
 /// Samples outside that get a value, counted from the nearest one inside along either axis.
 const RINGS: usize = 3;

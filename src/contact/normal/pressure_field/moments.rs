@@ -1,6 +1,6 @@
 //! The load centre of a pressure, and the same pressure moved or corrected.
 
-use crate::contact::normal::pressure_field::given::GridPressure;
+use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 
 impl GridPressure {
     /// Load centre `[x, y]` in mm of one patch, or of all of them: the mean place weighted with the pressure.

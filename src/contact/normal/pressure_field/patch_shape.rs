@@ -3,9 +3,10 @@
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 
+use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::components::NOWHERE;
-use crate::contact::normal::pressure_field::given::{GridPressure, PADDING};
-use crate::contact::normal::region::Patch;
+use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
+use crate::contact::normal::pressure_field::sample_grid::PADDING;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 

@@ -7,14 +7,16 @@
 
 use std::f64::consts::PI;
 
-use crate::contact::case::problem::Problem;
-use crate::contact::case::words::{MeshSize, Motion, TractionBound};
+use crate::contact::mesh::size::MeshSize;
 use crate::contact::mesh::strips::Segment;
-use crate::contact::normal::region::Patch;
+use crate::contact::normal::patch::Patch;
 use crate::contact::rolling::answer::{Tangential, Work};
 use crate::contact::rolling::linear_theory;
 use crate::contact::rolling::methods::full_slip;
+use crate::contact::rolling::methods::method::TractionBound;
+use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::strip_mesh::Level;
+use crate::contact::rolling::task::RollingTask;
 
 /// The mesh unless one is given: finer ones change the resultants by a small part of the method's own error.
 pub const MESH: MeshSize = MeshSize {
@@ -44,8 +46,8 @@ pub fn error_class(bound: TractionBound, mesh: MeshSize) -> f64 {
 /// area, and creepages about its centre of area; for an ellipse that is the ellipse. Slips are those of the single flexibility
 /// `(L1|ν_x| + L2|ν_y| + L3|φ|c)/√(ν_x² + ν_y² + φ²c²)`. Tractions with the parabolic bound exceed μp in the middle of a patch.
 #[must_use]
-pub fn solve(problem: &Problem, level: &Level, motion: &Motion) -> Tangential {
-    let parabolic = problem.traction_bound == TractionBound::Parabolic;
+pub fn solve(task: &RollingTask, level: &Level, motion: &Motion) -> Tangential {
+    let parabolic = task.traction_bound == TractionBound::Parabolic;
     if !parabolic && let Some(answer) = full_slip::rigid_answer(level, motion) {
         return answer;
     }
@@ -63,12 +65,12 @@ pub fn solve(problem: &Problem, level: &Level, motion: &Motion) -> Tangential {
         remarks: Vec::new(),
     };
     let mut bound = level.bound.clone();
-    for (p, patch) in problem.region.patches().iter().enumerate() {
+    for (p, patch) in task.footprint.patches().iter().enumerate() {
         if parabolic {
             make_parabolic(level, p, &mut bound);
         }
         let ellipse = Ellipse::like(level, p, patch);
-        let brush = Brush::new(&ellipse, problem.elasticity.poisson_ratio, motion);
+        let brush = Brush::new(&ellipse, task.elasticity.poisson_ratio, motion);
         let segments = &level.normalised.segments;
         for segment in segments.iter().filter(|s| s.chord.patch == p) {
             brush.sweep(level, segment, &bound, &mut answer);

@@ -1,15 +1,18 @@
 //! Companions of a mesh: the same motion on half the strips, and on half the cells. Their differences to the mesh tell its
 //! error across and along the strips apart.
 
-use crate::contact::case::problem::Problem;
-use crate::contact::case::words::{MeshSize, Motion};
 use crate::contact::error::SolveError;
+use crate::contact::mesh::size::MeshSize;
 use crate::contact::monitor::Monitor;
 use crate::contact::rolling::answer::{Failure, Tangential, Work};
+use crate::contact::rolling::mesh_plan::Plan;
 use crate::contact::rolling::methods::boundary_element::solve as boundary_element;
-use crate::contact::rolling::refinement::levels::{Ladder, Plan};
-use crate::contact::rolling::refinement::refine::{nested_tractions, tolerance};
+use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::refinement::companion_answer::Seen;
+use crate::contact::rolling::refinement::levels::Ladder;
+use crate::contact::rolling::refinement::warm_start::nested_tractions;
 use crate::contact::rolling::resultants::Resultants;
+use crate::contact::rolling::task::RollingTask;
 
 /// Which side of a mesh is halved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,19 +21,6 @@ pub enum Companion {
     Across,
     /// Half the cells in each.
     Along,
-}
-
-/// What is known of the error from a companion.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub enum Seen {
-    /// Nobody looked.
-    #[default]
-    Untried,
-    /// It cannot be had: the mesh is too small to be halved, or the iteration did not converge.
-    Missing,
-    /// Resultants of every patch on the companion, and by how much their change from the mesh would be larger on exactly half the
-    /// strips or cells if errors are of second order.
-    Found(Vec<Resultants>, f64),
 }
 
 impl Companion {
@@ -66,7 +56,7 @@ impl Companion {
     /// The monitor may stop the work.
     pub(crate) fn solve(
         self,
-        problem: &Problem,
+        task: &RollingTask,
         ladder: &mut Ladder,
         number: usize,
         answer: &Tangential,
@@ -86,10 +76,10 @@ impl Companion {
         let (fine, level) = (ladder.get(number), ladder.get(companion));
         let start = nested_tractions(fine, &answer.traction, level);
         let motion = level.scale.motion(motion);
-        let tolerance = tolerance(problem);
+        let tolerance = task.tolerance();
         match boundary_element::trapezoid(level, &motion, &start, tolerance, monitor) {
             Ok((traction, work)) => {
-                let patches = problem.region.patches().len();
+                let patches = task.footprint.patches().len();
                 let found = (0..patches)
                     .map(|p| Resultants::of_patch(level, &traction, p))
                     .collect();

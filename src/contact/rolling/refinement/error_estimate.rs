@@ -1,21 +1,24 @@
 //! How wrong are the resultants? From two rules, two companion meshes, the level before, and the cell that holds the spin
 //! pole.
 
-use crate::contact::case::problem::{Problem, Resolution};
-use crate::contact::case::words::{Method, Motion};
-use crate::contact::normal::region::{Patch, Region};
+use crate::contact::normal::patch::Patch;
 use crate::contact::rolling::answer::Tangential;
+use crate::contact::rolling::mesh_plan::Regime;
+use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::methods::{fastsim, full_slip};
-use crate::contact::rolling::refinement::companions::Seen;
+use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::refinement::companion_answer::Seen;
 use crate::contact::rolling::refinement::constants::{
     CAUTION, DATA, DECAY, DENSE_LEVELS, DENSE_LEVELS_NEAR, DIFFERENCES, JUMPING, LEVELS_LIKE,
     LEVELS_UNLIKE, LOAD, POLE_WEIGHT, REGION, REGION_CELLS, RULES_ON_MESH, RULES_ON_MESH_SAMPLED,
     SAMPLED, SAMPLED_DECAY, SHARE_LARGE, STRIPS_FEW, SURPRISES, WITHOUT_COMPANION,
 };
-use crate::contact::rolling::refinement::levels::{CELLS_FIRST, Regime};
+use crate::contact::rolling::refinement::mesh_policy::CELLS_FIRST;
+use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::rolling::regime::pole_error;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::strip_mesh::Level;
+use crate::contact::rolling::task::RollingTask;
 
 /// Relative error where everything slips along the rigid slip.
 const RIGID: f64 = 1e-6;
@@ -85,23 +88,23 @@ impl Indicators {
     /// Reads a solved level; `found` are the resultants of `answer` on it, not extrapolated.
     #[must_use]
     pub fn of_level(
-        problem: &Problem,
+        task: &RollingTask,
         level: &Level,
         answer: &Tangential,
         found: &[Resultants],
         circumstances: Circumstances,
     ) -> Indicators {
         let Circumstances { motion, finer, .. } = circumstances;
-        let patches = problem.region.patches();
+        let patches = task.footprint.patches();
         let none = vec![0.0; patches.len() + 1];
         let all = |value| Indicators::Known(vec![value; patches.len() + 1]);
-        if problem.friction == 0.0 {
+        if task.friction.is_frictionless() {
             return all(Some(0.0));
         }
         let slides = answer.slips.iter().all(|slips| *slips);
         let sums = finer.filter(|_| slides).map_or_else(
             || none.clone(),
-            |finer| sum_errors(problem, &patches, [level, finer], motion),
+            |finer| sum_errors(task, &patches, [level, finer], motion),
         );
         if answer.second.is_none() && answer.work.products == 0 && answer.work.iterations == 0 {
             if !answer.slips.iter().any(|s| *s) {
@@ -109,29 +112,29 @@ impl Indicators {
             }
             return Indicators::Known(sums.iter().map(|e| Some(e.max(RIGID))).collect());
         }
-        if problem.method == Method::Fastsim {
+        if task.method == Method::Fastsim {
             // No mesh tells what the theory leaves out.
             return all(Some(fastsim::error_class(
-                problem.traction_bound,
+                task.traction_bound,
                 level.plan.size,
             )));
         }
-        if problem.method == Method::LiuHsu {
-            return Indicators::Known(dense_errors(problem, &patches, found, circumstances));
+        if task.method == Method::LiuHsu {
+            return Indicators::Known(dense_errors(task, &patches, found, circumstances));
         }
         let rules = answer.second.as_ref().map(|second| {
             let second: Vec<Resultants> = (0..patches.len())
                 .map(|p| Resultants::of_patch(level, second, p))
                 .collect();
-            distances(problem, &patches, found, &second)
+            distances(task, &patches, found, &second)
         });
         let pole = if motion.spin_per_mm == 0.0 {
             0.0
         } else {
-            pole_error(problem, level, answer)
+            pole_error(task, level, answer)
         };
-        if matches!(problem.resolution, Resolution::Mesh(_)) {
-            let errors = mesh_errors(problem, level, rules.as_deref(), &sums, pole, circumstances);
+        if matches!(task.resolution, Resolution::Mesh(_)) {
+            let errors = mesh_errors(task, level, rules.as_deref(), &sums, pole, circumstances);
             return Indicators::Known(errors);
         }
         let sticking = matches!(level.plan.regime, Regime::Sticking { .. });
@@ -139,22 +142,22 @@ impl Indicators {
             rules,
             before: circumstances
                 .before
-                .map(|before| change(problem, &patches, level, found, before)),
+                .map(|before| change(task, &patches, level, found, before)),
             companions: [None, None],
             missing: false,
             pole: if sticking { 0.0 } else { POLE_WEIGHT * pole },
             sums,
-            normal: match finer.filter(|_| jumps(problem)) {
+            normal: match finer.filter(|_| jumps(task)) {
                 Some(finer) => data_errors(&patches, [level, finer]),
-                None => normal_errors(problem, &patches),
+                None => normal_errors(task, &patches),
             },
             tolerance: circumstances.tolerance,
-            scale: scale(problem, level, patches.len()),
+            scale: scale(task, level, patches.len()),
         }))
     }
 
     /// Takes in what companion `k` (0: half the strips, 1: half the cells) says of the resultants that were `found`.
-    pub fn see(&mut self, problem: &Problem, k: usize, found: &[Resultants], seen: &Seen) {
+    pub fn see(&mut self, task: &RollingTask, k: usize, found: &[Resultants], seen: &Seen) {
         let Indicators::Measured(measured) = self else {
             return;
         };
@@ -162,8 +165,8 @@ impl Indicators {
             Seen::Untried => {}
             Seen::Missing => measured.missing = true,
             Seen::Found(other, reach) => {
-                let patches = problem.region.patches();
-                let mut apart = distances(problem, &patches, found, other);
+                let patches = task.footprint.patches();
+                let mut apart = distances(task, &patches, found, other);
                 apart.iter_mut().for_each(|d| *d *= reach);
                 measured.companions[k] = Some(apart);
             }
@@ -210,39 +213,39 @@ impl Measured {
 }
 
 /// The factor on the root of the squares.
-fn scale(problem: &Problem, level: &Level, patches: usize) -> f64 {
+fn scale(task: &RollingTask, level: &Level, patches: usize) -> f64 {
     let cells = level.mesh.cells() as f64 / patches.max(1) as f64;
     let finer = (CELLS_FIRST / cells).min(1.0);
-    let (samples, decay) = match (&problem.region, problem.normal) {
-        (Region::Grid(field), None) => {
+    let (samples, decay) = match task.footprint.surprise() {
+        Some(surprise) => {
             let [smooth, jumping] = SURPRISES;
-            let between = ((field.surprise() - smooth) / (jumping - smooth)).clamp(0.0, 1.0);
+            let between = ((surprise - smooth) / (jumping - smooth)).clamp(0.0, 1.0);
             let mixed = |smooth: f64, jumping: f64| smooth + between * (jumping - smooth);
             (mixed(SAMPLED, JUMPING), mixed(SAMPLED_DECAY, DECAY))
         }
-        _ => (1.0, DECAY),
+        None => (1.0, DECAY),
     };
     samples * finer.powf(decay) * few_strips(level).sqrt()
 }
 
 /// Is the pressure one that was given with jumps?
 #[must_use]
-pub fn jumps(problem: &Problem) -> bool {
-    matches!(&problem.region, Region::Grid(field) if field.jump().is_some())
+pub fn jumps(task: &RollingTask) -> bool {
+    task.footprint.jumps()
 }
 
 /// Errors of region and pressure that were found from a gap, and of the load they carry.
 ///
 /// The first falls as the power 3/2 of the cells of the normal problem across a patch.
-fn normal_errors(problem: &Problem, patches: &[Patch]) -> Vec<f64> {
-    let (Region::Grid(field), Some(_)) = (&problem.region, problem.normal) else {
+fn normal_errors(task: &RollingTask, patches: &[Patch]) -> Vec<f64> {
+    let Some(uncertainty) = task.footprint.uncertainty() else {
         return vec![0.0; patches.len() + 1];
     };
-    let of = |cells: f64| {
+    let of = |cells: &f64| {
         let region = REGION * (REGION_CELLS / cells.max(1.0)).powf(1.5);
-        region.hypot(LOAD * problem.load_error)
+        region.hypot(LOAD * uncertainty.load)
     };
-    weighted(patches, field.cells_across().into_iter().map(of).collect())
+    weighted(patches, uncertainty.cells_across.iter().map(of).collect())
 }
 
 /// Errors of sampling a pressure that jumps: the change of its moments to a level of twice as many strips and cells.
@@ -281,7 +284,7 @@ fn weighted(patches: &[Patch], mut errors: Vec<f64>) -> Vec<f64> {
 
 /// The weighted change from the level before.
 fn change(
-    problem: &Problem,
+    task: &RollingTask,
     patches: &[Patch],
     level: &Level,
     found: &[Resultants],
@@ -293,14 +296,14 @@ fn change(
         (_, Regime::Sticking { .. }) => LEVELS_UNLIKE,
         _ => 0.0,
     };
-    let mut change = distances(problem, patches, found, before.summed);
+    let mut change = distances(task, patches, found, before.summed);
     change.iter_mut().for_each(|d| *d *= factor * before.share);
     change
 }
 
 /// The dense method has one rule; the change between its levels is all there is.
 fn dense_errors(
-    problem: &Problem,
+    task: &RollingTask,
     patches: &[Patch],
     found: &[Resultants],
     circumstances: Circumstances,
@@ -314,7 +317,7 @@ fn dense_errors(
         DENSE_LEVELS
     };
     let factor = factor * share * circumstances.slenderness.powf(CAUTION);
-    distances(problem, patches, found, summed)
+    distances(task, patches, found, summed)
         .iter()
         .map(|d| Some((factor * d).max(circumstances.tolerance)))
         .collect()
@@ -322,14 +325,14 @@ fn dense_errors(
 
 /// Errors on a mesh of the client's, which has no companions: from the difference of the two rules, the sums, and the vortex.
 fn mesh_errors(
-    problem: &Problem,
+    task: &RollingTask,
     level: &Level,
     rules: Option<&[f64]>,
     sums: &[f64],
     pole: f64,
     circumstances: Circumstances,
 ) -> Errors {
-    let factor = if problem.region.is_ellipse() {
+    let factor = if task.footprint.is_closed_form() {
         RULES_ON_MESH
     } else {
         RULES_ON_MESH_SAMPLED
@@ -348,7 +351,7 @@ fn mesh_errors(
 /// Errors of the sums over cells, which both rules share: where everything slips along the rigid slip, those sums are all there is.
 /// The change to a level of four times as many cells tells them.
 fn sum_errors(
-    problem: &Problem,
+    task: &RollingTask,
     patches: &[Patch],
     levels: [&Level; 2],
     motion: &Motion,
@@ -359,7 +362,7 @@ fn sum_errors(
             .map(|p| Resultants::of_patch(level, &traction, p))
             .collect()
     });
-    let mut errors = distances(problem, patches, &here, &finer);
+    let mut errors = distances(task, patches, &here, &finer);
     errors.iter_mut().for_each(|e| *e *= 4.0 / 3.0);
     errors
 }
@@ -394,7 +397,7 @@ fn few_strips(level: &Level) -> f64 {
 
 /// Distances of two sets of resultants: every patch relative to its own μN with moments about its middle, then the sums.
 fn distances(
-    problem: &Problem,
+    task: &RollingTask,
     patches: &[Patch],
     found: &[Resultants],
     other: &[Resultants],
@@ -403,7 +406,7 @@ fn distances(
     let (mut sum, mut sum_other) = (Resultants::default(), Resultants::default());
     let (mut force, mut area, mut centre) = (0.0, 0.0, [0.0, 0.0]);
     for ((patch, found), other) in patches.iter().zip(found).zip(other) {
-        let bound = problem.friction * patch.normal_force;
+        let bound = task.friction.limit(patch);
         let at = [
             0.5 * (patch.extent[0] + patch.extent[1]),
             0.5 * (patch.extent[2] + patch.extent[3]),

@@ -1,10 +1,13 @@
 //! From coarse to fine meshes until the estimate of the error meets the target.
 
+pub mod companion_answer;
 pub mod companions;
 pub mod constants;
 pub mod error_estimate;
 pub mod interpolate;
+pub mod level_solve;
 pub mod levels;
 pub mod mesh_policy;
 pub mod refine;
+pub mod resolution;
 pub mod warm_start;

@@ -1,7 +1,8 @@
 //! What the last motions left on each level: the start of the next motion of a sweep.
 
-use crate::contact::case::words::Motion;
 use crate::contact::rolling::answer::Tangential;
+use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::refinement::interpolate;
 use crate::contact::rolling::strip_mesh::Level;
 
 /// A motion that leaves the line of the last two by more than this share of its step is not extrapolated.
@@ -118,4 +119,33 @@ fn difference(a: &Motion, b: &Motion) -> [f64; 3] {
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// A start from the answer on a coarser level.
+pub(crate) fn nested_start(coarse: &Level, answer: &Tangential, level: &Level) -> Start {
+    let second = answer.second.as_ref().unwrap_or(&answer.traction);
+    Start {
+        mirror: nested_tractions(coarse, second, level),
+        trapezoid: None,
+    }
+}
+
+/// Tractions of one level on another; relative to the friction bound they vary less than as they are.
+pub(crate) fn nested_tractions(
+    from: &Level,
+    traction: &[Vec<f64>; 2],
+    to: &Level,
+) -> [Vec<f64>; 2] {
+    let relative = |values: &[f64]| -> Vec<f64> {
+        values
+            .iter()
+            .zip(&from.bound)
+            .map(|(t, g)| if *g > 0.0 { t / g } else { 0.0 })
+            .collect()
+    };
+    [0, 1].map(|k| {
+        let mut values = interpolate::interpolate(&from.mesh, &relative(&traction[k]), &to.mesh);
+        values.iter_mut().zip(&to.bound).for_each(|(t, g)| *t *= g);
+        values
+    })
 }

@@ -5,7 +5,7 @@ use axum::extract::State;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::{Method, Output};
+use crate::contact::case::words::{MethodName, Output};
 use crate::http::extract::caller::AnyTenant;
 use crate::http::options::HttpOptions;
 use crate::http::problem::catalogue::PlainProblems;
@@ -34,7 +34,7 @@ pub struct Capabilities {
 #[schema(as = MethodAbility)]
 pub struct MethodCapability {
     /// The word for `solver.method`.
-    name: Method,
+    name: MethodName,
     /// Used when the case names none.
     default: bool,
     /// What it is and when to choose it.
@@ -119,10 +119,10 @@ pub async fn methods(
     let own = jobs.options();
     Json(Capabilities {
         methods: [
-            Method::Auto,
-            Method::BoundaryElement,
-            Method::LiuHsu,
-            Method::Fastsim,
+            MethodName::Auto,
+            MethodName::BoundaryElement,
+            MethodName::LiuHsu,
+            MethodName::Fastsim,
         ]
         .map(describe_method)
         .into(),
@@ -157,23 +157,23 @@ pub async fn methods(
     })
 }
 
-fn describe_method(method: Method) -> MethodCapability {
+fn describe_method(method: MethodName) -> MethodCapability {
     let summary = match method {
-        Method::Auto => "The best method for the case; today always `boundary_element`.",
-        Method::BoundaryElement => {
+        MethodName::Auto => "The best method for the case; today always `boundary_element`.",
+        MethodName::BoundaryElement => {
             "Boundary elements with a semismooth Newton iteration: fast, for every motion and any shape of patch."
         }
-        Method::LiuHsu => {
+        MethodName::LiuHsu => {
             "The Newton–Raphson method of Liu and Hsu with its two initial guesses. Slower, for small meshes; \
              it does not converge at every spin and then says so."
         }
-        Method::Fastsim => {
+        MethodName::Fastsim => {
             "Kalker's simplified theory: a draft in microseconds, with a stated error instead of an estimated one."
         }
     };
     MethodCapability {
         name: method,
-        default: method == Method::default(),
+        default: method == MethodName::default(),
         summary,
     }
 }

@@ -5,13 +5,15 @@
 //! solves that linear system by GMRES with the segments' own blocks as preconditioner (Alart & Curnier 1991 for the
 //! projection form; `r = 0.3/M_ii` because larger values can cycle on fine meshes).
 
-use std::ops::ControlFlow;
-use std::sync::Arc;
-
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::gmres::{Gmres, LinearSystem};
-use crate::contact::rolling::methods::boundary_element::preconditioner::{OwnBlocks, StripBlocks};
+use crate::contact::rolling::methods::boundary_element::linearisation::Linearisation;
+use crate::contact::rolling::methods::boundary_element::preconditioner::StripBlocks;
+use crate::contact::rolling::methods::boundary_element::task::{Convergence, FrictionLaw};
+use crate::contact::rolling::own_blocks::OwnBlocks;
 use crate::contact::rolling::slip_equations::Equations;
+use std::ops::ControlFlow;
+use std::sync::Arc;
 
 /// Projection parameter times `M_ii`.
 const PROJECTION: f64 = 0.3;
@@ -27,65 +29,6 @@ const LIFT_NEGLIGIBLE: f64 = 0.1;
 const INNER_TOLERANCE: (f64, f64) = (1e-4, 1e-1);
 /// The residual may grow by this factor against the largest of the last steps before a step is halved.
 const GROWTH_ALLOWED: f64 = 1.5;
-
-/// What a solve needs besides the equations, all per cell, padded like the equations' vectors.
-#[derive(Debug, Clone, Copy)]
-pub struct FrictionLaw<'a> {
-    /// Rigid slip, x then y.
-    pub rigid: &'a [f64],
-    /// Friction bound g = μp.
-    pub bound: &'a [f64],
-    /// Area of every cell, the weight of its residual.
-    pub area: &'a [f64],
-    /// Traction scale of the case: residuals are relative to it.
-    pub scale: f64,
-    /// Residual to reach.
-    pub tolerance: f64,
-}
-
-/// How a solve ended.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Convergence {
-    /// Did the residual reach the tolerance?
-    pub converged: bool,
-    /// Newton steps.
-    pub iterations: u32,
-    /// Products of the influence with a vector.
-    pub products: u32,
-    /// Area-weighted root mean square of `T − Π(T + r s)`, relative to the scale of the case.
-    pub residual: f64,
-    /// Steps whose linear system was not solved to its tolerance; harmless if the residual still came down.
-    pub inexact_steps: u32,
-}
-
-/// The state of one Newton step: which cells slip, and in which direction.
-#[derive(Debug, Default)]
-pub struct Linearisation {
-    /// `(1, 0)` where a cell sticks, the unit tangent where it slips.
-    direction: Vec<(f64, f64)>,
-    /// D where a cell slips, −1 where it sticks.
-    stiffness: Vec<f64>,
-}
-
-impl Linearisation {
-    /// Does the cell slip?
-    #[must_use]
-    pub fn slips(&self, cell: usize) -> bool {
-        self.stiffness[cell] >= 0.0
-    }
-
-    /// Direction of the cell's first unknown.
-    #[must_use]
-    pub fn direction(&self, cell: usize) -> (f64, f64) {
-        self.direction[cell]
-    }
-
-    /// D of a slipping cell, 0 of a sticking one.
-    #[must_use]
-    pub fn stiffness(&self, cell: usize) -> f64 {
-        self.stiffness[cell].max(0.0)
-    }
-}
 
 /// Solver for one rule on one mesh; keeps its factors and buffers between solves.
 pub struct Newton<'a> {
@@ -106,7 +49,7 @@ pub struct Newton<'a> {
 
 /// Vectors that one Newton step after the other uses.
 #[derive(Debug, Default)]
-struct Steps {
+pub(crate) struct Steps {
     step: Vec<f64>,
     rhs: Vec<f64>,
     best: Vec<f64>,

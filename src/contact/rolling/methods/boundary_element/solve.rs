@@ -5,25 +5,22 @@
 //! the slip from the three-point rule, whose slips are smooth, along the traction as Coulomb's law demands; the
 //! difference of the two rules is a second opinion on the error.
 
-use crate::contact::case::words::Motion;
-use crate::contact::half_space::strip_operator::operator::Parity;
+use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::gmres::GmresExit;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::answer::{Failure, Tangential, Work, obey_coulomb};
-use crate::contact::rolling::methods::boundary_element::newton::{
-    Convergence, FrictionLaw, Newton,
-};
-use crate::contact::rolling::methods::boundary_element::preconditioner::OwnBlocks;
+use crate::contact::rolling::methods::boundary_element::fixed_point::fixed_point;
+use crate::contact::rolling::methods::boundary_element::newton::Newton;
+use crate::contact::rolling::methods::boundary_element::task::{Convergence, FrictionLaw};
 use crate::contact::rolling::methods::full_slip;
+use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::LevelOperator;
+use crate::contact::rolling::own_blocks::OwnBlocks;
 use crate::contact::rolling::refinement::warm_start::Start;
 use crate::contact::rolling::slip_equations::Equations;
 use crate::contact::rolling::slip_rules::Rule;
 use crate::contact::rolling::strip_mesh::Level;
-
-/// Residual of the friction law that ends a solve on an explicit mesh, relative to the traction scale of the case.
-pub const TOLERANCE: f64 = 1e-6;
 
 /// Solves one motion (dimensionless, about the level's origin) on one level, from a start or from zero tractions.
 ///
@@ -217,7 +214,7 @@ impl<'a> Solve<'a> {
             tolerance: self.tolerance,
         };
         let settled = if shortcut {
-            full_slip::fixed_point(newton, &law, t, self.monitor)?
+            fixed_point(newton, &law, t, self.monitor)?
         } else {
             None
         };

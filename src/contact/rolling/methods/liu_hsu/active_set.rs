@@ -77,29 +77,29 @@ pub struct Division {
 /// # Errors
 /// Only if the monitor stops the work.
 pub fn run(
-    problem: &DenseProblem,
+    task: &DenseProblem,
     guess: Guess,
     start: Option<&[f64]>,
     monitor: &dyn Monitor,
 ) -> Result<(Attempt, Division), Stop> {
     let mut attempt = Attempt {
-        rule: problem.rule,
+        rule: task.rule,
         guess,
         exit: Exit::IterationLimit,
         outer_iterations: 0,
         newton_iterations: 0,
     };
-    let mut division = first_division(problem, start);
+    let mut division = first_division(task, start);
     let mut seen: Vec<Vec<bool>> = Vec::new();
     while attempt.outer_iterations < DIVISIONS_MAX {
         attempt.outer_iterations += 1;
         seen.push(division.slips.clone());
-        let system = SlipSystem::new(problem, &division.slips, monitor)?;
-        if !solve_division(problem, &system, &mut attempt, &mut division, monitor)? {
+        let system = SlipSystem::new(task, &division.slips, monitor)?;
+        if !solve_division(task, &system, &mut attempt, &mut division, monitor)? {
             attempt.exit = Exit::NewtonDiverged;
             break;
         }
-        let misplaced = misplaced(problem, &system, &division.tractions);
+        let misplaced = misplaced(task, &system, &division.tractions);
         if misplaced.is_empty() {
             attempt.exit = Exit::Converged;
             break;
@@ -118,31 +118,31 @@ pub fn run(
 }
 
 /// All cells stick, or those slip that `start` loads up to their bound. A cell without pressure cannot stick.
-fn first_division(problem: &DenseProblem, start: Option<&[f64]>) -> Division {
-    let n = problem.cells;
+fn first_division(task: &DenseProblem, start: Option<&[f64]>) -> Division {
+    let n = task.cells;
     let tractions = start.map_or_else(|| vec![0.0; 2 * n], <[f64]>::to_vec);
     let slips = (0..n)
-        .map(|i| tractions[i].hypot(tractions[n + i]) >= problem.bound[i] * (1.0 - START_MARGIN))
+        .map(|i| tractions[i].hypot(tractions[n + i]) >= task.bound[i] * (1.0 - START_MARGIN))
         .collect();
     Division { tractions, slips }
 }
 
 /// Tractions for one division into zones; `false` if Newton–Raphson finds none.
 fn solve_division(
-    problem: &DenseProblem,
+    task: &DenseProblem,
     system: &SlipSystem,
     attempt: &mut Attempt,
     division: &mut Division,
     monitor: &dyn Monitor,
 ) -> Result<bool, Stop> {
-    let bound = system.slip_cells.iter().map(|i| problem.bound[*i]);
+    let bound = system.slip_cells.iter().map(|i| task.bound[*i]);
     let mut roots = Roots {
         system,
         bound: bound.collect(),
         iterations: 0,
         monitor,
     };
-    let start = |guess| start_tractions(problem, system, guess, &division.tractions);
+    let start = |guess| start_tractions(task, system, guess, &division.tractions);
     let found = match attempt.guess {
         Guess::Continued => roots.along_slip(start(Guess::Continued), start(Guess::RigidSlip))?,
         guess => roots.find(start(guess), Steps::Full)?,
@@ -152,11 +152,11 @@ fn solve_division(
         return Ok(false);
     };
     division.tractions.fill(0.0);
-    let on_stick = both_components(&system.stick_cells, problem.cells);
+    let on_stick = both_components(&system.stick_cells, task.cells);
     for (place, value) in on_stick.iter().zip(system.stick_tractions(&t)) {
         division.tractions[*place] = value;
     }
-    let on_slip = both_components(&system.slip_cells, problem.cells);
+    let on_slip = both_components(&system.slip_cells, task.cells);
     for (place, value) in on_slip.iter().zip(&t) {
         division.tractions[*place] = *value;
     }
@@ -222,7 +222,7 @@ fn turned(system: &SlipSystem, t: &[f64]) -> Vec<f64> {
 
 /// The guess on all slip cells, x before y.
 fn start_tractions(
-    problem: &DenseProblem,
+    task: &DenseProblem,
     system: &SlipSystem,
     guess: Guess,
     before: &[f64],
@@ -230,23 +230,23 @@ fn start_tractions(
     let count = system.slip_cells.len();
     let mut t = vec![0.0; 2 * count];
     for (k, &i) in system.slip_cells.iter().enumerate() {
-        let before = [before[i], before[problem.cells + i]];
-        let at = [problem.x[i], problem.y[i]];
-        let [x, y] = guess.direction(&problem.motion, at, before);
-        t[k] = problem.bound[i] * x;
-        t[count + k] = problem.bound[i] * y;
+        let before = [before[i], before[task.cells + i]];
+        let at = [task.x[i], task.y[i]];
+        let [x, y] = guess.direction(&task.motion, at, before);
+        t[k] = task.bound[i] * x;
+        t[count + k] = task.bound[i] * y;
     }
     t
 }
 
 /// The cells that disagree with their zones.
-fn misplaced(problem: &DenseProblem, system: &SlipSystem, t: &[f64]) -> Vec<usize> {
-    let n = problem.cells;
+fn misplaced(task: &DenseProblem, system: &SlipSystem, t: &[f64]) -> Vec<usize> {
+    let n = task.cells;
     let mut found: Vec<usize> = system
         .stick_cells
         .iter()
         .copied()
-        .filter(|i| t[*i].hypot(t[n + i]) >= problem.bound[*i] * (1.0 + STICK_MARGIN))
+        .filter(|i| t[*i].hypot(t[n + i]) >= task.bound[*i] * (1.0 + STICK_MARGIN))
         .collect();
     let t_slip: Vec<f64> = both_components(&system.slip_cells, n)
         .into_iter()

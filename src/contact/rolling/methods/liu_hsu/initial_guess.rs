@@ -1,6 +1,6 @@
 //! Where the Newton–Raphson iteration starts: the two guesses of the paper, and the tractions of the last division.
 
-use crate::contact::case::words::Motion;
+use crate::contact::rolling::motion::Motion;
 
 /// A choice of the direction of every slip traction; its size is always the friction bound.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,7 +13,7 @@ pub enum Guess {
     /// rigid pole `(−ν_y/φ, ν_x/φ)` this would be guess 1 again; the pole of the elastic problem makes the difference.
     SpinPole([f64; 2]),
     /// Along the tractions of the division before, see the third run in
-    /// [`liu_hsu`](crate::contact::rolling::methods::liu_hsu::solve) (not in the paper).
+    /// [`liu_hsu`](crate::contact::rolling::methods::liu_hsu) (not in the paper).
     Continued,
 }
 

@@ -63,6 +63,7 @@
 //! seconds and 100 MB and more, and the checks of a case allow no more.
 
 pub mod active_set;
+pub mod dense_task;
 pub mod initial_guess;
 pub mod newton_raphson;
 pub mod on_level;

@@ -1,11 +1,13 @@
 //! The method on a mesh level of a case, as the recipe calls it.
 
-use crate::contact::case::words::Motion;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::answer::{Failure, Tangential, Work, obey_coulomb};
-use crate::contact::rolling::methods::boundary_element::newton::{FrictionLaw, Newton};
+use crate::contact::rolling::methods::boundary_element::newton::Newton;
+use crate::contact::rolling::methods::boundary_element::task::FrictionLaw;
 use crate::contact::rolling::methods::full_slip;
-use crate::contact::rolling::methods::liu_hsu::solve::{Outcome, Stage, solve_by_upwind};
+use crate::contact::rolling::methods::liu_hsu::dense_task::Stage;
+use crate::contact::rolling::methods::liu_hsu::solve::{Outcome, solve_by_upwind};
+use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::LevelOperator;
 use crate::contact::rolling::slip_equations::Equations;
 use crate::contact::rolling::slip_rules::Rule;

@@ -62,31 +62,16 @@
 //! A solve that ends otherwise says so; `boundary_element` converges in all these states. All is dense: 1000 cells take
 //! seconds and 100 MB and more, and the checks of a case allow no more.
 
-use crate::contact::case::words::Motion;
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::rolling::methods::boundary_element::newton::{
-    Convergence, FrictionLaw, Newton,
-};
+use crate::contact::rolling::methods::boundary_element::newton::Newton;
+use crate::contact::rolling::methods::boundary_element::task::Convergence;
 use crate::contact::rolling::methods::liu_hsu::active_set;
 use crate::contact::rolling::methods::liu_hsu::active_set::{Attempt, Division, Exit};
+use crate::contact::rolling::methods::liu_hsu::dense_task::Stage;
 use crate::contact::rolling::methods::liu_hsu::initial_guess::Guess;
 use crate::contact::rolling::methods::liu_hsu::stick_block::DenseProblem;
-use crate::contact::rolling::slip_equations::Equations;
 use crate::contact::rolling::slip_rules::Rule;
 use crate::contact::rolling::vortex;
-
-/// One mesh with everything that is asked there. All values are dimensionless, as in [`Equations`].
-#[derive(Debug, Clone, Copy)]
-pub struct Stage<'a> {
-    /// The discrete equations over the whole mesh, without parity.
-    pub equations: &'a Equations<'a>,
-    /// Friction bound, rigid slip, tolerance.
-    pub law: FrictionLaw<'a>,
-    /// x and y of every cell's node.
-    pub nodes: (&'a [f64], &'a [f64]),
-    /// The motion; only the direction of its rigid slip matters here.
-    pub motion: Motion,
-}
 
 /// What a solve leaves behind besides the tractions.
 #[derive(Debug, Clone, PartialEq)]
@@ -169,7 +154,7 @@ pub fn solve_by_upwind(
         let first = solve(upwind, None, t, monitor)?;
         search.attempts.extend(&first.attempts);
         if first.converged {
-            search.start = search.problem.compact(t);
+            search.start = search.task.compact(t);
         }
         search.attempt(Guess::Continued)?;
     }
@@ -199,15 +184,15 @@ pub fn coarse_pole(coarse: &Stage, monitor: &dyn Monitor) -> Result<Option<[f64;
     if coarse.motion.spin_per_mm == 0.0 {
         return Ok(None);
     }
-    let problem = DenseProblem::new(coarse, monitor)?;
-    let (_, division) = active_set::run(&problem, Guess::RigidSlip, None, monitor)?;
-    let load: Vec<f64> = (0..problem.cells)
-        .map(|i| problem.bound[i] * coarse.law.area[i])
+    let task = DenseProblem::new(coarse, monitor)?;
+    let (_, division) = active_set::run(&task, Guess::RigidSlip, None, monitor)?;
+    let load: Vec<f64> = (0..task.cells)
+        .map(|i| task.bound[i] * coarse.law.area[i])
         .collect();
     Ok(vortex::vortex_centre(
         &division.tractions,
-        &problem.x,
-        &problem.y,
+        &task.x,
+        &task.y,
         &load,
     ))
 }
@@ -216,7 +201,7 @@ pub fn coarse_pole(coarse: &Stage, monitor: &dyn Monitor) -> Result<Option<[f64;
 struct Search<'a> {
     stage: &'a Stage<'a>,
     monitor: &'a dyn Monitor,
-    problem: DenseProblem,
+    task: DenseProblem,
     /// Tractions given by the caller, over the cells without padding.
     start: Vec<f64>,
     newton: Newton<'a>,
@@ -226,12 +211,12 @@ struct Search<'a> {
 
 impl<'a> Search<'a> {
     fn new(stage: &'a Stage<'a>, t: &[f64], monitor: &'a dyn Monitor) -> Result<Search<'a>, Stop> {
-        let problem = DenseProblem::new(stage, monitor)?;
+        let task = DenseProblem::new(stage, monitor)?;
         Ok(Search {
             stage,
             monitor,
-            start: problem.compact(t),
-            problem,
+            start: task.compact(t),
+            task,
             newton: Newton::new(stage.equations),
             attempts: Vec::new(),
             best: None,
@@ -255,7 +240,7 @@ impl<'a> Search<'a> {
     /// Runs the outer iteration with one guess; did it converge?
     fn attempt(&mut self, guess: Guess) -> Result<bool, Stop> {
         let start = (guess == Guess::Continued).then_some(&self.start[..]);
-        let (mut attempt, division) = active_set::run(&self.problem, guess, start, self.monitor)?;
+        let (mut attempt, division) = active_set::run(&self.task, guess, start, self.monitor)?;
         let residual = self.residual(&division.tractions);
         let exact = residual <= self.stage.law.tolerance;
         if attempt.exit == Exit::Converged && !exact {
@@ -276,7 +261,7 @@ impl<'a> Search<'a> {
 
     /// Residual of the projected friction law, the measure both methods share.
     fn residual(&mut self, tractions: &[f64]) -> f64 {
-        let padded = self.problem.padded(tractions);
+        let padded = self.task.padded(tractions);
         let mut unused = Convergence {
             converged: false,
             iterations: 0,
@@ -289,13 +274,13 @@ impl<'a> Search<'a> {
 
     fn finish(mut self, t: &mut [f64]) -> Outcome {
         let (_, division) = self.best.take().unwrap_or_else(|| {
-            let tractions = vec![0.0; 2 * self.problem.cells];
-            let slips = vec![false; self.problem.cells];
+            let tractions = vec![0.0; 2 * self.task.cells];
+            let slips = vec![false; self.task.cells];
             (f64::INFINITY, Division { tractions, slips })
         });
         // Evaluated once more, because the slips kept by the evaluation are those of its last call.
         let residual = self.residual(&division.tractions);
-        t.copy_from_slice(&self.problem.padded(&division.tractions));
+        t.copy_from_slice(&self.task.padded(&division.tractions));
         Outcome {
             converged: self
                 .attempts

@@ -3,10 +3,10 @@
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 
-use crate::contact::case::words::Motion;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::dense_lu::{DenseLu, look, subtract_product};
-use crate::contact::rolling::methods::liu_hsu::solve::Stage;
+use crate::contact::rolling::methods::liu_hsu::dense_task::Stage;
+use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::slip_rules::Rule;
 
 /// The discrete problem as dense arrays over the cells without padding, x components before y components.
@@ -101,26 +101,26 @@ impl SlipSystem {
     /// # Errors
     /// Only if the monitor stops the work.
     pub fn new(
-        problem: &DenseProblem,
+        task: &DenseProblem,
         slips: &[bool],
         monitor: &dyn Monitor,
     ) -> Result<SlipSystem, Stop> {
-        let cells = 0..problem.cells;
+        let cells = 0..task.cells;
         let slip_cells: Vec<usize> = cells
             .clone()
-            .filter(|i| slips[*i] && problem.bound[*i] > 0.0)
+            .filter(|i| slips[*i] && task.bound[*i] > 0.0)
             .collect();
         let stick_cells: Vec<usize> = cells.filter(|i| !slips[*i]).collect();
         let (slip, stick) = (
-            both_components(&slip_cells, problem.cells),
-            both_components(&stick_cells, problem.cells),
+            both_components(&slip_cells, task.cells),
+            both_components(&stick_cells, task.cells),
         );
         let known = |rows: &[usize]| {
             Mat::from_fn(rows.len(), slip.len() + 1, |i, j| {
                 if j < slip.len() {
-                    problem.map[(rows[i], slip[j])]
+                    task.map[(rows[i], slip[j])]
                 } else {
-                    problem.rigid[rows[i]]
+                    task.rigid[rows[i]]
                 }
             })
         };
@@ -131,7 +131,7 @@ impl SlipSystem {
         if !stick.is_empty() {
             let part = |rows: &[usize]| {
                 Mat::from_fn(rows.len(), stick.len(), |i, j| {
-                    problem.map[(rows[i], stick[j])]
+                    task.map[(rows[i], stick[j])]
                 })
             };
             DenseLu::new(part(&stick), monitor)?.solve(on_stick.as_mut(), monitor)?;

@@ -1,0 +1,132 @@
+//! The solved normal problem of one frame: its patches and their pressures.
+
+use crate::contact::mesh::strips::Chord;
+use crate::contact::normal::hertz::Ellipse;
+use crate::contact::normal::patch::Patch;
+use crate::contact::normal::pressure_field::field::PressureField;
+
+/// The patches of one frame with their pressures; never empty. It answers where the patches are, how long their chords are,
+/// and what pressure acts on them, and nothing else.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Footprint {
+    shape: FootprintShape,
+    patches: Vec<Patch>,
+    uncertainty: Option<NormalUncertainty>,
+}
+
+/// Where the pressure comes from.
+#[derive(Debug, Clone, PartialEq)]
+enum FootprintShape {
+    /// Hertz's ellipse, in closed form.
+    Hertz(Ellipse),
+    /// A pressure on one grid of samples or several.
+    Sampled(PressureField),
+}
+
+/// What computing region and pressure leaves uncertain.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NormalUncertainty {
+    /// Cells of the normal problem across each patch.
+    pub cells_across: Vec<f64>,
+    /// By how much, relatively, the load may differ from the one asked for.
+    pub load: f64,
+}
+
+impl Footprint {
+    /// Hertz's ellipse.
+    #[must_use]
+    pub fn hertz(ellipse: Ellipse) -> Footprint {
+        Footprint {
+            patches: vec![ellipse.patch()],
+            shape: FootprintShape::Hertz(ellipse),
+            uncertainty: None,
+        }
+    }
+
+    /// A pressure that was given, and is exact as it stands.
+    #[must_use]
+    pub fn given(field: PressureField) -> Footprint {
+        Footprint {
+            patches: field.patches(),
+            shape: FootprintShape::Sampled(field),
+            uncertainty: None,
+        }
+    }
+
+    /// A pressure that was computed, and whose load may differ from the one asked for by the relative `load_error`.
+    #[must_use]
+    pub fn computed(field: PressureField, load_error: f64) -> Footprint {
+        let uncertainty = NormalUncertainty {
+            cells_across: field.cells_across(),
+            load: load_error,
+        };
+        Footprint {
+            uncertainty: Some(uncertainty),
+            ..Footprint::given(field)
+        }
+    }
+
+    /// The patches, in order of their smallest y.
+    #[must_use]
+    pub fn patches(&self) -> &[Patch] {
+        &self.patches
+    }
+
+    /// What computing region and pressure left uncertain, where they were computed.
+    #[must_use]
+    pub fn uncertainty(&self) -> Option<&NormalUncertainty> {
+        self.uncertainty.as_ref()
+    }
+
+    /// Is it Hertz's ellipse, in closed form?
+    #[must_use]
+    pub fn is_closed_form(&self) -> bool {
+        matches!(self.shape, FootprintShape::Hertz(_))
+    }
+
+    /// Does the pressure jump from one sample to the next?
+    #[must_use]
+    pub fn jumps(&self) -> bool {
+        matches!(&self.shape, FootprintShape::Sampled(field) if field.jump().is_some())
+    }
+
+    /// By how much samples of a given pressure differ from what their neighbours let expect, see [`PressureField::surprise`]; nothing for
+    /// pressures that were computed or are known in closed form.
+    #[must_use]
+    pub fn surprise(&self) -> Option<f64> {
+        match &self.shape {
+            FootprintShape::Sampled(field) if self.uncertainty.is_none() => Some(field.surprise()),
+            _ => None,
+        }
+    }
+
+    /// Segments that a strip has on average, for each patch: more than 1 where patches are hollow or bent.
+    #[must_use]
+    pub fn segments_per_strip(&self) -> Vec<f64> {
+        match &self.shape {
+            FootprintShape::Hertz(_) => vec![1.0],
+            FootprintShape::Sampled(field) => field.segments_per_strip(),
+        }
+    }
+
+    /// Chords of one patch along the lines `y`, each standing for a strip of width `dy`; strips that miss the
+    /// patch have no chord, strips that cross it several times have several, from smaller to larger x.
+    ///
+    /// `strips` lists `(y, dy)` of the strips from smaller to larger y; all lengths in mm.
+    #[must_use]
+    pub fn chords(&self, patch: usize, strips: &[(f64, f64)]) -> Vec<Chord> {
+        match &self.shape {
+            FootprintShape::Hertz(ellipse) => ellipse.chords(strips),
+            FootprintShape::Sampled(field) => field.chords(patch, strips),
+        }
+    }
+
+    /// Mean pressure in MPa over `x0 < x < x1` on the line of a chord (not yet scaled to the patch's force).
+    #[must_use]
+    pub fn mean_pressure(&self, chord: &Chord, x0: f64, x1: f64) -> f64 {
+        match &self.shape {
+            FootprintShape::Hertz(ellipse) => ellipse.mean_pressure(chord, x0, x1),
+            FootprintShape::Sampled(field) => field.mean_pressure(chord, x0, x1),
+        }
+    }
+}

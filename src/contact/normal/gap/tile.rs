@@ -1,0 +1,36 @@
+//! A grid of the normal problem with its pressure.
+
+use crate::contact::normal::gap::conjugate_gradients::Pressed;
+use crate::contact::normal::gap::grid::Grid;
+
+/// A grid with its part of the solution; distances and pressures are its own, the rest belongs to all.
+#[derive(Debug, Clone)]
+pub(crate) struct Tile {
+    pub(crate) grid: Grid,
+    pub(crate) pressed: Pressed,
+}
+
+impl Tile {
+    /// Load over the area of a cell of 1 mm².
+    pub(crate) fn load(&self) -> f64 {
+        self.pressed.pressure.iter().sum::<f64>() * self.grid.step[0] * self.grid.step[1]
+    }
+
+    pub(crate) fn largest(&self) -> f64 {
+        self.pressed.largest()
+    }
+}
+
+/// Pressures on the last grids.
+pub(crate) struct Outcome {
+    /// The grids with their pressures: one, or one per patch.
+    pub(crate) tiles: Vec<Tile>,
+    /// Iterations over all grids.
+    pub(crate) iterations: u32,
+    /// Nothing changes any more with the grids.
+    pub(crate) settled: bool,
+    /// See [`Report`].
+    pub(crate) pressure_change: f64,
+    /// The least gap in mm.
+    pub(crate) least: f64,
+}

@@ -1,0 +1,35 @@
+//! A number or word of a remark.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// A number or a word in a remark.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(untagged)]
+pub enum Figure {
+    /// A finite number.
+    Number(f64),
+    /// Several numbers.
+    Numbers(Vec<f64>),
+    /// A word.
+    Word(String),
+}
+
+/// What can stand in a remark as a figure.
+pub(crate) trait AsFigure {
+    /// The figure; nothing for a number that is not finite or not there.
+    fn figure(&self) -> Option<Figure>;
+}
+
+impl AsFigure for [f64; 2] {
+    fn figure(&self) -> Option<Figure> {
+        let finite = self.iter().all(|part| part.is_finite());
+        finite.then(|| Figure::Numbers(self.to_vec()))
+    }
+}
+
+impl AsFigure for &'static str {
+    fn figure(&self) -> Option<Figure> {
+        Some(Figure::Word((*self).to_owned()))
+    }
+}

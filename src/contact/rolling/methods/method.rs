@@ -1,0 +1,34 @@
+//! Which method solves a motion.
+
+/// A method; each is a file or folder of this name beside this file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    /// Semismooth Newton iteration with strip-preconditioned GMRES.
+    BoundaryElement,
+    /// The method of Liu and Hsu.
+    LiuHsu,
+    /// Kalker's simplified theory.
+    Fastsim,
+}
+
+/// Where `fastsim` lets tractions slip.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum TractionBound {
+    /// At μ times the pressure.
+    #[default]
+    Elliptic,
+    /// At the square of the pressure, scaled to carry the same μN.
+    Parabolic,
+}
+
+impl Method {
+    /// The word of the field, as in errors and answers.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::BoundaryElement => "boundary_element",
+            Method::LiuHsu => "liu_hsu",
+            Method::Fastsim => "fastsim",
+        }
+    }
+}

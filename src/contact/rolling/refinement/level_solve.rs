@@ -1,0 +1,240 @@
+//! One motion on one level: start, method, indicators.
+
+use crate::contact::error::SolveError;
+use crate::contact::mesh::size::MeshSize;
+use crate::contact::monitor::Monitor;
+use crate::contact::rolling::answer::{Failure, Tangential, Work};
+use crate::contact::rolling::mesh_plan::{Plan, Regime};
+use crate::contact::rolling::methods::boundary_element::solve as boundary_element;
+use crate::contact::rolling::methods::liu_hsu::on_level;
+use crate::contact::rolling::methods::method::Method;
+use crate::contact::rolling::methods::{fastsim, full_slip};
+use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::refinement::constants::LEVEL_RATIO_MIN;
+use crate::contact::rolling::refinement::error_estimate;
+use crate::contact::rolling::refinement::error_estimate::{
+    Before, Circumstances, Errors, Indicators,
+};
+use crate::contact::rolling::refinement::levels::Ladder;
+use crate::contact::rolling::refinement::refine::slender;
+use crate::contact::rolling::refinement::warm_start::{Start, nested_start};
+use crate::contact::rolling::resultants::Resultants;
+use crate::contact::rolling::strip_mesh::Level;
+use crate::contact::rolling::task::RollingTask;
+
+/// The coarse mesh that gives the method of Liu and Hsu its spin pole: fewer than 30 cells, as they found.
+const POLE_MESH: MeshSize = MeshSize {
+    strips: 5,
+    cells: 5,
+};
+
+/// A motion of a problem, and the creepages it is solved with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Asked {
+    /// The number of the motion.
+    pub index: usize,
+    /// Creepages and spin.
+    pub motion: Motion,
+}
+
+/// The answer for one motion on the finest level it needed.
+#[derive(Debug, Clone)]
+pub struct Point {
+    /// The motion it was solved for.
+    pub motion: Motion,
+    /// A prescribed force could not be reached.
+    pub saturated: bool,
+    /// Tractions, slips and zones.
+    pub tangential: Tangential,
+    /// The number of that level in the ladder.
+    pub level: usize,
+    /// Resultants of every patch about the origin of the case: the best known.
+    pub resultants: Vec<Resultants>,
+    /// The same as the tractions give them, without extrapolation.
+    pub summed: Vec<Resultants>,
+    /// Estimated errors, see [`Indicators::errors`].
+    pub errors: Errors,
+    /// Work over all levels.
+    pub work: Work,
+    /// The method that was used.
+    pub method: Method,
+    /// Wall time in s.
+    pub seconds: f64,
+}
+
+impl Point {
+    /// Estimated error of the sum over the patches.
+    #[must_use]
+    pub fn error(&self) -> Option<f64> {
+        self.errors.last().copied().flatten()
+    }
+}
+
+/// A point with what its error is judged by.
+#[derive(Debug, Clone)]
+pub struct Solved {
+    /// The answer.
+    pub point: Point,
+    /// The indicators of its level.
+    pub indicators: Indicators,
+}
+
+/// Solves a motion on the level of one size, from the point of a coarser one if there is one. Estimates are those before
+/// companions, see `judge`.
+///
+/// # Errors
+/// Why there is no answer.
+pub fn climb(
+    task: &RollingTask,
+    ladder: &mut Ladder,
+    asked: Asked,
+    plan: Plan,
+    coarser: Option<Point>,
+    monitor: &dyn Monitor,
+) -> Result<Solved, SolveError> {
+    let began = monitor.elapsed();
+    let number = ladder.level(plan)?;
+    let level = ladder.get(number);
+    let below = coarser
+        .as_ref()
+        .map(|point| (ladder.get(point.level), &point.tangential));
+    let motion = level.scale.motion(&asked.motion);
+    let warm = ladder.trail.start(number, level, &motion);
+    let start = warm.or_else(|| below.map(|(coarse, answer)| nested_start(coarse, answer, level)));
+    let tangential = solve_level(task, level, &asked.motion, start, monitor)
+        .map_err(|f| named(f, task, task.first_motion + asked.index))?;
+    let patches = task.footprint.patches().len();
+    let summed: Vec<Resultants> = (0..patches)
+        .map(|p| Resultants::of_patch(level, &tangential.traction, p))
+        .collect();
+    let before = coarser
+        .as_ref()
+        .and_then(|point| before(ladder, level, point));
+    let finer = finer_for_sums(task, level, asked, &tangential);
+    let circumstances = Circumstances {
+        motion: &asked.motion,
+        before,
+        finer: finer.as_ref(),
+        slenderness: ladder.policy.slenderness(),
+        tolerance: task.tolerance(),
+    };
+    let indicators = Indicators::of_level(task, level, &tangential, &summed, circumstances);
+    let resultants = extrapolated(task, level, &summed, before);
+    ladder.trail.leave(number, motion, &tangential);
+    ladder.path.push(number);
+    let mut work = coarser.as_ref().map_or(Work::default(), |point| point.work);
+    work.add(tangential.work);
+    let seconds =
+        (monitor.elapsed() - began).as_secs_f64() + coarser.map_or(0.0, |point| point.seconds);
+    let point = Point {
+        motion: asked.motion,
+        saturated: false,
+        tangential,
+        level: number,
+        resultants,
+        summed,
+        errors: indicators.errors(),
+        work,
+        method: method_used(task),
+        seconds,
+    };
+    Ok(Solved { point, indicators })
+}
+
+/// The level before, if it is coarse enough to say something.
+pub(crate) fn before<'a>(ladder: &Ladder, level: &Level, point: &'a Point) -> Option<Before<'a>> {
+    let below = ladder.get(point.level);
+    let ratio = level.mesh.cells() as f64 / below.mesh.cells() as f64;
+    (ratio >= LEVEL_RATIO_MIN).then(|| Before {
+        summed: &point.summed,
+        regime: below.plan.regime,
+        share: 1.0 / (ratio - 1.0),
+    })
+}
+
+/// A level of four times as many cells, where the pressure jumps, or everything slips and the tractions turn: how they add up
+/// depends on the cells. Without spin all tractions point the same way, and cells of any size add up to the load.
+fn finer_for_sums(
+    task: &RollingTask,
+    level: &Level,
+    asked: Asked,
+    answer: &Tangential,
+) -> Option<Level> {
+    let turns = asked.motion.spin_per_mm != 0.0 && !task.friction.is_frictionless();
+    let slides = turns && answer.slips.iter().all(|slips| *slips);
+    if !slides && !error_estimate::jumps(task) {
+        return None;
+    }
+    let [strips, cells] = [level.plan.size.strips, level.plan.size.cells].map(|n| 2 * n);
+    let size = MeshSize { strips, cells };
+    Level::new(task, Plan { size, ..level.plan }).ok()
+}
+
+/// The resultants of every patch where the climb leads to: between meshes for stick errors fall as 1/N. The dense method and
+/// meshes gathered about a pole have no such record.
+fn extrapolated(
+    task: &RollingTask,
+    level: &Level,
+    summed: &[Resultants],
+    before: Option<Before>,
+) -> Vec<Resultants> {
+    let sticking = |regime| matches!(regime, Regime::Sticking { .. });
+    let like = before.filter(|b| sticking(b.regime) && sticking(level.plan.regime));
+    let Some(before) = like.filter(|_| task.target().is_some()) else {
+        return summed.to_vec();
+    };
+    let patches = task.footprint.patches();
+    let pairs = summed.iter().zip(before.summed).zip(patches);
+    pairs
+        .map(|((fine, coarse), patch)| {
+            fine.beyond(*coarse, before.share, task.friction.limit(patch))
+        })
+        .collect()
+}
+
+/// `auto` is the fast solver today.
+fn method_used(task: &RollingTask) -> Method {
+    task.method
+}
+
+pub(crate) fn named(failure: Failure, task: &RollingTask, point: usize) -> SolveError {
+    match failure {
+        Failure::Stopped(stop) => stop.into(),
+        Failure::NotConverged {
+            work,
+            tolerance,
+            advice,
+        } => SolveError::NotConverged {
+            method: method_used(task),
+            point,
+            iterations: work.iterations as usize,
+            residual: work.residual,
+            tolerance,
+            advice: match slender(task) {
+                Some(slender) => format!("{slender}; {advice}"),
+                None => advice,
+            },
+        },
+    }
+}
+
+fn solve_level(
+    task: &RollingTask,
+    level: &Level,
+    motion: &Motion,
+    start: Option<Start>,
+    monitor: &dyn Monitor,
+) -> Result<Tangential, Failure> {
+    if task.friction.is_frictionless() {
+        return Ok(full_slip::frictionless_answer(level, motion));
+    }
+    if task.method == Method::LiuHsu {
+        let coarse = Level::new(task, POLE_MESH).ok();
+        return on_level::solve(level, coarse.as_ref(), motion, task.tolerance(), monitor);
+    }
+    let motion = level.scale.motion(motion);
+    if task.method == Method::Fastsim {
+        return Ok(fastsim::solve(task, level, &motion));
+    }
+    boundary_element::solve(level, &motion, start.as_ref(), task.tolerance(), monitor)
+}

@@ -1,0 +1,90 @@
+//! What the tangential problem of one footprint asks: physics, method and accuracy.
+
+use crate::contact::friction::law::FrictionLaw;
+use crate::contact::half_space::elasticity::Elasticity;
+use crate::contact::half_space::strip_operator::kind::Precision;
+use crate::contact::normal::footprint::Footprint;
+use crate::contact::rolling::methods::method::{Method, TractionBound};
+use crate::contact::rolling::motion::{Motion, PrescribedForces};
+use crate::contact::rolling::refinement::resolution::Resolution;
+
+/// Targets from here on are met with an operator in single precision.
+const SINGLE_PRECISION_FROM: f64 = 5e-4;
+
+/// Residual of the friction law to which every method solves on a mesh of the client's, relative to the traction scale.
+pub const TOLERANCE_LEAST: f64 = 1e-6;
+
+/// The motions to be solved on one footprint, and how.
+#[derive(Debug, Clone, Copy)]
+pub struct RollingTask<'a> {
+    /// Patches and pressures.
+    pub footprint: &'a Footprint,
+    /// Elastic constants of the pair.
+    pub elasticity: &'a Elasticity,
+    /// Bound of the tractions.
+    pub friction: FrictionLaw,
+    /// The motions, in order; a creepage is 0 where a force is prescribed instead.
+    pub motions: &'a [Motion],
+    /// Forces prescribed instead of creepages, motion by motion.
+    pub forces: &'a [PrescribedForces],
+    /// The number of the first of these motions in its case.
+    pub first_motion: usize,
+    /// Does the case ask about one motion alone?
+    pub single_motion: bool,
+    /// The method.
+    pub method: Method,
+    /// Where `fastsim` lets tractions slip.
+    pub traction_bound: TractionBound,
+    /// Target or mesh.
+    pub resolution: Resolution,
+}
+
+impl RollingTask<'_> {
+    /// The allowed error of the resultants, where an error is asked for rather than a mesh.
+    #[must_use]
+    pub fn target(&self) -> Option<f64> {
+        match self.resolution {
+            Resolution::Target(target) => Some(target),
+            Resolution::Mesh(_) => None,
+        }
+    }
+
+    /// Residual to reach: far below the target, since every iteration below it is for nothing.
+    #[must_use]
+    pub fn tolerance(&self) -> f64 {
+        match self.resolution {
+            Resolution::Target(target) => {
+                // A force is searched as a function of its creepage: what the iteration leaves is noise to that. Ten times less than a
+                // force may be missed by (`SHARE_OF_TARGET`): a start that meets it is left as it is.
+                let part = if self.has_prescribed_forces() {
+                    0.0015
+                } else {
+                    0.04
+                };
+                (part * target).clamp(TOLERANCE_LEAST, 4e-4)
+            }
+            Resolution::Mesh(_) => TOLERANCE_LEAST,
+        }
+    }
+
+    /// Is a force prescribed for any motion?
+    #[must_use]
+    pub fn has_prescribed_forces(&self) -> bool {
+        self.forces.iter().any(|forces| *forces != [None; 2])
+    }
+
+    /// Single precision serves any target that the residuals of single precision can meet.
+    #[must_use]
+    pub fn precision(&self) -> Precision {
+        precision_of(self.resolution)
+    }
+}
+
+/// See [`RollingTask::precision`].
+#[must_use]
+pub fn precision_of(resolution: Resolution) -> Precision {
+    match resolution {
+        Resolution::Target(target) if target >= SINGLE_PRECISION_FROM => Precision::Single,
+        _ => Precision::Double,
+    }
+}

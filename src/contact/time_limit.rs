@@ -1,0 +1,67 @@
+//! The time limit of a case: a monitor that ends the solve, and says how far it came.
+
+use crate::contact::case::problem::Problem;
+use crate::contact::error::SolveError;
+use crate::contact::monitor::{Monitor, Stop};
+use std::cell::Cell;
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+/// The monitor of a whole case: adds the case's own time limit and turns motions done into progress.
+pub(crate) struct Watch<'a> {
+    inner: &'a dyn Monitor,
+    time_limit: Option<Duration>,
+    motions: usize,
+    done: Cell<usize>,
+}
+
+impl<'a> Watch<'a> {
+    /// Watches a case of so many motions.
+    pub(crate) fn new(
+        inner: &'a dyn Monitor,
+        time_limit: Option<Duration>,
+        motions: usize,
+    ) -> Watch<'a> {
+        Watch {
+            inner,
+            time_limit,
+            motions,
+            done: Cell::new(0),
+        }
+    }
+
+    /// An error of this case; one of time with the limit and how far the solve came.
+    pub(crate) fn explained(&self, error: SolveError, problem: &Problem) -> SolveError {
+        let SolveError::OutOfTime { limit_s: None, .. } = error else {
+            return error;
+        };
+        // Of a wheel on a rail every motion is solved patch by patch.
+        let done = self.done.get() * problem.motions.len() / self.motions.max(1);
+        SolveError::OutOfTime {
+            limit_s: self.time_limit.map(|limit| limit.as_secs_f64()),
+            motions: Some([problem.part.before + done, problem.part.all]),
+        }
+    }
+
+    /// One more motion is done.
+    pub(crate) fn advance(&self) {
+        self.done.set(self.done.get() + 1);
+    }
+}
+
+impl Monitor for Watch<'_> {
+    fn tick(&self, _progress: f64) -> ControlFlow<Stop> {
+        if self
+            .time_limit
+            .is_some_and(|limit| self.inner.elapsed() > limit)
+        {
+            return ControlFlow::Break(Stop::OutOfTime);
+        }
+        self.inner
+            .tick(self.done.get() as f64 / self.motions.max(1) as f64)
+    }
+
+    fn elapsed(&self) -> Duration {
+        self.inner.elapsed()
+    }
+}
