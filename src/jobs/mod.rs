@@ -61,8 +61,8 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use uuid::Uuid;
 
-use crate::contact::error::CaseError;
 use crate::contact::case::problem::Problem;
+use crate::contact::error::CaseError;
 use crate::jobs::batch::Batch;
 pub use crate::jobs::error::JobsError;
 pub use crate::jobs::job::{Failure, FailureKind, Job, QueuePlace, State};

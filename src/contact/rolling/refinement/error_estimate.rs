@@ -104,7 +104,7 @@ impl Indicators {
         let slides = answer.slips.iter().all(|slips| *slips);
         let sums = finer.filter(|_| slides).map_or_else(
             || none.clone(),
-            |finer| sum_errors(task, &patches, [level, finer], motion),
+            |finer| sum_errors(task, patches, [level, finer], motion),
         );
         if answer.second.is_none() && answer.work.products == 0 && answer.work.iterations == 0 {
             if !answer.slips.iter().any(|s| *s) {
@@ -120,13 +120,13 @@ impl Indicators {
             )));
         }
         if task.method == Method::LiuHsu {
-            return Indicators::Known(dense_errors(task, &patches, found, circumstances));
+            return Indicators::Known(dense_errors(task, patches, found, circumstances));
         }
         let rules = answer.second.as_ref().map(|second| {
             let second: Vec<Resultants> = (0..patches.len())
                 .map(|p| Resultants::of_patch(level, second, p))
                 .collect();
-            distances(task, &patches, found, &second)
+            distances(task, patches, found, &second)
         });
         let pole = if motion.spin_per_mm == 0.0 {
             0.0
@@ -142,14 +142,14 @@ impl Indicators {
             rules,
             before: circumstances
                 .before
-                .map(|before| change(task, &patches, level, found, before)),
+                .map(|before| change(task, patches, level, found, before)),
             companions: [None, None],
             missing: false,
             pole: if sticking { 0.0 } else { POLE_WEIGHT * pole },
             sums,
             normal: match finer.filter(|_| jumps(task)) {
-                Some(finer) => data_errors(&patches, [level, finer]),
-                None => normal_errors(task, &patches),
+                Some(finer) => data_errors(patches, [level, finer]),
+                None => normal_errors(task, patches),
             },
             tolerance: circumstances.tolerance,
             scale: scale(task, level, patches.len()),
@@ -166,7 +166,7 @@ impl Indicators {
             Seen::Missing => measured.missing = true,
             Seen::Found(other, reach) => {
                 let patches = task.footprint.patches();
-                let mut apart = distances(task, &patches, found, other);
+                let mut apart = distances(task, patches, found, other);
                 apart.iter_mut().for_each(|d| *d *= reach);
                 measured.companions[k] = Some(apart);
             }

@@ -2,8 +2,8 @@
 
 use axum::Json;
 
-use crate::contact::remark::list::Remark;
 use crate::contact::remark::kind::RemarkKind;
+use crate::contact::remark::list::Remark;
 use crate::http::problem::catalogue::PlainProblems;
 
 /// Every remark that an answer can carry: its code, what it means and what to do about it.

@@ -2,7 +2,7 @@
 //!
 //! Source: "Non-Hertzian rolling contact stress analysis" (eq. 6 to 15; "the paper" below), after Liu and Paul. It is
 //! here for fidelity and comparison: it solves the same discrete equations as
-//! [`boundary_element`](crate::contact::rolling::methods::boundary_element::solve), with dense matrices and a smaller domain of
+//! [`boundary_element`](crate::contact::tangential::boundary_element), with dense matrices and a smaller domain of
 //! convergence. The course, as in §4 and §5 of the paper:
 //!
 //! 1. All cells stick; their tractions follow from eq. 11.
