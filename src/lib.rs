@@ -11,17 +11,17 @@
 //!
 //! [`telemetry`] decides where logs and spans go and is used by [`cli`] only.
 //!
-//! Inside [`contact`] a case passes these stages, each of which returns a type of its own:
+//! Inside [`contact`] a case passes these stages, each a folder that returns a type of its own:
 //!
-//! 1. [`contact::check`]: the text becomes a [`Case`](contact::case::Case), every fault named at once, and then a
-//!    [`Problem`](contact::problem::Problem): materials combined, region and pressure known ([`contact::normal`]),
-//!    limits enforced.
-//! 2. [`contact::solve`]: [`Level`](contact::tangential::level::Level)s, coarse to fine: strips fitted to the patches
-//!    ([`contact::mesh`]), pressures of their cells, and how their surfaces give ([`contact::influence`]).
-//! 3. For every motion a [`Point`](contact::tangential::point::Point): tractions and slips
-//!    ([`contact::tangential`]: [`boundary_element`](contact::tangential::boundary_element),
-//!    [`liu_hsu`](contact::tangential::liu_hsu) or [`fastsim`](contact::tangential::fastsim)) with an estimate of their error.
-//! 4. [`contact::outputs`]: resultants, zones and fields become a [`Solution`](contact::solution::Solution).
+//! 1. [`contact::case`]: [`contact::check`] turns the text into a [`Case`](contact::case::words::Case), names every fault at once,
+//!    and makes a [`Problem`](contact::case::problem::Problem) of checked numbers.
+//! 2. [`contact::normal`]: patches and pressures, known in closed form or found from a gap or from profiles
+//!    ([`contact::geometry`]): a [`Footprint`](contact::normal::footprint::Footprint).
+//! 3. [`contact::rolling`]: for every motion, [`refinement`](contact::rolling::refinement) makes meshes from coarse to fine
+//!    ([`contact::mesh`]) and takes their operators ([`contact::half_space`]); a [method](contact::rolling::methods) solves each under
+//!    the law of [`friction`](contact::friction) until the estimate of the error meets the target.
+//! 4. [`contact::solution`]: resultants, zones and fields ([`contact::post`]) become a
+//!    [`Solution`](contact::solution::words::Solution) in the words a client reads.
 //!
 //! Files are named after what a user can choose: a method, a route, a command, a store is a file of that name.
 

@@ -1,7 +1,4 @@
-//! What a client should know about an answer besides its numbers: remarks with a stable code, a place and figures.
-//!
-//! A stage returns the [`Remark`]s of its own result, with the patch or the input they belong to where it knows that;
-//! the motion is added when the solution is put together. `list` holds them all: adding one means adding it there.
+//! How severe a remark is, and its entry in the list of all codes.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;

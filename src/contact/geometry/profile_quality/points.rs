@@ -1,7 +1,7 @@
 //! How far can the points of a profile be trusted? Pure functions of the points, in mm and MPa.
 //!
 //! The measures are local: what counts is what the points leave open where the bodies touch, expressed as a pressure that compares with
-//! that of the contact (see [`flattening`]).
+//! that of the contact (see [`flattening`](crate::contact::geometry::profile_quality::flattening)).
 
 use crate::contact::geometry::profile_quality::flattening::noise_pressure;
 use crate::contact::geometry::profile_quality::noise;

@@ -29,7 +29,7 @@ pub(crate) struct Outcome {
     pub(crate) iterations: u32,
     /// Nothing changes any more with the grids.
     pub(crate) settled: bool,
-    /// See [`Report`].
+    /// See [`Report`](crate::contact::normal::answer::Report).
     pub(crate) pressure_change: f64,
     /// The least gap in mm.
     pub(crate) least: f64,

@@ -7,7 +7,7 @@ use crate::contact::normal::pressure_field::sample_grid::Grid;
 /// Pressure samples on one rectangular grid and the patches they form.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GridPressure {
-    /// The given grid with [`PADDING`] more lines on each side.
+    /// The given grid with [`PADDING`](crate::contact::normal::pressure_field::sample_grid::PADDING) more lines on each side.
     pub(crate) grid: Grid,
     /// Squared pressure relative to its largest value, continued below 0 outside the contact.
     pub(crate) q: Vec<f64>,

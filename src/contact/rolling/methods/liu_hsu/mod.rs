@@ -2,7 +2,7 @@
 //!
 //! Source: "Non-Hertzian rolling contact stress analysis" (eq. 6 to 15; "the paper" below), after Liu and Paul. It is
 //! here for fidelity and comparison: it solves the same discrete equations as
-//! [`boundary_element`](crate::contact::tangential::boundary_element), with dense matrices and a smaller domain of
+//! [`boundary_element`](crate::contact::rolling::methods::boundary_element), with dense matrices and a smaller domain of
 //! convergence. The course, as in §4 and §5 of the paper:
 //!
 //! 1. All cells stick; their tractions follow from eq. 11.
@@ -11,14 +11,14 @@
 //! 3. The stick tractions are eliminated (eq. 13, [`stick_block`]); Newton–Raphson gives the slip tractions
 //!    (eq. 8 and 9, [`newton_raphson`]) from an initial guess (eq. 14 or 15, [`initial_guess`]). Back to 2 until no cell
 //!    changes.
-//! 4. This is done with guess 1. If it fails, guess 1 on a coarse mesh gives the spin pole ([`spin_pole`]) for guess 2.
+//! 4. This is done with guess 1. If it fails, guess 1 on a coarse mesh gives the spin pole ([`vortex`](crate::contact::rolling::vortex)) for guess 2.
 //!
 //! # What the paper leaves open
 //!
 //! | question | here |
 //! |---|---|
-//! | eq. 6 sums slip along the strip, eq. 12 needs slip itself | rows are differenced along the strip: the map is that of [`Equations`] |
-//! | weight of the own cell in eq. 6 | one half, from the centre to the side: [`Rule::Trapezoid`]; any other rule serves too |
+//! | eq. 6 sums slip along the strip, eq. 12 needs slip itself | rows are differenced along the strip: the map is that of [`Equations`](crate::contact::rolling::slip_equations::Equations) |
+//! | weight of the own cell in eq. 6 | one half, from the centre to the side: [`Rule::Trapezoid`](crate::contact::rolling::slip_rules::Rule::Trapezoid); any other rule serves too |
 //! | `x_U`, "the closest boundary" | the leading edge for every cell; with a stick/slip boundary the equations change with the zones, and some have two solutions or none |
 //! | when a stick cell slips | T reaches `μp (1 + 1e-9)` |
 //! | when a slip cell sticks | `s·T < 0`, in the same pass |
@@ -34,9 +34,9 @@
 //!
 //! The paper says always. Measured, that holds for the upwind rule without spin only. Most failures are divisions that
 //! repeat, because Newton–Raphson ends on a root of eq. 9 with some tractions against their slips. So a third run
-//! follows where both guesses fail, which is not in the paper ([`Guess::Continued`]): tractions start from those of the
+//! follows where both guesses fail, which is not in the paper ([`Guess::Continued`](crate::contact::rolling::methods::liu_hsu::initial_guess::Guess::Continued)): tractions start from those of the
 //! division before and stay on their circles, and a root with tractions against their slips is tried again with these
-//! turned round. The rules of second order come to it by way of an upwind solution ([`solve_by_upwind`]). Of 109 motions
+//! turned round. The rules of second order come to it by way of an upwind solution ([`solve_by_upwind`](crate::contact::rolling::methods::liu_hsu::solve::solve_by_upwind)). Of 109 motions
 //! (normalised creepage 0 to 3 in four directions, spin 0 to 20) so many converge, guess 2 with the pole of 25 coarse
 //! cells or guess 1 where there is no spin (`cargo bench --bench convergence_domain` prints more):
 //!
