@@ -36,7 +36,7 @@ pub struct Case {
     pub load: Option<Load>,
     /// One motion, a list of motions, or a sweep.
     pub motion: Motions,
-    /// MethodName and accuracy; `{"method": "auto", "target_error": 0.005}` when left out.
+    /// Method and accuracy; `{"method": "auto", "target_error": 0.005}` when left out.
     #[schema(required = false)]
     pub solver: Solver,
     /// What to compute; `["resultants", "zones"]` when left out.
@@ -309,7 +309,7 @@ pub enum Motions {
     },
 }
 
-/// MotionWords of a wheelset. Exactly one of `angular_velocity_rad_per_s` and `free_rolling_radius_mm` is given.
+/// Motion of a wheelset. Exactly one of `angular_velocity_rad_per_s` and `free_rolling_radius_mm` is given.
 ///
 /// With the speed V, the axle e, the angular velocity ω = Ω e + (roll rate, 0, yaw rate) and r from the wheelset's centre to the
 /// patch, the wheel's material moves with v = (V, lateral velocity, 0) + ω × r; the creepages of a patch with the tangent t and the
@@ -417,7 +417,7 @@ pub struct Solver {
     pub time_limit_s: Option<f64>,
 }
 
-/// The methods a client can choose; each is a file of that name in `contact/rolling/methods`.
+/// The methods a client can choose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = Method)]
