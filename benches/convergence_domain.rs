@@ -28,7 +28,7 @@ fn main() {
         "rule | cells | region | guess 1 | guess 2 | continued | 1 then 2 | all three | guess 1: divisions + steps, \
          diverged/repeats/other | guess 2 | continued | seconds"
     );
-    for rule in [Rule::Upwind, Rule::Mirror, Rule::Trapezoid] {
+    for rule in [Rule::Upwind, Rule::ThreePoint, Rule::Trapezoid] {
         for (strips, grading, name) in [
             (5, Grading::uniform(5), "5 x 5 equal"),
             (10, Grading::uniform(10), "10 x 10 equal"),

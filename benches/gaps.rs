@@ -8,7 +8,7 @@ mod machine;
 use std::hint::black_box;
 
 use railhead::contact::case::limits::Limits;
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 
@@ -40,11 +40,14 @@ fn row(case: &Value) -> [f64; 2] {
     let problem = check(&question(case), &Limits::default()).expect("a valid case");
     let time = |work: &dyn Fn()| median((0..REPEATS).map(|_| seconds_of(work).0).collect());
     let normal = time(&|| {
-        let _ = black_box(problem.pressed(&Unwatched));
+        let _ = black_box(problem.pressed(&Unmonitored));
     });
-    let pressed = problem.pressed(&Unwatched).expect("a contact").into_owned();
+    let pressed = problem
+        .pressed(&Unmonitored)
+        .expect("a contact")
+        .into_owned();
     let tangential = time(&|| {
-        let _ = black_box(solve(&pressed, &Unwatched));
+        let _ = black_box(solve(&pressed, &Unmonitored));
     });
     let patches = pressed.region.patches();
     let off =

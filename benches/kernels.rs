@@ -5,9 +5,9 @@ use std::hint::black_box;
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use railhead::contact::case::limits::Limits;
 use railhead::contact::half_space::strip_operator::kind::Precision;
-use railhead::contact::half_space::strip_operator::operator::{Differences, Scratch};
+use railhead::contact::half_space::strip_operator::operator::{OperatorScratch, StripOperator};
 use railhead::contact::mesh::strips::{Chord, Grading, Mesh, equal_strips};
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use railhead::contact::{check, solve};
 use serde_json::json;
 
@@ -49,7 +49,9 @@ fn influence(c: &mut Criterion) {
         for (name, folded, precision) in kinds() {
             let id = BenchmarkId::new(name, format!("{cells}x{strips}"));
             group.bench_with_input(id, &mesh, |b, mesh| {
-                b.iter(|| Differences::new(black_box(mesh), 0.28, folded, precision, &Unwatched));
+                b.iter(|| {
+                    StripOperator::new(black_box(mesh), 0.28, folded, precision, &Unmonitored)
+                });
             });
         }
     }
@@ -61,13 +63,13 @@ fn product(c: &mut Criterion) {
     for (cells, strips) in MESHES {
         let mesh = circle(cells, strips);
         for (name, folded, precision) in kinds() {
-            let differences = Differences::new(&mesh, 0.28, folded, precision, &Unwatched)
+            let differences = StripOperator::new(&mesh, 0.28, folded, precision, &Unmonitored)
                 .expect("never stopped");
             let t: Vec<f64> = (0..differences.padded(None))
                 .map(|i| (i as f64).sin())
                 .collect();
             let rows = (cells + 2) * strips;
-            let mut scratch = Scratch::default();
+            let mut scratch = OperatorScratch::default();
             let (mut ux, mut uy) = (vec![0.0; rows], vec![0.0; rows]);
             group.bench_function(BenchmarkId::new(name, format!("{cells}x{strips}")), |b| {
                 b.iter(|| {
@@ -119,7 +121,9 @@ fn cases(c: &mut Criterion) {
             "outputs": outputs,
         });
         let problem = check(&case, &Limits::default()).expect("a valid case");
-        group.bench_function(name, |b| b.iter(|| solve(black_box(&problem), &Unwatched)));
+        group.bench_function(name, |b| {
+            b.iter(|| solve(black_box(&problem), &Unmonitored))
+        });
     }
     group.finish();
 }

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use railhead::contact::case::limits::Limits;
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use railhead::contact::solution::words::Solution;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
@@ -60,7 +60,7 @@ fn main() -> ExitCode {
 
 fn solved(case: &Value) -> Result<Solution, String> {
     let problem = check(case, &Limits::default()).map_err(|error| error.to_string())?;
-    let answer = solve(&problem, &Unwatched).map_err(|error| error.to_string())?;
+    let answer = solve(&problem, &Unmonitored).map_err(|error| error.to_string())?;
     Ok(answer.0)
 }
 

@@ -2,7 +2,7 @@
 
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use serde_json::{Value, json};
 
 const POINTS: u32 = 81;
@@ -23,7 +23,7 @@ fn case(motion: &Value, target: f64) -> Value {
 /// Estimates of all motions of a case, and the cells of their meshes.
 fn estimates(case: &Value) -> Vec<(f64, u32)> {
     let problem = contact::check(case, &Limits::default()).expect("a sound case");
-    let (solution, _) = contact::solve(&problem, &Unwatched).expect("an answer");
+    let (solution, _) = contact::solve(&problem, &Unmonitored).expect("an answer");
     let points = solution.patches[0].points.iter();
     let of = |point: &contact::solution::words::PointSolution| {
         let mesh = point.solver.mesh;

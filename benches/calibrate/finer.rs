@@ -6,11 +6,11 @@ use railhead::contact;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::case::problem::Problem;
 use railhead::contact::error::SolveError;
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use railhead::contact::normal::patch::Patch;
 use railhead::contact::normal::region::Region;
 use railhead::contact::rolling::mesh_plan::Regime;
-use railhead::contact::rolling::refinement::level_solve::{Asked, climb};
+use railhead::contact::rolling::refinement::level_solve::{MotionTask, solve_level};
 use railhead::contact::rolling::refinement::levels::Ladder;
 use railhead::contact::rolling::refinement::resolution::Resolution;
 use railhead::contact::rolling::regime::regime;
@@ -40,7 +40,7 @@ pub fn find(class: Class, case: &Value) -> Result<Truth, String> {
     let mut fine = case.clone();
     fine["solver"] = json!({ "target_error": TARGET_GAP });
     let problem = contact::check(&fine, &Limits::default()).map_err(|e| e.to_string())?;
-    let pressed = problem.pressed(&Unwatched).map_err(|e| e.to_string())?;
+    let pressed = problem.pressed(&Unmonitored).map_err(|e| e.to_string())?;
     let (value, change) = two_meshes(&pressed).map_err(|e| e.to_string())?;
     let frame = frame_of(&pressed);
     let mut uncertainty = change + LEAST;
@@ -50,7 +50,7 @@ pub fn find(class: Class, case: &Value) -> Result<Truth, String> {
         let mut coarse = case.clone();
         coarse["solver"] = json!({ "target_error": 0.001 });
         let problem = contact::check(&coarse, &Limits::default()).map_err(|e| e.to_string())?;
-        let coarse = problem.pressed(&Unwatched).map_err(|e| e.to_string())?;
+        let coarse = problem.pressed(&Unmonitored).map_err(|e| e.to_string())?;
         let other = [&pressed, &coarse].map(|problem| {
             one_mesh(problem, 256)
                 .map(|(sum, _)| frame.relative(sum))
@@ -109,7 +109,7 @@ fn one_mesh(problem: &Problem, cells: u32) -> Result<(Resultants, usize), SolveE
         strips: 8,
         cells: 8,
     });
-    let asked = Asked {
+    let asked = MotionTask {
         index: 0,
         motion: problem.motions[0],
     };
@@ -117,19 +117,19 @@ fn one_mesh(problem: &Problem, cells: u32) -> Result<(Resultants, usize), SolveE
     let task = exact.rolling_task(&footprint);
     let mut ladder = Ladder::new(&task, &Arc::default());
     let plan = ladder.policy.plan(64, Regime::Unknown);
-    let mut solved = climb(&task, &mut ladder, asked, plan, None, &Unwatched)?;
+    let mut solved = solve_level(&task, &mut ladder, asked, plan, None, &Unmonitored)?;
     for cells in [256, cells] {
         let level = ladder.get(solved.point.level);
         let spinning = asked.motion.spin_per_mm != 0.0;
         let found = regime(level, &solved.point.tangential, spinning);
         let plan = ladder.policy.plan(cells, found);
-        solved = climb(
+        solved = solve_level(
             &task,
             &mut ladder,
             asked,
             plan,
             Some(solved.point),
-            &Unwatched,
+            &Unmonitored,
         )?;
     }
     let zero = Resultants::default();
@@ -142,7 +142,7 @@ fn of_profiles(case: &Value) -> Result<Truth, String> {
     let mut fine = case.clone();
     fine["solver"] = json!({ "target_error": TARGET_PROFILES });
     let problem = contact::check(&fine, &Limits::default()).map_err(|e| e.to_string())?;
-    let (solution, _) = contact::solve(&problem, &Unwatched).map_err(|e| e.to_string())?;
+    let (solution, _) = contact::solve(&problem, &Unmonitored).map_err(|e| e.to_string())?;
     let limit = problem.friction * normal_force(&solution);
     let value = tangential(&solution).map(|force| force / limit);
     let estimate = estimate(&solution).ok_or("no estimate")? / limit;

@@ -17,7 +17,7 @@ mod truth;
 use cpu_time::ThreadTime;
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use serde_json::json;
 
 use population::{Class, case};
@@ -108,7 +108,7 @@ fn tables(class: Class, truths: &Truths, each: bool) {
             question["solver"] = json!({ "target_error": target });
             let problem = contact::check(&question, &Limits::default()).expect("a sound case");
             let began = ThreadTime::now();
-            let (solution, _) = match contact::solve(&problem, &Unwatched) {
+            let (solution, _) = match contact::solve(&problem, &Unmonitored) {
                 Ok(found) => found,
                 Err(error) => {
                     println!("{} {number} at {target}: {error}", class.name());

@@ -8,7 +8,7 @@ mod drawing;
 use std::path::{Path, PathBuf};
 
 use railhead::contact::case::limits::Limits;
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use railhead::contact::post::outlines::outline::{outlines, patch_outline};
 use railhead::contact::post::zone::Zone;
 use railhead::contact::rolling::motion::Motion;
@@ -66,7 +66,7 @@ impl Figure {
             ..Limits::default()
         };
         let problem = check(&case, &limits).expect("a valid case");
-        let (solution, fields) = solve(&problem, &Unwatched).expect("an answer");
+        let (solution, fields) = solve(&problem, &Unmonitored).expect("an answer");
         let lengths = solution.patches.iter().map(|patch| patch.extent_mm);
         let half_length = lengths.map(|e| 0.5 * (e[1] - e[0])).fold(0.0, f64::max);
         let forces = solution.patches.iter().map(|patch| patch.normal_force_n);

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use railhead::contact::case::limits::Limits;
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use railhead::jobs::recipe::Recipe;
 use serde_json::{Value, json};
 
@@ -79,6 +79,6 @@ pub fn bare_rate(threads: usize, time: Duration, case: impl Fn(usize) -> Value +
 fn solve_one(recipe: &Recipe, case: &Value) {
     let problem = (recipe.check)(case, &Limits::default()).expect("a case");
     for slice in (recipe.slices)(&problem) {
-        (recipe.solve)(&problem, slice, &Unwatched).expect("a solution");
+        (recipe.solve)(&problem, slice, &Unmonitored).expect("a solution");
     }
 }

@@ -5,9 +5,9 @@ use std::fmt::Write as _;
 use std::hint::black_box;
 
 use railhead::contact::case::problem::Problem;
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use railhead::contact::normal::region::Region;
-use railhead::contact::normal::wheel_height::search::{Accuracy, Wanted};
+use railhead::contact::normal::wheel_height::search::{Accuracy, NormalPass};
 use railhead::contact::solution::words::Solution;
 use serde_json::{Value, json};
 
@@ -61,7 +61,7 @@ fn table<'a>(cases: impl Iterator<Item = &'a Value>, lu: f64) -> String {
         let problem = problem(&question(case));
         let (solution, seconds) = timed(&problem, REPEATS);
         let press = || {
-            let _ = black_box(problem.pressed(&Unwatched));
+            let _ = black_box(problem.pressed(&Unmonitored));
         };
         let pressing = median((0..REPEATS).map(|_| seconds_of(press).0).collect());
         let solution = solution.expect("an answer");
@@ -238,14 +238,14 @@ fn at_rest(problem: &Problem) -> (f64, u32) {
     let Region::Profiles(contact) = &problem.region else {
         unreachable!("the examples give profiles")
     };
-    let wanted = Wanted {
+    let wanted = NormalPass {
         friction_share: 0.0,
         accuracy: Accuracy::For(0.005),
     };
     let rest = || {
         let search = contact.search().expect("a wheel over a rail");
         contact
-            .press(&search, wanted, None, &Unwatched)
+            .press(&search, wanted, None, &Unmonitored)
             .expect("a rest")
             .heights
     };

@@ -2,7 +2,7 @@
 
 use railhead::contact::case::limits::Limits;
 use railhead::contact::case::problem::Problem;
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use railhead::contact::solution::words::{Solution, Total};
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
@@ -59,12 +59,12 @@ pub fn problem(question: &Value) -> Problem {
 
 /// The answer if there is one, and the median time of a solve over `repeats`, fewer where one takes long.
 pub fn timed(problem: &Problem, repeats: usize) -> (Option<Solution>, f64) {
-    let (first, answer) = seconds_of(|| solve(problem, &Unwatched));
+    let (first, answer) = seconds_of(|| solve(problem, &Unmonitored));
     let Ok((solution, _)) = answer else {
         return (None, first);
     };
     let repeats = if first > 0.1 { 1 } else { repeats };
-    let seconds = (0..repeats).map(|_| seconds_of(|| solve(problem, &Unwatched)).0);
+    let seconds = (0..repeats).map(|_| seconds_of(|| solve(problem, &Unmonitored)).0);
     (Some(solution), median(seconds.collect()))
 }
 

@@ -5,7 +5,7 @@ use std::hint::black_box;
 use std::sync::Arc;
 
 use railhead::contact::case::problem::Problem;
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::operator_store::OperatorStore;
 use railhead::contact::{solve, solve_with};
 use serde_json::{Value, json};
@@ -111,12 +111,12 @@ fn one_shape(lu: f64) -> String {
     let store = Arc::new(OperatorStore::default());
     let (alone, _) = seconds_of(|| {
         for problem in &problems {
-            let _ = black_box(solve(problem, &Unwatched));
+            let _ = black_box(solve(problem, &Unmonitored));
         }
     });
     let (kept, _) = seconds_of(|| {
         for problem in &problems {
-            let _ = black_box(solve_with(&store, problem, &Unwatched));
+            let _ = black_box(solve_with(&store, problem, &Unmonitored));
         }
     });
     let each = |seconds: f64| seconds / lu / f64::from(CASES_OF_A_SHAPE);
@@ -143,7 +143,7 @@ fn cost(motion: &Value, outputs: &Value, friction: f64) -> Cost {
     Cost {
         seconds,
         products: points.iter().map(|p| p.solver.products).sum(),
-        allocations: during(|| solve(&problem, &Unwatched)),
+        allocations: during(|| solve(&problem, &Unmonitored)),
     }
 }
 

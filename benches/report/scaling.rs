@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use railhead::contact::half_space::strip_operator::kind::Precision;
 use railhead::contact::half_space::strip_operator::operator;
-use railhead::contact::monitor::Unwatched;
-use railhead::contact::rolling::refinement::level_solve::Asked;
+use railhead::contact::monitor::Unmonitored;
+use railhead::contact::rolling::refinement::level_solve::MotionTask;
 use railhead::contact::rolling::refinement::levels::Ladder;
 use railhead::contact::rolling::refinement::refine;
 use serde_json::json;
@@ -40,14 +40,14 @@ pub fn section(lu: f64, pictures: &Path) -> String {
             "outputs": ["resultants"],
         }));
         let seconds = timed(&problem, 3).1;
-        let asked = Asked {
+        let asked = MotionTask {
             index: 0,
             motion: problem.motions[0],
         };
         let footprint = problem.footprint();
         let task = problem.rolling_task(&footprint);
         let mut ladder = Ladder::new(&task, &Arc::default());
-        let point = refine::solve(&task, &mut ladder, asked, &Unwatched).expect("an answer");
+        let point = refine::solve(&task, &mut ladder, asked, &Unmonitored).expect("an answer");
         let cells = (side * side) as usize;
         let bytes = operator::bytes(cells, side as usize, true, Precision::Double) as f64;
         let size = Size {

@@ -6,10 +6,10 @@ use faer::Mat;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::check;
 use railhead::contact::mesh::size::MeshSize;
-use railhead::contact::monitor::Unwatched;
-use railhead::contact::rolling::slip_equations::Equations;
+use railhead::contact::monitor::Unmonitored;
+use railhead::contact::rolling::slip_equations::SlipEquations;
 use railhead::contact::rolling::slip_rules::Rule;
-use railhead::contact::rolling::strip_mesh::Level;
+use railhead::contact::rolling::strip_mesh::StripMesh;
 use serde_json::json;
 
 /// Largest over smallest singular value of the map of a rule, ν = 0.28.
@@ -24,14 +24,14 @@ fn condition(a_over_b: f64, strips: u32, cells: u32, rule: Rule) -> f64 {
     });
     let problem = check(&case, &Limits::default()).expect("a valid case");
     let footprint = problem.footprint();
-    let level = Level::new(
+    let level = StripMesh::new(
         &problem.rolling_task(&footprint),
         MeshSize { strips, cells },
     )
     .expect("a mesh");
-    let operator = level.operator(&Unwatched).expect("never stopped");
-    let equations = Equations::new(rule, &level.normalised, &operator.influence, None);
-    let values = equations.dense(&Unwatched).expect("never stopped");
+    let operator = level.operator(&Unmonitored).expect("never stopped");
+    let equations = SlipEquations::new(rule, &level.normalised, &operator.influence, None);
+    let values = equations.dense(&Unmonitored).expect("never stopped");
     let n = 2 * equations.cells();
     let matrix = Mat::from_fn(n, n, |i, j| values[j * n + i]);
     let singular = matrix.singular_values().expect("singular values");
@@ -53,7 +53,7 @@ pub fn section() -> String {
         (0.02, 12, 12),
         (50.0, 12, 12),
     ] {
-        let [mirror, trapezoid, upwind] = [Rule::Mirror, Rule::Trapezoid, Rule::Upwind]
+        let [mirror, trapezoid, upwind] = [Rule::ThreePoint, Rule::Trapezoid, Rule::Upwind]
             .map(|rule| condition(a_over_b, strips, cells, rule));
         let _ = writeln!(
             text,

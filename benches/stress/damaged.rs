@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::geometry::formats::format::{Format, read};
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use railhead::contact::solution::words::Solution;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
@@ -338,7 +338,7 @@ pub fn with(
 /// The answer, if there is one.
 pub fn answer(case: &Value) -> Option<Solution> {
     let problem = check(case, &Limits::default()).ok()?;
-    solve(&problem, &Unwatched)
+    solve(&problem, &Unmonitored)
         .ok()
         .map(|(solution, _)| solution)
 }

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use railhead::contact::case::limits::Limits;
 use railhead::contact::case::problem::Problem;
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::operator_store::OperatorStore;
 use railhead::contact::{check, solve, solve_with};
 use serde_json::{Value, json};
@@ -65,7 +65,7 @@ pub fn creep_maps() -> String {
         let store = Arc::new(OperatorStore::default());
         let problem = creep_map(side);
         let began = Instant::now();
-        let (solution, _) = solve_with(&store, &problem, &Unwatched).expect("an answer");
+        let (solution, _) = solve_with(&store, &problem, &Unmonitored).expect("an answer");
         let seconds = began.elapsed().as_secs_f64();
         let peak = status("VmHWM:").unwrap_or(f64::NAN) - idle;
         let points = &solution.patches[0].points;
@@ -98,7 +98,7 @@ pub fn with_zones() -> String {
     for target in [0.02, 0.005, 0.002, 0.001] {
         let ask = |outputs: Value| {
             let problem = case(json!(motions), target, &outputs);
-            solve(&problem, &Unwatched).expect("an answer")
+            solve(&problem, &Unmonitored).expect("an answer")
         };
         let (plain, _) = ask(json!(["resultants"]));
         let (full, fields) = ask(json!([

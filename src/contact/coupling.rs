@@ -7,14 +7,14 @@ use crate::contact::answer;
 use crate::contact::case::problem::Problem;
 use crate::contact::case::words::Output;
 use crate::contact::error::SolveError;
-use crate::contact::geometry::contact_locus::Search;
+use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::geometry::wheelset::{WheelsetMotion, creepages};
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::region::Region;
 use crate::contact::normal::wheel_height::search::{
-    Accuracy, Loading, PressedGap, PressedWheel, ProfileContact, Wanted,
+    Accuracy, NormalPass, PressedGap, PressedWheel, WheelLoad, WheelTask,
 };
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
@@ -23,7 +23,7 @@ use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::solution::track_axes::merge;
 use crate::contact::solution::words::{Fields, NormalReport, Solution};
-use crate::contact::time_limit::Watch;
+use crate::contact::time_limit::TimeLimit;
 
 /// The vertical force may be missed by this part of it, and by this part of the target error if that is less; the bound for
 /// a change of friction's share in one round.
@@ -55,14 +55,14 @@ const TOLERANCE_FIRST: f64 = 0.1;
 pub(crate) fn solve(
     operators: &Arc<OperatorStore>,
     problem: &Problem,
-    contact: &ProfileContact,
+    contact: &WheelTask,
     judge: &dyn Judge,
     monitor: &dyn Monitor,
 ) -> Result<Found, SolveError> {
     let search = contact
         .search()
         .map_err(|reason| SolveError::NormalProblem { reason })?;
-    let vertical = matches!(contact.loading, Loading::Vertical(_)) && problem.friction > 0.0;
+    let vertical = matches!(contact.loading, WheelLoad::Vertical(_)) && problem.friction > 0.0;
     let solve = WheelSolve {
         operators,
         problem,
@@ -100,23 +100,23 @@ pub(crate) trait Judge {
 struct WheelSolve<'a> {
     operators: &'a Arc<OperatorStore>,
     problem: &'a Problem,
-    contact: &'a ProfileContact,
-    search: Search<'a>,
+    contact: &'a WheelTask,
+    search: ContactLocus<'a>,
     balanced: bool,
     judge: &'a dyn Judge,
     monitor: &'a dyn Monitor,
 }
 
 impl WheelSolve<'_> {
-    fn exactly(&self, friction_share: f64) -> Wanted {
-        Wanted {
+    fn exactly(&self, friction_share: f64) -> NormalPass {
+        NormalPass {
             friction_share,
             accuracy: Accuracy::For(self.problem.target()),
         }
     }
 
-    fn rest(&self, wanted: Wanted, before: Option<&PressedWheel>) -> Result<Rest, SolveError> {
-        let watch = Watch::new(self.monitor, self.problem.time_limit, 1);
+    fn rest(&self, wanted: NormalPass, before: Option<&PressedWheel>) -> Result<Rest, SolveError> {
+        let watch = TimeLimit::new(self.monitor, self.problem.time_limit, 1);
         let began = self.monitor.elapsed();
         let wheel = self.contact.press(&self.search, wanted, before, &watch);
         let wheel = wheel.map_err(|failure| watch.explained(failure.into(), self.problem))?;
@@ -155,7 +155,7 @@ impl WheelSolve<'_> {
             outputs: vec![Output::Resultants],
             ..problem.clone()
         };
-        let about = Wanted {
+        let about = NormalPass {
             friction_share: 0.0,
             accuracy: Accuracy::About(TOLERANCE_FIRST),
         };
@@ -306,7 +306,7 @@ impl Rest {
     fn found(
         mut self,
         problem: &Problem,
-        contact: &ProfileContact,
+        contact: &WheelTask,
         answers: Vec<(Solution, Fields)>,
     ) -> Found {
         let part = match problem.resolution {
@@ -339,11 +339,11 @@ impl Rest {
         &self,
         operators: &Arc<OperatorStore>,
         problem: &Problem,
-        contact: &ProfileContact,
+        contact: &WheelTask,
         monitor: &dyn Monitor,
     ) -> Result<Vec<(Solution, Fields)>, SolveError> {
         let parts = self.wheel.patches.len();
-        let watch = Watch::new(monitor, problem.time_limit, parts * problem.motions.len());
+        let watch = TimeLimit::new(monitor, problem.time_limit, parts * problem.motions.len());
         let mut answers = Vec::with_capacity(parts);
         for (k, gap) in self.wheel.patches.iter().enumerate() {
             // What all parts share is charged to the first.

@@ -32,13 +32,13 @@ use crate::contact::normal::region::Region;
 use crate::contact::profile_trust::trust;
 use crate::contact::rolling::force_control;
 use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::rolling::refinement::level_solve::Point;
+use crate::contact::rolling::refinement::level_solve::MotionAnswer;
 use crate::contact::rolling::refinement::levels::Ladder;
 use crate::contact::slices::{slices, solve_slice};
 use crate::contact::solution::assemble::Assembly;
 use crate::contact::solution::finish::{finish, share_seconds};
 use crate::contact::solution::words::{Fields, Solution};
-use crate::contact::time_limit::Watch;
+use crate::contact::time_limit::TimeLimit;
 
 /// Reads and checks a case.
 ///
@@ -98,7 +98,7 @@ fn solve_whole(
     let answer = if let Region::Profiles(contact) = &problem.region {
         trust::solve(operators, problem, contact, monitor)?
     } else {
-        let watch = Watch::new(monitor, problem.time_limit, problem.motions.len());
+        let watch = TimeLimit::new(monitor, problem.time_limit, problem.motions.len());
         let pressed = problem.pressed(&watch);
         let pressed = pressed.map_err(|error| watch.explained(error, problem))?;
         answer(operators, pressed.as_ref(), &watch)?
@@ -110,7 +110,7 @@ fn solve_whole(
 fn answer(
     operators: &Arc<OperatorStore>,
     problem: &Problem,
-    watch: &Watch,
+    watch: &TimeLimit,
 ) -> Result<(Solution, Fields), SolveError> {
     let answer = motions(operators, problem, watch);
     let (mut solution, fields) = answer.map_err(|error| watch.explained(error, problem))?;
@@ -121,13 +121,13 @@ fn answer(
 fn motions(
     operators: &Arc<OperatorStore>,
     problem: &Problem,
-    watch: &Watch,
+    watch: &TimeLimit,
 ) -> Result<(Solution, Fields), SolveError> {
     let footprint = problem.footprint();
     let task = problem.rolling_task(&footprint);
     let mut ladder = Ladder::new(&task, operators);
     let mut assembly = Assembly::new(problem);
-    let mut before: Option<Point> = None;
+    let mut before: Option<MotionAnswer> = None;
     for index in 0..problem.motions.len() {
         let mut point = force_control::solve(&task, &mut ladder, index, before.as_ref(), watch)?;
         if index == 0 {

@@ -22,9 +22,9 @@ pub trait Monitor {
 
 /// Never stops a solve and measures no time; for tests and for callers that just want the answer.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Unwatched;
+pub struct Unmonitored;
 
-impl Monitor for Unwatched {
+impl Monitor for Unmonitored {
     fn tick(&self, _progress: f64) -> ControlFlow<Stop> {
         ControlFlow::Continue(())
     }

@@ -8,21 +8,21 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 /// The monitor of a whole case: adds the case's own time limit and turns motions done into progress.
-pub(crate) struct Watch<'a> {
+pub(crate) struct TimeLimit<'a> {
     inner: &'a dyn Monitor,
     time_limit: Option<Duration>,
     motions: usize,
     done: Cell<usize>,
 }
 
-impl<'a> Watch<'a> {
+impl<'a> TimeLimit<'a> {
     /// Watches a case of so many motions.
     pub(crate) fn new(
         inner: &'a dyn Monitor,
         time_limit: Option<Duration>,
         motions: usize,
-    ) -> Watch<'a> {
-        Watch {
+    ) -> TimeLimit<'a> {
+        TimeLimit {
             inner,
             time_limit,
             motions,
@@ -49,7 +49,7 @@ impl<'a> Watch<'a> {
     }
 }
 
-impl Monitor for Watch<'_> {
+impl Monitor for TimeLimit<'_> {
     fn tick(&self, _progress: f64) -> ControlFlow<Stop> {
         if self
             .time_limit

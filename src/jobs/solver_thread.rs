@@ -323,7 +323,7 @@ mod tests {
     use super::*;
     use crate::contact;
     use crate::contact::case::limits::Limits;
-    use crate::contact::monitor::Unwatched;
+    use crate::contact::monitor::Unmonitored;
     use crate::jobs::recipe::Recipe;
 
     #[test]
@@ -342,7 +342,7 @@ mod tests {
         let mut parts = Vec::new();
         let mut whole: Option<(Solution, Fields)> = None;
         for cut in [0..3, 3..5, 5..7] {
-            let (solution, fields) = (recipe.solve)(&problem, cut, &Unwatched).unwrap();
+            let (solution, fields) = (recipe.solve)(&problem, cut, &Unmonitored).unwrap();
             parts.push(Encoded {
                 solution: Bytes::from(serde_json::to_vec(&solution).unwrap()),
                 fields: Some(Bytes::from(fields::encode(&fields).unwrap())),

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use railhead::contact::case::limits::Limits;
-use railhead::contact::monitor::{Monitor, Stop, Unwatched};
+use railhead::contact::monitor::{Monitor, Stop, Unmonitored};
 use railhead::contact::remark::entry::RemarkEntry;
 use railhead::contact::solution::words::Solution;
 use railhead::contact::{check, solve};
@@ -16,7 +16,7 @@ use crate::gap_samples::{profile, spread};
 
 fn answer(case: &Value) -> Solution {
     let problem = check(case, &Limits::default()).unwrap_or_else(|error| panic!("{error}"));
-    solve(&problem, &Unwatched)
+    solve(&problem, &Unmonitored)
         .unwrap_or_else(|error| panic!("{error}"))
         .0
 }

@@ -1,9 +1,9 @@
 //! Where `liu_hsu` converges, counted over the same motions on every region.
 
 use railhead::contact::mesh::strips::Grading;
-use railhead::contact::monitor::Unwatched;
-use railhead::contact::rolling::methods::liu_hsu::active_set::{Attempt, Exit};
-use railhead::contact::rolling::methods::liu_hsu::initial_guess::Guess;
+use railhead::contact::monitor::Unmonitored;
+use railhead::contact::rolling::methods::liu_hsu::active_set::{ZonesExit, ZonesRun};
+use railhead::contact::rolling::methods::liu_hsu::initial_guess::InitialGuess;
 use railhead::contact::rolling::methods::liu_hsu::solve::{
     coarse_pole, solve_by_upwind, solve_with,
 };
@@ -97,18 +97,18 @@ pub fn count(region: Region, rule: Rule, mesh: (usize, &Grading), motions: &[[f6
         let (rigid, rigid_coarse) = (on_fine.rigid(&motion), on_coarse.rigid(&motion));
         let stage = fine.stage(&on_fine, &rigid, motion, 1e-8);
         let first_stage = coarse.stage(&on_coarse, &rigid_coarse, motion, 1e-8);
-        let pole = coarse_pole(&first_stage, &Unwatched).unwrap();
+        let pole = coarse_pole(&first_stage, &Unmonitored).unwrap();
         let mut converges = [false; 3];
         for (k, guess) in [
-            Guess::RigidSlip,
-            pole.map_or(Guess::RigidSlip, Guess::SpinPole),
-            Guess::Continued,
+            InitialGuess::RigidSlip,
+            pole.map_or(InitialGuess::RigidSlip, InitialGuess::SpinPole),
+            InitialGuess::Continued,
         ]
         .into_iter()
         .enumerate()
         {
             t.fill(0.0);
-            let outcome = solve_with(&stage, guess, &mut t, &Unwatched).unwrap();
+            let outcome = solve_with(&stage, guess, &mut t, &Unmonitored).unwrap();
             converges[k] = outcome.converged;
             counts.note(k, outcome.last());
         }
@@ -121,7 +121,7 @@ pub fn count(region: Region, rule: Rule, mesh: (usize, &Grading), motions: &[[f6
         let upwind = fine.stage(&on_upwind, &rigid, motion, 1e-8);
         t.fill(0.0);
         let shipped = paper
-            || solve_by_upwind(&stage, &upwind, None, &mut t, &Unwatched)
+            || solve_by_upwind(&stage, &upwind, None, &mut t, &Unmonitored)
                 .unwrap()
                 .converged;
         counts.shipped += usize::from(shipped);
@@ -130,14 +130,14 @@ pub fn count(region: Region, rule: Rule, mesh: (usize, &Grading), motions: &[[f6
 }
 
 impl Counts {
-    fn note(&mut self, k: usize, attempt: &Attempt) {
+    fn note(&mut self, k: usize, attempt: &ZonesRun) {
         match attempt.exit {
-            Exit::Converged => {
+            ZonesExit::Converged => {
                 self.work[k][0] += attempt.outer_iterations;
                 self.work[k][1] += attempt.newton_iterations;
             }
-            Exit::NewtonDiverged => self.failures[k][0] += 1,
-            Exit::ZonesRepeat => self.failures[k][1] += 1,
+            ZonesExit::NewtonDiverged => self.failures[k][0] += 1,
+            ZonesExit::ZonesRepeat => self.failures[k][1] += 1,
             _ => self.failures[k][2] += 1,
         }
     }

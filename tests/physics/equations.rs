@@ -3,8 +3,8 @@
 
 use railhead::contact::half_space::kernels::{Rectangle, rectangle};
 use railhead::contact::mesh::strips::Grading;
-use railhead::contact::monitor::Unwatched;
-use railhead::contact::rolling::methods::liu_hsu::initial_guess::Guess;
+use railhead::contact::monitor::Unmonitored;
+use railhead::contact::rolling::methods::liu_hsu::initial_guess::InitialGuess;
 use railhead::contact::rolling::methods::liu_hsu::solve::solve_with;
 use railhead::contact::rolling::slip_rules::Rule;
 use serde::Deserialize;
@@ -168,7 +168,7 @@ fn liu_hsu_has_the_same_digits_where_guess_1_converges() {
     for value in &values {
         let contact = contact(&value.region);
         let (t, outcome) = on_stage(&contact, value.rule(), value.motion, 1e-10, |stage, t| {
-            solve_with(stage, Guess::RigidSlip, t, &Unwatched).unwrap()
+            solve_with(stage, InitialGuess::RigidSlip, t, &Unmonitored).unwrap()
         });
         if !outcome.converged {
             continue;

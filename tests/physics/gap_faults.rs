@@ -4,7 +4,7 @@ use railhead::contact;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::check;
 use railhead::contact::error::SolveError;
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, faults, good_with, with};
@@ -27,7 +27,7 @@ fn bowl() -> Value {
 
 fn reason(case: &Value) -> String {
     let problem = check(case, &Limits::default()).unwrap_or_else(|e| panic!("{e}"));
-    match contact::solve(&problem, &Unwatched) {
+    match contact::solve(&problem, &Unmonitored) {
         Err(SolveError::NormalProblem { reason }) => reason,
         other => panic!("{other:?}"),
     }
@@ -190,7 +190,7 @@ fn a_contact_just_inside_the_data_is_solved() {
     let y = spread(-5.9, 5.9, 31);
     let contact = profile(460.0, &y, |y| y * y / 600.0);
     let problem = check(&good_with("/contact", contact), &Limits::default()).unwrap();
-    let (solution, _) = contact::solve(&problem, &Unwatched).unwrap();
+    let (solution, _) = contact::solve(&problem, &Unmonitored).unwrap();
     assert!(
         (solution.patches[0].area_mm2 / 122.27 - 1.0).abs() < 0.01,
         "{:?}",
@@ -209,7 +209,7 @@ fn nearly_conformal_and_overloaded_contacts_carry_a_remark() {
             Some(json!({ "normal_force_n": force })),
         );
         let problem = check(&case, &Limits::default()).unwrap();
-        contact::solve(&problem, &Unwatched).unwrap().0.remarks
+        contact::solve(&problem, &Unmonitored).unwrap().0.remarks
     };
     assert!(
         warned(20.0, 20.0, 2e6)

@@ -14,8 +14,8 @@ use railhead::contact::case::limits::Limits;
 use railhead::contact::check;
 use railhead::contact::error::SolveError;
 use railhead::contact::half_space::kernels::{Rectangle, rectangle};
-use railhead::contact::monitor::{Monitor, Stop, Unwatched};
-use railhead::contact::normal::gap::surface::Gap;
+use railhead::contact::monitor::{Monitor, Stop, Unmonitored};
+use railhead::contact::normal::gap::surface::GapSurface;
 use railhead::contact::solution::words::{Fields, Solution};
 use serde_json::{Value, json};
 
@@ -114,16 +114,16 @@ fn samples(count: usize) -> Vec<Sample> {
 }
 
 /// The gap as the solver sees it: a smooth surface through the samples.
-fn surface(contact: &Value) -> Gap {
+fn surface(contact: &Value) -> GapSurface {
     let list = |name: &str| -> Vec<f64> {
         serde_json::from_value(contact[name].clone()).expect("numbers")
     };
     if contact["type"] == "gap_profile" {
         let rolling = contact["rolling_mm"].as_f64().expect("a radius");
-        return Gap::profile(rolling, &list("y_mm"), &list("gap_mm"));
+        return GapSurface::profile(rolling, &list("y_mm"), &list("gap_mm"));
     }
     let rows: Vec<Vec<f64>> = serde_json::from_value(contact["gap_mm"].clone()).expect("rows");
-    Gap::grid(&list("x_mm"), &list("y_mm"), &rows)
+    GapSurface::grid(&list("x_mm"), &list("y_mm"), &rows)
 }
 
 /// Largest distance of the deformed surfaces over the inner cells of the tangential mesh, relative to the depth to which
@@ -185,7 +185,7 @@ fn solve(sample: &Sample) -> Result<Outcome, String> {
         Ok(problem) => problem,
         Err(error) => return Ok(Outcome::Refused(error.to_string())),
     };
-    match contact::solve(&problem, &Unwatched) {
+    match contact::solve(&problem, &Unmonitored) {
         Ok((solution, fields)) => {
             let distance = distance_inside(sample, &solution, &fields);
             Ok(Outcome::Solved(Box::new(solution), distance))

@@ -3,7 +3,7 @@
 
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use serde_json::json;
 
 use crate::population::{Class, case};
@@ -40,7 +40,7 @@ fn tally(class: Class, target: f64) -> Tally {
         );
         question["solver"] = json!({ "target_error": target });
         let problem = contact::check(&question, &Limits::default()).expect("a sound case");
-        let (solution, _) = contact::solve(&problem, &Unwatched).expect("an answer");
+        let (solution, _) = contact::solve(&problem, &Unmonitored).expect("an answer");
         let [error, estimate] = judged(class, truth, &solution).expect("an estimate");
         tally.cases += 1;
         if error > truth.uncertainty {

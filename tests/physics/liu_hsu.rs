@@ -5,13 +5,13 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use railhead::contact::mesh::strips::Grading;
-use railhead::contact::monitor::{Monitor, Stop, Unwatched};
+use railhead::contact::monitor::{Monitor, Stop, Unmonitored};
 use railhead::contact::rolling::methods::boundary_element::newton::Newton;
 use railhead::contact::rolling::methods::boundary_element::task::Convergence;
-use railhead::contact::rolling::methods::liu_hsu::active_set::Exit;
-use railhead::contact::rolling::methods::liu_hsu::initial_guess::Guess;
+use railhead::contact::rolling::methods::liu_hsu::active_set::ZonesExit;
+use railhead::contact::rolling::methods::liu_hsu::initial_guess::InitialGuess;
 use railhead::contact::rolling::methods::liu_hsu::solve::{
-    Outcome, coarse_pole, solve, solve_by_upwind, solve_with,
+    ZonesOutcome, coarse_pole, solve, solve_by_upwind, solve_with,
 };
 use railhead::contact::rolling::motion::Motion;
 use railhead::contact::rolling::slip_rules::Rule;
@@ -22,9 +22,14 @@ use crate::regions::{self, Contact, REGIONS, Region, boundary_element, on_stage}
 const CIRCLE: Region = Region::Ellipse { b: 1.0 };
 const RULES: [Rule; 2] = [Rule::Upwind, Rule::Trapezoid];
 
-fn with_guess(contact: &Contact, rule: Rule, state: [f64; 3], guess: Guess) -> (Vec<f64>, Outcome) {
+fn with_guess(
+    contact: &Contact,
+    rule: Rule,
+    state: [f64; 3],
+    guess: InitialGuess,
+) -> (Vec<f64>, ZonesOutcome) {
     on_stage(contact, rule, state, 1e-8, |stage, t| {
-        solve_with(stage, guess, t, &Unwatched).unwrap()
+        solve_with(stage, guess, t, &Unmonitored).unwrap()
     })
 }
 
@@ -34,14 +39,14 @@ fn everything(
     coarse: &Contact,
     rule: Rule,
     state: [f64; 3],
-) -> (Vec<f64>, Outcome) {
+) -> (Vec<f64>, ZonesOutcome) {
     on_stage(fine, rule, state, 1e-8, |stage, t| {
         let motion = regions::motion(state);
         let (upwind, on_coarse) = (fine.equations(Rule::Upwind), coarse.equations(rule));
         let (rigid, rigid_coarse) = (upwind.rigid(&motion), on_coarse.rigid(&motion));
         let first = coarse.stage(&on_coarse, &rigid_coarse, motion, 1e-8);
         let upwind = fine.stage(&upwind, &rigid, motion, 1e-8);
-        solve_by_upwind(stage, &upwind, Some(&first), t, &Unwatched).unwrap()
+        solve_by_upwind(stage, &upwind, Some(&first), t, &Unmonitored).unwrap()
     })
 }
 
@@ -49,7 +54,11 @@ fn pole(contact: &Contact, rule: Rule, state: [f64; 3]) -> Option<[f64; 2]> {
     let equations = contact.equations(rule);
     let motion = regions::motion(state);
     let rigid = equations.rigid(&motion);
-    coarse_pole(&contact.stage(&equations, &rigid, motion, 1e-8), &Unwatched).unwrap()
+    coarse_pole(
+        &contact.stage(&equations, &rigid, motion, 1e-8),
+        &Unmonitored,
+    )
+    .unwrap()
 }
 
 fn largest_difference(a: [f64; 3], b: [f64; 3]) -> f64 {
@@ -196,8 +205,12 @@ fn all_guesses_that_converge_reach_the_same_tractions() {
                 assert_eq!(state[2], 0.0);
                 continue;
             };
-            let runs = [Guess::RigidSlip, Guess::SpinPole(pole), Guess::Continued]
-                .map(|guess| with_guess(&fine, rule, state, guess));
+            let runs = [
+                InitialGuess::RigidSlip,
+                InitialGuess::SpinPole(pole),
+                InitialGuess::Continued,
+            ]
+            .map(|guess| with_guess(&fine, rule, state, guess));
             let mut found = runs.iter().filter(|(_, outcome)| outcome.converged);
             let Some((first, _)) = found.next() else {
                 continue;
@@ -223,8 +236,8 @@ fn reversed_motion_reverses_the_answer_with_either_guess() {
         let (there, back) = (pole_there.unwrap(), pole_back.unwrap());
         assert!((there[0] - back[0]).abs() + (there[1] - back[1]).abs() < 1e-9);
         for (guess, opposite) in [
-            (Guess::RigidSlip, Guess::RigidSlip),
-            (Guess::SpinPole(there), Guess::SpinPole(back)),
+            (InitialGuess::RigidSlip, InitialGuess::RigidSlip),
+            (InitialGuess::SpinPole(there), InitialGuess::SpinPole(back)),
         ] {
             let (t, outcome) = with_guess(&fine, Rule::Trapezoid, state, guess);
             let (r, mirrored) = with_guess(&fine, Rule::Trapezoid, reversed, opposite);
@@ -259,7 +272,7 @@ fn the_spin_pole_lies_between_the_rigid_pole_and_the_trailing_edge() {
 fn tiny_motion_sticks_everywhere_without_a_newton_step() {
     let contact = Contact::new(CIRCLE, 6, &Grading::uniform(5));
     for state in [[0.0, 0.0, 0.0], [1e-9, 0.0, 0.0], [0.0, 1e-9, 1e-9]] {
-        let (t, outcome) = with_guess(&contact, Rule::Trapezoid, state, Guess::RigidSlip);
+        let (t, outcome) = with_guess(&contact, Rule::Trapezoid, state, InitialGuess::RigidSlip);
         assert!(outcome.converged, "{outcome:?}");
         assert_eq!(
             (outcome.outer_iterations(), outcome.newton_iterations()),
@@ -275,7 +288,7 @@ fn tiny_motion_sticks_everywhere_without_a_newton_step() {
 fn large_motion_slips_everywhere_and_carries_friction_times_load() {
     let contact = Contact::new(CIRCLE, 6, &Grading::uniform(5));
     for rule in RULES {
-        let (t, outcome) = with_guess(&contact, rule, [60.0, 80.0, 0.0], Guess::RigidSlip);
+        let (t, outcome) = with_guess(&contact, rule, [60.0, 80.0, 0.0], InitialGuess::RigidSlip);
         assert!(outcome.converged, "{outcome:?}");
         assert!(outcome.slips.iter().all(|slips| *slips));
         let [x, y, _] = contact.forces(&t);
@@ -291,7 +304,7 @@ fn a_cell_without_pressure_carries_nothing_and_slips() {
         contact.bound[cell] = 0.0;
     }
     for state in [[0.3, 0.1, 0.0], [0.2, 0.0, 1.0], [50.0, 0.0, 0.0]] {
-        let (t, outcome) = with_guess(&contact, Rule::Upwind, state, Guess::Continued);
+        let (t, outcome) = with_guess(&contact, Rule::Upwind, state, InitialGuess::Continued);
         assert!(outcome.converged, "{state:?} {outcome:?}");
         let padded = t.len() / 2;
         for cell in [0, 7, 29] {
@@ -311,10 +324,10 @@ fn a_run_without_answer_names_its_end_and_its_residual() {
     let contact = Contact::new(CIRCLE, 10, &Grading::uniform(10));
     let mut ends = Vec::new();
     for state in motions().into_iter().filter(|m| m[2] == 2.0) {
-        let (t, outcome) = with_guess(&contact, Rule::Upwind, state, Guess::RigidSlip);
+        let (t, outcome) = with_guess(&contact, Rule::Upwind, state, InitialGuess::RigidSlip);
         ends.push(outcome.last().exit);
         if !outcome.converged {
-            assert_ne!(outcome.last().exit, Exit::Converged);
+            assert_ne!(outcome.last().exit, ZonesExit::Converged);
             assert!(outcome.residual > 1e-8 && outcome.residual.is_finite());
             assert!(t.iter().all(|value| value.is_finite()));
             let advice = outcome.advice();
@@ -322,7 +335,7 @@ fn a_run_without_answer_names_its_end_and_its_residual() {
             assert!(advice.contains("boundary_element"), "{advice}");
         }
     }
-    assert!(ends.contains(&Exit::ZonesRepeat), "{ends:?}");
+    assert!(ends.contains(&ZonesExit::ZonesRepeat), "{ends:?}");
 }
 
 /// Stops at the given look.

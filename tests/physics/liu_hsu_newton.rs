@@ -1,8 +1,8 @@
 //! The algebra inside `liu_hsu`: the elimination of the stick tractions, and the Newton–Raphson step.
 
 use railhead::contact::mesh::strips::Grading;
-use railhead::contact::monitor::Unwatched;
-use railhead::contact::rolling::methods::liu_hsu::dense_task::Stage;
+use railhead::contact::monitor::Unmonitored;
+use railhead::contact::rolling::methods::liu_hsu::dense_task::DenseTask;
 use railhead::contact::rolling::methods::liu_hsu::newton_raphson::newton_step;
 use railhead::contact::rolling::methods::liu_hsu::stick_block::{
     DenseProblem, SlipSystem, both_components,
@@ -12,19 +12,19 @@ use railhead::contact::rolling::slip_rules::Rule;
 use crate::regions::{self, Contact, Region};
 
 /// A problem with a few, about half, or all of its cells slipping, and tractions that are not on their circles.
-fn half_slipping(check: impl Fn(&DenseProblem, &SlipSystem, &Stage, &[f64])) {
+fn half_slipping(check: impl Fn(&DenseProblem, &SlipSystem, &DenseTask, &[f64])) {
     let contact = Contact::new(Region::Egg, 5, &Grading::cosine(4));
     for rule in [Rule::Upwind, Rule::Trapezoid] {
         let equations = contact.equations(rule);
         let motion = regions::motion([0.3, -0.2, 1.5]);
         let rigid = equations.rigid(&motion);
         let stage = contact.stage(&equations, &rigid, motion, 1e-8);
-        let problem = DenseProblem::new(&stage, &Unwatched).unwrap();
+        let problem = DenseProblem::new(&stage, &Unmonitored).unwrap();
         for share in [1, 2, 20] {
             let slips: Vec<bool> = (0..problem.cells)
                 .map(|i| (7 * i) % 20 < share * 7)
                 .collect();
-            let system = SlipSystem::new(&problem, &slips, &Unwatched).unwrap();
+            let system = SlipSystem::new(&problem, &slips, &Unmonitored).unwrap();
             let n = system.slip_cells.len();
             let t: Vec<f64> = (0..2 * n)
                 .map(|k| 0.4 * (1.0 + 2.3 * k as f64).sin() + 0.1)
@@ -75,7 +75,7 @@ fn a_newton_step_solves_the_equations_linearised_by_differences() {
             let collinear = (0..n).map(|i| slip[i] * t[n + i] - slip[n + i] * t[i]);
             circle.chain(collinear).collect()
         };
-        let step = newton_step(system, &bound, t, &Unwatched).unwrap();
+        let step = newton_step(system, &bound, t, &Unmonitored).unwrap();
         let mut linear = equations(t);
         let largest = linear.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
         for column in 0..2 * n {

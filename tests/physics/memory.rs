@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use railhead::contact::case::limits::Limits;
 use railhead::contact::case::problem::Problem;
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::operator_store::OperatorStore;
 use railhead::contact::solution::words::Solution;
 use railhead::contact::{check, solve_with};
@@ -42,7 +42,7 @@ fn problem(case: &Value) -> Problem {
 
 /// The answer without its times.
 fn answer(store: &Arc<OperatorStore>, problem: &Problem) -> Solution {
-    let (mut solution, _) = solve_with(store, problem, &Unwatched).expect("an answer");
+    let (mut solution, _) = solve_with(store, problem, &Unmonitored).expect("an answer");
     for point in solution.patches.iter_mut().flat_map(|p| &mut p.points) {
         point.solver.seconds = 0.0;
     }

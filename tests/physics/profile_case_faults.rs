@@ -2,7 +2,7 @@
 
 use railhead::contact::case::limits::Limits;
 use railhead::contact::error::SolveError;
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 
@@ -32,7 +32,7 @@ fn columns(points: &[[f64; 2]]) -> String {
 
 fn reason(case: &Value) -> String {
     let problem = check(case, &Limits::default()).unwrap_or_else(|e| panic!("{e}"));
-    match solve(&problem, &Unwatched) {
+    match solve(&problem, &Unmonitored) {
         Err(SolveError::NormalProblem { reason }) => reason,
         other => panic!("{other:?}"),
     }
@@ -303,7 +303,7 @@ fn remarks_on_profiles_are_in_the_answer() {
     points.swap(100, 101);
     let case = changed(RAIL, json!(points));
     let problem = check(&case, &Limits::default()).unwrap();
-    let (solution, _) = solve(&problem, &Unwatched).unwrap();
+    let (solution, _) = solve(&problem, &Unmonitored).unwrap();
     assert!(
         solution
             .remarks

@@ -1,6 +1,6 @@
 //! Are faulty profiles refused, and doubtful ones remarked on?
 
-use railhead::contact::geometry::contact_locus::Search;
+use railhead::contact::geometry::contact_locus::ContactLocus;
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
 use railhead::contact::geometry::wheel_rail::WheelRail;
 use railhead::contact::remark::list::Remark;
@@ -190,7 +190,7 @@ fn a_wheel_beside_the_rail_has_no_contact() {
     apart.lateral_shift = 500.0;
     let geometry = WheelRail::new(rail.clone(), wheel.clone(), apart).unwrap();
     assert!(
-        Search::new(&geometry)
+        ContactLocus::new(&geometry)
             .unwrap_err()
             .contains("no part of the wheel lies above the rail")
     );
@@ -216,6 +216,9 @@ fn a_contact_at_the_end_of_a_profile_is_refused() {
         placement(),
     )
     .unwrap();
-    let fault = Search::new(&geometry).unwrap().frames(0.1).unwrap_err();
+    let fault = ContactLocus::new(&geometry)
+        .unwrap()
+        .frames(0.1)
+        .unwrap_err();
     assert!(fault.contains("end of a profile"), "{fault}");
 }

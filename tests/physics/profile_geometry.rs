@@ -1,6 +1,6 @@
 //! Do wheel and rail touch where they should?
 
-use railhead::contact::geometry::contact_locus::Search;
+use railhead::contact::geometry::contact_locus::ContactLocus;
 use railhead::contact::geometry::formats::format as formats;
 use railhead::contact::geometry::formats::format::Format;
 use railhead::contact::geometry::local_gap::{Detail, LocalGap};
@@ -48,7 +48,7 @@ pub fn roll(profiles: &[Profile; 2], placement: Placement) -> f64 {
             };
             let geometry =
                 WheelRail::new(profiles[0].clone(), profiles[1].clone(), placement).unwrap();
-            Search::new(&geometry).unwrap().touch
+            ContactLocus::new(&geometry).unwrap().touch
         };
         touch(Side::Left) - touch(Side::Right)
     };
@@ -114,7 +114,7 @@ fn manchester(profiles: &[Profile; 2], cant: f64) -> Vec<(f64, f64, f64)> {
             ..unrolled
         };
         let geometry = WheelRail::new(profiles[0].clone(), profiles[1].clone(), placement).unwrap();
-        let search = Search::new(&geometry).unwrap();
+        let search = ContactLocus::new(&geometry).unwrap();
         let touching = search.frames(1e-3).unwrap()[0];
         let lowering = approach / touching.angle.cos();
         let gaps = search.gaps(lowering, Detail::Fine).unwrap();
@@ -166,7 +166,7 @@ fn left_and_right_are_mirror_images() {
         WheelRail::new(profiles[0].clone(), profiles[1].clone(), placement).unwrap()
     });
     let [left, right] = [&left, &right].map(|geometry| {
-        Search::new(geometry)
+        ContactLocus::new(geometry)
             .unwrap()
             .gaps(0.03, Detail::Fine)
             .unwrap()
@@ -210,7 +210,7 @@ fn the_gap_of_a_cone_on_an_arc_has_the_closed_form() {
     )
     .unwrap();
     let lowering = 0.05;
-    let gaps = Search::new(&geometry)
+    let gaps = ContactLocus::new(&geometry)
         .unwrap()
         .gaps(lowering, Detail::Fine)
         .unwrap();
@@ -249,7 +249,7 @@ fn a_larger_clearance_of_the_wheel_makes_the_overlap_smaller_by_as_much() {
         },
     )
     .unwrap();
-    let search = Search::new(&geometry).unwrap();
+    let search = ContactLocus::new(&geometry).unwrap();
     let frame = search.frames(0.02).unwrap()[0];
     let [low, high] = [0.02, 0.03].map(|lowering| {
         geometry

@@ -1,6 +1,6 @@
 //! Do the frames and creepages of wheel and rail agree with CONTACT's? Needs the reference files beside the checkout.
 
-use railhead::contact::geometry::contact_locus::Search;
+use railhead::contact::geometry::contact_locus::ContactLocus;
 use railhead::contact::geometry::formats::format as formats;
 use railhead::contact::geometry::formats::format::Format;
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
@@ -70,7 +70,7 @@ fn frames_and_creepages_agree_with_contact() {
             },
         )
         .unwrap();
-        let search = Search::new(&geometry).unwrap();
+        let search = ContactLocus::new(&geometry).unwrap();
         let lowering = converged("approach_mm") / on_track[3].cos();
         let frames = search.frames(lowering).unwrap();
         assert_eq!(frames.len(), 1, "{}", record["id"]);

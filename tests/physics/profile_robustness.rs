@@ -2,7 +2,7 @@
 
 use railhead::contact::case::limits::Limits;
 use railhead::contact::error::SolveError;
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use railhead::contact::{check, solve};
 use serde_json::json;
 
@@ -31,7 +31,7 @@ fn random_wheelsets_are_balanced_or_refused_with_a_reason() {
         case["motion"] =
             json!({ "wheelset": { "speed_mm_per_s": 20000, "free_rolling_radius_mm": 460 } });
         let problem = check(&case, &Limits::default()).unwrap_or_else(|e| panic!("{k}: {e}"));
-        let solution = match solve(&problem, &Unwatched) {
+        let solution = match solve(&problem, &Unmonitored) {
             Ok((solution, _)) => solution,
             Err(SolveError::NormalProblem { reason }) => {
                 let known = ["end of a profile", "come to balance"];

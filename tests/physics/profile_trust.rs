@@ -2,7 +2,7 @@
 
 use railhead::contact::case::limits::Limits;
 use railhead::contact::error::SolveError;
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use railhead::contact::solution::words::Solution;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
@@ -33,14 +33,14 @@ fn on_rail(rail: &[[f64; 2]]) -> Value {
 
 fn solved(case: &Value) -> Solution {
     let problem = check(case, &Limits::default()).expect("a case");
-    solve(&problem, &Unwatched)
+    solve(&problem, &Unmonitored)
         .unwrap_or_else(|reason| panic!("{reason}"))
         .0
 }
 
 fn refusal(case: &Value) -> (String, String) {
     let problem = check(case, &Limits::default()).expect("a case");
-    match solve(&problem, &Unwatched) {
+    match solve(&problem, &Unmonitored) {
         Err(SolveError::RoughProfile { pointer, reason }) => (pointer, reason),
         other => panic!("{other:?}"),
     }
@@ -191,7 +191,7 @@ fn a_solve_that_fails_on_the_ridge_of_an_outlier_names_the_outlier() {
             let mut case = put(&case, "contact", json!({ "accept_rough_profiles": accept }));
             case["solver"]["method"] = json!(method);
             let problem = check(&case, &Limits::default()).expect("a case");
-            let told = match solve(&problem, &Unwatched) {
+            let told = match solve(&problem, &Unmonitored) {
                 Ok((found, _)) => {
                     let told = found.remarks.iter().find(|r| r.code == "profile-outlier");
                     told.expect("a remark").detail.clone()
@@ -305,7 +305,7 @@ fn a_contact_near_the_end_of_a_profile_is_told_with_what_is_left() {
         .filter(|at| at[0] <= under.y_mm[1] - 1.0)
         .collect();
     let problem = check(&on_rail(&cut), &Limits::default()).expect("a case");
-    let error = solve(&problem, &Unwatched)
+    let error = solve(&problem, &Unmonitored)
         .map(|_| ())
         .expect_err("cut off")
         .to_string();

@@ -2,7 +2,7 @@
 //! the checkout; `profile_conforming.rs` makes a pair of its own and tests the same.
 
 use railhead::contact::case::limits::Limits;
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use railhead::contact::solution::words::Solution;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
@@ -33,7 +33,7 @@ pub fn worn(shift: f64, force: f64, yaw: f64) -> Option<Value> {
 
 pub fn solved(case: &Value) -> Result<Solution, String> {
     let problem = check(case, &Limits::default()).map_err(|e| e.to_string())?;
-    solve(&problem, &Unwatched)
+    solve(&problem, &Unmonitored)
         .map(|(solution, _)| solution)
         .map_err(|e| e.to_string())
 }

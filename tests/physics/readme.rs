@@ -1,7 +1,7 @@
 //! The answer shown in the README is the one that the example has.
 
 use railhead::contact::case::limits::Limits;
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 
@@ -63,7 +63,7 @@ fn filled(shown: &Value, found: &Value, path: &str, differing: &mut Vec<String>)
 fn the_answer_in_the_readme_is_the_one_of_its_example() {
     let case: Value = serde_json::from_str(&read("api/examples/hertz-steel.case.json")).unwrap();
     let problem = check(&case, &Limits::default()).unwrap();
-    let (solution, _) = solve(&problem, &Unwatched).unwrap();
+    let (solution, _) = solve(&problem, &Unmonitored).unwrap();
     let found = json!({ "state": "succeeded", "result": serde_json::to_value(solution).unwrap() });
     let mut differing = Vec::new();
     let wanted = filled(&block(&read("README.md")), &found, "", &mut differing);

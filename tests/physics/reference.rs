@@ -4,7 +4,7 @@ use std::path::Path;
 
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use railhead::contact::solution::words::{Fields, PointSolution, Solution};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -185,7 +185,7 @@ impl Ellipse {
 pub fn solve(case: &Value) -> (Solution, Fields) {
     let problem =
         contact::check(case, &Limits::default()).unwrap_or_else(|e| panic!("{e}\n{case}"));
-    contact::solve(&problem, &Unwatched).unwrap_or_else(|e| panic!("{e}\n{case}"))
+    contact::solve(&problem, &Unmonitored).unwrap_or_else(|e| panic!("{e}\n{case}"))
 }
 
 /// Middle value; the lower one of two.

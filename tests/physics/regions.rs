@@ -4,15 +4,15 @@
 use std::f64::consts::PI;
 
 use railhead::contact::half_space::strip_operator::kind::Precision;
-use railhead::contact::half_space::strip_operator::operator::Differences;
+use railhead::contact::half_space::strip_operator::operator::StripOperator;
 use railhead::contact::mesh::strips::{Chord, Grading, Mesh, equal_strips};
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::methods::boundary_element::newton::Newton;
-use railhead::contact::rolling::methods::boundary_element::task::{Convergence, FrictionLaw};
-use railhead::contact::rolling::methods::liu_hsu::dense_task::Stage;
-use railhead::contact::rolling::methods::liu_hsu::solve::Outcome;
+use railhead::contact::rolling::methods::boundary_element::task::{Convergence, NewtonTask};
+use railhead::contact::rolling::methods::liu_hsu::dense_task::DenseTask;
+use railhead::contact::rolling::methods::liu_hsu::solve::ZonesOutcome;
 use railhead::contact::rolling::motion::Motion;
-use railhead::contact::rolling::slip_equations::Equations;
+use railhead::contact::rolling::slip_equations::SlipEquations;
 use railhead::contact::rolling::slip_rules::Rule;
 
 /// Poisson's ratio of all these contacts.
@@ -96,7 +96,7 @@ impl Region {
 /// A meshed region, ready to be asked.
 pub struct Contact {
     pub mesh: Mesh,
-    pub differences: Differences,
+    pub differences: StripOperator,
     pub bound: Vec<f64>,
     pub area: Vec<f64>,
     pub x: Vec<f64>,
@@ -108,7 +108,7 @@ impl Contact {
     pub fn new(region: Region, strips: usize, grading: &Grading) -> Contact {
         let mesh = Mesh::new(&region.chords(strips), grading);
         let differences =
-            Differences::new(&mesh, NU, false, Precision::Double, &Unwatched).unwrap();
+            StripOperator::new(&mesh, NU, false, Precision::Double, &Unmonitored).unwrap();
         let (x, y) = (mesh.node.clone(), mesh.rows());
         let mut bound: Vec<f64> = x
             .iter()
@@ -128,8 +128,8 @@ impl Contact {
         }
     }
 
-    pub fn equations(&self, rule: Rule) -> Equations<'_> {
-        Equations::new(rule, &self.mesh, &self.differences, None)
+    pub fn equations(&self, rule: Rule) -> SlipEquations<'_> {
+        SlipEquations::new(rule, &self.mesh, &self.differences, None)
     }
 
     /// Σ μp·A.
@@ -137,8 +137,8 @@ impl Contact {
         self.bound.iter().zip(&self.area).map(|(g, a)| g * a).sum()
     }
 
-    pub fn law<'a>(&'a self, rigid: &'a [f64], tolerance: f64) -> FrictionLaw<'a> {
-        FrictionLaw {
+    pub fn law<'a>(&'a self, rigid: &'a [f64], tolerance: f64) -> NewtonTask<'a> {
+        NewtonTask {
             rigid,
             bound: &self.bound,
             area: &self.area,
@@ -160,12 +160,12 @@ impl Contact {
 
     pub fn stage<'a>(
         &'a self,
-        equations: &'a Equations<'a>,
+        equations: &'a SlipEquations<'a>,
         rigid: &'a [f64],
         motion: Motion,
         tolerance: f64,
-    ) -> Stage<'a> {
-        Stage {
+    ) -> DenseTask<'a> {
+        DenseTask {
             equations,
             law: self.law(rigid, tolerance),
             nodes: (&self.x, &self.y),
@@ -215,7 +215,7 @@ pub fn boundary_element(
         let equations = contact.equations(rule);
         let rigid = equations.rigid(&motion(state));
         Newton::new(&equations)
-            .solve(&contact.law(&rigid, tolerance), t, &Unwatched)
+            .solve(&contact.law(&rigid, tolerance), t, &Unmonitored)
             .unwrap()
     };
     let mut t = vec![0.0; 2 * contact.bound.len()];
@@ -232,8 +232,8 @@ pub fn on_stage(
     rule: Rule,
     state: [f64; 3],
     tolerance: f64,
-    solve: impl FnOnce(&Stage, &mut [f64]) -> Outcome,
-) -> (Vec<f64>, Outcome) {
+    solve: impl FnOnce(&DenseTask, &mut [f64]) -> ZonesOutcome,
+) -> (Vec<f64>, ZonesOutcome) {
     let equations = contact.equations(rule);
     let motion = motion(state);
     let rigid = equations.rigid(&motion);

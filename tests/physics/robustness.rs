@@ -2,7 +2,7 @@
 
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use serde_json::json;
 
 use crate::random::Random;
@@ -63,7 +63,7 @@ fn five_hundred_random_motions_are_solved_in_few_iterations() {
         let (strips, cells) = [(8, 16), (12, 12), (6, 12)][k % 3];
         let problem =
             contact::check(&contact.case(strips, cells), &Limits::default()).expect("a valid case");
-        let (solution, fields) = match contact::solve(&problem, &Unwatched) {
+        let (solution, fields) = match contact::solve(&problem, &Unmonitored) {
             Ok(answer) => answer,
             Err(error) => {
                 failures.push(format!("{}: {error}", describe(contact)));
@@ -121,7 +121,7 @@ fn liu_hsu_solves_or_says_what_to_use_instead() {
         let mut case = contact.case(8, 8);
         case["solver"]["method"] = json!("liu_hsu");
         let problem = contact::check(&case, &Limits::default()).expect("a valid case");
-        match contact::solve(&problem, &Unwatched) {
+        match contact::solve(&problem, &Unmonitored) {
             Ok((solution, _)) => {
                 solved += 1;
                 let forces = contact.relative(&solution.patches[0].points[0]);

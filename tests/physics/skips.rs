@@ -4,14 +4,14 @@ use railhead::contact;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::case::problem::Problem;
 use railhead::contact::half_space::strip_operator::kind::Precision;
-use railhead::contact::half_space::strip_operator::operator::Differences;
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::half_space::strip_operator::operator::StripOperator;
+use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::methods::boundary_element::newton::Newton;
 use railhead::contact::rolling::methods::boundary_element::solve as boundary_element;
-use railhead::contact::rolling::methods::boundary_element::task::FrictionLaw;
-use railhead::contact::rolling::slip_equations::Equations;
+use railhead::contact::rolling::methods::boundary_element::task::NewtonTask;
+use railhead::contact::rolling::slip_equations::SlipEquations;
 use railhead::contact::rolling::slip_rules::Rule;
-use railhead::contact::rolling::strip_mesh::Level;
+use railhead::contact::rolling::strip_mesh::StripMesh;
 use railhead::contact::solution::words::PointSolution;
 
 use crate::reference::{Ellipse, solve};
@@ -33,17 +33,23 @@ fn distance_to_plain_newton(contact: &Ellipse) -> f64 {
         cells: CELLS,
     };
     let footprint = problem.footprint();
-    let level = Level::new(&problem.rolling_task(&footprint), size).expect("a mesh");
+    let level = StripMesh::new(&problem.rolling_task(&footprint), size).expect("a mesh");
     let motion = level.scale.motion(&problem.motions[0]);
     let shortened =
-        boundary_element::solve(&level, &motion, None, 1e-9, &Unwatched).expect("a solution");
+        boundary_element::solve(&level, &motion, None, 1e-9, &Unmonitored).expect("a solution");
 
     let nu = problem.elasticity.poisson_ratio;
-    let whole = Differences::new(&level.normalised, nu, false, Precision::Double, &Unwatched)
-        .expect("never stopped");
+    let whole = StripOperator::new(
+        &level.normalised,
+        nu,
+        false,
+        Precision::Double,
+        &Unmonitored,
+    )
+    .expect("never stopped");
     let mut t = vec![0.0; 2 * whole.padded(None)];
-    for rule in [Rule::Mirror, Rule::Trapezoid] {
-        let equations = Equations::new(rule, &level.normalised, &whole, None);
+    for rule in [Rule::ThreePoint, Rule::Trapezoid] {
+        let equations = SlipEquations::new(rule, &level.normalised, &whole, None);
         let resized = |values: &[f64]| {
             let mut values = values.to_vec();
             values.resize(equations.padded(), 0.0);
@@ -54,7 +60,7 @@ fn distance_to_plain_newton(contact: &Ellipse) -> f64 {
             resized(&level.bound),
             resized(&level.area),
         );
-        let law = FrictionLaw {
+        let law = NewtonTask {
             rigid: &rigid,
             bound: &bound,
             area: &area,
@@ -62,7 +68,7 @@ fn distance_to_plain_newton(contact: &Ellipse) -> f64 {
             tolerance: 1e-9,
         };
         let report = Newton::new(&equations)
-            .solve(&law, &mut t, &Unwatched)
+            .solve(&law, &mut t, &Unmonitored)
             .expect("never stopped");
         assert!(report.converged, "{rule:?}: {report:?}");
     }

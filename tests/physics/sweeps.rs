@@ -5,7 +5,7 @@ use std::sync::Arc;
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::check;
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use railhead::contact::remark::entry::RemarkEntry;
 use railhead::contact::rolling::operator_store::OperatorStore;
 use railhead::contact::slices::{slices, solve_slice};
@@ -217,7 +217,7 @@ fn a_sweep_solved_by_slices_in_any_order_is_the_sweep_solved_at_once() {
         .map(|range| {
             // Each in a process of its own, so to speak.
             let store = Arc::new(OperatorStore::new(0));
-            solve_slice(&store, &problem, range.clone(), &Unwatched).expect("an answer")
+            solve_slice(&store, &problem, range.clone(), &Unmonitored).expect("an answer")
         })
         .collect();
     let (mut solution, mut fields) = parts.pop().expect("a slice");
@@ -225,7 +225,7 @@ fn a_sweep_solved_by_slices_in_any_order_is_the_sweep_solved_at_once() {
         solution.append(more);
         fields.append(more_fields);
     }
-    let whole = timeless(contact::solve(&problem, &Unwatched).expect("an answer"));
+    let whole = timeless(contact::solve(&problem, &Unmonitored).expect("an answer"));
     let joined = timeless((solution, fields));
     assert_eq!(joined.0, whole.0);
     assert!(joined.1 == whole.1, "fields differ");

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
-use railhead::contact::monitor::{Monitor, Unwatched};
+use railhead::contact::monitor::{Monitor, Unmonitored};
 use railhead::contact::solution::words::{PatchFields, Solution};
 use railhead::jobs::recipe::Recipe;
 use railhead::jobs::store::sqlite::SqliteStore;
@@ -329,7 +329,7 @@ async fn a_killed_process_costs_a_sweep_no_more_than_the_slice_it_was_at() {
     assert_eq!(job["attempt"], 1, "each stored slice begins the count anew");
     assert_eq!(service.logged("slice stored"), slices - stored);
     let found = timeless_result(&service, &id).await;
-    let (solution, _) = contact::solve(&problem, &Unwatched).unwrap();
+    let (solution, _) = contact::solve(&problem, &Unmonitored).unwrap();
     let expected = timeless(solution);
     for part in ["patches", "total", "remarks"] {
         let zeroed = |value: &Value| {

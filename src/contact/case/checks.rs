@@ -1,8 +1,8 @@
 //! The checks of a case: every part by itself, all faults at once.
 
-use crate::contact::case::cost::Size;
+use crate::contact::case::cost::CostInput;
 use crate::contact::case::limits::Limits;
-use crate::contact::case::motions::Expanded;
+use crate::contact::case::motions::ExpandedMotions;
 use crate::contact::case::resolution::resolution;
 use crate::contact::case::words::{Contact, Load, Material, Motions, Output, Solver};
 use crate::contact::case::{cost, motions, profiles};
@@ -17,7 +17,7 @@ const FRICTION_USUAL_MAX: f64 = 1.0;
 
 /// Those parts of a case that could be read.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Given<'a> {
+pub(crate) struct PartialCase<'a> {
     pub(crate) material: Option<&'a Material>,
     pub(crate) friction: Option<f64>,
     pub(crate) contact: Option<&'a Contact>,
@@ -28,7 +28,7 @@ pub(crate) struct Given<'a> {
 }
 
 /// Faults of the parts of a case that can be checked although others are faulty.
-pub(crate) fn faults_of(given: Given, limits: &Limits) -> Vec<Fault> {
+pub(crate) fn faults_of(given: PartialCase, limits: &Limits) -> Vec<Fault> {
     // Without its load a region cannot be told; that is a fault already. Profiles are looked at all the same.
     let without_load = matches!(
         given.contact,
@@ -37,22 +37,22 @@ pub(crate) fn faults_of(given: Given, limits: &Limits) -> Vec<Fault> {
     let contact = given
         .contact
         .filter(|_| without_load || given.load.is_some());
-    Parts::check(Given { contact, ..given }, limits).1
+    CheckedParts::check(PartialCase { contact, ..given }, limits).1
 }
 
 /// The parts of a problem, checked as far as they are independent of each other.
 #[derive(Debug)]
-pub(crate) struct Parts {
+pub(crate) struct CheckedParts {
     pub(crate) elasticity: Option<Elasticity>,
     pub(crate) region: Option<(Region, Vec<RemarkEntry>)>,
-    pub(crate) motions: Option<Expanded>,
+    pub(crate) motions: Option<ExpandedMotions>,
 }
 
-impl Parts {
-    pub(crate) fn check(given: Given, limits: &Limits) -> (Parts, Vec<Fault>) {
+impl CheckedParts {
+    pub(crate) fn check(given: PartialCase, limits: &Limits) -> (CheckedParts, Vec<Fault>) {
         let mut faults = Vec::new();
         let elasticity = given.material.map(Elasticity::combine);
-        let elasticity = elasticity.and_then(|elasticity| keep(elasticity, &mut faults));
+        let elasticity = elasticity.and_then(|elasticity| collect_fault(elasticity, &mut faults));
         let region = region(given.contact, given.load, elasticity.as_ref(), limits);
         let region = match (region, given.contact) {
             (None, Some(contact @ Contact::Profiles { .. })) => {
@@ -62,10 +62,10 @@ impl Parts {
                     None
                 })
             }
-            (region, _) => region.and_then(|region| keep(region, &mut faults)),
+            (region, _) => region.and_then(|region| collect_fault(region, &mut faults)),
         };
         let motions = given.motion.map(|motion| motions::expand(motion, limits));
-        let motions = motions.and_then(|motions| keep(motions, &mut faults));
+        let motions = motions.and_then(|motions| collect_fault(motions, &mut faults));
         if let (Some(expanded), Some(motion)) = (&motions, given.motion) {
             let of_profiles = matches!(given.contact, Some(Contact::Profiles { .. }));
             let force = normal_force(region.as_ref().map(|(region, _)| region), given.load);
@@ -73,7 +73,7 @@ impl Parts {
             faults.extend(expanded.faults(motion, limit, of_profiles));
         }
         if let Some(solver) = given.solver {
-            let size = Size {
+            let size = CostInput {
                 method: solver.method.into(),
                 resolution: resolution(solver),
                 // What is not known counts as the least it can be.
@@ -95,7 +95,7 @@ impl Parts {
             };
             faults.extend(size.faults(limits));
         }
-        let parts = Parts {
+        let parts = CheckedParts {
             elasticity,
             region,
             motions,
@@ -112,7 +112,7 @@ pub(crate) fn unusual_friction(coefficient: f64) -> Option<RemarkEntry> {
     (coefficient > FRICTION_USUAL_MAX).then(|| remark.at_pointer("/friction/coefficient"))
 }
 
-fn keep<T>(result: Result<T, Fault>, faults: &mut Vec<Fault>) -> Option<T> {
+fn collect_fault<T>(result: Result<T, Fault>, faults: &mut Vec<Fault>) -> Option<T> {
     result.map_err(|fault| faults.push(fault)).ok()
 }
 

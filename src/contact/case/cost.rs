@@ -57,7 +57,7 @@ const FIELDS_BYTES_PER_CELL: f64 = 160.0;
 
 /// What decides how much a solve costs.
 #[derive(Debug, Clone)]
-pub(crate) struct Size {
+pub(crate) struct CostInput {
     pub(crate) method: Method,
     pub(crate) resolution: Resolution,
     /// Segments per strip, for each patch.
@@ -104,7 +104,7 @@ impl Problem {
     /// the answer. What the process keeps for all cases, the operator store, comes on top. Seconds are rough.
     #[must_use]
     pub fn cost(&self) -> Cost {
-        Size {
+        CostInput {
             method: self.method,
             resolution: self.resolution,
             segments: segments(&self.region),
@@ -121,7 +121,7 @@ impl Problem {
     }
 }
 
-impl Size {
+impl CostInput {
     fn cost(&self) -> Cost {
         let (cells, segments) = self.finest();
         let motions = self.motions as f64;

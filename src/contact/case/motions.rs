@@ -16,7 +16,7 @@ const STILL: AskedMotion = AskedMotion {
 
 /// The motions of a case in order, never empty.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Expanded {
+pub(crate) struct ExpandedMotions {
     /// Creepages are 0 where a force is prescribed.
     pub(crate) motions: Vec<Motion>,
     /// What is prescribed instead, motion by motion.
@@ -27,20 +27,20 @@ pub(crate) struct Expanded {
 ///
 /// # Errors
 /// See [`list`].
-pub(crate) fn expand(motions: &Motions, limits: &Limits) -> Result<Expanded, Fault> {
+pub(crate) fn expand(motions: &Motions, limits: &Limits) -> Result<ExpandedMotions, Fault> {
     let list = list(motions, limits)?;
     let motion = |asked: &AskedMotion| Motion {
         creepage_x: asked.creepage_x.unwrap_or(0.0),
         creepage_y: asked.creepage_y.unwrap_or(0.0),
         spin_per_mm: asked.spin_per_mm,
     };
-    Ok(Expanded {
+    Ok(ExpandedMotions {
         motions: list.iter().map(motion).collect(),
         forces: list.iter().map(|m| [m.force_x_n, m.force_y_n]).collect(),
     })
 }
 
-impl Expanded {
+impl ExpandedMotions {
     /// Faults of prescribed forces: more than friction can carry, where the limit μN is known, or a contact without
     /// one common frame.
     pub(crate) fn faults(

@@ -6,7 +6,7 @@ use crate::contact::case::problem::Problem;
 use crate::contact::error::SolveError;
 use crate::contact::friction::law::FrictionLaw;
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::answer::{Failure, Report};
+use crate::contact::normal::answer::{NormalError, NormalWork};
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::region::Region;
 use crate::contact::rolling::motion::Motion;
@@ -119,16 +119,16 @@ impl Problem {
     }
 }
 
-impl From<Failure> for SolveError {
-    fn from(failure: Failure) -> Self {
+impl From<NormalError> for SolveError {
+    fn from(failure: NormalError) -> Self {
         match failure {
-            Failure::Stopped(stop) => stop.into(),
-            Failure::NoAnswer(reason) => SolveError::NormalProblem { reason },
+            NormalError::Stopped(stop) => stop.into(),
+            NormalError::NoAnswer(reason) => SolveError::NormalProblem { reason },
         }
     }
 }
 
-impl Report {
+impl NormalWork {
     /// The report as the client reads it, with the wall time in s.
     #[must_use]
     pub fn with_time(self, seconds: f64) -> NormalReport {

@@ -2,10 +2,10 @@
 //!
 //! A [`Problem`] cannot exist unchecked: [`Problem::new`] is the only way to make one.
 
-use crate::contact::case::checks::{Given, Parts, missing_load, unusual_friction};
+use crate::contact::case::checks::{CheckedParts, PartialCase, missing_load, unusual_friction};
 use crate::contact::case::digest::digest;
 use crate::contact::case::limits::Limits;
-use crate::contact::case::motions::Expanded;
+use crate::contact::case::motions::ExpandedMotions;
 use crate::contact::case::resolution::resolution;
 use crate::contact::case::words::{Case, MethodName, Output};
 use crate::contact::case::{cost, plausibility, profiles};
@@ -83,7 +83,7 @@ impl Problem {
     /// # Errors
     /// Every fault found, each with its JSON pointer.
     pub fn new(case: &Case, limits: &Limits) -> Result<Problem, CaseError> {
-        let given = Given {
+        let given = PartialCase {
             material: Some(&case.material),
             friction: Some(case.friction.coefficient),
             contact: Some(&case.contact),
@@ -92,7 +92,7 @@ impl Problem {
             solver: Some(&case.solver),
             outputs: &case.outputs,
         };
-        let (parts, mut faults) = Parts::check(given, limits);
+        let (parts, mut faults) = CheckedParts::check(given, limits);
         if faults.is_empty() && parts.region.is_none() {
             faults.push(missing_load());
         }
@@ -107,7 +107,7 @@ impl Problem {
         let of_material = elasticity.remark().map(|r| r.at_pointer("/material"));
         let of_friction = unusual_friction(case.friction.coefficient);
         let of_case = of_material.into_iter().chain(of_friction);
-        let Expanded { motions, forces } = motions;
+        let ExpandedMotions { motions, forces } = motions;
         // Creepages that are searched are looked at when they are found.
         let given: &[Motion] = match forces.iter().all(|forces| *forces == [None; 2]) {
             true => &motions,

@@ -7,13 +7,13 @@ use crate::contact::case::words::{
     Contact, CrossSection, Load, Motions, Smoothing, SmoothingWord, Wheelset,
 };
 use crate::contact::error::Fault;
-use crate::contact::geometry::contact_locus::Search;
+use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::formats::format as formats;
 use crate::contact::geometry::profile::{Body, Profile, Reading};
 use crate::contact::geometry::wheel_rail::{Placement, WheelRail};
 use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::normal::region::Region;
-use crate::contact::normal::wheel_height::search::{Loading, ProfileContact};
+use crate::contact::normal::wheel_height::search::{WheelLoad, WheelTask};
 use crate::contact::profile_trust::before;
 use crate::contact::profile_trust::quality::PairQuality;
 use crate::contact::profile_trust::trust::Trust;
@@ -30,7 +30,7 @@ pub(crate) fn region(
     contact_modulus: Option<f64>,
 ) -> Result<Option<(Region, Vec<RemarkEntry>)>, Vec<Fault>> {
     let geometry = wheel_rail(contact)?;
-    if let Err(detail) = Search::new(&geometry) {
+    if let Err(detail) = ContactLocus::new(&geometry) {
         return Err(vec![fault("/contact".to_owned(), detail)]);
     }
     let mut remarks = geometry.remarks();
@@ -41,7 +41,7 @@ pub(crate) fn region(
     let (Some(loading), Some(contact_modulus)) = (loading, contact_modulus) else {
         return Ok(None);
     };
-    let contact = ProfileContact {
+    let contact = WheelTask {
         geometry,
         loading,
         contact_modulus,
@@ -84,11 +84,11 @@ pub(crate) fn wheelset(motions: &Motions) -> Option<WheelsetMotion> {
     })
 }
 
-fn loading(load: &Load) -> Option<Loading> {
+fn loading(load: &Load) -> Option<WheelLoad> {
     match (load.vertical_force_n, load.normal_force_n, load.approach_mm) {
-        (Some(force), _, _) => Some(Loading::Vertical(force)),
-        (None, Some(force), _) => Some(Loading::Normal(force)),
-        (None, None, Some(lowering)) => Some(Loading::Lowering(lowering)),
+        (Some(force), _, _) => Some(WheelLoad::Vertical(force)),
+        (None, Some(force), _) => Some(WheelLoad::Normal(force)),
+        (None, None, Some(lowering)) => Some(WheelLoad::Lowering(lowering)),
         (None, None, None) => None,
     }
 }

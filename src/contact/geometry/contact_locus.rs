@@ -26,9 +26,9 @@ const LOWERING_MAX: f64 = 16.0;
 
 /// Wheel and rail over each other, line by line.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Search<'g> {
+pub struct ContactLocus<'g> {
     pub(crate) geometry: &'g WheelRail,
-    pub(crate) lines: Vec<Line>,
+    pub(crate) lines: Vec<LocusPoint>,
     /// Which lines share a gap, if that is decided for all heights.
     pub(crate) grouping: Option<Grouping>,
     /// Height of the wheel's centre in mm at which the bodies just touch.
@@ -37,7 +37,7 @@ pub struct Search<'g> {
 
 /// One line along x: its y, the upper edge of the rail, and the clearance above first touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Line {
+pub(crate) struct LocusPoint {
     pub(crate) y: f64,
     pub(crate) clearance: f64,
     pub(crate) rail: f64,
@@ -74,12 +74,12 @@ impl Frame {
     }
 }
 
-impl<'g> Search<'g> {
+impl<'g> ContactLocus<'g> {
     /// Lays the wheel over the rail and finds the height of first touch.
     ///
     /// # Errors
     /// A sentence, if no part of the wheel lies above the rail.
-    pub fn new(geometry: &'g WheelRail) -> Result<Search<'g>, String> {
+    pub fn new(geometry: &'g WheelRail) -> Result<ContactLocus<'g>, String> {
         let [rail, wheel] = geometry.parameters(CURVE_STEP);
         let rail: Vec<_> = rail
             .into_iter()
@@ -103,7 +103,7 @@ impl<'g> Search<'g> {
                 wheel.points[(k - wheel.first) as usize],
             );
             if let (Some([z, rail]), Some([depth, wheel])) = (below, above) {
-                lines.push(Line {
+                lines.push(LocusPoint {
                     y: k as f64 * STEP,
                     clearance: -depth - z,
                     rail,
@@ -123,7 +123,7 @@ impl<'g> Search<'g> {
         for line in &mut lines {
             line.clearance -= least;
         }
-        Ok(Search {
+        Ok(ContactLocus {
             geometry,
             lines,
             grouping: None,
@@ -176,20 +176,20 @@ impl<'g> Search<'g> {
     }
 
     fn estimated_force(&self, lowering: f64) -> f64 {
-        let inside = |line: &Line| line.clearance < 0.5 * lowering;
+        let inside = |line: &LocusPoint| line.clearance < 0.5 * lowering;
         let runs = self.lines.chunk_by(|a, b| inside(a) == inside(b));
-        let length = |line: &Line| {
+        let length = |line: &LocusPoint| {
             let radius = self.geometry.placement.rolling_radius;
             2.0 * (2.0 * radius * (0.5 * lowering - line.clearance)).sqrt()
         };
-        let carried = |run: &[Line]| {
+        let carried = |run: &[LocusPoint]| {
             let area: f64 = run.iter().map(|line| length(line) * STEP).sum();
             4.0 / 3.0 * (area / std::f64::consts::PI).sqrt() * lowering
         };
         runs.filter(|run| inside(&run[0])).map(carried).sum()
     }
 
-    pub(crate) fn frame(&self, lines: &[Line], lowering: f64) -> Frame {
+    pub(crate) fn frame(&self, lines: &[LocusPoint], lowering: f64) -> Frame {
         let (mut weight, mut y, mut angle) = (0.0, 0.0, 0.0);
         for line in lines {
             let own = (lowering - line.clearance).max(0.0).powf(2.5);
@@ -202,7 +202,8 @@ impl<'g> Search<'g> {
             .partition_point(|line| line.y < y)
             .clamp(1, lines.len() - 1);
         let t = ((y - lines[k - 1].y) / (lines[k].y - lines[k - 1].y)).clamp(0.0, 1.0);
-        let between = |of: fn(&Line) -> f64| of(&lines[k - 1]) * (1.0 - t) + of(&lines[k]) * t;
+        let between =
+            |of: fn(&LocusPoint) -> f64| of(&lines[k - 1]) * (1.0 - t) + of(&lines[k]) * t;
         let (rail, wheel) = (between(|line| line.rail), between(|line| line.wheel));
         let [y, z] = self.geometry.rail_at(rail).at;
         let x = self.geometry.lowest(wheel).map_or(0.0, |point| point[0]);
@@ -215,7 +216,7 @@ impl<'g> Search<'g> {
     }
 
     /// Clearance on a line along the rail's normal, with the wheel lowered below first touch; in mm.
-    pub(crate) fn clearance(&self, line: &Line, lowering: f64) -> f64 {
+    pub(crate) fn clearance(&self, line: &LocusPoint, lowering: f64) -> f64 {
         (line.clearance - lowering) * self.inclination(line.rail).cos()
     }
 

@@ -1,10 +1,10 @@
 //! Which overlaps of wheel and rail are patches: near ones share a gap, bent ones are cut where they are thin.
 //!
 //! Whether neighbouring overlaps share a gap is a matter of thresholds, and the force changes where one is crossed. So that no force
-//! jumps while a height is sought, this is decided once, for a lowering near the one that is expected ([`Search::grouped_near`]), and
+//! jumps while a height is sought, this is decided once, for a lowering near the one that is expected ([`ContactLocus::grouped_near`]), and
 //! holds for every height.
 
-use crate::contact::geometry::contact_locus::{Line, STEP, Search};
+use crate::contact::geometry::contact_locus::{ContactLocus, LocusPoint, STEP};
 
 /// Overlaps nearer to each other than this along the rail, in mm, whose mean inclinations differ less, in rad, share one gap:
 /// there they influence each other. (CONTACT keeps apart what is 8 mm or 30° from each other.)
@@ -52,7 +52,7 @@ impl Grouping {
     }
 }
 
-impl Search<'_> {
+impl ContactLocus<'_> {
     /// The same with the overlaps divided among gaps, at every height, as near the lowering that is given in mm.
     #[must_use]
     pub fn grouped_near(self, lowering: f64) -> Self {
@@ -63,7 +63,7 @@ impl Search<'_> {
         let at = |halvings: i32| start * 0.5_f64.powi(halvings);
         let found = (0..HALVINGS).find_map(|k| self.divided(at(k), None).ok());
         let groups = |found: Vec<Overlap>| found.iter().map(|overlap| overlap.ends).collect();
-        Search {
+        ContactLocus {
             grouping: found.map(|found| Grouping {
                 groups: groups(found),
             }),
@@ -206,14 +206,15 @@ impl Search<'_> {
     }
 
     /// The lines of an overlap with the one on either side.
-    pub(crate) fn around(&self, [first, last]: [usize; 2]) -> &[Line] {
+    pub(crate) fn around(&self, [first, last]: [usize; 2]) -> &[LocusPoint] {
         &self.lines[first - 1..=last + 1]
     }
 
     /// How deep the bodies overlap along the normal, line by line, and where most.
     fn depths(&self, overlap: Overlap, lowering: f64) -> (Vec<f64>, usize) {
         let [first, last] = overlap.ends;
-        let depth = |line: &Line| (lowering - line.clearance) * self.inclination(line.rail).cos();
+        let depth =
+            |line: &LocusPoint| (lowering - line.clearance) * self.inclination(line.rail).cos();
         let depths: Vec<f64> = self.lines[first..=last].iter().map(depth).collect();
         let deeper = |a: &usize, b: &usize| depths[*a].total_cmp(&depths[*b]);
         let main = (0..depths.len()).max_by(deeper).unwrap_or(0);
@@ -222,7 +223,7 @@ impl Search<'_> {
 
     /// The lines beyond which an overlap touches nothing that belongs to its gap, toward another gap; none where there is no
     /// other gap. A cut overlap gets thin before its end, a whole one ends where the bodies do not overlap any more.
-    pub(crate) fn limits(&self, overlap: Overlap, lowering: f64) -> [Option<Line>; 2] {
+    pub(crate) fn limits(&self, overlap: Overlap, lowering: f64) -> [Option<LocusPoint>; 2] {
         let (depths, main) = self.depths(overlap, lowering);
         let thin = |k: &usize| depths[*k] <= THIN * depths[main];
         let thin_ends = [

@@ -80,7 +80,7 @@ struct Measured {
 
 /// The curve at one place: y to the field side, z up, in mm; derivatives to the parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct CurvePoint {
     /// Position `[y, z]`.
     pub at: [f64; 2],
     /// First derivative, of length about 1.
@@ -89,7 +89,7 @@ pub struct Place {
     pub bend: [f64; 2],
 }
 
-impl Place {
+impl CurvePoint {
     /// Unit tangent, from the track centre to the field side along the curve.
     #[must_use]
     pub fn tangent(&self) -> [f64; 2] {
@@ -232,11 +232,11 @@ impl Profile {
 
     /// The curve at a parameter; beyond the ends the tangent there.
     #[must_use]
-    pub fn at(&self, s: f64) -> Place {
+    pub fn at(&self, s: f64) -> CurvePoint {
         // Both have the same knots.
         let i = self.y.interval(s);
         let (y, z) = (self.y.at_in(i, s), self.z.at_in(i, s));
-        Place {
+        CurvePoint {
             at: [y.value, z.value],
             slope: [y.slope, z.slope],
             bend: [y.bend, z.bend],

@@ -9,7 +9,7 @@
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::contact::geometry::profile::{Place, Profile};
+use crate::contact::geometry::profile::{CurvePoint, Profile};
 use crate::contact::remark::entry::RemarkEntry;
 
 /// Left or right rail, seen along rolling.
@@ -174,11 +174,11 @@ impl WheelRail {
 
     /// The rail's curve in track axes `[y, z]`, with derivatives to the parameter.
     #[must_use]
-    pub fn rail_at(&self, s: f64) -> Place {
+    pub fn rail_at(&self, s: f64) -> CurvePoint {
         let sign = self.placement.side.sign();
         let place = self.rail.at(s);
         let turn = |[y, z]: [f64; 2]| [sign * y, z];
-        Place {
+        CurvePoint {
             at: turn([
                 place.at[0] + self.rail_origin[0],
                 place.at[1] + self.rail_origin[1],

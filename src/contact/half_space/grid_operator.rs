@@ -78,7 +78,7 @@ width!(f64, DOUBLE);
 /// the coefficient [`rectangle`](crate::contact::half_space::kernels::rectangle) calls `zz`. Values are stored at
 /// `j * nx + i`, i along x. The grid is padded to twice its size, so that the product is that of the dense matrix, to about
 /// 1e-14 (`f64`) or 1e-6 (`f32`) of the largest displacement.
-pub struct Convolution<T> {
+pub struct GridOperator<T> {
     nx: usize,
     ny: usize,
     /// Padded length along x.
@@ -100,7 +100,7 @@ pub struct Convolution<T> {
     scratch: Vec<Complex<T>>,
 }
 
-impl<T: Width> Convolution<T> {
+impl<T: Width> GridOperator<T> {
     /// Prepares the influence for rectangles of `dx` by `dy` mm and the contact modulus `E*` in MPa.
     #[must_use]
     pub fn new(nx: usize, ny: usize, dx: f64, dy: f64, contact_modulus: f64) -> Self {
@@ -115,7 +115,7 @@ impl<T: Width> Convolution<T> {
         let zero = Complex::new(T::zero(), T::zero());
         let half = width / 2 + 1;
         let coefficients = coefficients(nx, ny, dx, dy, contact_modulus);
-        let mut convolution = Convolution {
+        let mut convolution = GridOperator {
             nx,
             ny,
             width,
@@ -222,7 +222,7 @@ impl<T: Width> Convolution<T> {
         }
     }
 
-    /// The reverse of [`Convolution::store_rows`].
+    /// The reverse of [`GridOperator::store_rows`].
     fn fetch_rows(&mut self, first: usize, count: usize) {
         let half = self.width / 2 + 1;
         for (i, column) in self.columns.chunks_exact(self.height).enumerate() {
@@ -338,7 +338,7 @@ fn smooth_even(n: usize) -> usize {
     n
 }
 
-impl<T> std::fmt::Debug for Convolution<T> {
+impl<T> std::fmt::Debug for GridOperator<T> {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         f.debug_struct("Convolution")
             .field("nx", &self.nx)
@@ -384,13 +384,13 @@ mod tests {
             let expected = dense(nx, ny, dx, dy, nu, &pressure);
             let modulus = 1.0 / (1.0 - nu);
             compare(
-                &mut Convolution::<f64>::new(nx, ny, dx, dy, modulus),
+                &mut GridOperator::<f64>::new(nx, ny, dx, dy, modulus),
                 &pressure,
                 &expected,
                 1e-12,
             );
             compare(
-                &mut Convolution::<f32>::new(nx, ny, dx, dy, modulus),
+                &mut GridOperator::<f32>::new(nx, ny, dx, dy, modulus),
                 &pressure,
                 &expected,
                 2e-6,
@@ -399,7 +399,7 @@ mod tests {
     }
 
     fn compare<T: Width>(
-        convolution: &mut Convolution<T>,
+        convolution: &mut GridOperator<T>,
         pressure: &[f64],
         expected: &[f64],
         allowed: f64,
@@ -424,7 +424,7 @@ mod tests {
 
     #[test]
     fn a_cell_acts_on_itself_as_the_closed_form_says() {
-        let own = Convolution::<f32>::new(3, 2, 0.3, 0.2, 2.0).own();
+        let own = GridOperator::<f32>::new(3, 2, 0.3, 0.2, 2.0).own();
         let cell = Rectangle {
             x0: -0.15,
             x1: 0.15,
@@ -440,7 +440,7 @@ mod tests {
         let product = |size: f64| {
             let mut found = [f64::NAN; 6];
             let scaled = pressure.map(|p| size * p);
-            Convolution::<f32>::new(3, 2, 0.3, 0.2, 2.0).apply(&scaled, &mut found);
+            GridOperator::<f32>::new(3, 2, 0.3, 0.2, 2.0).apply(&scaled, &mut found);
             found.map(|u| u / size)
         };
         let plain = product(1.0);
@@ -450,7 +450,7 @@ mod tests {
             }
         }
         let mut none = [f64::NAN; 6];
-        Convolution::<f32>::new(3, 2, 0.3, 0.2, 2.0).apply(&[0.0; 6], &mut none);
+        GridOperator::<f32>::new(3, 2, 0.3, 0.2, 2.0).apply(&[0.0; 6], &mut none);
         assert_eq!(none, [0.0; 6]);
     }
 

@@ -2,25 +2,25 @@
 
 use crate::contact::monitor::Stop;
 use crate::contact::normal::gap::conjugate_gradients;
-use crate::contact::normal::gap::grid::Side;
+use crate::contact::normal::gap::grid::GridSide;
 use crate::contact::normal::gap::surface::Window;
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::remark::entry::RemarkEntry;
 
 /// The contact of a gap.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Found {
+pub struct NormalAnswer {
     /// Region and pressure.
     pub field: PressureField,
     /// How it was found.
-    pub report: Report,
+    pub report: NormalWork,
     /// Remarks for the answer.
     pub remarks: Vec<RemarkEntry>,
 }
 
 /// How a normal problem was solved.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Report {
+pub struct NormalWork {
     /// Cells of the last grid along x and y, of the one that carries most if there are several.
     pub cells: [usize; 2],
     /// Grids: 1, or one per patch where patches differ much in size.
@@ -36,20 +36,22 @@ pub struct Report {
 
 /// Why a gap has no contact to show.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Failure {
+pub enum NormalError {
     /// A reason, as a sentence.
     NoAnswer(String),
     /// The caller stopped the work.
     Stopped(Stop),
 }
 
-impl From<conjugate_gradients::Failure> for Failure {
-    fn from(failure: conjugate_gradients::Failure) -> Failure {
+impl From<conjugate_gradients::PressureFailure> for NormalError {
+    fn from(failure: conjugate_gradients::PressureFailure) -> NormalError {
         match failure {
-            conjugate_gradients::Failure::Stopped(stop) => Failure::Stopped(stop),
-            conjugate_gradients::Failure::NotConverged(residual) => Failure::NoAnswer(format!(
-                "the pressure did not converge: the contact conditions are violated by {residual:.1e} of the overlap"
-            )),
+            conjugate_gradients::PressureFailure::Stopped(stop) => NormalError::Stopped(stop),
+            conjugate_gradients::PressureFailure::NotConverged(residual) => {
+                NormalError::NoAnswer(format!(
+                    "the pressure did not converge: the contact conditions are violated by {residual:.1e} of the overlap"
+                ))
+            }
         }
     }
 }
@@ -60,8 +62,8 @@ pub(crate) fn no_touch(approach: f64, least: f64) -> String {
     )
 }
 
-pub(crate) fn edge_reached(side: Side, limits: Window) -> Failure {
-    Failure::NoAnswer(format!(
+pub(crate) fn edge_reached(side: GridSide, limits: Window) -> NormalError {
+    NormalError::NoAnswer(format!(
         "the contact reaches the edge {} of the given gap, so that the true contact is cut off; give the gap farther out",
         side.place(limits)
     ))

@@ -5,12 +5,12 @@ use std::sync::Arc;
 use crate::contact::case::words::{Contact, Load};
 use crate::contact::error::Fault;
 use crate::contact::mesh::strips::Chord;
-use crate::contact::normal::gap::surface::Gap;
-use crate::contact::normal::gap::task::GapContact;
+use crate::contact::normal::gap::surface::GapSurface;
+use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::hertz::{Ellipse, Pressing};
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::field::PressureField;
-use crate::contact::normal::wheel_height::search::ProfileContact;
+use crate::contact::normal::wheel_height::search::WheelTask;
 use crate::contact::remark::entry::RemarkEntry;
 
 /// Pressures in MPa, lengths in mm and ratios of semi-axes beyond which a patch is a mistake rather than a contact.
@@ -28,9 +28,9 @@ pub enum Region {
     /// A pressure on a grid.
     Grid(PressureField),
     /// A gap: region and pressure have to be found first, until then there are no patches.
-    Gap(Box<GapContact>),
+    Gap(Box<GapTask>),
     /// A wheel on a rail: patches have to be found first, each in a frame of its own, until then there are none.
-    Profiles(Arc<ProfileContact>),
+    Profiles(Arc<WheelTask>),
 }
 
 impl Region {
@@ -110,10 +110,10 @@ impl Region {
                 rolling_mm,
                 y_mm,
                 gap_mm,
-            } => (Gap::profile(*rolling_mm, y_mm, gap_mm), y_mm.len()),
+            } => (GapSurface::profile(*rolling_mm, y_mm, gap_mm), y_mm.len()),
             Contact::GapGrid { x_mm, y_mm, gap_mm } => {
                 let samples = x_mm.len().saturating_mul(y_mm.len());
-                (Gap::grid(x_mm, y_mm, gap_mm), samples)
+                (GapSurface::grid(x_mm, y_mm, gap_mm), samples)
             }
             _ => return Err(fault("/contact/type", "not a gap".to_owned())),
         };
@@ -123,7 +123,7 @@ impl Region {
                 format!("{samples} samples given; at most {samples_max} are allowed"),
             ));
         }
-        let contact = GapContact {
+        let contact = GapTask {
             gap,
             pressing: pressing(load),
             contact_modulus,

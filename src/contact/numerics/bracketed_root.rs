@@ -50,7 +50,7 @@ pub(crate) struct Root {
 
 /// Goes from `start` until the sign changes, then between the bounds by the Illinois rule (regula falsi that halves the value of
 /// a bound that stays). `f` gives the value at a place and sets the size below which it counts as 0.
-pub(crate) fn zero(
+pub(crate) fn find_root(
     start: f64,
     mut f: impl FnMut(f64, &mut f64) -> Result<f64, SolveError>,
 ) -> Result<Root, SolveError> {
@@ -112,7 +112,7 @@ mod tests {
             *least = tolerance;
             Ok(f(at))
         };
-        zero(0.1, look).unwrap()
+        find_root(0.1, look).unwrap()
     }
 
     #[test]

@@ -44,7 +44,7 @@ impl DenseLu {
         .or(permute_rows_in_place_scratch::<usize, f64>(n, n));
         let mut buffer = MemBuffer::new(request);
         for start in (0..n).step_by(PANEL) {
-            look(monitor)?;
+            check(monitor)?;
             let rest = n - start;
             let width = PANEL.min(rest);
             let (done, _, mut left, active) = matrix.as_mut().split_at_mut(start, start);
@@ -67,7 +67,7 @@ impl DenseLu {
             }
             let columns = right.ncols();
             for first in (0..columns).step_by(CHUNK) {
-                look(monitor)?;
+                check(monitor)?;
                 let chunk = right
                     .as_mut()
                     .subcols_mut(first, CHUNK.min(columns - first));
@@ -98,11 +98,11 @@ impl DenseLu {
         let request = permute_rows_in_place_scratch::<usize, f64>(n, CHUNK.min(columns));
         let mut buffer = MemBuffer::new(request);
         for first in (0..columns).step_by(CHUNK) {
-            look(monitor)?;
+            check(monitor)?;
             let mut chunk = rhs.as_mut().subcols_mut(first, CHUNK.min(columns - first));
             permute_rows_in_place(chunk.as_mut(), exchange, MemStack::new(&mut buffer));
             solve_unit_lower_triangular_in_place(self.factors.as_ref(), chunk.as_mut(), Par::Seq);
-            look(monitor)?;
+            check(monitor)?;
             solve_upper_triangular_in_place(self.factors.as_ref(), chunk, Par::Seq);
         }
         Ok(())
@@ -121,7 +121,7 @@ pub fn subtract_product(
 ) -> Result<(), Stop> {
     let columns = c.ncols();
     for first in (0..columns).step_by(CHUNK) {
-        look(monitor)?;
+        check(monitor)?;
         let count = CHUNK.min(columns - first);
         matmul(
             c.as_mut().subcols_mut(first, count),
@@ -139,7 +139,7 @@ pub fn subtract_product(
 ///
 /// # Errors
 /// The reason to stop.
-pub fn look(monitor: &dyn Monitor) -> Result<(), Stop> {
+pub fn check(monitor: &dyn Monitor) -> Result<(), Stop> {
     match monitor.tick(0.0) {
         ControlFlow::Continue(()) => Ok(()),
         ControlFlow::Break(stop) => Err(stop),
@@ -152,7 +152,7 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
-    use crate::contact::monitor::Unwatched;
+    use crate::contact::monitor::Unmonitored;
 
     fn wavy(n: usize) -> Mat<f64> {
         // No large diagonal: rows must be exchanged, also across panels.
@@ -165,8 +165,8 @@ mod tests {
             let a = wavy(n);
             let x = Mat::from_fn(n, 3, |i, j| (i as f64 + 0.3 * j as f64).cos());
             let mut b = &a * &x;
-            let lu = DenseLu::new(a, &Unwatched).unwrap();
-            lu.solve(b.as_mut(), &Unwatched).unwrap();
+            let lu = DenseLu::new(a, &Unmonitored).unwrap();
+            lu.solve(b.as_mut(), &Unmonitored).unwrap();
             let error = (&b - &x).norm_max();
             assert!(error < 1e-8, "{n}: {error}");
         }
@@ -179,7 +179,7 @@ mod tests {
             Mat::from_fn(40, 2 * CHUNK + 3, |i, j| (i * j) as f64),
         );
         let mut c = &a * &b;
-        subtract_product(c.as_mut(), a.as_ref(), b.as_ref(), &Unwatched).unwrap();
+        subtract_product(c.as_mut(), a.as_ref(), b.as_ref(), &Unmonitored).unwrap();
         assert!(c.norm_max() < 1e-7, "{}", c.norm_max());
     }
 

@@ -1,6 +1,6 @@
 //! Cell values brought onto a regular grid, for pictures and for programs that want arrays.
 
-use crate::contact::post::strip_segments::{Segment, Strips};
+use crate::contact::post::strip_segments::{StoredSegment, Strips};
 use crate::contact::post::zone::Zone;
 use crate::contact::solution::words::PatchCells;
 
@@ -65,7 +65,7 @@ pub fn resample_zone(fields: &PatchCells, zones: &[Zone], nx: usize, ny: usize) 
 }
 
 /// A point of one strip: the cells of its segment and the x to look at.
-struct Place {
+struct CellPosition {
     cells: std::ops::Range<usize>,
     x: f64,
 }
@@ -73,9 +73,9 @@ struct Place {
 /// A sample point inside the patch.
 struct Spot {
     /// In the nearest strip.
-    near: Place,
+    near: CellPosition,
     /// At the same relative position in the next strip on the point's side, if the segment goes on there.
-    far: Option<Place>,
+    far: Option<CellPosition>,
     /// Weight of `far`, 0 to ½.
     weight: f64,
 }
@@ -93,7 +93,8 @@ fn sample<T>(fields: &PatchCells, nx: usize, ny: usize, value: impl Fn(&Spot) ->
             values: Vec::new(),
         };
     }
-    let low = |f: fn(&Segment) -> f64| strips.segments.iter().map(f).fold(f64::INFINITY, f64::min);
+    let low =
+        |f: fn(&StoredSegment) -> f64| strips.segments.iter().map(f).fold(f64::INFINITY, f64::min);
     let (x0, x1) = (low(|s| s.left), -low(|s| -s.right));
     let (y0, y1) = (low(|s| s.y - 0.5 * s.dy), -low(|s| -(s.y + 0.5 * s.dy)));
     let x_mm = centres(x0, x1, nx);
@@ -141,7 +142,7 @@ impl Cut {
         };
         let place = |k: usize| {
             let segment = &strips.segments[k];
-            Place {
+            CellPosition {
                 cells: segment.cells.clone(),
                 x: segment.left + part * (segment.right - segment.left),
             }
@@ -195,7 +196,7 @@ fn chords(strips: &Strips, y: f64) -> Vec<Cut> {
 }
 
 /// Value of a segment at a place: linear between centres, constant beyond the outermost ones.
-fn along(fields: &PatchCells, values: &[f64], place: &Place) -> f64 {
+fn along(fields: &PatchCells, values: &[f64], place: &CellPosition) -> f64 {
     let cells = place.cells.clone();
     let after =
         cells.start + fields.x_mm[cells.clone()].partition_point(|&centre| centre <= place.x);

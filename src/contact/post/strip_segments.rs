@@ -7,7 +7,7 @@ pub(crate) const JOIN: f64 = 1e-9;
 
 /// An unbroken run of cells of one strip.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Segment {
+pub(crate) struct StoredSegment {
     /// Its cells, as indices into the fields, from smaller to larger x.
     pub cells: std::ops::Range<usize>,
     /// Mid-line in mm.
@@ -32,7 +32,7 @@ pub(crate) struct Segment {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Strips {
     /// All segments.
-    pub segments: Vec<Segment>,
+    pub segments: Vec<StoredSegment>,
     /// Segments of each strip.
     pub strips: Vec<std::ops::Range<usize>>,
 }
@@ -67,7 +67,7 @@ impl Strips {
                 open.right = x + half;
                 continue;
             }
-            out.segments.push(Segment {
+            out.segments.push(StoredSegment {
                 cells: i..i + 1,
                 y: fields.y_mm[i],
                 dy: fields.dy_mm[i],

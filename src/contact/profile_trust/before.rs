@@ -5,7 +5,7 @@ use crate::contact::geometry::profile_quality::noise;
 use crate::contact::geometry::profile_quality::points::{Grain, advised_smoothing};
 use crate::contact::geometry::profile_quality::shape::{Looks, looks_like};
 use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::normal::wheel_height::search::ProfileContact;
+use crate::contact::normal::wheel_height::search::WheelTask;
 use crate::contact::profile_trust::quality::{PairQuality, SectionQuality};
 use crate::contact::profile_trust::settle::PRESSURE_USUAL;
 use crate::contact::remark::entry::RemarkEntry;
@@ -34,7 +34,7 @@ pub fn quality(geometry: &WheelRail, modulus: f64) -> PairQuality {
 /// How many other readings of the profiles a solve will look at: two with a smoothing, one where the noise asks for one, and one to settle
 /// an automatic one.
 #[must_use]
-pub fn readings_expected(contact: &ProfileContact) -> u32 {
+pub fn readings_expected(contact: &WheelTask) -> u32 {
     let profiles = contact.geometry.profiles();
     let auto = contact.trust.auto.contains(&true);
     let smoothed = profiles.iter().any(|profile| profile.smoothing() > 0.0);

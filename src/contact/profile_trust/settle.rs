@@ -5,11 +5,11 @@ use crate::contact::error::SolveError;
 use crate::contact::geometry::profile::Body;
 use crate::contact::geometry::profile_quality::points::advised_smoothing;
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::wheel_height::search::{Accuracy, ProfileContact, Wanted};
+use crate::contact::normal::wheel_height::search::{Accuracy, NormalPass, WheelTask};
 use crate::contact::profile_trust::before;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
-use crate::contact::time_limit::Watch;
+use crate::contact::time_limit::TimeLimit;
 
 /// Pressure in MPa for the first choice.
 pub(crate) const PRESSURE_USUAL: f64 = 1200.0;
@@ -17,7 +17,7 @@ pub(crate) const PRESSURE_USUAL: f64 = 1200.0;
 const TOLERANCE: f64 = 0.1;
 
 /// What was chosen, for the answer.
-pub(crate) fn remarks(contact: &ProfileContact) -> Vec<RemarkEntry> {
+pub(crate) fn remarks(contact: &WheelTask) -> Vec<RemarkEntry> {
     let profiles = contact
         .geometry
         .profiles()
@@ -42,9 +42,9 @@ pub(crate) fn remarks(contact: &ProfileContact) -> Vec<RemarkEntry> {
 /// There is no rest of the wheel, or the monitor stopped the work.
 pub(crate) fn settled(
     problem: &Problem,
-    contact: &ProfileContact,
+    contact: &WheelTask,
     monitor: &dyn Monitor,
-) -> Result<Option<ProfileContact>, SolveError> {
+) -> Result<Option<WheelTask>, SolveError> {
     let auto = contact.trust.auto;
     if auto == [false; 2] {
         return Ok(None);
@@ -66,11 +66,11 @@ pub(crate) fn settled(
     let search = trial
         .search()
         .map_err(|reason| SolveError::NormalProblem { reason })?;
-    let wanted = Wanted {
+    let wanted = NormalPass {
         friction_share: 0.0,
         accuracy: Accuracy::About(TOLERANCE),
     };
-    let watch = Watch::new(monitor, problem.time_limit, 1);
+    let watch = TimeLimit::new(monitor, problem.time_limit, 1);
     let wheel = trial.press(&search, wanted, None, &watch)?;
     let pressures = wheel.patches.iter().flat_map(|gap| gap.field.patches());
     let main = pressures

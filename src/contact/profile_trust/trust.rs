@@ -5,11 +5,11 @@ use crate::contact::case::problem::Problem;
 use crate::contact::coupling;
 use crate::contact::coupling::{Found, Judge};
 use crate::contact::error::SolveError;
-use crate::contact::geometry::contact_locus::Search;
+use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::profile::{Body, Profile};
 use crate::contact::geometry::profile_quality::holes::{Hole, holes};
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::wheel_height::search::{PressedWheel, ProfileContact};
+use crate::contact::normal::wheel_height::search::{PressedWheel, WheelTask};
 use crate::contact::profile_trust::finding::{Cause, Finding};
 use crate::contact::profile_trust::judge::{FoundPatch, judge};
 use crate::contact::profile_trust::quality::{PatchQuality, ProfileQuality};
@@ -35,7 +35,7 @@ pub struct Trust {
 pub(crate) fn solve(
     operators: &Arc<OperatorStore>,
     problem: &Problem,
-    contact: &ProfileContact,
+    contact: &WheelTask,
     monitor: &dyn Monitor,
 ) -> Result<(Solution, Fields), SolveError> {
     let settled = settle::settled(problem, contact, monitor)?;
@@ -90,7 +90,7 @@ fn worst_of_each(findings: impl Iterator<Item = Finding>) -> Vec<Finding> {
 
 /// Judges the profiles under the patches of a wheel at rest.
 struct Judgement<'a> {
-    contact: &'a ProfileContact,
+    contact: &'a WheelTask,
 }
 
 impl Judge for Judgement<'_> {
@@ -184,7 +184,7 @@ impl Judgement<'_> {
             return Vec::new();
         }
         // The search is a good part of a solve; few profiles have chords so long.
-        let Ok(search) = Search::new(geometry) else {
+        let Ok(search) = ContactLocus::new(geometry) else {
             return Vec::new();
         };
         holes(&search, wheel.lowering, width)

@@ -16,7 +16,7 @@ use crate::contact::error::SolveError;
 use crate::contact::geometry::profile::Profile;
 use crate::contact::geometry::profile_quality::flattening::noise_pressure;
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::normal::wheel_height::search::{PressedWheel, ProfileContact};
+use crate::contact::normal::wheel_height::search::{PressedWheel, WheelTask};
 use crate::contact::profile_trust::quality::{ProfileQuality, ProfileUncertainty};
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
@@ -78,7 +78,7 @@ impl Judge for NoJudge {
 pub(crate) fn add(
     operators: &Arc<OperatorStore>,
     problem: &Problem,
-    contact: &ProfileContact,
+    contact: &WheelTask,
     suspicious: bool,
     solution: &mut Solution,
     monitor: &dyn Monitor,
@@ -174,7 +174,7 @@ fn open_by_points(patch: &PatchSolution, rough: bool) -> f64 {
 }
 
 /// The smoothings of the companions, of rail and wheel. Profiles without any are read once more with what suits their noise.
-fn readings(contact: &ProfileContact, solution: &Solution) -> Vec<[f64; 2]> {
+fn readings(contact: &WheelTask, solution: &Solution) -> Vec<[f64; 2]> {
     let used = contact.geometry.profiles().map(Profile::smoothing);
     let mut advised = [0.0_f64; 2];
     for quality in solution

@@ -5,7 +5,7 @@ use crate::contact::remark::list::Remark;
 
 /// The tangential answer on one level for one motion, dimensionless, one value per cell.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Tangential {
+pub struct LevelAnswer {
     /// Tractions along x and across, for forces.
     pub traction: [Vec<f64>; 2],
     /// A second opinion on the tractions from another discretisation rule, where there is one.
@@ -47,7 +47,7 @@ impl Work {
 
 /// Why there is no tangential answer.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Failure {
+pub enum LevelFailure {
     /// The caller stopped the work.
     Stopped(Stop),
     /// The iteration did not converge; the residual of its best iterate, what was needed, and advice as a clause.
@@ -61,15 +61,15 @@ pub enum Failure {
     },
 }
 
-impl From<Stop> for Failure {
+impl From<Stop> for LevelFailure {
     fn from(stop: Stop) -> Self {
-        Failure::Stopped(stop)
+        LevelFailure::Stopped(stop)
     }
 }
 
 /// Brings every traction into its disc (it may be outside by the solver's tolerance) and returns the slips: none in
 /// cells that stick, the part of the given slip along the traction in cells that slip.
-pub(crate) fn obey_coulomb(
+pub(crate) fn project_on_bound(
     bound: &[f64],
     slips: &[bool],
     traction: &mut [Vec<f64>; 2],

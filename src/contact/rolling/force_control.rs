@@ -9,14 +9,14 @@ use std::time::Duration;
 
 use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
-use crate::contact::numerics::bracketed_root::{PLACE_MAX, RootExit, zero};
+use crate::contact::numerics::bracketed_root::{PLACE_MAX, RootExit, find_root};
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::answer::Work;
 use crate::contact::rolling::linear_theory;
-use crate::contact::rolling::mesh_plan::Plan;
+use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
-use crate::contact::rolling::refinement::level_solve::{Asked, Point};
+use crate::contact::rolling::refinement::level_solve::{MotionAnswer, MotionTask};
 use crate::contact::rolling::refinement::levels::Ladder;
 use crate::contact::rolling::refinement::refine;
 use crate::contact::rolling::refinement::resolution::Resolution;
@@ -55,15 +55,15 @@ pub fn solve(
     task: &RollingTask,
     ladder: &mut Ladder,
     index: usize,
-    before: Option<&Point>,
+    before: Option<&MotionAnswer>,
     monitor: &dyn Monitor,
-) -> Result<Point, SolveError> {
+) -> Result<MotionAnswer, SolveError> {
     let motion = task.motions[index];
     if task.forces[index] == [None; 2] || task.friction.is_frictionless() {
-        return refine::solve(task, ladder, Asked { index, motion }, monitor);
+        return refine::solve(task, ladder, MotionTask { index, motion }, monitor);
     }
     let began = monitor.elapsed();
-    let mut search = Search::new(task, ladder, index, monitor);
+    let mut search = ForceSearch::new(task, ladder, index, monitor);
     let mut place = search.start(before);
     for _ in 0..CLIMBS_MAX {
         // A climb chooses the levels; on them the force is one function of the creepage.
@@ -79,13 +79,13 @@ pub fn solve(
 
 /// The cubic law of a problem.
 #[derive(Debug, Clone, Copy)]
-struct Law {
+struct CubicLaw {
     /// Force of linear theory over μN and creepage, along x and across.
     stiffness: [f64; 2],
 }
 
-impl Law {
-    fn new(task: &RollingTask, limit: f64) -> Law {
+impl CubicLaw {
+    fn new(task: &RollingTask, limit: f64) -> CubicLaw {
         let mut stiffness = [0.0; 2];
         for patch in task.footprint.patches() {
             let extent = patch.extent;
@@ -97,7 +97,7 @@ impl Law {
                 *stiffness += unit * c[k] / limit;
             }
         }
-        Law { stiffness }
+        CubicLaw { stiffness }
     }
 
     /// The linear force over μN that the cubic law brings down to `place`.
@@ -109,12 +109,12 @@ impl Law {
     }
 
     fn creepage(&self, k: usize, place: f64) -> f64 {
-        Law::linear(place) / self.stiffness[k]
+        CubicLaw::linear(place) / self.stiffness[k]
     }
 
     fn place(&self, k: usize, creepage: f64) -> f64 {
         let linear = (creepage * self.stiffness[k]).abs();
-        let knee = Law::linear(KNEE);
+        let knee = CubicLaw::linear(KNEE);
         let inside = 1.0 - (1.0 - linear.min(knee) / 3.0).powi(3);
         let beyond = (linear - knee).max(0.0) * (1.0 - KNEE).powf(2.0 / 3.0);
         (inside + beyond).min(PLACE_MAX).copysign(creepage)
@@ -129,7 +129,7 @@ impl Law {
 }
 
 /// One motion on its way to the prescribed forces.
-struct Search<'a, 'p> {
+struct ForceSearch<'a, 'p> {
     task: &'a RollingTask<'a>,
     ladder: &'a mut Ladder<'p>,
     index: usize,
@@ -137,11 +137,11 @@ struct Search<'a, 'p> {
     forces: PrescribedForces,
     /// μN of all patches in N.
     limit: f64,
-    law: Law,
+    law: CubicLaw,
     /// The levels to climb; chosen by the next trial if empty.
-    path: Vec<Plan>,
+    path: Vec<MeshPlan>,
     /// The answer nearest to the forces, and how far it is from them, relative to μN.
-    best: Option<(f64, Point)>,
+    best: Option<(f64, MotionAnswer)>,
     /// Largest force of the first trial, relative to μN.
     first: Option<f64>,
     saturated: bool,
@@ -150,23 +150,23 @@ struct Search<'a, 'p> {
     work: Work,
 }
 
-impl<'a, 'p> Search<'a, 'p> {
+impl<'a, 'p> ForceSearch<'a, 'p> {
     fn new(
         task: &'a RollingTask<'a>,
         ladder: &'a mut Ladder<'p>,
         index: usize,
         monitor: &'a dyn Monitor,
-    ) -> Search<'a, 'p> {
+    ) -> ForceSearch<'a, 'p> {
         let patches = task.footprint.patches();
         let limit = task.friction.limit_of_all(patches);
-        Search {
+        ForceSearch {
             task,
             ladder,
             index,
             monitor,
             forces: task.forces[index],
             limit,
-            law: Law::new(task, limit),
+            law: CubicLaw::new(task, limit),
             path: Vec::new(),
             best: None,
             first: None,
@@ -177,7 +177,7 @@ impl<'a, 'p> Search<'a, 'p> {
     }
 
     /// Places to begin at: those of the cubic law, corrected by as much as the motion before was off it.
-    fn start(&self, before: Option<&Point>) -> [f64; 2] {
+    fn start(&self, before: Option<&MotionAnswer>) -> [f64; 2] {
         let wanted = self.forces.map(|f| f.unwrap_or(0.0) / self.limit);
         let mut place = self.guess(wanted);
         if let Some(before) = before.filter(|point| !point.saturated) {
@@ -201,7 +201,7 @@ impl<'a, 'p> Search<'a, 'p> {
         if length == 0.0 {
             return [0.0; 2];
         }
-        let linear = Law::linear(length.min(1.0)) / length;
+        let linear = CubicLaw::linear(length.min(1.0)) / length;
         [0, 1].map(|k| self.law.place(k, linear * force[k] / self.law.stiffness[k]))
     }
 
@@ -217,7 +217,7 @@ impl<'a, 'p> Search<'a, 'p> {
             forces => {
                 let k = usize::from(forces[0].is_none());
                 let mut place = start;
-                let root = zero(start[k], |at, tolerance| {
+                let root = find_root(start[k], |at, tolerance| {
                     place[k] = at;
                     let off = self.trial(place)?[k];
                     *tolerance = self.tolerance();
@@ -271,9 +271,9 @@ impl<'a, 'p> Search<'a, 'p> {
     fn one_in_the_other(&mut self, start: [f64; 2]) -> Result<[f64; 2], SolveError> {
         let mut along = start[0];
         let mut exit_along = RootExit::Found;
-        let root = zero(start[1], |across, tolerance| {
+        let root = find_root(start[1], |across, tolerance| {
             let mut off = [0.0; 2];
-            let inner = zero(along, |at, tolerance| {
+            let inner = find_root(along, |at, tolerance| {
                 off = self.trial([at, across])?;
                 *tolerance = 0.3 * self.tolerance();
                 Ok(off[0])
@@ -312,11 +312,11 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// Solves the motion of two places; how far its forces are from those prescribed, relative to μN.
     fn trial(&mut self, place: [f64; 2]) -> Result<[f64; 2], SolveError> {
-        let asked = Asked {
+        let asked = MotionTask {
             index: self.index,
             motion: self.motion(place),
         };
-        let found = refine::along(self.task, self.ladder, asked, &self.path, self.monitor)?;
+        let found = refine::on_levels(self.task, self.ladder, asked, &self.path, self.monitor)?;
         let point = match found {
             Some(point) => point,
             None => refine::solve(self.task, self.ladder, asked, self.monitor)?,
@@ -377,11 +377,11 @@ impl<'a, 'p> Search<'a, 'p> {
         !chosen || error.is_some_and(|error| error <= target)
     }
 
-    fn finish(mut self, place: [f64; 2], began: Duration) -> Result<Point, SolveError> {
+    fn finish(mut self, place: [f64; 2], began: Duration) -> Result<MotionAnswer, SolveError> {
         if self.best.is_none() {
             self.trial(place)?;
         }
-        let asked = Asked {
+        let asked = MotionTask {
             index: self.index,
             motion: self.motion(place),
         };
@@ -398,7 +398,7 @@ impl<'a, 'p> Search<'a, 'p> {
     }
 }
 
-fn total(point: &Point) -> Resultants {
+fn total(point: &MotionAnswer) -> Resultants {
     let sum = Resultants::default();
     point.resultants.iter().fold(sum, |sum, r| sum.plus(*r))
 }

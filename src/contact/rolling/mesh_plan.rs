@@ -36,14 +36,14 @@ impl Regime {
 
 /// What a level is made from.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Plan {
+pub struct MeshPlan {
     /// Strips and cells.
     pub size: MeshSize,
     /// What it was made for.
     pub regime: Regime,
 }
 
-impl Plan {
+impl MeshPlan {
     /// Where cells and strips gather, if anywhere.
     #[must_use]
     pub fn pole(&self) -> Option<[f64; 2]> {
@@ -67,7 +67,7 @@ impl Plan {
 
     /// Do the meshes of two plans differ in size only, so that the change between them tells what is left?
     #[must_use]
-    pub fn is_like(&self, other: &Plan) -> bool {
+    pub fn is_like(&self, other: &MeshPlan) -> bool {
         match (self.regime, other.regime) {
             (Regime::Sticking { .. }, Regime::Sticking { .. })
             | (Regime::Spinning(_), Regime::Spinning(_)) => self.size.strips != other.size.strips,
@@ -76,9 +76,9 @@ impl Plan {
     }
 }
 
-impl From<MeshSize> for Plan {
+impl From<MeshSize> for MeshPlan {
     fn from(size: MeshSize) -> Self {
         let regime = Regime::Unknown;
-        Plan { size, regime }
+        MeshPlan { size, regime }
     }
 }

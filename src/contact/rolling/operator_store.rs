@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::contact::half_space::strip_operator::kind::Precision;
 use crate::contact::half_space::strip_operator::operator;
-use crate::contact::half_space::strip_operator::operator::Differences;
+use crate::contact::half_space::strip_operator::operator::StripOperator;
 use crate::contact::mesh::strips::{Mesh, Segment};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::own_blocks;
@@ -27,7 +27,7 @@ const LARGEST_PART: u64 = 2;
 #[derive(Debug)]
 pub struct LevelOperator {
     /// The influence of the mesh.
-    pub influence: Differences,
+    pub influence: StripOperator,
     /// Own blocks of its strips.
     pub own_blocks: SharedBlocks,
 }
@@ -125,7 +125,7 @@ impl OperatorStore {
             folded,
             precision,
         } = kind;
-        let influence = Differences::new(mesh, poisson_ratio, folded, precision, monitor)?;
+        let influence = StripOperator::new(mesh, poisson_ratio, folded, precision, monitor)?;
         let operator = Arc::new(LevelOperator {
             influence,
             own_blocks: SharedBlocks::default(),
@@ -286,7 +286,7 @@ mod tests {
     use super::*;
     use crate::contact::half_space::strip_operator::kind;
     use crate::contact::mesh::strips::{Chord, Grading, equal_strips};
-    use crate::contact::monitor::Unwatched;
+    use crate::contact::monitor::Unmonitored;
 
     fn mesh(half_width: f64) -> Mesh {
         let chords: Vec<Chord> = equal_strips(-half_width, half_width, 4)
@@ -311,7 +311,7 @@ mod tests {
     };
 
     fn get(store: &OperatorStore, half_width: f64, kind: OperatorKind) -> Arc<LevelOperator> {
-        store.get(&mesh(half_width), kind, &Unwatched).unwrap()
+        store.get(&mesh(half_width), kind, &Unmonitored).unwrap()
     }
 
     #[test]
@@ -357,12 +357,12 @@ mod tests {
     #[test]
     fn the_bytes_counted_are_those_of_the_matrix_and_all_its_own_blocks() {
         use crate::contact::rolling::own_blocks::OwnBlocks;
-        use crate::contact::rolling::slip_equations::Equations;
+        use crate::contact::rolling::slip_equations::SlipEquations;
         use crate::contact::rolling::slip_rules::Rule;
         for folded in [false, true] {
             let kind = OperatorKind { folded, ..KIND };
             let (mesh, store) = (mesh(1.0), OperatorStore::default());
-            let operator = store.get(&mesh, kind, &Unwatched).unwrap();
+            let operator = store.get(&mesh, kind, &Unmonitored).unwrap();
             let parities: &[_] = if folded {
                 &[
                     None,
@@ -373,9 +373,9 @@ mod tests {
                 &[None]
             };
             let mut blocks = 0;
-            for rule in [Rule::Upwind, Rule::Mirror, Rule::Trapezoid] {
+            for rule in [Rule::Upwind, Rule::ThreePoint, Rule::Trapezoid] {
                 for parity in parities {
-                    let equations = Equations::new(rule, &mesh, &operator.influence, *parity);
+                    let equations = SlipEquations::new(rule, &mesh, &operator.influence, *parity);
                     blocks += OwnBlocks::new(&equations).bytes();
                 }
             }
@@ -412,12 +412,12 @@ mod tests {
     #[test]
     fn what_a_case_used_last_is_at_hand_though_the_store_has_no_room() {
         let operators = CaseOperators::new(&Arc::new(OperatorStore::new(0)));
-        let first = operators.get(&mesh(1.0), KIND, &Unwatched).unwrap();
-        let again = operators.get(&mesh(1.0), KIND, &Unwatched).unwrap();
+        let first = operators.get(&mesh(1.0), KIND, &Unmonitored).unwrap();
+        let again = operators.get(&mesh(1.0), KIND, &Unmonitored).unwrap();
         assert!(Arc::ptr_eq(&first, &again));
         drop((first, again));
-        let last = Arc::downgrade(&operators.get(&mesh(1.0), KIND, &Unwatched).unwrap());
-        operators.get(&mesh(1.1), KIND, &Unwatched).unwrap();
+        let last = Arc::downgrade(&operators.get(&mesh(1.0), KIND, &Unmonitored).unwrap());
+        operators.get(&mesh(1.1), KIND, &Unmonitored).unwrap();
         assert!(last.upgrade().is_none());
     }
 }

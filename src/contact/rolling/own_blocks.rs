@@ -1,7 +1,7 @@
 //! Own blocks of the strips: the effect of a strip on itself, for each rule and parity.
 
 use crate::contact::half_space::strip_operator::kind::Parity;
-use crate::contact::rolling::slip_equations::Equations;
+use crate::contact::rolling::slip_equations::SlipEquations;
 use crate::contact::rolling::slip_rules::Rule;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -15,7 +15,7 @@ pub struct OwnBlocks {
 impl OwnBlocks {
     /// Collects the blocks.
     #[must_use]
-    pub fn new(equations: &Equations) -> OwnBlocks {
+    pub fn new(equations: &SlipEquations) -> OwnBlocks {
         OwnBlocks {
             blocks: (0..equations.segments())
                 .map(|j| equations.own_block(j))
@@ -32,7 +32,7 @@ impl OwnBlocks {
 
     /// `−(M_xx + M_yy)/2` on the diagonal, cell by cell.
     #[must_use]
-    pub fn diagonal(&self, equations: &Equations) -> Vec<f64> {
+    pub fn diagonal(&self, equations: &SlipEquations) -> Vec<f64> {
         let mut diagonal = vec![0.0; equations.cells()];
         for (j, (xx, yy)) in self.blocks.iter().enumerate() {
             let n = equations.segment(j).len();

@@ -1,10 +1,10 @@
 //! What do the tractions of a level look like, as far as the next mesh should know: how much sticks, and about which pole they turn.
 
 use crate::contact::mesh::strips::Segment;
-use crate::contact::rolling::answer::Tangential;
+use crate::contact::rolling::answer::LevelAnswer;
 use crate::contact::rolling::mesh_plan::Regime;
 use crate::contact::rolling::refinement::constants::{POLE, STICK_NEGLIGIBLE, STICK_UNCERTAIN};
-use crate::contact::rolling::strip_mesh::Level;
+use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::rolling::task::RollingTask;
 use crate::contact::rolling::vortex::vortex_centre;
 
@@ -15,7 +15,7 @@ const POLE_OUTMOST: f64 = 0.95;
 
 /// Which mesh the next level should have, seen from this one.
 #[must_use]
-pub fn regime(level: &Level, answer: &Tangential, spinning: bool) -> Regime {
+pub fn regime(level: &StripMesh, answer: &LevelAnswer, spinning: bool) -> Regime {
     if !spinning || stick_share(level, answer) >= STICK_NEGLIGIBLE {
         return Regime::Sticking { spinning };
     }
@@ -25,7 +25,7 @@ pub fn regime(level: &Level, answer: &Tangential, spinning: bool) -> Regime {
 }
 
 /// Share of the cells' area that sticks.
-fn stick_share(level: &Level, answer: &Tangential) -> f64 {
+fn stick_share(level: &StripMesh, answer: &LevelAnswer) -> f64 {
     let (mut stick, mut total) = (0.0, 0.0);
     for (slips, area) in answer.slips.iter().zip(&level.area) {
         total += area;
@@ -35,7 +35,7 @@ fn stick_share(level: &Level, answer: &Tangential) -> f64 {
 }
 
 /// A point inside the box about the patches as a place along the nearest chord and across, each from −1 to 1.
-fn place_inside(level: &Level, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+fn place_inside(level: &StripMesh, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
     let mesh = &level.normalised;
     let side = |sign: f64| {
         let sides = mesh
@@ -61,7 +61,7 @@ fn place_inside(level: &Level, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
 }
 
 /// Centre of the traction vortex, in the level's dimensionless coordinates.
-fn pole(level: &Level, answer: &Tangential) -> Option<[f64; 2]> {
+fn pole(level: &StripMesh, answer: &LevelAnswer) -> Option<[f64; 2]> {
     let rows = level.normalised.rows();
     let load = |i: usize| {
         if answer.slips[i] {
@@ -77,7 +77,7 @@ fn pole(level: &Level, answer: &Tangential) -> Option<[f64; 2]> {
 
 /// Error of sampling the vortex, relative to the whole load; 0 where the cell that holds the centre surely
 /// sticks.
-pub(crate) fn pole_error(task: &RollingTask, level: &Level, answer: &Tangential) -> f64 {
+pub(crate) fn pole_error(task: &RollingTask, level: &StripMesh, answer: &LevelAnswer) -> f64 {
     let Some([x, y]) = pole(level, answer) else {
         return 0.0;
     };

@@ -1,6 +1,6 @@
 //! Forces and moment of tractions over a patch.
 
-use crate::contact::rolling::strip_mesh::Level;
+use crate::contact::rolling::strip_mesh::StripMesh;
 
 /// Forces in N and moment about z in N·mm, on the lower body.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -21,7 +21,7 @@ impl Resultants {
     /// small: the mean of `y²` over the strip is larger than the square of the mean); `traction` is dimensionless as the level's, the moment is about the
     /// origin of the case.
     #[must_use]
-    pub fn of_patch(level: &Level, traction: &[Vec<f64>; 2], patch: usize) -> Resultants {
+    pub fn of_patch(level: &StripMesh, traction: &[Vec<f64>; 2], patch: usize) -> Resultants {
         let mut sum = Resultants::default();
         let mesh = &level.mesh;
         let segments = mesh.segments.iter().zip(&mesh.arm);

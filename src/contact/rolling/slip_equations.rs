@@ -7,7 +7,7 @@ use std::cell::RefCell;
 use std::ops::ControlFlow;
 
 use crate::contact::half_space::strip_operator::kind::Parity;
-use crate::contact::half_space::strip_operator::operator::{Differences, Scratch};
+use crate::contact::half_space::strip_operator::operator::{OperatorScratch, StripOperator};
 use crate::contact::mesh::strips::Mesh;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::motion::Motion;
@@ -15,10 +15,10 @@ use crate::contact::rolling::slip_rules::{Rule, Stencil};
 
 /// A rule on a mesh with its influence: the linear map from tractions to slips.
 #[derive(Debug)]
-pub struct Equations<'a> {
+pub struct SlipEquations<'a> {
     /// The rule in use.
     pub rule: Rule,
-    differences: &'a Differences,
+    differences: &'a StripOperator,
     parity: Option<Parity>,
     stencils: Vec<Stencil>,
     /// Cells and rows of every segment that has unknowns.
@@ -29,18 +29,18 @@ pub struct Equations<'a> {
     /// y of every segment, for the rigid slip.
     y: Vec<f64>,
     /// Of the products.
-    scratch: RefCell<Scratch>,
+    scratch: RefCell<OperatorScratch>,
 }
 
-impl<'a> Equations<'a> {
+impl<'a> SlipEquations<'a> {
     /// Sets up a rule for a mesh and its influence; with a parity, only the first half of the segments has unknowns.
     #[must_use]
     pub fn new(
         rule: Rule,
         mesh: &Mesh,
-        differences: &'a Differences,
+        differences: &'a StripOperator,
         parity: Option<Parity>,
-    ) -> Equations<'a> {
+    ) -> SlipEquations<'a> {
         let parity = if differences.is_folded() {
             parity
         } else {
@@ -52,7 +52,7 @@ impl<'a> Equations<'a> {
             mesh.segments.len()
         };
         let mut row = 0;
-        let mut equations = Equations {
+        let mut equations = SlipEquations {
             rule,
             differences,
             parity,
@@ -216,7 +216,7 @@ mod tests {
     use super::*;
     use crate::contact::half_space::strip_operator::kind::Precision;
     use crate::contact::mesh::strips::{Chord, Grading, equal_strips};
-    use crate::contact::monitor::Unwatched;
+    use crate::contact::monitor::Unmonitored;
 
     #[test]
     fn the_dense_matrix_acts_like_the_map_in_every_storage() {
@@ -235,18 +235,18 @@ mod tests {
         let mesh = Mesh::new(&chords, &Grading::cosine(5));
         for folded in [false, true] {
             let differences =
-                Differences::new(&mesh, 0.3, folded, Precision::Double, &Unwatched).unwrap();
+                StripOperator::new(&mesh, 0.3, folded, Precision::Double, &Unmonitored).unwrap();
             for (rule, parity) in [
                 (Rule::Upwind, None),
-                (Rule::Mirror, None),
+                (Rule::ThreePoint, None),
                 (Rule::Trapezoid, None),
                 (Rule::Trapezoid, Some(Parity::Longitudinal)),
                 (Rule::Trapezoid, Some(Parity::Lateral)),
             ] {
-                let equations = Equations::new(rule, &mesh, &differences, parity);
+                let equations = SlipEquations::new(rule, &mesh, &differences, parity);
                 let (n, padded) = (equations.cells(), equations.padded());
                 let place = |i: usize| if i < n { i } else { padded + i - n };
-                let matrix = equations.dense(&Unwatched).unwrap();
+                let matrix = equations.dense(&Unmonitored).unwrap();
                 let mut t = vec![0.0; 2 * padded];
                 for i in 0..2 * n {
                     t[place(i)] = (1.0 + 3.7 * i as f64).sin();

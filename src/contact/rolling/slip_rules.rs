@@ -14,7 +14,7 @@ pub enum Rule {
     Upwind,
     /// One-sided three-point derivative at the node; behind the leading edge the nodes are mirrored. Second order,
     /// smooth slips.
-    Mirror,
+    ThreePoint,
     /// The seed's eq. 6 with `x_U` at the leading edge and half weight for the own cell, differenced along the strip:
     /// slips of neighbouring cells average to the mean slip between their nodes. Second order, best forces, but its
     /// slips oscillate next to the stick zone.
@@ -27,7 +27,7 @@ impl Rule {
     pub fn name(self) -> &'static str {
         match self {
             Rule::Upwind => "upwind",
-            Rule::Mirror => "mirror",
+            Rule::ThreePoint => "mirror",
             Rule::Trapezoid => "trapezoid",
         }
     }
@@ -64,7 +64,7 @@ impl Stencil {
                     stencil.band[i] = [1.0 / (next - x), 0.0, 0.0];
                     stencil.rigid_at[i] = 0.5 * (x + next);
                 }
-                Rule::Mirror => {
+                Rule::ThreePoint => {
                     stencil.band[i] = three_point(&points, i, n);
                     stencil.rigid_at[i] = if n == 1 { 0.5 * (x + next) } else { x };
                 }
@@ -161,7 +161,7 @@ mod tests {
 
     #[test]
     fn every_rule_is_exact_for_a_uniform_strain() {
-        for rule in [Rule::Upwind, Rule::Mirror, Rule::Trapezoid] {
+        for rule in [Rule::Upwind, Rule::ThreePoint, Rule::Trapezoid] {
             for n in [1, 2, 3, 9] {
                 for (_, s) in slips(rule, n, |x| 0.7 * x - 3.0) {
                     assert!((s - 0.7).abs() < 1e-12, "{rule:?} {n} {s}");
@@ -173,7 +173,7 @@ mod tests {
     #[test]
     fn the_three_point_rule_is_exact_for_a_parabola() {
         for n in [2, 3, 9] {
-            for (x, s) in slips(Rule::Mirror, n, |x| x * x) {
+            for (x, s) in slips(Rule::ThreePoint, n, |x| x * x) {
                 assert!((s - 2.0 * x).abs() < 1e-12, "{n} {x} {s}");
             }
         }
@@ -190,7 +190,7 @@ mod tests {
 
     #[test]
     fn rigid_slip_enters_every_rule_like_a_displacement_of_that_slope() {
-        for rule in [Rule::Upwind, Rule::Mirror, Rule::Trapezoid] {
+        for rule in [Rule::Upwind, Rule::ThreePoint, Rule::Trapezoid] {
             for n in [1, 2, 7] {
                 let mesh = mesh(n);
                 let segment = &mesh.segments[0];

@@ -13,7 +13,7 @@ const GAUSS: [(f64, f64); 4] = [
 
 /// A strip's chord and the line of the region it was made from.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Fitted {
+pub struct StripChord {
     /// The chord to mesh: about the middle of the line, as long as the mean of the line's length and the mean length
     /// over the strip.
     pub chord: Chord,
@@ -25,7 +25,7 @@ pub struct Fitted {
     pub load: Option<f64>,
 }
 
-impl Fitted {
+impl StripChord {
     /// Mean pressure in MPa over `x0 < x < x1` of the chord: the pressure of the line, stretched and scaled with the
     /// length so that its profile keeps its form (exact for Hertz's semi-ellipse).
     #[must_use]
@@ -44,7 +44,7 @@ impl Fitted {
 /// width b of the patch, lowers the errors of the resultants on 62 Hertz cases by a third and Kalker's C33 with it.
 /// Where a strip has several chords the mid-line's are kept.
 #[must_use]
-pub fn chords(footprint: &Footprint, patch: usize, strips: &[(f64, f64)]) -> Vec<Fitted> {
+pub fn chords(footprint: &Footprint, patch: usize, strips: &[(f64, f64)]) -> Vec<StripChord> {
     let lines = footprint.chords(patch, strips);
     let alone = |line: &Chord| {
         lines
@@ -60,12 +60,12 @@ pub fn chords(footprint: &Footprint, patch: usize, strips: &[(f64, f64)]) -> Vec
     let width: f64 = strips.iter().map(|(_, dy)| dy).sum();
     let share = 0.5 / (1.0 + 0.5 * (longest / width).powi(2));
     let fit = |line: &Chord| {
-        let strip = alone(line).then(|| Strip::of(footprint, patch, line));
+        let strip = alone(line).then(|| StripLoad::of(footprint, patch, line));
         let mean = strip.and_then(|strip| strip.length);
         let length = line.right - line.left;
         let half = 0.5 * ((1.0 - share) * length + share * mean.unwrap_or(length));
         let middle = 0.5 * (line.left + line.right);
-        Fitted {
+        StripChord {
             chord: Chord {
                 left: middle - half,
                 right: middle + half,
@@ -81,7 +81,7 @@ pub fn chords(footprint: &Footprint, patch: usize, strips: &[(f64, f64)]) -> Vec
 
 /// What a strip holds between its two sides.
 #[derive(Debug, Clone, Copy)]
-struct Strip {
+struct StripLoad {
     /// Mean length of the chords; nothing if there is more than one on any of its lines.
     length: Option<f64>,
     /// y of the centre of the load.
@@ -90,9 +90,9 @@ struct Strip {
     load: f64,
 }
 
-impl Strip {
+impl StripLoad {
     /// The strip about a line.
-    fn of(footprint: &Footprint, patch: usize, line: &Chord) -> Strip {
+    fn of(footprint: &Footprint, patch: usize, line: &Chord) -> StripLoad {
         let (mut length, mut load, mut moment) = (Some(0.0), 0.0, 0.0);
         for (place, weight) in GAUSS {
             let y = line.y + 0.5 * line.dy * place;
@@ -113,7 +113,7 @@ impl Strip {
         } else {
             line.y
         };
-        Strip {
+        StripLoad {
             length,
             load_y,
             load,
@@ -134,7 +134,7 @@ mod tests {
 
     fn area(strips: usize) -> (f64, f64) {
         let fitted = chords(&circle(), 0, &equal_strips(-1.0, 1.0, strips));
-        let sum = |f: fn(&Fitted) -> f64| fitted.iter().map(f).sum::<f64>();
+        let sum = |f: fn(&StripChord) -> f64| fitted.iter().map(f).sum::<f64>();
         (
             sum(|f| (f.chord.right - f.chord.left) * f.chord.dy),
             sum(|f| (f.line.right - f.line.left) * f.line.dy),

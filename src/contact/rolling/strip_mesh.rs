@@ -9,13 +9,13 @@ use crate::contact::half_space::strip_operator::kind::{Parity, Precision};
 use crate::contact::mesh::strips::{Chord, Grading, Mesh, equal_strips, strips_about};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::footprint::Footprint;
-use crate::contact::rolling::mesh_plan::Plan;
+use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::{
     CaseOperators, LevelOperator, OperatorKind, OperatorStore,
 };
 use crate::contact::rolling::strip_chords;
-use crate::contact::rolling::strip_chords::Fitted;
+use crate::contact::rolling::strip_chords::StripChord;
 use crate::contact::rolling::task::RollingTask;
 
 /// Dimensionless coordinates in single precision are multiples of this: patches of one shape get the same mesh, to the last
@@ -60,9 +60,9 @@ impl Scale {
 
 /// A mesh with its pressures; its operator lies in the store of the process.
 #[derive(Debug)]
-pub struct Level {
+pub struct StripMesh {
     /// What it was made from.
-    pub plan: Plan,
+    pub plan: MeshPlan,
     /// The mesh in mm.
     pub mesh: Mesh,
     /// Pressure of every cell in MPa; the cells of a patch carry its normal force exactly.
@@ -81,15 +81,15 @@ pub struct Level {
     operators: Arc<CaseOperators>,
 }
 
-impl Level {
+impl StripMesh {
     /// Meshes every patch of the problem's region: equal strips and cosine-graded cells, or both gathered about the
     /// plan's pole.
     ///
     /// # Errors
     /// [`SolveError::Unmeshable`] if no strip meets a patch.
-    pub fn new(task: &RollingTask, plan: impl Into<Plan>) -> Result<Level, SolveError> {
+    pub fn new(task: &RollingTask, plan: impl Into<MeshPlan>) -> Result<StripMesh, SolveError> {
         let store = Arc::new(OperatorStore::new(0));
-        Level::with_operators(task, plan, CaseOperators::new(&store))
+        StripMesh::with_operators(task, plan, CaseOperators::new(&store))
     }
 
     /// The same, with the operators of a case to take its own from.
@@ -98,10 +98,10 @@ impl Level {
     /// The same.
     pub fn with_operators(
         task: &RollingTask,
-        plan: impl Into<Plan>,
+        plan: impl Into<MeshPlan>,
         operators: Arc<CaseOperators>,
-    ) -> Result<Level, SolveError> {
-        let plan: Plan = plan.into();
+    ) -> Result<StripMesh, SolveError> {
+        let plan: MeshPlan = plan.into();
         let size = plan.size;
         let Elasticity {
             shear_modulus,
@@ -109,7 +109,7 @@ impl Level {
             ..
         } = *task.elasticity;
         let (footprint, patches) = (task.footprint, task.footprint.patches());
-        let mut fitted: Vec<Fitted> = Vec::new();
+        let mut fitted: Vec<StripChord> = Vec::new();
         for (k, patch) in patches.iter().enumerate() {
             let [low, high] = [patch.extent[2], patch.extent[3]];
             let strips = match plan.pole() {
@@ -157,7 +157,7 @@ impl Level {
         let bound = pairs
             .map(|(p, y)| task.friction.relative(y) * p / largest)
             .collect();
-        Ok(Level {
+        Ok(StripMesh {
             plan,
             mesh,
             pressure,
@@ -239,7 +239,12 @@ impl Level {
 
 /// Mean pressures of the cells, scaled so that the cells carry the load of their strip where the region is not Hertz's
 /// ellipse (its line loads are smooth enough), then the patch's normal force.
-fn cell_pressures(footprint: &Footprint, fitted: &[Fitted], mesh: &Mesh, area: &[f64]) -> Vec<f64> {
+fn cell_pressures(
+    footprint: &Footprint,
+    fitted: &[StripChord],
+    mesh: &Mesh,
+    area: &[f64],
+) -> Vec<f64> {
     let patches = footprint.patches();
     let mut load = vec![0.0; patches.len()];
     let mut pressure = vec![0.0; mesh.cells()];

@@ -8,11 +8,11 @@ use crate::contact::post::zone::Zone;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::motion::Motion;
-use crate::contact::rolling::refinement::level_solve::Point;
+use crate::contact::rolling::refinement::level_solve::MotionAnswer;
 use crate::contact::rolling::refinement::levels::Ladder;
 use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
-use crate::contact::rolling::strip_mesh::Level;
+use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::solution::words::{
     CombinedMaterial, ErrorEstimate, Fields, MeshReport, NormalisedMotion, Origin, PatchCells,
     PatchFields, PatchSolution, PointFields, PointSolution, Solution, SolverReport, Total,
@@ -55,7 +55,7 @@ impl<'a> Assembly<'a> {
     }
 
     /// Adds the next motion.
-    pub fn add(&mut self, ladder: &Ladder, point: &Point) {
+    pub fn add(&mut self, ladder: &Ladder, point: &MotionAnswer) {
         let (problem, level) = (self.problem, ladder.get(point.level));
         self.remarks
             .extend(remarks(problem, self.total.len(), point));
@@ -72,7 +72,7 @@ impl<'a> Assembly<'a> {
     }
 
     /// Values per cell of the next motion; motions that were solved on one level share its cells.
-    fn add_fields(&mut self, level: &Level, point: &Point) {
+    fn add_fields(&mut self, level: &StripMesh, point: &MotionAnswer) {
         let problem = self.problem;
         let patches = self.patches.len();
         self.fields
@@ -149,10 +149,10 @@ fn patch_solution((patch, points): (&Patch, Vec<PointSolution>)) -> PatchSolutio
 
 fn point_solution(
     problem: &Problem,
-    level: &Level,
+    level: &StripMesh,
     patch: &Patch,
     index: usize,
-    point: &Point,
+    point: &MotionAnswer,
 ) -> PointSolution {
     let motion = &point.motion;
     let found = point.resultants[index];
@@ -201,7 +201,7 @@ fn point_solution(
 }
 
 /// Does the estimate of the sum over the patches stay within the target?
-fn target_met(problem: &Problem, point: &Point) -> Option<bool> {
+fn target_met(problem: &Problem, point: &MotionAnswer) -> Option<bool> {
     let Resolution::Target(target) = problem.resolution else {
         return None;
     };
@@ -225,7 +225,7 @@ struct ZoneAreas {
 
 /// Counts and areas of the zones; areas are the cells' shares of the patch's area, so that they add up to it.
 fn zone_areas(
-    level: &Level,
+    level: &StripMesh,
     patch: &Patch,
     cells: std::ops::Range<usize>,
     slips: &[bool],
@@ -285,7 +285,7 @@ fn absolute(problem: &Problem, patches: &[Patch], relative: f64) -> ErrorEstimat
     }
 }
 
-fn total(problem: &Problem, patches: &[Patch], point: &Point) -> Total {
+fn total(problem: &Problem, patches: &[Patch], point: &MotionAnswer) -> Total {
     let sum = point
         .resultants
         .iter()
@@ -306,7 +306,11 @@ fn total(problem: &Problem, patches: &[Patch], point: &Point) -> Total {
 }
 
 /// Remarks on motion `index` of the problem, with its number in the case.
-fn remarks(problem: &Problem, index: usize, point: &Point) -> impl Iterator<Item = RemarkEntry> {
+fn remarks(
+    problem: &Problem,
+    index: usize,
+    point: &MotionAnswer,
+) -> impl Iterator<Item = RemarkEntry> {
     let own = point.tangential.remarks.iter().cloned();
     let missed = target_missed(problem, point);
     let number = problem.part.before + index;
@@ -315,7 +319,7 @@ fn remarks(problem: &Problem, index: usize, point: &Point) -> impl Iterator<Item
         .map(move |remark| remark.at_point(number))
 }
 
-fn unreachable(problem: &Problem, index: usize, point: &Point) -> Option<Remark> {
+fn unreachable(problem: &Problem, index: usize, point: &MotionAnswer) -> Option<Remark> {
     let [wanted_x_n, wanted_y_n] = problem.forces[index];
     let sum = Resultants::default();
     let found = point.resultants.iter().fold(sum, |sum, r| sum.plus(*r));
@@ -327,7 +331,7 @@ fn unreachable(problem: &Problem, index: usize, point: &Point) -> Option<Remark>
     })
 }
 
-fn target_missed(problem: &Problem, point: &Point) -> Option<Remark> {
+fn target_missed(problem: &Problem, point: &MotionAnswer) -> Option<Remark> {
     let Resolution::Target(target) = problem.resolution else {
         return None;
     };
@@ -335,7 +339,7 @@ fn target_missed(problem: &Problem, point: &Point) -> Option<Remark> {
     (target_met(problem, point) == Some(false)).then_some(Remark::TargetMissed { estimate, target })
 }
 
-fn patch_cells(problem: &Problem, level: &Level, patch: usize) -> PatchCells {
+fn patch_cells(problem: &Problem, level: &StripMesh, patch: usize) -> PatchCells {
     let cells = level.patch_cells(patch);
     let mesh = &level.mesh;
     let mut fields = PatchCells::default();
@@ -358,9 +362,9 @@ fn patch_cells(problem: &Problem, level: &Level, patch: usize) -> PatchCells {
 
 fn point_fields(
     problem: &Problem,
-    level: &Level,
+    level: &StripMesh,
     cells: std::ops::Range<usize>,
-    point: &Point,
+    point: &MotionAnswer,
 ) -> PointFields {
     let answer = &point.tangential;
     let scaled = |values: &[f64], factor: f64| {

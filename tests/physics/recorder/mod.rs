@@ -17,7 +17,7 @@ use std::sync::Arc;
 use railhead::contact;
 use railhead::contact::case::digest::SOLVER_REVISION;
 use railhead::contact::case::limits::Limits;
-use railhead::contact::monitor::Unwatched;
+use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::operator_store::OperatorStore;
 use serde_json::Value;
 
@@ -47,7 +47,7 @@ fn solved(operators: &Arc<OperatorStore>, case: &Value) -> Record {
         Err(error) => return Record::refused(&error.to_string()),
     };
     let friction = case["friction"]["coefficient"].as_f64().unwrap_or(0.0);
-    match contact::solve_with(operators, &problem, &Unwatched) {
+    match contact::solve_with(operators, &problem, &Unmonitored) {
         Ok((solution, fields)) => Record::of(friction, &solution, &fields),
         Err(error) => Record::refused(&error.to_string()),
     }

@@ -26,7 +26,7 @@ const GAP: Quantity = Quantity {
 };
 
 #[derive(Clone, Copy)]
-enum Kind {
+enum ContactWord {
     Radii,
     Ellipse,
     GapProfile,
@@ -35,13 +35,13 @@ enum Kind {
     Profiles,
 }
 
-const KINDS: [(&str, Kind); 6] = [
-    ("radii", Kind::Radii),
-    ("ellipse", Kind::Ellipse),
-    ("gap_profile", Kind::GapProfile),
-    ("gap_grid", Kind::GapGrid),
-    ("pressure_grid", Kind::PressureGrid),
-    ("profiles", Kind::Profiles),
+const KINDS: [(&str, ContactWord); 6] = [
+    ("radii", ContactWord::Radii),
+    ("ellipse", ContactWord::Ellipse),
+    ("gap_profile", ContactWord::GapProfile),
+    ("gap_grid", ContactWord::GapGrid),
+    ("pressure_grid", ContactWord::PressureGrid),
+    ("profiles", ContactWord::Profiles),
 ];
 
 /// Reads the required member `contact` of a case.
@@ -50,7 +50,7 @@ pub(crate) fn read(case: &mut Object) -> Option<Contact> {
     let words = KINDS.map(|(word, _)| word).join(", ");
     block.required("type", &format!("one of {words}"))?;
     match block.word("type", &KINDS, &[])? {
-        Kind::Radii => {
+        ContactWord::Radii => {
             block.only(&["type", "rolling_mm", "lateral_mm"], &[]);
             let rolling_mm = block.required_number("rolling_mm", RADIUS);
             let lateral_mm = block.required_number("lateral_mm", RADIUS);
@@ -59,7 +59,7 @@ pub(crate) fn read(case: &mut Object) -> Option<Contact> {
                 lateral_mm: lateral_mm?,
             })
         }
-        Kind::Ellipse => {
+        ContactWord::Ellipse => {
             block.only(&["type", "a_mm", "b_mm"], &[]);
             let a_mm = block.required_number("a_mm", SEMI_AXIS);
             let b_mm = block.required_number("b_mm", SEMI_AXIS);
@@ -68,7 +68,7 @@ pub(crate) fn read(case: &mut Object) -> Option<Contact> {
                 b_mm: b_mm?,
             })
         }
-        Kind::GapProfile => {
+        ContactWord::GapProfile => {
             block.only(&["type", "rolling_mm", "y_mm", "gap_mm"], &[]);
             let rolling_mm = block.required_number("rolling_mm", RADIUS);
             let y_mm = axis(&mut block, "y_mm");
@@ -80,7 +80,7 @@ pub(crate) fn read(case: &mut Object) -> Option<Contact> {
                 gap_mm: gap_mm?,
             })
         }
-        Kind::GapGrid => {
+        ContactWord::GapGrid => {
             block.only(&["type", "x_mm", "y_mm", "gap_mm"], &[]);
             let (x_mm, y_mm, gap_mm) = grid(&mut block, GAP);
             Some(Contact::GapGrid {
@@ -89,7 +89,7 @@ pub(crate) fn read(case: &mut Object) -> Option<Contact> {
                 gap_mm: gap_mm?,
             })
         }
-        Kind::PressureGrid => {
+        ContactWord::PressureGrid => {
             block.only(&["type", "x_mm", "y_mm", "pressure_mpa"], &[]);
             let (x_mm, y_mm, pressure_mpa) = grid(&mut block, PRESSURE);
             Some(Contact::PressureGrid {
@@ -98,7 +98,7 @@ pub(crate) fn read(case: &mut Object) -> Option<Contact> {
                 pressure_mpa: pressure_mpa?,
             })
         }
-        Kind::Profiles => profiles::read(&mut block),
+        ContactWord::Profiles => profiles::read(&mut block),
     }
 }
 

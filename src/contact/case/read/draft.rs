@@ -3,7 +3,7 @@
 //! A member that is absent, of the wrong type, out of range, unknown or contradictory gets a fault with its JSON
 //! pointer (RFC 6901), the value received and what is allowed. Nothing is repaired.
 
-use crate::contact::case::checks::{Given, faults_of};
+use crate::contact::case::checks::{PartialCase, faults_of};
 use crate::contact::case::limits::Limits;
 use crate::contact::case::read::object::{Faults, Interval, Object, has_controls, join, shown};
 use crate::contact::case::read::{contact, material, motion, solver};
@@ -27,7 +27,7 @@ const FRICTION_LEAST: f64 = 1e-12;
 ///
 /// `None` in a required part means that it is faulty or absent; the fault is in the list that came with the draft.
 #[derive(Debug, Default)]
-pub(crate) struct Draft {
+pub(crate) struct CaseDraft {
     name: Option<String>,
     labels: BTreeMap<String, String>,
     material: Option<Material>,
@@ -56,7 +56,7 @@ impl Case {
 }
 
 /// Reads what can be read, and lists the faults of the rest.
-pub(crate) fn draft(value: &Value) -> (Draft, Vec<Fault>) {
+pub(crate) fn draft(value: &Value) -> (CaseDraft, Vec<Fault>) {
     let mut faults = Faults::default();
     let draft = Object::open(value, String::new(), &mut faults)
         .map(|mut case| read(&mut case))
@@ -64,10 +64,10 @@ pub(crate) fn draft(value: &Value) -> (Draft, Vec<Fault>) {
     (draft, faults.into_list())
 }
 
-impl Draft {
+impl CaseDraft {
     /// Faults against physics and limits of the parts that could be read.
     pub(crate) fn faults_beside(&self, limits: &Limits) -> Vec<Fault> {
-        let given = Given {
+        let given = PartialCase {
             material: self.material.as_ref(),
             friction: self.friction.as_ref().map(|f| f.coefficient),
             contact: self.contact.as_ref(),
@@ -95,7 +95,7 @@ impl Draft {
     }
 }
 
-fn read(case: &mut Object) -> Draft {
+fn read(case: &mut Object) -> CaseDraft {
     case.only(
         &[
             "name", "labels", "material", "friction", "contact", "load", "motion", "solver",
@@ -112,7 +112,7 @@ fn read(case: &mut Object) -> Draft {
     let motion = motion::read(case);
     let solver = solver::read(case);
     let outputs = solver::read_outputs(case);
-    Draft {
+    CaseDraft {
         name,
         labels,
         material,

@@ -1,10 +1,10 @@
 //! Two-column text or CSV: y and z in mm, one point per line.
 
-use crate::contact::geometry::formats::profile_file::{Contents, numbers, unreadable};
+use crate::contact::geometry::formats::profile_file::{ProfileFile, numbers, unreadable};
 
 /// Lines that start with `#`, `!`, `%` or `"` are remarks; one line of titles may stand before the first point.
-pub(crate) fn read(text: &str) -> Result<Contents, String> {
-    let mut contents = Contents::default();
+pub(crate) fn read(text: &str) -> Result<ProfileFile, String> {
+    let mut contents = ProfileFile::default();
     let mut title_allowed = true;
     for (k, line) in text.lines().enumerate() {
         let line = line.trim().trim_start_matches('\u{feff}');

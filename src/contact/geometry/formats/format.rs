@@ -1,6 +1,6 @@
 //! Profiles as text files: columns, Simpack and MiniProf. Text comes in, never a path.
 
-use crate::contact::geometry::formats::profile_file::Contents;
+use crate::contact::geometry::formats::profile_file::ProfileFile;
 use crate::contact::geometry::formats::{columns, miniprof, simpack};
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -24,7 +24,7 @@ const PATH_LENGTH_MAX: usize = 1000;
 ///
 /// # Errors
 /// A sentence with the number of the line that cannot be read, or with what is missing.
-pub fn read(format: Format, text: &str) -> Result<Contents, String> {
+pub fn read(format: Format, text: &str) -> Result<ProfileFile, String> {
     if is_path(text) {
         return Err(format!(
             "{:?} given, which looks like a path; text is what the file holds, not its path",

@@ -4,14 +4,14 @@
 //! is z here. Instruments differ in the sense of both: x usually runs toward the track centre, z is told by the shape.
 
 use crate::contact::geometry::formats::profile_file::{
-    Contents, has_decimal_commas, numbers, unreadable,
+    ProfileFile, has_decimal_commas, numbers, unreadable,
 };
 
 /// Known by the header: a line with `=` that is not a point.
-pub(crate) fn read(text: &str) -> Result<Contents, String> {
-    let mut contents = Contents {
+pub(crate) fn read(text: &str) -> Result<ProfileFile, String> {
+    let mut contents = ProfileFile {
         mirror_y: Some(true),
-        ..Contents::default()
+        ..ProfileFile::default()
     };
     let mut columns = [0, 1];
     let mut expected = None;

@@ -2,7 +2,7 @@
 
 /// What a file says.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Contents {
+pub struct ProfileFile {
     /// Points `[y, z]` in mm, with the file's own shifts, rotation and mirroring done.
     pub points: Vec<[f64; 2]>,
     /// y of the points is positive to the track centre, if the format settles that.

@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::contact::geometry::formats::profile_file::{Contents, numbers, unreadable};
+use crate::contact::geometry::formats::profile_file::{ProfileFile, numbers, unreadable};
 
 #[derive(Debug, Clone, Copy)]
 struct Settings {
@@ -22,7 +22,7 @@ struct Settings {
 }
 
 /// Weights of the points are left aside.
-pub(crate) fn read(text: &str) -> Result<Contents, String> {
+pub(crate) fn read(text: &str) -> Result<ProfileFile, String> {
     let mut settings = Settings {
         wheel: None,
         in_spline: false,
@@ -93,7 +93,7 @@ impl Settings {
         Some(())
     }
 
-    fn apply(&self, mut points: Vec<[f64; 2]>) -> Result<Contents, String> {
+    fn apply(&self, mut points: Vec<[f64; 2]>) -> Result<ProfileFile, String> {
         let angle = self.rotate / self.per_radian;
         if angle.abs() > TAU {
             return Err(format!(
@@ -117,7 +117,7 @@ impl Settings {
         for point in &mut points {
             *point = [point[0] * scale[0], point[1] * scale[1]];
         }
-        Ok(Contents {
+        Ok(ProfileFile {
             points,
             // After the mirroring of the file y points to the field side and z down.
             mirror_y: Some(false),

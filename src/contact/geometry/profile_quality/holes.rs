@@ -1,6 +1,6 @@
 //! Stretches without points where the bodies may touch all the same.
 
-use crate::contact::geometry::contact_locus::Search;
+use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::profile::Body;
 
 /// Shorter chords hide nothing, in mm, nor do those below this multiple of the width of the contact.
@@ -34,7 +34,7 @@ impl Hole {
 /// Chords over which the clearance of the bodies, with the wheel lowered by `lowering` mm below first touch, is less than the height that
 /// they may hide; `width` is that of the widest patch.
 #[must_use]
-pub fn holes(search: &Search, lowering: f64, width: f64) -> Vec<Hole> {
+pub fn holes(search: &ContactLocus, lowering: f64, width: f64) -> Vec<Hole> {
     let mut found = Vec::new();
     let profiles = search.geometry.profiles();
     for (body, profile) in [Body::Rail, Body::Wheel].into_iter().zip(profiles) {

@@ -10,7 +10,7 @@ use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::simd_ln::Number;
 
 /// All cell edges of a mesh, as seen from the mid-line of one strip.
-pub(crate) struct Edges<T> {
+pub(crate) struct CellEdges<T> {
     /// x of every edge, segment by segment.
     x: Vec<T>,
     /// Distance in y from the strip's smaller-y side, and its logarithm (0 for distance 0).
@@ -25,8 +25,8 @@ pub(crate) struct Edges<T> {
     row: [Vec<T>; 3],
 }
 
-impl<T: Number> Edges<T> {
-    pub(crate) fn new(mesh: &Mesh) -> Edges<T> {
+impl<T: Number> CellEdges<T> {
+    pub(crate) fn new(mesh: &Mesh) -> CellEdges<T> {
         let mut x: Vec<T> = Vec::with_capacity(mesh.cells() + mesh.segments.len());
         for segment in &mesh.segments {
             x.extend(mesh.left[segment.cells.clone()].iter().map(|x| T::of(*x)));
@@ -34,7 +34,7 @@ impl<T: Number> Edges<T> {
         }
         let edges = || vec![T::ZERO; x.len()];
         let cells = || vec![T::ZERO; mesh.cells()];
-        Edges {
+        CellEdges {
             q1: edges(),
             q2: edges(),
             ln_q1: edges(),
@@ -136,7 +136,7 @@ impl<T: Number> Edges<T> {
 }
 
 /// A matrix to compute.
-pub(crate) struct Assembly<'a> {
+pub(crate) struct OperatorAssembly<'a> {
     pub(crate) mesh: &'a Mesh,
     pub(crate) nu: f64,
     pub(crate) folded: bool,
@@ -147,12 +147,12 @@ pub(crate) struct Assembly<'a> {
     pub(crate) first_row: &'a [usize],
 }
 
-impl Assembly<'_> {
+impl OperatorAssembly<'_> {
     /// All rows, one after the other.
     pub(crate) fn rows<T: Number>(&self, monitor: &dyn Monitor) -> Result<Vec<T>, Stop> {
         let rows = self.first_row[self.first_row.len() - 1];
         let mut matrix = vec![T::ZERO; rows * self.row_length];
-        let mut edges = Edges::new(self.mesh);
+        let mut edges = CellEdges::new(self.mesh);
         let arch = Arch::new();
         let places = self.first_row.windows(2);
         for (place, segment) in places.zip(&self.mesh.segments) {
@@ -177,7 +177,7 @@ impl Assembly<'_> {
 
 /// Computes all rows of one segment.
 pub(crate) struct SegmentRows<'a, T> {
-    pub(crate) edges: &'a mut Edges<T>,
+    pub(crate) edges: &'a mut CellEdges<T>,
     pub(crate) points: &'a [f64],
     pub(crate) mesh: &'a Mesh,
     pub(crate) nu: f64,

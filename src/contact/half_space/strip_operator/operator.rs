@@ -7,7 +7,7 @@
 //! The matrix depends on the mesh and Poisson's ratio only. Tractions are in any unit, displacement differences come
 //! out in (that unit / G) × (length unit of the mesh).
 
-use crate::contact::half_space::strip_operator::assembly::Assembly;
+use crate::contact::half_space::strip_operator::assembly::OperatorAssembly;
 use crate::contact::half_space::strip_operator::kind::{LANES, Parity, Precision};
 use crate::contact::half_space::strip_operator::product::{Matrix, Product};
 use crate::contact::mesh::strips::Mesh;
@@ -16,7 +16,7 @@ use pulp::Arch;
 
 /// How the matrix is laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Layout {
+enum OperatorLayout {
     /// Row `[xx | xy | yy]` over all cells.
     Full,
     /// Rows of the first half of the segments only, `[xx+ | xx− | xy+ | xy− | yy+ | yy−]` over the cells of that half,
@@ -26,8 +26,8 @@ enum Layout {
 
 /// Displacement differences of all segments, see the module's text.
 #[derive(Debug, Clone)]
-pub struct Differences {
-    layout: Layout,
+pub struct StripOperator {
+    layout: OperatorLayout,
     /// Cells of the whole mesh.
     cells: usize,
     /// Length of a block of a row.
@@ -42,7 +42,7 @@ pub struct Differences {
 /// What a product needs beside its arguments; the caller keeps it, so that a product allocates nothing and the matrix can be
 /// shared by threads.
 #[derive(Debug, Clone, Default)]
-pub struct Scratch {
+pub struct OperatorScratch {
     /// Tractions in single precision.
     narrow: [Vec<f32>; 2],
     /// Tractions, then displacement differences of the two parities.
@@ -68,7 +68,7 @@ pub fn bytes(cells: usize, segments: usize, folded: bool, precision: Precision) 
     precision.bytes() * numbers
 }
 
-impl Differences {
+impl StripOperator {
     /// Computes the matrix; with `folded`, the mesh must have a mirror line.
     ///
     /// # Errors
@@ -79,7 +79,7 @@ impl Differences {
         folded: bool,
         precision: Precision,
         monitor: &dyn Monitor,
-    ) -> Result<Differences, Stop> {
+    ) -> Result<StripOperator, Stop> {
         debug_assert!(!folded || mesh.mirror_line().is_some());
         let stored = if folded {
             mesh.segments.len() / 2
@@ -98,7 +98,7 @@ impl Differences {
             first_cell.push(segment.cells.end);
         }
         let blocks = if folded { 6 } else { 3 };
-        let assembly = Assembly {
+        let assembly = OperatorAssembly {
             mesh,
             nu,
             folded,
@@ -110,8 +110,12 @@ impl Differences {
             Precision::Single => Matrix::Single(assembly.rows(monitor)?),
             Precision::Double => Matrix::Double(assembly.rows(monitor)?),
         };
-        let layout = if folded { Layout::Folded } else { Layout::Full };
-        Ok(Differences {
+        let layout = if folded {
+            OperatorLayout::Folded
+        } else {
+            OperatorLayout::Full
+        };
+        Ok(StripOperator {
             layout,
             cells: mesh.cells(),
             stride,
@@ -136,7 +140,7 @@ impl Differences {
     /// Is only one half of a mirror-symmetric mesh stored?
     #[must_use]
     pub fn is_folded(&self) -> bool {
-        self.layout == Layout::Folded
+        self.layout == OperatorLayout::Folded
     }
 
     /// Rows of segment `j`.
@@ -161,9 +165,9 @@ impl Differences {
     #[must_use]
     pub fn entries(&self, parity: Option<Parity>) -> usize {
         let blocks = match (self.layout, parity) {
-            (Layout::Full, _) => 3,
-            (Layout::Folded, None) => 6,
-            (Layout::Folded, Some(_)) => 4,
+            (OperatorLayout::Full, _) => 3,
+            (OperatorLayout::Folded, None) => 6,
+            (OperatorLayout::Folded, Some(_)) => 4,
         };
         blocks * self.row_count() * self.stride
     }
@@ -172,7 +176,7 @@ impl Differences {
     #[must_use]
     pub fn padded(&self, parity: Option<Parity>) -> usize {
         match (self.layout, parity) {
-            (Layout::Folded, None) => self.cells.next_multiple_of(LANES),
+            (OperatorLayout::Folded, None) => self.cells.next_multiple_of(LANES),
             _ => self.stride,
         }
     }
@@ -190,9 +194,9 @@ impl Differences {
     /// The blocks that act as (xx, u_x from T_y, u_y from T_x, yy).
     fn roles(&self, parity: Option<Parity>) -> [usize; 4] {
         match (self.layout, parity) {
-            (Layout::Full, _) => [0, 1, 1, 2],
-            (Layout::Folded, Some(Parity::Lateral)) => [1, 2, 3, 4],
-            (Layout::Folded, _) => [0, 3, 2, 5],
+            (OperatorLayout::Full, _) => [0, 1, 1, 2],
+            (OperatorLayout::Folded, Some(Parity::Lateral)) => [1, 2, 3, 4],
+            (OperatorLayout::Folded, _) => [0, 3, 2, 5],
         }
     }
 
@@ -248,7 +252,7 @@ impl Differences {
         ty: &[f64],
         out_x: &mut [f64],
         out_y: &mut [f64],
-        scratch: &mut Scratch,
+        scratch: &mut OperatorScratch,
     ) {
         if self.is_folded() && parity.is_none() {
             self.apply_both(tx, ty, out_x, out_y, scratch);
@@ -311,10 +315,10 @@ impl Differences {
         ty: &[f64],
         out_x: &mut [f64],
         out_y: &mut [f64],
-        scratch: &mut Scratch,
+        scratch: &mut OperatorScratch,
     ) {
         let (stride, rows) = (self.stride, self.row_count());
-        let Scratch { narrow, halves } = scratch;
+        let OperatorScratch { narrow, halves } = scratch;
         let [parts, sums] = halves;
         parts.resize(4 * stride, 0.0);
         sums.resize(4 * rows, 0.0);

@@ -4,7 +4,7 @@
 //! δ prescribed (Polonsky and Keer 1999). Cells may differ in size: scalar products are weighted with their areas, and
 //! distances are scaled by what a cell's own pressure displaces, so that small cells take no more iterations than large ones.
 
-use crate::contact::half_space::grid_operator::{Convolution, Width};
+use crate::contact::half_space::grid_operator::{GridOperator, Width};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::hertz::Pressing;
 
@@ -25,21 +25,21 @@ pub(crate) trait Influence {
     fn yielding(&self, cell: usize) -> f64;
 }
 
-impl<T: Width> Influence for Convolution<T> {
+impl<T: Width> Influence for GridOperator<T> {
     const CHANGES_MAX: usize = 12;
 
     fn apply(&mut self, pressure: &[f64], displacement: &mut [f64]) {
-        Convolution::apply(self, pressure, displacement);
+        GridOperator::apply(self, pressure, displacement);
     }
 
     fn add(&self, changes: &[(usize, f64)], displacement: &mut [f64]) {
         for (cell, pressure) in changes {
-            Convolution::add(self, *cell, *pressure, displacement);
+            GridOperator::add(self, *cell, *pressure, displacement);
         }
     }
 
     fn own(&self) -> f64 {
-        Convolution::own(self)
+        GridOperator::own(self)
     }
 
     #[inline]
@@ -81,7 +81,7 @@ impl Pressed {
 
 /// Why there is no pressure.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Failure {
+pub(crate) enum PressureFailure {
     /// The iteration ended with this residual.
     NotConverged(f64),
     /// The caller stopped the work.
@@ -99,10 +99,10 @@ pub(crate) fn press<I: Influence>(
     start: Vec<f64>,
     tolerance: f64,
     monitor: &dyn Monitor,
-) -> Result<Pressed, Failure> {
+) -> Result<Pressed, PressureFailure> {
     let least = gap.iter().copied().fold(f64::INFINITY, f64::min);
     let n = gap.len();
-    let mut work = Work {
+    let mut work = PressureIterate {
         p: start,
         u: vec![0.0; n],
         g: vec![0.0; n],
@@ -116,7 +116,7 @@ pub(crate) fn press<I: Influence>(
     let mut residual = f64::INFINITY;
     for iterations in 0..ITERATIONS_MAX {
         if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.0) {
-            return Err(Failure::Stopped(stop));
+            return Err(PressureFailure::Stopped(stop));
         }
         let approach = work.distances(influence, gap, pressing);
         let (violation, square) = work.part_from(influence, approach);
@@ -145,10 +145,10 @@ pub(crate) fn press<I: Influence>(
             influence.apply(&work.p, &mut work.u);
         }
     }
-    Err(Failure::NotConverged(residual))
+    Err(PressureFailure::NotConverged(residual))
 }
 
-struct Work {
+struct PressureIterate {
     /// Pressure and displacement.
     p: Vec<f64>,
     u: Vec<f64>,
@@ -161,7 +161,7 @@ struct Work {
     changes: Vec<(usize, f64)>,
 }
 
-impl Work {
+impl PressureIterate {
     /// Scales the pressures to the prescribed force; returns the factor.
     fn scale_to(&mut self, influence: &impl Influence, pressing: Pressing, cell: f64) -> f64 {
         let Pressing::Force(force) = pressing else {
@@ -298,7 +298,7 @@ fn sums<const N: usize>(n: usize, term: impl Fn(usize) -> [f64; N]) -> [f64; N] 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::monitor::Unwatched;
+    use crate::contact::monitor::Unmonitored;
 
     const CELLS: usize = 24;
     const STEP: f64 = 0.5;
@@ -312,7 +312,7 @@ mod tests {
     }
 
     fn solved(pressing: Pressing, start: Vec<f64>) -> Pressed {
-        let mut influence = Convolution::<f64>::new(CELLS, CELLS, STEP, STEP, MODULUS);
+        let mut influence = GridOperator::<f64>::new(CELLS, CELLS, STEP, STEP, MODULUS);
         let gap = paraboloid();
         press(
             &mut influence,
@@ -321,7 +321,7 @@ mod tests {
             pressing,
             start,
             1e-9,
-            &Unwatched,
+            &Unmonitored,
         )
         .unwrap()
     }

@@ -1,19 +1,19 @@
 //! Tuned numbers of the gap solver: how fine its grids are, and when they are fine enough.
 
-use crate::contact::normal::gap::grid::Resolution;
+use crate::contact::normal::gap::grid::GridFineness;
 
 /// Cells of the first grid along either axis.
 pub(crate) const CELLS_FIRST: usize = 32;
 
 /// How fine the last grid is at least.
-pub(crate) const RESOLUTION: Resolution = Resolution {
+pub(crate) const RESOLUTION: GridFineness = GridFineness {
     contact: 44.0,
     patch: 24.0,
     share_min: 0.02,
 };
 
 /// The same where only forces are asked for, to some tenths of a per cent.
-pub(crate) const RESOLUTION_COARSE: Resolution = Resolution {
+pub(crate) const RESOLUTION_COARSE: GridFineness = GridFineness {
     contact: 22.0,
     patch: 12.0,
     share_min: 0.05,

@@ -7,7 +7,7 @@
 use std::f64::consts::PI;
 
 use crate::contact::half_space::kernels::{Rectangle, rectangle};
-use crate::contact::normal::gap::grid::Grid;
+use crate::contact::normal::gap::grid::PressureGrid;
 
 /// Chebyshev points per axis. Displacements differ from the exact sum by less than 5e-5 of the largest one that the other grid
 /// causes (the test below; with 6 points by 1e-4). That is the error of interpolation alone: 11 points leave 2e-7.
@@ -54,7 +54,7 @@ enum Kind {
 
 impl Coupling {
     /// Prepares the influence of `from` on `to`, two grids that do not overlap, for the contact modulus `E*` in MPa.
-    pub(crate) fn new(to: &Grid, from: &Grid, contact_modulus: f64) -> Coupling {
+    pub(crate) fn new(to: &PressureGrid, from: &PressureGrid, contact_modulus: f64) -> Coupling {
         let mut blocks = Vec::new();
         let mut pending = vec![(Cells::all(to), Cells::all(from))];
         while let Some((acted, acting)) = pending.pop() {
@@ -146,7 +146,7 @@ fn spread(values: &[f64], cells: Cells, width: usize, basis: &[Vec<f64>; 2], to:
 }
 
 impl Cells {
-    fn all(grid: &Grid) -> Cells {
+    fn all(grid: &PressureGrid) -> Cells {
         Cells {
             first: [0; 2],
             count: grid.cells,
@@ -154,7 +154,7 @@ impl Cells {
     }
 
     /// The box of these cells in mm.
-    fn range(self, grid: &Grid) -> [[f64; 2]; 2] {
+    fn range(self, grid: &PressureGrid) -> [[f64; 2]; 2] {
         [0, 1].map(|k| {
             let low = grid.range(k)[0];
             [self.first[k], self.first[k] + self.count[k]].map(|i| low + i as f64 * grid.step[k])
@@ -162,13 +162,13 @@ impl Cells {
     }
 
     /// Half the longer side of the box in mm.
-    fn half_side(self, grid: &Grid) -> f64 {
+    fn half_side(self, grid: &PressureGrid) -> f64 {
         let side = |k: usize| 0.5 * self.count[k] as f64 * grid.step[k];
         side(0).max(side(1))
     }
 
     /// Two halves along the longer side; none of few cells.
-    fn halves(self, grid: &Grid) -> Option<[Cells; 2]> {
+    fn halves(self, grid: &PressureGrid) -> Option<[Cells; 2]> {
         if self.count[0] * self.count[1] <= CELLS_FEW {
             return None;
         }
@@ -197,7 +197,13 @@ impl Cells {
 }
 
 impl Block {
-    fn near(to: &Grid, from: &Grid, acted: Cells, acting: Cells, contact_modulus: f64) -> Block {
+    fn near(
+        to: &PressureGrid,
+        from: &PressureGrid,
+        acted: Cells,
+        acting: Cells,
+        contact_modulus: f64,
+    ) -> Block {
         let (places, centres) = (
             [to.centres(0), to.centres(1)],
             [from.centres(0), from.centres(1)],
@@ -227,7 +233,13 @@ impl Block {
         }
     }
 
-    fn far(to: &Grid, from: &Grid, acted: Cells, acting: Cells, contact_modulus: f64) -> Block {
+    fn far(
+        to: &PressureGrid,
+        from: &PressureGrid,
+        acted: Cells,
+        acting: Cells,
+        contact_modulus: f64,
+    ) -> Block {
         let points = |range: [f64; 2]| -> [f64; ORDER] {
             let (middle, half) = (0.5 * (range[0] + range[1]), 0.5 * (range[1] - range[0]));
             std::array::from_fn(|k| middle + half * (PI * (k as f64 + 0.5) / ORDER as f64).cos())
@@ -304,7 +316,7 @@ mod tests {
 
     const MODULUS: f64 = 115_000.0;
 
-    fn exact(to: &Grid, from: &Grid, pressure: &[f64]) -> Vec<f64> {
+    fn exact(to: &PressureGrid, from: &PressureGrid, pressure: &[f64]) -> Vec<f64> {
         let block = Block::near(to, from, Cells::all(to), Cells::all(from), MODULUS);
         let Kind::Near(coefficients) = block.kind else {
             unreachable!("asked for")
@@ -315,7 +327,7 @@ mod tests {
             .collect()
     }
 
-    fn dome(grid: &Grid) -> Vec<f64> {
+    fn dome(grid: &PressureGrid) -> Vec<f64> {
         let [x, y] = [grid.centres(0), grid.centres(1)];
         let part = |k: usize, axis: &[f64]| {
             let last = axis.len() - 1;
@@ -331,14 +343,14 @@ mod tests {
 
     #[test]
     fn far_near_and_adjoining_grids_act_as_the_sum_over_all_cells_says() {
-        let large = Grid::new([[-5.0, 5.0], [-6.0, 6.0]], [40, 48], [false; 2]);
+        let large = PressureGrid::new([[-5.0, 5.0], [-6.0, 6.0]], [40, 48], [false; 2]);
         for (window, cells) in [
             ([[-0.4, 0.5], [14.0, 14.8]], [20, 22]),
             ([[-0.4, 0.5], [6.5, 7.3]], [20, 22]),
             ([[-4.0, 4.0], [6.0, 6.7]], [30, 20]),
             ([[5.0, 15.0], [-6.0, 6.0]], [24, 31]),
         ] {
-            let small = Grid::new(window, cells, [false; 2]);
+            let small = PressureGrid::new(window, cells, [false; 2]);
             for (to, from) in [(&large, &small), (&small, &large)] {
                 let pressure = dome(from);
                 let expected = exact(to, from, &pressure);
@@ -354,8 +366,8 @@ mod tests {
 
     #[test]
     fn far_grids_take_one_block() {
-        let large = Grid::new([[-5.0, 5.0], [-6.0, 6.0]], [44, 44], [false; 2]);
-        let small = Grid::new([[-0.4, 0.5], [14.0, 14.8]], [24, 24], [false; 2]);
+        let large = PressureGrid::new([[-5.0, 5.0], [-6.0, 6.0]], [44, 44], [false; 2]);
+        let small = PressureGrid::new([[-0.4, 0.5], [14.0, 14.8]], [24, 24], [false; 2]);
         assert_eq!(Coupling::new(&large, &small, MODULUS).blocks.len(), 1);
     }
 }

@@ -2,11 +2,11 @@
 
 use std::f64::consts::PI;
 
-use crate::contact::half_space::grid_operator::Convolution;
+use crate::contact::half_space::grid_operator::GridOperator;
 use crate::contact::normal::gap::conjugate_gradients::Pressed;
 use crate::contact::normal::gap::edges;
 use crate::contact::normal::gap::search_box::Reach;
-use crate::contact::normal::gap::surface::{Gap, Window};
+use crate::contact::normal::gap::surface::{GapSurface, Window};
 
 /// Most cells along either axis.
 const CELLS_MAX: usize = 200;
@@ -15,7 +15,7 @@ const GROWTH: f64 = 0.25;
 
 /// Cells of a box; cell (i, j) is stored at `j * cells[0] + i`.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Grid {
+pub(crate) struct PressureGrid {
     /// Middle of the box in mm.
     middle: [f64; 2],
     /// Size of a cell in mm.
@@ -28,7 +28,7 @@ pub(crate) struct Grid {
 
 /// One of the four sides of a box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Side {
+pub(crate) struct GridSide {
     axis: usize,
     /// The end of larger coordinates.
     upper: bool,
@@ -36,7 +36,7 @@ pub(crate) struct Side {
 
 /// How fine the next grid should be, and where.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Wanted {
+pub(crate) struct NextGrid {
     pub(crate) window: Window,
     pub(crate) cells: [usize; 2],
     /// So many cells are not allowed: some patch will be too coarse.
@@ -45,7 +45,7 @@ pub(crate) struct Wanted {
 
 /// How many cells are wanted across what.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Resolution {
+pub(crate) struct GridFineness {
     /// Across everything in contact.
     pub(crate) contact: f64,
     /// Across the smallest patch that counts.
@@ -54,7 +54,7 @@ pub(crate) struct Resolution {
     pub(crate) share_min: f64,
 }
 
-impl Side {
+impl GridSide {
     /// The side in words, with its coordinate in the limits of the data.
     pub(crate) fn place(self, limits: Window) -> String {
         let name = ["x", "y"][self.axis];
@@ -62,10 +62,10 @@ impl Side {
     }
 }
 
-impl Grid {
+impl PressureGrid {
     /// The grid of so many cells (at most 200 along either axis) over a window; made symmetric about
     /// x = 0 and y = 0 where `mirrored`.
-    pub(crate) fn new(window: Window, cells: [usize; 2], mirrored: [bool; 2]) -> Grid {
+    pub(crate) fn new(window: Window, cells: [usize; 2], mirrored: [bool; 2]) -> PressureGrid {
         let cells = cells.map(|n| n.clamp(4, CELLS_MAX));
         let mut middle = window.map(|[low, high]| 0.5 * (low + high));
         let mut length = window.map(|[low, high]| high - low);
@@ -73,7 +73,7 @@ impl Grid {
             let [low, high] = window[k];
             (middle[k], length[k]) = (0.0, 2.0 * high.max(-low));
         }
-        Grid {
+        PressureGrid {
             middle,
             step: [0, 1].map(|k| length[k] / cells[k] as f64),
             cells,
@@ -97,13 +97,13 @@ impl Grid {
     }
 
     /// Single precision does for the violations of the contact conditions that are asked for.
-    pub(crate) fn influence(&self, contact_modulus: f64) -> Convolution<f32> {
+    pub(crate) fn influence(&self, contact_modulus: f64) -> GridOperator<f32> {
         let ([nx, ny], [dx, dy]) = (self.cells, self.step);
-        Convolution::new(nx, ny, dx, dy, contact_modulus)
+        GridOperator::new(nx, ny, dx, dy, contact_modulus)
     }
 
     /// The gap at the centres.
-    pub(crate) fn gap(&self, gap: &Gap) -> Vec<f64> {
+    pub(crate) fn gap(&self, gap: &GapSurface) -> Vec<f64> {
         let mut values = gap.on(&self.centres(0), &self.centres(1));
         for [image, cell] in self.images() {
             values[image] = values[cell];
@@ -145,7 +145,12 @@ impl Grid {
 
     /// Pressures of another grid at the centres of this one: the root of their squares, which fall linearly to 0 at the
     /// edge and are continued beyond it, interpolated bilinearly.
-    pub(crate) fn interpolate(&self, other: &Grid, pressure: &[f64], gap: &[f64]) -> Vec<f64> {
+    pub(crate) fn interpolate(
+        &self,
+        other: &PressureGrid,
+        pressure: &[f64],
+        gap: &[f64],
+    ) -> Vec<f64> {
         let largest = pressure.iter().copied().fold(0.0, f64::max);
         self.never_empty(self.interpolated(other, pressure), largest, gap)
     }
@@ -160,7 +165,7 @@ impl Grid {
     }
 
     /// The same, 0 everywhere if the other grid presses nothing here.
-    pub(crate) fn interpolated(&self, other: &Grid, pressure: &[f64]) -> Vec<f64> {
+    pub(crate) fn interpolated(&self, other: &PressureGrid, pressure: &[f64]) -> Vec<f64> {
         let squares = edges::continued(other.cells[0], edges::squares(other.cells[0], pressure));
         let places = [0, 1].map(|axis| -> Vec<(isize, f64)> {
             let first = other.range(axis)[0] + 0.5 * other.step[axis];
@@ -192,9 +197,9 @@ impl Grid {
     }
 
     /// Sides whose outermost cells are in contact.
-    pub(crate) fn sides_in_contact(&self, pressure: &[f64]) -> Vec<Side> {
+    pub(crate) fn sides_in_contact(&self, pressure: &[f64]) -> Vec<GridSide> {
         let [nx, ny] = self.cells;
-        let touches = |side: &Side| {
+        let touches = |side: &GridSide| {
             let last = if side.upper {
                 self.cells[side.axis] - 1
             } else {
@@ -203,18 +208,18 @@ impl Grid {
             (0..nx * ny).any(|k| pressure[k] > 0.0 && [k % nx, k / nx][side.axis] == last)
         };
         let all = [(0, false), (0, true), (1, false), (1, true)];
-        let sides = all.map(|(axis, upper)| Side { axis, upper });
+        let sides = all.map(|(axis, upper)| GridSide { axis, upper });
         sides.into_iter().filter(touches).collect()
     }
 
     /// Does this side lie at the limit of the data?
-    pub(crate) fn ends_at(&self, side: Side, limits: Window) -> bool {
+    pub(crate) fn ends_at(&self, side: GridSide, limits: Window) -> bool {
         let end = usize::from(side.upper);
         (self.range(side.axis)[end] - limits[side.axis][end]).abs() < 0.5 * self.step[side.axis]
     }
 
     /// A grid that reaches farther out on some sides, with cells of about the same size.
-    pub(crate) fn enlarged(&self, sides: &[Side], limits: Window) -> Grid {
+    pub(crate) fn enlarged(&self, sides: &[GridSide], limits: Window) -> PressureGrid {
         let mut window = [self.range(0), self.range(1)];
         for side in sides {
             let end = usize::from(side.upper);
@@ -226,7 +231,7 @@ impl Grid {
             let [low, high] = window[k];
             ((high - low) / self.step[k]).round() as usize
         });
-        Grid::new(window, cells, self.mirrored)
+        PressureGrid::new(window, cells, self.mirrored)
     }
 
     /// The box around all cells that touch or nearly do (closer than `near`), and the cells that resolve what is in it.
@@ -234,9 +239,9 @@ impl Grid {
         &self,
         pressed: &Pressed,
         near: f64,
-        resolution: Resolution,
+        resolution: GridFineness,
         limits: Window,
-    ) -> Wanted {
+    ) -> NextGrid {
         let width = self.cells[0];
         let cell = |k: usize| [k % width, k / width];
         let mut whole = Extent::default();
@@ -268,7 +273,7 @@ impl Grid {
         });
         let window = within(window, limits);
         let needed = [0, 1].map(|k| ((window[k][1] - window[k][0]) / steps[k]).ceil() as usize);
-        Wanted {
+        NextGrid {
             window,
             cells: needed.map(|cells| cells.clamp(4, CELLS_MAX)),
             capped: needed.iter().any(|cells| *cells > CELLS_MAX),

@@ -1,10 +1,10 @@
 //! The answer of a gap: pressures of the last grids as a field, and what is to be said of them.
 
-use crate::contact::normal::answer::{Failure, Found, Report};
+use crate::contact::normal::answer::{NormalAnswer, NormalError, NormalWork};
 use crate::contact::normal::gap::edges;
-use crate::contact::normal::gap::surface::Gap;
-use crate::contact::normal::gap::task::GapContact;
-use crate::contact::normal::gap::tile::{Outcome, Tile};
+use crate::contact::normal::gap::surface::GapSurface;
+use crate::contact::normal::gap::task::GapTask;
+use crate::contact::normal::gap::tile::{GapOutcome, Tile};
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::remark::entry::RemarkEntry;
@@ -29,9 +29,9 @@ struct Coarse {
     share: f64,
 }
 
-impl GapContact {
+impl GapTask {
     /// Field, report and remarks.
-    pub(crate) fn found(&self, outcome: Outcome) -> Result<Found, Failure> {
+    pub(crate) fn found(&self, outcome: GapOutcome) -> Result<NormalAnswer, NormalError> {
         let loads = outcome.tiles.iter().map(Tile::load);
         let heaviest = loads
             .zip(&outcome.tiles)
@@ -40,14 +40,14 @@ impl GapContact {
         let Some(Tile { grid, pressed }) = heaviest else {
             unreachable!("at least one grid is tried")
         };
-        let report = Report {
+        let report = NormalWork {
             cells: grid.cells,
             grids: outcome.tiles.len(),
             iterations: outcome.iterations,
             residual: pressed.residual,
             pressure_change: outcome.pressure_change,
         };
-        let field = field(&outcome.tiles).map_err(Failure::NoAnswer)?;
+        let field = field(&outcome.tiles).map_err(NormalError::NoAnswer)?;
         let coarse = coarse(&outcome.tiles);
         let mut remarks = Vec::new();
         for Coarse {
@@ -69,7 +69,7 @@ impl GapContact {
             remarks.push(Remark::GapRough {}.into());
         }
         remarks.extend(self.remarks(&field, pressed.approach - outcome.least));
-        Ok(Found {
+        Ok(NormalAnswer {
             field,
             report,
             remarks,
@@ -89,7 +89,7 @@ impl GapContact {
         let [x_min, x_max, y_min, y_max] = extent;
         let (a, b) = (0.5 * (x_max - x_min), 0.5 * (y_max - y_min));
         let mut remarks = Vec::new();
-        if let Gap::Profile { rolling, .. } = self.gap
+        if let GapSurface::Profile { rolling, .. } = self.gap
             && a > HALF_LENGTH_USUAL_MAX * rolling
         {
             let remark = Remark::NearlyConformal {

@@ -1,6 +1,6 @@
 //! Where a contact can be: a box that holds every point the bodies could touch at, before anything is solved.
 
-use crate::contact::normal::gap::surface::{Gap, Window};
+use crate::contact::normal::gap::surface::{GapSurface, Window};
 use crate::contact::normal::hertz::Pressing;
 
 /// Points of a box along each axis when it is looked through.
@@ -36,7 +36,7 @@ struct Look {
 /// Contact lies where the gap is smaller than the approach, whatever the pressure. The approach belonging to a force is
 /// estimated as if the region overlapping by half of it were a circle of the same area pressed by a sphere, which is
 /// exact for a paraboloid: `N = 4/3 E* √(A/π) δ` with A the area where the gap is less than `δ/2` above its least value.
-pub(crate) fn reach(gap: &Gap, pressing: Pressing, contact_modulus: f64) -> Reach {
+pub(crate) fn reach(gap: &GapSurface, pressing: Pressing, contact_modulus: f64) -> Reach {
     let limits = gap.window();
     let mut window = first_box(gap);
     let mut level = f64::INFINITY;
@@ -49,7 +49,7 @@ pub(crate) fn reach(gap: &Gap, pressing: Pressing, contact_modulus: f64) -> Reac
             Pressing::Force(force) => look.least + MARGIN * look.depth(force / contact_modulus),
         };
         let mut next = look.below(level, limits);
-        if let Gap::Profile { rolling, .. } = gap
+        if let GapSurface::Profile { rolling, .. } = gap
             && level > least
         {
             let half = 1.02 * (2.0 * rolling * (level - least)).sqrt();
@@ -69,7 +69,7 @@ pub(crate) fn reach(gap: &Gap, pressing: Pressing, contact_modulus: f64) -> Reac
 }
 
 /// The box in which the gap is less than `level`.
-pub(crate) fn reach_of_level(gap: &Gap, level: f64) -> Reach {
+pub(crate) fn reach_of_level(gap: &GapSurface, level: f64) -> Reach {
     reach(gap, Pressing::Approach(level), f64::NAN)
 }
 
@@ -78,9 +78,9 @@ fn length(range: [f64; 2]) -> f64 {
 }
 
 /// The whole window; where a formula holds, as far as the gap exceeds all that the samples tell.
-fn first_box(gap: &Gap) -> Window {
+fn first_box(gap: &GapSurface) -> Window {
     let mut window = gap.window();
-    if let Gap::Profile { rolling, .. } = gap {
+    if let GapSurface::Profile { rolling, .. } = gap {
         let [low, high] = gap.extremes();
         let half = (2.0 * rolling * (high - low)).sqrt();
         window[0] = [-half, half];
@@ -89,7 +89,7 @@ fn first_box(gap: &Gap) -> Window {
 }
 
 impl Look {
-    fn new(gap: &Gap, window: Window) -> Look {
+    fn new(gap: &GapSurface, window: Window) -> Look {
         let samples = gap.samples();
         let axes = [0, 1].map(|k| points(window[k], samples[k]));
         let values = gap.on(&axes[0], &axes[1]);
@@ -211,7 +211,11 @@ mod tests {
                 let pressing = Pressing::Force(force);
                 let hertz = Ellipse::of_radii(rolling, lateral, pressing, modulus);
                 let (y, values) = parabola(lateral, 40.0 * hertz.b);
-                let reach = reach(&Gap::profile(rolling, &y, &values), pressing, modulus);
+                let reach = reach(
+                    &GapSurface::profile(rolling, &y, &values),
+                    pressing,
+                    modulus,
+                );
                 assert!(
                     reach.level > hertz.approach,
                     "{} {}",
@@ -229,14 +233,18 @@ mod tests {
     #[test]
     fn a_level_below_everything_ends_at_the_deepest_point() {
         let (y, values) = parabola(300.0, 10.0);
-        let reach = reach_of_level(&Gap::profile(460.0, &y, &values), -1.0);
+        let reach = reach_of_level(&GapSurface::profile(460.0, &y, &values), -1.0);
         assert!(reach.least.abs() < 1e-9 && reach.level == -1.0);
     }
 
     #[test]
     fn data_end_the_box() {
         let (y, values) = parabola(300.0, 2.0);
-        let reach = reach(&Gap::profile(460.0, &y, &values), Pressing::Force(1e6), 1e5);
+        let reach = reach(
+            &GapSurface::profile(460.0, &y, &values),
+            Pressing::Force(1e6),
+            1e5,
+        );
         assert_eq!(reach.window[1], [-2.0, 2.0]);
         assert!(length(reach.window[0]) > 10.0);
     }

@@ -5,19 +5,19 @@
 //! patches, each gets a grid of its own (see `tiles.rs`). At the end the edges are placed between the cells.
 
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::answer::{Failure, Found, edge_reached, no_touch};
+use crate::contact::normal::answer::{NormalAnswer, NormalError, edge_reached, no_touch};
 use crate::contact::normal::gap::conjugate_gradients::{Pressed, press};
 use crate::contact::normal::gap::constants::{
     APPROACH_CHANGE, CELLS_FIRST, COARSER_MAX, GRIDS_MAX, NEAR, PRESSURE_CHANGE, REFINEMENT,
     RESOLUTION, RESOLUTION_COARSE, TARGET_POWER, TARGET_USUAL, TOLERANCE, TOLERANCE_FIRST,
 };
-use crate::contact::normal::gap::grid::{Grid, Resolution, Side};
+use crate::contact::normal::gap::grid::{GridFineness, GridSide, PressureGrid};
 use crate::contact::normal::gap::search_box::{Reach, reach, reach_of_level};
-use crate::contact::normal::gap::task::GapContact;
-use crate::contact::normal::gap::tile::{Outcome, Tile};
+use crate::contact::normal::gap::task::GapTask;
+use crate::contact::normal::gap::tile::{GapOutcome, Tile};
 use crate::contact::normal::hertz::Pressing;
 
-impl GapContact {
+impl GapTask {
     /// What is wrong with the gap, as far as its samples tell without solving.
     ///
     /// # Errors
@@ -51,7 +51,7 @@ impl GapContact {
     ///
     /// # Errors
     /// A reason why there is no answer; or the monitor stopped the work.
-    pub fn solve(&self, monitor: &dyn Monitor) -> Result<Found, Failure> {
+    pub fn solve(&self, monitor: &dyn Monitor) -> Result<NormalAnswer, NormalError> {
         self.solve_on(RESOLUTION, monitor)
     }
 
@@ -59,30 +59,39 @@ impl GapContact {
     /// within a cell of a twentieth of the contact. Roughness is not followed.
     ///
     /// # Errors
-    /// As [`GapContact::solve`].
-    pub fn estimate(&self, monitor: &dyn Monitor) -> Result<Found, Failure> {
+    /// As [`GapTask::solve`].
+    pub fn estimate(&self, monitor: &dyn Monitor) -> Result<NormalAnswer, NormalError> {
         self.solve_on(RESOLUTION_COARSE, monitor)
     }
 
     /// The same for a target of the resultants' error, relative to μN: finer below 0.002.
     ///
     /// # Errors
-    /// As [`GapContact::solve`].
-    pub fn solve_for(&self, target: f64, monitor: &dyn Monitor) -> Result<Found, Failure> {
+    /// As [`GapTask::solve`].
+    pub fn solve_for(
+        &self,
+        target: f64,
+        monitor: &dyn Monitor,
+    ) -> Result<NormalAnswer, NormalError> {
         self.solve_on(RESOLUTION.for_target(target), monitor)
     }
 
-    fn solve_on(&self, resolution: Resolution, monitor: &dyn Monitor) -> Result<Found, Failure> {
+    fn solve_on(
+        &self,
+        resolution: GridFineness,
+        monitor: &dyn Monitor,
+    ) -> Result<NormalAnswer, NormalError> {
         let mut reach = reach(&self.gap, self.pressing, self.contact_modulus);
         if let Pressing::Approach(approach) = self.pressing
             && approach <= reach.least
         {
-            return Err(Failure::NoAnswer(no_touch(approach, reach.least)));
+            return Err(NormalError::NoAnswer(no_touch(approach, reach.least)));
         }
-        let first =
-            |reach: &Reach| Grid::new(reach.window, [CELLS_FIRST; 2], self.gap.is_mirrored());
+        let first = |reach: &Reach| {
+            PressureGrid::new(reach.window, [CELLS_FIRST; 2], self.gap.is_mirrored())
+        };
         let mut grid = first(&reach);
-        let mut solved: Option<(Grid, Pressed)> = None;
+        let mut solved: Option<(PressureGrid, Pressed)> = None;
         let (mut iterations, mut pressure_change) = (0, 0.0);
         let mut end = Next::Rough { capped: false };
         for _ in 0..GRIDS_MAX {
@@ -95,14 +104,14 @@ impl GapContact {
                 // The estimate was too small: parts of the gap beyond the box may touch as well.
                 let depth = pressed.approach - reach.least;
                 reach = reach_of_level(&self.gap, pressed.approach + 0.2 * depth);
-                Next::Grid(first(&reach))
+                Next::PressureGrid(first(&reach))
             } else {
                 let depth = pressed.approach - reach.least;
                 self.next_grid(&grid, &pressed, solved.as_ref(), depth, resolution)?
             };
             solved = Some((grid, pressed));
             match next {
-                Next::Grid(next) => grid = next,
+                Next::PressureGrid(next) => grid = next,
                 last => {
                     end = last;
                     break;
@@ -117,13 +126,13 @@ impl GapContact {
             && let Some(found) =
                 self.solve_on_tiles(whole.clone(), reach.least, resolution, monitor)?
         {
-            return self.found(Outcome {
+            return self.found(GapOutcome {
                 iterations: iterations + found.iterations,
                 least: reach.least,
                 ..found
             });
         }
-        self.found(Outcome {
+        self.found(GapOutcome {
             tiles: vec![whole],
             iterations,
             settled: matches!(end, Next::Settled { .. }),
@@ -134,11 +143,11 @@ impl GapContact {
 
     fn press(
         &self,
-        grid: &Grid,
-        before: Option<&(Grid, Pressed)>,
+        grid: &PressureGrid,
+        before: Option<&(PressureGrid, Pressed)>,
         reach: &Reach,
         monitor: &dyn Monitor,
-    ) -> Result<Pressed, Failure> {
+    ) -> Result<Pressed, NormalError> {
         let gap = grid.gap(&self.gap);
         let (start, tolerance) = match before {
             Some((coarse, pressed)) => {
@@ -167,24 +176,24 @@ impl GapContact {
     /// What to do after a grid: enlarge it, refine it, or be content.
     fn next_grid(
         &self,
-        grid: &Grid,
+        grid: &PressureGrid,
         pressed: &Pressed,
-        before: Option<&(Grid, Pressed)>,
+        before: Option<&(PressureGrid, Pressed)>,
         depth: f64,
-        resolution: Resolution,
-    ) -> Result<Next, Failure> {
+        resolution: GridFineness,
+    ) -> Result<Next, NormalError> {
         let limits = self.gap.window();
-        let (cut, short): (Vec<Side>, Vec<Side>) = grid
+        let (cut, short): (Vec<GridSide>, Vec<GridSide>) = grid
             .sides_in_contact(&pressed.pressure)
             .into_iter()
             .partition(|side| grid.ends_at(*side, limits));
         if !short.is_empty() {
-            return Ok(Next::Grid(grid.enlarged(&short, limits)));
+            return Ok(Next::PressureGrid(grid.enlarged(&short, limits)));
         }
         let wanted = grid.wanted(pressed, NEAR * depth, resolution, limits);
-        let finer = Grid::new(wanted.window, wanted.cells, grid.mirrored);
+        let finer = PressureGrid::new(wanted.window, wanted.cells, grid.mirrored);
         if (0..2).any(|k| finer.step[k] < COARSER_MAX * grid.step[k]) {
-            return Ok(Next::Grid(finer));
+            return Ok(Next::PressureGrid(finer));
         }
         if let Some(side) = cut.first() {
             return Err(edge_reached(*side, limits));
@@ -200,17 +209,17 @@ impl GapContact {
             return Ok(Next::Settled { capped });
         }
         let cells = grid.cells.map(|n| (n as f64 * REFINEMENT) as usize);
-        let finer = Grid::new(wanted.window, cells, grid.mirrored);
+        let finer = PressureGrid::new(wanted.window, cells, grid.mirrored);
         if (0..2).all(|k| finer.step[k] > COARSER_MAX * grid.step[k]) {
             return Ok(Next::Rough { capped });
         }
-        Ok(Next::Grid(finer))
+        Ok(Next::PressureGrid(finer))
     }
 }
 
 /// What follows a grid.
 enum Next {
-    Grid(Grid),
+    PressureGrid(PressureGrid),
     /// Nothing changes any more; `capped` if a patch would want more cells than a grid may have.
     Settled {
         capped: bool,
@@ -230,11 +239,11 @@ impl Next {
     }
 }
 
-impl Resolution {
+impl GridFineness {
     /// The resolution for a target of the resultants' error relative to μN; as it is from [`TARGET_USUAL`] on.
-    fn for_target(self, target: f64) -> Resolution {
+    fn for_target(self, target: f64) -> GridFineness {
         let finer = (target.min(TARGET_USUAL) / TARGET_USUAL).powf(TARGET_POWER);
-        Resolution {
+        GridFineness {
             contact: finer * self.contact,
             patch: finer * self.patch,
             ..self

@@ -1,6 +1,6 @@
 //! About how many patches will a rough gap fall apart into? A look at the samples, before anything is solved.
 
-use crate::contact::normal::gap::task::GapContact;
+use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::hertz::{Ellipse, Pressing};
 
 /// Valleys less deep than this part of the approach are pressed flat.
@@ -8,7 +8,7 @@ const DEPTH: f64 = 0.05;
 /// More patches than this are not told apart by any grid.
 const SUMMITS_MAX: usize = 48;
 
-impl GapContact {
+impl GapTask {
     /// Summits of the bodies that are likely to touch: least values of the gap within the approach of a smooth contact of the same
     /// extent, with deeper valleys between them. At least 1.
     #[must_use]

@@ -4,7 +4,7 @@ use crate::contact::numerics::cubic::{Cubic, interval, sober_slopes};
 
 /// Distance of the undeformed surfaces in mm, both bodies together, over the contact plane.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Gap {
+pub enum GapSurface {
     /// `h = x²/(2 rolling) + across(y)`.
     Profile {
         /// Relative radius in the rolling direction in mm.
@@ -40,11 +40,11 @@ pub struct Surface {
 /// Where the gap is known, `[low, high]` in mm along x and y; infinite where it is given by a formula.
 pub type Window = [[f64; 2]; 2];
 
-impl Gap {
+impl GapSurface {
     /// The gap of a cross-section `(y, gap)` that rolls on a circle; at least 2 samples, y increasing.
     #[must_use]
-    pub fn profile(rolling: f64, y: &[f64], gap: &[f64]) -> Gap {
-        Gap::Profile {
+    pub fn profile(rolling: f64, y: &[f64], gap: &[f64]) -> GapSurface {
+        GapSurface::Profile {
             rolling,
             across: Curve::new(y, gap),
         }
@@ -52,18 +52,18 @@ impl Gap {
 
     /// The gap `gap[j][i]` at `(x[i], y[j])`; at least 2 samples along either axis, axes increasing.
     #[must_use]
-    pub fn grid(x: &[f64], y: &[f64], gap: &[Vec<f64>]) -> Gap {
-        Gap::Grid(Surface::new(x, y, gap))
+    pub fn grid(x: &[f64], y: &[f64], gap: &[Vec<f64>]) -> GapSurface {
+        GapSurface::Grid(Surface::new(x, y, gap))
     }
 
     /// Where the gap is known.
     #[must_use]
     pub fn window(&self) -> Window {
         match self {
-            Gap::Profile { across, .. } => {
+            GapSurface::Profile { across, .. } => {
                 [[f64::NEG_INFINITY, f64::INFINITY], range(&across.axis)]
             }
-            Gap::Grid(surface) => [range(&surface.x), range(&surface.y)],
+            GapSurface::Grid(surface) => [range(&surface.x), range(&surface.y)],
         }
     }
 
@@ -71,8 +71,8 @@ impl Gap {
     #[must_use]
     pub fn samples(&self) -> [&[f64]; 2] {
         match self {
-            Gap::Profile { across, .. } => [&[], &across.axis],
-            Gap::Grid(surface) => [&surface.x, &surface.y],
+            GapSurface::Profile { across, .. } => [&[], &across.axis],
+            GapSurface::Grid(surface) => [&surface.x, &surface.y],
         }
     }
 
@@ -80,7 +80,7 @@ impl Gap {
     #[must_use]
     pub fn on(&self, x: &[f64], y: &[f64]) -> Vec<f64> {
         match self {
-            Gap::Profile { rolling, across } => {
+            GapSurface::Profile { rolling, across } => {
                 let along: Vec<f64> = x.iter().map(|x| 0.5 * x * x / rolling).collect();
                 y.iter()
                     .flat_map(|y| {
@@ -89,7 +89,7 @@ impl Gap {
                     })
                     .collect()
             }
-            Gap::Grid(surface) => surface.on(x, y),
+            GapSurface::Grid(surface) => surface.on(x, y),
         }
     }
 
@@ -97,8 +97,8 @@ impl Gap {
     #[must_use]
     pub fn extremes(&self) -> [f64; 2] {
         let values = match self {
-            Gap::Profile { across, .. } => &across.values,
-            Gap::Grid(surface) => &surface.values,
+            GapSurface::Profile { across, .. } => &across.values,
+            GapSurface::Grid(surface) => &surface.values,
         };
         let start = [f64::INFINITY, f64::NEG_INFINITY];
         values.iter().fold(start, |[low, high], value| {
@@ -112,13 +112,13 @@ impl Gap {
         let place = |name: &str, at: f64| format!("{name} = {at} mm");
         let least = self.extremes()[0];
         match self {
-            Gap::Profile { across, .. } => {
+            GapSurface::Profile { across, .. } => {
                 let last = across.values.len() - 1;
                 let inside = (1..last).any(|k| across.values[k] <= least);
                 let at = if across.values[0] <= least { 0 } else { last };
                 (!inside).then(|| place("y", across.axis[at]))
             }
-            Gap::Grid(Surface { x, y, values, .. }) => {
+            GapSurface::Grid(Surface { x, y, values, .. }) => {
                 let low = |k: usize| values[k] <= least;
                 let at_edge = |k: usize, n: usize| k == 0 || k + 1 == n;
                 let cell = |k: usize| (k % x.len(), k / x.len());
@@ -143,8 +143,10 @@ impl Gap {
         let mirrored = |axis: &[f64]| axis.iter().zip(axis.iter().rev()).all(|(a, b)| *a == -b);
         let alike = |values: &[f64]| values.iter().zip(values.iter().rev()).all(|(a, b)| a == b);
         match self {
-            Gap::Profile { across, .. } => [true, mirrored(&across.axis) && alike(&across.values)],
-            Gap::Grid(surface) => {
+            GapSurface::Profile { across, .. } => {
+                [true, mirrored(&across.axis) && alike(&across.values)]
+            }
+            GapSurface::Grid(surface) => {
                 let mut rows = surface.values.chunks_exact(surface.x.len());
                 let images = rows.clone().zip(rows.clone().rev());
                 [
@@ -231,12 +233,12 @@ mod tests {
         0.01 * x * x + 0.02 * y * y + 0.003 * x * y - 0.1 * x + 0.05
     }
 
-    fn sampled(x: &[f64], y: &[f64]) -> Gap {
+    fn sampled(x: &[f64], y: &[f64]) -> GapSurface {
         let rows: Vec<Vec<f64>> = y
             .iter()
             .map(|y| x.iter().map(|x| paraboloid(*x, *y)).collect())
             .collect();
-        Gap::grid(x, y, &rows)
+        GapSurface::grid(x, y, &rows)
     }
 
     #[test]
@@ -261,7 +263,7 @@ mod tests {
 
     #[test]
     fn two_samples_make_a_line() {
-        let gap = Gap::profile(500.0, &[1.0, 3.0], &[0.2, 0.6]);
+        let gap = GapSurface::profile(500.0, &[1.0, 3.0], &[0.2, 0.6]);
         let found = gap.on(&[0.0, 10.0], &[2.5]);
         assert!((found[0] - 0.5).abs() < 1e-15 && (found[1] - 0.6).abs() < 1e-15);
         assert_eq!(gap.extremes(), [0.2, 0.6]);
@@ -274,7 +276,7 @@ mod tests {
             .iter()
             .map(|y| if *y > 2.0 { 1e3 } else { 0.002 * y * y })
             .collect();
-        let curve = Gap::profile(500.0, &y, &gap);
+        let curve = GapSurface::profile(500.0, &y, &gap);
         for k in 0..=1000 {
             let at = -5.0 + 0.01 * f64::from(k);
             let found = curve.on(&[0.0], &[at])[0];
@@ -290,15 +292,16 @@ mod tests {
     #[test]
     fn mirror_images_are_recognised_sample_by_sample() {
         let y = [-2.0, -0.5, 0.5, 2.0];
-        let profile = |y: &[f64], gap: &[f64]| Gap::profile(1.0, y, gap).is_mirrored();
+        let profile = |y: &[f64], gap: &[f64]| GapSurface::profile(1.0, y, gap).is_mirrored();
         assert_eq!(profile(&y, &[1.0, 0.0, 0.0, 1.0]), [true, true]);
         assert_eq!(profile(&y, &[1.0, 0.0, 1e-9, 1.0]), [true, false]);
         let askew = [-2.0, -0.5, 0.6, 2.0];
         assert_eq!(profile(&askew, &[1.0, 0.0, 0.0, 1.0]), [true, false]);
         let x = [0.0, 1.0];
         let rows = |last: f64| vec![vec![3.0, 1.0], vec![0.0, 0.5], vec![3.0, last]];
-        let grid =
-            |x: &[f64], rows: &[Vec<f64>]| Gap::grid(x, &[-1.0, 0.0, 1.0], rows).is_mirrored();
+        let grid = |x: &[f64], rows: &[Vec<f64>]| {
+            GapSurface::grid(x, &[-1.0, 0.0, 1.0], rows).is_mirrored()
+        };
         assert_eq!(grid(&x, &rows(1.0)), [false, true]);
         assert_eq!(grid(&x, &rows(1.1)), [false, false]);
         let even = vec![vec![2.0, 2.0], vec![0.0, 0.0], vec![3.0, 3.0]];

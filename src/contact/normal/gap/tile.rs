@@ -1,12 +1,12 @@
 //! A grid of the normal problem with its pressure.
 
 use crate::contact::normal::gap::conjugate_gradients::Pressed;
-use crate::contact::normal::gap::grid::Grid;
+use crate::contact::normal::gap::grid::PressureGrid;
 
 /// A grid with its part of the solution; distances and pressures are its own, the rest belongs to all.
 #[derive(Debug, Clone)]
 pub(crate) struct Tile {
-    pub(crate) grid: Grid,
+    pub(crate) grid: PressureGrid,
     pub(crate) pressed: Pressed,
 }
 
@@ -22,14 +22,14 @@ impl Tile {
 }
 
 /// Pressures on the last grids.
-pub(crate) struct Outcome {
+pub(crate) struct GapOutcome {
     /// The grids with their pressures: one, or one per patch.
     pub(crate) tiles: Vec<Tile>,
     /// Iterations over all grids.
     pub(crate) iterations: u32,
     /// Nothing changes any more with the grids.
     pub(crate) settled: bool,
-    /// See [`Report`](crate::contact::normal::answer::Report).
+    /// See [`Report`](crate::contact::normal::answer::NormalWork).
     pub(crate) pressure_change: f64,
     /// The least gap in mm.
     pub(crate) least: f64,

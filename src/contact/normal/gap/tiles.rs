@@ -6,14 +6,14 @@
 //! is settled.
 
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::answer::{Failure, edge_reached};
+use crate::contact::normal::answer::{NormalError, edge_reached};
 use crate::contact::normal::gap::conjugate_gradients::{Pressed, press};
 use crate::contact::normal::gap::constants::{
     APPROACH_CHANGE, COARSER_MAX, GRIDS_MAX, NEAR, PRESSURE_CHANGE, REFINEMENT,
 };
-use crate::contact::normal::gap::grid::{Grid, Resolution, within};
-use crate::contact::normal::gap::task::GapContact;
-use crate::contact::normal::gap::tile::{Outcome, Tile};
+use crate::contact::normal::gap::grid::{GridFineness, PressureGrid, within};
+use crate::contact::normal::gap::task::GapTask;
+use crate::contact::normal::gap::tile::{GapOutcome, Tile};
 use crate::contact::normal::gap::tiles_influence::TilesInfluence;
 use std::ops::Range;
 
@@ -36,24 +36,24 @@ const CELLS_TINY: f64 = 10.0;
 enum Next {
     Keep,
     Rough,
-    Change(Grid),
+    Change(PressureGrid),
 }
 
-impl GapContact {
+impl GapTask {
     /// Goes on from a solution on one grid with one grid per patch; none if there is only one patch, or too many.
     pub(crate) fn solve_on_tiles(
         &self,
         whole: Tile,
         least: f64,
-        resolution: Resolution,
+        resolution: GridFineness,
         monitor: &dyn Monitor,
-    ) -> Result<Option<Outcome>, Failure> {
+    ) -> Result<Option<GapOutcome>, NormalError> {
         let limits = self.gap.window();
         let mut grids = boxes(&whole, limits);
         if !(2..=TILES_MAX).contains(&grids.len()) {
             return Ok(None);
         }
-        let mut found = Outcome {
+        let mut found = GapOutcome {
             tiles: vec![whole],
             iterations: 0,
             settled: false,
@@ -101,10 +101,10 @@ impl GapContact {
 
     fn press_tiles(
         &self,
-        grids: Vec<Grid>,
+        grids: Vec<PressureGrid>,
         before: &[Tile],
         monitor: &dyn Monitor,
-    ) -> Result<Vec<Tile>, Failure> {
+    ) -> Result<Vec<Tile>, NormalError> {
         let mut influence = TilesInfluence::new(&grids, self.contact_modulus);
         let (mut gap, mut start) = (Vec::new(), Vec::new());
         for grid in &grids {
@@ -123,7 +123,7 @@ impl GapContact {
             monitor,
         )?;
         let parts = grids.into_iter().zip(influence.ranges);
-        let tile = |(grid, range): (Grid, Range<usize>)| {
+        let tile = |(grid, range): (PressureGrid, Range<usize>)| {
             let mut pressure = pressed.pressure[range.clone()].to_vec();
             grid.symmetrise(&mut pressure);
             let pressed = Pressed {
@@ -136,14 +136,14 @@ impl GapContact {
         Ok(parts.map(tile).collect())
     }
 
-    /// What to do after the grid of a patch: enlarge it, refine it, or be content. See `GapContact::next_grid`.
+    /// What to do after the grid of a patch: enlarge it, refine it, or be content. See `GapTask::next_grid`.
     fn next_tile(
         &self,
         tile: &Tile,
         before: &[Tile],
         depth: f64,
-        resolution: Resolution,
-    ) -> Result<Next, Failure> {
+        resolution: GridFineness,
+    ) -> Result<Next, NormalError> {
         let limits = self.gap.window();
         let Tile { grid, pressed } = tile;
         let (cut, short): (Vec<_>, Vec<_>) = grid
@@ -157,7 +157,7 @@ impl GapContact {
             return Ok(Next::Keep);
         }
         let wanted = grid.wanted(pressed, NEAR * depth, resolution, limits);
-        let finer = Grid::new(wanted.window, wanted.cells, grid.mirrored);
+        let finer = PressureGrid::new(wanted.window, wanted.cells, grid.mirrored);
         if (0..2).any(|k| finer.step[k] < COARSER_MAX * grid.step[k]) {
             return Ok(Next::Change(finer));
         }
@@ -186,7 +186,7 @@ impl GapContact {
             return Ok(Next::Keep);
         }
         let cells = grid.cells.map(|n| (n as f64 * REFINEMENT) as usize);
-        let finer = Grid::new(wanted.window, cells, grid.mirrored);
+        let finer = PressureGrid::new(wanted.window, cells, grid.mirrored);
         if (0..2).all(|k| finer.step[k] > COARSER_MAX * grid.step[k]) {
             return Ok(Next::Rough);
         }
@@ -195,7 +195,7 @@ impl GapContact {
 
     /// Grids around samples of the gap outside all grids at which the deformed surfaces overlap: patches that were too small to
     /// be seen before.
-    fn missed(&self, tiles: &[Tile], depth: f64) -> Vec<Grid> {
+    fn missed(&self, tiles: &[Tile], depth: f64) -> Vec<PressureGrid> {
         let approach = tiles[0].pressed.approach;
         let limits = self.gap.window();
         let samples = self.gap.samples();
@@ -242,7 +242,7 @@ impl GapContact {
                 let window = [window.next(), window.next()].map(Option::unwrap_or_default);
                 let mirrored = [self.gap.is_mirrored()[0] && samples[0].is_empty(), false];
                 let cells = [CELLS_FIRST[0] as usize; 2];
-                found.push(Grid::new(within(window, limits), cells, mirrored));
+                found.push(PressureGrid::new(within(window, limits), cells, mirrored));
             }
         }
         found
@@ -270,15 +270,15 @@ fn point_loads(tile: &Tile) -> Vec<[f64; 3]> {
 }
 
 /// The resolution that a part of the load asks for.
-fn own_resolution(resolution: Resolution, share: f64) -> Resolution {
+fn own_resolution(resolution: GridFineness, share: f64) -> GridFineness {
     if share < resolution.share_min {
-        Resolution {
+        GridFineness {
             contact: CELLS_TINY,
             patch: CELLS_TINY,
             ..resolution
         }
     } else if share < SHARE_LARGE {
-        Resolution {
+        GridFineness {
             contact: RESOLUTION_SMALL * resolution.contact,
             ..resolution
         }
@@ -288,7 +288,7 @@ fn own_resolution(resolution: Resolution, share: f64) -> Resolution {
 }
 
 /// A box around every patch of a grid, those that overlap in one.
-fn boxes(whole: &Tile, limits: [[f64; 2]; 2]) -> Vec<Grid> {
+fn boxes(whole: &Tile, limits: [[f64; 2]; 2]) -> Vec<PressureGrid> {
     let grid = &whole.grid;
     let boxes = grid.patches(&whole.pressed.pressure).into_iter();
     let boxes = boxes.map(|patch| {
@@ -306,14 +306,14 @@ fn boxes(whole: &Tile, limits: [[f64; 2]; 2]) -> Vec<Grid> {
         let middle = window[1][0] + window[1][1];
         let straddles = middle.abs() < 1e-9 * (window[1][1] - window[1][0]);
         let mirrored = [grid.mirrored[0], grid.mirrored[1] && straddles];
-        Grid::new(window, cells, mirrored)
+        PressureGrid::new(window, cells, mirrored)
     });
     merged(boxes.collect())
 }
 
 /// The grids, those that overlap replaced by one over both with the finer cells.
-fn merged(mut grids: Vec<Grid>) -> Vec<Grid> {
-    let overlap = |a: &Grid, b: &Grid| {
+fn merged(mut grids: Vec<PressureGrid>) -> Vec<PressureGrid> {
+    let overlap = |a: &PressureGrid, b: &PressureGrid| {
         (0..2).all(|k| a.range(k)[0] < b.range(k)[1] && b.range(k)[0] < a.range(k)[1])
     };
     let mut k = 0;
@@ -333,18 +333,18 @@ fn merged(mut grids: Vec<Grid>) -> Vec<Grid> {
             ((high - low) / a.step[k].min(b.step[k])).ceil() as usize
         });
         let mirrored = [0, 1].map(|k| a.mirrored[k] && b.mirrored[k]);
-        grids[k] = Grid::new(window, cells, mirrored);
+        grids[k] = PressureGrid::new(window, cells, mirrored);
         k = 0;
     }
     grids
 }
 
-fn cells(grids: &[Grid]) -> usize {
+fn cells(grids: &[PressureGrid]) -> usize {
     grids.iter().map(|grid| grid.cells[0] * grid.cells[1]).sum()
 }
 
 /// Pressures to start from on a grid: those of all earlier grids that reach into it.
-fn start_on(grid: &Grid, before: &[Tile], gap: &[f64]) -> Vec<f64> {
+fn start_on(grid: &PressureGrid, before: &[Tile], gap: &[f64]) -> Vec<f64> {
     let mut start = vec![0.0_f64; gap.len()];
     for tile in before {
         if tile.grid == *grid {

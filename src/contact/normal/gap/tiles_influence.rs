@@ -2,16 +2,16 @@
 
 use std::ops::Range;
 
-use crate::contact::half_space::grid_operator::Convolution;
+use crate::contact::half_space::grid_operator::GridOperator;
 use crate::contact::normal::gap::conjugate_gradients::Influence;
 use crate::contact::normal::gap::coupling::Coupling;
-use crate::contact::normal::gap::grid::Grid;
+use crate::contact::normal::gap::grid::PressureGrid;
 
 /// The influence of all grids on all.
 pub(crate) struct TilesInfluence {
     /// Cells of every grid.
     pub(crate) ranges: Vec<Range<usize>>,
-    own: Vec<Convolution<f32>>,
+    own: Vec<GridOperator<f32>>,
     /// Grid acted on, grid that acts.
     couplings: Vec<(usize, usize, Coupling)>,
     /// Cell by cell, relative to the first cell.
@@ -20,8 +20,8 @@ pub(crate) struct TilesInfluence {
 }
 
 impl TilesInfluence {
-    pub(crate) fn new(grids: &[Grid], contact_modulus: f64) -> TilesInfluence {
-        let own: Vec<Convolution<f32>> = grids
+    pub(crate) fn new(grids: &[PressureGrid], contact_modulus: f64) -> TilesInfluence {
+        let own: Vec<GridOperator<f32>> = grids
             .iter()
             .map(|grid| grid.influence(contact_modulus))
             .collect();

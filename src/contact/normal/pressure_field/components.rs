@@ -1,6 +1,6 @@
 //! Finds the separate patches of a grid: which positive samples hang together.
 
-use crate::contact::normal::pressure_field::sample_grid::{Grid, PATCHES_MAX};
+use crate::contact::normal::pressure_field::sample_grid::{PATCHES_MAX, SampleGrid};
 
 /// Label of samples and cells that belong to no patch.
 pub(crate) const NOWHERE: u8 = u8::MAX;
@@ -12,7 +12,7 @@ pub(crate) const NOWHERE: u8 = u8::MAX;
 ///
 /// # Errors
 /// The number of patches, if there are more than [`PATCHES_MAX`].
-pub(crate) fn label_samples(grid: &Grid, q: &[f64]) -> Result<(Vec<u8>, usize), usize> {
+pub(crate) fn label_samples(grid: &SampleGrid, q: &[f64]) -> Result<(Vec<u8>, usize), usize> {
     let (nx, ny) = (grid.x.len(), grid.y.len());
     let mut labels = vec![NOWHERE; nx * ny];
     let mut seen = vec![false; nx * ny];
@@ -51,7 +51,7 @@ pub(crate) fn label_samples(grid: &Grid, q: &[f64]) -> Result<(Vec<u8>, usize), 
 
 /// Label of every cell between four samples, stored like the samples at its corner of smallest x and y: that of its
 /// corners, of which no two belong to different patches.
-pub(crate) fn label_cells(grid: &Grid, samples: &[u8]) -> Vec<u8> {
+pub(crate) fn label_cells(grid: &SampleGrid, samples: &[u8]) -> Vec<u8> {
     let (nx, ny) = (grid.x.len(), grid.y.len());
     let mut labels = vec![NOWHERE; nx * ny];
     for j in 0..ny - 1 {

@@ -2,7 +2,7 @@
 
 use crate::contact::normal::pressure_field::components::NOWHERE;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
-use crate::contact::normal::pressure_field::sample_grid::{Grid, PADDING, padded};
+use crate::contact::normal::pressure_field::sample_grid::{PADDING, SampleGrid, padded};
 
 impl GridPressure {
     /// The field of a pressure computed on equal cells with the centres `(x[i], y[j])` in mm, stored at
@@ -20,7 +20,7 @@ impl GridPressure {
         pressure: &[f64],
         approach: f64,
     ) -> Result<GridPressure, String> {
-        let grid = Grid {
+        let grid = SampleGrid {
             x: padded(x),
             y: padded(y),
         };

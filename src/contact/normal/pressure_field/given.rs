@@ -9,8 +9,10 @@ use crate::contact::mesh::strips::Chord;
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::normal::pressure_field::level_set::State;
-use crate::contact::normal::pressure_field::line::Line;
-use crate::contact::normal::pressure_field::sample_grid::{Grid, PADDING, PATCHES_MAX, padded};
+use crate::contact::normal::pressure_field::line::GridLine;
+use crate::contact::normal::pressure_field::sample_grid::{
+    PADDING, PATCHES_MAX, SampleGrid, padded,
+};
 use crate::contact::normal::pressure_field::{components, level_set, line};
 use crate::contact::numerics::cubic::{interval, weights};
 use crate::contact::remark::entry::RemarkEntry;
@@ -33,7 +35,7 @@ impl GridPressure {
         pressure: &[Vec<f64>],
     ) -> Result<(GridPressure, Vec<RemarkEntry>), String> {
         let pressure_max = pressure.iter().flatten().copied().fold(0.0, f64::max);
-        let grid = Grid {
+        let grid = SampleGrid {
             x: padded(x),
             y: padded(y),
         };
@@ -66,7 +68,7 @@ impl GridPressure {
     /// A field whose patches have no region yet, and the patch of every sample; `q` is as in [`GridPressure::q`] with 0
     /// outside the contact.
     pub(crate) fn from_squares(
-        grid: Grid,
+        grid: SampleGrid,
         q: Vec<f64>,
         pressure_max: f64,
     ) -> Result<(GridPressure, Vec<u8>), String> {
@@ -205,7 +207,7 @@ impl GridPressure {
             _ => (label, y),
         };
         let shape = &self.shapes[label];
-        let Grid { x, y: rows } = &self.grid;
+        let SampleGrid { x, y: rows } = &self.grid;
         let j = interval(rows, y);
         if rows[j] > y || rows[j + 1] < y || !shape.rows.contains(&j) {
             return Vec::new();
@@ -214,7 +216,7 @@ impl GridPressure {
         let weights = weights(rows, j, y);
         // One more node on either side for the tangents.
         let nodes = shape.columns.start() - 1..=shape.columns.end() + 2;
-        let line = Line {
+        let line = GridLine {
             axis: x,
             first: *nodes.start(),
             values: nodes.map(|i| self.value_on_column(i, j, weights)).collect(),

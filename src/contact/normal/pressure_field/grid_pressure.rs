@@ -1,14 +1,14 @@
 //! A pressure on one grid of samples, with its patches.
 
 use crate::contact::normal::pressure_field::jumps::Jump;
-use crate::contact::normal::pressure_field::patch_shape::Shape;
-use crate::contact::normal::pressure_field::sample_grid::Grid;
+use crate::contact::normal::pressure_field::patch_shape::PatchShape;
+use crate::contact::normal::pressure_field::sample_grid::SampleGrid;
 
 /// Pressure samples on one rectangular grid and the patches they form.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GridPressure {
     /// The given grid with [`PADDING`](crate::contact::normal::pressure_field::sample_grid::PADDING) more lines on each side.
-    pub(crate) grid: Grid,
+    pub(crate) grid: SampleGrid,
     /// Squared pressure relative to its largest value, continued below 0 outside the contact.
     pub(crate) q: Vec<f64>,
     /// Samples that are positive or continued by a parabola.
@@ -17,7 +17,7 @@ pub struct GridPressure {
     pub(crate) cells: Vec<u8>,
     /// Largest pressure in MPa.
     pub(crate) pressure_max: f64,
-    pub(crate) shapes: Vec<Shape>,
+    pub(crate) shapes: Vec<PatchShape>,
     /// The patch that is the mirror image about y = 0 of each one; empty if the pressure has no such symmetry.
     pub(crate) images: Vec<usize>,
     /// The largest jump from one given sample to the next.

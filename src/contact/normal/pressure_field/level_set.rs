@@ -4,7 +4,7 @@
 //! itself. Samples outside the contact (where only `p = 0` is known) therefore get negative values extrapolated from
 //! inside. For Hertz's pressure q is a parabola and the continuation is exact.
 
-use crate::contact::normal::pressure_field::sample_grid::Grid;
+use crate::contact::normal::pressure_field::sample_grid::SampleGrid;
 
 /// Samples outside that get a value, counted from the nearest one inside along either axis.
 const RINGS: usize = 3;
@@ -24,8 +24,8 @@ pub(crate) enum State {
 }
 
 /// Replaces the zeros of `q` near positive samples by extrapolated values, none of them positive; `q` is scaled to at
-/// most 1 and stored as [`Grid`] says. Returns how each sample is known.
-pub(crate) fn extend(grid: &Grid, q: &mut [f64]) -> Vec<State> {
+/// most 1 and stored as [`SampleGrid`] says. Returns how each sample is known.
+pub(crate) fn extend(grid: &SampleGrid, q: &mut [f64]) -> Vec<State> {
     let state_of = |q: &f64| {
         if *q > 0.0 {
             State::Smooth
@@ -64,7 +64,7 @@ pub(crate) fn extend(grid: &Grid, q: &mut [f64]) -> Vec<State> {
 }
 
 /// Which samples have a positive one at most [`RINGS`] away along x and along y.
-fn near_positive(grid: &Grid, q: &[f64]) -> Vec<bool> {
+fn near_positive(grid: &SampleGrid, q: &[f64]) -> Vec<bool> {
     let (nx, ny) = (grid.x.len(), grid.y.len());
     let reach = |k: usize, n: usize| k.saturating_sub(RINGS)..(k + RINGS + 1).min(n);
     let along: Vec<bool> = (0..nx * ny)
@@ -78,7 +78,7 @@ fn near_positive(grid: &Grid, q: &[f64]) -> Vec<bool> {
 /// Value of the unknown sample `k` from the best extrapolations along the axes, if there is any: their harmonic mean,
 /// so that a weak patch is not squeezed by the steep end of a strong one beside it.
 fn continued(
-    grid: &Grid,
+    grid: &SampleGrid,
     q: &[f64],
     states: &[State],
     k: usize,
@@ -195,7 +195,7 @@ mod tests {
         let axis: Vec<f64> = (0..24)
             .map(|k| -1.4 + 0.12 * f64::from(k) + 0.001 * f64::from(k * k))
             .collect();
-        let grid = Grid {
+        let grid = SampleGrid {
             x: axis.clone(),
             y: axis,
         };

@@ -4,7 +4,7 @@ use crate::contact::numerics::cubic::Cubic;
 
 /// Values at the nodes of an axis, and the intervals that may belong to a patch.
 #[derive(Debug)]
-pub(crate) struct Line<'f> {
+pub(crate) struct GridLine<'f> {
     pub(crate) axis: &'f [f64],
     /// Node of the axis that `values` starts with.
     pub(crate) first: usize,
@@ -23,7 +23,7 @@ pub(crate) struct Bounded {
     bounds: [f64; 2],
 }
 
-impl Line<'_> {
+impl GridLine<'_> {
     /// The segments where the curve is positive, from smaller to larger coordinate.
     pub(crate) fn segments(&self) -> Vec<(f64, f64)> {
         let mut segments: Vec<(f64, f64)> = Vec::new();

@@ -16,7 +16,7 @@ const SAMPLES_ACROSS_MIN: usize = 8;
 
 /// One patch and the cells it may occupy.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Shape {
+pub(crate) struct PatchShape {
     pub(crate) patch: Patch,
     pub(crate) columns: RangeInclusive<usize>,
     pub(crate) rows: RangeInclusive<usize>,
@@ -25,7 +25,7 @@ pub(crate) struct Shape {
 
 impl GridPressure {
     /// Patches without their region: force, rows and columns come from the samples.
-    pub(crate) fn shapes_from_samples(&self, samples: &[u8], count: usize) -> Vec<Shape> {
+    pub(crate) fn shapes_from_samples(&self, samples: &[u8], count: usize) -> Vec<PatchShape> {
         let nx = self.grid.x.len();
         let mut boxes = vec![[usize::MAX, 0, usize::MAX, 0]; count];
         let (mut forces, mut largest) = (vec![0.0; count], vec![0.0_f64; count]);
@@ -48,7 +48,7 @@ impl GridPressure {
         (0..count)
             .map(|label| {
                 let [i0, i1, j0, j1] = boxes[label];
-                Shape {
+                PatchShape {
                     patch: Patch {
                         normal_force: forces[label],
                         approach: None,
@@ -67,7 +67,7 @@ impl GridPressure {
     }
 
     /// Extent `[x_min, x_max, y_min, y_max]` and area of a patch, by lines through it.
-    pub(crate) fn measure(&self, label: usize, shape: &Shape) -> ([f64; 4], f64) {
+    pub(crate) fn measure(&self, label: usize, shape: &PatchShape) -> ([f64; 4], f64) {
         let [y_min, y_max] = self.extent_across(shape, label);
         // Chords have a root at both ends of the patch, so the lines crowd there.
         let lines = (32 + shape.rows.clone().count()).max(72);
@@ -110,7 +110,7 @@ impl GridPressure {
     }
 
     /// First and last y of lines that meet the patch.
-    fn extent_across(&self, shape: &Shape, label: usize) -> [f64; 2] {
+    fn extent_across(&self, shape: &PatchShape, label: usize) -> [f64; 2] {
         // Two spacings halved so often are too small to matter.
         const STEPS: usize = 36;
         let y = &self.grid.y;
@@ -130,7 +130,7 @@ impl GridPressure {
         })
     }
 
-    pub(crate) fn remarks(&self, samples: &[u8], shapes: &[Shape]) -> Vec<RemarkEntry> {
+    pub(crate) fn remarks(&self, samples: &[u8], shapes: &[PatchShape]) -> Vec<RemarkEntry> {
         let (nx, ny) = (self.grid.x.len(), self.grid.y.len());
         let at_edge = |k: usize, n: usize| k == PADDING || k + PADDING + 1 == n;
         let mut remarks = Vec::new();

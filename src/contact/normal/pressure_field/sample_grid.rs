@@ -8,7 +8,7 @@ pub(crate) const PADDING: usize = 4;
 
 /// Coordinates of a rectangular grid in mm; the value at `(x[i], y[j])` is stored at `j * x.len() + i`.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Grid {
+pub(crate) struct SampleGrid {
     pub(crate) x: Vec<f64>,
     pub(crate) y: Vec<f64>,
 }

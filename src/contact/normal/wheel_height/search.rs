@@ -7,14 +7,14 @@
 
 use std::f64::consts::PI;
 
-use crate::contact::geometry::contact_locus::{Frame, Search};
+use crate::contact::geometry::contact_locus::{ContactLocus, Frame};
 use crate::contact::geometry::local_gap::{Detail, LocalGap};
 use crate::contact::geometry::surface_exit::SurfaceExit;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::answer::{Failure, Report};
-use crate::contact::normal::gap::surface::Gap;
-use crate::contact::normal::gap::task::GapContact;
+use crate::contact::normal::answer::{NormalError, NormalWork};
+use crate::contact::normal::gap::surface::GapSurface;
+use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::hertz::Pressing;
 use crate::contact::normal::neighbours::{Neighbour, neglected};
 use crate::contact::normal::pressure_field::field::PressureField;
@@ -38,7 +38,7 @@ const DEPTH_SHARE_MIN: f64 = 2e-3;
 
 /// What presses the wheel on the rail.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Loading {
+pub enum WheelLoad {
     /// Vertical force in N.
     Vertical(f64),
     /// Sum of the normal forces of all patches in N.
@@ -49,11 +49,11 @@ pub enum Loading {
 
 /// A wheel over its rail, and what presses them together.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ProfileContact {
+pub struct WheelTask {
     /// Wheel and rail in place.
     pub geometry: WheelRail,
     /// The load.
-    pub loading: Loading,
+    pub loading: WheelLoad,
     /// Contact modulus `E* = G/(1−ν)` in MPa.
     pub contact_modulus: f64,
     /// What the case says about the trust in the profiles.
@@ -91,7 +91,7 @@ pub struct PressedGap {
     /// Region and pressure.
     pub field: PressureField,
     /// How it was found.
-    pub report: Report,
+    pub report: NormalWork,
     /// Remarks for the answer.
     pub remarks: Vec<RemarkEntry>,
 }
@@ -113,7 +113,7 @@ impl PressedGap {
 
 /// How a wheel should come to rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Wanted {
+pub struct NormalPass {
     /// Of a vertical force the normal forces carry the part `1 / (1 + friction_share)`.
     pub friction_share: f64,
     /// How exactly.
@@ -148,7 +148,7 @@ struct Fineness {
 }
 
 impl Fineness {
-    fn fine(wanted: Wanted) -> Fineness {
+    fn fine(wanted: NormalPass) -> Fineness {
         let target = match wanted.accuracy {
             Accuracy::About(_) => f64::INFINITY,
             Accuracy::For(target) => target,
@@ -200,11 +200,11 @@ impl PressedWheel {
     }
 }
 
-impl ProfileContact {
+impl WheelTask {
     /// The same with other smoothings of rail and wheel, in mm.
     #[must_use]
-    pub fn smoothed(&self, smoothing: [f64; 2]) -> ProfileContact {
-        ProfileContact {
+    pub fn smoothed(&self, smoothing: [f64; 2]) -> WheelTask {
+        WheelTask {
             geometry: self.geometry.smoothed(smoothing),
             ..self.clone()
         }
@@ -213,14 +213,14 @@ impl ProfileContact {
     /// The search for the places of contact, with its overlaps divided among gaps as near the height that is expected.
     ///
     /// # Errors
-    /// As [`Search::new`].
-    pub fn search(&self) -> Result<Search<'_>, String> {
-        let search = Search::new(&self.geometry)?;
+    /// As [`ContactLocus::new`].
+    pub fn search(&self) -> Result<ContactLocus<'_>, String> {
+        let search = ContactLocus::new(&self.geometry)?;
         let expected = match self.loading {
-            Loading::Vertical(force) | Loading::Normal(force) => {
+            WheelLoad::Vertical(force) | WheelLoad::Normal(force) => {
                 search.estimated_lowering(force / self.contact_modulus)
             }
-            Loading::Lowering(lowering) => lowering,
+            WheelLoad::Lowering(lowering) => lowering,
         };
         Ok(search.grouped_near(expected))
     }
@@ -231,15 +231,15 @@ impl ProfileContact {
     /// A reason why there is no answer; or the monitor stopped the work.
     pub fn press(
         &self,
-        search: &Search,
-        wanted: Wanted,
+        search: &ContactLocus,
+        wanted: NormalPass,
         before: Option<&PressedWheel>,
         monitor: &dyn Monitor,
-    ) -> Result<PressedWheel, Failure> {
+    ) -> Result<PressedWheel, NormalError> {
         let target = match self.loading {
-            Loading::Vertical(force) => force / (1.0 + wanted.friction_share),
-            Loading::Normal(force) => force,
-            Loading::Lowering(lowering) => {
+            WheelLoad::Vertical(force) => force / (1.0 + wanted.friction_share),
+            WheelLoad::Normal(force) => force,
+            WheelLoad::Lowering(lowering) => {
                 return self.lowered(search, lowering, Fineness::fine(wanted), monitor);
             }
         };
@@ -264,11 +264,11 @@ impl ProfileContact {
         for heights in 1..=HEIGHTS_MAX {
             let mut found = match self.looked_at(search, lowering, fineness, monitor) {
                 Ok(found) => found,
-                Err(Failure::NoAnswer(reason)) => {
+                Err(NormalError::NoAnswer(reason)) => {
                     // Too deep, perhaps; the load may be carried higher up.
                     lowering = bracket
                         .refuse(lowering, reason)
-                        .map_err(Failure::NoAnswer)?;
+                        .map_err(NormalError::NoAnswer)?;
                     continue;
                 }
                 Err(stopped) => return Err(stopped),
@@ -287,7 +287,7 @@ impl ProfileContact {
                 return Ok(found.at_rest(HeightExit::Met { missed }, target));
             }
             if let Some(reason) = bracket.closed_on_refusal(lowering) {
-                return Err(Failure::NoAnswer(reason));
+                return Err(NormalError::NoAnswer(reason));
             }
             let closed = bracket.is_closed(lowering);
             if closed && fine {
@@ -301,7 +301,7 @@ impl ProfileContact {
                 bracket = bracket.opened(found.found[1]);
             }
         }
-        Err(Failure::NoAnswer(format!(
+        Err(NormalError::NoAnswer(format!(
             "no height of the wheel carries the load after {HEIGHTS_MAX} tries"
         )))
     }
@@ -309,13 +309,13 @@ impl ProfileContact {
     /// The wheel at one height; where a coarse look has no answer, a fine one may.
     fn looked_at(
         &self,
-        search: &Search,
+        search: &ContactLocus,
         lowering: f64,
         fineness: Fineness,
         monitor: &dyn Monitor,
-    ) -> Result<PressedWheel, Failure> {
+    ) -> Result<PressedWheel, NormalError> {
         match self.lowered(search, lowering, fineness, monitor) {
-            Err(Failure::NoAnswer(_)) if fineness.detail == Detail::Coarse => {
+            Err(NormalError::NoAnswer(_)) if fineness.detail == Detail::Coarse => {
                 let fine = Fineness {
                     detail: Detail::Fine,
                     ..fineness
@@ -329,15 +329,15 @@ impl ProfileContact {
     /// The wheel at one height.
     fn lowered(
         &self,
-        search: &Search,
+        search: &ContactLocus,
         lowering: f64,
         fineness: Fineness,
         monitor: &dyn Monitor,
-    ) -> Result<PressedWheel, Failure> {
+    ) -> Result<PressedWheel, NormalError> {
         let centre = search.touch - lowering;
         let gaps = search
             .gaps(lowering, fineness.detail)
-            .map_err(Failure::NoAnswer)?;
+            .map_err(NormalError::NoAnswer)?;
         let depths: Vec<f64> = gaps.iter().map(depth).collect();
         let least = DEPTH_SHARE_MIN * depths.iter().copied().fold(0.0, f64::max);
         let touching = gaps.iter().zip(&depths).filter(|(_, d)| **d > least);
@@ -345,7 +345,7 @@ impl ProfileContact {
             .map(|(gap, depth)| self.pressed(gap, *depth, centre, fineness, monitor))
             .collect::<Result<Vec<_>, _>>()?;
         if patches.is_empty() {
-            return Err(Failure::NoAnswer(
+            return Err(NormalError::NoAnswer(
                 "wheel and rail do not overlap at this height of the wheel".to_owned(),
             ));
         }
@@ -372,17 +372,17 @@ impl ProfileContact {
         centre: f64,
         fineness: Fineness,
         monitor: &dyn Monitor,
-    ) -> Result<PressedGap, Failure> {
+    ) -> Result<PressedGap, NormalError> {
         if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.0) {
-            return Err(Failure::Stopped(stop));
+            return Err(NormalError::Stopped(stop));
         }
         let above: Vec<Vec<f64>> = gap
             .gap
             .iter()
             .map(|row| row.iter().map(|height| height + depth).collect())
             .collect();
-        let contact = GapContact {
-            gap: Gap::grid(&gap.x, &gap.y, &above),
+        let contact = GapTask {
+            gap: GapSurface::grid(&gap.x, &gap.y, &above),
             pressing: Pressing::Approach(depth),
             contact_modulus: self.contact_modulus,
         };
@@ -394,7 +394,7 @@ impl ProfileContact {
         remarks.extend(missed_beside(gap, &found.field));
         let moved = |to: [f64; 2]| {
             let place = self.geometry.moved(&gap.frame, to, centre);
-            place.map_err(|miss| Failure::NoAnswer(miss.to_string()))
+            place.map_err(|miss| NormalError::NoAnswer(miss.to_string()))
         };
         if fineness.detail == Detail::Fine {
             for patch in 0..found.field.patches().len() {
@@ -419,7 +419,7 @@ impl ProfileContact {
             force: gap.normal_force(),
             approach: gap.approach,
         });
-        let keeps_load = !matches!(self.loading, Loading::Lowering(_));
+        let keeps_load = !matches!(self.loading, WheelLoad::Lowering(_));
         let gaps: Vec<Neighbour> = gaps.collect();
         let [share, distance_mm] = neglected(&gaps, self.contact_modulus, keeps_load)?;
         (share > part).then_some(Remark::PatchesUncoupled { share, distance_mm })
@@ -428,8 +428,8 @@ impl ProfileContact {
     /// The force that is prescribed, as it came out.
     fn carried(&self, found: &PressedWheel) -> f64 {
         match self.loading {
-            Loading::Vertical(_) => found.vertical_force(),
-            Loading::Normal(_) | Loading::Lowering(_) => {
+            WheelLoad::Vertical(_) => found.vertical_force(),
+            WheelLoad::Normal(_) | WheelLoad::Lowering(_) => {
                 found.patches.iter().map(PressedGap::normal_force).sum()
             }
         }
@@ -441,8 +441,8 @@ impl ProfileContact {
             let cos = gap.frame.angle.cos();
             let own = 2.0 * self.contact_modulus * gap.stiffness() * cos;
             match self.loading {
-                Loading::Vertical(_) => own * cos,
-                Loading::Normal(_) | Loading::Lowering(_) => own,
+                WheelLoad::Vertical(_) => own * cos,
+                WheelLoad::Normal(_) | WheelLoad::Lowering(_) => own,
             }
         };
         let slope: f64 = found.patches.iter().map(part).sum();

@@ -32,8 +32,8 @@ pub fn outlines(
     let wanted = |i: usize| which.is_none_or(|zone| zones.is_some_and(|z| z[i] == zone));
     let cells: Vec<usize> = (0..n).filter(|&i| wanted(i)).collect();
 
-    let x = Edges::new(&fields.x_mm, &fields.dx_mm, &cells);
-    let y = Edges::new(&fields.y_mm, &fields.dy_mm, &cells);
+    let x = CellBorders::new(&fields.x_mm, &fields.dx_mm, &cells);
+    let y = CellBorders::new(&fields.y_mm, &fields.dy_mm, &cells);
     let mut rows: BTreeMap<(usize, usize), Vec<(usize, usize)>> = BTreeMap::new();
     for (&from_to_x, &from_to_y) in x.of_cell.iter().zip(&y.of_cell) {
         rows.entry(from_to_y).or_default().push(from_to_x);
@@ -86,13 +86,13 @@ pub fn patch_outline(fields: &PatchCells) -> Vec<Vec<[f64; 2]>> {
 }
 
 /// Distinct edges along one axis; every cell knows its two by rank.
-struct Edges {
+struct CellBorders {
     values: Vec<f64>,
     of_cell: Vec<(usize, usize)>,
 }
 
-impl Edges {
-    fn new(centres: &[f64], widths: &[f64], cells: &[usize]) -> Edges {
+impl CellBorders {
+    fn new(centres: &[f64], widths: &[f64], cells: &[usize]) -> CellBorders {
         let mut sides: Vec<(f64, f64, usize)> = Vec::with_capacity(2 * cells.len());
         for (k, &i) in cells.iter().enumerate() {
             let (centre, width) = (centres[i], widths[i]);
@@ -119,7 +119,7 @@ impl Edges {
             .chunks_exact(2)
             .map(|pair| (pair[0], pair[1]))
             .collect();
-        Edges { values, of_cell }
+        CellBorders { values, of_cell }
     }
 }
 

@@ -10,12 +10,12 @@ use std::f64::consts::PI;
 use crate::contact::mesh::size::MeshSize;
 use crate::contact::mesh::strips::Segment;
 use crate::contact::normal::patch::Patch;
-use crate::contact::rolling::answer::{Tangential, Work};
+use crate::contact::rolling::answer::{LevelAnswer, Work};
 use crate::contact::rolling::linear_theory;
 use crate::contact::rolling::methods::full_slip;
 use crate::contact::rolling::methods::method::TractionBound;
 use crate::contact::rolling::motion::Motion;
-use crate::contact::rolling::strip_mesh::Level;
+use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::rolling::task::RollingTask;
 
 /// The mesh unless one is given: finer ones change the resultants by a small part of the method's own error.
@@ -46,13 +46,13 @@ pub fn error_class(bound: TractionBound, mesh: MeshSize) -> f64 {
 /// area, and creepages about its centre of area; for an ellipse that is the ellipse. Slips are those of the single flexibility
 /// `(L1|ν_x| + L2|ν_y| + L3|φ|c)/√(ν_x² + ν_y² + φ²c²)`. Tractions with the parabolic bound exceed μp in the middle of a patch.
 #[must_use]
-pub fn solve(task: &RollingTask, level: &Level, motion: &Motion) -> Tangential {
+pub fn solve(task: &RollingTask, level: &StripMesh, motion: &Motion) -> LevelAnswer {
     let parabolic = task.traction_bound == TractionBound::Parabolic;
     if !parabolic && let Some(answer) = full_slip::rigid_answer(level, motion) {
         return answer;
     }
     let cells = level.mesh.cells();
-    let mut answer = Tangential {
+    let mut answer = LevelAnswer {
         traction: [vec![0.0; cells], vec![0.0; cells]],
         second: None,
         slip: [vec![0.0; cells], vec![0.0; cells]],
@@ -69,8 +69,8 @@ pub fn solve(task: &RollingTask, level: &Level, motion: &Motion) -> Tangential {
         if parabolic {
             make_parabolic(level, p, &mut bound);
         }
-        let ellipse = Ellipse::like(level, p, patch);
-        let brush = Brush::new(&ellipse, task.elasticity.poisson_ratio, motion);
+        let ellipse = EquivalentEllipse::like(level, p, patch);
+        let brush = SimplifiedTheory::new(&ellipse, task.elasticity.poisson_ratio, motion);
         let segments = &level.normalised.segments;
         for segment in segments.iter().filter(|s| s.chord.patch == p) {
             brush.sweep(level, segment, &bound, &mut answer);
@@ -80,7 +80,7 @@ pub fn solve(task: &RollingTask, level: &Level, motion: &Motion) -> Tangential {
 }
 
 /// Replaces the bound of a patch by its square, scaled to the same load: a paraboloid instead of Hertz's ellipsoid.
-fn make_parabolic(level: &Level, patch: usize, bound: &mut [f64]) {
+fn make_parabolic(level: &StripMesh, patch: usize, bound: &mut [f64]) {
     let (mut load, mut square) = (0.0, 0.0);
     for i in level.patch_cells(patch) {
         load += level.area[i] * bound[i];
@@ -95,14 +95,14 @@ fn make_parabolic(level: &Level, patch: usize, bound: &mut [f64]) {
 
 /// The ellipse that stands for a patch, dimensionless.
 #[derive(Debug, Clone, Copy)]
-struct Ellipse {
+struct EquivalentEllipse {
     centre: [f64; 2],
     a: f64,
     b: f64,
 }
 
-impl Ellipse {
-    fn like(level: &Level, index: usize, patch: &Patch) -> Ellipse {
+impl EquivalentEllipse {
+    fn like(level: &StripMesh, index: usize, patch: &Patch) -> EquivalentEllipse {
         let mesh = &level.normalised;
         let segments = || mesh.segments.iter().filter(|s| s.chord.patch == index);
         let (mut area, mut first, mut second) = (0.0, [0.0; 2], [0.0; 2]);
@@ -125,7 +125,7 @@ impl Ellipse {
             }
         };
         let c = (patch.area / PI).sqrt() / level.scale.length;
-        Ellipse {
+        EquivalentEllipse {
             centre,
             a: c * a_over_b.sqrt(),
             b: c / a_over_b.sqrt(),
@@ -135,7 +135,7 @@ impl Ellipse {
 
 /// Rigid slip over flexibility, `(ν_x/L1 − φy/L3, ν_y/L2 + φx/L3)`: how fast sticking tractions grow.
 #[derive(Debug, Clone, Copy)]
-struct Brush {
+struct SimplifiedTheory {
     growth: [f64; 2],
     turning: f64,
     centre: [f64; 2],
@@ -143,9 +143,9 @@ struct Brush {
     flexibility: f64,
 }
 
-impl Brush {
-    fn new(ellipse: &Ellipse, poisson_ratio: f64, motion: &Motion) -> Brush {
-        let Ellipse { centre, a, b } = *ellipse;
+impl SimplifiedTheory {
+    fn new(ellipse: &EquivalentEllipse, poisson_ratio: f64, motion: &Motion) -> SimplifiedTheory {
+        let EquivalentEllipse { centre, a, b } = *ellipse;
         let [c11, c22, c23] = linear_theory::coefficients(a / b, poisson_ratio);
         let [l1, l2] = [c11, c22].map(|c| 8.0 * a / (3.0 * c));
         let l3 = PI * a * (a / b).sqrt() / (4.0 * c23);
@@ -154,7 +154,7 @@ impl Brush {
         let y = motion.creepage_y + spin * centre[0];
         let turn = spin * (a * b).sqrt();
         let length = x.hypot(y).hypot(turn);
-        Brush {
+        SimplifiedTheory {
             growth: [x / l1, y / l2],
             turning: spin / l3,
             centre,
@@ -167,7 +167,7 @@ impl Brush {
     }
 
     /// One pass along a segment, from its leading edge to its trailing one.
-    fn sweep(&self, level: &Level, segment: &Segment, bound: &[f64], answer: &mut Tangential) {
+    fn sweep(&self, level: &StripMesh, segment: &Segment, bound: &[f64], answer: &mut LevelAnswer) {
         let mut ahead = segment.chord.right;
         let mut traction = [0.0; 2];
         let across = self.growth[0] - self.turning * (segment.chord.y - self.centre[1]);

@@ -1,8 +1,8 @@
 //! States that need no Newton iteration: nothing slips because nothing moves, or everything slips.
 
-use crate::contact::rolling::answer::{Tangential, Work};
+use crate::contact::rolling::answer::{LevelAnswer, Work};
 use crate::contact::rolling::motion::Motion;
-use crate::contact::rolling::strip_mesh::Level;
+use crate::contact::rolling::strip_mesh::StripMesh;
 
 /// No elastic slip of a patch in full slip was seen above a third of this, in units of (μ p_max)/G, for a/b from
 /// 1/50 to 50 and any ν.
@@ -13,11 +13,11 @@ const NEGLIGIBLE: f64 = 1e6;
 
 /// Tractions at the bound along the rigid slip of a dimensionless motion, on every cell.
 #[must_use]
-pub fn along_rigid_slip(level: &Level, motion: &Motion) -> [Vec<f64>; 2] {
+pub fn along_rigid_slip(level: &StripMesh, motion: &Motion) -> [Vec<f64>; 2] {
     along(level, &rigid_slip(level, motion))
 }
 
-fn rigid_slip(level: &Level, motion: &Motion) -> [Vec<f64>; 2] {
+fn rigid_slip(level: &StripMesh, motion: &Motion) -> [Vec<f64>; 2] {
     let normalised = &level.normalised;
     let x = normalised.rows();
     let x = x.iter().map(|y| motion.creepage_x - motion.spin_per_mm * y);
@@ -27,7 +27,7 @@ fn rigid_slip(level: &Level, motion: &Motion) -> [Vec<f64>; 2] {
 }
 
 /// Tractions at the bound in the directions of the slips.
-fn along(level: &Level, slip: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
+fn along(level: &StripMesh, slip: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
     let lengths: Vec<f64> = slip[0]
         .iter()
         .zip(&slip[1])
@@ -50,7 +50,7 @@ fn along(level: &Level, slip: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
 /// The answer if the rigid slip decides everything: no motion, no friction, or a rigid slip so large that elastic
 /// slip cannot turn it (relative change of the tractions below 1e-6).
 #[must_use]
-pub fn rigid_answer(level: &Level, motion: &Motion) -> Option<Tangential> {
+pub fn rigid_answer(level: &StripMesh, motion: &Motion) -> Option<LevelAnswer> {
     let cells = level.mesh.cells();
     let slip = rigid_slip(level, motion);
     let sizes = slip[0].iter().zip(&slip[1]).map(|(x, y)| x.hypot(*y));
@@ -64,7 +64,7 @@ pub fn rigid_answer(level: &Level, motion: &Motion) -> Option<Tangential> {
         return None;
     };
     let traction = along(level, &slip);
-    Some(Tangential {
+    Some(LevelAnswer {
         traction,
         second: None,
         slips: vec![!still; cells],
@@ -77,11 +77,11 @@ pub fn rigid_answer(level: &Level, motion: &Motion) -> Option<Tangential> {
 
 /// Without friction there are no tractions, and the slip is the rigid one.
 #[must_use]
-pub fn frictionless_answer(level: &Level, motion: &Motion) -> Tangential {
+pub fn frictionless_answer(level: &StripMesh, motion: &Motion) -> LevelAnswer {
     let cells = level.mesh.cells();
     let rows = level.mesh.rows();
     let still = motion.creepage_x == 0.0 && motion.creepage_y == 0.0 && motion.spin_per_mm == 0.0;
-    Tangential {
+    LevelAnswer {
         traction: [vec![0.0; cells], vec![0.0; cells]],
         second: None,
         slip: [
@@ -103,7 +103,7 @@ pub fn frictionless_answer(level: &Level, motion: &Motion) -> Tangential {
 }
 
 /// Does the rigid slip vanish somewhere in the box around the patches?
-fn pole_inside(level: &Level, motion: &Motion) -> bool {
+fn pole_inside(level: &StripMesh, motion: &Motion) -> bool {
     if motion.spin_per_mm == 0.0 {
         return false;
     }

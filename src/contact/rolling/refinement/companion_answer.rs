@@ -4,7 +4,7 @@ use crate::contact::rolling::resultants::Resultants;
 
 /// What is known of the error from a companion.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub enum Seen {
+pub enum CompanionAnswer {
     /// Nobody looked.
     #[default]
     Untried,

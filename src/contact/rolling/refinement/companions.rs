@@ -4,11 +4,11 @@
 use crate::contact::error::SolveError;
 use crate::contact::mesh::size::MeshSize;
 use crate::contact::monitor::Monitor;
-use crate::contact::rolling::answer::{Failure, Tangential, Work};
-use crate::contact::rolling::mesh_plan::Plan;
+use crate::contact::rolling::answer::{LevelAnswer, LevelFailure, Work};
+use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::methods::boundary_element::solve as boundary_element;
 use crate::contact::rolling::motion::Motion;
-use crate::contact::rolling::refinement::companion_answer::Seen;
+use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;
 use crate::contact::rolling::refinement::levels::Ladder;
 use crate::contact::rolling::refinement::warm_start::nested_tractions;
 use crate::contact::rolling::resultants::Resultants;
@@ -25,7 +25,7 @@ pub enum Companion {
 
 impl Companion {
     /// The plan of the companion: same regime and pole, an even number of strips that is about half.
-    fn plan(self, plan: Plan) -> Option<Plan> {
+    fn plan(self, plan: MeshPlan) -> Option<MeshPlan> {
         let MeshSize { strips, cells } = plan.size;
         let size = match self {
             Companion::Across => MeshSize {
@@ -38,10 +38,10 @@ impl Companion {
             },
         };
         let halved = size.strips >= 2 && size.cells >= 2 && size != plan.size;
-        halved.then_some(Plan { size, ..plan })
+        halved.then_some(MeshPlan { size, ..plan })
     }
 
-    /// See [`Seen::Found`]; six strips have four for a half.
+    /// See [`CompanionAnswer::Found`]; six strips have four for a half.
     fn reach(self, fine: MeshSize, halved: MeshSize) -> f64 {
         let (fine, halved) = match self {
             Companion::Across => (fine.strips, halved.strips),
@@ -59,11 +59,11 @@ impl Companion {
         task: &RollingTask,
         ladder: &mut Ladder,
         number: usize,
-        answer: &Tangential,
+        answer: &LevelAnswer,
         motion: &Motion,
         monitor: &dyn Monitor,
-    ) -> Result<(Seen, Work), SolveError> {
-        let missing = (Seen::Missing, Work::default());
+    ) -> Result<(CompanionAnswer, Work), SolveError> {
+        let missing = (CompanionAnswer::Missing, Work::default());
         let Some(plan) = self.plan(ladder.get(number).plan) else {
             return Ok(missing);
         };
@@ -84,10 +84,10 @@ impl Companion {
                     .map(|p| Resultants::of_patch(level, &traction, p))
                     .collect();
                 let reach = self.reach(fine.plan.size, plan.size);
-                Ok((Seen::Found(found, reach), work))
+                Ok((CompanionAnswer::Found(found, reach), work))
             }
-            Err(Failure::NotConverged { work, .. }) => Ok((Seen::Missing, work)),
-            Err(Failure::Stopped(stop)) => Err(stop.into()),
+            Err(LevelFailure::NotConverged { work, .. }) => Ok((CompanionAnswer::Missing, work)),
+            Err(LevelFailure::Stopped(stop)) => Err(stop.into()),
         }
     }
 }

@@ -2,12 +2,12 @@
 //! pole.
 
 use crate::contact::normal::patch::Patch;
-use crate::contact::rolling::answer::Tangential;
+use crate::contact::rolling::answer::LevelAnswer;
 use crate::contact::rolling::mesh_plan::Regime;
 use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::methods::{fastsim, full_slip};
 use crate::contact::rolling::motion::Motion;
-use crate::contact::rolling::refinement::companion_answer::Seen;
+use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;
 use crate::contact::rolling::refinement::constants::{
     CAUTION, DATA, DECAY, DENSE_LEVELS, DENSE_LEVELS_NEAR, DIFFERENCES, JUMPING, LEVELS_LIKE,
     LEVELS_UNLIKE, LOAD, POLE_WEIGHT, REGION, REGION_CELLS, RULES_ON_MESH, RULES_ON_MESH_SAMPLED,
@@ -17,17 +17,17 @@ use crate::contact::rolling::refinement::mesh_policy::CELLS_FIRST;
 use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::rolling::regime::pole_error;
 use crate::contact::rolling::resultants::Resultants;
-use crate::contact::rolling::strip_mesh::Level;
+use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::rolling::task::RollingTask;
 
 /// Relative error where everything slips along the rigid slip.
 const RIGID: f64 = 1e-6;
 /// Relative errors of every patch, then of the sum over them; nothing where there is no second opinion.
-pub type Errors = Vec<Option<f64>>;
+pub type RelativeErrors = Vec<Option<f64>>;
 
 /// The level before on the climb, as far as it says something.
 #[derive(Debug, Clone, Copy)]
-pub struct Before<'a> {
+pub struct CoarserLevel<'a> {
     /// Its resultants.
     pub summed: &'a [Resultants],
     /// What it was made for.
@@ -38,13 +38,13 @@ pub struct Before<'a> {
 
 /// What an estimate depends on beside the answer on its level.
 #[derive(Debug, Clone, Copy)]
-pub struct Circumstances<'a> {
+pub struct EstimateContext<'a> {
     /// The motion in mm.
     pub motion: &'a Motion,
     /// The level before.
-    pub before: Option<Before<'a>>,
+    pub before: Option<CoarserLevel<'a>>,
     /// A finer level, where everything slips or the pressure jumps.
-    pub finer: Option<&'a Level>,
+    pub finer: Option<&'a StripMesh>,
     /// How many times more slender the patch is than the factors of an explicit mesh were found for; at least 1.
     pub slenderness: f64,
     /// Residual of the solve.
@@ -56,7 +56,7 @@ pub struct Circumstances<'a> {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Indicators {
     /// Nothing is left to find out.
-    Known(Errors),
+    Known(RelativeErrors),
     /// Differences that a factor turns into an error.
     Measured(Box<Measured>),
 }
@@ -89,12 +89,12 @@ impl Indicators {
     #[must_use]
     pub fn of_level(
         task: &RollingTask,
-        level: &Level,
-        answer: &Tangential,
+        level: &StripMesh,
+        answer: &LevelAnswer,
         found: &[Resultants],
-        circumstances: Circumstances,
+        circumstances: EstimateContext,
     ) -> Indicators {
-        let Circumstances { motion, finer, .. } = circumstances;
+        let EstimateContext { motion, finer, .. } = circumstances;
         let patches = task.footprint.patches();
         let none = vec![0.0; patches.len() + 1];
         let all = |value| Indicators::Known(vec![value; patches.len() + 1]);
@@ -157,14 +157,20 @@ impl Indicators {
     }
 
     /// Takes in what companion `k` (0: half the strips, 1: half the cells) says of the resultants that were `found`.
-    pub fn see(&mut self, task: &RollingTask, k: usize, found: &[Resultants], seen: &Seen) {
+    pub fn see(
+        &mut self,
+        task: &RollingTask,
+        k: usize,
+        found: &[Resultants],
+        seen: &CompanionAnswer,
+    ) {
         let Indicators::Measured(measured) = self else {
             return;
         };
         match seen {
-            Seen::Untried => {}
-            Seen::Missing => measured.missing = true,
-            Seen::Found(other, reach) => {
+            CompanionAnswer::Untried => {}
+            CompanionAnswer::Missing => measured.missing = true,
+            CompanionAnswer::Found(other, reach) => {
                 let patches = task.footprint.patches();
                 let mut apart = distances(task, patches, found, other);
                 apart.iter_mut().for_each(|d| *d *= reach);
@@ -175,7 +181,7 @@ impl Indicators {
 
     /// The estimates, see `error`.
     #[must_use]
-    pub fn errors(&self) -> Errors {
+    pub fn errors(&self) -> RelativeErrors {
         match self {
             Indicators::Known(errors) => errors.clone(),
             Indicators::Measured(measured) => (0..measured.sums.len())
@@ -213,7 +219,7 @@ impl Measured {
 }
 
 /// The factor on the root of the squares.
-fn scale(task: &RollingTask, level: &Level, patches: usize) -> f64 {
+fn scale(task: &RollingTask, level: &StripMesh, patches: usize) -> f64 {
     let cells = level.mesh.cells() as f64 / patches.max(1) as f64;
     let finer = (CELLS_FIRST / cells).min(1.0);
     let (samples, decay) = match task.footprint.surprise() {
@@ -249,8 +255,8 @@ fn normal_errors(task: &RollingTask, patches: &[Patch]) -> Vec<f64> {
 }
 
 /// Errors of sampling a pressure that jumps: the change of its moments to a level of twice as many strips and cells.
-fn data_errors(patches: &[Patch], levels: [&Level; 2]) -> Vec<f64> {
-    let moments = |level: &Level, k: usize| {
+fn data_errors(patches: &[Patch], levels: [&StripMesh; 2]) -> Vec<f64> {
+    let moments = |level: &StripMesh, k: usize| {
         let [x0, x1, y0, y1] = patches[k].extent;
         let (a, b) = (0.5 * (x1 - x0), 0.5 * (y1 - y0));
         let (x, y) = (0.5 * (x0 + x1), 0.5 * (y0 + y1));
@@ -286,9 +292,9 @@ fn weighted(patches: &[Patch], mut errors: Vec<f64>) -> Vec<f64> {
 fn change(
     task: &RollingTask,
     patches: &[Patch],
-    level: &Level,
+    level: &StripMesh,
     found: &[Resultants],
-    before: Before,
+    before: CoarserLevel,
 ) -> Vec<f64> {
     let factor = match (before.regime, level.plan.regime) {
         (Regime::Sticking { .. }, Regime::Sticking { .. })
@@ -306,9 +312,9 @@ fn dense_errors(
     task: &RollingTask,
     patches: &[Patch],
     found: &[Resultants],
-    circumstances: Circumstances,
-) -> Errors {
-    let Some(Before { summed, share, .. }) = circumstances.before else {
+    circumstances: EstimateContext,
+) -> RelativeErrors {
+    let Some(CoarserLevel { summed, share, .. }) = circumstances.before else {
         return vec![None; patches.len() + 1];
     };
     let factor = if share > SHARE_LARGE {
@@ -326,12 +332,12 @@ fn dense_errors(
 /// Errors on a mesh of the client's, which has no companions: from the difference of the two rules, the sums, and the vortex.
 fn mesh_errors(
     task: &RollingTask,
-    level: &Level,
+    level: &StripMesh,
     rules: Option<&[f64]>,
     sums: &[f64],
     pole: f64,
-    circumstances: Circumstances,
-) -> Errors {
+    circumstances: EstimateContext,
+) -> RelativeErrors {
     let factor = if task.footprint.is_closed_form() {
         RULES_ON_MESH
     } else {
@@ -353,7 +359,7 @@ fn mesh_errors(
 fn sum_errors(
     task: &RollingTask,
     patches: &[Patch],
-    levels: [&Level; 2],
+    levels: [&StripMesh; 2],
     motion: &Motion,
 ) -> Vec<f64> {
     let [here, finer] = levels.map(|level| -> Vec<Resultants> {
@@ -368,7 +374,7 @@ fn sum_errors(
 }
 
 /// A factor for a patch whose load lies on few of its strips.
-fn few_strips(level: &Level) -> f64 {
+fn few_strips(level: &StripMesh) -> f64 {
     let mut loads: Vec<(usize, usize, f64)> = Vec::new();
     for segment in &level.mesh.segments {
         let load = |i: usize| level.pressure[i] * level.area[i];

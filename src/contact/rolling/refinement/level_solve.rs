@@ -3,8 +3,8 @@
 use crate::contact::error::SolveError;
 use crate::contact::mesh::size::MeshSize;
 use crate::contact::monitor::Monitor;
-use crate::contact::rolling::answer::{Failure, Tangential, Work};
-use crate::contact::rolling::mesh_plan::{Plan, Regime};
+use crate::contact::rolling::answer::{LevelAnswer, LevelFailure, Work};
+use crate::contact::rolling::mesh_plan::{MeshPlan, Regime};
 use crate::contact::rolling::methods::boundary_element::solve as boundary_element;
 use crate::contact::rolling::methods::liu_hsu::on_level;
 use crate::contact::rolling::methods::method::Method;
@@ -13,13 +13,13 @@ use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::refinement::constants::LEVEL_RATIO_MIN;
 use crate::contact::rolling::refinement::error_estimate;
 use crate::contact::rolling::refinement::error_estimate::{
-    Before, Circumstances, Errors, Indicators,
+    CoarserLevel, EstimateContext, Indicators, RelativeErrors,
 };
 use crate::contact::rolling::refinement::levels::Ladder;
 use crate::contact::rolling::refinement::refine::slender;
 use crate::contact::rolling::refinement::warm_start::{Start, nested_start};
 use crate::contact::rolling::resultants::Resultants;
-use crate::contact::rolling::strip_mesh::Level;
+use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::rolling::task::RollingTask;
 
 /// The coarse mesh that gives the method of Liu and Hsu its spin pole: fewer than 30 cells, as they found.
@@ -30,7 +30,7 @@ const POLE_MESH: MeshSize = MeshSize {
 
 /// A motion of a problem, and the creepages it is solved with.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Asked {
+pub struct MotionTask {
     /// The number of the motion.
     pub index: usize,
     /// Creepages and spin.
@@ -39,13 +39,13 @@ pub struct Asked {
 
 /// The answer for one motion on the finest level it needed.
 #[derive(Debug, Clone)]
-pub struct Point {
+pub struct MotionAnswer {
     /// The motion it was solved for.
     pub motion: Motion,
     /// A prescribed force could not be reached.
     pub saturated: bool,
     /// Tractions, slips and zones.
-    pub tangential: Tangential,
+    pub tangential: LevelAnswer,
     /// The number of that level in the ladder.
     pub level: usize,
     /// Resultants of every patch about the origin of the case: the best known.
@@ -53,7 +53,7 @@ pub struct Point {
     /// The same as the tractions give them, without extrapolation.
     pub summed: Vec<Resultants>,
     /// Estimated errors, see [`Indicators::errors`].
-    pub errors: Errors,
+    pub errors: RelativeErrors,
     /// Work over all levels.
     pub work: Work,
     /// The method that was used.
@@ -62,7 +62,7 @@ pub struct Point {
     pub seconds: f64,
 }
 
-impl Point {
+impl MotionAnswer {
     /// Estimated error of the sum over the patches.
     #[must_use]
     pub fn error(&self) -> Option<f64> {
@@ -72,9 +72,9 @@ impl Point {
 
 /// A point with what its error is judged by.
 #[derive(Debug, Clone)]
-pub struct Solved {
+pub struct JudgedAnswer {
     /// The answer.
-    pub point: Point,
+    pub point: MotionAnswer,
     /// The indicators of its level.
     pub indicators: Indicators,
 }
@@ -84,14 +84,14 @@ pub struct Solved {
 ///
 /// # Errors
 /// Why there is no answer.
-pub fn climb(
+pub fn solve_level(
     task: &RollingTask,
     ladder: &mut Ladder,
-    asked: Asked,
-    plan: Plan,
-    coarser: Option<Point>,
+    asked: MotionTask,
+    plan: MeshPlan,
+    coarser: Option<MotionAnswer>,
     monitor: &dyn Monitor,
-) -> Result<Solved, SolveError> {
+) -> Result<JudgedAnswer, SolveError> {
     let began = monitor.elapsed();
     let number = ladder.level(plan)?;
     let level = ladder.get(number);
@@ -101,7 +101,7 @@ pub fn climb(
     let motion = level.scale.motion(&asked.motion);
     let warm = ladder.trail.start(number, level, &motion);
     let start = warm.or_else(|| below.map(|(coarse, answer)| nested_start(coarse, answer, level)));
-    let tangential = solve_level(task, level, &asked.motion, start, monitor)
+    let tangential = run_method(task, level, &asked.motion, start, monitor)
         .map_err(|f| named(f, task, task.first_motion + asked.index))?;
     let patches = task.footprint.patches().len();
     let summed: Vec<Resultants> = (0..patches)
@@ -111,7 +111,7 @@ pub fn climb(
         .as_ref()
         .and_then(|point| before(ladder, level, point));
     let finer = finer_for_sums(task, level, asked, &tangential);
-    let circumstances = Circumstances {
+    let circumstances = EstimateContext {
         motion: &asked.motion,
         before,
         finer: finer.as_ref(),
@@ -120,13 +120,13 @@ pub fn climb(
     };
     let indicators = Indicators::of_level(task, level, &tangential, &summed, circumstances);
     let resultants = extrapolated(task, level, &summed, before);
-    ladder.trail.leave(number, motion, &tangential);
+    ladder.trail.remember(number, motion, &tangential);
     ladder.path.push(number);
     let mut work = coarser.as_ref().map_or(Work::default(), |point| point.work);
     work.add(tangential.work);
     let seconds =
         (monitor.elapsed() - began).as_secs_f64() + coarser.map_or(0.0, |point| point.seconds);
-    let point = Point {
+    let point = MotionAnswer {
         motion: asked.motion,
         saturated: false,
         tangential,
@@ -138,14 +138,18 @@ pub fn climb(
         method: method_used(task),
         seconds,
     };
-    Ok(Solved { point, indicators })
+    Ok(JudgedAnswer { point, indicators })
 }
 
 /// The level before, if it is coarse enough to say something.
-pub(crate) fn before<'a>(ladder: &Ladder, level: &Level, point: &'a Point) -> Option<Before<'a>> {
+pub(crate) fn before<'a>(
+    ladder: &Ladder,
+    level: &StripMesh,
+    point: &'a MotionAnswer,
+) -> Option<CoarserLevel<'a>> {
     let below = ladder.get(point.level);
     let ratio = level.mesh.cells() as f64 / below.mesh.cells() as f64;
-    (ratio >= LEVEL_RATIO_MIN).then(|| Before {
+    (ratio >= LEVEL_RATIO_MIN).then(|| CoarserLevel {
         summed: &point.summed,
         regime: below.plan.regime,
         share: 1.0 / (ratio - 1.0),
@@ -156,10 +160,10 @@ pub(crate) fn before<'a>(ladder: &Ladder, level: &Level, point: &'a Point) -> Op
 /// depends on the cells. Without spin all tractions point the same way, and cells of any size add up to the load.
 fn finer_for_sums(
     task: &RollingTask,
-    level: &Level,
-    asked: Asked,
-    answer: &Tangential,
-) -> Option<Level> {
+    level: &StripMesh,
+    asked: MotionTask,
+    answer: &LevelAnswer,
+) -> Option<StripMesh> {
     let turns = asked.motion.spin_per_mm != 0.0 && !task.friction.is_frictionless();
     let slides = turns && answer.slips.iter().all(|slips| *slips);
     if !slides && !error_estimate::jumps(task) {
@@ -167,16 +171,16 @@ fn finer_for_sums(
     }
     let [strips, cells] = [level.plan.size.strips, level.plan.size.cells].map(|n| 2 * n);
     let size = MeshSize { strips, cells };
-    Level::new(task, Plan { size, ..level.plan }).ok()
+    StripMesh::new(task, MeshPlan { size, ..level.plan }).ok()
 }
 
 /// The resultants of every patch where the climb leads to: between meshes for stick errors fall as 1/N. The dense method and
 /// meshes gathered about a pole have no such record.
 fn extrapolated(
     task: &RollingTask,
-    level: &Level,
+    level: &StripMesh,
     summed: &[Resultants],
-    before: Option<Before>,
+    before: Option<CoarserLevel>,
 ) -> Vec<Resultants> {
     let sticking = |regime| matches!(regime, Regime::Sticking { .. });
     let like = before.filter(|b| sticking(b.regime) && sticking(level.plan.regime));
@@ -197,10 +201,10 @@ fn method_used(task: &RollingTask) -> Method {
     task.method
 }
 
-pub(crate) fn named(failure: Failure, task: &RollingTask, point: usize) -> SolveError {
+pub(crate) fn named(failure: LevelFailure, task: &RollingTask, point: usize) -> SolveError {
     match failure {
-        Failure::Stopped(stop) => stop.into(),
-        Failure::NotConverged {
+        LevelFailure::Stopped(stop) => stop.into(),
+        LevelFailure::NotConverged {
             work,
             tolerance,
             advice,
@@ -218,18 +222,18 @@ pub(crate) fn named(failure: Failure, task: &RollingTask, point: usize) -> Solve
     }
 }
 
-fn solve_level(
+fn run_method(
     task: &RollingTask,
-    level: &Level,
+    level: &StripMesh,
     motion: &Motion,
     start: Option<Start>,
     monitor: &dyn Monitor,
-) -> Result<Tangential, Failure> {
+) -> Result<LevelAnswer, LevelFailure> {
     if task.friction.is_frictionless() {
         return Ok(full_slip::frictionless_answer(level, motion));
     }
     if task.method == Method::LiuHsu {
-        let coarse = Level::new(task, POLE_MESH).ok();
+        let coarse = StripMesh::new(task, POLE_MESH).ok();
         return on_level::solve(level, coarse.as_ref(), motion, task.tolerance(), monitor);
     }
     let motion = level.scale.motion(motion);

@@ -2,11 +2,11 @@
 //! motions.
 
 use crate::contact::error::SolveError;
-use crate::contact::rolling::mesh_plan::Plan;
+use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::operator_store::{CaseOperators, OperatorStore};
 use crate::contact::rolling::refinement::mesh_policy::MeshPolicy;
-use crate::contact::rolling::refinement::warm_start::Trail;
-use crate::contact::rolling::strip_mesh::Level;
+use crate::contact::rolling::refinement::warm_start::SweepState;
+use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::rolling::task::RollingTask;
 use std::sync::Arc;
 
@@ -20,14 +20,14 @@ pub struct Ladder<'a> {
     task: &'a RollingTask<'a>,
     operators: Arc<CaseOperators>,
     /// With their numbers, which are never given twice, in the order of their last use.
-    levels: Vec<(usize, Level)>,
+    levels: Vec<(usize, StripMesh)>,
     made: usize,
     /// What the motions solved so far left on the levels.
-    pub trail: Trail,
+    pub trail: SweepState,
     /// The levels that the last motion climbed.
     pub path: Vec<usize>,
     /// Where the next motion of a sweep may begin.
-    pub begin: Option<Plan>,
+    pub begin: Option<MeshPlan>,
     /// Which meshes suit the patches.
     pub policy: MeshPolicy,
 }
@@ -41,7 +41,7 @@ impl<'a> Ladder<'a> {
             operators: CaseOperators::new(store),
             levels: Vec::new(),
             made: 0,
-            trail: Trail::default(),
+            trail: SweepState::default(),
             path: Vec::new(),
             begin: None,
             policy: MeshPolicy::new(task.footprint),
@@ -52,14 +52,14 @@ impl<'a> Ladder<'a> {
     ///
     /// # Errors
     /// If no strip meets a patch.
-    pub fn level(&mut self, plan: Plan) -> Result<usize, SolveError> {
+    pub fn level(&mut self, plan: MeshPlan) -> Result<usize, SolveError> {
         if let Some(place) = self.levels.iter().position(|(_, level)| level.plan == plan) {
             // The last used stand last.
             self.levels[place..].rotate_left(1);
             return Ok(self.levels[self.levels.len() - 1].0);
         }
         let operators = Arc::clone(&self.operators);
-        let level = Level::with_operators(self.task, plan, operators)?;
+        let level = StripMesh::with_operators(self.task, plan, operators)?;
         self.levels.push((self.made, level));
         self.made += 1;
         Ok(self.made - 1)
@@ -67,7 +67,7 @@ impl<'a> Ladder<'a> {
 
     /// A level by its number; it must have been used since the last [`Ladder::trim`], or lie on the path.
     #[must_use]
-    pub fn get(&self, level: usize) -> &Level {
+    pub fn get(&self, level: usize) -> &StripMesh {
         let found = self
             .levels
             .iter()

@@ -3,7 +3,7 @@
 
 use crate::contact::mesh::size::MeshSize;
 use crate::contact::normal::footprint::Footprint;
-use crate::contact::rolling::mesh_plan::{Plan, Regime};
+use crate::contact::rolling::mesh_plan::{MeshPlan, Regime};
 use crate::contact::rolling::methods::fastsim;
 use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::refinement::constants::{MARGIN, SLACK};
@@ -72,14 +72,14 @@ impl MeshPolicy {
 
     /// The first mesh of a motion of which nothing is known.
     #[must_use]
-    pub fn first(&self) -> Plan {
+    pub fn first(&self) -> MeshPlan {
         self.plan(self.cells_first().round() as u32, Regime::Unknown)
     }
 
     /// The plan with about so many cells over all patches, an even number of strips, and a pole where the tractions turn
     /// about one. Poles lie on a grid, so that motions that differ little share their meshes.
     #[must_use]
-    pub fn plan(&self, cells: u32, regime: Regime) -> Plan {
+    pub fn plan(&self, cells: u32, regime: Regime) -> MeshPlan {
         let regime = match regime {
             Regime::Spinning(pole) if self.patches == 1.0 => {
                 Regime::Spinning(pole.map(|p| (p / POLE_GRID).round() * POLE_GRID))
@@ -93,7 +93,7 @@ impl MeshPolicy {
             },
             other => other,
         };
-        Plan {
+        MeshPlan {
             size: self.size(cells, regime),
             regime,
         }
@@ -124,7 +124,7 @@ impl MeshPolicy {
         (2.0 * (cells as f64 / self.cells_first()).log2()).round() as i32
     }
 
-    fn at(&self, half_doublings: i32, regime: Regime) -> Plan {
+    fn at(&self, half_doublings: i32, regime: Regime) -> MeshPlan {
         let cells = self.cells_first() * 2.0_f64.powf(0.5 * f64::from(half_doublings));
         self.plan(cells.round() as u32, regime)
     }
@@ -132,7 +132,7 @@ impl MeshPolicy {
     /// The mesh after one of so many cells whose error is `excess` times the target: errors fall about as 1/N. Motions of a sweep take
     /// coarse steps, so that they share their meshes; a motion alone may take small ones.
     #[must_use]
-    pub fn next(&self, cells: usize, excess: f64, regime: Regime, alone: bool) -> Plan {
+    pub fn next(&self, cells: usize, excess: f64, regime: Regime, alone: bool) -> MeshPlan {
         let here = self.half_doublings(cells);
         let least = if alone && here < SMALL_STEPS_BELOW {
             1
@@ -147,7 +147,7 @@ impl MeshPolicy {
     /// Where the next motion of a sweep should begin after a mesh whose error is `excess` times the target: on the same mesh, which
     /// keeps estimates and values continuous, until it is much finer than it need be.
     #[must_use]
-    pub fn next_begin(&self, plan: Plan, cells: usize, excess: Option<f64>) -> Plan {
+    pub fn next_begin(&self, plan: MeshPlan, cells: usize, excess: Option<f64>) -> MeshPlan {
         let here = self.half_doublings(cells);
         if here >= 2 && excess.is_some_and(|excess| excess < SLACK) {
             return self.at(here - 2, plan.regime);

@@ -5,12 +5,14 @@ use crate::contact::mesh::size::MeshSize;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::patch::Patch;
 use crate::contact::rolling::answer::Work;
-use crate::contact::rolling::mesh_plan::{Plan, Regime};
-use crate::contact::rolling::refinement::companion_answer::Seen;
+use crate::contact::rolling::mesh_plan::{MeshPlan, Regime};
+use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;
 use crate::contact::rolling::refinement::companions::Companion;
 use crate::contact::rolling::refinement::constants::{CELLS_FINE, EXTRAPOLATED, FINE_TARGET};
 use crate::contact::rolling::refinement::error_estimate::Indicators;
-use crate::contact::rolling::refinement::level_solve::{Asked, Point, Solved, climb};
+use crate::contact::rolling::refinement::level_solve::{
+    JudgedAnswer, MotionAnswer, MotionTask, solve_level,
+};
 use crate::contact::rolling::refinement::levels::Ladder;
 use crate::contact::rolling::refinement::mesh_policy::MeshPolicy;
 use crate::contact::rolling::refinement::resolution::Resolution;
@@ -31,17 +33,17 @@ const SLENDER: f64 = 20.0;
 pub fn solve(
     task: &RollingTask,
     ladder: &mut Ladder,
-    asked: Asked,
+    asked: MotionTask,
     monitor: &dyn Monitor,
-) -> Result<Point, SolveError> {
+) -> Result<MotionAnswer, SolveError> {
     let sizes = MeshPolicy::fixed_sizes(task.resolution, task.method);
     ladder.path.clear();
     match (sizes, task.resolution) {
         (Some(sizes), _) => {
-            let mut solved = climb(task, ladder, asked, sizes[0].into(), None, monitor)?;
+            let mut solved = solve_level(task, ladder, asked, sizes[0].into(), None, monitor)?;
             for size in &sizes[1..] {
                 let below = Some(solved.point);
-                solved = climb(task, ladder, asked, (*size).into(), below, monitor)?;
+                solved = solve_level(task, ladder, asked, (*size).into(), below, monitor)?;
             }
             Ok(solved.point)
         }
@@ -54,10 +56,10 @@ pub fn solve(
 fn on_mesh(
     task: &RollingTask,
     ladder: &mut Ladder,
-    asked: Asked,
+    asked: MotionTask,
     size: MeshSize,
     monitor: &dyn Monitor,
-) -> Result<Point, SolveError> {
+) -> Result<MotionAnswer, SolveError> {
     let cells = |size: MeshSize| u64::from(size.strips) * u64::from(size.cells);
     let mut coarser = None;
     let half = MeshSize {
@@ -76,25 +78,25 @@ fn on_mesh(
             Err(error) => return Err(error),
         };
     }
-    climb(task, ladder, asked, size.into(), coarser, monitor).map(|solved| solved.point)
+    solve_level(task, ladder, asked, size.into(), coarser, monitor).map(|solved| solved.point)
 }
 
 /// Solves a motion on given levels, one after the other, so that the resultants are one function of the motion.
 ///
 /// # Errors
 /// Why there is no answer.
-pub fn along(
+pub fn on_levels(
     task: &RollingTask,
     ladder: &mut Ladder,
-    asked: Asked,
-    path: &[Plan],
+    asked: MotionTask,
+    path: &[MeshPlan],
     monitor: &dyn Monitor,
-) -> Result<Option<Point>, SolveError> {
+) -> Result<Option<MotionAnswer>, SolveError> {
     ladder.path.clear();
-    let mut solved: Option<Solved> = None;
+    let mut solved: Option<JudgedAnswer> = None;
     for plan in path {
         let below = solved.map(|solved| solved.point);
-        solved = Some(climb(task, ladder, asked, *plan, below, monitor)?);
+        solved = Some(solve_level(task, ladder, asked, *plan, below, monitor)?);
     }
     if let Some(solved) = &mut solved {
         judge(task, ladder, asked, solved, None, monitor)?;
@@ -133,19 +135,19 @@ pub(crate) fn slender(task: &RollingTask) -> Option<String> {
 pub(crate) fn to_target(
     task: &RollingTask,
     ladder: &mut Ladder,
-    asked: Asked,
+    asked: MotionTask,
     target: f64,
     monitor: &dyn Monitor,
-) -> Result<Point, SolveError> {
+) -> Result<MotionAnswer, SolveError> {
     let begun = match ladder.begin.take() {
-        Some(plan) => again(task, ladder, asked, plan, monitor)?,
+        Some(plan) => begin_on(task, ladder, asked, plan, monitor)?,
         None => None,
     };
     let mut solved = match begun {
         Some(solved) => solved,
         None => {
             let first = ladder.policy.first();
-            climb(task, ladder, asked, first, None, monitor)?
+            solve_level(task, ladder, asked, first, None, monitor)?
         }
     };
     loop {
@@ -171,7 +173,7 @@ pub(crate) fn to_target(
         let excess = solved.point.error().map_or(1.0, |error| error / target);
         let found = regime_of(ladder, asked, &solved.point);
         let plan = ladder.policy.next(cells, excess, found, task.single_motion);
-        solved = climb(task, ladder, asked, plan, Some(solved.point), monitor)?;
+        solved = solve_level(task, ladder, asked, plan, Some(solved.point), monitor)?;
     }
     let level = ladder.get(solved.point.level);
     let (plan, cells) = (level.plan, level.mesh.cells());
@@ -188,8 +190,8 @@ pub(crate) fn to_target(
 pub(crate) fn judge(
     task: &RollingTask,
     ladder: &mut Ladder,
-    asked: Asked,
-    solved: &mut Solved,
+    asked: MotionTask,
+    solved: &mut JudgedAnswer,
     target: Option<f64>,
     monitor: &dyn Monitor,
 ) -> Result<(), SolveError> {
@@ -197,7 +199,7 @@ pub(crate) fn judge(
         return Ok(());
     }
     let began = monitor.elapsed();
-    let mut seen = [Seen::Untried, Seen::Untried];
+    let mut seen = [CompanionAnswer::Untried, CompanionAnswer::Untried];
     let point = &mut solved.point;
     for (k, which) in [Companion::Across, Companion::Along]
         .into_iter()
@@ -222,12 +224,15 @@ pub(crate) fn judge(
         });
         point.errors = solved.indicators.errors();
     }
-    if let [Seen::Found(across, strips), Seen::Found(along, cells)] = &seen
+    if let [
+        CompanionAnswer::Found(across, strips),
+        CompanionAnswer::Found(on_levels, cells),
+    ] = &seen
         && ladder.get(point.level).plan.pole().is_none()
     {
         for (p, patch) in task.footprint.patches().iter().enumerate() {
             let bound = task.friction.limit(patch);
-            let companions = [(across[p], strips), (along[p], cells)];
+            let companions = [(across[p], strips), (on_levels[p], cells)];
             let companions = companions.map(|(other, reach)| (other, EXTRAPOLATED * reach));
             point.resultants[p] = point.summed[p].beyond_all(companions, bound);
         }
@@ -237,13 +242,13 @@ pub(crate) fn judge(
 }
 
 /// Begins a motion of a sweep on the mesh where the last motion ended, if that serves this one too.
-fn again(
+fn begin_on(
     task: &RollingTask,
     ladder: &mut Ladder,
-    asked: Asked,
-    plan: Plan,
+    asked: MotionTask,
+    plan: MeshPlan,
     monitor: &dyn Monitor,
-) -> Result<Option<Solved>, SolveError> {
+) -> Result<Option<JudgedAnswer>, SolveError> {
     if plan.regime == Regime::Unknown {
         return Ok(None);
     }
@@ -253,7 +258,7 @@ fn again(
     if ladder.trail.start(number, level, &motion).is_none() {
         return Ok(None);
     }
-    let solved = climb(task, ladder, asked, plan, None, monitor)?;
+    let solved = solve_level(task, ladder, asked, plan, None, monitor)?;
     let found = regime_of(ladder, asked, &solved.point);
     if plan.serves(found) {
         return Ok(Some(solved));
@@ -262,11 +267,11 @@ fn again(
     ladder.path.clear();
     let cells = ladder.get(number).mesh.cells() as u32;
     let plan = ladder.policy.plan(cells, found);
-    climb(task, ladder, asked, plan, Some(solved.point), monitor).map(Some)
+    solve_level(task, ladder, asked, plan, Some(solved.point), monitor).map(Some)
 }
 
 /// What the tractions of a solved level look like.
-fn regime_of(ladder: &Ladder, asked: Asked, point: &Point) -> Regime {
+fn regime_of(ladder: &Ladder, asked: MotionTask, point: &MotionAnswer) -> Regime {
     let spinning = asked.motion.spin_per_mm != 0.0;
     regime(ladder.get(point.level), &point.tangential, spinning)
 }

@@ -1,9 +1,9 @@
 //! What the last motions left on each level: the start of the next motion of a sweep.
 
-use crate::contact::rolling::answer::Tangential;
+use crate::contact::rolling::answer::LevelAnswer;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::refinement::interpolate;
-use crate::contact::rolling::strip_mesh::Level;
+use crate::contact::rolling::strip_mesh::StripMesh;
 
 /// A motion that leaves the line of the last two by more than this share of its step is not extrapolated.
 const STRAIGHT: f64 = 1e-6;
@@ -23,12 +23,12 @@ pub struct Start {
 
 /// The answers of the last two motions on every level.
 #[derive(Debug, Default)]
-pub struct Trail {
-    steps: Vec<Step>,
+pub struct SweepState {
+    steps: Vec<Remembered>,
 }
 
 #[derive(Debug)]
-struct Step {
+struct Remembered {
     level: usize,
     /// Dimensionless, about the level's origin.
     motion: Motion,
@@ -36,9 +36,9 @@ struct Step {
     trapezoid: [Vec<f64>; 2],
 }
 
-impl Trail {
+impl SweepState {
     /// Remembers an answer; the last but one on the level is forgotten.
-    pub fn leave(&mut self, number: usize, motion: Motion, answer: &Tangential) {
+    pub fn remember(&mut self, number: usize, motion: Motion, answer: &LevelAnswer) {
         let Some(second) = &answer.second else {
             return;
         };
@@ -47,7 +47,7 @@ impl Trail {
         {
             self.steps.remove(oldest);
         }
-        self.steps.push(Step {
+        self.steps.push(Remembered {
             level: number,
             motion,
             mirror: second.clone(),
@@ -63,7 +63,7 @@ impl Trail {
     /// A start for a motion on a level: the line through the last two answers continued, or the last answer itself if the
     /// motion is near.
     #[must_use]
-    pub fn start(&self, number: usize, level: &Level, motion: &Motion) -> Option<Start> {
+    pub fn start(&self, number: usize, level: &StripMesh, motion: &Motion) -> Option<Start> {
         let mut steps = self.steps.iter().rev().filter(|s| s.level == number);
         let last = steps.next()?;
         let to_go = difference(motion, &last.motion);
@@ -122,7 +122,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// A start from the answer on a coarser level.
-pub(crate) fn nested_start(coarse: &Level, answer: &Tangential, level: &Level) -> Start {
+pub(crate) fn nested_start(coarse: &StripMesh, answer: &LevelAnswer, level: &StripMesh) -> Start {
     let second = answer.second.as_ref().unwrap_or(&answer.traction);
     Start {
         mirror: nested_tractions(coarse, second, level),
@@ -132,9 +132,9 @@ pub(crate) fn nested_start(coarse: &Level, answer: &Tangential, level: &Level) -
 
 /// Tractions of one level on another; relative to the friction bound they vary less than as they are.
 pub(crate) fn nested_tractions(
-    from: &Level,
+    from: &StripMesh,
     traction: &[Vec<f64>; 2],
-    to: &Level,
+    to: &StripMesh,
 ) -> [Vec<f64>; 2] {
     let relative = |values: &[f64]| -> Vec<f64> {
         values

@@ -6,7 +6,7 @@ use super::*;
 use crate::contact::half_space::kernels::{Rectangle, rectangle};
 use crate::contact::mesh::observation::observation_points;
 use crate::contact::mesh::strips::{Chord, Grading, equal_strips};
-use crate::contact::monitor::Unwatched;
+use crate::contact::monitor::Unmonitored;
 
 fn ellipse(a: f64, b: f64, strips: usize, cells: usize) -> Mesh {
     let chords: Vec<Chord> = equal_strips(-b, b, strips)
@@ -104,11 +104,18 @@ fn largest_gap(a: &[f64], b: &[f64]) -> f64 {
         / size
 }
 
-fn applied(differences: &Differences, mesh: &Mesh) -> (Vec<f64>, Vec<f64>) {
+fn applied(differences: &StripOperator, mesh: &Mesh) -> (Vec<f64>, Vec<f64>) {
     let (tx, ty) = tractions(mesh, differences.padded(None));
     let rows: usize = mesh.segments.iter().map(|s| rows_of(s.cells.len())).sum();
     let (mut ux, mut uy) = (vec![0.0; rows], vec![0.0; rows]);
-    differences.apply(None, &tx, &ty, &mut ux, &mut uy, &mut Scratch::default());
+    differences.apply(
+        None,
+        &tx,
+        &ty,
+        &mut ux,
+        &mut uy,
+        &mut OperatorScratch::default(),
+    );
     (ux, uy)
 }
 
@@ -122,7 +129,7 @@ fn products_agree_with_the_closed_forms() {
     ] {
         for nu in [0.0, 0.28, 0.5] {
             let differences =
-                Differences::new(&mesh, nu, false, Precision::Double, &Unwatched).unwrap();
+                StripOperator::new(&mesh, nu, false, Precision::Double, &Unmonitored).unwrap();
             let (ux, uy) = applied(&differences, &mesh);
             let (tx, ty) = tractions(&mesh, mesh.cells());
             let (expected_x, expected_y) = by_closed_form(&mesh, nu, &tx, &ty);
@@ -143,8 +150,8 @@ fn products_agree_with_the_closed_forms() {
 #[test]
 fn a_folded_matrix_gives_the_same_products_as_the_full_one() {
     for mesh in [ellipse(1.0, 2.0, 6, 16), ellipse(3.0, 1.0, 4, 16)] {
-        let full = Differences::new(&mesh, 0.3, false, Precision::Double, &Unwatched).unwrap();
-        let folded = Differences::new(&mesh, 0.3, true, Precision::Double, &Unwatched).unwrap();
+        let full = StripOperator::new(&mesh, 0.3, false, Precision::Double, &Unmonitored).unwrap();
+        let folded = StripOperator::new(&mesh, 0.3, true, Precision::Double, &Unmonitored).unwrap();
         let (expected_x, expected_y) = applied(&full, &mesh);
         let (ux, uy) = applied(&folded, &mesh);
         assert!(largest_gap(&ux, &expected_x) < 1e-13 && largest_gap(&uy, &expected_y) < 1e-13);
@@ -156,8 +163,10 @@ fn a_folded_matrix_gives_the_same_products_as_the_full_one() {
 fn single_precision_keeps_five_digits() {
     for folded in [false, true] {
         let mesh = ellipse(1.5, 1.0, 6, 8);
-        let double = Differences::new(&mesh, 0.3, folded, Precision::Double, &Unwatched).unwrap();
-        let single = Differences::new(&mesh, 0.3, folded, Precision::Single, &Unwatched).unwrap();
+        let double =
+            StripOperator::new(&mesh, 0.3, folded, Precision::Double, &Unmonitored).unwrap();
+        let single =
+            StripOperator::new(&mesh, 0.3, folded, Precision::Single, &Unmonitored).unwrap();
         let (expected_x, expected_y) = applied(&double, &mesh);
         let (ux, uy) = applied(&single, &mesh);
         assert!(largest_gap(&ux, &expected_x) < 1e-5 && largest_gap(&uy, &expected_y) < 1e-5);
@@ -168,7 +177,7 @@ fn single_precision_keeps_five_digits() {
 #[test]
 fn one_parity_needs_half_the_cells_only() {
     let mesh = ellipse(1.5, 1.0, 6, 8);
-    let folded = Differences::new(&mesh, 0.3, true, Precision::Double, &Unwatched).unwrap();
+    let folded = StripOperator::new(&mesh, 0.3, true, Precision::Double, &Unmonitored).unwrap();
     let half = mesh.cells() / 2;
     for (parity, sign_x, sign_y) in [
         (Parity::Longitudinal, 1.0, -1.0),
@@ -190,7 +199,7 @@ fn one_parity_needs_half_the_cells_only() {
             &ty,
             &mut all_x,
             &mut all_y,
-            &mut Scratch::default(),
+            &mut OperatorScratch::default(),
         );
         let (mut ux, mut uy) = (vec![0.0; rows], vec![0.0; rows]);
         tx.truncate(half);
@@ -203,7 +212,7 @@ fn one_parity_needs_half_the_cells_only() {
             &ty,
             &mut ux,
             &mut uy,
-            &mut Scratch::default(),
+            &mut OperatorScratch::default(),
         );
         assert!(
             largest_gap(&ux, &all_x[..rows]) < 1e-13 && largest_gap(&uy, &all_y[..rows]) < 1e-13
@@ -222,7 +231,7 @@ fn a_stop_is_seen_between_segments() {
             std::time::Duration::ZERO
         }
     }
-    let stopped = Differences::new(
+    let stopped = StripOperator::new(
         &ellipse(1.0, 1.0, 4, 4),
         0.3,
         false,

@@ -2,7 +2,7 @@
 
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
-use crate::contact::rolling::methods::boundary_element::task::{Convergence, FrictionLaw};
+use crate::contact::rolling::methods::boundary_element::task::{Convergence, NewtonTask};
 
 /// Rigid slip above this, in the same units, makes the fixed point worth trying.
 const FIXED_POINT_FROM: f64 = 30.0;
@@ -18,7 +18,7 @@ const SWEEPS_MAX: u32 = 12;
 /// Only if the monitor stops the work.
 pub fn fixed_point(
     newton: &mut Newton,
-    law: &FrictionLaw,
+    law: &NewtonTask,
     t: &mut [f64],
     monitor: &dyn Monitor,
 ) -> Result<Option<Convergence>, Stop> {

@@ -8,10 +8,10 @@
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::gmres::{Gmres, LinearSystem};
 use crate::contact::rolling::methods::boundary_element::linearisation::Linearisation;
-use crate::contact::rolling::methods::boundary_element::preconditioner::StripBlocks;
-use crate::contact::rolling::methods::boundary_element::task::{Convergence, FrictionLaw};
+use crate::contact::rolling::methods::boundary_element::preconditioner::StripFactors;
+use crate::contact::rolling::methods::boundary_element::task::{Convergence, NewtonTask};
 use crate::contact::rolling::own_blocks::OwnBlocks;
-use crate::contact::rolling::slip_equations::Equations;
+use crate::contact::rolling::slip_equations::SlipEquations;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -32,11 +32,11 @@ const GROWTH_ALLOWED: f64 = 1.5;
 
 /// Solver for one rule on one mesh; keeps its factors and buffers between solves.
 pub struct Newton<'a> {
-    equations: &'a Equations<'a>,
+    equations: &'a SlipEquations<'a>,
     own: Arc<OwnBlocks>,
     /// Projection parameter r of every cell.
     parameter: Vec<f64>,
-    blocks: StripBlocks,
+    blocks: StripFactors,
     gmres: Gmres,
     linear: Linearisation,
     /// What brings each slipping cell from its traction to the tangent of its disc.
@@ -44,12 +44,12 @@ pub struct Newton<'a> {
     slip: Vec<f64>,
     scratch: Vec<f64>,
     expanded: Vec<f64>,
-    steps: Steps,
+    steps: NewtonScratch,
 }
 
 /// Vectors that one Newton step after the other uses.
 #[derive(Debug, Default)]
-pub(crate) struct Steps {
+pub(crate) struct NewtonScratch {
     step: Vec<f64>,
     rhs: Vec<f64>,
     best: Vec<f64>,
@@ -60,27 +60,27 @@ pub(crate) struct Steps {
 impl<'a> Newton<'a> {
     /// Prepares the own blocks and the buffers.
     #[must_use]
-    pub fn new(equations: &'a Equations<'a>) -> Newton<'a> {
+    pub fn new(equations: &'a SlipEquations<'a>) -> Newton<'a> {
         Newton::with_blocks(equations, Arc::new(OwnBlocks::new(equations)))
     }
 
     /// Prepares the buffers; the own blocks are those of the equations.
     #[must_use]
-    pub fn with_blocks(equations: &'a Equations<'a>, own: Arc<OwnBlocks>) -> Newton<'a> {
+    pub fn with_blocks(equations: &'a SlipEquations<'a>, own: Arc<OwnBlocks>) -> Newton<'a> {
         let diagonal = own.diagonal(equations);
         let length = 2 * equations.padded();
         Newton {
             equations,
             parameter: diagonal.iter().map(|m| PROJECTION / m.abs()).collect(),
             own,
-            blocks: StripBlocks::default(),
+            blocks: StripFactors::default(),
             gmres: Gmres::default(),
             linear: Linearisation::default(),
             lift: vec![(0.0, 0.0); equations.cells()],
             slip: vec![0.0; length],
             scratch: vec![0.0; 2 * equations.row_count()],
             expanded: vec![0.0; length],
-            steps: Steps::default(),
+            steps: NewtonScratch::default(),
         }
     }
 
@@ -109,7 +109,7 @@ impl<'a> Newton<'a> {
     /// Only if the monitor stops the work.
     pub fn solve(
         &mut self,
-        law: &FrictionLaw,
+        law: &NewtonTask,
         t: &mut [f64],
         monitor: &dyn Monitor,
     ) -> Result<Convergence, Stop> {
@@ -120,7 +120,7 @@ impl<'a> Newton<'a> {
             residual: f64::INFINITY,
             inexact_steps: 0,
         };
-        let Steps {
+        let NewtonScratch {
             mut step,
             mut rhs,
             mut best,
@@ -174,7 +174,7 @@ impl<'a> Newton<'a> {
             report.residual = least;
             t.copy_from_slice(&best);
         }
-        self.steps = Steps {
+        self.steps = NewtonScratch {
             step,
             rhs,
             best,
@@ -203,7 +203,7 @@ impl<'a> Newton<'a> {
     }
 
     /// Computes the slips of `t` and the residual of the projected law.
-    pub fn evaluate(&mut self, law: &FrictionLaw, t: &[f64], report: &mut Convergence) -> f64 {
+    pub fn evaluate(&mut self, law: &NewtonTask, t: &[f64], report: &mut Convergence) -> f64 {
         let padded = self.equations.padded();
         self.equations.elastic(t, &mut self.slip, &mut self.scratch);
         report.products += 1;
@@ -230,7 +230,7 @@ impl<'a> Newton<'a> {
     /// and sets up the right-hand side there.
     fn linearise(
         &mut self,
-        law: &FrictionLaw,
+        law: &NewtonTask,
         t: &mut [f64],
         rhs: &mut [f64],
         report: &mut Convergence,
@@ -318,7 +318,7 @@ impl<'a> Newton<'a> {
     }
 
     /// `next` is `t` plus the step, slipping cells brought back to the circle.
-    fn candidate(&self, law: &FrictionLaw, t: &[f64], step: &[f64], next: &mut [f64]) {
+    fn candidate(&self, law: &NewtonTask, t: &[f64], step: &[f64], next: &mut [f64]) {
         let padded = self.equations.padded();
         next.copy_from_slice(t);
         for i in 0..self.equations.cells() {
@@ -356,9 +356,9 @@ fn inner_tolerance(residual: f64, last: f64, goal: f64) -> f64 {
 
 /// The linearised equations as GMRES sees them.
 struct NewtonSystem<'a> {
-    equations: &'a Equations<'a>,
+    equations: &'a SlipEquations<'a>,
     linear: &'a Linearisation,
-    blocks: &'a mut StripBlocks,
+    blocks: &'a mut StripFactors,
     scratch: &'a mut [f64],
     expanded: &'a mut [f64],
     slip: &'a mut [f64],

@@ -2,7 +2,7 @@
 
 use crate::contact::rolling::methods::boundary_element::linearisation::Linearisation;
 use crate::contact::rolling::own_blocks::OwnBlocks;
-use crate::contact::rolling::slip_equations::Equations;
+use crate::contact::rolling::slip_equations::SlipEquations;
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::lu::partial_pivoting::factor;
@@ -11,7 +11,7 @@ use pulp::{Arch, NullaryFnOnce};
 
 /// Factored blocks of one Newton step.
 #[derive(Debug, Default)]
-pub struct StripBlocks {
+pub struct StripFactors {
     factors: Vec<f64>,
     /// Position in a full vector of every unknown of every block, in the order of the block's pivot rows.
     pivot_places: Vec<usize>,
@@ -24,27 +24,27 @@ pub struct StripBlocks {
     gathered: Vec<f64>,
     /// Cells of the newest block that stick.
     stick: Vec<usize>,
-    scratch: Scratch,
+    scratch: FactorScratch,
 }
 
 /// Buffers of the factorisation.
 #[derive(Default)]
-struct Scratch {
+struct FactorScratch {
     pivots: Vec<usize>,
     pivots_inverse: Vec<usize>,
     stack: Option<(usize, MemBuffer)>,
 }
 
-impl std::fmt::Debug for Scratch {
+impl std::fmt::Debug for FactorScratch {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("Scratch")
     }
 }
 
-impl StripBlocks {
+impl StripFactors {
     /// Builds and factors the blocks of a linearisation: one block per segment, or one for each component where
     /// nothing slips (sticking x and y do not touch each other inside a segment).
-    pub fn factor(&mut self, own: &OwnBlocks, equations: &Equations, linear: &Linearisation) {
+    pub fn factor(&mut self, own: &OwnBlocks, equations: &SlipEquations, linear: &Linearisation) {
         self.places.clear();
         self.pivot_places.clear();
         self.starts.clear();
@@ -164,22 +164,22 @@ impl StripBlocks {
 
     /// `x ← P⁻¹ x`, block by block.
     pub fn apply(&mut self, x: &mut [f64]) {
-        Arch::new().dispatch(Substitution { blocks: self, x });
+        Arch::new().dispatch(Elimination { blocks: self, x });
     }
 }
 
 /// Forward and backward substitution in all blocks, column by column: each step is one update of contiguous values.
-struct Substitution<'a> {
-    blocks: &'a mut StripBlocks,
+struct Elimination<'a> {
+    blocks: &'a mut StripFactors,
     x: &'a mut [f64],
 }
 
-impl NullaryFnOnce for Substitution<'_> {
+impl NullaryFnOnce for Elimination<'_> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
-        let Substitution { blocks, x } = self;
+        let Elimination { blocks, x } = self;
         for j in 0..blocks.offsets.len() {
             let range = blocks.starts[j]..blocks.starts[j + 1];
             let size = range.len();

@@ -9,37 +9,37 @@ use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::gmres::GmresExit;
 use crate::contact::remark::list::Remark;
-use crate::contact::rolling::answer::{Failure, Tangential, Work, obey_coulomb};
+use crate::contact::rolling::answer::{LevelAnswer, LevelFailure, Work, project_on_bound};
 use crate::contact::rolling::methods::boundary_element::fixed_point::fixed_point;
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
-use crate::contact::rolling::methods::boundary_element::task::{Convergence, FrictionLaw};
+use crate::contact::rolling::methods::boundary_element::task::{Convergence, NewtonTask};
 use crate::contact::rolling::methods::full_slip;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::LevelOperator;
 use crate::contact::rolling::own_blocks::OwnBlocks;
 use crate::contact::rolling::refinement::warm_start::Start;
-use crate::contact::rolling::slip_equations::Equations;
+use crate::contact::rolling::slip_equations::SlipEquations;
 use crate::contact::rolling::slip_rules::Rule;
-use crate::contact::rolling::strip_mesh::Level;
+use crate::contact::rolling::strip_mesh::StripMesh;
 
 /// Solves one motion (dimensionless, about the level's origin) on one level, from a start or from zero tractions.
 ///
 /// # Errors
-/// [`Failure::NotConverged`] if no start leads to a solution of the three-point rule; [`Failure::Stopped`] if the
+/// [`LevelFailure::NotConverged`] if no start leads to a solution of the three-point rule; [`LevelFailure::Stopped`] if the
 /// monitor stops the work. If only the trapezoid rule fails, the three-point tractions serve and a remark says so.
 pub fn solve(
-    level: &Level,
+    level: &StripMesh,
     motion: &Motion,
     start: Option<&Start>,
     tolerance: f64,
     monitor: &dyn Monitor,
-) -> Result<Tangential, Failure> {
+) -> Result<LevelAnswer, LevelFailure> {
     if let Some(answer) = full_slip::rigid_answer(level, motion) {
         return Ok(answer);
     }
     let operator = level.operator(monitor)?;
     let parity = level.parity(motion);
-    let mut solve = Solve::new(level, motion, &operator, parity, tolerance, monitor);
+    let mut solve = RuleSequence::new(level, motion, &operator, parity, tolerance, monitor);
     let mut skipped = Vec::new();
     if parity.is_some() {
         skipped.push("mirror symmetry of patch and motion: half the cells".to_owned());
@@ -63,8 +63,8 @@ pub fn solve(
         }
     };
     let mut traction = solve.expand(&t);
-    let slip = obey_coulomb(&level.bound, &slips, &mut traction, &mirror.slip);
-    Ok(Tangential {
+    let slip = project_on_bound(&level.bound, &slips, &mut traction, &mirror.slip);
+    Ok(LevelAnswer {
         traction,
         second,
         slip,
@@ -78,24 +78,24 @@ pub fn solve(
 /// Tractions of the trapezoid rule alone, from a start that is near: what a companion of a mesh is asked for.
 ///
 /// # Errors
-/// [`Failure::NotConverged`] if neither the start nor the upwind solution leads to a solution; [`Failure::Stopped`] if the
+/// [`LevelFailure::NotConverged`] if neither the start nor the upwind solution leads to a solution; [`LevelFailure::Stopped`] if the
 /// monitor stops the work.
 pub fn trapezoid(
-    level: &Level,
+    level: &StripMesh,
     motion: &Motion,
     start: &[Vec<f64>; 2],
     tolerance: f64,
     monitor: &dyn Monitor,
-) -> Result<([Vec<f64>; 2], Work), Failure> {
+) -> Result<([Vec<f64>; 2], Work), LevelFailure> {
     if let Some(answer) = full_slip::rigid_answer(level, motion) {
         return Ok((answer.traction, answer.work));
     }
     let operator = level.operator(monitor)?;
     let parity = level.parity(motion);
-    let mut solve = Solve::new(level, motion, &operator, parity, tolerance, monitor);
+    let mut solve = RuleSequence::new(level, motion, &operator, parity, tolerance, monitor);
     let mut t = solve.start(Some(start));
     let Some(slips) = solve.trapezoid(&mut t, None)? else {
-        return Err(Failure::NotConverged {
+        return Err(LevelFailure::NotConverged {
             work: solve.work,
             tolerance,
             advice: "try another mesh".to_owned(),
@@ -103,7 +103,7 @@ pub fn trapezoid(
     };
     let mut traction = solve.expand(&t);
     let none = [0, 1].map(|_| vec![0.0; slips.len()]);
-    obey_coulomb(&level.bound, &slips, &mut traction, &none);
+    project_on_bound(&level.bound, &slips, &mut traction, &none);
     Ok((traction, solve.work))
 }
 
@@ -120,15 +120,15 @@ fn advice(report: &Convergence) -> String {
 }
 
 /// What the three-point rule gave besides tractions.
-struct MirrorAnswer {
+struct ThreePointAnswer {
     slip: [Vec<f64>; 2],
     slips: Vec<bool>,
     by_fixed_point: bool,
 }
 
 /// One motion on one level.
-struct Solve<'a> {
-    level: &'a Level,
+struct RuleSequence<'a> {
+    level: &'a StripMesh,
     motion: &'a Motion,
     operator: &'a LevelOperator,
     parity: Option<Parity>,
@@ -139,22 +139,22 @@ struct Solve<'a> {
     monitor: &'a dyn Monitor,
 }
 
-impl<'a> Solve<'a> {
+impl<'a> RuleSequence<'a> {
     fn new(
-        level: &'a Level,
+        level: &'a StripMesh,
         motion: &'a Motion,
         operator: &'a LevelOperator,
         parity: Option<Parity>,
         tolerance: f64,
         monitor: &'a dyn Monitor,
-    ) -> Solve<'a> {
+    ) -> RuleSequence<'a> {
         let padded = operator.influence.padded(parity);
         let resized = |values: &[f64]| {
             let mut values = values.to_vec();
             values.resize(padded.max(values.len()), 0.0);
             values
         };
-        Solve {
+        RuleSequence {
             level,
             motion,
             operator,
@@ -167,8 +167,8 @@ impl<'a> Solve<'a> {
         }
     }
 
-    fn equations(&self, rule: Rule) -> Equations<'a> {
-        Equations::new(
+    fn equations(&self, rule: Rule) -> SlipEquations<'a> {
+        SlipEquations::new(
             rule,
             &self.level.normalised,
             &self.operator.influence,
@@ -177,7 +177,7 @@ impl<'a> Solve<'a> {
     }
 
     /// A solver that shares its own blocks with the other motions of the level.
-    fn newton<'e>(&self, equations: &'e Equations<'e>) -> Newton<'e> {
+    fn newton<'e>(&self, equations: &'e SlipEquations<'e>) -> Newton<'e> {
         let own = self
             .operator
             .own_blocks
@@ -206,7 +206,7 @@ impl<'a> Solve<'a> {
         shortcut: bool,
     ) -> Result<(Convergence, bool), Stop> {
         let largest = rigid.iter().fold(0.0_f64, |m, w| m.max(w.abs()));
-        let law = FrictionLaw {
+        let law = NewtonTask {
             rigid,
             bound: &self.bound,
             area: &self.area,
@@ -233,8 +233,8 @@ impl<'a> Solve<'a> {
     }
 
     /// The three-point rule: from the start, else from zero, else from the upwind solution.
-    fn mirror(&mut self, t: &mut [f64], started: bool) -> Result<MirrorAnswer, Failure> {
-        let equations = self.equations(Rule::Mirror);
+    fn mirror(&mut self, t: &mut [f64], started: bool) -> Result<ThreePointAnswer, LevelFailure> {
+        let equations = self.equations(Rule::ThreePoint);
         let rigid = equations.rigid(self.motion);
         let mut newton = self.newton(&equations);
         let (mut report, by_fixed_point) = self.rule(&mut newton, &rigid, t, true)?;
@@ -248,13 +248,13 @@ impl<'a> Solve<'a> {
             report = self.rule(&mut newton, &rigid, t, false)?.0;
         }
         if !report.converged {
-            return Err(Failure::NotConverged {
+            return Err(LevelFailure::NotConverged {
                 work: self.work,
                 tolerance: self.tolerance,
                 advice: advice(&report),
             });
         }
-        Ok(MirrorAnswer {
+        Ok(ThreePointAnswer {
             slip: self.expand(newton.slip()),
             slips: self.zones(&newton, t),
             by_fixed_point,

@@ -2,7 +2,7 @@
 
 /// What a solve needs besides the equations, all per cell, padded like the equations' vectors.
 #[derive(Debug, Clone, Copy)]
-pub struct FrictionLaw<'a> {
+pub struct NewtonTask<'a> {
     /// Rigid slip, x then y.
     pub rigid: &'a [f64],
     /// Friction bound g = μp.

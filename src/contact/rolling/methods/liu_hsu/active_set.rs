@@ -1,9 +1,9 @@
 //! The outer iteration: which cells stick and which slip.
 
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::rolling::methods::liu_hsu::initial_guess::Guess;
+use crate::contact::rolling::methods::liu_hsu::initial_guess::InitialGuess;
 use crate::contact::rolling::methods::liu_hsu::newton_raphson;
-use crate::contact::rolling::methods::liu_hsu::newton_raphson::Steps;
+use crate::contact::rolling::methods::liu_hsu::newton_raphson::StepRule;
 use crate::contact::rolling::methods::liu_hsu::stick_block::{
     DenseProblem, SlipSystem, both_components,
 };
@@ -18,7 +18,7 @@ const START_MARGIN: f64 = 1e-6;
 
 /// How the outer iteration ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Exit {
+pub enum ZonesExit {
     /// The division into zones agrees with the tractions and slips that follow from it.
     Converged,
     /// Newton–Raphson found no tractions for a division.
@@ -31,29 +31,29 @@ pub enum Exit {
     Inexact,
 }
 
-impl Exit {
+impl ZonesExit {
     /// A clause for messages.
     #[must_use]
     pub fn reason(self) -> &'static str {
         match self {
-            Exit::Converged => "converged",
-            Exit::NewtonDiverged => "Newton-Raphson diverged",
-            Exit::ZonesRepeat => "the division into stick and slip repeats itself",
-            Exit::IterationLimit => "too many divisions into stick and slip",
-            Exit::Inexact => "the residual stays above the tolerance",
+            ZonesExit::Converged => "converged",
+            ZonesExit::NewtonDiverged => "Newton-Raphson diverged",
+            ZonesExit::ZonesRepeat => "the division into stick and slip repeats itself",
+            ZonesExit::IterationLimit => "too many divisions into stick and slip",
+            ZonesExit::Inexact => "the residual stays above the tolerance",
         }
     }
 }
 
 /// One run of the outer iteration.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Attempt {
+pub struct ZonesRun {
     /// The discretisation rule.
     pub rule: Rule,
     /// The initial guess used.
-    pub guess: Guess,
+    pub guess: InitialGuess,
     /// How it ended.
-    pub exit: Exit,
+    pub exit: ZonesExit,
     /// Divisions into stick and slip that were solved.
     pub outer_iterations: u32,
     /// Newton–Raphson steps over all divisions.
@@ -62,7 +62,7 @@ pub struct Attempt {
 
 /// Tractions and zones, over the cells without padding.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Division {
+pub struct Zoning {
     /// Tractions, x of all cells before y.
     pub tractions: Vec<f64>,
     /// Does the cell slip?
@@ -78,14 +78,14 @@ pub struct Division {
 /// Only if the monitor stops the work.
 pub fn run(
     task: &DenseProblem,
-    guess: Guess,
+    guess: InitialGuess,
     start: Option<&[f64]>,
     monitor: &dyn Monitor,
-) -> Result<(Attempt, Division), Stop> {
-    let mut attempt = Attempt {
+) -> Result<(ZonesRun, Zoning), Stop> {
+    let mut attempt = ZonesRun {
         rule: task.rule,
         guess,
-        exit: Exit::IterationLimit,
+        exit: ZonesExit::IterationLimit,
         outer_iterations: 0,
         newton_iterations: 0,
     };
@@ -96,12 +96,12 @@ pub fn run(
         seen.push(division.slips.clone());
         let system = SlipSystem::new(task, &division.slips, monitor)?;
         if !solve_division(task, &system, &mut attempt, &mut division, monitor)? {
-            attempt.exit = Exit::NewtonDiverged;
+            attempt.exit = ZonesExit::NewtonDiverged;
             break;
         }
         let misplaced = misplaced(task, &system, &division.tractions);
         if misplaced.is_empty() {
-            attempt.exit = Exit::Converged;
+            attempt.exit = ZonesExit::Converged;
             break;
         }
         let mut next = division.slips.clone();
@@ -109,7 +109,7 @@ pub fn run(
             next[cell] = !next[cell];
         }
         if seen.contains(&next) {
-            attempt.exit = Exit::ZonesRepeat;
+            attempt.exit = ZonesExit::ZonesRepeat;
             break;
         }
         division.slips = next;
@@ -118,25 +118,25 @@ pub fn run(
 }
 
 /// All cells stick, or those slip that `start` loads up to their bound. A cell without pressure cannot stick.
-fn first_division(task: &DenseProblem, start: Option<&[f64]>) -> Division {
+fn first_division(task: &DenseProblem, start: Option<&[f64]>) -> Zoning {
     let n = task.cells;
     let tractions = start.map_or_else(|| vec![0.0; 2 * n], <[f64]>::to_vec);
     let slips = (0..n)
         .map(|i| tractions[i].hypot(tractions[n + i]) >= task.bound[i] * (1.0 - START_MARGIN))
         .collect();
-    Division { tractions, slips }
+    Zoning { tractions, slips }
 }
 
 /// Tractions for one division into zones; `false` if Newton–Raphson finds none.
 fn solve_division(
     task: &DenseProblem,
     system: &SlipSystem,
-    attempt: &mut Attempt,
-    division: &mut Division,
+    attempt: &mut ZonesRun,
+    division: &mut Zoning,
     monitor: &dyn Monitor,
 ) -> Result<bool, Stop> {
     let bound = system.slip_cells.iter().map(|i| task.bound[*i]);
-    let mut roots = Roots {
+    let mut roots = RootChoice {
         system,
         bound: bound.collect(),
         iterations: 0,
@@ -144,8 +144,11 @@ fn solve_division(
     };
     let start = |guess| start_tractions(task, system, guess, &division.tractions);
     let found = match attempt.guess {
-        Guess::Continued => roots.along_slip(start(Guess::Continued), start(Guess::RigidSlip))?,
-        guess => roots.find(start(guess), Steps::Full)?,
+        InitialGuess::Continued => roots.along_slip(
+            start(InitialGuess::Continued),
+            start(InitialGuess::RigidSlip),
+        )?,
+        guess => roots.find(start(guess), StepRule::Full)?,
     };
     attempt.newton_iterations += roots.iterations;
     let Some(t) = found else {
@@ -164,16 +167,16 @@ fn solve_division(
 }
 
 /// The search for roots of eq. 8 and 9 with one division.
-struct Roots<'a> {
+struct RootChoice<'a> {
     system: &'a SlipSystem,
     bound: Vec<f64>,
     iterations: u32,
     monitor: &'a dyn Monitor,
 }
 
-impl Roots<'_> {
+impl RootChoice<'_> {
     /// The root that Newton–Raphson finds from a start, if any.
-    fn find(&mut self, mut t: Vec<f64>, steps: Steps) -> Result<Option<Vec<f64>>, Stop> {
+    fn find(&mut self, mut t: Vec<f64>, steps: StepRule) -> Result<Option<Vec<f64>>, Stop> {
         let end = newton_raphson::solve(self.system, &self.bound, steps, &mut t, self.monitor)?;
         self.iterations += end.iterations;
         Ok(end.converged.then_some(t))
@@ -182,7 +185,7 @@ impl Roots<'_> {
     /// A root with as few cells as possible that pull against their slip. Eq. 9 has a root for every choice of such
     /// cells; the one found from `first` is tried again with those cells turned round, then from `second`.
     fn along_slip(&mut self, first: Vec<f64>, second: Vec<f64>) -> Result<Option<Vec<f64>>, Stop> {
-        let mut best = self.find(first, Steps::OnCircles)?;
+        let mut best = self.find(first, StepRule::OnCircles)?;
         let turned = best.as_ref().map(|t| turned(self.system, t));
         for start in turned.into_iter().chain([second]) {
             let count = |t: &Vec<f64>| opposed(self.system, t).len();
@@ -190,7 +193,7 @@ impl Roots<'_> {
             if least == 0 {
                 break;
             }
-            if let Some(t) = self.find(start, Steps::OnCircles)?
+            if let Some(t) = self.find(start, StepRule::OnCircles)?
                 && opposed(self.system, &t).len() < least
             {
                 best = Some(t);
@@ -224,7 +227,7 @@ fn turned(system: &SlipSystem, t: &[f64]) -> Vec<f64> {
 fn start_tractions(
     task: &DenseProblem,
     system: &SlipSystem,
-    guess: Guess,
+    guess: InitialGuess,
     before: &[f64],
 ) -> Vec<f64> {
     let count = system.slip_cells.len();

@@ -1,16 +1,16 @@
 //! What the dense method solves: equations, bound and motion on one mesh.
 
-use crate::contact::rolling::methods::boundary_element::task::FrictionLaw;
+use crate::contact::rolling::methods::boundary_element::task::NewtonTask;
 use crate::contact::rolling::motion::Motion;
-use crate::contact::rolling::slip_equations::Equations;
+use crate::contact::rolling::slip_equations::SlipEquations;
 
-/// One mesh with everything that is asked there. All values are dimensionless, as in [`Equations`].
+/// One mesh with everything that is asked there. All values are dimensionless, as in [`SlipEquations`].
 #[derive(Debug, Clone, Copy)]
-pub struct Stage<'a> {
+pub struct DenseTask<'a> {
     /// The discrete equations over the whole mesh, without parity.
-    pub equations: &'a Equations<'a>,
+    pub equations: &'a SlipEquations<'a>,
     /// Friction bound, rigid slip, tolerance.
-    pub law: FrictionLaw<'a>,
+    pub law: NewtonTask<'a>,
     /// x and y of every cell's node.
     pub nodes: (&'a [f64], &'a [f64]),
     /// The motion; only the direction of its rigid slip matters here.

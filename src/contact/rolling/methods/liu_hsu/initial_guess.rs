@@ -4,7 +4,7 @@ use crate::contact::rolling::motion::Motion;
 
 /// A choice of the direction of every slip traction; its size is always the friction bound.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Guess {
+pub enum InitialGuess {
     /// Initial guess 1: along the rigid slip `(ν_x − φ y, ν_y + φ x)` (eq. 14).
     RigidSlip,
     /// Initial guess 2: around a spin pole, `sgn φ (−(y − y_p), x − x_p)` (eq. 15).
@@ -17,14 +17,14 @@ pub enum Guess {
     Continued,
 }
 
-impl Guess {
+impl InitialGuess {
     /// A word for logs and answers.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
-            Guess::RigidSlip => "rigid slip",
-            Guess::SpinPole(_) => "spin pole",
-            Guess::Continued => "continued",
+            InitialGuess::RigidSlip => "rigid slip",
+            InitialGuess::SpinPole(_) => "spin pole",
+            InitialGuess::Continued => "continued",
         }
     }
 
@@ -40,12 +40,12 @@ impl Guess {
             motion.creepage_y + motion.spin_per_mm * x,
         ];
         let wanted = match self {
-            Guess::RigidSlip => rigid,
-            Guess::SpinPole([pole_x, pole_y]) => {
+            InitialGuess::RigidSlip => rigid,
+            InitialGuess::SpinPole([pole_x, pole_y]) => {
                 let sign = motion.spin_per_mm.signum();
                 [-sign * (y - pole_y), sign * (x - pole_x)]
             }
-            Guess::Continued => before,
+            InitialGuess::Continued => before,
         };
         unit(wanted).or_else(|| unit(rigid)).unwrap_or([1.0, 0.0])
     }
@@ -76,8 +76,8 @@ mod tests {
             };
             let pole = [-motion.creepage_y / spin, motion.creepage_x / spin];
             for at in [[0.0, 0.0], [1.0, 2.0], [-3.0, 0.4]] {
-                let one = Guess::RigidSlip.direction(&motion, at, [0.0; 2]);
-                let two = Guess::SpinPole(pole).direction(&motion, at, [0.0; 2]);
+                let one = InitialGuess::RigidSlip.direction(&motion, at, [0.0; 2]);
+                let two = InitialGuess::SpinPole(pole).direction(&motion, at, [0.0; 2]);
                 assert!((one[0] - two[0]).abs() < 1e-15 && (one[1] - two[1]).abs() < 1e-15);
             }
         }
@@ -91,9 +91,9 @@ mod tests {
             spin_per_mm: 1.0,
         };
         for guess in [
-            Guess::RigidSlip,
-            Guess::SpinPole([0.0, 0.0]),
-            Guess::Continued,
+            InitialGuess::RigidSlip,
+            InitialGuess::SpinPole([0.0, 0.0]),
+            InitialGuess::Continued,
         ] {
             let [x, y] = guess.direction(&still, [0.0, 0.0], [0.0, 0.0]);
             assert!((x.hypot(y) - 1.0).abs() < 1e-15, "{guess:?}");
@@ -102,7 +102,7 @@ mod tests {
 
     #[test]
     fn the_continued_guess_keeps_the_direction_before() {
-        let [x, y] = Guess::Continued.direction(&MOTION, [1.0, 1.0], [3.0, -4.0]);
+        let [x, y] = InitialGuess::Continued.direction(&MOTION, [1.0, 1.0], [3.0, -4.0]);
         assert!((x - 0.6).abs() < 1e-15 && (y + 0.8).abs() < 1e-15);
     }
 }

@@ -17,7 +17,7 @@
 //!
 //! | question | here |
 //! |---|---|
-//! | eq. 6 sums slip along the strip, eq. 12 needs slip itself | rows are differenced along the strip: the map is that of [`Equations`](crate::contact::rolling::slip_equations::Equations) |
+//! | eq. 6 sums slip along the strip, eq. 12 needs slip itself | rows are differenced along the strip: the map is that of [`Equations`](crate::contact::rolling::slip_equations::SlipEquations) |
 //! | weight of the own cell in eq. 6 | one half, from the centre to the side: [`Rule::Trapezoid`](crate::contact::rolling::slip_rules::Rule::Trapezoid); any other rule serves too |
 //! | `x_U`, "the closest boundary" | the leading edge for every cell; with a stick/slip boundary the equations change with the zones, and some have two solutions or none |
 //! | when a stick cell slips | T reaches `μp (1 + 1e-9)` |
@@ -34,7 +34,7 @@
 //!
 //! The paper says always. Measured, that holds for the upwind rule without spin only. Most failures are divisions that
 //! repeat, because Newton–Raphson ends on a root of eq. 9 with some tractions against their slips. So a third run
-//! follows where both guesses fail, which is not in the paper ([`Guess::Continued`](crate::contact::rolling::methods::liu_hsu::initial_guess::Guess::Continued)): tractions start from those of the
+//! follows where both guesses fail, which is not in the paper ([`Guess::Continued`](crate::contact::rolling::methods::liu_hsu::initial_guess::InitialGuess::Continued)): tractions start from those of the
 //! division before and stay on their circles, and a root with tractions against their slips is tried again with these
 //! turned round. The rules of second order come to it by way of an upwind solution ([`solve_by_upwind`](crate::contact::rolling::methods::liu_hsu::solve::solve_by_upwind)). Of 109 motions
 //! (normalised creepage 0 to 3 in four directions, spin 0 to 20) so many converge, guess 2 with the pole of 25 coarse

@@ -3,7 +3,7 @@
 use faer::{Mat, MatMut};
 
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::numerics::dense_lu::{DenseLu, look};
+use crate::contact::numerics::dense_lu::{DenseLu, check};
 use crate::contact::rolling::methods::liu_hsu::stick_block::SlipSystem;
 
 /// Steps before giving up.
@@ -15,7 +15,7 @@ const HALVINGS_MAX: u32 = 6;
 
 /// Where the iterates may go.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Steps {
+pub enum StepRule {
     /// As in the paper: full steps, `|T|² = g²` is one of the equations.
     Full,
     /// The angle of each traction is the unknown: iterates stay on their circles, and a step is halved until the
@@ -43,7 +43,7 @@ pub struct NewtonEnd {
 pub fn solve(
     system: &SlipSystem,
     bound: &[f64],
-    steps: Steps,
+    steps: StepRule,
     t: &mut [f64],
     monitor: &dyn Monitor,
 ) -> Result<NewtonEnd, Stop> {
@@ -52,7 +52,7 @@ pub fn solve(
         iterations: 0,
     };
     while !end.converged && end.iterations < ITERATIONS_MAX {
-        look(monitor)?;
+        check(monitor)?;
         let step = newton_step(system, bound, t, monitor)?;
         end.iterations += 1;
         let n = bound.len();
@@ -67,12 +67,12 @@ pub fn solve(
             break;
         }
         match steps {
-            Steps::Full => {
+            StepRule::Full => {
                 for (value, change) in t.iter_mut().zip(&step) {
                     *value += change;
                 }
             }
-            Steps::OnCircles => search_on_circles(system, bound, &step, t),
+            StepRule::OnCircles => search_on_circles(system, bound, &step, t),
         }
         end.converged = largest <= STEP_SMALL;
     }

@@ -1,30 +1,30 @@
 //! The method on a mesh level of a case, as the recipe calls it.
 
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::rolling::answer::{Failure, Tangential, Work, obey_coulomb};
+use crate::contact::rolling::answer::{LevelAnswer, LevelFailure, Work, project_on_bound};
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
-use crate::contact::rolling::methods::boundary_element::task::FrictionLaw;
+use crate::contact::rolling::methods::boundary_element::task::NewtonTask;
 use crate::contact::rolling::methods::full_slip;
-use crate::contact::rolling::methods::liu_hsu::dense_task::Stage;
-use crate::contact::rolling::methods::liu_hsu::solve::{Outcome, solve_by_upwind};
+use crate::contact::rolling::methods::liu_hsu::dense_task::DenseTask;
+use crate::contact::rolling::methods::liu_hsu::solve::{ZonesOutcome, solve_by_upwind};
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::LevelOperator;
-use crate::contact::rolling::slip_equations::Equations;
+use crate::contact::rolling::slip_equations::SlipEquations;
 use crate::contact::rolling::slip_rules::Rule;
-use crate::contact::rolling::strip_mesh::Level;
+use crate::contact::rolling::strip_mesh::StripMesh;
 
 /// Solves one motion (about the origin of the case) with the trapezoid rule, the spin pole from the level `coarse`
 /// (without it, guess 2 is left out).
 ///
 /// # Errors
-/// [`Failure::NotConverged`] with the residual of the tractions it ended on; [`Failure::Stopped`].
+/// [`LevelFailure::NotConverged`] with the residual of the tractions it ended on; [`LevelFailure::Stopped`].
 pub fn solve(
-    level: &Level,
-    coarse: Option<&Level>,
+    level: &StripMesh,
+    coarse: Option<&StripMesh>,
     motion: &Motion,
     tolerance: f64,
     monitor: &dyn Monitor,
-) -> Result<Tangential, Failure> {
+) -> Result<LevelAnswer, LevelFailure> {
     let here = level.scale.motion(motion);
     if let Some(answer) = full_slip::rigid_answer(level, &here) {
         return Ok(answer);
@@ -32,11 +32,11 @@ pub fn solve(
     let operator = level.operator(monitor)?;
     let coarse = coarse.map(|coarse| Ok::<_, Stop>((coarse, coarse.operator(monitor)?)));
     let coarse = coarse.transpose()?;
-    let fine = Prepared::new(level, &operator, Rule::Trapezoid, &here);
-    let upwind = Prepared::new(level, &operator, Rule::Upwind, &here);
+    let fine = DenseParts::new(level, &operator, Rule::Trapezoid, &here);
+    let upwind = DenseParts::new(level, &operator, Rule::Upwind, &here);
     let coarse = coarse.as_ref().map(|(level, operator)| {
         let motion = level.scale.motion(motion);
-        Prepared::new(level, operator, Rule::Trapezoid, &motion)
+        DenseParts::new(level, operator, Rule::Trapezoid, &motion)
     });
     let mut t = vec![0.0; 2 * fine.equations.padded()];
     let outcome = solve_by_upwind(
@@ -48,7 +48,7 @@ pub fn solve(
     )?;
     let work = work(&outcome);
     if !outcome.converged {
-        return Err(Failure::NotConverged {
+        return Err(LevelFailure::NotConverged {
             work,
             tolerance,
             advice: outcome.advice(),
@@ -58,13 +58,13 @@ pub fn solve(
     let padded = fine.equations.padded();
     let halves = |v: &[f64]| [v[..cells].to_vec(), v[padded..padded + cells].to_vec()];
     let mut traction = halves(&t);
-    let slip = obey_coulomb(
+    let slip = project_on_bound(
         &level.bound,
         &outcome.slips,
         &mut traction,
         &halves(&outcome.slip),
     );
-    Ok(Tangential {
+    Ok(LevelAnswer {
         traction,
         second: None,
         slip,
@@ -75,7 +75,7 @@ pub fn solve(
     })
 }
 
-fn work(outcome: &Outcome) -> Work {
+fn work(outcome: &ZonesOutcome) -> Work {
     Work {
         iterations: outcome.newton_iterations(),
         products: 0,
@@ -84,10 +84,10 @@ fn work(outcome: &Outcome) -> Work {
     }
 }
 
-/// The equations of one rule on a level with everything a [`Stage`] borrows.
-struct Prepared<'a> {
-    level: &'a Level,
-    equations: Equations<'a>,
+/// The equations of one rule on a level with everything a [`DenseTask`] borrows.
+struct DenseParts<'a> {
+    level: &'a StripMesh,
+    equations: SlipEquations<'a>,
     motion: Motion,
     rigid: Vec<f64>,
     bound: Vec<f64>,
@@ -96,14 +96,14 @@ struct Prepared<'a> {
     scale: f64,
 }
 
-impl<'a> Prepared<'a> {
+impl<'a> DenseParts<'a> {
     fn new(
-        level: &'a Level,
+        level: &'a StripMesh,
         operator: &'a LevelOperator,
         rule: Rule,
         motion: &Motion,
-    ) -> Prepared<'a> {
-        let equations = Equations::new(rule, &level.normalised, &operator.influence, None);
+    ) -> DenseParts<'a> {
+        let equations = SlipEquations::new(rule, &level.normalised, &operator.influence, None);
         let padded = equations.padded();
         let resized = |mut values: Vec<f64>| {
             values.resize(padded, 0.0);
@@ -112,7 +112,7 @@ impl<'a> Prepared<'a> {
         let rigid = equations.rigid(motion);
         let largest = rigid.iter().fold(0.0_f64, |m, w| m.max(w.abs()));
         let compliance = Newton::new(&equations).compliance();
-        Prepared {
+        DenseParts {
             bound: resized(level.bound.clone()),
             area: resized(level.normalised.areas()),
             y: level.normalised.rows(),
@@ -124,10 +124,10 @@ impl<'a> Prepared<'a> {
         }
     }
 
-    fn stage(&self, tolerance: f64) -> Stage<'_> {
-        Stage {
+    fn stage(&self, tolerance: f64) -> DenseTask<'_> {
+        DenseTask {
             equations: &self.equations,
-            law: FrictionLaw {
+            law: NewtonTask {
                 rigid: &self.rigid,
                 bound: &self.bound,
                 area: &self.area,

@@ -4,32 +4,32 @@ use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
 use crate::contact::rolling::methods::boundary_element::task::Convergence;
 use crate::contact::rolling::methods::liu_hsu::active_set;
-use crate::contact::rolling::methods::liu_hsu::active_set::{Attempt, Division, Exit};
-use crate::contact::rolling::methods::liu_hsu::dense_task::Stage;
-use crate::contact::rolling::methods::liu_hsu::initial_guess::Guess;
+use crate::contact::rolling::methods::liu_hsu::active_set::{ZonesExit, ZonesRun, Zoning};
+use crate::contact::rolling::methods::liu_hsu::dense_task::DenseTask;
+use crate::contact::rolling::methods::liu_hsu::initial_guess::InitialGuess;
 use crate::contact::rolling::methods::liu_hsu::stick_block::DenseProblem;
 use crate::contact::rolling::slip_rules::Rule;
 use crate::contact::rolling::vortex;
 
 /// What a solve leaves behind besides the tractions.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Outcome {
+pub struct ZonesOutcome {
     /// Did the residual reach the tolerance?
     pub converged: bool,
     /// Residual of the tractions returned, as in [`Convergence`].
     pub residual: f64,
     /// The runs of the outer iteration on the fine mesh, in order; the last one is what counts.
-    pub attempts: Vec<Attempt>,
+    pub attempts: Vec<ZonesRun>,
     /// Slip of every cell for the tractions returned, in the layout of the equations.
     pub slip: Vec<f64>,
     /// Does the cell slip?
     pub slips: Vec<bool>,
 }
 
-impl Outcome {
+impl ZonesOutcome {
     /// The run of the outer iteration that counts.
     #[must_use]
-    pub fn last(&self) -> &Attempt {
+    pub fn last(&self) -> &ZonesRun {
         &self.attempts[self.attempts.len() - 1]
     }
 
@@ -62,14 +62,14 @@ impl Outcome {
 /// # Errors
 /// Only if the monitor stops the work; an iteration that does not converge is told in the outcome.
 pub fn solve(
-    fine: &Stage,
-    coarse: Option<&Stage>,
+    fine: &DenseTask,
+    coarse: Option<&DenseTask>,
     t: &mut [f64],
     monitor: &dyn Monitor,
-) -> Result<Outcome, Stop> {
-    let mut search = Search::new(fine, t, monitor)?;
+) -> Result<ZonesOutcome, Stop> {
+    let mut search = ZonesSearch::new(fine, t, monitor)?;
     if !search.as_in_the_paper(coarse)? {
-        search.attempt(Guess::Continued)?;
+        search.attempt(InitialGuess::Continued)?;
     }
     Ok(search.finish(t))
 }
@@ -80,36 +80,36 @@ pub fn solve(
 /// # Errors
 /// Only if the monitor stops the work; an iteration that does not converge is told in the outcome.
 pub fn solve_by_upwind(
-    fine: &Stage,
-    upwind: &Stage,
-    coarse: Option<&Stage>,
+    fine: &DenseTask,
+    upwind: &DenseTask,
+    coarse: Option<&DenseTask>,
     t: &mut [f64],
     monitor: &dyn Monitor,
-) -> Result<Outcome, Stop> {
+) -> Result<ZonesOutcome, Stop> {
     debug_assert_eq!(upwind.equations.rule, Rule::Upwind);
-    let mut search = Search::new(fine, t, monitor)?;
+    let mut search = ZonesSearch::new(fine, t, monitor)?;
     if !search.as_in_the_paper(coarse)? {
         let first = solve(upwind, None, t, monitor)?;
         search.attempts.extend(&first.attempts);
         if first.converged {
             search.start = search.task.compact(t);
         }
-        search.attempt(Guess::Continued)?;
+        search.attempt(InitialGuess::Continued)?;
     }
     Ok(search.finish(t))
 }
 
-/// Solves with one guess alone. `t` is as in [`solve`]; only [`Guess::Continued`] reads it.
+/// Solves with one guess alone. `t` is as in [`solve`]; only [`InitialGuess::Continued`] reads it.
 ///
 /// # Errors
 /// Only if the monitor stops the work.
 pub fn solve_with(
-    stage: &Stage,
-    guess: Guess,
+    stage: &DenseTask,
+    guess: InitialGuess,
     t: &mut [f64],
     monitor: &dyn Monitor,
-) -> Result<Outcome, Stop> {
-    let mut search = Search::new(stage, t, monitor)?;
+) -> Result<ZonesOutcome, Stop> {
+    let mut search = ZonesSearch::new(stage, t, monitor)?;
     search.attempt(guess)?;
     Ok(search.finish(t))
 }
@@ -118,12 +118,12 @@ pub fn solve_with(
 ///
 /// # Errors
 /// Only if the monitor stops the work.
-pub fn coarse_pole(coarse: &Stage, monitor: &dyn Monitor) -> Result<Option<[f64; 2]>, Stop> {
+pub fn coarse_pole(coarse: &DenseTask, monitor: &dyn Monitor) -> Result<Option<[f64; 2]>, Stop> {
     if coarse.motion.spin_per_mm == 0.0 {
         return Ok(None);
     }
     let task = DenseProblem::new(coarse, monitor)?;
-    let (_, division) = active_set::run(&task, Guess::RigidSlip, None, monitor)?;
+    let (_, division) = active_set::run(&task, InitialGuess::RigidSlip, None, monitor)?;
     let load: Vec<f64> = (0..task.cells)
         .map(|i| task.bound[i] * coarse.law.area[i])
         .collect();
@@ -136,21 +136,25 @@ pub fn coarse_pole(coarse: &Stage, monitor: &dyn Monitor) -> Result<Option<[f64;
 }
 
 /// The runs on one mesh and the best tractions so far.
-struct Search<'a> {
-    stage: &'a Stage<'a>,
+struct ZonesSearch<'a> {
+    stage: &'a DenseTask<'a>,
     monitor: &'a dyn Monitor,
     task: DenseProblem,
     /// Tractions given by the caller, over the cells without padding.
     start: Vec<f64>,
     newton: Newton<'a>,
-    attempts: Vec<Attempt>,
-    best: Option<(f64, Division)>,
+    attempts: Vec<ZonesRun>,
+    best: Option<(f64, Zoning)>,
 }
 
-impl<'a> Search<'a> {
-    fn new(stage: &'a Stage<'a>, t: &[f64], monitor: &'a dyn Monitor) -> Result<Search<'a>, Stop> {
+impl<'a> ZonesSearch<'a> {
+    fn new(
+        stage: &'a DenseTask<'a>,
+        t: &[f64],
+        monitor: &'a dyn Monitor,
+    ) -> Result<ZonesSearch<'a>, Stop> {
         let task = DenseProblem::new(stage, monitor)?;
-        Ok(Search {
+        Ok(ZonesSearch {
             stage,
             monitor,
             start: task.compact(t),
@@ -162,30 +166,30 @@ impl<'a> Search<'a> {
     }
 
     /// Guess 1, then guess 2 about the pole of the coarse stage; did either converge?
-    fn as_in_the_paper(&mut self, coarse: Option<&Stage>) -> Result<bool, Stop> {
-        if self.attempt(Guess::RigidSlip)? {
+    fn as_in_the_paper(&mut self, coarse: Option<&DenseTask>) -> Result<bool, Stop> {
+        if self.attempt(InitialGuess::RigidSlip)? {
             return Ok(true);
         }
         let Some(coarse) = coarse else {
             return Ok(false);
         };
         match coarse_pole(coarse, self.monitor)? {
-            Some(pole) => self.attempt(Guess::SpinPole(pole)),
+            Some(pole) => self.attempt(InitialGuess::SpinPole(pole)),
             None => Ok(false),
         }
     }
 
     /// Runs the outer iteration with one guess; did it converge?
-    fn attempt(&mut self, guess: Guess) -> Result<bool, Stop> {
-        let start = (guess == Guess::Continued).then_some(&self.start[..]);
+    fn attempt(&mut self, guess: InitialGuess) -> Result<bool, Stop> {
+        let start = (guess == InitialGuess::Continued).then_some(&self.start[..]);
         let (mut attempt, division) = active_set::run(&self.task, guess, start, self.monitor)?;
         let residual = self.residual(&division.tractions);
         let exact = residual <= self.stage.law.tolerance;
-        if attempt.exit == Exit::Converged && !exact {
-            attempt.exit = Exit::Inexact;
+        if attempt.exit == ZonesExit::Converged && !exact {
+            attempt.exit = ZonesExit::Inexact;
         }
         self.attempts.push(attempt);
-        let converged = attempt.exit == Exit::Converged;
+        let converged = attempt.exit == ZonesExit::Converged;
         if converged
             || self
                 .best
@@ -210,20 +214,20 @@ impl<'a> Search<'a> {
         self.newton.evaluate(&self.stage.law, &padded, &mut unused)
     }
 
-    fn finish(mut self, t: &mut [f64]) -> Outcome {
+    fn finish(mut self, t: &mut [f64]) -> ZonesOutcome {
         let (_, division) = self.best.take().unwrap_or_else(|| {
             let tractions = vec![0.0; 2 * self.task.cells];
             let slips = vec![false; self.task.cells];
-            (f64::INFINITY, Division { tractions, slips })
+            (f64::INFINITY, Zoning { tractions, slips })
         });
         // Evaluated once more, because the slips kept by the evaluation are those of its last call.
         let residual = self.residual(&division.tractions);
         t.copy_from_slice(&self.task.padded(&division.tractions));
-        Outcome {
+        ZonesOutcome {
             converged: self
                 .attempts
                 .last()
-                .is_some_and(|a| a.exit == Exit::Converged),
+                .is_some_and(|a| a.exit == ZonesExit::Converged),
             residual,
             attempts: self.attempts,
             slip: self.newton.slip().to_vec(),

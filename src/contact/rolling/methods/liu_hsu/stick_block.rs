@@ -4,8 +4,8 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::numerics::dense_lu::{DenseLu, look, subtract_product};
-use crate::contact::rolling::methods::liu_hsu::dense_task::Stage;
+use crate::contact::numerics::dense_lu::{DenseLu, check, subtract_product};
+use crate::contact::rolling::methods::liu_hsu::dense_task::DenseTask;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::slip_rules::Rule;
 
@@ -37,13 +37,13 @@ impl DenseProblem {
     ///
     /// # Errors
     /// Only if the monitor stops the work.
-    pub fn new(stage: &Stage, monitor: &dyn Monitor) -> Result<DenseProblem, Stop> {
-        let Stage { equations, law, .. } = stage;
+    pub fn new(stage: &DenseTask, monitor: &dyn Monitor) -> Result<DenseProblem, Stop> {
+        let DenseTask { equations, law, .. } = stage;
         let (n, padded) = (equations.cells(), equations.padded());
         let values = equations.dense(monitor)?;
-        look(monitor)?;
+        check(monitor)?;
         let map = MatRef::from_column_major_slice(&values, 2 * n, 2 * n).to_owned();
-        look(monitor)?;
+        check(monitor)?;
         Ok(DenseProblem {
             rule: equations.rule,
             cells: n,
@@ -124,9 +124,9 @@ impl SlipSystem {
                 }
             })
         };
-        look(monitor)?;
+        check(monitor)?;
         let mut on_slip = known(&slip);
-        look(monitor)?;
+        check(monitor)?;
         let mut on_stick = known(&stick);
         if !stick.is_empty() {
             let part = |rows: &[usize]| {
