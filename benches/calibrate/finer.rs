@@ -11,7 +11,7 @@ use railhead::contact::normal::patch::Patch;
 use railhead::contact::normal::region::Region;
 use railhead::contact::rolling::mesh_plan::Regime;
 use railhead::contact::rolling::refinement::level_solve::{MotionTask, solve_level};
-use railhead::contact::rolling::refinement::levels::Ladder;
+use railhead::contact::rolling::refinement::levels::Levels;
 use railhead::contact::rolling::refinement::resolution::Resolution;
 use railhead::contact::rolling::regime::regime;
 use railhead::contact::rolling::resultants::Resultants;
@@ -115,17 +115,17 @@ fn one_mesh(problem: &Problem, cells: u32) -> Result<(Resultants, usize), SolveE
     };
     let footprint = exact.footprint();
     let task = exact.rolling_task(&footprint);
-    let mut ladder = Ladder::new(&task, &Arc::default());
-    let plan = ladder.policy.plan(64, Regime::Unknown);
-    let mut solved = solve_level(&task, &mut ladder, asked, plan, None, &Unmonitored)?;
+    let mut levels = Levels::new(&task, &Arc::default());
+    let plan = levels.policy.plan(64, Regime::Unknown);
+    let mut solved = solve_level(&task, &mut levels, asked, plan, None, &Unmonitored)?;
     for cells in [256, cells] {
-        let level = ladder.get(solved.point.level);
+        let level = levels.get(solved.point.level);
         let spinning = asked.motion.spin_per_mm != 0.0;
         let found = regime(level, &solved.point.tangential, spinning);
-        let plan = ladder.policy.plan(cells, found);
+        let plan = levels.policy.plan(cells, found);
         solved = solve_level(
             &task,
-            &mut ladder,
+            &mut levels,
             asked,
             plan,
             Some(solved.point),
@@ -134,7 +134,7 @@ fn one_mesh(problem: &Problem, cells: u32) -> Result<(Resultants, usize), SolveE
     }
     let zero = Resultants::default();
     let sum = solved.point.summed.iter().fold(zero, |sum, r| sum.plus(*r));
-    Ok((sum, ladder.get(solved.point.level).mesh.cells()))
+    Ok((sum, levels.get(solved.point.level).mesh.cells()))
 }
 
 /// Tangential forces of a wheel on a rail, summed over the frames of its patches, from a fine target.

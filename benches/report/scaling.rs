@@ -8,7 +8,7 @@ use railhead::contact::half_space::strip_operator::kind::Precision;
 use railhead::contact::half_space::strip_operator::operator;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::refinement::level_solve::MotionTask;
-use railhead::contact::rolling::refinement::levels::Ladder;
+use railhead::contact::rolling::refinement::levels::Levels;
 use railhead::contact::rolling::refinement::refine;
 use serde_json::json;
 
@@ -46,8 +46,8 @@ pub fn section(lu: f64, pictures: &Path) -> String {
         };
         let footprint = problem.footprint();
         let task = problem.rolling_task(&footprint);
-        let mut ladder = Ladder::new(&task, &Arc::default());
-        let point = refine::solve(&task, &mut ladder, asked, &Unmonitored).expect("an answer");
+        let mut levels = Levels::new(&task, &Arc::default());
+        let point = refine::solve(&task, &mut levels, asked, &Unmonitored).expect("an answer");
         let cells = (side * side) as usize;
         let bytes = operator::bytes(cells, side as usize, true, Precision::Double) as f64;
         let size = Size {

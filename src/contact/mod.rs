@@ -33,7 +33,7 @@ use crate::contact::profile_trust::trust;
 use crate::contact::rolling::force_control;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::refinement::level_solve::MotionAnswer;
-use crate::contact::rolling::refinement::levels::Ladder;
+use crate::contact::rolling::refinement::levels::Levels;
 use crate::contact::slices::{slices, solve_slice};
 use crate::contact::solution::assemble::Assembly;
 use crate::contact::solution::finish::{finish, share_seconds};
@@ -125,17 +125,17 @@ fn motions(
 ) -> Result<(Solution, Fields), SolveError> {
     let footprint = problem.footprint();
     let task = problem.rolling_task(&footprint);
-    let mut ladder = Ladder::new(&task, operators);
+    let mut levels = Levels::new(&task, operators);
     let mut assembly = Assembly::new(problem);
     let mut before: Option<MotionAnswer> = None;
     for index in 0..problem.motions.len() {
-        let mut point = force_control::solve(&task, &mut ladder, index, before.as_ref(), watch)?;
+        let mut point = force_control::solve(&task, &mut levels, index, before.as_ref(), watch)?;
         if index == 0 {
             // What all motions share is charged to the first.
             point.seconds += problem.normal.map_or(0.0, |normal| normal.seconds);
         }
-        assembly.add(&ladder, &point);
-        ladder.trim();
+        assembly.add(&levels, &point);
+        levels.trim();
         before = Some(point);
         watch.advance();
     }

@@ -48,7 +48,7 @@ const LIU_HSU_MATRICES: f64 = 4.0;
 const VECTORS_PER_CELL: f64 = 64.0;
 /// Bytes per cell of a level that is kept: two meshes, pressure, area and bound, and what two motions left on it.
 const LEVEL_BYTES_PER_CELL: f64 = 200.0;
-/// Levels that a motion climbs at most.
+/// Levels that one motion is solved on at most.
 const LEVELS_PER_MOTION: f64 = 4.0;
 /// Bytes of a motion in the answer, for each patch, and of its text.
 const MOTION_BYTES: f64 = 2000.0;
@@ -173,14 +173,14 @@ impl CostInput {
         }
     }
 
-    /// Time of a solve alone, in s, that climbs to a target.
+    /// Time of a solve alone, in s, that is refined to a target.
     fn target_seconds(&self, target: f64, cells: f64) -> f64 {
         let precision = match precision_of(self.resolution) {
             Precision::Single => 1.0,
             Precision::Double => DOUBLE_TIMES,
         };
         let smooth = (TARGET_USUAL / target.max(TARGET_LEAST)).powf(TARGET_STEEP);
-        let climb = TARGET_SECONDS * smooth * precision * self.segments.iter().sum::<f64>();
+        let refined = TARGET_SECONDS * smooth * precision * self.segments.iter().sum::<f64>();
         // Many patches have more cells than any target asks for, and need more steps.
         let crowded = self.segments.len() as f64 * PATCH_CELLS_MIN;
         let crowd = if crowded > f64::from(CELLS_MAX) / 4.0 {
@@ -188,7 +188,7 @@ impl CostInput {
         } else {
             0.0
         };
-        2e-4 + climb.max(crowd)
+        2e-4 + refined.max(crowd)
     }
 
     /// Peak memory in bytes.

@@ -60,14 +60,14 @@ pub struct Reading {
 pub struct Profile {
     y: Spline,
     z: Spline,
-    measured: Arc<Measured>,
+    measured: Arc<MeasuredCurve>,
     /// What was found and changed on the way.
     pub remarks: Vec<Remark>,
 }
 
 /// The points that a curve was made from.
 #[derive(Debug, Clone, PartialEq)]
-struct Measured {
+struct MeasuredCurve {
     /// z up, in order from the track centre to the field side.
     points: Vec<[f64; 2]>,
     /// Length of the chords up to each point: the knots of the splines.
@@ -154,7 +154,7 @@ impl Profile {
         for pair in points.windows(2) {
             along.push(along[along.len() - 1] + distance(pair[0], pair[1]));
         }
-        let measured = Measured {
+        let measured = MeasuredCurve {
             points,
             along,
             smoothing: reading.smoothing,
@@ -163,7 +163,7 @@ impl Profile {
         Ok(Profile::of(measured, remarks))
     }
 
-    fn of(measured: Measured, remarks: Vec<Remark>) -> Profile {
+    fn of(measured: MeasuredCurve, remarks: Vec<Remark>) -> Profile {
         let part = |k: usize| {
             let values: Vec<f64> = measured.points.iter().map(|point| point[k]).collect();
             Spline::new(&measured.along, &values, measured.smoothing)
@@ -179,7 +179,7 @@ impl Profile {
     /// The curve of the same points with another smoothing, its cut wavelength in mm (0: none).
     #[must_use]
     pub fn smoothed(&self, smoothing: f64) -> Profile {
-        let measured = Measured {
+        let measured = MeasuredCurve {
             smoothing,
             ..(*self.measured).clone()
         };

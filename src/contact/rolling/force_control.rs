@@ -17,7 +17,7 @@ use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::refinement::level_solve::{MotionAnswer, MotionTask};
-use crate::contact::rolling::refinement::levels::Ladder;
+use crate::contact::rolling::refinement::levels::Levels;
 use crate::contact::rolling::refinement::refine;
 use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
@@ -53,20 +53,20 @@ const CORRECTION_MAX: f64 = 0.3;
 /// Why there is no answer.
 pub fn solve(
     task: &RollingTask,
-    ladder: &mut Ladder,
+    levels: &mut Levels,
     index: usize,
     before: Option<&MotionAnswer>,
     monitor: &dyn Monitor,
 ) -> Result<MotionAnswer, SolveError> {
     let motion = task.motions[index];
     if task.forces[index] == [None; 2] || task.friction.is_frictionless() {
-        return refine::solve(task, ladder, MotionTask { index, motion }, monitor);
+        return refine::solve(task, levels, MotionTask { index, motion }, monitor);
     }
     let began = monitor.elapsed();
-    let mut search = ForceSearch::new(task, ladder, index, monitor);
+    let mut search = ForceSearch::new(task, levels, index, monitor);
     let mut place = search.start(before);
     for _ in 0..CLIMBS_MAX {
-        // A climb chooses the levels; on them the force is one function of the creepage.
+        // Refinement chooses the levels; on them the force is one function of the creepage.
         search.path.clear();
         search.best = None;
         place = search.find(place)?;
@@ -131,14 +131,14 @@ impl CubicLaw {
 /// One motion on its way to the prescribed forces.
 struct ForceSearch<'a, 'p> {
     task: &'a RollingTask<'a>,
-    ladder: &'a mut Ladder<'p>,
+    levels: &'a mut Levels<'p>,
     index: usize,
     monitor: &'a dyn Monitor,
     forces: PrescribedForces,
     /// μN of all patches in N.
     limit: f64,
     law: CubicLaw,
-    /// The levels to climb; chosen by the next trial if empty.
+    /// The levels to solve on, coarse to fine; chosen by the next trial if empty.
     path: Vec<MeshPlan>,
     /// The answer nearest to the forces, and how far it is from them, relative to μN.
     best: Option<(f64, MotionAnswer)>,
@@ -153,7 +153,7 @@ struct ForceSearch<'a, 'p> {
 impl<'a, 'p> ForceSearch<'a, 'p> {
     fn new(
         task: &'a RollingTask<'a>,
-        ladder: &'a mut Ladder<'p>,
+        levels: &'a mut Levels<'p>,
         index: usize,
         monitor: &'a dyn Monitor,
     ) -> ForceSearch<'a, 'p> {
@@ -161,7 +161,7 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
         let limit = task.friction.limit_of_all(patches);
         ForceSearch {
             task,
-            ladder,
+            levels,
             index,
             monitor,
             forces: task.forces[index],
@@ -316,14 +316,14 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
             index: self.index,
             motion: self.motion(place),
         };
-        let found = refine::on_levels(self.task, self.ladder, asked, &self.path, self.monitor)?;
+        let found = refine::on_levels(self.task, self.levels, asked, &self.path, self.monitor)?;
         let point = match found {
             Some(point) => point,
-            None => refine::solve(self.task, self.ladder, asked, self.monitor)?,
+            None => refine::solve(self.task, self.levels, asked, self.monitor)?,
         };
         if self.path.is_empty() {
-            let plan = |number: &usize| self.ladder.get(*number).plan;
-            self.path = self.ladder.path.iter().map(plan).collect();
+            let plan = |number: &usize| self.levels.get(*number).plan;
+            self.path = self.levels.path.iter().map(plan).collect();
         }
         self.work.add(point.work);
         let sum = total(&point);
@@ -388,7 +388,7 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
         let inexact = self.inexact();
         let mut point = match self.best.take() {
             Some((_, point)) => point,
-            None => refine::solve(self.task, self.ladder, asked, self.monitor)?,
+            None => refine::solve(self.task, self.levels, asked, self.monitor)?,
         };
         point.tangential.remarks.extend(inexact);
         point.work = self.work;

@@ -9,7 +9,7 @@ use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::refinement::level_solve::MotionAnswer;
-use crate::contact::rolling::refinement::levels::Ladder;
+use crate::contact::rolling::refinement::levels::Levels;
 use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::strip_mesh::StripMesh;
@@ -55,8 +55,8 @@ impl<'a> Assembly<'a> {
     }
 
     /// Adds the next motion.
-    pub fn add(&mut self, ladder: &Ladder, point: &MotionAnswer) {
-        let (problem, level) = (self.problem, ladder.get(point.level));
+    pub fn add(&mut self, levels: &Levels, point: &MotionAnswer) {
+        let (problem, level) = (self.problem, levels.get(point.level));
         self.remarks
             .extend(remarks(problem, self.total.len(), point));
         if self.remarks.len() > REMARKS_AT_ONCE {

@@ -45,8 +45,8 @@ pub fn roughness(points: Points, smoothing: f64, contact: [f64; 2], modulus: f64
     let step = STEP.max((window[1] - window[0]) / SAMPLES_MAX as f64);
     let count = ((window[1] - window[0]) / step).floor() as usize + 1;
     let places: Vec<f64> = (0..count).map(|k| window[0] + step * k as f64).collect();
-    let used = Curve::smoothed(part, smoothing);
-    let pressures = |other: &Curve| {
+    let used = HeightCurve::smoothed(part, smoothing);
+    let pressures = |other: &HeightCurve| {
         let heights: Vec<f64> = places.iter().map(|s| used.above(other, *s)).collect();
         flattening(&heights, step, modulus)
     };
@@ -62,7 +62,7 @@ pub fn roughness(points: Points, smoothing: f64, contact: [f64; 2], modulus: f64
         }
         (sum / count.max(1.0)).sqrt()
     };
-    let waves = pressures(&Curve::smoothed(part, reference));
+    let waves = pressures(&HeightCurve::smoothed(part, reference));
     let mut sizes: Vec<f64> = waves.iter().map(|pressure| pressure.abs()).collect();
     Roughness {
         waviness: over_contact(&waves),
@@ -70,20 +70,20 @@ pub fn roughness(points: Points, smoothing: f64, contact: [f64; 2], modulus: f64
         ambiguity: if smoothing > 0.0 {
             0.0
         } else {
-            over_contact(&pressures(&Curve::Akima(Akima::new(part))))
+            over_contact(&pressures(&HeightCurve::Akima(Akima::new(part))))
         },
     }
 }
 
 /// A curve through or near points.
-enum Curve {
+enum HeightCurve {
     Spline([Spline; 2]),
     Akima(Akima),
 }
 
-impl Curve {
-    fn smoothed(points: Points, cut: f64) -> Curve {
-        Curve::Spline([0, 1].map(|part| {
+impl HeightCurve {
+    fn smoothed(points: Points, cut: f64) -> HeightCurve {
+        HeightCurve::Spline([0, 1].map(|part| {
             let values: Vec<f64> = points.at.iter().map(|at| at[part]).collect();
             Spline::new(points.along, &values, cut)
         }))
@@ -91,17 +91,17 @@ impl Curve {
 
     fn at(&self, s: f64) -> [f64; 2] {
         match self {
-            Curve::Spline([y, z]) => {
+            HeightCurve::Spline([y, z]) => {
                 let i = y.interval(s);
                 [y.at_in(i, s).value, z.at_in(i, s).value]
             }
-            Curve::Akima(curve) => curve.at(s),
+            HeightCurve::Akima(curve) => curve.at(s),
         }
     }
 
     /// How far this spline lies above another curve, along its normal.
-    fn above(&self, other: &Curve, s: f64) -> f64 {
-        let Curve::Spline([y, z]) = self else {
+    fn above(&self, other: &HeightCurve, s: f64) -> f64 {
+        let HeightCurve::Spline([y, z]) = self else {
             return 0.0;
         };
         let i = y.interval(s);

@@ -9,7 +9,7 @@ use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::hertz::Pressing;
 
 /// Displacements that pressures on cells cause, cells of one size or of several.
-pub(crate) trait Influence {
+pub(crate) trait PressureInfluence {
     /// Up to so many changed pressures are added to the displacement one by one, for less than a whole product costs.
     const CHANGES_MAX: usize;
     /// Displacement in mm at every centre for pressures in MPa.
@@ -25,7 +25,7 @@ pub(crate) trait Influence {
     fn yielding(&self, cell: usize) -> f64;
 }
 
-impl<T: Width> Influence for GridOperator<T> {
+impl<T: Width> PressureInfluence for GridOperator<T> {
     const CHANGES_MAX: usize = 12;
 
     fn apply(&mut self, pressure: &[f64], displacement: &mut [f64]) {
@@ -91,7 +91,7 @@ pub(crate) enum PressureFailure {
 /// Solves for the pressure under which surfaces with the gap `gap` touch; `cell` is the area of the first cell in mm².
 ///
 /// `start` is any pressure that is not 0 everywhere; it decides the number of iterations only.
-pub(crate) fn press<I: Influence>(
+pub(crate) fn press<I: PressureInfluence>(
     influence: &mut I,
     gap: &[f64],
     cell: f64,
@@ -163,7 +163,12 @@ struct PressureIterate {
 
 impl PressureIterate {
     /// Scales the pressures to the prescribed force; returns the factor.
-    fn scale_to(&mut self, influence: &impl Influence, pressing: Pressing, cell: f64) -> f64 {
+    fn scale_to(
+        &mut self,
+        influence: &impl PressureInfluence,
+        pressing: Pressing,
+        cell: f64,
+    ) -> f64 {
         let Pressing::Force(force) = pressing else {
             return 1.0;
         };
@@ -174,7 +179,12 @@ impl PressureIterate {
     }
 
     /// Puts `u + h` into the distances and returns the approach δ; with a force it makes the mean over the contact 0.
-    fn distances(&mut self, influence: &impl Influence, gap: &[f64], pressing: Pressing) -> f64 {
+    fn distances(
+        &mut self,
+        influence: &impl PressureInfluence,
+        gap: &[f64],
+        pressing: Pressing,
+    ) -> f64 {
         for ((g, u), h) in self.g.iter_mut().zip(&self.u).zip(gap) {
             *g = u + h;
         }
@@ -191,7 +201,7 @@ impl PressureIterate {
     }
 
     /// Takes the approach from the distances; their largest violation, and the sum of their squares in the contact.
-    fn part_from(&mut self, influence: &impl Influence, approach: f64) -> (f64, f64) {
+    fn part_from(&mut self, influence: &impl PressureInfluence, approach: f64) -> (f64, f64) {
         let mut violation = 0.0_f64;
         for (g, p) in self.g.iter_mut().zip(&self.p) {
             *g -= approach;
@@ -202,7 +212,7 @@ impl PressureIterate {
         (violation, square)
     }
 
-    fn direction(&mut self, influence: &impl Influence, factor: f64) {
+    fn direction(&mut self, influence: &impl PressureInfluence, factor: f64) {
         for (k, ((t, g), p)) in self.t.iter_mut().zip(&self.g).zip(&self.p).enumerate() {
             *t = if *p > 0.0 {
                 influence.yielding(k) * g + factor * *t
@@ -213,7 +223,7 @@ impl PressureIterate {
     }
 
     /// Length of the step that leaves no distance along the direction.
-    fn step(&self, influence: &impl Influence, pressing: Pressing) -> f64 {
+    fn step(&self, influence: &impl PressureInfluence, pressing: Pressing) -> f64 {
         let (g, t, r) = (&self.g, &self.t, &self.r);
         let [above, product, along, sum, count] = self.inside(|k| {
             let area = influence.area(k);
@@ -240,7 +250,7 @@ impl PressureIterate {
 
     /// Takes the step, and notes where the pressures had to be changed beside it. Says whether the next direction may
     /// build on this one: no cell came into contact.
-    fn advance(&mut self, influence: &impl Influence, step: f64) -> bool {
+    fn advance(&mut self, influence: &impl PressureInfluence, step: f64) -> bool {
         let mut follow = true;
         self.changes.clear();
         for (k, p) in self.p.iter_mut().enumerate() {

@@ -93,7 +93,7 @@ impl GapTask {
         let mut grid = first(&reach);
         let mut solved: Option<(PressureGrid, Pressed)> = None;
         let (mut iterations, mut pressure_change) = (0, 0.0);
-        let mut end = Next::Rough { capped: false };
+        let mut end = NextStep::Rough { capped: false };
         for _ in 0..GRIDS_MAX {
             let pressed = self.press(&grid, solved.as_ref(), &reach, monitor)?;
             iterations += pressed.iterations;
@@ -104,14 +104,14 @@ impl GapTask {
                 // The estimate was too small: parts of the gap beyond the box may touch as well.
                 let depth = pressed.approach - reach.least;
                 reach = reach_of_level(&self.gap, pressed.approach + 0.2 * depth);
-                Next::PressureGrid(first(&reach))
+                NextStep::PressureGrid(first(&reach))
             } else {
                 let depth = pressed.approach - reach.least;
                 self.next_grid(&grid, &pressed, solved.as_ref(), depth, resolution)?
             };
             solved = Some((grid, pressed));
             match next {
-                Next::PressureGrid(next) => grid = next,
+                NextStep::PressureGrid(next) => grid = next,
                 last => {
                     end = last;
                     break;
@@ -135,7 +135,7 @@ impl GapTask {
         self.found(GapOutcome {
             tiles: vec![whole],
             iterations,
-            settled: matches!(end, Next::Settled { .. }),
+            settled: matches!(end, NextStep::Settled { .. }),
             pressure_change,
             least: reach.least,
         })
@@ -181,44 +181,44 @@ impl GapTask {
         before: Option<&(PressureGrid, Pressed)>,
         depth: f64,
         resolution: GridFineness,
-    ) -> Result<Next, NormalError> {
+    ) -> Result<NextStep, NormalError> {
         let limits = self.gap.window();
         let (cut, short): (Vec<GridSide>, Vec<GridSide>) = grid
             .sides_in_contact(&pressed.pressure)
             .into_iter()
             .partition(|side| grid.ends_at(*side, limits));
         if !short.is_empty() {
-            return Ok(Next::PressureGrid(grid.enlarged(&short, limits)));
+            return Ok(NextStep::PressureGrid(grid.enlarged(&short, limits)));
         }
         let wanted = grid.wanted(pressed, NEAR * depth, resolution, limits);
         let finer = PressureGrid::new(wanted.window, wanted.cells, grid.mirrored);
         if (0..2).any(|k| finer.step[k] < COARSER_MAX * grid.step[k]) {
-            return Ok(Next::PressureGrid(finer));
+            return Ok(NextStep::PressureGrid(finer));
         }
         if let Some(side) = cut.first() {
             return Err(edge_reached(*side, limits));
         }
         let capped = wanted.capped;
         let Some((coarse, before)) = before.filter(|_| resolution.settles()) else {
-            return Ok(Next::Settled { capped });
+            return Ok(NextStep::Settled { capped });
         };
         let ratio = (coarse.step[0] / grid.step[0]).max(coarse.step[1] / grid.step[1]);
         if (pressed.approach - before.approach).abs() <= APPROACH_CHANGE * ratio * depth
             && (before.largest() / pressed.largest() - 1.0).abs() <= PRESSURE_CHANGE * ratio
         {
-            return Ok(Next::Settled { capped });
+            return Ok(NextStep::Settled { capped });
         }
         let cells = grid.cells.map(|n| (n as f64 * REFINEMENT) as usize);
         let finer = PressureGrid::new(wanted.window, cells, grid.mirrored);
         if (0..2).all(|k| finer.step[k] > COARSER_MAX * grid.step[k]) {
-            return Ok(Next::Rough { capped });
+            return Ok(NextStep::Rough { capped });
         }
-        Ok(Next::PressureGrid(finer))
+        Ok(NextStep::PressureGrid(finer))
     }
 }
 
 /// What follows a grid.
-enum Next {
+enum NextStep {
     PressureGrid(PressureGrid),
     /// Nothing changes any more; `capped` if a patch would want more cells than a grid may have.
     Settled {
@@ -230,11 +230,11 @@ enum Next {
     },
 }
 
-impl Next {
+impl NextStep {
     fn capped(&self) -> bool {
         matches!(
             self,
-            Next::Settled { capped: true } | Next::Rough { capped: true }
+            NextStep::Settled { capped: true } | NextStep::Rough { capped: true }
         )
     }
 }

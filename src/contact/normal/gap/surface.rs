@@ -10,7 +10,7 @@ pub enum GapSurface {
         /// Relative radius in the rolling direction in mm.
         rolling: f64,
         /// The gap at x = 0.
-        across: Curve,
+        across: GapCurve,
     },
     /// Any surface, given on a rectangular grid.
     Grid(Surface),
@@ -20,7 +20,7 @@ pub enum GapSurface {
 ///
 /// Beyond the first and the last sample there is nothing.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Curve {
+pub struct GapCurve {
     axis: Vec<f64>,
     values: Vec<f64>,
     slopes: Vec<f64>,
@@ -46,7 +46,7 @@ impl GapSurface {
     pub fn profile(rolling: f64, y: &[f64], gap: &[f64]) -> GapSurface {
         GapSurface::Profile {
             rolling,
-            across: Curve::new(y, gap),
+            across: GapCurve::new(y, gap),
         }
     }
 
@@ -158,9 +158,9 @@ impl GapSurface {
     }
 }
 
-impl Curve {
-    fn new(axis: &[f64], values: &[f64]) -> Curve {
-        Curve {
+impl GapCurve {
+    fn new(axis: &[f64], values: &[f64]) -> GapCurve {
+        GapCurve {
             slopes: sober_slopes(axis, values),
             axis: axis.to_vec(),
             values: values.to_vec(),

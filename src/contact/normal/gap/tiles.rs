@@ -33,7 +33,7 @@ const RESOLUTION_SMALL: f64 = 0.7;
 const CELLS_TINY: f64 = 10.0;
 
 /// What follows the grid of a patch.
-enum Next {
+enum NextTiles {
     Keep,
     Rough,
     Change(PressureGrid),
@@ -72,12 +72,12 @@ impl GapTask {
             for tile in &found.tiles {
                 let resolution = own_resolution(resolution, tile.load() / total);
                 match self.next_tile(tile, &before, depth, resolution)? {
-                    Next::Keep => next.push(tile.grid.clone()),
-                    Next::Rough => {
+                    NextTiles::Keep => next.push(tile.grid.clone()),
+                    NextTiles::Rough => {
                         rough = true;
                         next.push(tile.grid.clone());
                     }
-                    Next::Change(grid) => {
+                    NextTiles::Change(grid) => {
                         changed = true;
                         next.push(grid);
                     }
@@ -143,7 +143,7 @@ impl GapTask {
         before: &[Tile],
         depth: f64,
         resolution: GridFineness,
-    ) -> Result<Next, NormalError> {
+    ) -> Result<NextTiles, NormalError> {
         let limits = self.gap.window();
         let Tile { grid, pressed } = tile;
         let (cut, short): (Vec<_>, Vec<_>) = grid
@@ -151,15 +151,15 @@ impl GapTask {
             .into_iter()
             .partition(|side| grid.ends_at(*side, limits));
         if !short.is_empty() {
-            return Ok(Next::Change(grid.enlarged(&short, limits)));
+            return Ok(NextTiles::Change(grid.enlarged(&short, limits)));
         }
         if tile.largest() <= 0.0 {
-            return Ok(Next::Keep);
+            return Ok(NextTiles::Keep);
         }
         let wanted = grid.wanted(pressed, NEAR * depth, resolution, limits);
         let finer = PressureGrid::new(wanted.window, wanted.cells, grid.mirrored);
         if (0..2).any(|k| finer.step[k] < COARSER_MAX * grid.step[k]) {
-            return Ok(Next::Change(finer));
+            return Ok(NextTiles::Change(finer));
         }
         if let Some(side) = cut.first() {
             return Err(edge_reached(*side, limits));
@@ -169,10 +169,10 @@ impl GapTask {
             (0..2).all(|k| (other.grid.range(k)[0]..other.grid.range(k)[1]).contains(&middle[k]))
         };
         let Some(coarse) = before.iter().find(holds) else {
-            return Ok(Next::Keep);
+            return Ok(NextTiles::Keep);
         };
         if resolution.patch <= CELLS_TINY || coarse.grid == *grid {
-            return Ok(Next::Keep);
+            return Ok(NextTiles::Keep);
         }
         let ratio = |k: usize| coarse.grid.step[k] / grid.step[k];
         let ratio = ratio(0).max(ratio(1));
@@ -183,14 +183,14 @@ impl GapTask {
             && alone
             && (coarse.largest() / tile.largest() - 1.0).abs() <= PRESSURE_CHANGE * ratio
         {
-            return Ok(Next::Keep);
+            return Ok(NextTiles::Keep);
         }
         let cells = grid.cells.map(|n| (n as f64 * REFINEMENT) as usize);
         let finer = PressureGrid::new(wanted.window, cells, grid.mirrored);
         if (0..2).all(|k| finer.step[k] > COARSER_MAX * grid.step[k]) {
-            return Ok(Next::Rough);
+            return Ok(NextTiles::Rough);
         }
-        Ok(Next::Change(finer))
+        Ok(NextTiles::Change(finer))
     }
 
     /// Grids around samples of the gap outside all grids at which the deformed surfaces overlap: patches that were too small to

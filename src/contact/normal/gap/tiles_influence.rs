@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::contact::half_space::grid_operator::GridOperator;
-use crate::contact::normal::gap::conjugate_gradients::Influence;
+use crate::contact::normal::gap::conjugate_gradients::PressureInfluence;
 use crate::contact::normal::gap::coupling::Coupling;
 use crate::contact::normal::gap::grid::PressureGrid;
 
@@ -51,7 +51,7 @@ impl TilesInfluence {
     }
 }
 
-impl Influence for TilesInfluence {
+impl PressureInfluence for TilesInfluence {
     // A change acts on every other grid: a whole product costs less than adding one by one.
     const CHANGES_MAX: usize = 0;
 

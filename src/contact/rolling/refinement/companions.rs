@@ -9,7 +9,7 @@ use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::methods::boundary_element::solve as boundary_element;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;
-use crate::contact::rolling::refinement::levels::Ladder;
+use crate::contact::rolling::refinement::levels::Levels;
 use crate::contact::rolling::refinement::warm_start::nested_tractions;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::task::RollingTask;
@@ -57,23 +57,23 @@ impl Companion {
     pub(crate) fn solve(
         self,
         task: &RollingTask,
-        ladder: &mut Ladder,
+        levels: &mut Levels,
         number: usize,
         answer: &LevelAnswer,
         motion: &Motion,
         monitor: &dyn Monitor,
     ) -> Result<(CompanionAnswer, Work), SolveError> {
         let missing = (CompanionAnswer::Missing, Work::default());
-        let Some(plan) = self.plan(ladder.get(number).plan) else {
+        let Some(plan) = self.plan(levels.get(number).plan) else {
             return Ok(missing);
         };
-        let companion = match ladder.level(plan) {
+        let companion = match levels.level(plan) {
             Ok(companion) => companion,
             // Half the strips may miss a patch.
             Err(SolveError::Unmeshable { .. }) => return Ok(missing),
             Err(error) => return Err(error),
         };
-        let (fine, level) = (ladder.get(number), ladder.get(companion));
+        let (fine, level) = (levels.get(number), levels.get(companion));
         let start = nested_tractions(fine, &answer.traction, level);
         let motion = level.scale.motion(motion);
         let tolerance = task.tolerance();

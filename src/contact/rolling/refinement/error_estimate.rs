@@ -25,7 +25,7 @@ const RIGID: f64 = 1e-6;
 /// Relative errors of every patch, then of the sum over them; nothing where there is no second opinion.
 pub type RelativeErrors = Vec<Option<f64>>;
 
-/// The level before on the climb, as far as it says something.
+/// The coarser level that was solved before this one, where it says something.
 #[derive(Debug, Clone, Copy)]
 pub struct CoarserLevel<'a> {
     /// Its resultants.

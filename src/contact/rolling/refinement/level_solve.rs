@@ -15,7 +15,7 @@ use crate::contact::rolling::refinement::error_estimate;
 use crate::contact::rolling::refinement::error_estimate::{
     CoarserLevel, EstimateContext, Indicators, RelativeErrors,
 };
-use crate::contact::rolling::refinement::levels::Ladder;
+use crate::contact::rolling::refinement::levels::Levels;
 use crate::contact::rolling::refinement::refine::slender;
 use crate::contact::rolling::refinement::warm_start::{Start, nested_start};
 use crate::contact::rolling::resultants::Resultants;
@@ -46,7 +46,7 @@ pub struct MotionAnswer {
     pub saturated: bool,
     /// Tractions, slips and zones.
     pub tangential: LevelAnswer,
-    /// The number of that level in the ladder.
+    /// The number of that level in the levels.
     pub level: usize,
     /// Resultants of every patch about the origin of the case: the best known.
     pub resultants: Vec<Resultants>,
@@ -86,20 +86,20 @@ pub struct JudgedAnswer {
 /// Why there is no answer.
 pub fn solve_level(
     task: &RollingTask,
-    ladder: &mut Ladder,
+    levels: &mut Levels,
     asked: MotionTask,
     plan: MeshPlan,
     coarser: Option<MotionAnswer>,
     monitor: &dyn Monitor,
 ) -> Result<JudgedAnswer, SolveError> {
     let began = monitor.elapsed();
-    let number = ladder.level(plan)?;
-    let level = ladder.get(number);
+    let number = levels.level(plan)?;
+    let level = levels.get(number);
     let below = coarser
         .as_ref()
-        .map(|point| (ladder.get(point.level), &point.tangential));
+        .map(|point| (levels.get(point.level), &point.tangential));
     let motion = level.scale.motion(&asked.motion);
-    let warm = ladder.trail.start(number, level, &motion);
+    let warm = levels.sweep.start(number, level, &motion);
     let start = warm.or_else(|| below.map(|(coarse, answer)| nested_start(coarse, answer, level)));
     let tangential = run_method(task, level, &asked.motion, start, monitor)
         .map_err(|f| named(f, task, task.first_motion + asked.index))?;
@@ -109,19 +109,19 @@ pub fn solve_level(
         .collect();
     let before = coarser
         .as_ref()
-        .and_then(|point| before(ladder, level, point));
+        .and_then(|point| before(levels, level, point));
     let finer = finer_for_sums(task, level, asked, &tangential);
     let circumstances = EstimateContext {
         motion: &asked.motion,
         before,
         finer: finer.as_ref(),
-        slenderness: ladder.policy.slenderness(),
+        slenderness: levels.policy.slenderness(),
         tolerance: task.tolerance(),
     };
     let indicators = Indicators::of_level(task, level, &tangential, &summed, circumstances);
     let resultants = extrapolated(task, level, &summed, before);
-    ladder.trail.remember(number, motion, &tangential);
-    ladder.path.push(number);
+    levels.sweep.remember(number, motion, &tangential);
+    levels.path.push(number);
     let mut work = coarser.as_ref().map_or(Work::default(), |point| point.work);
     work.add(tangential.work);
     let seconds =
@@ -143,11 +143,11 @@ pub fn solve_level(
 
 /// The level before, if it is coarse enough to say something.
 pub(crate) fn before<'a>(
-    ladder: &Ladder,
+    levels: &Levels,
     level: &StripMesh,
     point: &'a MotionAnswer,
 ) -> Option<CoarserLevel<'a>> {
-    let below = ladder.get(point.level);
+    let below = levels.get(point.level);
     let ratio = level.mesh.cells() as f64 / below.mesh.cells() as f64;
     (ratio >= LEVEL_RATIO_MIN).then(|| CoarserLevel {
         summed: &point.summed,
@@ -174,7 +174,7 @@ fn finer_for_sums(
     StripMesh::new(task, MeshPlan { size, ..level.plan }).ok()
 }
 
-/// The resultants of every patch where the climb leads to: between meshes for stick errors fall as 1/N. The dense method and
+/// The resultants of every patch, extrapolated from two levels: between meshes made for stick, errors fall as 1/N. The dense method and
 /// meshes gathered about a pole have no such record.
 fn extrapolated(
     task: &RollingTask,

@@ -1,5 +1,4 @@
-//! Which meshes a case climbs: sizes from the number of cells and the shape of the patch, made once and shared by all
-//! motions.
+//! The meshes of a footprint that exist: made once, shared by all motions, the least recently used dropped.
 
 use crate::contact::error::SolveError;
 use crate::contact::rolling::mesh_plan::MeshPlan;
@@ -16,15 +15,15 @@ pub const LEVELS_KEPT: usize = 32;
 
 /// The levels of a case that exist; the least recently used are dropped between motions.
 #[derive(Debug)]
-pub struct Ladder<'a> {
+pub struct Levels<'a> {
     task: &'a RollingTask<'a>,
     operators: Arc<CaseOperators>,
     /// With their numbers, which are never given twice, in the order of their last use.
-    levels: Vec<(usize, StripMesh)>,
+    kept: Vec<(usize, StripMesh)>,
     made: usize,
     /// What the motions solved so far left on the levels.
-    pub trail: SweepState,
-    /// The levels that the last motion climbed.
+    pub sweep: SweepState,
+    /// The levels on which the last motion was solved, coarse to fine.
     pub path: Vec<usize>,
     /// Where the next motion of a sweep may begin.
     pub begin: Option<MeshPlan>,
@@ -32,16 +31,16 @@ pub struct Ladder<'a> {
     pub policy: MeshPolicy,
 }
 
-impl<'a> Ladder<'a> {
+impl<'a> Levels<'a> {
     /// No levels yet; their operators come from a store.
     #[must_use]
-    pub fn new(task: &'a RollingTask<'a>, store: &Arc<OperatorStore>) -> Ladder<'a> {
-        Ladder {
+    pub fn new(task: &'a RollingTask<'a>, store: &Arc<OperatorStore>) -> Levels<'a> {
+        Levels {
             task,
             operators: CaseOperators::new(store),
-            levels: Vec::new(),
+            kept: Vec::new(),
             made: 0,
-            trail: SweepState::default(),
+            sweep: SweepState::default(),
             path: Vec::new(),
             begin: None,
             policy: MeshPolicy::new(task.footprint),
@@ -53,26 +52,22 @@ impl<'a> Ladder<'a> {
     /// # Errors
     /// If no strip meets a patch.
     pub fn level(&mut self, plan: MeshPlan) -> Result<usize, SolveError> {
-        if let Some(place) = self.levels.iter().position(|(_, level)| level.plan == plan) {
+        if let Some(place) = self.kept.iter().position(|(_, level)| level.plan == plan) {
             // The last used stand last.
-            self.levels[place..].rotate_left(1);
-            return Ok(self.levels[self.levels.len() - 1].0);
+            self.kept[place..].rotate_left(1);
+            return Ok(self.kept[self.kept.len() - 1].0);
         }
         let operators = Arc::clone(&self.operators);
         let level = StripMesh::with_operators(self.task, plan, operators)?;
-        self.levels.push((self.made, level));
+        self.kept.push((self.made, level));
         self.made += 1;
         Ok(self.made - 1)
     }
 
-    /// A level by its number; it must have been used since the last [`Ladder::trim`], or lie on the path.
+    /// A level by its number; it must have been used since the last [`Levels::trim`], or lie on the path.
     #[must_use]
     pub fn get(&self, level: usize) -> &StripMesh {
-        let found = self
-            .levels
-            .iter()
-            .rev()
-            .find(|(number, _)| *number == level);
+        let found = self.kept.iter().rev().find(|(number, _)| *number == level);
         let Some((_, level)) = found else {
             unreachable!("level {level} was dropped while it was in use")
         };
@@ -82,10 +77,10 @@ impl<'a> Ladder<'a> {
     /// Drops the least recently used levels beyond [`LEVELS_KEPT`], and what motions left on them. Called between motions: no answer
     /// may refer to a level by its number after that.
     pub fn trim(&mut self) {
-        let surplus = self.levels.len().saturating_sub(LEVELS_KEPT);
-        let dropped = self.levels.drain(..surplus).map(|(number, _)| number);
+        let surplus = self.kept.len().saturating_sub(LEVELS_KEPT);
+        let dropped = self.kept.drain(..surplus).map(|(number, _)| number);
         for number in dropped {
-            self.trail.forget(number);
+            self.sweep.forget(number);
             self.path.retain(|on_path| *on_path != number);
         }
     }

@@ -13,7 +13,7 @@ use crate::contact::rolling::refinement::error_estimate::Indicators;
 use crate::contact::rolling::refinement::level_solve::{
     JudgedAnswer, MotionAnswer, MotionTask, solve_level,
 };
-use crate::contact::rolling::refinement::levels::Ladder;
+use crate::contact::rolling::refinement::levels::Levels;
 use crate::contact::rolling::refinement::mesh_policy::MeshPolicy;
 use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::rolling::regime::regime;
@@ -32,30 +32,30 @@ const SLENDER: f64 = 20.0;
 /// Why there is no answer.
 pub fn solve(
     task: &RollingTask,
-    ladder: &mut Ladder,
+    levels: &mut Levels,
     asked: MotionTask,
     monitor: &dyn Monitor,
 ) -> Result<MotionAnswer, SolveError> {
     let sizes = MeshPolicy::fixed_sizes(task.resolution, task.method);
-    ladder.path.clear();
+    levels.path.clear();
     match (sizes, task.resolution) {
         (Some(sizes), _) => {
-            let mut solved = solve_level(task, ladder, asked, sizes[0].into(), None, monitor)?;
+            let mut solved = solve_level(task, levels, asked, sizes[0].into(), None, monitor)?;
             for size in &sizes[1..] {
                 let below = Some(solved.point);
-                solved = solve_level(task, ladder, asked, (*size).into(), below, monitor)?;
+                solved = solve_level(task, levels, asked, (*size).into(), below, monitor)?;
             }
             Ok(solved.point)
         }
-        (None, Resolution::Mesh(size)) => on_mesh(task, ladder, asked, size, monitor),
-        (None, Resolution::Target(target)) => to_target(task, ladder, asked, target, monitor),
+        (None, Resolution::Mesh(size)) => on_mesh(task, levels, asked, size, monitor),
+        (None, Resolution::Target(target)) => to_target(task, levels, asked, target, monitor),
     }
 }
 
 /// Solves a motion on a mesh of the client's, a large one from a start on meshes of half as many strips and cells.
 fn on_mesh(
     task: &RollingTask,
-    ladder: &mut Ladder,
+    levels: &mut Levels,
     asked: MotionTask,
     size: MeshSize,
     monitor: &dyn Monitor,
@@ -66,19 +66,19 @@ fn on_mesh(
         strips: (size.strips / 4 * 2).max(SIDE_HALVED),
         cells: (size.cells / 2).max(SIDE_HALVED),
     };
-    let number = ladder.level(size.into())?;
-    let level = ladder.get(number);
+    let number = levels.level(size.into())?;
+    let level = levels.get(number);
     let motion = level.scale.motion(&asked.motion);
-    let started = ladder.trail.start(number, level, &motion).is_some();
+    let started = levels.sweep.start(number, level, &motion).is_some();
     if !started && cells(size) >= CELLS_NESTED && 2 * cells(half) <= cells(size) {
-        coarser = match on_mesh(task, ladder, asked, half, monitor) {
+        coarser = match on_mesh(task, levels, asked, half, monitor) {
             Ok(point) => Some(point),
             // The mesh that was asked for may do better.
             Err(SolveError::NotConverged { .. } | SolveError::Unmeshable { .. }) => None,
             Err(error) => return Err(error),
         };
     }
-    solve_level(task, ladder, asked, size.into(), coarser, monitor).map(|solved| solved.point)
+    solve_level(task, levels, asked, size.into(), coarser, monitor).map(|solved| solved.point)
 }
 
 /// Solves a motion on given levels, one after the other, so that the resultants are one function of the motion.
@@ -87,19 +87,19 @@ fn on_mesh(
 /// Why there is no answer.
 pub fn on_levels(
     task: &RollingTask,
-    ladder: &mut Ladder,
+    levels: &mut Levels,
     asked: MotionTask,
     path: &[MeshPlan],
     monitor: &dyn Monitor,
 ) -> Result<Option<MotionAnswer>, SolveError> {
-    ladder.path.clear();
+    levels.path.clear();
     let mut solved: Option<JudgedAnswer> = None;
     for plan in path {
         let below = solved.map(|solved| solved.point);
-        solved = Some(solve_level(task, ladder, asked, *plan, below, monitor)?);
+        solved = Some(solve_level(task, levels, asked, *plan, below, monitor)?);
     }
     if let Some(solved) = &mut solved {
-        judge(task, ladder, asked, solved, None, monitor)?;
+        judge(task, levels, asked, solved, None, monitor)?;
     }
     Ok(solved.map(|solved| solved.point))
 }
@@ -134,30 +134,30 @@ pub(crate) fn slender(task: &RollingTask) -> Option<String> {
 /// Why there is no answer.
 pub(crate) fn to_target(
     task: &RollingTask,
-    ladder: &mut Ladder,
+    levels: &mut Levels,
     asked: MotionTask,
     target: f64,
     monitor: &dyn Monitor,
 ) -> Result<MotionAnswer, SolveError> {
-    let begun = match ladder.begin.take() {
-        Some(plan) => begin_on(task, ladder, asked, plan, monitor)?,
+    let begun = match levels.begin.take() {
+        Some(plan) => begin_on(task, levels, asked, plan, monitor)?,
         None => None,
     };
     let mut solved = match begun {
         Some(solved) => solved,
         None => {
-            let first = ladder.policy.first();
-            solve_level(task, ladder, asked, first, None, monitor)?
+            let first = levels.policy.first();
+            solve_level(task, levels, asked, first, None, monitor)?
         }
     };
     loop {
-        let cells = ladder.get(solved.point.level).mesh.cells();
+        let cells = levels.get(solved.point.level).mesh.cells();
         let small = target < FINE_TARGET && cells < CELLS_FINE;
-        let larger = ladder.policy.is_refinable(cells);
+        let larger = levels.policy.is_refinable(cells);
         if !(small && larger) {
             judge(
                 task,
-                ladder,
+                levels,
                 asked,
                 &mut solved,
                 larger.then_some(target),
@@ -171,14 +171,14 @@ pub(crate) fn to_target(
             break;
         }
         let excess = solved.point.error().map_or(1.0, |error| error / target);
-        let found = regime_of(ladder, asked, &solved.point);
-        let plan = ladder.policy.next(cells, excess, found, task.single_motion);
-        solved = solve_level(task, ladder, asked, plan, Some(solved.point), monitor)?;
+        let found = regime_of(levels, asked, &solved.point);
+        let plan = levels.policy.next(cells, excess, found, task.single_motion);
+        solved = solve_level(task, levels, asked, plan, Some(solved.point), monitor)?;
     }
-    let level = ladder.get(solved.point.level);
+    let level = levels.get(solved.point.level);
     let (plan, cells) = (level.plan, level.mesh.cells());
     let excess = solved.point.error().map(|error| error / target);
-    ladder.begin = Some(ladder.policy.next_begin(plan, cells, excess));
+    levels.begin = Some(levels.policy.next_begin(plan, cells, excess));
     Ok(solved.point)
 }
 
@@ -189,7 +189,7 @@ pub(crate) fn to_target(
 /// Why there is no answer.
 pub(crate) fn judge(
     task: &RollingTask,
-    ladder: &mut Ladder,
+    levels: &mut Levels,
     asked: MotionTask,
     solved: &mut JudgedAnswer,
     target: Option<f64>,
@@ -210,7 +210,7 @@ pub(crate) fn judge(
         }
         let (found, work) = which.solve(
             task,
-            ladder,
+            levels,
             point.level,
             &point.tangential,
             &asked.motion,
@@ -228,7 +228,7 @@ pub(crate) fn judge(
         CompanionAnswer::Found(across, strips),
         CompanionAnswer::Found(on_levels, cells),
     ] = &seen
-        && ladder.get(point.level).plan.pole().is_none()
+        && levels.get(point.level).plan.pole().is_none()
     {
         for (p, patch) in task.footprint.patches().iter().enumerate() {
             let bound = task.friction.limit(patch);
@@ -244,7 +244,7 @@ pub(crate) fn judge(
 /// Begins a motion of a sweep on the mesh where the last motion ended, if that serves this one too.
 fn begin_on(
     task: &RollingTask,
-    ladder: &mut Ladder,
+    levels: &mut Levels,
     asked: MotionTask,
     plan: MeshPlan,
     monitor: &dyn Monitor,
@@ -252,26 +252,26 @@ fn begin_on(
     if plan.regime == Regime::Unknown {
         return Ok(None);
     }
-    let number = ladder.level(plan)?;
-    let level = ladder.get(number);
+    let number = levels.level(plan)?;
+    let level = levels.get(number);
     let motion = level.scale.motion(&asked.motion);
-    if ladder.trail.start(number, level, &motion).is_none() {
+    if levels.sweep.start(number, level, &motion).is_none() {
         return Ok(None);
     }
-    let solved = solve_level(task, ladder, asked, plan, None, monitor)?;
-    let found = regime_of(ladder, asked, &solved.point);
+    let solved = solve_level(task, levels, asked, plan, None, monitor)?;
+    let found = regime_of(levels, asked, &solved.point);
     if plan.serves(found) {
         return Ok(Some(solved));
     }
     // The tractions are a good start for a mesh that does.
-    ladder.path.clear();
-    let cells = ladder.get(number).mesh.cells() as u32;
-    let plan = ladder.policy.plan(cells, found);
-    solve_level(task, ladder, asked, plan, Some(solved.point), monitor).map(Some)
+    levels.path.clear();
+    let cells = levels.get(number).mesh.cells() as u32;
+    let plan = levels.policy.plan(cells, found);
+    solve_level(task, levels, asked, plan, Some(solved.point), monitor).map(Some)
 }
 
 /// What the tractions of a solved level look like.
-fn regime_of(ladder: &Ladder, asked: MotionTask, point: &MotionAnswer) -> Regime {
+fn regime_of(levels: &Levels, asked: MotionTask, point: &MotionAnswer) -> Regime {
     let spinning = asked.motion.spin_per_mm != 0.0;
-    regime(ladder.get(point.level), &point.tangential, spinning)
+    regime(levels.get(point.level), &point.tangential, spinning)
 }
