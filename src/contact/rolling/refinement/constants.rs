@@ -30,9 +30,9 @@ pub const POLE_WEIGHT: f64 = 0.3;
 /// With the load on fewer strips than these, counted by `(Σ load)² / Σ load²`, the estimate grows as what is missing; four
 /// strips of an ellipse count as 3.5.
 pub const STRIPS_FEW: f64 = 3.5;
-/// Factor where a smooth pressure is given in samples, and the power of the cells that it falls with in place of [`DECAY`]. 80 grids:
-/// .988, .963 and .963 covered at three targets, estimates 4.2, 3.5 and 3.6 times the error in the median; 1 and .12 cover no more and give
-/// 5.8, 4.3 and 4.0; .75 and 0 give 4.1, 3.6 and 4.1 and cover .975, .938 and .963.
+/// Factor where a smooth pressure is given in samples, and the power of the cells that it falls with in place of [`DECAY`]. 80 grids
+/// at targets of 0.02, 0.005 and 0.001: .99, .96 and .95 covered, estimates 4.4, 3.6 and 3.7 times the error in the median
+/// (`cargo bench --bench calibrate`); 1 and .12 cover no more and give 5.8, 4.3 and 4.0; .72 and −.05 give 3.8 but cover .925.
 pub const SAMPLED: f64 = 0.78;
 /// The power; see [`SAMPLED`].
 pub const SAMPLED_DECAY: f64 = 0.05;
