@@ -1,11 +1,12 @@
 //! The time limit of a case: a monitor that ends the solve, and says how far it came.
 
-use crate::contact::case::problem::Problem;
-use crate::contact::error::SolveError;
-use crate::contact::monitor::{Monitor, Stop};
 use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::time::Duration;
+
+use crate::contact::case::problem::Problem;
+use crate::contact::error::SolveError;
+use crate::contact::monitor::{Monitor, Stop};
 
 /// The monitor of a whole case: adds the case's own time limit and turns motions done into progress.
 pub(crate) struct TimeLimit<'a> {

@@ -2,6 +2,10 @@
 //!
 //! A [`Problem`] cannot exist unchecked: [`Problem::new`] is the only way to make one.
 
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::time::Duration;
+
 use crate::contact::case::checks::{CheckedParts, PartialCase, missing_load, unusual_friction};
 use crate::contact::case::digest::digest;
 use crate::contact::case::limits::Limits;
@@ -18,9 +22,6 @@ use crate::contact::rolling::methods::method::{Method, TractionBound};
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::solution::words::NormalReport;
-use std::collections::BTreeMap;
-use std::ops::Range;
-use std::time::Duration;
 
 /// Which motions of a case a problem asks about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,5 +1,6 @@
-//! Solves a wheel on a rail and says how far its profiles can be trusted: their quality under every patch, what is wrong with them and
-//! what the measurement leaves open. Where an answer would mislead there is none.
+//! A wheel on a rail solved with the judge of its profiles beside it.
+
+use std::sync::Arc;
 
 use crate::contact::case::problem::Problem;
 use crate::contact::coupling;
@@ -16,7 +17,6 @@ use crate::contact::profile_trust::quality::{PatchQuality, ProfileQuality};
 use crate::contact::profile_trust::{settle, uncertainty};
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::solution::words::{Fields, Solution};
-use std::sync::Arc;
 
 /// What a case says about the trust in its profiles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -1,12 +1,13 @@
 //! A remark in the words of the answer, with its place; and how the remarks of one answer are merged.
 
-use crate::contact::remark::figure::{AsFigure, Figure};
-use crate::contact::remark::kind::Severity;
-use crate::contact::remark::list::Remark;
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
+
+use crate::contact::remark::figure::{AsFigure, Figure};
+use crate::contact::remark::kind::Severity;
+use crate::contact::remark::list::Remark;
 
 /// Motions with the same remark of which the figures are kept; the others are only numbered.
 const KEPT_MAX: usize = 4;

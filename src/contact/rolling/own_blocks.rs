@@ -1,9 +1,10 @@
 //! Own blocks of the strips: the effect of a strip on itself, for each rule and parity.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::rolling::slip_equations::SlipEquations;
 use crate::contact::rolling::slip_rules::Rule;
-use std::sync::{Arc, Mutex, PoisonError};
 
 /// Own blocks of the operator, fixed for a rule and mesh.
 #[derive(Debug)]

@@ -3,6 +3,10 @@
 //! A member that is absent, of the wrong type, out of range, unknown or contradictory gets a fault with its JSON
 //! pointer (RFC 6901), the value received and what is allowed. Nothing is repaired.
 
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+
 use crate::contact::case::checks::{PartialCase, faults_of};
 use crate::contact::case::limits::Limits;
 use crate::contact::case::read::object::{Faults, Interval, Object, has_controls, join, shown};
@@ -11,9 +15,6 @@ use crate::contact::case::words::{
     Case, Contact, Friction, Load, Material, Motions, Output, Solver,
 };
 use crate::contact::error::{CaseError, Fault};
-use std::collections::BTreeMap;
-
-use serde_json::Value;
 
 const NAME_LENGTH_MAX: usize = 200;
 const LABELS_MAX: usize = 32;

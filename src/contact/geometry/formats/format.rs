@@ -1,9 +1,10 @@
-//! Profiles as text files: columns, Simpack and MiniProf. Text comes in, never a path.
+//! The formats of profile files, and how a text is told to be one of them.
+
+use serde::Serialize;
+use utoipa::ToSchema;
 
 use crate::contact::geometry::formats::profile_file::ProfileFile;
 use crate::contact::geometry::formats::{columns, miniprof, simpack};
-use serde::Serialize;
-use utoipa::ToSchema;
 
 /// A file format a client can name; each is a file of that name beside this one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]

@@ -1,7 +1,4 @@
-//! How far can the points of a profile be trusted? Pure functions of the points, in mm and MPa.
-//!
-//! The measures are local: what counts is what the points leave open where the bodies touch, expressed as a pressure that compares with
-//! that of the contact (see [`flattening`](crate::contact::geometry::profile_quality::flattening)).
+//! What a profile is like under a contact, and the smoothing that its noise calls for.
 
 use crate::contact::geometry::profile_quality::flattening::noise_pressure;
 use crate::contact::geometry::profile_quality::noise;

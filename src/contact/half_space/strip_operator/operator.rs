@@ -7,12 +7,13 @@
 //! The matrix depends on the mesh and Poisson's ratio only. Tractions are in any unit, displacement differences come
 //! out in (that unit / G) × (length unit of the mesh).
 
+use pulp::Arch;
+
 use crate::contact::half_space::strip_operator::assembly::OperatorAssembly;
 use crate::contact::half_space::strip_operator::kind::{LANES, Parity, Precision};
 use crate::contact::half_space::strip_operator::product::{Matrix, Product};
 use crate::contact::mesh::strips::Mesh;
 use crate::contact::monitor::{Monitor, Stop};
-use pulp::Arch;
 
 /// How the matrix is laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

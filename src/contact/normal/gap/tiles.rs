@@ -5,6 +5,8 @@
 //! influence is a convolution, between grids see `coupling.rs`. Every grid is refined, moved or enlarged until its own patch
 //! is settled.
 
+use std::ops::Range;
+
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::answer::{NormalError, edge_reached};
 use crate::contact::normal::gap::conjugate_gradients::{Pressed, press};
@@ -15,7 +17,6 @@ use crate::contact::normal::gap::grid::{GridFineness, PressureGrid, within};
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::gap::tile::{GapOutcome, Tile};
 use crate::contact::normal::gap::tiles_influence::TilesInfluence;
-use std::ops::Range;
 
 /// More grids than this are not coupled: such a gap is rough, not a few patches of different size.
 const TILES_MAX: usize = 6;

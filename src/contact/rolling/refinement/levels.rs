@@ -1,5 +1,7 @@
 //! The meshes of a footprint that exist: made once, shared by all motions, the least recently used dropped.
 
+use std::sync::Arc;
+
 use crate::contact::error::SolveError;
 use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::operator_store::{CaseOperators, OperatorStore};
@@ -7,7 +9,6 @@ use crate::contact::rolling::refinement::mesh_policy::MeshPolicy;
 use crate::contact::rolling::refinement::warm_start::SweepState;
 use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::rolling::task::RollingTask;
-use std::sync::Arc;
 
 /// Levels that are kept from one motion to the next: a few paths of about four levels. Sweeps come back to levels of the last few
 /// motions only; of a creep map of 900 motions at fixed spin, half as many make no difference.

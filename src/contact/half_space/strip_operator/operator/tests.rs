@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 
 use super::*;
+
 use crate::contact::half_space::kernels::{Rectangle, rectangle};
 use crate::contact::mesh::observation::observation_points;
 use crate::contact::mesh::strips::{Chord, Grading, equal_strips};

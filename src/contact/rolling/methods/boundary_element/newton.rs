@@ -5,6 +5,9 @@
 //! solves that linear system by GMRES with the segments' own blocks as preconditioner (Alart & Curnier 1991 for the
 //! projection form; `r = 0.3/M_ii` because larger values can cycle on fine meshes).
 
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::gmres::{Gmres, LinearSystem};
 use crate::contact::rolling::methods::boundary_element::linearisation::Linearisation;
@@ -12,8 +15,6 @@ use crate::contact::rolling::methods::boundary_element::preconditioner::StripFac
 use crate::contact::rolling::methods::boundary_element::task::{Convergence, NewtonTask};
 use crate::contact::rolling::own_blocks::OwnBlocks;
 use crate::contact::rolling::slip_equations::SlipEquations;
-use std::ops::ControlFlow;
-use std::sync::Arc;
 
 /// Projection parameter times `M_ii`.
 const PROJECTION: f64 = 0.3;

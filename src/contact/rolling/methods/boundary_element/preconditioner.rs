@@ -1,13 +1,13 @@
 //! The preconditioner: every segment's own block of the Newton matrix, factored on its own.
 
-use crate::contact::rolling::methods::boundary_element::linearisation::Linearisation;
-use crate::contact::rolling::own_blocks::OwnBlocks;
-use crate::contact::rolling::slip_equations::SlipEquations;
-
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::lu::partial_pivoting::factor;
 use faer::{MatMut, Par};
 use pulp::{Arch, NullaryFnOnce};
+
+use crate::contact::rolling::methods::boundary_element::linearisation::Linearisation;
+use crate::contact::rolling::own_blocks::OwnBlocks;
+use crate::contact::rolling::slip_equations::SlipEquations;
 
 /// Factored blocks of one Newton step.
 #[derive(Debug, Default)]

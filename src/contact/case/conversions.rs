@@ -1,0 +1,75 @@
+//! Between the words of a case and the types of the numerics: a change of a solver does not change the contract.
+
+use crate::contact::case::words::{MeshSizeWords, MethodName, MotionWords, TractionBoundName};
+use crate::contact::mesh::size::MeshSize;
+use crate::contact::rolling::methods::method::{Method, TractionBound};
+use crate::contact::rolling::motion::Motion;
+
+impl From<MotionWords> for Motion {
+    fn from(words: MotionWords) -> Motion {
+        Motion {
+            creepage_x: words.creepage_x,
+            creepage_y: words.creepage_y,
+            spin_per_mm: words.spin_per_mm,
+        }
+    }
+}
+
+impl From<Motion> for MotionWords {
+    fn from(motion: Motion) -> MotionWords {
+        MotionWords {
+            creepage_x: motion.creepage_x,
+            creepage_y: motion.creepage_y,
+            spin_per_mm: motion.spin_per_mm,
+        }
+    }
+}
+
+impl From<MeshSizeWords> for MeshSize {
+    fn from(words: MeshSizeWords) -> MeshSize {
+        MeshSize {
+            strips: words.strips,
+            cells: words.cells,
+        }
+    }
+}
+
+impl MethodName {
+    /// The word itself.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            MethodName::Auto => "auto",
+            named => Method::from(named).name(),
+        }
+    }
+}
+
+impl From<MethodName> for Method {
+    fn from(name: MethodName) -> Method {
+        match name {
+            MethodName::Auto | MethodName::BoundaryElement => Method::BoundaryElement,
+            MethodName::LiuHsu => Method::LiuHsu,
+            MethodName::Fastsim => Method::Fastsim,
+        }
+    }
+}
+
+impl From<Method> for MethodName {
+    fn from(method: Method) -> MethodName {
+        match method {
+            Method::BoundaryElement => MethodName::BoundaryElement,
+            Method::LiuHsu => MethodName::LiuHsu,
+            Method::Fastsim => MethodName::Fastsim,
+        }
+    }
+}
+
+impl From<TractionBoundName> for TractionBound {
+    fn from(name: TractionBoundName) -> TractionBound {
+        match name {
+            TractionBoundName::Elliptic => TractionBound::Elliptic,
+            TractionBoundName::Parabolic => TractionBound::Parabolic,
+        }
+    }
+}
