@@ -213,7 +213,7 @@ impl Drop for Draft {
                 tasks.spawn_on(async move { shared.drop_abandoned().await }, &runtime);
             }
         } else {
-            shared.underway().living.remove(&self.id);
+            shared.underway().forget(self.id);
         }
     }
 }
@@ -248,7 +248,7 @@ impl Jobs {
     }
 
     /// Queues the good cases of a draft. Once this returns all of them survive the death of the process; if it fails,
-    /// none of them will be there. Workers may begin before it returns. Also says whether the batch is that of an
+    /// none of them will be there. Workers begin once all are there. Also says whether the batch is that of an
     /// earlier submission with the same idempotency key.
     ///
     /// # Errors
@@ -298,6 +298,7 @@ impl Jobs {
                 Some(begun) => begun,
                 None => {
                     draft.in_table = true;
+                    self.shared.underway().filling.insert(id);
                     let bounds = self.queue_bounds();
                     let begun = self.shared.store.begin_batch(&new, &living, bounds).await;
                     self.noted(begun)?
@@ -320,7 +321,14 @@ impl Jobs {
         let filled = self.shared.tasks.spawn(async move {
             let filled = jobs.fill(&new, &mut draft, traceparent).await;
             match &filled {
-                Ok(()) => draft.settle(),
+                Ok(()) => {
+                    draft.settle();
+                    // Opens the batch to the workers.
+                    drop(draft);
+                    for _ in 0..jobs.shared.options.workers {
+                        jobs.shared.wake.notify_one();
+                    }
+                }
                 Err(_) => jobs.give_up(draft).await,
             }
             filled
@@ -374,9 +382,6 @@ impl Jobs {
             }
             let ended = self.shared.store.enqueue_many(new.id, &some).await?;
             self.shared.ended_cached(&ended);
-            for _ in 0..self.shared.options.workers {
-                self.shared.wake.notify_one();
-            }
         }
         self.shared.store.complete_batch(new.id).await?;
         tracing::info!(batch = %new.id, jobs = new.count, rejected = new.rejected, "batch queued");

@@ -14,8 +14,23 @@ use crate::jobs::error::JobsError;
 pub(super) struct Underway {
     /// Being received or filled by this process.
     pub(super) living: HashSet<Uuid>,
+    /// Those of them whose jobs are being queued: no worker takes one before all are there.
+    pub(super) filling: HashSet<Uuid>,
     /// Given up; what is left of them is solved and shown to nobody, and removed as soon as the disk allows it.
     pub(super) abandoned: HashSet<Uuid>,
+}
+
+impl Underway {
+    /// Batches whose jobs no worker may take.
+    pub(super) fn closed_to_workers(&self) -> HashSet<Uuid> {
+        self.filling.union(&self.abandoned).copied().collect()
+    }
+
+    /// This process neither receives nor fills this batch any more.
+    pub(super) fn forget(&mut self, id: Uuid) {
+        self.living.remove(&id);
+        self.filling.remove(&id);
+    }
 }
 
 impl Shared {
@@ -27,7 +42,7 @@ impl Shared {
     /// From now on nobody fills this batch, nobody is shown its jobs, and no worker takes one.
     pub(super) fn abandon(&self, id: Uuid) {
         let mut batches = self.underway();
-        batches.living.remove(&id);
+        batches.forget(id);
         batches.abandoned.insert(id);
     }
 

@@ -174,7 +174,7 @@ impl Worker {
         let options = &shared.options;
         let full = shared.turns.parked().0 >= options.parked_max;
         let slice_us = u64::try_from(options.slice.as_micros()).unwrap_or(u64::MAX);
-        let skip = shared.underway().abandoned.clone();
+        let skip = shared.underway().closed_to_workers();
         let request = ClaimRequest {
             worker: &self.name,
             tenant,

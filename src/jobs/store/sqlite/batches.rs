@@ -1,6 +1,6 @@
 //! Batches in the embedded job table: filled piece by piece, acknowledged once they are complete.
 //!
-//! The jobs of a batch may be claimed while it is being filled. A batch that a dead process left incomplete was never
+//! No worker claims a job of a batch while it is being filled ([`skip`](crate::jobs::store::ClaimRequest::skip)). A batch that a dead process left incomplete was never
 //! acknowledged and is removed with its jobs.
 
 use std::collections::{BTreeMap, HashSet};
