@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::Unmonitored;
-use railhead::jobs::recipe::Recipe;
+use railhead::jobs::engine::Engine;
 use serde_json::{Value, json};
 
 use crate::machine::{median, seconds_of};
@@ -40,11 +40,11 @@ pub fn meshed(number: usize, size: u32) -> Value {
 
 /// The mesh on which one case takes about `seconds`, and how long it does take.
 pub fn size_of(seconds: f64) -> (u32, f64) {
-    let recipe = Recipe::contact();
+    let engine = Engine::contact();
     let time = |size| {
         median(
             (0..7)
-                .map(|number| seconds_of(|| solve_one(&recipe, &meshed(number, size))).0)
+                .map(|number| seconds_of(|| solve_one(&engine, &meshed(number, size))).0)
                 .collect(),
         )
     };
@@ -61,13 +61,13 @@ pub fn size_of(seconds: f64) -> (u32, f64) {
 
 /// Cases per second of the bare solver on so many threads, measured for about `time`.
 pub fn bare_rate(threads: usize, time: Duration, case: impl Fn(usize) -> Value + Sync) -> f64 {
-    let (recipe, next) = (Recipe::contact(), AtomicUsize::new(0));
+    let (engine, next) = (Engine::contact(), AtomicUsize::new(0));
     let start = Instant::now();
     std::thread::scope(|scope| {
         for _ in 0..threads {
             scope.spawn(|| {
                 while start.elapsed() < time {
-                    solve_one(&recipe, &case(next.fetch_add(1, Ordering::Relaxed)));
+                    solve_one(&engine, &case(next.fetch_add(1, Ordering::Relaxed)));
                 }
             });
         }
@@ -76,9 +76,9 @@ pub fn bare_rate(threads: usize, time: Duration, case: impl Fn(usize) -> Value +
 }
 
 /// As a worker does it, operators kept by the process included.
-fn solve_one(recipe: &Recipe, case: &Value) {
-    let problem = (recipe.check)(case, &Limits::default()).expect("a case");
-    for slice in (recipe.slices)(&problem) {
-        (recipe.solve)(&problem, slice, &Unmonitored).expect("a solution");
+fn solve_one(engine: &Engine, case: &Value) {
+    let problem = (engine.check)(case, &Limits::default()).expect("a case");
+    for slice in (engine.slices)(&problem) {
+        (engine.solve)(&problem, slice, &Unmonitored).expect("a solution");
     }
 }

@@ -7,9 +7,11 @@ use std::time::Instant;
 use bytes::Bytes;
 use railhead::jobs::State;
 use railhead::jobs::store::list::Filter;
-use railhead::jobs::store::sqlite::SqliteStore;
-use railhead::jobs::store::{ClaimRequest, NewBatch, NewJob, QueueBounds, Release, Which};
-use railhead::jobs::wishes::Wishes;
+use railhead::jobs::store::sqlite::database::SqliteStore;
+use railhead::jobs::store::types::{
+    ClaimKind, ClaimRequest, NewBatch, NewJob, QueueBounds, ReleaseReason,
+};
+use railhead::jobs::submit_options::SubmitOptions;
 use uuid::Uuid;
 
 use crate::Row;
@@ -34,7 +36,7 @@ pub async fn claims() -> Vec<Row> {
             let request = ClaimRequest {
                 worker: "w",
                 tenant: TENANT,
-                which: Which::New,
+                kind: ClaimKind::New,
                 jobs: 256,
                 cost_us: 200_000,
                 each_slice_us: None,
@@ -48,7 +50,7 @@ pub async fn claims() -> Vec<Row> {
             let claims = store.claim(&request).await.expect("a claim");
             times.push(start.elapsed().as_secs_f64());
             assert!(!claims.is_empty());
-            let released = store.release(&claims, Release::NotBegun, 0).await;
+            let released = store.release(&claims, ReleaseReason::NotBegun, 0).await;
             assert_eq!(released.expect("a release").len(), claims.len());
         }
     }
@@ -193,10 +195,10 @@ fn job() -> NewJob {
         outputs: "[]".to_owned(),
         cost_us: 1000,
         slice_us: 1000,
-        reuse_key: None,
+        cache_key: None,
         source: None,
         idempotency: None,
         traceparent: None,
-        wishes: Wishes::default(),
+        options: SubmitOptions::default(),
     }
 }

@@ -6,7 +6,8 @@ use anyhow::{Context, bail};
 
 use crate::cli::commands::{KeysAction, KeysArgs};
 use crate::cli::output::{print, print_error};
-use crate::jobs::keys::{Key, Keyring};
+use crate::jobs::keys::key::Key;
+use crate::jobs::keys::keyring::Keyring;
 
 /// Runs the action on the keys.
 pub(super) fn run(args: &KeysArgs) -> anyhow::Result<ExitCode> {

@@ -24,7 +24,7 @@ use crate::cli::serve_args::ServeArgs;
 use crate::cli::stop::{Schedule, Signals};
 use crate::cli::values::Anonymous;
 use crate::http::{self, HttpOptions};
-use crate::jobs::recipe::Recipe;
+use crate::jobs::engine::Engine;
 use crate::jobs::trace::Tracer;
 use crate::jobs::{Jobs, Options};
 use crate::telemetry::{self, Traces};
@@ -131,7 +131,7 @@ async fn open_jobs(args: &ServeArgs, traces: Option<&Traces>) -> anyhow::Result<
         tracer: traces.map(|traces| Tracer::new(traces.tracer())),
         ..Options::new(&args.data_dir)
     });
-    let recipe = Recipe::with_operators(args.case.operators());
+    let recipe = Engine::with_operators(args.case.operators());
     Ok(Jobs::open_with(options, recipe).await?)
 }
 

@@ -6,7 +6,7 @@ use clap::Args;
 
 use crate::cli::values::positive;
 use crate::jobs::Options;
-use crate::jobs::staging::StagingBounds;
+use crate::jobs::quota::StagingBounds;
 
 /// Settings of workers and of batches that are being received.
 #[derive(Debug, Clone, Args)]

@@ -6,8 +6,8 @@ use std::os::unix::fs::DirBuilderExt;
 use std::path::Path;
 
 use crate::jobs::error::JobsError;
-use crate::jobs::lifecycle::make_private_folder;
-use crate::jobs::store::sqlite::SqliteStore;
+use crate::jobs::maintenance::disk_reserve::make_private_folder;
+use crate::jobs::store::sqlite::database::SqliteStore;
 
 /// Copies the jobs and their results into a new folder, from which a service can be started.
 ///

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use thiserror::Error;
 
 use crate::contact::error::CaseError;
-use crate::jobs::job::{Job, State};
+use crate::jobs::model::{Job, State};
 
 /// Every way a call of [`Jobs`](crate::jobs::Jobs) can fail.
 #[derive(Debug, Error)]
@@ -122,7 +122,7 @@ pub enum JobsError {
     OtherForm,
     /// Reading or writing a stored result failed.
     #[error("the stored results failed: {0}")]
-    Results(#[from] object_store::Error),
+    Blobs(#[from] object_store::Error),
     /// Something stored cannot be read back.
     #[error("stored data is damaged: {0}")]
     Damaged(String),

@@ -1,8 +1,6 @@
 //! What the jobs room counts for the operator. Labels have few values, all known beforehand: never an id, never a name
 //! that a client chose.
 
-use std::sync::atomic::Ordering;
-
 use prometheus_client::encoding::EncodeLabelSet;
 use prometheus_client::metrics::counter::Counter;
 use prometheus_client::metrics::family::Family;
@@ -13,20 +11,19 @@ use prometheus_client::registry::Registry;
 
 use crate::contact::case::words::MethodName;
 use crate::contact::solution::words::Solution;
-use crate::jobs::Jobs;
-use crate::jobs::error::JobsError;
-use crate::jobs::job::{FailureKind, State};
-use crate::jobs::store::Ending;
+use crate::jobs::model::{FailureKind, State};
+use crate::jobs::store::types::Ending;
 
 /// Upper bounds of solve times in s.
 const SOLVE_SECONDS: [f64; 14] = [
     0.0001, 0.0003, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 1000.0,
 ];
+
 /// Upper bounds of Newton iterations of one motion on one patch.
 const ITERATIONS: [f64; 9] = [2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 50.0, 100.0, 200.0];
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-struct StateLabel {
+pub(crate) struct StateLabel {
     state: &'static str,
 }
 
@@ -42,9 +39,9 @@ struct ReasonLabel {
 
 /// A solver at work.
 #[derive(Debug)]
-pub(super) struct Working(Gauge);
+pub(crate) struct BusyWorker(Gauge);
 
-impl Drop for Working {
+impl Drop for BusyWorker {
     fn drop(&mut self) {
         self.0.dec();
     }
@@ -52,27 +49,27 @@ impl Drop for Working {
 
 /// Counters of one service; clones share them.
 #[derive(Debug, Clone)]
-pub(super) struct Metrics {
-    jobs: Family<StateLabel, Gauge>,
-    oldest_queued_seconds: Gauge<f64, std::sync::atomic::AtomicU64>,
-    database_bytes: Gauge,
-    result_bytes: Gauge,
-    operator_bytes: Gauge,
+pub(crate) struct Metrics {
+    pub(crate) jobs: Family<StateLabel, Gauge>,
+    pub(crate) oldest_queued_seconds: Gauge<f64, std::sync::atomic::AtomicU64>,
+    pub(crate) database_bytes: Gauge,
+    pub(crate) result_bytes: Gauge,
+    pub(crate) operator_bytes: Gauge,
     solve_seconds: Family<MethodLabel, Histogram>,
     iterations: Family<MethodLabel, Histogram>,
     ended: Family<StateLabel, Counter>,
     failures: Family<ReasonLabel, Counter>,
     storage_failing: Gauge,
-    parked: Gauge,
-    abandoned: Gauge,
-    workers: Gauge,
+    pub(crate) parked: Gauge,
+    pub(crate) abandoned: Gauge,
+    pub(crate) workers: Gauge,
     working: Gauge,
     cache_hits: Counter,
     cache_misses: Counter,
 }
 
 impl Metrics {
-    pub(super) fn new() -> Metrics {
+    pub(crate) fn new() -> Metrics {
         let metrics = Metrics {
             jobs: Family::default(),
             oldest_queued_seconds: Gauge::default(),
@@ -102,13 +99,13 @@ impl Metrics {
     }
 
     /// A solver is at work as long as this is held.
-    pub(super) fn working(&self) -> Working {
+    pub(crate) fn working(&self) -> BusyWorker {
         self.working.inc();
-        Working(self.working.clone())
+        BusyWorker(self.working.clone())
     }
 
     /// A case was solved in `seconds`.
-    pub(super) fn solved(&self, asked: MethodName, solution: &Solution, seconds: f64) {
+    pub(crate) fn solved(&self, asked: MethodName, solution: &Solution, seconds: f64) {
         let points = || solution.patches.iter().flat_map(|patch| &patch.points);
         let used = points().next().map_or(asked, |point| point.solver.method);
         let used = MethodLabel {
@@ -126,7 +123,7 @@ impl Metrics {
     }
 
     /// A job ended in this way.
-    pub(super) fn ending(&self, ending: &Ending) {
+    pub(crate) fn ending(&self, ending: &Ending) {
         match ending {
             Ending::Succeeded { .. } => self.ended(State::Succeeded, 1),
             Ending::Cancelled => self.ended(State::Cancelled, 1),
@@ -135,28 +132,28 @@ impl Metrics {
     }
 
     /// A job failed for this reason.
-    pub(super) fn failed(&self, kind: FailureKind) {
+    pub(crate) fn failed(&self, kind: FailureKind) {
         self.ended(State::Failed, 1);
         self.failures.get_or_create(&reason_label(kind)).inc();
     }
 
     /// Jobs ended in this state.
-    pub(super) fn ended(&self, state: State, jobs: u64) {
+    pub(crate) fn ended(&self, state: State, jobs: u64) {
         self.ended.get_or_create(&state_label(state)).inc_by(jobs);
     }
 
     /// Earlier results were looked for.
-    pub(super) fn looked_up(&self, hits: u64, misses: u64) {
+    pub(crate) fn cache_lookup(&self, hits: u64, misses: u64) {
         self.cache_hits.inc_by(hits);
         self.cache_misses.inc_by(misses);
     }
 
     /// The disk takes data, or does not.
-    pub(super) fn storage_failing(&self, failing: bool) {
+    pub(crate) fn storage_failing(&self, failing: bool) {
         self.storage_failing.set(i64::from(failing));
     }
 
-    fn register(&self, registry: &mut Registry) {
+    pub(crate) fn register(&self, registry: &mut Registry) {
         registry.register(
             "build",
             "The running version",
@@ -245,53 +242,7 @@ impl Metrics {
     }
 }
 
-impl Jobs {
-    /// Adds what this room counts to a registry.
-    pub fn register_metrics(&self, registry: &mut Registry) {
-        self.shared.metrics.register(registry);
-    }
-
-    /// Brings those figures up to date that are read from the store and not counted as they happen.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub async fn refresh_metrics(&self) -> Result<(), JobsError> {
-        let metrics = &self.shared.metrics;
-        metrics.workers.set(count(self.shared.options.workers));
-        metrics.parked.set(count(self.shared.turns.parked().0));
-        let abandoned = self.shared.abandoned.load(Ordering::Acquire);
-        metrics.abandoned.set(count(abandoned));
-        let figures = match self.shared.store.figures().await {
-            Err(error) if error.trouble().is_some() => {
-                // The alert for this must not fail with it.
-                self.shared.note::<()>(&Err(error));
-                return Ok(());
-            }
-            figures => figures?,
-        };
-        for (state, jobs) in figures.jobs {
-            let gauge = metrics.jobs.get_or_create_owned(&state_label(state));
-            gauge.set(i64::try_from(jobs).unwrap_or(i64::MAX));
-        }
-        let age_ms = figures
-            .oldest_queued_at
-            .map_or(0, |created| (self.shared.now_ms() - created).max(0));
-        #[expect(clippy::cast_precision_loss, reason = "an age is far below 2^53 ms")]
-        metrics.oldest_queued_seconds.set(age_ms as f64 / 1000.0);
-        let bytes = |bytes: u64| i64::try_from(bytes).unwrap_or(i64::MAX);
-        metrics.database_bytes.set(bytes(figures.database_bytes));
-        metrics.result_bytes.set(bytes(figures.result_bytes));
-        let operators = self.shared.recipe.operators.bytes();
-        metrics.operator_bytes.set(bytes(operators));
-        Ok(())
-    }
-}
-
-fn count(number: usize) -> i64 {
-    i64::try_from(number).unwrap_or(i64::MAX)
-}
-
-fn state_label(state: State) -> StateLabel {
+pub(crate) fn state_label(state: State) -> StateLabel {
     StateLabel {
         state: state.name(),
     }

@@ -1,381 +1,192 @@
-//! Stored results: blobs outside the job table, in a folder of the data folder.
-//!
-//! Keys are `results/{yyyy}/{mm}/{job}/{lease number}/{name}`, year and month those of the job's submission (UTC). The
-//! lease number in the key makes a late write of a worker that lost its lease harmless. Blobs are written, and
-//! synced to the disk, before the job is called succeeded.
-
-use std::fs::Permissions;
-use std::os::unix::fs::PermissionsExt;
-use std::path::{Path as FilePath, PathBuf};
-use std::sync::Arc;
+//! What is kept of a job besides its row: the case, the solution, the fields.
 
 use bytes::Bytes;
-use object_store::local::LocalFileSystem;
-use object_store::path::Path;
-use object_store::{ObjectStore, ObjectStoreExt, PutPayload};
 use uuid::Uuid;
 
-use crate::contact::solution::words::PatchFields;
+use crate::contact::case::words::Output;
+use crate::contact::solution::words::{PatchFields, Solution};
+use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::error::JobsError;
-use crate::jobs::fields::{Header, PREFIX_BYTES, header_length};
-use crate::jobs::store::Claim;
+use crate::jobs::handle::Jobs;
+use crate::jobs::model::Job;
+use crate::jobs::store::types::ResultRef;
 
-/// The folder of the data folder in which results lie.
-pub(super) const ROOT: &str = "results";
-const SOLUTION: &str = "solution.json";
-const FIELDS: &str = "fields.bin";
+/// Solutions from this size on are read off the threads that answer requests.
+const LARGE_BYTES: usize = 64 << 10;
 
-/// A result in its stored form.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Encoded {
-    /// The solution as JSON.
-    pub solution: Bytes,
-    /// The fields as [`encode`](crate::jobs::fields::encode) writes them, if the case asked for any.
-    pub fields: Option<Bytes>,
-}
-
-impl Encoded {
-    /// Size in bytes.
-    #[must_use]
-    pub fn bytes(&self) -> usize {
-        self.solution.len() + self.fields.as_ref().map_or(0, Bytes::len)
-    }
-
-    /// The cells of one patch, with the values of one motion or of all of them.
-    ///
-    /// # Errors
-    /// There is no such motion, or the fields cannot be read.
-    pub fn patch_fields(
-        &self,
-        patch: usize,
-        point: Option<usize>,
-    ) -> Result<PatchFields, JobsError> {
-        let file = self.fields.as_deref().unwrap_or_default();
-        let damaged = |error: String| JobsError::Damaged(format!("stored fields: {error}"));
-        let prefix = file.get(..PREFIX_BYTES).unwrap_or_default();
-        let body = PREFIX_BYTES + header_length(prefix).map_err(damaged)?;
-        let cut = || damaged("cut short".to_owned());
-        let header =
-            Header::read(file.get(PREFIX_BYTES..body).ok_or_else(cut)?).map_err(damaged)?;
-        let points = header.points(patch);
-        if point.is_some_and(|point| point >= points) {
-            return Err(JobsError::NoSuchPoint { points });
-        }
-        let mut pieces = Vec::new();
-        for range in header.ranges(patch, point) {
-            let start = usize::try_from(range.start).unwrap_or(usize::MAX);
-            let end = usize::try_from(range.end).unwrap_or(usize::MAX);
-            let piece = file[body..].get(start..end).ok_or_else(cut)?;
-            pieces.extend_from_slice(piece);
-        }
-        header.decode(patch, point, &pieces).map_err(damaged)
-    }
-}
-
-/// The place where results are kept.
+/// The answer of a succeeded job as it is stored, without fields.
 #[derive(Debug, Clone)]
-pub struct Results {
-    blobs: Arc<dyn ObjectStore>,
-    root: PathBuf,
+pub struct FetchedResult {
+    /// What was computed, as JSON text.
+    pub solution: Bytes,
+    /// It was computed for an identical case before.
+    pub cached: bool,
+    /// What the case asked for.
+    pub outputs: Vec<Output>,
 }
 
-impl Results {
-    /// Keeps results below `root`, which is created if it is not there.
+impl Jobs {
+    /// The case of a job as submitted, as JSON text.
     ///
     /// # Errors
-    /// The folder cannot be created or read.
-    pub fn open(root: &FilePath) -> Result<Results, JobsError> {
-        std::fs::create_dir_all(root).map_err(|source| JobsError::DataDir {
-            path: root.to_owned(),
-            source,
-        })?;
-        let blobs = LocalFileSystem::new_with_prefix(root)?.with_fsync(true);
-        Ok(Results {
-            blobs: Arc::new(blobs),
-            root: root.to_owned(),
+    /// [`JobsError::NotFound`], or a failed database.
+    pub async fn case(&self, id: Uuid) -> Result<Bytes, JobsError> {
+        self.get(id).await?;
+        let cases = self.shared.store.cases(&[id]).await?;
+        // It was there a moment ago.
+        let (case, _) = cases.into_values().next().ok_or(JobsError::Expired)?;
+        if case.template.is_none() {
+            return Ok(case.body);
+        }
+        let filled = tokio::task::spawn_blocking(move || case.value());
+        let filled = filled
+            .await
+            .map_err(|error| JobsError::Damaged(error.to_string()))??;
+        Ok(Bytes::from(filled.to_string()))
+    }
+
+    /// The answer of a succeeded job, without fields.
+    ///
+    /// # Errors
+    /// [`JobsError::NotReady`], [`JobsError::NotSucceeded`], [`JobsError::NotFound`], or a failed store.
+    pub async fn solution(&self, id: Uuid) -> Result<Solution, JobsError> {
+        let text = self.answer(id).await?.solution;
+        let damaged = |error: String| JobsError::Damaged(format!("solution of job {id}: {error}"));
+        let large = text.len() >= LARGE_BYTES;
+        let read = move || serde_json::from_slice(&text);
+        let solution = match large {
+            false => read(),
+            true => tokio::task::spawn_blocking(read)
+                .await
+                .map_err(|error| damaged(error.to_string()))?,
+        };
+        solution.map_err(|error| damaged(error.to_string()))
+    }
+
+    /// Size of the answer of a succeeded job as it is stored, without fields.
+    ///
+    /// # Errors
+    /// As [`Jobs::solution`].
+    pub async fn answer_bytes(&self, id: Uuid) -> Result<usize, JobsError> {
+        let (_, stored) = self.stored(id).await?;
+        match &stored.key {
+            Some(key) => match self.shared.blobs.solution_bytes(key).await {
+                Err(error) => Err(self.gone_meanwhile(id, error).await),
+                read => read,
+            },
+            None => Ok(self.shared.options.small_result_max_bytes),
+        }
+    }
+
+    /// The answer of a succeeded job as it is stored.
+    ///
+    /// # Errors
+    /// As [`Jobs::solution`].
+    pub async fn answer(&self, id: Uuid) -> Result<FetchedResult, JobsError> {
+        let (job, stored) = self.stored(id).await?;
+        let solution = match &stored.key {
+            Some(key) => match self.shared.blobs.solution(key).await {
+                Ok(text) => text,
+                Err(error) => return Err(self.gone_meanwhile(id, error).await),
+            },
+            None => self.small(&stored).await?.solution,
+        };
+        Ok(FetchedResult {
+            solution,
+            cached: job.cached,
+            outputs: outputs_of(id, &stored)?,
         })
     }
 
-    /// Stores a result and returns its key; durable once it returns.
+    /// The outputs that the case of a succeeded job asked for.
     ///
     /// # Errors
-    /// The result could not be written.
-    pub async fn put(&self, claim: &Claim, result: Encoded) -> Result<String, JobsError> {
-        let folder = job_folder(claim.id).join(claim.lease_number.to_string());
-        self.put_into(folder, result).await
+    /// As [`Jobs::solution`].
+    pub async fn outputs(&self, id: Uuid) -> Result<Vec<Output>, JobsError> {
+        let (_, stored) = self.stored(id).await?;
+        outputs_of(id, &stored)
     }
 
-    /// As [`Results::put`], of one slice of a sweep: `{lease number}-{number of the slice}` stands in place of the lease
-    /// number.
+    /// The cells of one patch with the values of every motion; reads no other patch.
     ///
     /// # Errors
-    /// The result could not be written.
-    pub async fn put_slice(
+    /// [`JobsError::NoSuchPatch`], else as [`Jobs::solution`].
+    pub async fn patch_fields(&self, id: Uuid, patch: usize) -> Result<PatchFields, JobsError> {
+        self.fields_of(id, patch, None).await
+    }
+
+    /// The cells of one patch with the values of one motion, the only entry of `points`; reads nothing else.
+    ///
+    /// # Errors
+    /// [`JobsError::NoSuchPatch`], [`JobsError::NoSuchPoint`], else as [`Jobs::solution`].
+    pub async fn point_fields(
         &self,
-        claim: &Claim,
-        number: u32,
-        result: Encoded,
-    ) -> Result<String, JobsError> {
-        let folder = job_folder(claim.id).join(format!("{}-{number}", claim.lease_number));
-        self.put_into(folder, result).await
+        id: Uuid,
+        patch: usize,
+        point: usize,
+    ) -> Result<PatchFields, JobsError> {
+        self.fields_of(id, patch, Some(point)).await
     }
 
-    async fn put_into(&self, folder: Path, result: Encoded) -> Result<String, JobsError> {
-        if let Some(fields) = result.fields {
-            self.blobs
-                .put(&folder.clone().join(FIELDS), PutPayload::from_bytes(fields))
-                .await?;
-        }
-        self.blobs
-            .put(
-                &folder.clone().join(SOLUTION),
-                PutPayload::from_bytes(result.solution),
-            )
-            .await?;
-        self.make_private(&folder).await?;
-        Ok(folder.to_string())
-    }
-
-    /// Reads a stored solution as JSON text.
-    ///
-    /// # Errors
-    /// It cannot be read.
-    pub async fn solution(&self, folder: &str) -> Result<Bytes, JobsError> {
-        let path = Path::from(folder).join(SOLUTION);
-        Ok(self.blobs.get(&path).await?.bytes().await?)
-    }
-
-    /// Size of a stored solution.
-    ///
-    /// # Errors
-    /// It cannot be read.
-    pub async fn solution_bytes(&self, folder: &str) -> Result<usize, JobsError> {
-        let path = Path::from(folder).join(SOLUTION);
-        let about = self.blobs.head(&path).await?;
-        Ok(usize::try_from(about.size).unwrap_or(usize::MAX))
-    }
-
-    /// Reads a whole stored result.
-    ///
-    /// # Errors
-    /// It cannot be read.
-    pub async fn whole(&self, folder: &str) -> Result<Encoded, JobsError> {
-        let solution = self.solution(folder).await?;
-        let path = Path::from(folder).join(FIELDS);
-        let fields = match self.blobs.get(&path).await {
-            Ok(found) => Some(found.bytes().await?),
-            Err(object_store::Error::NotFound { .. }) => None,
-            Err(error) => return Err(error.into()),
-        };
-        Ok(Encoded { solution, fields })
-    }
-
-    /// Reads the cells of one patch, with the values of one motion or of all of them, and nothing else.
-    ///
-    /// # Errors
-    /// There is no such motion, or the fields cannot be read.
-    pub async fn patch_fields(
+    async fn fields_of(
         &self,
-        folder: &str,
+        id: Uuid,
         patch: usize,
         point: Option<usize>,
     ) -> Result<PatchFields, JobsError> {
-        let path = Path::from(folder).join(FIELDS);
-        let damaged = |error: String| JobsError::Damaged(format!("{path}: {error}"));
-        let prefix = self.blobs.get_range(&path, 0..PREFIX_BYTES as u64).await?;
-        let body = (PREFIX_BYTES + header_length(&prefix).map_err(damaged)?) as u64;
-        let header = Header::read(
-            &self
-                .blobs
-                .get_range(&path, PREFIX_BYTES as u64..body)
-                .await?,
-        )
-        .map_err(damaged)?;
-        let points = header.points(patch);
-        if point.is_some_and(|point| point >= points) {
-            return Err(JobsError::NoSuchPoint { points });
+        let (_, stored) = self.stored(id).await?;
+        if patch >= stored.field_patches {
+            return Err(JobsError::NoSuchPatch {
+                patches: stored.field_patches,
+            });
         }
-        let ranges: Vec<_> = header
-            .ranges(patch, point)
-            .into_iter()
-            .map(|range| range.start + body..range.end + body)
-            .collect();
-        let pieces = self.blobs.get_ranges(&path, &ranges).await?;
-        // Decompression is arithmetic; it stays off the threads that answer requests.
-        let decoded =
-            tokio::task::spawn_blocking(move || header.decode(patch, point, &pieces.concat()))
-                .await;
-        decoded
-            .map_err(|error| JobsError::Damaged(error.to_string()))?
-            .map_err(damaged)
+        match &stored.key {
+            Some(key) => match self.shared.blobs.patch_fields(key, patch, point).await {
+                Err(error) => Err(self.gone_meanwhile(id, error).await),
+                read => read,
+            },
+            None => self.small(&stored).await?.patch_fields(patch, point),
+        }
     }
 
-    /// Removes the result under a key; one that is gone already is no error.
-    ///
-    /// # Errors
-    /// Something could not be removed.
-    pub async fn remove(&self, key: &str) -> Result<(), JobsError> {
-        let folder = Path::from(key);
-        for name in [SOLUTION, FIELDS] {
-            match self.blobs.delete(&folder.clone().join(name)).await {
-                Ok(()) | Err(object_store::Error::NotFound { .. }) => {}
-                Err(error) => return Err(error.into()),
-            }
+    /// Why the result of a job that was just there cannot be read: it went in between, or `error`.
+    pub(crate) async fn gone_meanwhile(&self, id: Uuid, error: JobsError) -> JobsError {
+        if !matches!(
+            error,
+            JobsError::Blobs(object_store::Error::NotFound { .. })
+        ) {
+            return error;
         }
-        self.scrub(&folder).await
+        match self.get(id).await {
+            Ok(_) => error,
+            Err(JobsError::NotFound | JobsError::Expired) => JobsError::Expired,
+            Err(failed) => failed,
+        }
     }
 
-    /// The keys of everything that is stored, job by job, month by month.
-    ///
-    /// # Errors
-    /// The store cannot be listed.
-    pub async fn keys(&self, month: &Path) -> Result<Vec<(Uuid, String)>, JobsError> {
-        let mut keys = Vec::new();
-        for job in self.below(month).await? {
-            let Some(id) = job.filename().and_then(|id| Uuid::try_parse(id).ok()) else {
-                continue;
-            };
-            let attempts = self.below(&job).await?;
-            keys.extend(attempts.into_iter().map(|key| (id, key.to_string())));
-        }
-        Ok(keys)
+    /// A result that lies in the database.
+    async fn small(&self, stored: &ResultRef) -> Result<EncodedResult, JobsError> {
+        let result = self.shared.store.small_result(stored.job).await?;
+        // It was there a moment ago.
+        result.ok_or(JobsError::Expired)
     }
 
-    /// The months in which something is stored.
-    ///
-    /// # Errors
-    /// The store cannot be listed.
-    pub async fn months(&self) -> Result<Vec<Path>, JobsError> {
-        let mut months = Vec::new();
-        for year in self.below(&Path::from(ROOT)).await? {
-            months.extend(self.below(&year).await?);
-        }
-        Ok(months)
-    }
-
-    async fn below(&self, folder: &Path) -> Result<Vec<Path>, JobsError> {
-        let listed = self.blobs.list_with_delimiter(Some(folder)).await?;
-        Ok(listed.common_prefixes)
-    }
-
-    /// Removes an emptied local folder with what a killed process may have left half-written in it, which the blob
-    /// store does not show, and the folder of its job once that is empty.
-    async fn scrub(&self, folder: &Path) -> Result<(), JobsError> {
-        let path = self.root.join(folder.as_ref());
-        match tokio::fs::remove_dir_all(&path).await {
-            Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
-                return Err(JobsError::DataDir { path, source });
-            }
-            _ => {}
-        }
-        if let Some(job) = path.parent() {
-            // It stays as long as another attempt lies in it.
-            let _ = tokio::fs::remove_dir(job).await;
-        }
-        Ok(())
-    }
-
-    /// Keeps what was just written from everybody else on this machine.
-    async fn make_private(&self, folder: &Path) -> Result<(), JobsError> {
-        let path = self.root.join(folder.as_ref());
-        let failed = |source| JobsError::DataDir {
-            path: path.clone(),
-            source,
+    /// Where the result of a job lies.
+    async fn stored(&self, id: Uuid) -> Result<(Job, ResultRef), JobsError> {
+        let found = self.shared.store.result(id).await?;
+        let Some((job, stored)) = found.filter(|(job, _)| *job.tenant == *self.tenant) else {
+            return Err(self.missing(id, JobsError::NotFound).await);
         };
-        for name in [SOLUTION, FIELDS] {
-            let mode = Permissions::from_mode(0o600);
-            match tokio::fs::set_permissions(path.join(name), mode).await {
-                Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
-                    return Err(failed(source));
-                }
-                _ => {}
-            }
+        let job = self.unexpired(job)?;
+        match stored {
+            Some(stored) => Ok((job, stored)),
+            None if job.state.ended() => Err(JobsError::NotSucceeded(Box::new(job))),
+            None => Err(JobsError::NotReady(job.state)),
         }
-        Ok(())
     }
 }
 
-/// Where everything stored for a job lies.
-fn job_folder(id: Uuid) -> Path {
-    let seconds = id.get_timestamp().map_or(0, |time| time.to_unix().0);
-    let time = i64::try_from(seconds)
-        .ok()
-        .and_then(|s| jiff::Timestamp::from_second(s).ok());
-    let date = time
-        .unwrap_or_default()
-        .to_zoned(jiff::tz::TimeZone::UTC)
-        .date();
-    Path::from(format!(
-        "{ROOT}/{:04}/{:02}/{id}",
-        date.year(),
-        date.month()
-    ))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn claim(id: Uuid, lease_number: u64) -> Claim {
-        Claim {
-            id,
-            attempt: 1,
-            lease_number,
-            method: "auto".to_owned(),
-            traceparent: None,
-            reuse_key: None,
-            suspect: false,
-            slices: 0,
-        }
-    }
-
-    fn encoded(text: &'static str) -> Encoded {
-        Encoded {
-            solution: Bytes::from_static(text.as_bytes()),
-            fields: Some(Bytes::from_static(b"fields")),
-        }
-    }
-
-    #[test]
-    fn a_job_lies_in_the_month_of_its_submission() {
-        // 2024-02-29T23:59:59.999Z in milliseconds, the leading 48 bits of a UUIDv7.
-        let id = Uuid::from_u128((1_709_251_199_999_u128 << 80) | (7 << 76) | (2 << 62) | 1);
-        assert_eq!(job_folder(id).to_string(), format!("results/2024/02/{id}"));
-    }
-
-    #[tokio::test]
-    async fn attempts_are_kept_apart_and_removed_one_by_one() {
-        let folder = tempfile::tempdir().unwrap();
-        let results = Results::open(folder.path()).unwrap();
-        let id = Uuid::now_v7();
-        let first = results.put(&claim(id, 1), encoded("1")).await.unwrap();
-        let second = results.put(&claim(id, 2), encoded("2")).await.unwrap();
-        assert_ne!(first, second);
-        // What a process killed in the middle of a write leaves behind.
-        std::fs::write(folder.path().join(&first).join("fields.bin#1"), b"half").unwrap();
-
-        results.remove(&first).await.unwrap();
-        assert!(!folder.path().join(&first).exists());
-        assert!(folder.path().join(&second).join(SOLUTION).exists());
-        let months = results.months().await.unwrap();
-        let keys = results.keys(&months[0]).await.unwrap();
-        assert_eq!((months.len(), keys), (1, vec![(id, second.clone())]));
-
-        results.remove(&second).await.unwrap();
-        assert_eq!(results.keys(&months[0]).await.unwrap(), []);
-        results.remove(&second).await.unwrap();
-    }
-
-    #[tokio::test]
-    async fn what_is_stored_is_for_nobody_else_to_read() {
-        let folder = tempfile::tempdir().unwrap();
-        let results = Results::open(folder.path()).unwrap();
-        let claim = claim(Uuid::now_v7(), 1);
-        let key = results.put(&claim, encoded("1")).await.unwrap();
-        let key = folder.path().join(key);
-        for name in [SOLUTION, FIELDS] {
-            let about = std::fs::metadata(key.join(name)).unwrap();
-            assert_eq!(about.permissions().mode() & 0o777, 0o600, "{name}");
-        }
-    }
+fn outputs_of(id: Uuid, stored: &ResultRef) -> Result<Vec<Output>, JobsError> {
+    serde_json::from_str(&stored.outputs)
+        .map_err(|error| JobsError::Damaged(format!("outputs of job {id}: {error}")))
 }

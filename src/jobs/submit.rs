@@ -10,10 +10,11 @@ use uuid::Uuid;
 use crate::contact::case::problem::Problem;
 use crate::contact::case::words::Output;
 use crate::jobs::error::JobsError;
-use crate::jobs::job::Job;
-use crate::jobs::store::{Enqueued, NewJob, QueueBounds, Refusal};
-use crate::jobs::wishes::Wishes;
-use crate::jobs::{Jobs, idempotency};
+use crate::jobs::handle::Jobs;
+use crate::jobs::idempotency;
+use crate::jobs::model::{Job, created_at};
+use crate::jobs::store::types::{Enqueued, NewJob, QueueBounds, Refusal};
+use crate::jobs::submit_options::SubmitOptions;
 
 impl Jobs {
     /// Checks a case and queues it. Once this returns the job survives the death of the process. If an identical case
@@ -30,7 +31,7 @@ impl Jobs {
         case: Value,
         idempotency_key: Option<String>,
     ) -> Result<Job, JobsError> {
-        let submitted = self.submit_with(case, idempotency_key, Wishes::default());
+        let submitted = self.submit_with(case, idempotency_key, SubmitOptions::default());
         submitted.await.map(|(job, _)| job)
     }
 
@@ -43,11 +44,11 @@ impl Jobs {
         &self,
         case: Value,
         idempotency_key: Option<String>,
-        wishes: Wishes,
+        options: SubmitOptions,
     ) -> Result<(Job, bool), JobsError> {
-        let span = self.submitting();
+        let span = self.submit_span();
         let traceparent = span.traceparent();
-        let submitted = self.store_case(case, idempotency_key, wishes, traceparent);
+        let submitted = self.store_case(case, idempotency_key, options, traceparent);
         span.end(submitted.await, |(job, _)| {
             vec![
                 KeyValue::new("railhead.job.id", job.id.to_string()),
@@ -60,7 +61,7 @@ impl Jobs {
         &self,
         case: Value,
         idempotency_key: Option<String>,
-        wishes: Wishes,
+        options: SubmitOptions,
         traceparent: Option<Arc<str>>,
     ) -> Result<(Job, bool), JobsError> {
         if self.shared.draining.is_cancelled() {
@@ -71,7 +72,7 @@ impl Jobs {
         // not take the cores from them either.
         let turn = self.shared.checks.acquire().await;
         let read = tokio::task::spawn_blocking(move || {
-            let digest = || wishes.digest(&idempotency::digest(&case));
+            let digest = || options.digest(&idempotency::digest(&case));
             let idempotency = idempotency_key.map(|key| (key, digest()));
             (jobs.check(&case), serde_json::to_vec(&case), idempotency)
         });
@@ -102,19 +103,19 @@ impl Jobs {
             outputs: outputs_text(&outputs),
             cost_us,
             slice_us,
-            reuse_key: self.reuse_key(&problem.digest),
+            cache_key: self.cache_key(&problem.digest),
             source: None,
             body: Bytes::from(body.map_err(|error| JobsError::Damaged(error.to_string()))?),
             row: false,
             idempotency,
             traceparent,
-            wishes,
+            options,
         };
-        if !wishes.fresh {
+        if !options.bypass_cache {
             self.find_sources(std::iter::once(&mut new)).await?;
         }
         let stored = self.shared.store.enqueue(&new, self.queue_bounds()).await;
-        let (job, replayed) = self.of_enqueued(self.noted(stored)?)?;
+        let (job, replayed) = self.of_enqueued(self.observe_write(stored)?)?;
         if job.id == id && job.cached {
             self.shared.ended_cached(&[id]);
             tracing::info!(job = %id, method = new.method, "job answered from an earlier result");
@@ -126,15 +127,15 @@ impl Jobs {
     }
 
     /// Expected solve time of the longest slice of a case in µs.
-    pub(super) fn slice_us(&self, problem: &Problem) -> u32 {
-        let slices = (self.shared.recipe.slices)(problem);
+    pub(crate) fn slice_us(&self, problem: &Problem) -> u32 {
+        let slices = (self.shared.engine.slices)(problem);
         let longest = slices.iter().map(ExactSizeIterator::len).max().unwrap_or(1);
         let part = longest as f64 / problem.motions.len().max(1) as f64;
         microseconds(problem.cost().seconds * part)
     }
 
     /// The bounds of the queue.
-    pub(super) fn queue_bounds(&self) -> QueueBounds {
+    pub(crate) fn queue_bounds(&self) -> QueueBounds {
         QueueBounds {
             all: self.shared.options.queue_max,
             tenant: self.shared.options.tenant_queue_max,
@@ -142,7 +143,7 @@ impl Jobs {
     }
 
     /// Why there is no room.
-    pub(super) fn refused(&self, refusal: Refusal) -> JobsError {
+    pub(crate) fn refused(&self, refusal: Refusal) -> JobsError {
         let bounds = self.queue_bounds();
         match refusal {
             Refusal::Quota => JobsError::QuotaExceeded {
@@ -166,17 +167,17 @@ impl Jobs {
 }
 
 /// The names of outputs as a JSON list.
-pub(super) fn outputs_text(outputs: &[Output]) -> String {
+pub(crate) fn outputs_text(outputs: &[Output]) -> String {
     serde_json::to_string(outputs).unwrap_or_default()
 }
 
 /// Expected solve time in µs.
-pub(super) fn cost_us(problem: &Problem) -> u32 {
+pub(crate) fn cost_us(problem: &Problem) -> u32 {
     microseconds(problem.cost().seconds)
 }
 
 /// A time in s as µs, at least 1.
-pub(super) fn microseconds(seconds: f64) -> u32 {
+pub(crate) fn microseconds(seconds: f64) -> u32 {
     let microseconds = (seconds * 1e6).clamp(1.0, f64::from(i32::MAX));
     #[expect(
         clippy::cast_possible_truncation,
@@ -186,9 +187,4 @@ pub(super) fn microseconds(seconds: f64) -> u32 {
     {
         microseconds as u32
     }
-}
-
-/// The time of submission is the one inside the id, so that order by id is order by time.
-pub(super) fn created_at(id: Uuid) -> i64 {
-    i64::try_from(id.as_u128() >> 80).unwrap_or(0)
 }

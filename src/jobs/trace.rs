@@ -5,26 +5,23 @@
 
 use std::collections::HashMap;
 use std::sync::Arc;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::SystemTime;
 
 use opentelemetry::global::{BoxedTracer, ObjectSafeTracer};
 use opentelemetry::propagation::TextMapPropagator;
 use opentelemetry::trace::{Span, SpanKind, Status, TraceContextExt, Tracer as _};
 use opentelemetry::{Context, KeyValue};
 use opentelemetry_sdk::propagation::TraceContextPropagator;
-use uuid::Uuid;
 
-use crate::jobs::solver_thread::Outcome;
-use crate::jobs::store::Claim;
-use crate::jobs::submit::created_at;
-use crate::jobs::{Jobs, JobsError, Shared};
+use crate::jobs::error::JobsError;
 
-const TRACEPARENT: &str = "traceparent";
+pub(crate) const TRACEPARENT: &str = "traceparent";
+
 const TRACESTATE: &str = "tracestate";
 
 /// Makes spans for those who collect them; clones share it.
 #[derive(Debug, Clone)]
-pub struct Tracer(Arc<BoxedTracer>);
+pub struct Tracer(pub(crate) Arc<BoxedTracer>);
 
 impl Tracer {
     /// Spans go where this tracer of OpenTelemetry sends them.
@@ -55,7 +52,7 @@ impl Tracer {
     }
 
     /// Writes down a span that is over.
-    fn past(
+    pub(crate) fn past(
         &self,
         name: &'static str,
         parent: &Context,
@@ -74,11 +71,11 @@ impl Tracer {
 }
 
 /// The span of a submission; without a tracer it is none.
-pub(super) struct Submitting(Option<Context>);
+pub(crate) struct SubmitSpan(pub(crate) Option<Context>);
 
-impl Submitting {
+impl SubmitSpan {
     /// What is written to the rows of the jobs; `None` if the trace is not collected.
-    pub(super) fn traceparent(&self) -> Option<Arc<str>> {
+    pub(crate) fn traceparent(&self) -> Option<Arc<str>> {
         let context = self.0.as_ref()?;
         if !context.span().span_context().is_sampled() {
             return None;
@@ -89,7 +86,7 @@ impl Submitting {
     }
 
     /// Ends the span with what became of it.
-    pub(super) fn end<T>(
+    pub(crate) fn end<T>(
         self,
         submitted: Result<T, JobsError>,
         tell: impl FnOnce(&T) -> Vec<KeyValue>,
@@ -103,106 +100,5 @@ impl Submitting {
             span.end();
         }
         submitted
-    }
-}
-
-impl Jobs {
-    /// What makes the spans, if somebody collects them.
-    #[must_use]
-    pub fn tracer(&self) -> Option<&Tracer> {
-        self.shared.options.tracer.as_ref()
-    }
-
-    /// Begins the span of a submission, inside the span of the request.
-    pub(super) fn submitting(&self) -> Submitting {
-        Submitting(self.tracer().map(|tracer| {
-            let parent = Context::current();
-            let span = tracer.0.start_with_context("submit", &parent);
-            parent.with_span(span)
-        }))
-    }
-}
-
-impl Shared {
-    /// The trace to which an attempt at a job belongs, if it is collected.
-    pub(super) fn traced(&self, claim: &Claim) -> Option<Traced> {
-        let tracer = self.options.tracer.clone()?;
-        let traceparent = claim.traceparent.clone()?;
-        let headers = HashMap::from([(TRACEPARENT.to_owned(), traceparent)]);
-        Some(Traced {
-            parent: TraceContextPropagator::new().extract_with_context(&Context::new(), &headers),
-            tracer,
-            job: claim.id,
-            attempt: claim.attempt,
-            method: claim.method.clone(),
-        })
-    }
-}
-
-/// An attempt at a job whose trace is collected.
-#[derive(Debug, Clone)]
-pub(super) struct Traced {
-    tracer: Tracer,
-    parent: Context,
-    job: Uuid,
-    attempt: u32,
-    method: String,
-}
-
-impl Traced {
-    /// Solves a case and writes down how long it had waited and how long it took.
-    pub(super) fn solving(
-        traced: Option<&Traced>,
-        comes_from_queue: bool,
-        solve: impl FnOnce() -> Outcome,
-    ) -> Outcome {
-        let Some(traced) = traced else {
-            return solve();
-        };
-        let from = SystemTime::now();
-        if comes_from_queue {
-            traced.waited_until(from);
-        }
-        let outcome = solve();
-        let fault = match &outcome {
-            Outcome::Solved { .. } | Outcome::Slice { .. } => None,
-            Outcome::Unsolved(error) => Some(error.to_string()),
-            Outcome::Refused(error) => Some(error.to_string()),
-            Outcome::Broken(failure) => Some(failure.detail.clone()),
-            Outcome::Abandoned => Some("the solver did not stop".to_owned()),
-        };
-        let method = KeyValue::new("railhead.method", traced.method.clone());
-        traced.past("solve", [from, SystemTime::now()], vec![method], fault);
-        outcome
-    }
-
-    /// Writes down how long a job has waited.
-    pub(super) fn waited_until(&self, end: SystemTime) {
-        let queued = Duration::from_millis(created_at(self.job).unsigned_abs());
-        // The clock may have been set back since.
-        let queued = (UNIX_EPOCH + queued).min(end);
-        self.past("queue", [queued, end], Vec::new(), None);
-    }
-
-    /// Writes down how long the end of a job took to store, and what it was.
-    pub(super) fn stored(&self, from: SystemTime, end: &'static str) {
-        let end = KeyValue::new("railhead.job.state", end);
-        self.past("store", [from, SystemTime::now()], vec![end], None);
-    }
-
-    fn past(
-        &self,
-        name: &'static str,
-        times: [SystemTime; 2],
-        mut attributes: Vec<KeyValue>,
-        fault: Option<String>,
-    ) {
-        attributes.push(KeyValue::new("railhead.job.id", self.job.to_string()));
-        attributes.push(KeyValue::new(
-            "railhead.job.attempt",
-            i64::from(self.attempt),
-        ));
-        self.tracer
-            .past(name, &self.parent, times, attributes, fault);
     }
 }

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use railhead::contact;
 use railhead::http::{HttpOptions, Peer};
-use railhead::jobs::keys::Keyring;
+use railhead::jobs::keys::keyring::Keyring;
 use railhead::jobs::{Jobs, Options};
 use reqwest::Method;
 use serde_json::{Value, json};

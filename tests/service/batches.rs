@@ -8,7 +8,7 @@ use railhead::jobs::Options;
 use reqwest::Method;
 use serde_json::{Value, json};
 
-use railhead::jobs::store::QueueBounds;
+use railhead::jobs::store::types::QueueBounds;
 
 use crate::errors::assert_problem;
 use crate::server::{Answer, Server, Setup};
@@ -367,7 +367,7 @@ async fn a_batch_outlives_two_kills_and_every_case_is_answered_once() {
 #[tokio::test]
 async fn jobs_of_a_group_that_died_are_retried_alone_and_uncounted() {
     use crate::store::claim_up_to;
-    use railhead::jobs::store::sqlite::SqliteStore;
+    use railhead::jobs::store::sqlite::database::SqliteStore;
     let folder = tempfile::tempdir().unwrap();
     let store = SqliteStore::open(&folder.path().join("jobs.db"))
         .await
@@ -402,8 +402,8 @@ async fn jobs_of_a_group_that_died_are_retried_alone_and_uncounted() {
 
 #[tokio::test]
 async fn an_incomplete_batch_is_gone_after_a_restart() {
-    use railhead::jobs::store::sqlite::SqliteStore;
-    use railhead::jobs::store::{Begun, NewBatch};
+    use railhead::jobs::store::sqlite::database::SqliteStore;
+    use railhead::jobs::store::types::{BatchBegun, NewBatch};
     let folder = tempfile::tempdir().unwrap();
     let store = SqliteStore::open(&folder.path().join("jobs.db"))
         .await
@@ -419,7 +419,7 @@ async fn an_incomplete_batch_is_gone_after_a_restart() {
     };
     let living = HashSet::new();
     let begun = store.begin_batch(&new, &living, QueueBounds::NONE).await;
-    assert_eq!(begun.unwrap(), Begun::Created);
+    assert_eq!(begun.unwrap(), BatchBegun::Created);
     let job = crate::store::new_job();
     let id = job.id;
     store.enqueue_many(new.id, &[(0, job)]).await.unwrap();

@@ -223,7 +223,7 @@ async fn a_batch_is_answered_from_earlier_results() {
 }
 
 /// Sends a batch and returns its lines once all have ended.
-async fn batch_lines(server: &Server, cases: &[Value], fresh: bool) -> Vec<Value> {
+async fn batch_items(server: &Server, cases: &[Value], fresh: bool) -> Vec<Value> {
     let shape = |request: RequestBuilder| match fresh {
         true => request.header("cache-control", "no-cache").json(cases),
         false => request.json(cases),
@@ -247,7 +247,7 @@ async fn of_identical_cases_in_one_batch_one_is_solved() {
             case
         })
         .collect();
-    let lines = batch_lines(&server, &cases, false).await;
+    let lines = batch_items(&server, &cases, false).await;
     assert_eq!(solves.load(Ordering::SeqCst), 2);
     for (index, line) in lines.iter().enumerate() {
         assert_eq!(line["state"], "succeeded", "{line}");
@@ -257,7 +257,7 @@ async fn of_identical_cases_in_one_batch_one_is_solved() {
             bare(&lines[index % 2]["result"])["total"]
         );
     }
-    batch_lines(&server, &cases[..10], true).await;
+    batch_items(&server, &cases[..10], true).await;
     assert_eq!(solves.load(Ordering::SeqCst), 12, "no-cache is kept to");
 }
 
@@ -272,7 +272,7 @@ async fn identical_cases_that_fail_all_say_why() {
         })
         .start()
         .await;
-    let lines = batch_lines(&server, &vec![case("hopeless"); 100], false).await;
+    let lines = batch_items(&server, &vec![case("hopeless"); 100], false).await;
     for line in &lines {
         assert_eq!(
             line["error"]["type"], "/problems/out-of-time",

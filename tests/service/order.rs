@@ -7,8 +7,8 @@ use std::time::Duration;
 use railhead::contact;
 use railhead::jobs::State;
 use railhead::jobs::clock::Clock;
-use railhead::jobs::store::NewJob;
-use railhead::jobs::wishes::{Priority, Wishes};
+use railhead::jobs::store::types::NewJob;
+use railhead::jobs::submit_options::{Priority, SubmitOptions};
 use reqwest::{Method, RequestBuilder};
 use serde_json::{Value, json};
 
@@ -23,9 +23,9 @@ const DAY_MS: i64 = 24 * 3600 * 1000;
 fn wishing(tenant: &str, priority: Priority) -> NewJob {
     NewJob {
         tenant: tenant.into(),
-        wishes: Wishes {
+        options: SubmitOptions {
             priority,
-            ..Wishes::default()
+            ..SubmitOptions::default()
         },
         ..new_job()
     }

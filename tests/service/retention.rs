@@ -7,12 +7,12 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use railhead::jobs::clock::Clock;
-use railhead::jobs::store::NewJob;
-use railhead::jobs::store::sqlite::SqliteStore;
+use railhead::jobs::store::sqlite::database::SqliteStore;
+use railhead::jobs::store::types::NewJob;
 use railhead::jobs::{Jobs, JobsError, Options};
 use serde_json::{Value, json};
 
-use railhead::jobs::store::QueueBounds;
+use railhead::jobs::store::types::QueueBounds;
 
 use crate::errors::assert_problem;
 use crate::results::path_of;

@@ -9,7 +9,7 @@ use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Monitor;
 use railhead::contact::solution::words::{Fields, Solution};
 use railhead::http::{HttpOptions, router};
-use railhead::jobs::recipe::Recipe;
+use railhead::jobs::engine::Engine;
 use railhead::jobs::{Jobs, Options};
 use reqwest::header::HeaderMap;
 use reqwest::{Method, RequestBuilder};
@@ -31,7 +31,7 @@ pub struct Server {
 pub struct Setup {
     pub options: Options,
     pub http: HttpOptions,
-    pub recipe: Recipe,
+    pub recipe: Engine,
     /// Without workers every job stays queued.
     pub working: bool,
     folder: TempDir,
@@ -55,7 +55,7 @@ impl Setup {
         Setup {
             options: Options::new(folder.path()),
             http: HttpOptions::default(),
-            recipe: Recipe::contact(),
+            recipe: Engine::contact(),
             working: true,
             folder,
         }

@@ -6,7 +6,7 @@ use std::time::Duration;
 use railhead::contact::case::problem::Problem;
 use railhead::contact::monitor::Monitor;
 use railhead::contact::solve;
-use railhead::jobs::store::sqlite::SqliteStore;
+use railhead::jobs::store::sqlite::database::SqliteStore;
 use railhead::jobs::{FailureKind, Jobs, JobsError, Options, State};
 use reqwest::Method;
 use sqlx::Connection;

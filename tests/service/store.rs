@@ -6,12 +6,12 @@ use bytes::Bytes;
 use railhead::contact::remark::entry::RemarkEntry;
 use railhead::contact::remark::list::Remark;
 use railhead::jobs::store::list::Filter;
-use railhead::jobs::store::sqlite::SqliteStore;
-use railhead::jobs::store::{
-    Claim, ClaimRequest, Deleted, Ending, Enqueued, NewJob, Placed, QueueBounds, Release, Renewal,
-    Which,
+use railhead::jobs::store::sqlite::database::SqliteStore;
+use railhead::jobs::store::types::{
+    Claim, ClaimKind, ClaimRequest, Deleted, Ending, Enqueued, NewJob, QueueBounds, ReleaseReason,
+    Renewal, StoredResult,
 };
-use railhead::jobs::wishes::Wishes;
+use railhead::jobs::submit_options::SubmitOptions;
 use railhead::jobs::{Failure, FailureKind, Job, State};
 use tempfile::TempDir;
 use uuid::Uuid;
@@ -59,7 +59,7 @@ impl Table {
 
     /// Hands one job back; its new state.
     async fn release(&self, claim: &Claim, now: i64) -> Option<State> {
-        let why = Release::NotBegun;
+        let why = ReleaseReason::NotBegun;
         let released = self
             .store
             .release(std::slice::from_ref(claim), why, now)
@@ -88,7 +88,7 @@ pub async fn claim_up_to(store: &SqliteStore, now: i64, lease_ms: i64, jobs: usi
             tenant,
             jobs,
             cost_us: 1_000_000,
-            which: Which::New,
+            kind: ClaimKind::New,
             each_slice_us: None,
             workers: 1,
             lease_until: now + lease_ms,
@@ -133,11 +133,11 @@ pub fn new_job() -> NewJob {
         outputs: "[]".to_owned(),
         cost_us: 1000,
         slice_us: 1000,
-        reuse_key: None,
+        cache_key: None,
         source: None,
         idempotency: None,
         traceparent: None,
-        wishes: Wishes::default(),
+        options: SubmitOptions::default(),
     }
 }
 
@@ -155,7 +155,7 @@ fn remark() -> RemarkEntry {
 pub fn success() -> Ending {
     Ending::Succeeded {
         remarks: vec![remark()],
-        result: Placed::Folder("results/1".to_owned(), 10),
+        result: StoredResult::Blob("results/1".to_owned(), 10),
         field_patches: 2,
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use railhead::jobs::store::{Enqueued, NewJob, QueueBounds};
+use railhead::jobs::store::types::{Enqueued, NewJob, QueueBounds};
 
 use crate::store::{Table, new_job};
 

@@ -1,7 +1,7 @@
 //! Do lists of jobs show every job once, whatever the filter and whatever happens meanwhile?
 
-use railhead::jobs::store::NewJob;
 use railhead::jobs::store::list::Filter;
+use railhead::jobs::store::types::NewJob;
 use railhead::jobs::{JobsError, State};
 use serde_json::{Value, json};
 use uuid::Uuid;

@@ -5,10 +5,12 @@ use std::collections::BTreeMap;
 use bytes::Bytes;
 use proptest::prelude::*;
 use railhead::jobs::State;
-use railhead::jobs::store::QueueBounds;
-use railhead::jobs::store::sqlite::SqliteStore;
-use railhead::jobs::store::{Claim, Deleted, Ending, NewJob, Placed, Release, Renewal};
-use railhead::jobs::wishes::Wishes;
+use railhead::jobs::store::sqlite::database::SqliteStore;
+use railhead::jobs::store::types::QueueBounds;
+use railhead::jobs::store::types::{
+    Claim, Deleted, Ending, NewJob, ReleaseReason, Renewal, StoredResult,
+};
+use railhead::jobs::submit_options::SubmitOptions;
 use uuid::Uuid;
 
 use crate::store::{claim_up_to, finish_one};
@@ -105,11 +107,11 @@ impl Pair {
             outputs: "[]".to_owned(),
             cost_us: 1000,
             slice_us: 1000,
-            reuse_key: None,
+            cache_key: None,
             source: None,
             idempotency: None,
             traceparent: None,
-            wishes: Wishes::default(),
+            options: SubmitOptions::default(),
         };
         self.store.enqueue(&new, QueueBounds::NONE).await.unwrap();
         self.ids.push(id);
@@ -184,7 +186,7 @@ impl Pair {
         let ending = if well {
             Ending::Succeeded {
                 remarks: Vec::new(),
-                result: Placed::Folder("k".to_owned(), 1),
+                result: StoredResult::Blob("k".to_owned(), 1),
                 field_patches: 0,
             }
         } else {
@@ -206,7 +208,7 @@ impl Pair {
         let claims = std::slice::from_ref(&claim);
         let released = self
             .store
-            .release(claims, Release::NotBegun, self.now)
+            .release(claims, ReleaseReason::NotBegun, self.now)
             .await;
         let state = released.unwrap().first().map(|(_, state)| *state);
         let expected = self.held(&claim).map(|row| {

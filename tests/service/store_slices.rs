@@ -4,11 +4,13 @@ use std::collections::HashSet;
 use std::time::Duration;
 
 use bytes::Bytes;
-use railhead::jobs::results::Encoded;
-use railhead::jobs::store::sqlite::SqliteStore;
-use railhead::jobs::store::sqlite::deadlines::Moment;
-use railhead::jobs::store::{Claim, ClaimRequest, Ending, NewSlice, Placed, Release, Which};
-use railhead::jobs::sweep::SliceNote;
+use railhead::jobs::codec::result::EncodedResult;
+use railhead::jobs::store::sqlite::database::SqliteStore;
+use railhead::jobs::store::types::Moment;
+use railhead::jobs::store::types::SliceRecord;
+use railhead::jobs::store::types::{
+    Claim, ClaimKind, ClaimRequest, Ending, NewSlice, ReleaseReason, StoredResult,
+};
 use railhead::jobs::{Failure, State};
 
 use crate::store::{Table, claim_up_to, new_job, success};
@@ -18,7 +20,7 @@ async fn claim_begun(store: &SqliteStore, now: i64) -> Option<Claim> {
     let request = ClaimRequest {
         worker: "w",
         tenant: "anonymous",
-        which: Which::Begun,
+        kind: ClaimKind::Begun,
         jobs: 1,
         cost_us: 1_000_000,
         each_slice_us: None,
@@ -41,15 +43,15 @@ async fn other_writer(table: &Table) -> sqlx::SqlitePool {
 
 fn slice(number: u32, key: Option<&str>) -> NewSlice {
     NewSlice {
-        note: SliceNote {
+        note: SliceRecord {
             number,
             motions: 2 * (number + 1),
             digest: "d".to_owned(),
             spent: Duration::from_secs(u64::from(number) + 1),
         },
         result: match key {
-            Some(key) => Placed::Folder(key.to_owned(), 7),
-            None => Placed::Table(Encoded {
+            Some(key) => StoredResult::Blob(key.to_owned(), 7),
+            None => StoredResult::Inline(EncodedResult {
                 solution: Bytes::from_static(b"{}"),
                 fields: None,
             }),
@@ -77,7 +79,7 @@ async fn a_stored_slice_is_fenced_and_stored_once_and_begins_the_count_of_attemp
     assert!(store.add_slice(&old, &slice(1, None)).await.unwrap());
     let job = store.get(id).await.unwrap().unwrap();
     assert_eq!((job.attempt, job.progress), (1, 0.5));
-    let why = Release::NotBegun;
+    let why = ReleaseReason::NotBegun;
     store
         .release(std::slice::from_ref(&old), why, 3)
         .await
@@ -131,12 +133,18 @@ async fn whatever_ends_a_job_releases_its_slices() {
             "failed" => drop(table.finish(&claim, &lost(), 1).await.unwrap()),
             "cancelled" => drop(table.finish(&claim, &Ending::Cancelled, 1).await.unwrap()),
             "cancelled queued" => {
-                store.release(&[claim], Release::NotBegun, 1).await.unwrap();
+                store
+                    .release(&[claim], ReleaseReason::NotBegun, 1)
+                    .await
+                    .unwrap();
                 store.cancel(id, 2).await.unwrap();
             }
             "reaped" => drop(store.reap_dead(1, 1).await.unwrap()),
             _ => {
-                store.release(&[claim], Release::NotBegun, 1).await.unwrap();
+                store
+                    .release(&[claim], ReleaseReason::NotBegun, 1)
+                    .await
+                    .unwrap();
                 sqlx::query("UPDATE jobs SET deadline = 5")
                     .execute(&other_writer(&table).await)
                     .await

@@ -12,7 +12,7 @@ use railhead::contact::case::problem::Problem;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Monitor;
 use railhead::contact::solution::words::{Fields, Solution};
-use railhead::jobs::recipe::Recipe;
+use railhead::jobs::engine::Engine;
 use railhead::jobs::{Jobs, Options};
 use reqwest::{Method, RequestBuilder};
 use serde_json::{Value, json};
@@ -45,7 +45,7 @@ pub async fn open<F>(options: Options, solve: F) -> Jobs
 where
     F: Fn(&Problem, &dyn Monitor) -> Result<(Solution, Fields), SolveError> + Send + Sync + 'static,
 {
-    let recipe = Recipe::contact().solving(solve);
+    let recipe = Engine::contact().solving(solve);
     let options = Options {
         cache: false,
         ..options

@@ -8,8 +8,8 @@ use railhead::contact;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::{Monitor, Unmonitored};
 use railhead::contact::solution::words::{PatchFields, Solution};
-use railhead::jobs::recipe::Recipe;
-use railhead::jobs::store::sqlite::SqliteStore;
+use railhead::jobs::engine::Engine;
+use railhead::jobs::store::sqlite::database::SqliteStore;
 use railhead::jobs::{FailureKind, Jobs, Options, State};
 use reqwest::Method;
 use serde_json::{Value, json};
@@ -49,9 +49,9 @@ impl Shop {
 
     /// Opens the service, once more if it was open before.
     async fn open(&self, change: impl FnOnce(&mut Options)) -> Jobs {
-        let real = Recipe::contact();
+        let real = Engine::contact();
         let (solved, go) = (self.solved.clone(), self.let_go.clone());
-        let recipe = Recipe {
+        let recipe = Engine {
             slices: Arc::new(|problem| {
                 let motions = problem.motions.len();
                 let cuts = (0..motions).step_by(2);
@@ -69,7 +69,7 @@ impl Shop {
                 solved.fetch_add(1, Ordering::SeqCst);
                 Ok(answer)
             }),
-            ..Recipe::contact()
+            ..Engine::contact()
         };
         let mut options = Options {
             slice: Duration::from_millis(10),
@@ -179,11 +179,11 @@ async fn a_sweep_that_ends_before_its_time_leaves_no_parts() {
     let jobs = shop.open(|_| {}).await;
     jobs.start().unwrap();
     for ends_by_itself in [false, true] {
-        let wishes = railhead::jobs::wishes::Wishes {
+        let options = railhead::jobs::submit_options::SubmitOptions {
             ends_within: ends_by_itself.then_some(Duration::from_secs(1)),
             ..Default::default()
         };
-        let submitted = jobs.submit_with(sweep("held", 11), None, wishes).await;
+        let submitted = jobs.submit_with(sweep("held", 11), None, options).await;
         let id = submitted.unwrap().0.id;
         if !ends_by_itself {
             until_slices(&jobs, id, 0.3).await;

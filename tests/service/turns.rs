@@ -7,7 +7,7 @@ use std::time::Duration;
 use railhead::contact::case::problem::Problem;
 use railhead::contact::monitor::Monitor;
 use railhead::contact::solve;
-use railhead::jobs::store::{QueueBounds, Release, Which};
+use railhead::jobs::store::types::{ClaimKind, QueueBounds, ReleaseReason};
 use railhead::jobs::{Jobs, Options, State};
 use serde_json::json;
 
@@ -197,7 +197,7 @@ async fn a_suspect_is_solved_while_nothing_else_is() {
     let shop = shop(|options| options.workers = 3).await;
     let jobs = &shop.jobs;
     let folder = shop._folder.path().join("jobs.db");
-    let store = railhead::jobs::store::sqlite::SqliteStore::open(&folder)
+    let store = railhead::jobs::store::sqlite::database::SqliteStore::open(&folder)
         .await
         .unwrap();
     let mut ids = Vec::new();
@@ -233,19 +233,19 @@ async fn a_job_that_was_longer_than_thought_is_known_as_long() {
     let store = &table.store;
     let id = table.add(new_job()).await.id;
     let claims = claim_up_to(store, 0, 1000, 1).await;
-    let long = Release::Long {
+    let long = ReleaseReason::Long {
         slice_us: 5_000_000,
     };
     assert_eq!(
         store.release(&claims, long, 1).await.unwrap(),
         [(id, State::Queued)]
     );
-    let request = |each_slice_us| railhead::jobs::store::ClaimRequest {
+    let request = |each_slice_us| railhead::jobs::store::types::ClaimRequest {
         worker: "w",
         tenant: "anonymous",
         jobs: 8,
         cost_us: 200_000,
-        which: Which::New,
+        kind: ClaimKind::New,
         each_slice_us,
         workers: 1,
         lease_until: 1000,
@@ -317,12 +317,12 @@ async fn a_clock_that_is_set_forward_makes_nothing_late_or_old() {
         jobs.wait(old, AT_MOST).await.unwrap().state,
         State::Succeeded
     );
-    let wishes = railhead::jobs::wishes::Wishes {
+    let options = railhead::jobs::submit_options::SubmitOptions {
         ends_within: Some(Duration::from_secs(1800)),
         ..Default::default()
     };
     let long = jobs
-        .submit_with(case("long"), None, wishes)
+        .submit_with(case("long"), None, options)
         .await
         .unwrap()
         .0

@@ -8,8 +8,8 @@ use utoipa::ToSchema;
 use crate::contact::case::words::Case;
 use crate::http::dto::job::rfc3339;
 use crate::http::dto::problem::Fault;
-use crate::jobs::batch::Batch;
-use crate::jobs::job::State as JobState;
+use crate::jobs::batch::model::Batch;
+use crate::jobs::model::State as JobState;
 
 /// The cases of a batch.
 #[derive(ToSchema)]

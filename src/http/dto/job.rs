@@ -10,8 +10,8 @@ use crate::contact::remark::entry::RemarkEntry;
 use crate::http::dto::problem::ProblemBody;
 use crate::http::dto::result::JobResult;
 use crate::http::problem::error::ApiError;
-use crate::jobs::job::{Job, QueuePlace, State as JobState};
-use crate::jobs::wishes::Priority;
+use crate::jobs::model::{Job, QueuePlace, State as JobState};
+use crate::jobs::submit_options::Priority;
 
 /// A job as the client sees it. Times are RFC 3339 in UTC with milliseconds.
 #[derive(Debug, Serialize, ToSchema)]

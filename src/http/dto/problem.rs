@@ -4,7 +4,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::http::problem::kinds::ProblemKind;
-use crate::jobs::job::{Failure, FailureKind, Job};
+use crate::jobs::model::{Failure, FailureKind, Job};
 
 /// A failure as the client reads it (RFC 9457).
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]

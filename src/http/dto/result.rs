@@ -10,7 +10,7 @@ use uuid::Uuid;
 use crate::contact::case::words::Output;
 use crate::contact::solution::words::Solution;
 use crate::http::problem::error::ApiError;
-use crate::jobs::fetch::Answer;
+use crate::jobs::results::FetchedResult;
 
 /// The result of a job: the solution without its fields, and where to get those.
 #[derive(Debug, Serialize, ToSchema)]
@@ -28,7 +28,7 @@ impl JobResult {
     ///
     /// # Errors
     /// The stored solution is no object.
-    pub fn text(id: Uuid, answer: &Answer) -> Result<[Bytes; 2], ApiError> {
+    pub fn text(id: Uuid, answer: &FetchedResult) -> Result<[Bytes; 2], ApiError> {
         // An object that is continued: the closing brace makes way.
         if !answer.solution.ends_with(b"}") {
             return Err(ApiError::internal(&format!(

@@ -5,7 +5,7 @@ use std::time::Duration;
 use axum::http::{HeaderMap, header};
 
 use crate::http::extract::query::{query, reader, seconds};
-use crate::jobs::wishes::{Priority, Wishes};
+use crate::jobs::submit_options::{Priority, SubmitOptions};
 
 /// Longest deadline in s: 30 days.
 const DEADLINE_MAX_SECONDS: u32 = 30 * 24 * 3600;
@@ -25,13 +25,13 @@ query! {
 impl SubmitQuery {
     /// The options of a submission with these headers.
     #[must_use]
-    pub fn options(self, headers: &HeaderMap) -> Wishes {
-        Wishes {
+    pub fn options(self, headers: &HeaderMap) -> SubmitOptions {
+        SubmitOptions {
             priority: self.priority.unwrap_or_default(),
             ends_within: self
                 .deadline_s
                 .map(|seconds| Duration::from_secs(seconds.into())),
-            fresh: wants_fresh(headers),
+            bypass_cache: wants_fresh(headers),
         }
     }
 }

@@ -8,9 +8,9 @@ use axum::response::{IntoResponse, Response};
 use crate::contact::error::CaseError;
 use crate::http::dto::problem::{Fault, ProblemBody};
 use crate::http::problem::kinds::ProblemKind;
-use crate::jobs::Trouble;
+use crate::jobs::StorageFault;
 use crate::jobs::error::JobsError;
-use crate::jobs::job::{Job, State};
+use crate::jobs::model::{Job, State};
 
 /// Content type of every failure.
 pub const PROBLEM_JSON: &str = "application/problem+json";
@@ -230,7 +230,7 @@ impl From<JobsError> for ApiError {
                 ProblemKind::Draining,
                 "the service is shutting down and takes no new jobs",
             ),
-            other => match other.trouble() {
+            other => match other.storage_fault() {
                 Some(trouble) => troubled(trouble, &other),
                 None => ApiError::internal(&other),
             },
@@ -239,11 +239,11 @@ impl From<JobsError> for ApiError {
 }
 
 /// The disk cannot be written; the log has the message of the system.
-fn troubled(trouble: Trouble, reason: &JobsError) -> ApiError {
+fn troubled(trouble: StorageFault, reason: &JobsError) -> ApiError {
     tracing::warn!(%reason, "a request failed for want of a disk");
     let (kind, what) = match trouble {
-        Trouble::Full => (ProblemKind::StorageFull, "the disk of the service is full"),
-        Trouble::Unwritable => (
+        StorageFault::Full => (ProblemKind::StorageFull, "the disk of the service is full"),
+        StorageFault::Unwritable => (
             ProblemKind::StorageUnwritable,
             "the disk of the service cannot be written at the moment",
         ),

@@ -30,9 +30,9 @@ use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::http::render::csv::number;
 use crate::jobs::Jobs;
-use crate::jobs::batch::{Line, LineResult};
+use crate::jobs::batch::model::{BatchItem, ItemResult};
 use crate::jobs::error::JobsError;
-use crate::jobs::job::State as JobState;
+use crate::jobs::model::State as JobState;
 
 /// Longest time results are waited for, in s.
 const WAIT_MAX_SECONDS: u32 = 3600;
@@ -167,7 +167,7 @@ async fn next_piece(
     }
     let lines = place
         .jobs
-        .batch_lines(place.batch, place.after, place.page, place.until);
+        .batch_items(place.batch, place.after, place.page, place.until);
     let lines = tokio::select! {
         lines = lines => lines?,
         // Broken off, so that what was sent is not taken for all there is.
@@ -203,7 +203,7 @@ struct Front<'a> {
 }
 
 /// Writes lines of NDJSON. A stored solution is passed on as it is, without reading it.
-fn write_ndjson(lines: &[Line]) -> Result<Vec<u8>, JobsError> {
+fn write_ndjson(lines: &[BatchItem]) -> Result<Vec<u8>, JobsError> {
     let mut out = Vec::with_capacity(lines.len() * 2048);
     for line in lines {
         let job = &line.job;
@@ -216,7 +216,7 @@ fn write_ndjson(lines: &[Line]) -> Result<Vec<u8>, JobsError> {
             error: error_of(line),
         };
         write_json(&mut out, &front)?;
-        if let Some(LineResult::Solution(solution)) = &line.result {
+        if let Some(ItemResult::Solution(solution)) = &line.result {
             // Both are objects that are continued: the closing brace makes way.
             out.pop();
             out.extend_from_slice(b",\"result\":");
@@ -242,24 +242,24 @@ fn write_json<T: Serialize>(out: &mut Vec<u8>, value: &T) -> Result<(), JobsErro
 const UNREADABLE: &str = "the stored result cannot be read";
 
 /// Why a line has no result although its job has ended.
-fn error_of(line: &Line) -> Option<ProblemBody> {
+fn error_of(line: &BatchItem) -> Option<ProblemBody> {
     let job = &line.job;
     let mut problem = match &line.result {
-        None | Some(LineResult::Solution(_)) => {
+        None | Some(ItemResult::Solution(_)) => {
             let failure = job.failure.as_ref()?;
             return Some(ProblemBody::of_job(job, failure));
         }
-        Some(LineResult::Gone) => ProblemBody::new(
+        Some(ItemResult::Gone) => ProblemBody::new(
             ProblemKind::Expired,
             "the job was removed with its result while the results were read",
         ),
-        Some(LineResult::Unreadable) => ProblemBody::new(ProblemKind::Internal, UNREADABLE),
+        Some(ItemResult::Unreadable) => ProblemBody::new(ProblemKind::Internal, UNREADABLE),
     };
     problem.instance = Some(format!("/v1/jobs/{}", job.id));
     Some(problem)
 }
 
-fn outputs(line: &Line) -> Vec<String> {
+fn outputs(line: &BatchItem) -> Vec<String> {
     serde_json::from_str(&line.outputs).unwrap_or_default()
 }
 
@@ -289,7 +289,7 @@ fn csv_head() -> String {
 }
 
 /// Writes lines of CSV, without the header.
-fn write_csv(lines: &[Line]) -> Result<Vec<u8>, JobsError> {
+fn write_csv(lines: &[BatchItem]) -> Result<Vec<u8>, JobsError> {
     let damaged = |error: &dyn std::fmt::Display| JobsError::Damaged(error.to_string());
     let mut out = csv::Writer::from_writer(Vec::new());
     for line in lines {
@@ -301,7 +301,7 @@ fn write_csv(lines: &[Line]) -> Result<Vec<u8>, JobsError> {
             job.state.name().to_owned(),
         ];
         let solution = match &line.result {
-            Some(LineResult::Solution(text)) => serde_json::from_slice::<Solution>(text).ok(),
+            Some(ItemResult::Solution(text)) => serde_json::from_slice::<Solution>(text).ok(),
             _ => None,
         };
         let Some(solution) = solution else {

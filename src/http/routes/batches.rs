@@ -19,7 +19,7 @@ use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::http::routes::jobs::{idempotency_key, mark_replay};
-use crate::jobs::draft::Draft;
+use crate::jobs::batch::upload::BatchUpload;
 
 problems! {
     /// What `POST /v1/batches` can fail with.
@@ -82,10 +82,10 @@ pub async fn submit(
 ) -> Result<Response, ApiError> {
     let key = idempotency_key(request.headers())?;
     let (batch, submit) = <(BatchQuery, SubmitQuery)>::read(request.uri(), &())?;
-    let wishes = submit.options(request.headers());
+    let submit_options = submit.options(request.headers());
     let form = form(&jobs, request.headers(), batch.template).await?;
     let mut draft = read_draft(&jobs, &memory, &options, form, request).await?;
-    draft.wishes = wishes;
+    draft.options = submit_options;
     if draft.cases == draft.rejected || (draft.rejected > 0 && !batch.accept.unwrap_or(false)) {
         return Err(refusal(&draft));
     }
@@ -105,7 +105,7 @@ pub async fn submit(
 }
 
 /// Why a batch is not taken.
-fn refusal(draft: &Draft) -> ApiError {
+fn refusal(draft: &BatchUpload) -> ApiError {
     if draft.cases == 0 {
         return ApiError::new(ProblemKind::FaultyBatch, "the batch has no case");
     }
@@ -123,7 +123,7 @@ fn refusal(draft: &Draft) -> ApiError {
     )
 }
 
-fn faults(draft: &Draft) -> Vec<Fault> {
+fn faults(draft: &BatchUpload) -> Vec<Fault> {
     let cases = draft.faulty.iter();
     let faults = cases.flat_map(|case| {
         case.faults.iter().map(|fault| Fault {

@@ -31,7 +31,7 @@ use crate::http::problem::error::ApiError;
 use crate::http::routes::batches::GetBatchProblems;
 use crate::http::routes::jobs::GetProblems;
 use crate::jobs::Jobs;
-use crate::jobs::job::{Job, State as JobState};
+use crate::jobs::model::{Job, State as JobState};
 
 /// A comment is sent when nothing has happened for this long, so that no one in between closes the connection.
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
@@ -167,7 +167,7 @@ async fn next_of_job(
     id: Uuid,
     seen: Option<u64>,
 ) -> Option<(Result<Event, Infallible>, Option<Option<u64>>)> {
-    let job = changed(jobs.next_change(id, seen).await)?;
+    let job = changed(jobs.job_changed_since(id, seen).await)?;
     let event = event(&job.version.to_string(), &JobEvent::of(&job))?;
     let next = (!job.state.ended()).then_some(Some(job.version));
     Some((Ok(event), next))
@@ -204,7 +204,7 @@ pub async fn batch(
     let batch = jobs.batch(id).await?;
     let seen = last_event_id(&headers);
     let (ended, all) = batch.ended();
-    if ended == all && seen.as_deref() == Some(&batch.mark()) {
+    if ended == all && seen.as_deref() == Some(&batch.change_tag()) {
         return Ok(StatusCode::NO_CONTENT.into_response());
     }
     let place = crowds.stream(jobs.tenant())?;
@@ -223,8 +223,8 @@ async fn next_of_batch(
     id: Uuid,
     seen: Option<String>,
 ) -> Option<(Result<Event, Infallible>, Option<Option<String>>)> {
-    let batch = changed(jobs.next_change_of_batch(id, seen.as_deref()).await)?;
-    let (mark, (ended, all)) = (batch.mark(), batch.ended());
+    let batch = changed(jobs.batch_changed_since(id, seen.as_deref()).await)?;
+    let (mark, (ended, all)) = (batch.change_tag(), batch.ended());
     let event = event(&mark, &BatchAnswer::from(batch))?;
     Some((Ok(event), (ended < all).then_some(Some(mark))))
 }

@@ -25,7 +25,7 @@ use crate::http::limits::memory::Memory;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 use crate::http::routes::results::result_text;
-use crate::jobs::job::State as JobState;
+use crate::jobs::model::State as JobState;
 use crate::jobs::{Filter, PAGE_MAX};
 
 /// Longest time that `Prefer: wait` holds a request, in s.
@@ -103,8 +103,8 @@ pub async fn submit(
     let place =
         preferred_wait(&headers).and_then(|seconds| Some((seconds, crowds.wait(jobs.tenant())?)));
     let wait = place.as_ref().map(|(seconds, _)| *seconds);
-    let wishes = SubmitQuery::read(&uri, &())?.options(&headers);
-    let (mut job, replayed) = jobs.submit_with(value, key, wishes).await?;
+    let options = SubmitQuery::read(&uri, &())?.options(&headers);
+    let (mut job, replayed) = jobs.submit_with(value, key, options).await?;
     drop(room);
     let location = format!("/v1/jobs/{}", job.id);
     let mut result = None;
@@ -293,7 +293,7 @@ problems! {
     responses((status = 200, description = "The job", body = JobAnswer), GetProblems)
 )]
 pub async fn get(Caller(jobs): Caller, JobId(id): JobId) -> Result<Json<JobAnswer>, ApiError> {
-    Ok(Json(JobAnswer::new(jobs.look(id).await?)))
+    Ok(Json(JobAnswer::new(jobs.get_with_queue_place(id).await?)))
 }
 
 /// The case of a job, as it was submitted.

@@ -2,7 +2,7 @@
 
 use uuid::Uuid;
 
-use crate::jobs::job::{Job, State};
+use crate::jobs::model::{Job, State};
 
 /// Which jobs to list; everything left out does not restrict.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -32,14 +32,14 @@ impl Filter {
     /// The cursor that continues this list after the job `last`: 40 characters of `[0-9a-f]`.
     #[must_use]
     pub fn cursor_after(&self, last: Uuid) -> String {
-        format!("{}{}", last.simple(), self.mark())
+        format!("{}{}", last.simple(), self.change_tag())
     }
 
     /// The job after which `cursor` continues; `None` if it is not a cursor of this very filter.
     #[must_use]
     pub fn read_cursor(&self, cursor: &str) -> Option<Uuid> {
         let (id, mark) = cursor.split_at_checked(32)?;
-        if mark != self.mark() {
+        if mark != self.change_tag() {
             return None;
         }
         let id = Uuid::try_parse(id).ok()?;
@@ -48,17 +48,17 @@ impl Filter {
     }
 
     /// Smallest id a job of the filter can have: UUIDv7 begins with 48 bits of milliseconds.
-    pub(super) fn id_from(&self) -> Option<Uuid> {
+    pub(crate) fn id_from(&self) -> Option<Uuid> {
         self.created_after.map(first_id_at)
     }
 
     /// Smallest id that is too young for the filter.
-    pub(super) fn id_before(&self) -> Option<Uuid> {
+    pub(crate) fn id_before(&self) -> Option<Uuid> {
         self.created_before.map(first_id_at)
     }
 
     /// Eight hexadecimal digits that tell one filter from another.
-    fn mark(&self) -> String {
+    fn change_tag(&self) -> String {
         let mut hasher = blake3::Hasher::new();
         let parts = [
             self.state.map(|state| state.name().to_owned()),
@@ -79,7 +79,7 @@ impl Filter {
 }
 
 /// The smallest UUID whose leading 48 bits are the given time; times outside 48 bits are clamped.
-pub(super) fn first_id_at(epoch_ms: i64) -> Uuid {
+pub(crate) fn first_id_at(epoch_ms: i64) -> Uuid {
     let millis = u128::try_from(epoch_ms.clamp(0, (1 << 48) - 1)).unwrap_or(0);
     Uuid::from_u128(millis << 80)
 }
@@ -116,7 +116,7 @@ mod tests {
             label: Some((key.to_owned(), value.to_owned())),
             ..Filter::default()
         };
-        assert_ne!(with("ab", "c").mark(), with("a", "bc").mark());
+        assert_ne!(with("ab", "c").change_tag(), with("a", "bc").change_tag());
     }
 
     #[test]

@@ -19,7 +19,7 @@ use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::jobs::Jobs;
-use crate::jobs::draft::Draft;
+use crate::jobs::batch::upload::BatchUpload;
 
 /// Bytes per second of a batch at least, on average and after a head start of the time that a piece may take: otherwise
 /// one byte at a time could keep a connection and a file open for ever.
@@ -96,7 +96,7 @@ pub async fn read_draft(
     options: &HttpOptions,
     mut form: Form,
     request: Request<Body>,
-) -> Result<Draft, ApiError> {
+) -> Result<BatchUpload, ApiError> {
     let mut arriving = Arriving::new(options, request)?;
     let mut draft = jobs.draft()?;
     if let Form::Table(table) = &form {
@@ -213,7 +213,7 @@ impl Arriving<'_> {
     }
 }
 
-fn require_count(draft: &Draft, options: &HttpOptions) -> Result<(), ApiError> {
+fn require_count(draft: &BatchUpload, options: &HttpOptions) -> Result<(), ApiError> {
     if draft.cases <= options.batch_max_cases {
         return Ok(());
     }
@@ -238,10 +238,10 @@ impl Checking<'_> {
     /// Checks some cases, in their turn.
     async fn check(
         &self,
-        mut draft: Draft,
+        mut draft: BatchUpload,
         mut form: Form,
         portion: Vec<Element>,
-    ) -> Result<(Draft, Form), ApiError> {
+    ) -> Result<(BatchUpload, Form), ApiError> {
         if portion.is_empty() {
             return Ok((draft, form));
         }
@@ -263,7 +263,7 @@ impl Checking<'_> {
 
 /// Adds one case to a draft, with its faults if it has any.
 fn add(
-    draft: &mut Draft,
+    draft: &mut BatchUpload,
     form: &mut Form,
     element: &Element,
     parsed_max_bytes: usize,

@@ -10,7 +10,8 @@ use serde_json::Value;
 
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
-use crate::jobs::template::{self, Cell};
+use crate::jobs::batch::template;
+use crate::jobs::batch::template::Cell;
 
 /// Short names of columns and what they stand for.
 const SHORT_NAMES: [(&str, &str); 13] = [

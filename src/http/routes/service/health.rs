@@ -59,7 +59,9 @@ problems! {
 pub async fn ready(State(AnyTenant(jobs)): State<AnyTenant>) -> Result<Json<Health>, ApiError> {
     match jobs.ready().await {
         Ok(()) => Ok(Health::new("ready")),
-        Err(reason) if matches!(reason, JobsError::Draining) || reason.trouble().is_some() => {
+        Err(reason)
+            if matches!(reason, JobsError::Draining) || reason.storage_fault().is_some() =>
+        {
             Err(reason.into())
         }
         Err(reason) => {

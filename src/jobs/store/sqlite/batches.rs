@@ -1,6 +1,6 @@
 //! Batches in the embedded job table: filled piece by piece, acknowledged once they are complete.
 //!
-//! No worker claims a job of a batch while it is being filled ([`skip`](crate::jobs::store::ClaimRequest::skip)). A batch that a dead process left incomplete was never
+//! No worker claims a job of a batch while it is being filled ([`skip`](crate::jobs::store::types::ClaimRequest::skip)). A batch that a dead process left incomplete was never
 //! acknowledged and is removed with its jobs.
 
 use std::collections::{BTreeMap, HashSet};
@@ -8,18 +8,17 @@ use std::collections::{BTreeMap, HashSet};
 use sqlx::{Row, SqliteConnection};
 use uuid::Uuid;
 
-use crate::jobs::batch::{Batch, Line, LineResult};
+use crate::jobs::batch::model::{Batch, BatchItem, ItemResult};
 use crate::jobs::error::JobsError;
-use crate::jobs::job::State;
-use crate::jobs::store::sqlite::SqliteStore;
+use crate::jobs::model::{State, created_at};
 use crate::jobs::store::sqlite::blobs::release_blobs;
+use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::insert::insert_jobs;
 use crate::jobs::store::sqlite::quota::Places;
 use crate::jobs::store::sqlite::rows::{
     job_columns, read_blob_ids, read_count, read_id, read_job, read_state,
 };
-use crate::jobs::store::{Begun, NewBatch, NewJob, QueueBounds, Refusal};
-use crate::jobs::submit::created_at;
+use crate::jobs::store::types::{BatchBegun, NewBatch, NewJob, QueueBounds, Refusal};
 
 const CANCEL: &str = "UPDATE jobs SET state = CASE WHEN state = 'queued' THEN 'cancelled' ELSE state END, \
      ended_at = CASE WHEN state = 'queued' THEN $1 ELSE NULL END, \
@@ -69,7 +68,7 @@ impl SqliteStore {
         &self,
         new: &NewBatch,
         living: &HashSet<Uuid>,
-    ) -> Result<Option<Begun>, JobsError> {
+    ) -> Result<Option<BatchBegun>, JobsError> {
         let mut connection = self.readers.acquire().await?;
         by_key(&mut connection, new, living).await
     }
@@ -84,7 +83,7 @@ impl SqliteStore {
         new: &NewBatch,
         living: &HashSet<Uuid>,
         bounds: QueueBounds,
-    ) -> Result<Begun, JobsError> {
+    ) -> Result<BatchBegun, JobsError> {
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         if let Some(begun) = by_key(&mut transaction, new, living).await? {
             return Ok(begun);
@@ -101,8 +100,8 @@ impl SqliteStore {
         let mut places = Places::new(&mut transaction, bounds);
         match places.take(&new.tenant, lacking).await? {
             Ok(taken) if taken == lacking => {}
-            Ok(_) => return Ok(Begun::Refused(places.refusal_of(&new.tenant))),
-            Err(refusal) => return Ok(Begun::Refused(refusal)),
+            Ok(_) => return Ok(BatchBegun::Refused(places.refusal_of(&new.tenant))),
+            Err(refusal) => return Ok(BatchBegun::Refused(refusal)),
         }
         sqlx::query(
             "INSERT INTO batches (id, tenant, created_at, count, rejected, reserved) VALUES ($1, $2, $3, $4, $5, $4) \
@@ -136,7 +135,7 @@ impl SqliteStore {
             .await?;
         }
         transaction.commit().await?;
-        Ok(Begun::Created)
+        Ok(BatchBegun::Created)
     }
 
     /// Queues jobs of a batch with their places in it, all or none, on the places reserved for them. Returns those that
@@ -316,12 +315,12 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn batch_lines(
+    pub async fn batch_items(
         &self,
         id: Uuid,
         after: Option<Uuid>,
         limit: u32,
-    ) -> Result<Vec<Line>, JobsError> {
+    ) -> Result<Vec<BatchItem>, JobsError> {
         let rows = sqlx::query(concat!(
             "SELECT ",
             job_columns!(),
@@ -337,12 +336,12 @@ impl SqliteStore {
         rows.iter()
             .map(|row| {
                 let solution: Option<Vec<u8>> = row.try_get("solution")?;
-                Ok(Line {
+                Ok(BatchItem {
                     index: row.try_get("batch_index")?,
                     job: read_job(row)?,
                     outputs: row.try_get("outputs")?,
                     key: row.try_get("blob_key")?,
-                    result: solution.map(|solution| LineResult::Solution(solution.into())),
+                    result: solution.map(|solution| ItemResult::Solution(solution.into())),
                 })
             })
             .collect()
@@ -353,7 +352,7 @@ async fn by_key(
     connection: &mut SqliteConnection,
     new: &NewBatch,
     living: &HashSet<Uuid>,
-) -> Result<Option<Begun>, JobsError> {
+) -> Result<Option<BatchBegun>, JobsError> {
     let Some((key, digest)) = &new.idempotency else {
         return Ok(None);
     };
@@ -371,8 +370,8 @@ async fn by_key(
     Ok(match (stored == digest, complete) {
         // Nobody fills it any more, and it was never acknowledged.
         (_, false) if !living.contains(&id) => None,
-        (false, _) => Some(Begun::Conflict),
-        (true, true) => Some(Begun::Existing(id)),
-        (true, false) => Some(Begun::Unfinished),
+        (false, _) => Some(BatchBegun::Conflict),
+        (true, true) => Some(BatchBegun::Existing(id)),
+        (true, false) => Some(BatchBegun::Unfinished),
     })
 }

@@ -4,25 +4,19 @@
 //! blob ends: it is called in every transaction that drops references. Only the slices of sweeps have blobs of their own, which
 //! nobody else refers to; triggers of the table remove them in the transaction in which their job ends.
 
-use std::time::Duration;
-
 use sqlx::{QueryBuilder, Row, Sqlite, SqliteConnection};
-use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
-use crate::jobs::store::sqlite::SqliteStore;
-use crate::jobs::store::sqlite::claims::fence;
-use crate::jobs::store::sqlite::rows::read_count;
-use crate::jobs::store::{Claim, NewSlice, Placed};
-use crate::jobs::sweep::SliceNote;
+use crate::jobs::store::sqlite::database::SqliteStore;
+use crate::jobs::store::types::StoredResult;
 
 /// Values bound in one statement; far below the bound of SQLite.
 const VALUES_PER_STATEMENT: usize = 250;
 
 /// Stores results within the caller's transaction; the ids of their blobs are in the order of the results.
-pub(super) async fn insert_blobs(
+pub(crate) async fn insert_blobs(
     connection: &mut SqliteConnection,
-    results: &[&Placed],
+    results: &[&StoredResult],
 ) -> Result<Vec<i64>, JobsError> {
     if results.is_empty() {
         return Ok(Vec::new());
@@ -42,8 +36,8 @@ pub(super) async fn insert_blobs(
             next += 1;
             ids.push(next);
             let (key, inside) = match result {
-                Placed::Folder(key, _) => (Some(key.as_str()), None),
-                Placed::Table(result) => (None, Some(result)),
+                StoredResult::Blob(key, _) => (Some(key.as_str()), None),
+                StoredResult::Inline(result) => (None, Some(result)),
             };
             row.push_bind(next)
                 .push_bind(key)
@@ -57,7 +51,7 @@ pub(super) async fn insert_blobs(
 }
 
 /// Removes those of these blobs that no job refers to any more; the keys of the large ones enter the outbox.
-pub(super) async fn release_blobs(
+pub(crate) async fn release_blobs(
     connection: &mut SqliteConnection,
     mut ids: Vec<i64>,
 ) -> Result<(), JobsError> {
@@ -148,113 +142,6 @@ impl SqliteStore {
     }
 }
 
-const NOTES: &str =
-    "SELECT number, motions, digest, spent_us FROM job_slices WHERE job_id = $1 ORDER BY number";
-const RESULTS: &str = "SELECT key, bytes, solution, fields FROM job_slices JOIN blobs ON blobs.id = blob_id \
-     WHERE job_id = $1 ORDER BY number";
-/// Attempts are counted from the last slice that was stored: who gets on is not what processes die of.
-const ADD: &str = "UPDATE jobs SET slices = $3 + 1, done = $4, progress = $4, cost_us = $5, attempt = 1, \
-     version = version + 1 WHERE id = $1 AND lease_number = $2 AND state = 'running'";
-
-impl SqliteStore {
-    /// Stores a solved slice of a claimed job in place of what there was from its number on; the same call again changes
-    /// nothing. Returns whether the lease was still held; otherwise nothing changed.
-    ///
-    /// # Errors
-    /// The database failed; nothing changed.
-    pub async fn add_slice(&self, claim: &Claim, slice: &NewSlice) -> Result<bool, JobsError> {
-        let id = claim.id.to_string();
-        let note = &slice.note;
-        let spent_us = i64::try_from(note.spent.as_micros()).unwrap_or(i64::MAX);
-        let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
-        let added = sqlx::query(ADD)
-            .bind(&id)
-            .bind(fence(claim))
-            .bind(note.number)
-            .bind(slice.done)
-            .bind(i64::try_from(slice.rest_us).unwrap_or(i64::MAX))
-            .execute(&mut *transaction)
-            .await?;
-        if added.rows_affected() == 0 {
-            return Ok(false);
-        }
-        let there = sqlx::query(
-            "SELECT 1 FROM job_slices WHERE job_id = $1 AND number = $2 AND digest = $3 AND spent_us = $4",
-        )
-        .bind(&id)
-        .bind(note.number)
-        .bind(&note.digest)
-        .bind(spent_us)
-        .fetch_optional(&mut *transaction)
-        .await?;
-        if there.is_none() {
-            sqlx::query("DELETE FROM job_slices WHERE job_id = $1 AND number >= $2")
-                .bind(&id)
-                .bind(note.number)
-                .execute(&mut *transaction)
-                .await?;
-            let blobs = insert_blobs(&mut transaction, &[&slice.result]).await?;
-            sqlx::query(
-                "INSERT INTO job_slices (job_id, number, motions, digest, spent_us, blob_id) \
-                 VALUES ($1, $2, $3, $4, $5, $6)",
-            )
-            .bind(&id)
-            .bind(note.number)
-            .bind(note.motions)
-            .bind(&note.digest)
-            .bind(spent_us)
-            .bind(blobs.first())
-            .execute(&mut *transaction)
-            .await?;
-        }
-        transaction.commit().await?;
-        Ok(true)
-    }
-
-    /// What is known of the stored slices of a job, in their order.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub async fn slice_notes(&self, id: Uuid) -> Result<Vec<SliceNote>, JobsError> {
-        let rows = sqlx::query(NOTES)
-            .bind(id.to_string())
-            .fetch_all(&self.readers)
-            .await?;
-        rows.iter()
-            .map(|row| {
-                Ok(SliceNote {
-                    number: row.try_get("number")?,
-                    motions: row.try_get("motions")?,
-                    digest: row.try_get("digest")?,
-                    spent: Duration::from_micros(read_count(row, "spent_us")?),
-                })
-            })
-            .collect()
-    }
-
-    /// Where the parts of the answer of a job are kept, in their order.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub async fn slice_results(&self, id: Uuid) -> Result<Vec<Placed>, JobsError> {
-        let rows = sqlx::query(RESULTS)
-            .bind(id.to_string())
-            .fetch_all(&self.readers)
-            .await?;
-        rows.iter()
-            .map(|row| {
-                if let Some(key) = row.try_get::<Option<String>, _>("key")? {
-                    return Ok(Placed::Folder(key, read_count(row, "bytes")?));
-                }
-                Ok(Placed::read(
-                    row.try_get("solution")?,
-                    row.try_get("fields")?,
-                ))
-            })
-            .collect()
-    }
-}
-
 fn push_keys(query: &mut QueryBuilder<Sqlite>, keys: &[String]) {
     let mut list = query.separated(", ");
     for key in keys {
@@ -267,6 +154,7 @@ fn push_keys(query: &mut QueryBuilder<Sqlite>, keys: &[String]) {
 mod tests {
     use super::*;
     use crate::jobs::store::sqlite::lists::tests::plan;
+    use crate::jobs::store::sqlite::slices::{NOTES, RESULTS};
 
     #[tokio::test]
     async fn references_to_a_blob_are_found_by_index() {

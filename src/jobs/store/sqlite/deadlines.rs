@@ -3,33 +3,25 @@
 use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
-use crate::jobs::job::{Failure, State};
-use crate::jobs::store::sqlite::SqliteStore;
+use crate::jobs::model::{Failure, State};
+use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::{read_id, read_state, to_json};
+use crate::jobs::store::types::Moment;
 
 /// Late at $1; what was submitted before $2 is late only if it is at $3.
 const LATE: &str = "SELECT id, state FROM jobs WHERE deadline <= $1 AND deadline IS NOT NULL AND ended_at IS NULL \
      AND (created_at >= $2 OR deadline <= $3)";
+
 const FAIL_LATE: &str = "UPDATE jobs SET state = 'failed', failure = $4, ended_at = $1, version = version + 1 \
      WHERE id IN (SELECT id FROM jobs WHERE deadline <= $1 AND deadline IS NOT NULL AND ended_at IS NULL \
      AND (created_at >= $2 OR deadline <= $3) AND state || '' = 'queued' LIMIT $5) RETURNING id";
+
 /// Jobs ended in one transaction.
 const AT_ONCE: i64 = 1000;
 
-/// The present, and what became of the clock.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Moment {
-    /// Epoch milliseconds.
-    pub now: i64,
-    /// What was submitted before this time is judged by the next.
-    pub set_at: i64,
-    /// The present of a clock that was not set.
-    pub unset: i64,
-}
-
 /// Jobs whose deadline has passed.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Late {
+pub struct Overdue {
     /// There are queued ones.
     pub queued: bool,
     /// The running ones.
@@ -41,14 +33,14 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn late(&self, moment: Moment) -> Result<Late, JobsError> {
+    pub async fn late(&self, moment: Moment) -> Result<Overdue, JobsError> {
         let rows = sqlx::query(LATE)
             .bind(moment.now)
             .bind(moment.set_at)
             .bind(moment.unset)
             .fetch_all(&self.readers)
             .await?;
-        let mut late = Late::default();
+        let mut late = Overdue::default();
         for row in &rows {
             match read_state(row)? {
                 State::Queued => late.queued = true,

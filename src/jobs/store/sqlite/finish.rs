@@ -1,17 +1,24 @@
 //! Ends of claimed jobs in the embedded job table: one transaction, and so one write to the disk, for all of them.
 
+use crate::jobs::store::sqlite::cached::Pair;
+use crate::jobs::store::sqlite::cached::SOURCE;
+use crate::jobs::store::sqlite::cached::end_pairs;
+use crate::jobs::store::sqlite::rows::read_cache_key;
+use crate::jobs::store::types::CacheKey;
+use sqlx::Row;
+use std::collections::HashMap;
 use std::collections::HashSet;
 
 use sqlx::{QueryBuilder, Sqlite};
 use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
-use crate::jobs::job::State;
-use crate::jobs::store::sqlite::SqliteStore;
+use crate::jobs::model::State;
 use crate::jobs::store::sqlite::blobs::{insert_blobs, release_blobs};
-use crate::jobs::store::sqlite::claims::fence;
+use crate::jobs::store::sqlite::database::SqliteStore;
+use crate::jobs::store::sqlite::rows::fence;
 use crate::jobs::store::sqlite::rows::{read_id, to_json};
-use crate::jobs::store::{Claim, Ending, Placed};
+use crate::jobs::store::types::{Claim, Ending, StoredResult};
 
 impl SqliteStore {
     /// Ends jobs, all in one transaction. Returns those that ended; the others' leases were lost and nothing of them
@@ -73,17 +80,70 @@ impl SqliteStore {
     }
 }
 
+impl SqliteStore {
+    /// For each of these keys that a succeeded job carries, one such job.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn sources(&self, keys: &[CacheKey]) -> Result<HashMap<CacheKey, Uuid>, JobsError> {
+        if keys.is_empty() {
+            return Ok(HashMap::new());
+        }
+        let mut query = QueryBuilder::<Sqlite>::new("WITH asked (cache_key) AS (");
+        query.push_values(keys, |mut row, key| {
+            row.push_bind(key.as_slice());
+        });
+        query.push(") SELECT cache_key, ").push(SOURCE);
+        query.push(" AS id FROM asked");
+        let rows = query.build().fetch_all(&self.readers).await?;
+        let mut sources = HashMap::new();
+        for row in &rows {
+            if row.try_get::<Option<&str>, _>("id")?.is_some()
+                && let Some(key) = read_cache_key(row)?
+            {
+                sources.insert(key, read_id(row)?);
+            }
+        }
+        Ok(sources)
+    }
+
+    /// Ends claimed jobs with the results of their sources, as long as their leases are held. Returns those that ended; the
+    /// source of another is gone, or its lease is lost.
+    ///
+    /// # Errors
+    /// The database failed; nothing changed.
+    pub async fn finish_with_sources(
+        &self,
+        pairs: &[(Claim, Uuid)],
+        now: i64,
+    ) -> Result<HashSet<Uuid>, JobsError> {
+        let pairs: Vec<_> = pairs
+            .iter()
+            .map(|(claim, source)| Pair {
+                job: claim.id,
+                source: *source,
+                at: now,
+                lease_number: Some(fence(claim)),
+            })
+            .collect();
+        let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
+        let ended = end_pairs(&mut transaction, &pairs).await?;
+        transaction.commit().await?;
+        Ok(ended.into_iter().collect())
+    }
+}
+
 /// The end of a job in the form the database takes.
-pub(super) struct EndRow<'a> {
-    pub(super) state: State,
-    pub(super) remarks: String,
-    pub(super) failure: Option<String>,
-    pub(super) field_patches: u32,
-    pub(super) result: Option<&'a Placed>,
+pub(crate) struct EndRow<'a> {
+    pub(crate) state: State,
+    pub(crate) remarks: String,
+    pub(crate) failure: Option<String>,
+    pub(crate) field_patches: u32,
+    pub(crate) result: Option<&'a StoredResult>,
 }
 
 impl EndRow<'_> {
-    pub(super) fn of(ending: &Ending) -> Result<EndRow<'_>, JobsError> {
+    pub(crate) fn of(ending: &Ending) -> Result<EndRow<'_>, JobsError> {
         let mut row = EndRow {
             state: State::Cancelled,
             remarks: "[]".to_owned(),

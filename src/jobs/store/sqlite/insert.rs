@@ -4,16 +4,16 @@ use sqlx::{QueryBuilder, Sqlite, SqliteConnection};
 use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
-use crate::jobs::store::sqlite::reuse::end_with_sources;
+use crate::jobs::store::sqlite::cached::end_with_sources;
 use crate::jobs::store::sqlite::rows::to_json;
-use crate::jobs::store::{NewJob, ReuseKey};
+use crate::jobs::store::types::{CacheKey, NewJob};
 
 /// Jobs in one statement; with 17 values each far below the bound of SQLite.
 const ROWS_PER_STATEMENT: usize = 250;
 
 /// Queues jobs within the caller's transaction, those of a batch with their places in it. Returns those that ended at
 /// once with the result of their source.
-pub(super) async fn insert_jobs(
+pub(crate) async fn insert_jobs(
     connection: &mut SqliteConnection,
     batch: Option<Uuid>,
     jobs: &[(Option<u32>, &NewJob)],
@@ -27,7 +27,7 @@ pub(super) async fn insert_jobs(
             .collect::<Result<Vec<_>, _>>()?;
         let mut rows = QueryBuilder::<Sqlite>::new(
             "INSERT INTO jobs (id, state, name, labels, method, created_at, batch_id, batch_index, cost_us, slice_us, outputs, \
-             reuse_key, tenant, fresh, rank, deadline, traceparent) ",
+             cache_key, tenant, bypass_cache, rank, deadline, traceparent) ",
         );
         rows.push_values(
             some.iter().zip(labels),
@@ -43,10 +43,10 @@ pub(super) async fn insert_jobs(
                     .push_bind(job.cost_us)
                     .push_bind(job.slice_us)
                     .push_bind(&job.outputs)
-                    .push_bind(job.reuse_key.as_ref().map(ReuseKey::as_slice))
+                    .push_bind(job.cache_key.as_ref().map(CacheKey::as_slice))
                     .push_bind(&*job.tenant)
-                    .push_bind(job.wishes.fresh)
-                    .push_bind(job.wishes.priority.rank())
+                    .push_bind(job.options.bypass_cache)
+                    .push_bind(job.options.priority.rank())
                     .push_bind(job.deadline())
                     .push_bind(job.traceparent.as_deref());
             },

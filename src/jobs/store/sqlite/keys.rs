@@ -4,10 +4,11 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
 use crate::jobs::error::JobsError;
-use crate::jobs::keys::Key;
-use crate::jobs::store::sqlite::SqliteStore;
+use crate::jobs::keys::key::Key;
+use crate::jobs::store::sqlite::database::SqliteStore;
 
 const ALL: &str = "SELECT id, hash, tenant, name, created_at, revoked_at FROM api_keys";
+
 const ONE: &str =
     "SELECT id, hash, tenant, name, created_at, revoked_at FROM api_keys WHERE id = $1";
 

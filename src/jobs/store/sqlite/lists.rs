@@ -5,7 +5,7 @@ use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
 use crate::jobs::store::list::{Filter, Page};
-use crate::jobs::store::sqlite::SqliteStore;
+use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::{job_columns, read_job};
 
 impl SqliteStore {
@@ -124,17 +124,14 @@ fn within_batch(
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(crate) mod tests {
     use sqlx::{AssertSqlSafe, Row};
 
     use super::*;
-    use crate::jobs::job::State;
+    use crate::jobs::model::State;
 
     /// The steps SQLite takes for a statement.
-    pub(in crate::jobs::store::sqlite) async fn plan(
-        store: &SqliteStore,
-        statement: &str,
-    ) -> Vec<String> {
+    pub(crate) async fn plan(store: &SqliteStore, statement: &str) -> Vec<String> {
         sqlx::query(AssertSqlSafe(format!("EXPLAIN QUERY PLAN {statement}")))
             .fetch_all(&store.writer)
             .await

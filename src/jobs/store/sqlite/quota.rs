@@ -2,14 +2,12 @@
 
 use std::collections::{HashMap, HashSet};
 
-use sqlx::{QueryBuilder, Row, Sqlite, SqliteConnection};
+use sqlx::{QueryBuilder, Sqlite, SqliteConnection};
 use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
-use crate::jobs::job::Job;
-use crate::jobs::store::sqlite::SqliteStore;
 use crate::jobs::store::sqlite::rows::{push_list, read_count, read_id};
-use crate::jobs::store::{NewJob, QueueBounds, Refusal};
+use crate::jobs::store::types::{NewJob, QueueBounds, Refusal};
 
 /// Queued jobs of a tenant (all of them if it is NULL) and the places reserved for batches under way.
 const TAKEN: &str = "SELECT (SELECT COALESCE(SUM(number), 0) FROM job_counts \
@@ -17,7 +15,7 @@ const TAKEN: &str = "SELECT (SELECT COALESCE(SUM(number), 0) FROM job_counts \
      (SELECT COALESCE(SUM(reserved), 0) FROM batches WHERE complete = 0 AND (tenant = $1 OR $1 IS NULL)) AS taken";
 
 /// Places still free, as one transaction sees them and takes them.
-pub(super) struct Places<'a> {
+pub(crate) struct Places<'a> {
     connection: &'a mut SqliteConnection,
     bounds: QueueBounds,
     all: Option<u64>,
@@ -26,7 +24,7 @@ pub(super) struct Places<'a> {
 
 impl Places<'_> {
     /// Nothing is looked at before the first place is asked for.
-    pub(super) fn new(connection: &mut SqliteConnection, bounds: QueueBounds) -> Places<'_> {
+    pub(crate) fn new(connection: &mut SqliteConnection, bounds: QueueBounds) -> Places<'_> {
         Places {
             connection,
             bounds,
@@ -36,7 +34,7 @@ impl Places<'_> {
     }
 
     /// Takes as many places as there are, at most `most`; a refusal if there is not even one.
-    pub(super) async fn take(
+    pub(crate) async fn take(
         &mut self,
         tenant: &str,
         most: u64,
@@ -62,7 +60,7 @@ impl Places<'_> {
     }
 
     /// Which bound has no place left.
-    pub(super) fn refusal_of(&self, tenant: &str) -> Refusal {
+    pub(crate) fn refusal_of(&self, tenant: &str) -> Refusal {
         let of_tenant = self.of_tenants.get(tenant).copied().unwrap_or(0);
         if of_tenant >= self.bounds.tenant {
             Refusal::Quota
@@ -81,7 +79,7 @@ async fn taken(connection: &mut SqliteConnection, tenant: Option<&str>) -> Resul
 }
 
 /// Those of these jobs whose source is still there, so that they end at once and need no place.
-pub(super) async fn with_living_source(
+pub(crate) async fn with_living_source(
     connection: &mut SqliteConnection,
     jobs: &[&NewJob],
 ) -> Result<HashSet<Uuid>, JobsError> {
@@ -104,67 +102,4 @@ pub(super) async fn with_living_source(
             .is_some_and(|(source, _)| living.contains(&source))
     });
     Ok(with.map(|job| job.id).collect())
-}
-
-/// Jobs of the tenant before one of this rank and id, and their expected µs; no further than the limit.
-const BEFORE: &str = "SELECT COUNT(*) AS jobs, COALESCE(SUM(cost_us), 0) AS cost_us FROM (SELECT cost_us FROM jobs \
-     WHERE state = 'queued' AND tenant = $1 AND (rank, id) < ($2, $3) LIMIT $4) AS before";
-
-impl SqliteStore {
-    /// Number of queued jobs of a tenant that come before this one, and their expected solve time in µs, counted no
-    /// further than `limit` jobs; and the number of tenants with queued jobs.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub async fn queued_before(
-        &self,
-        job: &Job,
-        limit: u32,
-    ) -> Result<(u64, u64, usize), JobsError> {
-        let row = sqlx::query(BEFORE)
-            .bind(&job.tenant)
-            .bind(job.priority.rank())
-            .bind(job.id.to_string())
-            .bind(limit)
-            .fetch_one(&self.readers)
-            .await?;
-        let tenants = self.queued_tenants().await?.len();
-        Ok((
-            read_count(&row, "jobs")?,
-            read_count(&row, "cost_us")?,
-            tenants,
-        ))
-    }
-
-    /// Number of queued jobs, of a tenant or of all.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub async fn queued(&self, tenant: Option<&str>) -> Result<u64, JobsError> {
-        let row = sqlx::query(
-            "SELECT COALESCE(SUM(number), 0) AS queued FROM job_counts \
-             WHERE state = 'queued' AND (tenant = $1 OR $1 IS NULL)",
-        )
-        .bind(tenant)
-        .fetch_one(&self.readers)
-        .await?;
-        Ok(u64::try_from(row.try_get::<i64, _>("queued")?).unwrap_or(0))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::jobs::store::sqlite::lists::tests::plan;
-
-    #[tokio::test]
-    async fn a_place_in_the_queue_is_read_from_an_index_alone() {
-        let folder = tempfile::tempdir().unwrap();
-        let store = SqliteStore::open(&folder.path().join("jobs.db"))
-            .await
-            .unwrap();
-        let steps = plan(&store, BEFORE).await;
-        let seeks = |step: &String| step.contains("COVERING INDEX jobs_queued (tenant=?");
-        assert!(steps.iter().any(seeks), "{steps:?}");
-    }
 }

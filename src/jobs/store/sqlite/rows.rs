@@ -1,5 +1,6 @@
 //! Rows of the job table as the words of this room, and back.
 
+use crate::jobs::store::types::Claim;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use sqlx::sqlite::SqliteRow;
@@ -7,9 +8,9 @@ use sqlx::{QueryBuilder, Row, Sqlite};
 use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
-use crate::jobs::job::{Job, State};
-use crate::jobs::store::ReuseKey;
-use crate::jobs::wishes::Priority;
+use crate::jobs::model::{Job, State};
+use crate::jobs::store::types::CacheKey;
+use crate::jobs::submit_options::Priority;
 
 /// The columns a [`Job`] is read from.
 macro_rules! job_columns {
@@ -17,10 +18,10 @@ macro_rules! job_columns {
         "id, tenant, state, name, labels, batch_id, created_at, started_at, ended_at, attempt, progress, remarks, failure, cached, version, rank, deadline"
     };
 }
-pub(super) use job_columns;
+pub(crate) use job_columns;
 
 /// Reads a row that has the columns of `job_columns`.
-pub(super) fn read_job(row: &SqliteRow) -> Result<Job, JobsError> {
+pub(crate) fn read_job(row: &SqliteRow) -> Result<Job, JobsError> {
     let failure: Option<String> = row.try_get("failure")?;
     let batch: Option<String> = row.try_get("batch_id")?;
     Ok(Job {
@@ -51,26 +52,26 @@ pub(super) fn read_job(row: &SqliteRow) -> Result<Job, JobsError> {
     })
 }
 
-pub(super) fn read_id(row: &SqliteRow) -> Result<Uuid, JobsError> {
+pub(crate) fn read_id(row: &SqliteRow) -> Result<Uuid, JobsError> {
     let text: &str = row.try_get("id")?;
     Uuid::try_parse(text).map_err(|error| JobsError::Damaged(format!("job id {text:?}: {error}")))
 }
 
 /// The key of identical cases, if the row has one.
-pub(super) fn read_reuse_key(row: &SqliteRow) -> Result<Option<ReuseKey>, JobsError> {
-    let key: Option<Vec<u8>> = row.try_get("reuse_key")?;
-    key.map(ReuseKey::try_from)
+pub(crate) fn read_cache_key(row: &SqliteRow) -> Result<Option<CacheKey>, JobsError> {
+    let key: Option<Vec<u8>> = row.try_get("cache_key")?;
+    key.map(CacheKey::try_from)
         .transpose()
         .map_err(|_| JobsError::Damaged("a reuse key has a wrong length".to_owned()))
 }
 
 /// The blob a row refers to.
-pub(super) fn read_blob_id(row: &SqliteRow) -> Result<Option<i64>, JobsError> {
+pub(crate) fn read_blob_id(row: &SqliteRow) -> Result<Option<i64>, JobsError> {
     Ok(row.try_get("blob_id")?)
 }
 
 /// The blobs that rows refer to.
-pub(super) fn read_blob_ids(rows: &[SqliteRow]) -> Result<Vec<i64>, JobsError> {
+pub(crate) fn read_blob_ids(rows: &[SqliteRow]) -> Result<Vec<i64>, JobsError> {
     let ids = rows
         .iter()
         .map(read_blob_id)
@@ -78,17 +79,17 @@ pub(super) fn read_blob_ids(rows: &[SqliteRow]) -> Result<Vec<i64>, JobsError> {
     Ok(ids.into_iter().flatten().collect())
 }
 
-pub(super) fn read_state(row: &SqliteRow) -> Result<State, JobsError> {
+pub(crate) fn read_state(row: &SqliteRow) -> Result<State, JobsError> {
     let name: &str = row.try_get("state")?;
     State::from_name(name).ok_or_else(|| JobsError::Damaged(format!("job state {name:?}")))
 }
 
-pub(super) fn read_count(row: &SqliteRow, column: &str) -> Result<u64, JobsError> {
+pub(crate) fn read_count(row: &SqliteRow, column: &str) -> Result<u64, JobsError> {
     let count: i64 = row.try_get(column)?;
     u64::try_from(count).map_err(|_| JobsError::Damaged(format!("{column} is {count}")))
 }
 
-pub(super) fn to_json<T: Serialize>(value: &T) -> Result<String, JobsError> {
+pub(crate) fn to_json<T: Serialize>(value: &T) -> Result<String, JobsError> {
     serde_json::to_string(value).map_err(|error| JobsError::Damaged(error.to_string()))
 }
 
@@ -97,9 +98,17 @@ fn from_json<T: DeserializeOwned>(text: &str) -> Result<T, JobsError> {
 }
 
 /// Ids as the list of an `IN`, without the brackets.
-pub(super) fn push_list(query: &mut QueryBuilder<Sqlite>, ids: &[Uuid]) {
+pub(crate) fn push_list(query: &mut QueryBuilder<Sqlite>, ids: &[Uuid]) {
     let mut list = query.separated(", ");
     for id in ids {
         list.push_bind(id.to_string());
     }
 }
+
+/// The lease number in the form the database takes.
+pub(crate) fn fence(claim: &Claim) -> i64 {
+    i64::try_from(claim.lease_number).unwrap_or(i64::MAX)
+}
+
+/// One job.
+pub(crate) const GET: &str = concat!("SELECT ", job_columns!(), " FROM jobs WHERE id = $1");

@@ -8,8 +8,10 @@ use crate::jobs::error::JobsError;
 
 /// The statements that make an empty file a job table.
 const SCHEMA: &str = include_str!("schema.sql");
+
 /// Marks a file as a job table of this service ("rhjb").
 const APPLICATION: i64 = 0x7268_6a62;
+
 /// The form that this version reads and writes; grows with every change of `schema.sql` after the first release.
 const FORM: i64 = 1;
 
@@ -17,7 +19,7 @@ const FORM: i64 = 1;
 ///
 /// # Errors
 /// [`JobsError::OtherForm`] if the file holds something else, or the database failed.
-pub(super) async fn make_or_require(writer: &SqlitePool) -> Result<(), JobsError> {
+pub(crate) async fn make_or_require(writer: &SqlitePool) -> Result<(), JobsError> {
     let mut transaction = writer.begin_with("BEGIN IMMEDIATE").await?;
     let tables: i64 = sqlx::query_scalar("SELECT COUNT(*) FROM sqlite_schema")
         .fetch_one(&mut *transaction)
@@ -39,7 +41,7 @@ pub(super) async fn make_or_require(writer: &SqlitePool) -> Result<(), JobsError
 ///
 /// # Errors
 /// [`JobsError::OtherForm`], or the database failed.
-pub(super) async fn require(pool: &SqlitePool) -> Result<(), JobsError> {
+pub(crate) async fn require(pool: &SqlitePool) -> Result<(), JobsError> {
     let application: i64 = sqlx::query_scalar("PRAGMA application_id")
         .fetch_one(pool)
         .await?;
@@ -53,7 +55,7 @@ pub(super) async fn require(pool: &SqlitePool) -> Result<(), JobsError> {
 }
 
 /// Writes the mark of the form again: a page that stays as it was.
-pub(super) async fn mark(writer: &SqlitePool) -> Result<(), JobsError> {
+pub(crate) async fn mark(writer: &SqlitePool) -> Result<(), JobsError> {
     sqlx::raw_sql(sqlx::AssertSqlSafe(format!("PRAGMA user_version = {FORM}")))
         .execute(writer)
         .await?;
@@ -64,7 +66,7 @@ pub(super) async fn mark(writer: &SqlitePool) -> Result<(), JobsError> {
 mod tests {
     use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
 
-    use crate::jobs::store::sqlite::SqliteStore;
+    use crate::jobs::store::sqlite::database::SqliteStore;
 
     async fn write(file: &std::path::Path, statement: &'static str) {
         let options = SqliteConnectOptions::new()

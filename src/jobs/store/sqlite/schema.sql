@@ -11,8 +11,8 @@ CREATE TABLE jobs (
     slice_us         INTEGER NOT NULL,           -- that of its longest slice
     slices           INTEGER NOT NULL DEFAULT 0, -- slices that are solved and stored
     done             REAL    NOT NULL DEFAULT 0, -- the part of the job that they are, 0 to 1
-    reuse_key        BLOB,                       -- equal for cases that have the same answer; NULL: never a source
-    fresh            INTEGER NOT NULL,           -- 1: solved even if an identical case was solved before
+    cache_key        BLOB,                       -- equal for cases that have the same answer; NULL: never a source
+    bypass_cache            INTEGER NOT NULL,           -- 1: solved even if an identical case was solved before
     rank             INTEGER NOT NULL,           -- 0: high priority, 1: normal, 2: low
     deadline         INTEGER,                    -- a job that has not ended by then fails
     traceparent      TEXT,                       -- W3C trace context of the span that submitted it; NULL: nobody collects it
@@ -51,7 +51,7 @@ CREATE INDEX jobs_by_batch ON jobs (batch_id, id) WHERE batch_id IS NOT NULL;
 CREATE INDEX jobs_by_batch_and_state ON jobs (batch_id, state, id) WHERE batch_id IS NOT NULL;
 -- Those of a batch that can still be cancelled.
 CREATE INDEX jobs_to_cancel ON jobs (batch_id) WHERE ended_at IS NULL AND cancel_requested = 0;
-CREATE INDEX jobs_by_reuse_key ON jobs (reuse_key) WHERE state = 'succeeded';
+CREATE INDEX jobs_by_cache_key ON jobs (cache_key) WHERE state = 'succeeded';
 -- Who still refers to a blob.
 CREATE INDEX jobs_by_blob ON jobs (blob_id) WHERE blob_id IS NOT NULL;
 

@@ -1,0 +1,76 @@
+//! Batches as a whole: looked at, cancelled, deleted.
+
+use uuid::Uuid;
+
+use crate::jobs::batch::model::Batch;
+use crate::jobs::error::JobsError;
+use crate::jobs::handle::Jobs;
+use crate::jobs::worker::attempt_control::StopReason;
+
+/// Jobs removed in one transaction.
+pub(crate) const DELETED_AT_ONCE: u32 = 500;
+
+/// Jobs cancelled in one transaction.
+const CANCELLED_AT_ONCE: u32 = 2000;
+
+impl Jobs {
+    /// Looks at a batch.
+    ///
+    /// # Errors
+    /// [`JobsError::BatchNotFound`], or a failed database.
+    pub async fn batch(&self, id: Uuid) -> Result<Batch, JobsError> {
+        let batch = self.shared.store.batch(id).await?;
+        match batch.filter(|batch| *batch.tenant == *self.tenant) {
+            Some(batch) => Ok(batch),
+            None => Err(self.missing(id, JobsError::BatchNotFound).await),
+        }
+    }
+
+    /// Cancels every job of a batch that has not ended: queued ones end at once, running ones at the next tick of
+    /// their solvers. Returns the batch as it then is.
+    ///
+    /// # Errors
+    /// [`JobsError::BatchNotFound`], or a failed database.
+    pub async fn cancel_batch(&self, id: Uuid) -> Result<Batch, JobsError> {
+        self.batch(id).await?;
+        loop {
+            let now = self.shared.now_ms();
+            let store = &self.shared.store;
+            let changed = store.cancel_batch(id, CANCELLED_AT_ONCE, now).await?;
+            for (job, state) in &changed {
+                if state.ended() {
+                    self.shared.metrics.ended(*state, 1);
+                    self.shared.announce(*job);
+                } else if let Some(watch) = self.shared.running.get(*job) {
+                    watch.stop(StopReason::Cancel);
+                }
+            }
+            if changed.len() < CANCELLED_AT_ONCE as usize {
+                break;
+            }
+        }
+        self.batch(id).await
+    }
+
+    /// Removes a batch of which every job has ended, with its jobs, their cases and their results. The jobs go in portions, so that
+    /// other writers are not held up; if the process dies meanwhile, the rest is still there and can be removed again.
+    ///
+    /// # Errors
+    /// [`JobsError::BatchNotEnded`], [`JobsError::BatchNotFound`], or a failed database.
+    pub async fn delete_batch(&self, id: Uuid) -> Result<(), JobsError> {
+        let (ended, all) = self.batch(id).await?.ended();
+        if ended < all {
+            return Err(JobsError::BatchNotEnded(all - ended));
+        }
+        loop {
+            let gone = self.shared.store.delete_ended(id, DELETED_AT_ONCE).await?;
+            self.shared.collect_blobs().await;
+            if gone < u64::from(DELETED_AT_ONCE) {
+                break;
+            }
+        }
+        self.shared.store.delete_empty_batch(id).await?;
+        tracing::info!(batch = %id, jobs = all, "batch deleted");
+        Ok(())
+    }
+}

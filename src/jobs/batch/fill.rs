@@ -1,0 +1,209 @@
+//! Queues the cases of an uploaded batch.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use bytes::Bytes;
+use opentelemetry::KeyValue;
+use uuid::Uuid;
+
+use crate::jobs::batch::model::Batch;
+use crate::jobs::batch::staging::StagedCase;
+use crate::jobs::batch::upload::BatchUpload;
+use crate::jobs::error::JobsError;
+use crate::jobs::handle::Jobs;
+use crate::jobs::model::created_at;
+use crate::jobs::store::types::{BatchBegun, NewBatch, NewJob};
+use crate::jobs::submit_options::SubmitOptions;
+
+/// Jobs queued in one transaction.
+const CHUNK_JOBS: usize = 1000;
+
+/// Bytes of cases queued in one transaction, the last case beyond them included.
+const CHUNK_BYTES: usize = 4 << 20;
+
+/// Shortest and longest pause between two looks at a batch that another request is filling.
+const FILLING_PAUSE: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(1));
+
+impl Jobs {
+    /// Queues the good cases of a draft. Once this returns all of them survive the death of the process; if it fails,
+    /// none of them will be there. Workers begin once all are there. Also says whether the batch is that of an
+    /// earlier submission with the same idempotency key.
+    ///
+    /// # Errors
+    /// [`JobsError::QueueFull`], [`JobsError::QuotaExceeded`], [`JobsError::IdempotencyConflict`], [`JobsError::Draining`],
+    /// or a failed database.
+    pub async fn submit_batch(
+        &self,
+        draft: BatchUpload,
+        idempotency_key: Option<String>,
+    ) -> Result<(Batch, bool), JobsError> {
+        let span = self.submit_span();
+        let traceparent = span.traceparent();
+        let submitted = self.store_batch(draft, idempotency_key, traceparent);
+        span.end(submitted.await, |(batch, _)| {
+            vec![
+                KeyValue::new("railhead.batch.id", batch.id.to_string()),
+                KeyValue::new("railhead.batch.jobs", i64::from(batch.count)),
+            ]
+        })
+    }
+
+    async fn store_batch(
+        &self,
+        mut draft: BatchUpload,
+        idempotency_key: Option<String>,
+        traceparent: Option<Arc<str>>,
+    ) -> Result<(Batch, bool), JobsError> {
+        let id = draft.id;
+        let digest = draft.options.digest(draft.digest.finalize().as_bytes());
+        let new = NewBatch {
+            id,
+            tenant: self.tenant.clone(),
+            created_at: created_at(id),
+            count: draft.cases - draft.rejected,
+            rejected: draft.rejected,
+            template: draft.template.clone(),
+            idempotency: idempotency_key.map(|key| (key, digest)),
+        };
+        let mut pause = FILLING_PAUSE.0;
+        loop {
+            if self.shared.draining.is_cancelled() {
+                return Err(JobsError::Draining);
+            }
+            let living = self.shared.unfinished_batches().living.clone();
+            let known = self.shared.store.batch_by_key(&new, &living).await?;
+            let begun = match known {
+                Some(begun) => begun,
+                None => {
+                    draft.in_table = true;
+                    self.shared.unfinished_batches().filling.insert(id);
+                    let bounds = self.queue_bounds();
+                    let begun = self.shared.store.begin_batch(&new, &living, bounds).await;
+                    self.observe_write(begun)?
+                }
+            };
+            match begun {
+                BatchBegun::Created => break,
+                BatchBegun::Existing(id) => return Ok((self.batch(id).await?, true)),
+                BatchBegun::Conflict => return Err(JobsError::IdempotencyConflict),
+                BatchBegun::Refused(refusal) => {
+                    self.give_up(draft).await;
+                    return Err(self.refused(refusal));
+                }
+                BatchBegun::Unfinished => tokio::time::sleep(pause).await,
+            }
+            pause = (2 * pause).min(FILLING_PAUSE.1);
+        }
+        // A client that hangs up must not leave a batch half filled, so the filling goes on without it.
+        let jobs = self.clone();
+        let filled = self.shared.tasks.spawn(async move {
+            let filled = jobs.fill(&new, &mut draft, traceparent).await;
+            match &filled {
+                Ok(()) => {
+                    draft.settle();
+                    // Opens the batch to the workers.
+                    drop(draft);
+                    for _ in 0..jobs.shared.options.workers {
+                        jobs.shared.wake.notify_one();
+                    }
+                }
+                Err(_) => jobs.give_up(draft).await,
+            }
+            filled
+        });
+        let filled = filled
+            .await
+            .map_err(|error| JobsError::Damaged(error.to_string()))?;
+        self.observe_write(filled)?;
+        Ok((self.batch(id).await?, false))
+    }
+
+    async fn fill(
+        &self,
+        new: &NewBatch,
+        draft: &mut BatchUpload,
+        traceparent: Option<Arc<str>>,
+    ) -> Result<(), JobsError> {
+        let options = draft.options;
+        let Some(staging) = draft.staging.take() else {
+            return Ok(());
+        };
+        let mut reader = staging
+            .into_reader()
+            .map_err(|source| self.staging_failed(source))?;
+        loop {
+            if self.shared.stopping.is_cancelled() {
+                return Err(JobsError::Draining);
+            }
+            let taken = tokio::task::spawn_blocking(move || {
+                let cases = reader.take(CHUNK_JOBS, CHUNK_BYTES);
+                (reader, cases)
+            });
+            let (back, cases) = taken
+                .await
+                .map_err(|error| JobsError::Damaged(error.to_string()))?;
+            reader = back;
+            let cases = cases.map_err(|source| self.staging_failed(source))?;
+            if cases.is_empty() {
+                break;
+            }
+            let mut some: Vec<_> = cases
+                .into_iter()
+                .map(|(staged, case)| {
+                    let traceparent = traceparent.clone();
+                    (
+                        staged.index,
+                        self.new_job(staged, case, options, traceparent),
+                    )
+                })
+                .collect();
+            if !options.bypass_cache {
+                self.find_sources(some.iter_mut().map(|(_, job)| job))
+                    .await?;
+            }
+            let ended = self.shared.store.enqueue_many(new.id, &some).await?;
+            self.shared.ended_cached(&ended);
+        }
+        self.shared.store.complete_batch(new.id).await?;
+        tracing::info!(batch = %new.id, jobs = new.count, rejected = new.rejected, "batch queued");
+        Ok(())
+    }
+
+    /// Ends a draft that is not wanted any more, at once if the disk allows it.
+    async fn give_up(&self, mut draft: BatchUpload) {
+        if draft.in_table {
+            self.shared.abandon(draft.id);
+            draft.settle();
+            self.shared.drop_abandoned().await;
+        }
+    }
+
+    fn new_job(
+        &self,
+        staged: StagedCase,
+        case: Vec<u8>,
+        options: SubmitOptions,
+        traceparent: Option<Arc<str>>,
+    ) -> NewJob {
+        let id = Uuid::now_v7();
+        NewJob {
+            id,
+            tenant: self.tenant.clone(),
+            created_at: created_at(id),
+            name: staged.name,
+            labels: staged.labels,
+            method: staged.method,
+            outputs: staged.outputs,
+            cost_us: staged.cost_us,
+            slice_us: staged.slice_us,
+            body: Bytes::from(case),
+            row: staged.row,
+            cache_key: self.cache_key(&staged.digest),
+            source: None,
+            idempotency: None,
+            traceparent,
+            options,
+        }
+    }
+}

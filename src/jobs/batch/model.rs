@@ -1,0 +1,87 @@
+//! A batch and its jobs as clients read them.
+
+use std::collections::BTreeMap;
+
+use bytes::Bytes;
+use uuid::Uuid;
+
+use crate::jobs::model::{Job, State};
+
+/// What is known of one batch.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Batch {
+    /// UUIDv7.
+    pub id: Uuid,
+    /// Whose it is.
+    pub tenant: String,
+    /// Time of submission, epoch milliseconds.
+    pub created_at: i64,
+    /// Number of jobs it was made of.
+    pub count: u32,
+    /// Number of faulty cases that were left out.
+    pub rejected: u32,
+    /// Number of jobs in each state; every state is there.
+    pub states: BTreeMap<State, u64>,
+}
+
+impl Batch {
+    /// Number of jobs in a state.
+    #[must_use]
+    pub fn in_state(&self, state: State) -> u64 {
+        self.states.get(&state).copied().unwrap_or(0)
+    }
+
+    /// Number of jobs that have ended, and of all jobs that are still there.
+    #[must_use]
+    pub fn ended(&self) -> (u64, u64) {
+        let ended = self.states.iter().filter(|(state, _)| state.ended());
+        (
+            ended.map(|(_, jobs)| jobs).sum(),
+            self.states.values().sum(),
+        )
+    }
+}
+
+/// One job of a batch with what is needed to show its result.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BatchItem {
+    /// Place of the case in what was sent, counted from 0.
+    pub index: u32,
+    /// The job.
+    pub job: Job,
+    /// The outputs the case asks for, as the JSON list of their names.
+    pub outputs: String,
+    /// What there is to show; `None` until the job has succeeded.
+    pub result: Option<ItemResult>,
+    pub(crate) key: Option<String>,
+}
+
+/// The result of one job of a batch.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ItemResult {
+    /// The solution as JSON text.
+    Solution(Bytes),
+    /// It was removed while the lines were read: the job has expired or was deleted.
+    Gone,
+    /// It cannot be read.
+    Unreadable,
+}
+
+impl ItemResult {
+    /// Size in bytes of what is there.
+    pub(crate) fn bytes(&self) -> usize {
+        match self {
+            ItemResult::Solution(text) => text.len(),
+            ItemResult::Gone | ItemResult::Unreadable => 0,
+        }
+    }
+}
+
+impl Batch {
+    /// A short text that differs between any two states of the batch that a client can tell apart.
+    #[must_use]
+    pub fn change_tag(&self) -> String {
+        let counts: Vec<String> = self.states.values().map(ToString::to_string).collect();
+        counts.join("-")
+    }
+}

@@ -1,0 +1,100 @@
+//! Batches: many jobs queued together, followed, read and cancelled as one.
+
+use std::time::Duration;
+
+use tokio::time::{Instant, timeout_at};
+use uuid::Uuid;
+
+use crate::jobs::batch::model::{BatchItem, ItemResult};
+use crate::jobs::error::JobsError;
+use crate::jobs::handle::Jobs;
+use crate::jobs::shared::POLL_INTERVAL;
+
+/// Solutions read at once: once they are this large together, the rest is left for the next page.
+const PAGE_BYTES: usize = 1 << 20;
+
+/// Pause between two looks at a job that a reader of results waits for.
+const REREAD_PAUSE: Duration = Duration::from_millis(10);
+
+impl Jobs {
+    /// The next jobs of a batch after the job `after`, in the order they were sent, at most `limit`, fewer if their
+    /// results are large. With `until`, only jobs that have ended are returned as long as that time is not reached, and at
+    /// least one is waited for. Empty at the end of the batch.
+    ///
+    /// # Errors
+    /// A failed database.
+    pub async fn batch_items(
+        &self,
+        id: Uuid,
+        after: Option<Uuid>,
+        limit: u32,
+        until: Option<Instant>,
+    ) -> Result<Vec<BatchItem>, JobsError> {
+        let until = until.unwrap_or_else(Instant::now);
+        loop {
+            // Subscribe first, then look: what ends in between is announced.
+            let mut ended = self.shared.ended.subscribe();
+            let mut lines = self.shared.store.batch_items(id, after, limit).await?;
+            lines.retain(|line| *line.job.tenant == *self.tenant);
+            let waiting = Instant::now() < until && !self.shared.draining.is_cancelled();
+            if waiting {
+                let done = lines
+                    .iter()
+                    .take_while(|line| line.job.state.ended())
+                    .count();
+                if done == 0
+                    && let Some(first) = lines.first().map(|line| line.job.id)
+                {
+                    while Instant::now() < until
+                        && !self.shared.draining.is_cancelled()
+                        && self
+                            .recent(first, REREAD_PAUSE)
+                            .await
+                            .is_ok_and(|job| !job.state.ended())
+                    {
+                        let look = until.min(Instant::now() + POLL_INTERVAL);
+                        // A lagging receiver may have missed the announcement, so it looks again as well.
+                        let announced =
+                            async { while ended.recv().await.is_ok_and(|ended| ended != first) {} };
+                        tokio::select! {
+                            _ = timeout_at(look, announced) => {}
+                            () = self.shared.draining.cancelled() => {}
+                        }
+                        // Many jobs end in the same moment; one look serves all of them.
+                        tokio::time::sleep(REREAD_PAUSE).await;
+                        ended = ended.resubscribe();
+                    }
+                    continue;
+                }
+                lines.truncate(done);
+            }
+            let mut bytes = 0;
+            for place in 0..lines.len() {
+                let line = &mut lines[place];
+                if let Some(key) = &line.key {
+                    line.result = Some(self.item_result(line.job.id, key).await?);
+                }
+                bytes += line.result.as_ref().map_or(0, ItemResult::bytes);
+                if bytes >= PAGE_BYTES {
+                    lines.truncate(place + 1);
+                    break;
+                }
+            }
+            return Ok(lines);
+        }
+    }
+
+    /// The result of a line that lies outside the table. What cannot be read costs its own line and no other.
+    async fn item_result(&self, id: Uuid, key: &str) -> Result<ItemResult, JobsError> {
+        Ok(match self.shared.blobs.solution(key).await {
+            Ok(solution) => ItemResult::Solution(solution),
+            Err(error) => match self.gone_meanwhile(id, error).await {
+                JobsError::Expired => ItemResult::Gone,
+                error => {
+                    tracing::error!(job = %id, %error, "a stored result cannot be read");
+                    ItemResult::Unreadable
+                }
+            },
+        })
+    }
+}

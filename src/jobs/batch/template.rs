@@ -1,0 +1,99 @@
+//! Cases that are rows of a table: a template, and what the row puts into it. Only the latter is kept for each row.
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use crate::jobs::error::JobsError;
+use crate::jobs::store::types::StoredCase;
+
+/// A value and the members that lead to its place.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Cell(pub Vec<String>, pub Value);
+
+/// The template with the values of a row in their places.
+///
+/// # Errors
+/// The number of the first cell that leads nowhere, and why.
+pub fn fill(template: &Value, row: &[Cell]) -> Result<Value, (usize, String)> {
+    let mut case = template.clone();
+    for (number, Cell(path, value)) in row.iter().enumerate() {
+        put(&mut case, path, value.clone()).map_err(|reason| (number, reason))?;
+    }
+    Ok(case)
+}
+
+/// Puts a value where the members lead; objects on the way are made.
+fn put(case: &mut Value, path: &[String], value: Value) -> Result<(), String> {
+    let Some((last, way)) = path.split_last() else {
+        return Ok(());
+    };
+    let mut place = case;
+    for member in way {
+        place = step(place, member)?;
+    }
+    *step(place, last)? = value;
+    Ok(())
+}
+
+fn step<'a>(place: &'a mut Value, member: &str) -> Result<&'a mut Value, String> {
+    if place.is_null() {
+        *place = Value::Object(Map::new());
+    }
+    match place {
+        Value::Object(members) => Ok(members.entry(member).or_insert(Value::Null)),
+        Value::Array(items) => {
+            let count = items.len();
+            let index = member.parse::<usize>().ok();
+            let item = index.and_then(|index| items.get_mut(index));
+            item.ok_or_else(|| format!("leads to `{member}` of an array with {count} entries"))
+        }
+        _ => Err(format!(
+            "leads to `{member}` of what is neither an object nor an array in the template"
+        )),
+    }
+}
+
+impl StoredCase {
+    /// The case as JSON.
+    ///
+    /// # Errors
+    /// What is stored cannot be read.
+    pub fn value(&self) -> Result<Value, JobsError> {
+        let damaged = |reason: String| JobsError::Damaged(format!("a stored case: {reason}"));
+        let Some(template) = &self.template else {
+            return serde_json::from_slice(&self.body).map_err(|error| damaged(error.to_string()));
+        };
+        let template = serde_json::from_slice(template);
+        let template: Value = template.map_err(|error| damaged(error.to_string()))?;
+        let row: Vec<Cell> =
+            serde_json::from_slice(&self.body).map_err(|error| damaged(error.to_string()))?;
+        fill(&template, &row).map_err(|(_, reason)| damaged(reason))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn a_stored_row_is_the_case_that_was_checked() {
+        let template = json!({ "load": { "normal_force_n": 1 }, "y_mm": [0, 1] });
+        let row = vec![
+            Cell(vec!["load".into(), "normal_force_n".into()], json!(8e4)),
+            Cell(vec!["labels".into(), "km".into()], json!("37.2")),
+            Cell(vec!["y_mm".into(), "1".into()], json!(-2)),
+        ];
+        let checked = fill(&template, &row).unwrap();
+        let stored = StoredCase {
+            template: Some(template.to_string().into()),
+            body: serde_json::to_vec(&row).unwrap().into(),
+        };
+        assert_eq!(stored.value().unwrap(), checked);
+        assert_eq!(
+            checked,
+            json!({ "load": { "normal_force_n": 8e4 }, "labels": { "km": "37.2" }, "y_mm": [0, -2] })
+        );
+    }
+}

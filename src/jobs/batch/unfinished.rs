@@ -1,0 +1,29 @@
+//! Batches that are not acknowledged: being received and filled, or given up and to be removed.
+
+use std::collections::HashSet;
+
+use uuid::Uuid;
+
+/// Batches that are not acknowledged.
+#[derive(Debug, Default)]
+pub(crate) struct UnfinishedBatches {
+    /// Being received or filled by this process.
+    pub(crate) living: HashSet<Uuid>,
+    /// Those of them whose jobs are being queued: no worker takes one before all are there.
+    pub(crate) filling: HashSet<Uuid>,
+    /// Given up; what is left of them is solved and shown to nobody, and removed as soon as the disk allows it.
+    pub(crate) abandoned: HashSet<Uuid>,
+}
+
+impl UnfinishedBatches {
+    /// Batches whose jobs no worker may take.
+    pub(crate) fn closed_to_workers(&self) -> HashSet<Uuid> {
+        self.filling.union(&self.abandoned).copied().collect()
+    }
+
+    /// This process neither receives nor fills this batch any more.
+    pub(crate) fn forget(&mut self, id: Uuid) {
+        self.living.remove(&id);
+        self.filling.remove(&id);
+    }
+}

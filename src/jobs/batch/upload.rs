@@ -1,0 +1,246 @@
+//! Batches in the making: cases are checked and staged while they arrive, on places reserved for them, and then queued.
+
+use bytes::Bytes;
+use serde_json::Value;
+use tokio::runtime::Handle;
+use uuid::Uuid;
+
+use crate::contact::error::Fault;
+use crate::jobs::batch::staging::{StagedCase, Staging};
+use crate::jobs::batch::template::Cell;
+use crate::jobs::error::JobsError;
+use crate::jobs::handle::Jobs;
+use crate::jobs::idempotency;
+use crate::jobs::submit::{cost_us, outputs_text};
+use crate::jobs::submit_options::SubmitOptions;
+
+/// Faulty cases whose faults are kept; further ones are only counted.
+const FAULTY_KEPT: usize = 1000;
+
+/// Good cases of a batch that are staged before places are reserved: a batch that small is refused early enough when it
+/// is queued.
+const UNRESERVED_MAX: u32 = 1000;
+
+/// A faulty case of a batch.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FaultyCase {
+    /// Place of the case in what was sent, counted from 0.
+    pub index: u32,
+    /// Line of the text on which it stands, counted from 1, if cases are lines.
+    pub line: Option<u64>,
+    /// Every fault of the case.
+    pub faults: Vec<Fault>,
+}
+
+/// A batch in the making: checked cases wait in a file of the data folder. Dropping it gives everything back.
+#[derive(Debug)]
+pub struct BatchUpload {
+    jobs: Jobs,
+    pub(crate) id: Uuid,
+    pub(crate) staging: Option<Staging>,
+    pub(crate) template: Option<Bytes>,
+    pub(crate) digest: blake3::Hasher,
+    /// Cases seen so far.
+    pub cases: u32,
+    /// Faulty ones among them.
+    pub rejected: u32,
+    /// The first faulty ones.
+    pub faulty: Vec<FaultyCase>,
+    /// What is wished for all jobs.
+    pub options: SubmitOptions,
+    /// Places in the queue reserved so far.
+    reserved: u32,
+    /// Bytes counted so far.
+    staged: u64,
+    /// There may be something of it in the job table.
+    pub(crate) in_table: bool,
+}
+
+impl BatchUpload {
+    /// The case that rows added with [`BatchUpload::add_row`] fill.
+    pub fn set_template(&mut self, template: Bytes) {
+        self.digest.update(&template);
+        self.template = Some(template);
+    }
+
+    /// Checks one more case and keeps it if it has no fault. `case` is what `text` says, or why it says nothing. Blocks;
+    /// not to be called on a thread that answers requests.
+    ///
+    /// # Errors
+    /// The file could not be written, or there is no room for more cases: [`JobsError::QueueFull`],
+    /// [`JobsError::QuotaExceeded`], [`JobsError::StagingFull`], [`JobsError::StagingQuotaExceeded`].
+    pub fn add(
+        &mut self,
+        line: Option<u64>,
+        text: &[u8],
+        case: Result<Value, String>,
+    ) -> Result<(), JobsError> {
+        self.count(text.len())?;
+        self.check(line, text, case, None)
+    }
+
+    /// As [`BatchUpload::add`], of a row of a table: the case that it makes of the template, with what it puts into it.
+    ///
+    /// # Errors
+    /// As [`BatchUpload::add`].
+    pub fn add_row(
+        &mut self,
+        line: Option<u64>,
+        text: &[u8],
+        row: Result<(Value, Vec<Cell>), String>,
+    ) -> Result<(), JobsError> {
+        // Checked and solved as a case of this size, however little is kept of it.
+        self.count(text.len() + self.template.as_ref().map_or(0, Bytes::len))?;
+        let (case, cells) = match row {
+            Ok((case, cells)) => (Ok(case), serde_json::to_vec(&cells)),
+            Err(reason) => (Err(reason), Ok(Vec::new())),
+        };
+        let cells = cells.map_err(|error| JobsError::Damaged(error.to_string()))?;
+        self.check(line, text, case, Some(cells))
+    }
+
+    fn check(
+        &mut self,
+        line: Option<u64>,
+        text: &[u8],
+        case: Result<Value, String>,
+        row: Option<Vec<u8>>,
+    ) -> Result<(), JobsError> {
+        let index = self.cases;
+        self.cases += 1;
+        let checked = match &case {
+            Ok(case) => {
+                self.digest.update(&idempotency::digest(case));
+                self.jobs.check(case).map_err(|error| error.0)
+            }
+            Err(reason) => {
+                self.digest.update(text);
+                Err(vec![Fault {
+                    pointer: String::new(),
+                    detail: reason.clone(),
+                }])
+            }
+        };
+        let problem = match checked {
+            Ok(problem) => problem,
+            Err(faults) => {
+                self.rejected += 1;
+                if self.faulty.len() < FAULTY_KEPT {
+                    self.faulty.push(FaultyCase {
+                        index,
+                        line,
+                        faults,
+                    });
+                }
+                return Ok(());
+            }
+        };
+        self.require_place()?;
+        let staged = StagedCase {
+            index,
+            row: row.is_some(),
+            method: problem.method.name().to_owned(),
+            outputs: outputs_text(&problem.outputs),
+            cost_us: cost_us(&problem),
+            slice_us: self.jobs.slice_us(&problem),
+            digest: problem.digest,
+            name: problem.name,
+            labels: problem.labels,
+        };
+        let Some(staging) = &mut self.staging else {
+            return Ok(());
+        };
+        let written = staging.push(&staged, row.as_deref().unwrap_or(text));
+        written.map_err(|source| self.jobs.staging_failed(source))
+    }
+
+    fn count(&mut self, bytes: usize) -> Result<(), JobsError> {
+        let (shared, bytes) = (&self.jobs.shared, bytes as u64);
+        let bounds = shared.options.staging;
+        shared.staged.add(&self.jobs.tenant, bytes, bounds)?;
+        self.staged += bytes;
+        Ok(())
+    }
+
+    /// Reserves more places as the batch grows, twice as many each time, so that few writes reserve many.
+    fn require_place(&mut self) -> Result<(), JobsError> {
+        let good = self.cases - self.rejected;
+        if good <= UNRESERVED_MAX || good <= self.reserved {
+            return Ok(());
+        }
+        let most = self.reserved.max(2 * UNRESERVED_MAX);
+        self.in_table = true;
+        let store = &self.jobs.shared.store;
+        let bounds = self.jobs.queue_bounds();
+        let reserved =
+            Handle::current().block_on(store.reserve(self.id, &self.jobs.tenant, most, bounds));
+        self.reserved += match self.jobs.observe_write(reserved)? {
+            Ok(places) => places,
+            Err(refusal) => return Err(self.jobs.refused(refusal)),
+        };
+        if good > self.reserved {
+            // The first reservation has to cover what was staged without one.
+            return self.require_place();
+        }
+        Ok(())
+    }
+
+    /// Nothing of it is left to be given back but its bytes.
+    pub(crate) fn settle(&mut self) {
+        self.in_table = false;
+    }
+}
+
+impl Drop for BatchUpload {
+    fn drop(&mut self) {
+        let shared = &self.jobs.shared;
+        shared.staged.give_back(&self.jobs.tenant, self.staged);
+        if self.in_table {
+            shared.abandon(self.id);
+            if let Ok(runtime) = Handle::try_current() {
+                let shared = shared.clone();
+                let tasks = shared.tasks.clone();
+                tasks.spawn_on(async move { shared.drop_abandoned().await }, &runtime);
+            }
+        } else {
+            shared.unfinished_batches().forget(self.id);
+        }
+    }
+}
+
+impl Jobs {
+    /// An empty batch.
+    ///
+    /// # Errors
+    /// [`JobsError::Draining`], or the data folder cannot be written.
+    pub fn draft(&self) -> Result<BatchUpload, JobsError> {
+        if self.shared.draining.is_cancelled() {
+            return Err(JobsError::Draining);
+        }
+        let staging = Staging::new(&self.shared.options.data_dir);
+        let staging = staging.map_err(|source| self.staging_failed(source))?;
+        let id = Uuid::now_v7();
+        self.shared.unfinished_batches().living.insert(id);
+        Ok(BatchUpload {
+            jobs: self.clone(),
+            id,
+            staging: Some(staging),
+            template: None,
+            digest: blake3::Hasher::new(),
+            cases: 0,
+            rejected: 0,
+            faulty: Vec::new(),
+            options: SubmitOptions::default(),
+            reserved: 0,
+            staged: 0,
+            in_table: false,
+        })
+    }
+
+    pub(crate) fn staging_failed(&self, source: std::io::Error) -> JobsError {
+        JobsError::DataDir {
+            path: self.shared.options.data_dir.clone(),
+            source,
+        }
+    }
+}

@@ -1,0 +1,340 @@
+//! Stored results: blobs outside the job table, in a folder of the data folder.
+//!
+//! Keys are `results/{yyyy}/{mm}/{job}/{lease number}/{name}`, year and month those of the job's submission (UTC). The
+//! lease number in the key makes a late write of a worker that lost its lease harmless. Blobs are written, and
+//! synced to the disk, before the job is called succeeded.
+
+use std::fs::Permissions;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path as FilePath, PathBuf};
+use std::sync::Arc;
+
+use bytes::Bytes;
+use object_store::local::LocalFileSystem;
+use object_store::path::Path;
+use object_store::{ObjectStore, ObjectStoreExt, PutPayload};
+use uuid::Uuid;
+
+use crate::contact::solution::words::PatchFields;
+use crate::jobs::codec::fields::{Header, PREFIX_BYTES, header_length};
+use crate::jobs::codec::result::EncodedResult;
+use crate::jobs::error::JobsError;
+use crate::jobs::store::types::Claim;
+
+/// The folder of the data folder in which results lie.
+pub(crate) const ROOT: &str = "results";
+
+const SOLUTION: &str = "solution.json";
+
+const FIELDS: &str = "fields.bin";
+
+/// The place where results are kept.
+#[derive(Debug, Clone)]
+pub struct Blobs {
+    objects: Arc<dyn ObjectStore>,
+    root: PathBuf,
+}
+
+impl Blobs {
+    /// Keeps results below `root`, which is created if it is not there.
+    ///
+    /// # Errors
+    /// The folder cannot be created or read.
+    pub fn open(root: &FilePath) -> Result<Blobs, JobsError> {
+        std::fs::create_dir_all(root).map_err(|source| JobsError::DataDir {
+            path: root.to_owned(),
+            source,
+        })?;
+        let objects = LocalFileSystem::new_with_prefix(root)?.with_fsync(true);
+        Ok(Blobs {
+            objects: Arc::new(objects),
+            root: root.to_owned(),
+        })
+    }
+
+    /// Stores a result and returns its key; durable once it returns.
+    ///
+    /// # Errors
+    /// The result could not be written.
+    pub async fn put(&self, claim: &Claim, result: EncodedResult) -> Result<String, JobsError> {
+        let folder = job_folder(claim.id).join(claim.lease_number.to_string());
+        self.put_into(folder, result).await
+    }
+
+    /// As [`Blobs::put`], of one slice of a sweep: `{lease number}-{number of the slice}` stands in place of the lease
+    /// number.
+    ///
+    /// # Errors
+    /// The result could not be written.
+    pub async fn put_slice(
+        &self,
+        claim: &Claim,
+        number: u32,
+        result: EncodedResult,
+    ) -> Result<String, JobsError> {
+        let folder = job_folder(claim.id).join(format!("{}-{number}", claim.lease_number));
+        self.put_into(folder, result).await
+    }
+
+    async fn put_into(&self, folder: Path, result: EncodedResult) -> Result<String, JobsError> {
+        if let Some(fields) = result.fields {
+            self.objects
+                .put(&folder.clone().join(FIELDS), PutPayload::from_bytes(fields))
+                .await?;
+        }
+        self.objects
+            .put(
+                &folder.clone().join(SOLUTION),
+                PutPayload::from_bytes(result.solution),
+            )
+            .await?;
+        self.make_private(&folder).await?;
+        Ok(folder.to_string())
+    }
+
+    /// Reads a stored solution as JSON text.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    pub async fn solution(&self, folder: &str) -> Result<Bytes, JobsError> {
+        let path = Path::from(folder).join(SOLUTION);
+        Ok(self.objects.get(&path).await?.bytes().await?)
+    }
+
+    /// Size of a stored solution.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    pub async fn solution_bytes(&self, folder: &str) -> Result<usize, JobsError> {
+        let path = Path::from(folder).join(SOLUTION);
+        let about = self.objects.head(&path).await?;
+        Ok(usize::try_from(about.size).unwrap_or(usize::MAX))
+    }
+
+    /// Reads a whole stored result.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    pub async fn whole(&self, folder: &str) -> Result<EncodedResult, JobsError> {
+        let solution = self.solution(folder).await?;
+        let path = Path::from(folder).join(FIELDS);
+        let fields = match self.objects.get(&path).await {
+            Ok(found) => Some(found.bytes().await?),
+            Err(object_store::Error::NotFound { .. }) => None,
+            Err(error) => return Err(error.into()),
+        };
+        Ok(EncodedResult { solution, fields })
+    }
+
+    /// Reads the cells of one patch, with the values of one motion or of all of them, and nothing else.
+    ///
+    /// # Errors
+    /// There is no such motion, or the fields cannot be read.
+    pub async fn patch_fields(
+        &self,
+        folder: &str,
+        patch: usize,
+        point: Option<usize>,
+    ) -> Result<PatchFields, JobsError> {
+        let path = Path::from(folder).join(FIELDS);
+        let damaged = |error: String| JobsError::Damaged(format!("{path}: {error}"));
+        let prefix = self
+            .objects
+            .get_range(&path, 0..PREFIX_BYTES as u64)
+            .await?;
+        let body = (PREFIX_BYTES + header_length(&prefix).map_err(damaged)?) as u64;
+        let header = Header::read(
+            &self
+                .objects
+                .get_range(&path, PREFIX_BYTES as u64..body)
+                .await?,
+        )
+        .map_err(damaged)?;
+        let points = header.points(patch);
+        if point.is_some_and(|point| point >= points) {
+            return Err(JobsError::NoSuchPoint { points });
+        }
+        let ranges: Vec<_> = header
+            .ranges(patch, point)
+            .into_iter()
+            .map(|range| range.start + body..range.end + body)
+            .collect();
+        let pieces = self.objects.get_ranges(&path, &ranges).await?;
+        // Decompression is arithmetic; it stays off the threads that answer requests.
+        let decoded =
+            tokio::task::spawn_blocking(move || header.decode(patch, point, &pieces.concat()))
+                .await;
+        decoded
+            .map_err(|error| JobsError::Damaged(error.to_string()))?
+            .map_err(damaged)
+    }
+
+    /// Removes the result under a key; one that is gone already is no error.
+    ///
+    /// # Errors
+    /// Something could not be removed.
+    pub async fn remove(&self, key: &str) -> Result<(), JobsError> {
+        let folder = Path::from(key);
+        for name in [SOLUTION, FIELDS] {
+            match self.objects.delete(&folder.clone().join(name)).await {
+                Ok(()) | Err(object_store::Error::NotFound { .. }) => {}
+                Err(error) => return Err(error.into()),
+            }
+        }
+        self.scrub(&folder).await
+    }
+
+    /// The keys of everything that is stored, job by job, month by month.
+    ///
+    /// # Errors
+    /// The store cannot be listed.
+    pub async fn keys(&self, month: &Path) -> Result<Vec<(Uuid, String)>, JobsError> {
+        let mut keys = Vec::new();
+        for job in self.below(month).await? {
+            let Some(id) = job.filename().and_then(|id| Uuid::try_parse(id).ok()) else {
+                continue;
+            };
+            let attempts = self.below(&job).await?;
+            keys.extend(attempts.into_iter().map(|key| (id, key.to_string())));
+        }
+        Ok(keys)
+    }
+
+    /// The months in which something is stored.
+    ///
+    /// # Errors
+    /// The store cannot be listed.
+    pub async fn months(&self) -> Result<Vec<Path>, JobsError> {
+        let mut months = Vec::new();
+        for year in self.below(&Path::from(ROOT)).await? {
+            months.extend(self.below(&year).await?);
+        }
+        Ok(months)
+    }
+
+    async fn below(&self, folder: &Path) -> Result<Vec<Path>, JobsError> {
+        let listed = self.objects.list_with_delimiter(Some(folder)).await?;
+        Ok(listed.common_prefixes)
+    }
+
+    /// Removes an emptied local folder with what a killed process may have left half-written in it, which the blob
+    /// store does not show, and the folder of its job once that is empty.
+    async fn scrub(&self, folder: &Path) -> Result<(), JobsError> {
+        let path = self.root.join(folder.as_ref());
+        match tokio::fs::remove_dir_all(&path).await {
+            Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
+                return Err(JobsError::DataDir { path, source });
+            }
+            _ => {}
+        }
+        if let Some(job) = path.parent() {
+            // It stays as long as another attempt lies in it.
+            let _ = tokio::fs::remove_dir(job).await;
+        }
+        Ok(())
+    }
+
+    /// Keeps what was just written from everybody else on this machine.
+    async fn make_private(&self, folder: &Path) -> Result<(), JobsError> {
+        let path = self.root.join(folder.as_ref());
+        let failed = |source| JobsError::DataDir {
+            path: path.clone(),
+            source,
+        };
+        for name in [SOLUTION, FIELDS] {
+            let mode = Permissions::from_mode(0o600);
+            match tokio::fs::set_permissions(path.join(name), mode).await {
+                Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
+                    return Err(failed(source));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Where everything stored for a job lies.
+fn job_folder(id: Uuid) -> Path {
+    let seconds = id.get_timestamp().map_or(0, |time| time.to_unix().0);
+    let time = i64::try_from(seconds)
+        .ok()
+        .and_then(|s| jiff::Timestamp::from_second(s).ok());
+    let date = time
+        .unwrap_or_default()
+        .to_zoned(jiff::tz::TimeZone::UTC)
+        .date();
+    Path::from(format!(
+        "{ROOT}/{:04}/{:02}/{id}",
+        date.year(),
+        date.month()
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn claim(id: Uuid, lease_number: u64) -> Claim {
+        Claim {
+            id,
+            attempt: 1,
+            lease_number,
+            method: "auto".to_owned(),
+            traceparent: None,
+            cache_key: None,
+            suspect: false,
+            slices: 0,
+        }
+    }
+
+    fn encoded(text: &'static str) -> EncodedResult {
+        EncodedResult {
+            solution: Bytes::from_static(text.as_bytes()),
+            fields: Some(Bytes::from_static(b"fields")),
+        }
+    }
+
+    #[test]
+    fn a_job_lies_in_the_month_of_its_submission() {
+        // 2024-02-29T23:59:59.999Z in milliseconds, the leading 48 bits of a UUIDv7.
+        let id = Uuid::from_u128((1_709_251_199_999_u128 << 80) | (7 << 76) | (2 << 62) | 1);
+        assert_eq!(job_folder(id).to_string(), format!("results/2024/02/{id}"));
+    }
+
+    #[tokio::test]
+    async fn attempts_are_kept_apart_and_removed_one_by_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let results = Blobs::open(folder.path()).unwrap();
+        let id = Uuid::now_v7();
+        let first = results.put(&claim(id, 1), encoded("1")).await.unwrap();
+        let second = results.put(&claim(id, 2), encoded("2")).await.unwrap();
+        assert_ne!(first, second);
+        // What a process killed in the middle of a write leaves behind.
+        std::fs::write(folder.path().join(&first).join("fields.bin#1"), b"half").unwrap();
+
+        results.remove(&first).await.unwrap();
+        assert!(!folder.path().join(&first).exists());
+        assert!(folder.path().join(&second).join(SOLUTION).exists());
+        let months = results.months().await.unwrap();
+        let keys = results.keys(&months[0]).await.unwrap();
+        assert_eq!((months.len(), keys), (1, vec![(id, second.clone())]));
+
+        results.remove(&second).await.unwrap();
+        assert_eq!(results.keys(&months[0]).await.unwrap(), []);
+        results.remove(&second).await.unwrap();
+    }
+
+    #[tokio::test]
+    async fn what_is_stored_is_for_nobody_else_to_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let results = Blobs::open(folder.path()).unwrap();
+        let claim = claim(Uuid::now_v7(), 1);
+        let key = results.put(&claim, encoded("1")).await.unwrap();
+        let key = folder.path().join(key);
+        for name in [SOLUTION, FIELDS] {
+            let about = std::fs::metadata(key.join(name)).unwrap();
+            assert_eq!(about.permissions().mode() & 0o777, 0o600, "{name}");
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! A result in its stored form.
+
+use bytes::Bytes;
+
+use crate::contact::solution::words::PatchFields;
+use crate::jobs::codec::fields::{Header, PREFIX_BYTES, header_length};
+use crate::jobs::error::JobsError;
+
+/// A result in its stored form.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct EncodedResult {
+    /// The solution as JSON.
+    pub solution: Bytes,
+    /// The fields as [`encode`](crate::jobs::codec::encode::encode) writes them, if the case asked for any.
+    pub fields: Option<Bytes>,
+}
+
+impl EncodedResult {
+    /// Size in bytes.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.solution.len() + self.fields.as_ref().map_or(0, Bytes::len)
+    }
+
+    /// The cells of one patch, with the values of one motion or of all of them.
+    ///
+    /// # Errors
+    /// There is no such motion, or the fields cannot be read.
+    pub fn patch_fields(
+        &self,
+        patch: usize,
+        point: Option<usize>,
+    ) -> Result<PatchFields, JobsError> {
+        let file = self.fields.as_deref().unwrap_or_default();
+        let damaged = |error: String| JobsError::Damaged(format!("stored fields: {error}"));
+        let prefix = file.get(..PREFIX_BYTES).unwrap_or_default();
+        let body = PREFIX_BYTES + header_length(prefix).map_err(damaged)?;
+        let cut = || damaged("cut short".to_owned());
+        let header =
+            Header::read(file.get(PREFIX_BYTES..body).ok_or_else(cut)?).map_err(damaged)?;
+        let points = header.points(patch);
+        if point.is_some_and(|point| point >= points) {
+            return Err(JobsError::NoSuchPoint { points });
+        }
+        let mut pieces = Vec::new();
+        for range in header.ranges(patch, point) {
+            let start = usize::try_from(range.start).unwrap_or(usize::MAX);
+            let end = usize::try_from(range.end).unwrap_or(usize::MAX);
+            let piece = file[body..].get(start..end).ok_or_else(cut)?;
+            pieces.extend_from_slice(piece);
+        }
+        header.decode(patch, point, &pieces).map_err(damaged)
+    }
+}

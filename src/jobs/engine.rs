@@ -1,0 +1,85 @@
+//! What the workers do with a case: check it, solve it. Production uses `contact`; tests may put in their own.
+
+use std::fmt;
+use std::ops::Range;
+use std::sync::Arc;
+
+use serde_json::Value;
+
+use crate::contact;
+use crate::contact::case::limits::Limits;
+use crate::contact::case::problem::Problem;
+use crate::contact::error::{CaseError, SolveError};
+use crate::contact::monitor::Monitor;
+use crate::contact::rolling::operator_store::OperatorStore;
+use crate::contact::slices::{slices, solve_slice};
+use crate::contact::solution::words::{Fields, Solution};
+
+/// Checks a case against limits.
+pub type Check = dyn Fn(&Value, &Limits) -> Result<Problem, CaseError> + Send + Sync;
+
+/// Where a checked case is cut: ranges of motions, one after the other.
+pub type Slices = dyn Fn(&Problem) -> Vec<Range<usize>> + Send + Sync;
+
+/// Solves one of these ranges of a checked case under a monitor.
+pub type Solve = dyn Fn(&Problem, Range<usize>, &dyn Monitor) -> Result<(Solution, Fields), SolveError>
+    + Send
+    + Sync;
+
+/// How a case becomes an answer.
+#[derive(Clone)]
+pub struct Engine {
+    /// The first step, done at submission and again before solving.
+    pub check: Arc<Check>,
+    /// Where the second step is cut, by the case alone.
+    pub slices: Arc<Slices>,
+    /// The second step, done on a solver thread, slice by slice.
+    pub solve: Arc<Solve>,
+    /// What all solver threads share.
+    pub operators: Arc<OperatorStore>,
+}
+
+impl Engine {
+    /// The real physics, with operators kept in a store of the usual size.
+    #[must_use]
+    pub fn contact() -> Engine {
+        Engine::with_operators(OperatorStore::default())
+    }
+
+    /// The real physics with this store.
+    #[must_use]
+    pub fn with_operators(operators: OperatorStore) -> Engine {
+        let operators = Arc::new(operators);
+        let store = Arc::clone(&operators);
+        Engine {
+            check: Arc::new(contact::check),
+            slices: Arc::new(slices),
+            solve: Arc::new(move |problem, slice, monitor| {
+                solve_slice(&store, problem, slice, monitor)
+            }),
+            operators,
+        }
+    }
+
+    /// The same with another solver, which solves every case at once.
+    #[must_use]
+    pub fn solving<F>(self, solve: F) -> Engine
+    where
+        F: Fn(&Problem, &dyn Monitor) -> Result<(Solution, Fields), SolveError>
+            + Send
+            + Sync
+            + 'static,
+    {
+        Engine {
+            slices: Arc::new(|problem| std::iter::once(0..problem.motions.len()).collect()),
+            solve: Arc::new(move |problem, _, monitor| solve(problem, monitor)),
+            ..self
+        }
+    }
+}
+
+impl fmt::Debug for Engine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Recipe")
+    }
+}

@@ -1,0 +1,42 @@
+//! Which jobs are still there for clients, and which have expired.
+
+use uuid::Uuid;
+
+use crate::jobs::error::JobsError;
+use crate::jobs::handle::Jobs;
+use crate::jobs::model::Job;
+
+impl Jobs {
+    /// The job with the time at which it will expire.
+    pub(crate) fn dated(&self, mut job: Job) -> Job {
+        job.expires_at = self.shared.expires_at(&job);
+        job
+    }
+
+    /// The job with that time, unless it is over, or belongs to a batch that was never acknowledged.
+    pub(crate) fn unexpired(&self, job: Job) -> Result<Job, JobsError> {
+        let job = self.dated(job);
+        if let Some(batch) = &job.batch_id
+            && self.shared.unfinished_batches().abandoned.contains(batch)
+        {
+            return Err(JobsError::NotFound);
+        }
+        let now = self.shared.now_ms();
+        let now = job
+            .ended_at
+            .map_or(now, |ended| self.shared.clock_step().now_for(ended, now));
+        match job.expires_at {
+            Some(time) if time <= now => Err(JobsError::Expired),
+            _ => Ok(job),
+        }
+    }
+
+    /// Why there is nothing with this id for this tenant: `unknown`, or that it has expired.
+    pub(crate) async fn missing(&self, id: Uuid, unknown: JobsError) -> JobsError {
+        match self.shared.store.has_expired(id, &self.tenant).await {
+            Ok(true) => JobsError::Expired,
+            Ok(false) => unknown,
+            Err(error) => error,
+        }
+    }
+}

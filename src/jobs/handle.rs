@@ -1,0 +1,181 @@
+//! The handle through which the outside submits, reads and controls jobs.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use serde_json::Value;
+use tokio::time::timeout;
+use uuid::Uuid;
+
+use crate::contact::case::problem::Problem;
+use crate::contact::error::CaseError;
+use crate::jobs::error::JobsError;
+use crate::jobs::model::{Job, QueuePlace, State};
+use crate::jobs::options::Options;
+use crate::jobs::shared::Shared;
+use crate::jobs::store::list::{Filter, Page};
+use crate::jobs::store::types::Deleted;
+use crate::jobs::worker::attempt_control::StopReason;
+
+/// Longest list page.
+pub const PAGE_MAX: u32 = 1000;
+
+/// Places of the queue beyond which a job is not told its own.
+const PLACES_COUNTED: u32 = 10_000;
+
+/// How long a readiness check waits for the database.
+const READY_WITHIN: Duration = Duration::from_secs(2);
+
+/// Jobs: submit, look, list, wait, cancel, fetch. A cheap handle; clones share everything.
+#[derive(Debug, Clone)]
+pub struct Jobs {
+    pub(crate) shared: Arc<Shared>,
+    /// Whose jobs this handle makes and sees.
+    pub(crate) tenant: Arc<str>,
+}
+
+impl Jobs {
+    /// The same jobs as one tenant sees them: its own and no others.
+    #[must_use]
+    pub fn of(&self, tenant: Arc<str>) -> Jobs {
+        Jobs {
+            shared: self.shared.clone(),
+            tenant,
+        }
+    }
+
+    /// Whose jobs these are.
+    #[must_use]
+    pub fn tenant(&self) -> &str {
+        &self.tenant
+    }
+
+    /// How jobs are kept and worked on here.
+    #[must_use]
+    pub fn options(&self) -> &Options {
+        &self.shared.options
+    }
+
+    /// Checks a case against the limits of this service.
+    ///
+    /// # Errors
+    /// Every fault of the case.
+    pub fn check(&self, case: &Value) -> Result<Problem, CaseError> {
+        (self.shared.engine.check)(case, &self.shared.options.limits)
+    }
+
+    /// Looks at a job.
+    ///
+    /// # Errors
+    /// [`JobsError::NotFound`], [`JobsError::Expired`], or a failed database.
+    pub async fn get(&self, id: Uuid) -> Result<Job, JobsError> {
+        let job = self.shared.store.get(id).await?;
+        // What belongs to another tenant is answered like what does not exist.
+        match job.filter(|job| *job.tenant == *self.tenant) {
+            Some(job) => self.unexpired(job),
+            None => Err(self.missing(id, JobsError::NotFound).await),
+        }
+    }
+
+    /// As [`Jobs::get`], with the place of a queued job among the others; without it where too many come before.
+    ///
+    /// # Errors
+    /// As [`Jobs::get`].
+    pub async fn get_with_queue_place(&self, id: Uuid) -> Result<Job, JobsError> {
+        let mut job = self.get(id).await?;
+        if job.state != State::Queued {
+            return Ok(job);
+        }
+        let store = &self.shared.store;
+        let (before, cost_us, tenants) = store.queued_before(&job, PLACES_COUNTED).await?;
+        if let Ok(position) = u32::try_from(before)
+            && position < PLACES_COUNTED
+        {
+            #[expect(clippy::cast_precision_loss, reason = "rough")]
+            let seconds = cost_us as f64 * 1e-6;
+            // Each of the tenants has as much solver time as this one, until its own queue is empty.
+            #[expect(clippy::cast_precision_loss, reason = "rough")]
+            let share = tenants.max(1) as f64 / self.shared.options.workers.max(1) as f64;
+            job.queue = Some(QueuePlace {
+                position,
+                starts_in_s: seconds * share,
+            });
+        }
+        Ok(job)
+    }
+
+    /// One page of a list, newest first; `limit` is brought into 1 to [`PAGE_MAX`].
+    ///
+    /// # Errors
+    /// [`JobsError::BadCursor`], or a failed database.
+    pub async fn list(
+        &self,
+        filter: &Filter,
+        cursor: Option<&str>,
+        limit: u32,
+    ) -> Result<Page, JobsError> {
+        let store = &self.shared.store;
+        let mut page = store
+            .list(&self.tenant, filter, cursor, limit.clamp(1, PAGE_MAX))
+            .await?;
+        let jobs = page.jobs.into_iter();
+        page.jobs = jobs.filter_map(|job| self.unexpired(job).ok()).collect();
+        Ok(page)
+    }
+
+    /// Cancels a job: a queued one ends at once, a running one at the next tick of its solver, an ended one stays as
+    /// it is. Returns the job as it then is.
+    ///
+    /// # Errors
+    /// [`JobsError::NotFound`], or a failed database.
+    pub async fn cancel(&self, id: Uuid) -> Result<Job, JobsError> {
+        self.get(id).await?;
+        let now = self.shared.now_ms();
+        let job = self
+            .shared
+            .store
+            .cancel(id, now)
+            .await?
+            .ok_or(JobsError::NotFound)?;
+        if job.state.ended() {
+            if job.state == State::Cancelled && job.ended_at == Some(now) {
+                self.shared.metrics.ended(State::Cancelled, 1);
+            }
+            self.shared.announce(id);
+        } else if let Some(watch) = self.shared.running.get(id) {
+            // A worker that registers later reads the wish from the table.
+            watch.stop(StopReason::Cancel);
+        }
+        Ok(self.dated(job))
+    }
+
+    /// Removes an ended job with its case and results.
+    ///
+    /// # Errors
+    /// [`JobsError::NotEnded`], [`JobsError::NotFound`], or a failed database.
+    pub async fn delete(&self, id: Uuid) -> Result<(), JobsError> {
+        self.get(id).await?;
+        match self.shared.store.delete(id).await? {
+            Deleted::NotEnded(state) => Err(JobsError::NotEnded(state)),
+            Deleted::NotFound => Err(JobsError::NotFound),
+            Deleted::Done => {
+                self.shared.collect_blobs().await;
+                Ok(())
+            }
+        }
+    }
+
+    /// Can this service take requests? A round trip to the database, which must also take data.
+    ///
+    /// # Errors
+    /// [`JobsError::Draining`], or a database that fails or does not answer in time.
+    pub async fn ready(&self) -> Result<(), JobsError> {
+        if self.shared.draining.is_cancelled() {
+            return Err(JobsError::Draining);
+        }
+        timeout(READY_WITHIN, self.shared.store.ping())
+            .await
+            .unwrap_or(Err(JobsError::Database(sqlx::Error::PoolTimedOut)))?;
+        self.shared.require_storage().await
+    }
+}

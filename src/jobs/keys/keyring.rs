@@ -1,0 +1,96 @@
+//! API keys: which tenant a request belongs to. Of a key only its hash is kept.
+
+use std::path::Path;
+
+use crate::jobs::clock::Clock;
+use crate::jobs::error::JobsError;
+use crate::jobs::keys::key::{Key, MARK, is_tenant};
+use crate::jobs::store::sqlite::database::SqliteStore;
+
+/// The keys of a data folder, also beside a running service.
+#[derive(Debug)]
+pub struct Keyring {
+    store: SqliteStore,
+}
+
+impl Keyring {
+    /// Opens the keys of a data folder. The folder must be there; a new one gets its job table.
+    ///
+    /// # Errors
+    /// There is no such folder, or it cannot be used.
+    pub async fn open(data_dir: &Path) -> Result<Keyring, JobsError> {
+        std::fs::read_dir(data_dir).map_err(|source| JobsError::DataDir {
+            path: data_dir.to_owned(),
+            source,
+        })?;
+        let store = SqliteStore::open(&data_dir.join("jobs.db")).await?;
+        Ok(Keyring { store })
+    }
+
+    /// Is this the data folder of a service?
+    #[must_use]
+    pub fn is_there(data_dir: &Path) -> bool {
+        data_dir.join("jobs.db").is_file()
+    }
+
+    /// Makes a key of a tenant. The secret, returned second, is shown this one time and kept nowhere.
+    ///
+    /// # Errors
+    /// [`JobsError::BadTenant`], no randomness, or a failed database.
+    pub async fn create(
+        &self,
+        tenant: &str,
+        name: Option<String>,
+    ) -> Result<(Key, String), JobsError> {
+        if !is_tenant(tenant) {
+            return Err(JobsError::BadTenant);
+        }
+        let mut id = [0; 6];
+        let mut secret = [0; 32];
+        getrandom::fill(&mut id)
+            .and_then(|()| getrandom::fill(&mut secret))
+            .map_err(|error| JobsError::Damaged(format!("no randomness: {error}")))?;
+        let id = hex(&id);
+        let text = format!("{MARK}{id}_{}", hex(&secret));
+        let key = Key {
+            id,
+            hash: blake3::hash(text.as_bytes()),
+            tenant: tenant.into(),
+            name,
+            created_at: Clock::system().now_ms(),
+            revoked_at: None,
+        };
+        self.store.add_key(&key).await?;
+        Ok((key, text))
+    }
+
+    /// All keys, oldest first, the revoked ones included.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn list(&self) -> Result<Vec<Key>, JobsError> {
+        self.store.keys().await
+    }
+
+    /// Revokes a key by its id; `None` if there is none.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn revoke(&self, id: &str) -> Result<Option<Key>, JobsError> {
+        self.store.revoke_key(id, Clock::system().now_ms()).await
+    }
+
+    /// Closes the data folder.
+    pub async fn close(self) {
+        self.store.close().await;
+    }
+}
+
+fn hex(bytes: &[u8]) -> String {
+    use std::fmt::Write;
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}

@@ -1,0 +1,65 @@
+//! Which tenant a request belongs to.
+
+use std::sync::PoisonError;
+use std::time::{Duration, Instant};
+
+use crate::jobs::error::JobsError;
+use crate::jobs::handle::Jobs;
+use crate::jobs::keys::key::{Key, MARK};
+
+/// How long a key that was found good is not looked up again; a revoked one stops within this time.
+const TRUSTED_FOR: Duration = Duration::from_secs(1);
+
+/// Keys remembered at most.
+const REMEMBERED: usize = 4096;
+
+impl Jobs {
+    /// The key that `text` is, if it is one that is not revoked. Hashes are compared in constant time.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn key(&self, text: &str) -> Result<Option<Key>, JobsError> {
+        let Some((id, _)) = text
+            .strip_prefix(MARK)
+            .and_then(|rest| rest.split_once('_'))
+        else {
+            return Ok(None);
+        };
+        let hash = blake3::hash(text.as_bytes());
+        let trusted = || {
+            let trusted = &self.shared.trusted;
+            trusted.lock().unwrap_or_else(PoisonError::into_inner)
+        };
+        if let Some((key, since)) = trusted().get(id)
+            && since.elapsed() < TRUSTED_FOR
+        {
+            return Ok((key.hash == hash).then(|| key.clone()));
+        }
+        // Taken before the look: what is revoked meanwhile is not trusted for longer.
+        let now = Instant::now();
+        let found = self.shared.store.key(id).await?;
+        let good = found.filter(|key| key.hash == hash && key.revoked_at.is_none());
+        let mut trusted = trusted();
+        match &good {
+            Some(key) => {
+                if trusted.len() >= REMEMBERED {
+                    trusted.clear();
+                }
+                trusted.insert(id.to_owned(), (key.clone(), now));
+            }
+            None => {
+                trusted.remove(id);
+            }
+        }
+        Ok(good)
+    }
+
+    /// Is there any key that is not revoked?
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn any_key(&self) -> Result<bool, JobsError> {
+        let keys = self.shared.store.keys().await?;
+        Ok(keys.iter().any(|key| key.revoked_at.is_none()))
+    }
+}

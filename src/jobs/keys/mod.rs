@@ -1,0 +1,5 @@
+//! API keys: which tenant a request belongs to.
+
+pub mod key;
+pub mod keyring;
+pub mod lookup;

@@ -1,0 +1,63 @@
+//! A little room on the disk that is kept for a start on a full one: the job table cannot be opened without a new file beside it.
+
+use std::fs::{DirBuilder, File};
+use std::io::{Result, Write};
+use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
+use std::path::Path;
+
+/// Makes a folder that nobody else may read, if there is none, whatever the umask.
+pub(crate) fn make_private_folder(path: &Path) -> std::io::Result<()> {
+    DirBuilder::new().recursive(true).mode(0o700).create(path)
+}
+
+const NAME: &str = "reserve";
+
+/// SQLite needs 32 KiB for the index of its log, and a page or two for the log.
+const BYTES: usize = 1 << 20;
+
+/// Keeps the room, if it is not kept yet and the disk has it.
+pub(crate) fn keep(data_dir: &Path) {
+    let path = data_dir.join(NAME);
+    if std::fs::metadata(&path).is_ok_and(|about| about.len() >= BYTES as u64) {
+        return;
+    }
+    let written = write(&path);
+    if written.is_err() {
+        // What was written of it is of no use to anybody.
+        let _ = std::fs::remove_file(path);
+    }
+}
+
+fn write(path: &Path) -> Result<()> {
+    let mut file = File::options()
+        .create(true)
+        .truncate(true)
+        .write(true)
+        .mode(0o600)
+        .open(path)?;
+    file.write_all(&vec![0; BYTES])?;
+    file.sync_all()
+}
+
+/// Gives the room back; `false` if none was kept.
+pub(crate) fn give_back(data_dir: &Path) -> bool {
+    std::fs::remove_file(data_dir.join(NAME)).is_ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_kept_is_given_back_once() {
+        let folder = tempfile::tempdir().unwrap();
+        for _ in 0..2 {
+            keep(folder.path());
+        }
+        let kept = std::fs::metadata(folder.path().join(NAME)).unwrap();
+        assert_eq!(kept.len(), BYTES as u64);
+        assert!(give_back(folder.path()));
+        assert!(!give_back(folder.path()));
+        keep(&folder.path().join("that is not there"));
+    }
+}

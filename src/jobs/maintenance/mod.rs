@@ -1,0 +1,8 @@
+//! What runs beside the workers: leases, deadlines, retention, blobs.
+
+pub mod blob_collector;
+pub mod deadlines;
+pub mod disk_reserve;
+pub mod reaper;
+pub mod recovery;
+pub mod retention;

@@ -1,0 +1,61 @@
+//! Takes jobs from workers whose lease has run out.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use crate::jobs::model::{FailureKind, State};
+use crate::jobs::shared::{Shared, heartbeat};
+
+/// Takes jobs whose lease has run out from their workers, three times per lease, until the service drains.
+pub(crate) async fn reap_expired(shared: Arc<Shared>) {
+    let mut beat = tokio::time::interval(heartbeat(&shared));
+    beat.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+    let recovered = shared.recovered.wait();
+    let _ = shared.draining.run_until_cancelled(recovered).await;
+    let mut quiet_until = i64::MIN;
+    let mut looked = shared.steady_ms();
+    while shared
+        .draining
+        .run_until_cancelled(beat.tick())
+        .await
+        .is_some()
+    {
+        // While nothing can be written no lease can be renewed either, which is no silence of the workers.
+        if shared.storage_failing.load(Ordering::Relaxed) {
+            quiet_until = shared.lease_until();
+        }
+        let now = shared.steady_ms();
+        // Who was held up by the table has held up the heartbeats of the workers as well.
+        if now.saturating_sub(looked) > shared.lease_ms() * 2 / 3 {
+            quiet_until = shared.lease_until();
+        }
+        looked = now;
+        if now < quiet_until {
+            continue;
+        }
+        let reaped = shared
+            .store
+            .reap(now, shared.now_ms(), shared.options.attempts_max);
+        match reaped.await {
+            Ok(taken) => {
+                for (id, state) in taken {
+                    tracing::warn!(job = %id, state = state.name(), "lease ran out, job taken back");
+                    if state.ended() {
+                        count_taken(&shared, state);
+                        shared.announce(id);
+                    } else {
+                        shared.wake.notify_one();
+                    }
+                }
+            }
+            Err(error) => tracing::warn!(%error, "expired leases could not be looked for"),
+        }
+    }
+}
+
+fn count_taken(shared: &Shared, state: State) {
+    match state {
+        State::Failed => shared.metrics.failed(FailureKind::WorkerLost),
+        state => shared.metrics.ended(state, 1),
+    }
+}

@@ -1,0 +1,55 @@
+//! Metrics that are read from the store when they are scraped.
+
+use std::sync::atomic::Ordering;
+
+use prometheus_client::registry::Registry;
+
+use crate::jobs::error::JobsError;
+use crate::jobs::handle::Jobs;
+use crate::jobs::metrics::state_label;
+
+impl Jobs {
+    /// Adds what this room counts to a registry.
+    pub fn register_metrics(&self, registry: &mut Registry) {
+        self.shared.metrics.register(registry);
+    }
+
+    /// Brings those figures up to date that are read from the store and not counted as they happen.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn refresh_metrics(&self) -> Result<(), JobsError> {
+        let metrics = &self.shared.metrics;
+        metrics.workers.set(count(self.shared.options.workers));
+        metrics.parked.set(count(self.shared.turns.parked().0));
+        let abandoned = self.shared.abandoned.load(Ordering::Acquire);
+        metrics.abandoned.set(count(abandoned));
+        let stats = match self.shared.store.stats().await {
+            Err(error) if error.storage_fault().is_some() => {
+                // The alert for this must not fail with it.
+                self.shared.observe_storage::<()>(&Err(error));
+                return Ok(());
+            }
+            stats => stats?,
+        };
+        for (state, jobs) in stats.jobs {
+            let gauge = metrics.jobs.get_or_create_owned(&state_label(state));
+            gauge.set(i64::try_from(jobs).unwrap_or(i64::MAX));
+        }
+        let age_ms = stats
+            .oldest_queued_at
+            .map_or(0, |created| (self.shared.now_ms() - created).max(0));
+        #[expect(clippy::cast_precision_loss, reason = "an age is far below 2^53 ms")]
+        metrics.oldest_queued_seconds.set(age_ms as f64 / 1000.0);
+        let bytes = |bytes: u64| i64::try_from(bytes).unwrap_or(i64::MAX);
+        metrics.database_bytes.set(bytes(stats.database_bytes));
+        metrics.result_bytes.set(bytes(stats.result_bytes));
+        let operators = self.shared.engine.operators.bytes();
+        metrics.operator_bytes.set(bytes(operators));
+        Ok(())
+    }
+}
+
+fn count(number: usize) -> i64 {
+    i64::try_from(number).unwrap_or(i64::MAX)
+}

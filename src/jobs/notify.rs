@@ -1,0 +1,144 @@
+//! Following jobs and batches: the next change after the one that was seen.
+//!
+//! The table is the truth and is looked at; announcements only bring a look forward. Nothing is queued for a follower, so
+//! one that does not come back costs nothing.
+
+use std::time::Duration;
+
+use tokio::time::{Instant, sleep, timeout_at};
+use uuid::Uuid;
+
+use crate::jobs::batch::model::Batch;
+use crate::jobs::error::JobsError;
+use crate::jobs::handle::Jobs;
+use crate::jobs::model::Job;
+use crate::jobs::shared::POLL_INTERVAL;
+
+/// Shortest time between two looks of one follower.
+const PAUSE: Duration = Duration::from_millis(50);
+
+/// Time between two looks at a batch, for each job of it; counting them takes time too.
+const PAUSE_PER_JOB: Duration = Duration::from_micros(10);
+
+impl Jobs {
+    /// Waits until a job is at another version than `seen` and returns it; at once if it is, or if nothing was seen yet.
+    /// `None` when nothing more will come: the job had ended, or the service is about to stop.
+    ///
+    /// # Errors
+    /// [`JobsError::NotFound`], or a failed database.
+    pub async fn job_changed_since(
+        &self,
+        id: Uuid,
+        seen: Option<u64>,
+    ) -> Result<Option<Job>, JobsError> {
+        // Subscribe first, then look: what ends in between is announced.
+        let mut ended = self.shared.ended.subscribe();
+        let mut announced = true;
+        loop {
+            // A look that others had a moment ago serves, unless something was announced since.
+            let job = match announced {
+                true => self.get(id).await?,
+                false => self.recent(id, PAUSE).await?,
+            };
+            if seen != Some(job.version) {
+                return Ok(Some(job));
+            }
+            if job.state.ended() {
+                return Ok(None);
+            }
+            let again = Instant::now() + POLL_INTERVAL;
+            let end = async {
+                sleep(PAUSE).await;
+                // A lagging receiver may have missed the announcement, so it looks again as well.
+                while ended.recv().await.is_ok_and(|ended| ended != id) {}
+            };
+            tokio::select! {
+                end = timeout_at(again, end) => announced = end.is_ok(),
+                () = self.shared.draining.cancelled() => return Ok(None),
+            }
+        }
+    }
+
+    /// Waits until the jobs of a batch are in other states than `seen` says and returns it; at once if they are, or if
+    /// nothing was seen yet. `None` when nothing more will come: all jobs had ended, or the service is about to stop.
+    ///
+    /// # Errors
+    /// [`JobsError::BatchNotFound`], or a failed database.
+    pub async fn batch_changed_since(
+        &self,
+        id: Uuid,
+        seen: Option<&str>,
+    ) -> Result<Option<Batch>, JobsError> {
+        let mut pause = PAUSE;
+        loop {
+            let batch = match seen {
+                None => self.batch(id).await?,
+                Some(_) => self.recent_batch(id, pause).await?,
+            };
+            if seen != Some(&batch.change_tag()) {
+                return Ok(Some(batch));
+            }
+            let (ended, all) = batch.ended();
+            if ended == all {
+                return Ok(None);
+            }
+            pause = PAUSE_PER_JOB.saturating_mul(batch.count).max(PAUSE);
+            tokio::select! {
+                () = sleep(pause) => {}
+                () = self.shared.draining.cancelled() => return Ok(None),
+            }
+        }
+    }
+}
+
+impl Jobs {
+    /// As [`Jobs::get`], as the job was a moment ago: one look serves all who follow it.
+    ///
+    /// # Errors
+    /// As [`Jobs::get`].
+    pub(crate) async fn recent(&self, id: Uuid, age: Duration) -> Result<Job, JobsError> {
+        let look = self.shared.store.get(id);
+        let job = self.shared.recent_jobs.at(id, age, look).await?;
+        match job.filter(|job| *job.tenant == *self.tenant) {
+            Some(job) => self.unexpired(job),
+            None => Err(self.missing(id, JobsError::NotFound).await),
+        }
+    }
+
+    /// The same of a batch.
+    async fn recent_batch(&self, id: Uuid, age: Duration) -> Result<Batch, JobsError> {
+        let look = self.shared.store.batch(id);
+        let batch = self.shared.recent_batches.at(id, age, look).await?;
+        match batch.filter(|batch| *batch.tenant == *self.tenant) {
+            Some(batch) => Ok(batch),
+            None => Err(self.missing(id, JobsError::BatchNotFound).await),
+        }
+    }
+}
+
+impl Jobs {
+    /// Waits until a job has ended, but not longer than `at_most`, and returns it as it then is. Returns at once when
+    /// the service is about to stop.
+    ///
+    /// # Errors
+    /// [`JobsError::NotFound`], or a failed database.
+    pub async fn wait(&self, id: Uuid, at_most: Duration) -> Result<Job, JobsError> {
+        let until = Instant::now() + at_most;
+        // Subscribe first, then look: what ends in between is announced.
+        let mut ended = self.shared.ended.subscribe();
+        loop {
+            let job = self.get(id).await?;
+            if job.state.ended() || Instant::now() >= until || self.shared.draining.is_cancelled() {
+                return Ok(job);
+            }
+            let announced = async {
+                // A lagging receiver may have missed the announcement, so it looks again as well.
+                while ended.recv().await.is_ok_and(|ended| ended != id) {}
+            };
+            tokio::select! {
+                _ = timeout_at(until.min(Instant::now() + POLL_INTERVAL), announced) => {}
+                () = self.shared.draining.cancelled() => {}
+            }
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! What was looked up a moment ago, for all who look for the same: however many follow a batch, the table is asked once.
+
+use std::collections::HashMap;
+use std::fmt;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use tokio::time::Instant;
+use uuid::Uuid;
+
+type Look<T> = Arc<tokio::sync::Mutex<Option<(Instant, T)>>>;
+
+/// The last looks at things that somebody follows.
+pub(crate) struct RecentReads<T>(Mutex<HashMap<Uuid, Look<T>>>);
+
+impl<T> Default for RecentReads<T> {
+    fn default() -> Self {
+        RecentReads(Mutex::default())
+    }
+}
+
+impl<T> fmt::Debug for RecentReads<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("RecentLooks")
+    }
+}
+
+impl<T: Clone> RecentReads<T> {
+    /// What a look finds, or found not longer than `age` ago. While one looks the others wait for what it finds.
+    pub(crate) async fn at<E>(
+        &self,
+        id: Uuid,
+        age: Duration,
+        look: impl Future<Output = Result<T, E>>,
+    ) -> Result<T, E> {
+        let last = {
+            let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            Arc::clone(all.entry(id).or_default())
+        };
+        let mut seen = last.lock().await;
+        if let Some((when, found)) = seen.as_ref()
+            && when.elapsed() < age
+        {
+            return Ok(found.clone());
+        }
+        let found = look.await?;
+        *seen = Some((Instant::now(), found.clone()));
+        drop(seen);
+        drop(last);
+        self.forget(age);
+        Ok(found)
+    }
+
+    /// Forgets what nobody looks at any more.
+    fn forget(&self, age: Duration) {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        all.retain(|_, look| {
+            Arc::strong_count(look) > 1
+                || look.try_lock().is_ok_and(|seen| {
+                    seen.as_ref()
+                        .is_some_and(|(when, _)| when.elapsed() < 4 * age)
+                })
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicU64, Ordering};
+
+    use super::*;
+
+    #[tokio::test]
+    async fn a_thousand_who_look_for_the_same_are_a_few_looks() {
+        let looks = Arc::new(RecentReads::<u64>::default());
+        let asked = Arc::new(AtomicU64::new(0));
+        let (id, age) = (Uuid::now_v7(), Duration::from_millis(200));
+        for round in 1..=2 {
+            let before = asked.load(Ordering::SeqCst);
+            let all = (0..1000).map(|_| {
+                let (looks, asked) = (looks.clone(), asked.clone());
+                tokio::spawn(async move {
+                    let look = async {
+                        tokio::time::sleep(Duration::from_millis(5)).await;
+                        Ok::<_, ()>(asked.fetch_add(1, Ordering::SeqCst) + 1)
+                    };
+                    looks.at(id, age, look).await
+                })
+            });
+            for found in all.collect::<Vec<_>>() {
+                assert!(found.await.unwrap().unwrap() > before, "older than allowed");
+            }
+            // One, on a machine that is not very slow.
+            let looked = asked.load(Ordering::SeqCst) - before;
+            assert!(looked <= 20, "round {round}: {looked}");
+            tokio::time::sleep(age).await;
+        }
+        // A look that fails is nobody else's answer, and what nobody follows is forgotten.
+        let failed = looks.at(id, age, async { Err::<u64, _>("away") }).await;
+        assert_eq!(failed, Err("away"));
+        let other = looks.at(Uuid::now_v7(), age, async { Ok::<_, ()>(7) });
+        assert_eq!(other.await, Ok(7));
+        tokio::time::sleep(5 * age).await;
+        looks.forget(age);
+        assert!(looks.0.lock().unwrap().is_empty());
+    }
+}

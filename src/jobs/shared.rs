@@ -1,0 +1,124 @@
+//! What every handle and every worker shares.
+
+use std::fs::File;
+use std::sync::atomic::{AtomicBool, AtomicUsize};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use tokio::sync::{Notify, Semaphore, SetOnce, broadcast};
+use tokio_util::sync::CancellationToken;
+use tokio_util::task::TaskTracker;
+use uuid::Uuid;
+
+use crate::jobs::batch::model::Batch;
+use crate::jobs::batch::unfinished::UnfinishedBatches;
+use crate::jobs::blobs::Blobs;
+use crate::jobs::clock_steps::{ClockStep, ClockSteps};
+use crate::jobs::engine::Engine;
+use crate::jobs::keys::key::Trusted;
+use crate::jobs::metrics::Metrics;
+use crate::jobs::model::Job;
+use crate::jobs::options::Options;
+use crate::jobs::quota::StagedBytes;
+use crate::jobs::recent_reads::RecentReads;
+use crate::jobs::store::sqlite::database::SqliteStore;
+use crate::jobs::worker::fair_turns::FairTurns;
+use crate::jobs::worker::running::RunningAttempts;
+
+/// How often a waiting caller looks again although nothing was announced.
+pub(crate) const POLL_INTERVAL: Duration = Duration::from_secs(1);
+
+/// What every handle and every worker shares.
+#[derive(Debug)]
+pub(crate) struct Shared {
+    pub(crate) options: Options,
+    pub(crate) engine: Engine,
+    pub(crate) store: SqliteStore,
+    pub(crate) blobs: Blobs,
+    /// Wakes an idle worker; a hint only, workers also look by themselves.
+    pub(crate) wake: Notify,
+    /// Announces ended jobs; a hint only, waiting callers also look by themselves.
+    pub(crate) ended: broadcast::Sender<Uuid>,
+    /// The attempts of this process.
+    pub(crate) running: RunningAttempts,
+    /// Set when the service is about to stop: no new claims, not ready, no more waiting.
+    pub(crate) draining: CancellationToken,
+    /// Set when the grace period is over: running jobs are handed back.
+    pub(crate) stopping: CancellationToken,
+    pub(crate) tasks: TaskTracker,
+    pub(crate) metrics: Metrics,
+    /// The last write failed because of the disk.
+    pub(crate) storage_failing: AtomicBool,
+    /// Keys found good a moment ago.
+    pub(crate) trusted: Mutex<Trusted>,
+    /// Cases of single jobs that may be checked at the same time.
+    pub(crate) checks: Semaphore,
+    /// Bytes of batches that are being received.
+    pub(crate) staged: StagedBytes,
+    /// Batches that are being received or filled, and those of which only remains are left.
+    pub(crate) batches: Mutex<UnfinishedBatches>,
+    /// Batches and jobs that somebody follows, as they were a moment ago.
+    pub(crate) recent_batches: RecentReads<Option<Batch>>,
+    pub(crate) recent_jobs: RecentReads<Option<Job>>,
+    /// What became of the wall clock.
+    pub(crate) leaps: ClockSteps,
+    /// Whose turn it is, and solves that wait for theirs.
+    pub(crate) turns: FairTurns,
+    /// Held by all that is solved; alone by what may have killed a process.
+    pub(crate) solo: Arc<tokio::sync::RwLock<()>>,
+    /// Attempts that wait to be solved alone.
+    pub(crate) suspects_waiting: AtomicUsize,
+    /// Solver threads that did not stop and still run.
+    pub(crate) abandoned: Arc<AtomicUsize>,
+    /// Set when there are too many of them.
+    pub(crate) broken: CancellationToken,
+    /// What a dead process left is taken back; nothing is claimed before.
+    pub(crate) recovered: SetOnce<()>,
+    /// Held as long as this process uses the data folder.
+    pub(crate) lock: Mutex<Option<File>>,
+}
+
+impl Shared {
+    /// The present, epoch milliseconds.
+    pub(crate) fn now_ms(&self) -> i64 {
+        self.options.clock.now_ms()
+    }
+
+    /// Milliseconds of a clock that nobody turns; leases are measured with it.
+    pub(crate) fn steady_ms(&self) -> i64 {
+        self.options.clock.steady_ms()
+    }
+
+    /// The time from a claim or a heartbeat until the job is given away, in ms.
+    pub(crate) fn lease_ms(&self) -> i64 {
+        i64::try_from(self.options.lease.as_millis()).unwrap_or(i64::MAX)
+    }
+
+    /// How far the wall clock has leapt since the start.
+    pub(crate) fn clock_step(&self) -> ClockStep {
+        self.leaps.look(&self.options.clock)
+    }
+
+    /// When a lease that begins now runs out.
+    pub(crate) fn lease_until(&self) -> i64 {
+        self.steady_ms().saturating_add(self.lease_ms())
+    }
+
+    /// Tells waiting callers that a job has ended.
+    pub(crate) fn announce(&self, id: Uuid) {
+        // Nobody listening is no error.
+        let _ = self.ended.send(id);
+    }
+}
+
+impl Shared {
+    /// Batches that are not acknowledged.
+    pub(crate) fn unfinished_batches(&self) -> MutexGuard<'_, UnfinishedBatches> {
+        self.batches.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Time between two heartbeats of a worker, and between two looks of the reaper.
+pub(crate) fn heartbeat(shared: &Shared) -> Duration {
+    (shared.options.lease / 3).max(Duration::from_millis(1))
+}

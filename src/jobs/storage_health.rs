@@ -1,0 +1,89 @@
+//! What becomes of jobs while the disk is full or cannot be written: nothing new is accepted, nothing accepted is lost.
+//!
+//! A result that cannot be stored stays in memory, its worker waits with it and tries again.
+
+use std::future::Future;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use crate::jobs::error::JobsError;
+use crate::jobs::handle::Jobs;
+use crate::jobs::shared::Shared;
+
+/// Tries to write where the cause is not the disk, with pauses that double from [`FIRST_PAUSE`].
+const WRITE_TRIES: u32 = 6;
+
+const FIRST_PAUSE: Duration = Duration::from_millis(50);
+
+/// Longest pause between two tries.
+const LONGEST_PAUSE: Duration = Duration::from_secs(2);
+
+impl Jobs {
+    /// Passes a failed submission on; trouble with the disk makes the service not ready until a write succeeds.
+    pub(crate) fn observe_write<T>(&self, written: Result<T, JobsError>) -> Result<T, JobsError> {
+        self.shared.observe_storage(&written);
+        written
+    }
+}
+
+impl Shared {
+    /// Remembers whether the disk takes what is written.
+    pub(crate) fn observe_storage<T>(&self, written: &Result<T, JobsError>) {
+        let trouble = match written {
+            Ok(_) => None,
+            Err(error) => match error.storage_fault() {
+                Some(trouble) => Some(trouble),
+                // It was not about the disk.
+                None => return,
+            },
+        };
+        let before = self
+            .storage_failing
+            .swap(trouble.is_some(), Ordering::Relaxed);
+        self.metrics.storage_failing(trouble.is_some());
+        match trouble {
+            Some(trouble) if !before => tracing::error!(?trouble, "the disk takes nothing"),
+            None if before => tracing::info!("the disk takes data again"),
+            _ => {}
+        }
+    }
+
+    /// Writes, again and again: a few times if the database fails for a moment, for as long as it takes if the disk is
+    /// full or cannot be written. Gives up when the service stops.
+    pub(crate) async fn write_with_retries<T, F>(
+        &self,
+        mut write: impl FnMut() -> F,
+    ) -> Result<T, JobsError>
+    where
+        F: Future<Output = Result<T, JobsError>>,
+    {
+        let (mut pause, mut tries) = (FIRST_PAUSE, 1);
+        loop {
+            let written = write().await;
+            self.observe_storage(&written);
+            let Err(error) = &written else { return written };
+            let waits = error.storage_fault().is_some() && !self.stopping.is_cancelled();
+            let again = matches!(error, JobsError::Database(_)) && tries < WRITE_TRIES;
+            if !waits && !again {
+                return written;
+            }
+            tracing::warn!(%error, "could not be written yet");
+            tokio::select! {
+                () = tokio::time::sleep(pause) => {}
+                () = self.stopping.cancelled(), if waits => {}
+            }
+            pause = (pause * 2).min(LONGEST_PAUSE);
+            tries += 1;
+        }
+    }
+
+    /// Does the disk take data? Writes only if it did not the last time.
+    pub(crate) async fn require_storage(&self) -> Result<(), JobsError> {
+        if !self.storage_failing.load(Ordering::Relaxed) {
+            return Ok(());
+        }
+        let written = self.store.touch().await;
+        self.observe_storage(&written);
+        written
+    }
+}

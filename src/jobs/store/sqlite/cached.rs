@@ -1,0 +1,101 @@
+//! Results that are used again: finding the job that has one, and ending another job with it.
+//!
+//! A result is lent: the other job refers to the same blob, which is kept for as long as any job refers to it.
+
+use sqlx::{QueryBuilder, Sqlite, SqliteConnection};
+use uuid::Uuid;
+
+use crate::jobs::error::JobsError;
+use crate::jobs::store::sqlite::rows::read_id;
+use crate::jobs::store::types::NewJob;
+
+/// One seek in the index, however many jobs have the same key.
+pub(crate) const SOURCE: &str =
+    "(SELECT id FROM jobs WHERE cache_key = asked.cache_key AND state = 'succeeded' LIMIT 1)";
+
+/// Ends those of the jobs just queued that have a source, with its result. A job whose source is gone meanwhile stays
+/// queued. Returns the jobs that ended.
+pub(crate) async fn end_with_sources(
+    connection: &mut SqliteConnection,
+    jobs: impl Iterator<Item = &NewJob>,
+) -> Result<Vec<Uuid>, JobsError> {
+    let pairs: Vec<_> = jobs
+        .filter_map(|job| {
+            let (source, at) = job.source?;
+            Some(Pair {
+                job: job.id,
+                source,
+                at,
+                lease_number: None,
+            })
+        })
+        .collect();
+    end_pairs(connection, &pairs).await
+}
+
+/// A job and the one whose result it gets.
+pub(crate) struct Pair {
+    pub(crate) job: Uuid,
+    pub(crate) source: Uuid,
+    pub(crate) at: i64,
+    /// Of a claimed job.
+    pub(crate) lease_number: Option<i64>,
+}
+
+/// Ends jobs that are queued, or running under the given lease; returns them.
+pub(crate) async fn end_pairs(
+    connection: &mut SqliteConnection,
+    pairs: &[Pair],
+) -> Result<Vec<Uuid>, JobsError> {
+    if pairs.is_empty() {
+        return Ok(Vec::new());
+    }
+    let mut update = with_pairs(pairs);
+    update.push(
+        " UPDATE jobs SET state = 'succeeded', started_at = pairs.at, ended_at = pairs.at, progress = 1.0, cached = 1, \
+         remarks = source.remarks, blob_id = source.blob_id, field_patches = source.field_patches, \
+         cache_key = NULL, lease_until = NULL, worker = NULL, version = jobs.version + 1, \
+         attempt = jobs.attempt - (pairs.lease_number IS NOT NULL) \
+         FROM pairs JOIN jobs AS source ON source.id = pairs.source AND source.state = 'succeeded' \
+         WHERE jobs.id = pairs.job AND (jobs.state = 'queued' AND pairs.lease_number IS NULL \
+         OR jobs.state = 'running' AND jobs.lease_number = pairs.lease_number) RETURNING id",
+    );
+    let rows = update.build().fetch_all(&mut *connection).await?;
+    rows.iter().map(read_id).collect()
+}
+
+fn with_pairs<'a>(pairs: impl IntoIterator<Item = &'a Pair>) -> QueryBuilder<Sqlite> {
+    let mut query = QueryBuilder::new("WITH pairs (job, at, source, lease_number) AS (");
+    query.push_values(pairs, |mut row, pair| {
+        row.push_bind(pair.job.to_string())
+            .push_bind(pair.at)
+            .push_bind(pair.source.to_string())
+            .push_bind(pair.lease_number);
+    });
+    query.push(")");
+    query
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::jobs::store::sqlite::database::SqliteStore;
+    use crate::jobs::store::sqlite::lists::tests::plan;
+
+    #[tokio::test]
+    async fn a_source_is_found_by_one_seek() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = SqliteStore::open(&folder.path().join("jobs.db"))
+            .await
+            .unwrap();
+        let statement =
+            format!("WITH asked (cache_key) AS (VALUES (x'00')) SELECT {SOURCE} FROM asked");
+        let steps = plan(&store, &statement).await;
+        assert!(
+            steps
+                .iter()
+                .any(|step| step.contains("jobs_by_cache_key (cache_key=?)")),
+            "{steps:?}"
+        );
+    }
+}

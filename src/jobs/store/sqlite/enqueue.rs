@@ -1,0 +1,58 @@
+//! Submission of single jobs, and what their idempotency keys stand for.
+
+use tokio::sync::oneshot;
+
+use crate::jobs::error::JobsError;
+use crate::jobs::store::sqlite::database::SqliteStore;
+use crate::jobs::store::sqlite::group_commit::{Submission, by_key};
+use crate::jobs::store::types::{Enqueued, NewJob, QueueBounds};
+
+impl SqliteStore {
+    /// Queues a job if the bounds leave it a place, or finds the one its idempotency key already stands for. Durable once it returns. Whoever stops
+    /// waiting for it does not stop it.
+    ///
+    /// # Errors
+    /// The database failed; nothing was stored.
+    pub async fn enqueue(&self, new: &NewJob, bounds: QueueBounds) -> Result<Enqueued, JobsError> {
+        let gone = || JobsError::Database(sqlx::Error::WorkerCrashed);
+        let (reply, answer) = oneshot::channel();
+        let waiting = Submission {
+            new: new.clone(),
+            bounds,
+            reply,
+        };
+        self.group_commit
+            .0
+            .send(waiting)
+            .await
+            .map_err(|_| gone())?;
+        answer.await.map_err(|_| gone())?
+    }
+
+    /// Frees an idempotency key, whatever job it stands for.
+    ///
+    /// # Errors
+    /// The database failed; nothing changed.
+    pub async fn forget_key(&self, tenant: &str, key: &str) -> Result<(), JobsError> {
+        sqlx::query("DELETE FROM idempotency_keys WHERE of_tenant = $1 AND key = $2")
+            .bind(tenant)
+            .bind(key)
+            .execute(&self.writer)
+            .await?;
+        Ok(())
+    }
+
+    /// What an idempotency key of a tenant stands for, if it was used.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn by_key(
+        &self,
+        tenant: &str,
+        key: &str,
+        digest: &[u8; 32],
+    ) -> Result<Option<Enqueued>, JobsError> {
+        let mut connection = self.readers.acquire().await?;
+        by_key(&mut connection, tenant, key, digest).await
+    }
+}

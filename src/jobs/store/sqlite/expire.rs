@@ -1,0 +1,125 @@
+//! Removal of what has expired, and of the space it took, in the embedded job table.
+
+use sqlx::{QueryBuilder, Sqlite};
+use uuid::Uuid;
+
+use crate::jobs::error::JobsError;
+use crate::jobs::store::list::first_id_at;
+use crate::jobs::store::sqlite::blobs::release_blobs;
+use crate::jobs::store::sqlite::database::SqliteStore;
+use crate::jobs::store::sqlite::rows::{push_list, read_blob_ids, read_id};
+use crate::jobs::store::types::RetentionRule;
+
+/// Ids grow with the time of submission, so the oldest rows are looked at and no others.
+const EXPIRED: &str = "SELECT id, blob_id FROM jobs \
+     WHERE id < $1 AND ended_at <= $2 ORDER BY id LIMIT $3";
+
+impl SqliteStore {
+    /// Removes expired jobs, complete batches of that age without jobs, and ids remembered long enough. Returns the number
+    /// of jobs removed.
+    ///
+    /// # Errors
+    /// The database failed; nothing changed.
+    pub async fn expire(&self, expiry: RetentionRule) -> Result<u64, JobsError> {
+        let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
+        let young = first_id_at(expiry.ended_before.saturating_add(1)).to_string();
+        let rows = sqlx::query(EXPIRED)
+            .bind(&young)
+            .bind(expiry.ended_before)
+            .bind(expiry.jobs)
+            .fetch_all(&mut *transaction)
+            .await?;
+        let mut blobs = Vec::with_capacity(rows.len());
+        for some in rows.chunks(250) {
+            let ids = some.iter().map(read_id).collect::<Result<Vec<_>, _>>()?;
+            blobs.extend(read_blob_ids(some)?);
+            let mut bury = QueryBuilder::<Sqlite>::new(
+                "INSERT OR REPLACE INTO tombstones (id, tenant, gone_at) SELECT id, tenant, ",
+            );
+            bury.push_bind(expiry.now);
+            bury.push(" FROM jobs WHERE id IN (");
+            push_list(&mut bury, &ids);
+            bury.push(")");
+            bury.build().execute(&mut *transaction).await?;
+            let mut delete = QueryBuilder::<Sqlite>::new("DELETE FROM jobs WHERE id IN (");
+            push_list(&mut delete, &ids);
+            delete.push(")");
+            delete.build().execute(&mut *transaction).await?;
+        }
+        release_blobs(&mut transaction, blobs).await?;
+        sqlx::query(
+            "INSERT OR REPLACE INTO tombstones (id, tenant, gone_at) SELECT id, tenant, $1 FROM batches \
+             WHERE id < $2 AND complete = 1 AND NOT EXISTS (SELECT 1 FROM jobs WHERE batch_id = batches.id)",
+        )
+        .bind(expiry.now)
+        .bind(&young)
+        .execute(&mut *transaction)
+        .await?;
+        sqlx::query(
+            "DELETE FROM batches \
+             WHERE id < $1 AND complete = 1 AND NOT EXISTS (SELECT 1 FROM jobs WHERE batch_id = batches.id)",
+        )
+        .bind(&young)
+        .execute(&mut *transaction)
+        .await?;
+        sqlx::query("DELETE FROM tombstones WHERE id < $1 AND gone_at <= $2")
+            .bind(first_id_at(expiry.forget_before.saturating_add(1)).to_string())
+            .bind(expiry.forget_before)
+            .execute(&mut *transaction)
+            .await?;
+        transaction.commit().await?;
+        Ok(rows.len() as u64)
+    }
+
+    /// Was there a job or a batch of this tenant with this id that has expired?
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn has_expired(&self, id: Uuid, tenant: &str) -> Result<bool, JobsError> {
+        let found = sqlx::query("SELECT 1 FROM tombstones WHERE id = $1 AND tenant = $2")
+            .bind(id.to_string())
+            .bind(tenant)
+            .fetch_optional(&self.readers)
+            .await?;
+        Ok(found.is_some())
+    }
+
+    /// Gives at most `step` free pages of the file back, if there are more than `spare`; says whether it did.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn shrink(&self, spare: i64, step: u32) -> Result<bool, JobsError> {
+        let free: i64 = sqlx::query_scalar("PRAGMA freelist_count")
+            .fetch_one(&self.readers)
+            .await?;
+        if free <= spare {
+            return Ok(false);
+        }
+        let step = i64::from(step).min(free - spare);
+        sqlx::query(sqlx::AssertSqlSafe(format!(
+            "PRAGMA incremental_vacuum({step})"
+        )))
+        .fetch_all(&self.writer)
+        .await?;
+        let left: i64 = sqlx::query_scalar("PRAGMA freelist_count")
+            .fetch_one(&self.writer)
+            .await?;
+        Ok(left < free)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::jobs::store::sqlite::lists::tests::plan;
+
+    #[tokio::test]
+    async fn the_sweep_looks_at_old_jobs_only() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = SqliteStore::open(&folder.path().join("jobs.db"))
+            .await
+            .unwrap();
+        let steps = plan(&store, EXPIRED).await;
+        assert_eq!(steps, ["SEARCH jobs USING PRIMARY KEY (id<?)"]);
+    }
+}

@@ -1,0 +1,185 @@
+//! What workers write while they hold a lease.
+
+use crate::jobs::store::sqlite::rows::fence;
+use std::collections::{HashMap, HashSet};
+
+use bytes::Bytes;
+use sqlx::{QueryBuilder, Row, Sqlite};
+use uuid::Uuid;
+
+use crate::jobs::error::JobsError;
+use crate::jobs::model::State;
+use crate::jobs::store::sqlite::database::SqliteStore;
+use crate::jobs::store::sqlite::rows::{push_list, read_id, read_state};
+use crate::jobs::store::types::{Claim, ReleaseReason, Renewal, StoredCase};
+
+impl SqliteStore {
+    /// The cases of jobs, and whether their cancellation was asked for. A template is read once, however many rows fill it.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn cases(
+        &self,
+        ids: &[Uuid],
+    ) -> Result<HashMap<Uuid, (StoredCase, bool)>, JobsError> {
+        let mut query = QueryBuilder::<Sqlite>::new(
+            "SELECT id, row, body, batch_id, cancel_requested FROM cases JOIN jobs ON jobs.id = cases.job_id \
+             WHERE job_id IN (",
+        );
+        push_list(&mut query, ids);
+        query.push(")");
+        let rows = query.build().fetch_all(&self.readers).await?;
+        let mut templates: HashMap<String, Bytes> = HashMap::new();
+        let mut cases = HashMap::with_capacity(rows.len());
+        for row in &rows {
+            let mut template = None;
+            if row.try_get("row")? {
+                let batch: String = row.try_get("batch_id")?;
+                if !templates.contains_key(&batch) {
+                    templates.insert(batch.clone(), self.template(&batch).await?);
+                }
+                template = templates.get(&batch).cloned();
+            }
+            let body: Vec<u8> = row.try_get("body")?;
+            let case = StoredCase {
+                template,
+                body: body.into(),
+            };
+            cases.insert(read_id(row)?, (case, row.try_get("cancel_requested")?));
+        }
+        Ok(cases)
+    }
+
+    async fn template(&self, batch: &str) -> Result<Bytes, JobsError> {
+        let body: Option<Vec<u8>> =
+            sqlx::query_scalar("SELECT body FROM batch_templates WHERE batch_id = $1")
+                .bind(batch)
+                .fetch_optional(&self.readers)
+                .await?;
+        // It goes with the last job of its batch.
+        body.map(Bytes::from).ok_or(JobsError::Expired)
+    }
+
+    /// Extends leases and notes the progress. The answers are in the order of the claims.
+    ///
+    /// # Errors
+    /// The database failed; the leases stand as they were.
+    pub async fn renew(
+        &self,
+        claims: &[(&Claim, f64)],
+        lease_until: i64,
+    ) -> Result<Vec<Renewal>, JobsError> {
+        let mut query = QueryBuilder::<Sqlite>::new("WITH held (id, lease_number, now_at) AS (");
+        query.push_values(claims, |mut row, (claim, progress)| {
+            row.push_bind(claim.id.to_string())
+                .push_bind(fence(claim))
+                .push_bind(*progress);
+        });
+        query.push(") UPDATE jobs SET lease_until = ");
+        query.push_bind(lease_until);
+        query.push(
+            ", progress = MAX(held.now_at, done), \
+             version = CASE WHEN progress = MAX(held.now_at, done) THEN version ELSE version + 1 END",
+        );
+        query.push(OF_HELD).push("jobs.id AS id, cancel_requested");
+        let rows = query.build().fetch_all(&self.writer).await?;
+        let mut held = HashMap::with_capacity(rows.len());
+        for row in &rows {
+            held.insert(read_id(row)?, row.try_get("cancel_requested")?);
+        }
+        let answers = claims.iter().map(|(claim, _)| match held.get(&claim.id) {
+            Some(cancel_requested) => Renewal::Held {
+                cancel_requested: *cancel_requested,
+            },
+            None => Renewal::Lost,
+        });
+        Ok(answers.collect())
+    }
+
+    /// Notes that claimed jobs are being solved, or that they wait for their turn, each by itself from now on.
+    ///
+    /// # Errors
+    /// The database failed; nothing changed.
+    pub async fn set_solving(&self, claims: &[Claim], solving: bool) -> Result<(), JobsError> {
+        if claims.is_empty() {
+            return Ok(());
+        }
+        let mut query = with_held(claims);
+        query.push(" UPDATE jobs SET group_size = 1, solving = ");
+        query.push_bind(solving);
+        query.push(OF_HELD).push("jobs.id AS id");
+        query.build().execute(&self.writer).await?;
+        Ok(())
+    }
+
+    /// Hands running jobs back to the queue without counting their attempts; those whose cancellation was asked for end as
+    /// cancelled instead. Returns those that were still held, with their new states.
+    ///
+    /// # Errors
+    /// The database failed; nothing changed.
+    pub async fn release(
+        &self,
+        claims: &[Claim],
+        why: ReleaseReason,
+        now: i64,
+    ) -> Result<Vec<(Uuid, State)>, JobsError> {
+        if claims.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut query = with_held(claims);
+        query.push(
+            " UPDATE jobs SET state = CASE WHEN cancel_requested = 1 THEN 'cancelled' ELSE 'queued' END, \
+             started_at = CASE WHEN cancel_requested = 1 THEN started_at ELSE NULL END, \
+             attempt = attempt - 1, progress = done, lease_until = NULL, worker = NULL, solving = 0, \
+             version = version + 1",
+        );
+        match why {
+            ReleaseReason::NotBegun => {}
+            ReleaseReason::SolveItself => drop(query.push(", bypass_cache = 1")),
+            ReleaseReason::Long { slice_us } => {
+                let slice_us = i64::try_from(slice_us).unwrap_or(i64::MAX);
+                query
+                    .push(", slice_us = MAX(slice_us, ")
+                    .push_bind(slice_us);
+                query.push("), cost_us = MAX(cost_us, ").push_bind(slice_us);
+                query.push(")");
+            }
+        }
+        query.push(", ended_at = CASE WHEN cancel_requested = 1 THEN ");
+        query.push_bind(now);
+        query
+            .push(" ELSE NULL END")
+            .push(OF_HELD)
+            .push("jobs.id AS id, state");
+        let rows = query.build().fetch_all(&self.writer).await?;
+        rows.iter()
+            .map(|row| Ok((read_id(row)?, read_state(row)?)))
+            .collect()
+    }
+
+    /// Those of these jobs that are running.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn running(&self, ids: &[Uuid]) -> Result<HashSet<Uuid>, JobsError> {
+        let mut query =
+            QueryBuilder::<Sqlite>::new("SELECT id FROM jobs WHERE state = 'running' AND id IN (");
+        push_list(&mut query, ids);
+        query.push(")");
+        let rows = query.build().fetch_all(&self.readers).await?;
+        rows.iter().map(read_id).collect()
+    }
+}
+
+/// The end of an update of claimed jobs, as long as their leases are held.
+const OF_HELD: &str = " FROM held WHERE jobs.id = held.id AND jobs.lease_number = held.lease_number \
+     AND jobs.state = 'running' RETURNING ";
+
+fn with_held(claims: &[Claim]) -> QueryBuilder<Sqlite> {
+    let mut query = QueryBuilder::new("WITH held (id, lease_number) AS (");
+    query.push_values(claims, |mut row, claim| {
+        row.push_bind(claim.id.to_string()).push_bind(fence(claim));
+    });
+    query.push(")");
+    query
+}

@@ -1,0 +1,129 @@
+//! What an operator wants to know of the embedded job table: how many jobs, how old, how large.
+
+use crate::jobs::model::Job;
+use sqlx::Row;
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::path::Path;
+
+use crate::jobs::error::JobsError;
+use crate::jobs::model::State;
+use crate::jobs::store::sqlite::database::SqliteStore;
+use crate::jobs::store::sqlite::rows::{read_count, read_state};
+use crate::jobs::store::types::Stats;
+
+const COUNT: &str = "SELECT state, SUM(number) AS jobs FROM job_counts GROUP BY state";
+
+const RESULT_BYTES: &str = "SELECT COALESCE(SUM(bytes), 0) FROM blobs WHERE key IS NOT NULL";
+
+impl SqliteStore {
+    /// The figures as they are now.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn stats(&self) -> Result<Stats, JobsError> {
+        let rows = sqlx::query(COUNT).fetch_all(&self.readers).await?;
+        let mut jobs: BTreeMap<State, u64> =
+            State::ALL.into_iter().map(|state| (state, 0)).collect();
+        for row in &rows {
+            jobs.insert(read_state(row)?, read_count(row, "jobs")?);
+        }
+        let oldest_queued_at =
+            sqlx::query_scalar("SELECT MIN(created_at) FROM jobs WHERE id = (SELECT MIN(id) FROM jobs WHERE state = 'queued')")
+                .fetch_one(&self.readers)
+                .await?;
+        let result_bytes: i64 = sqlx::query_scalar(RESULT_BYTES)
+            .fetch_one(&self.readers)
+            .await?;
+        let mut log = OsString::from(self.file.as_os_str());
+        log.push("-wal");
+        Ok(Stats {
+            jobs,
+            oldest_queued_at,
+            database_bytes: size(&self.file).await + size(Path::new(&log)).await,
+            result_bytes: u64::try_from(result_bytes).unwrap_or(0),
+        })
+    }
+}
+
+/// Jobs of the tenant before one of this rank and id, and their expected µs; no further than the limit.
+const BEFORE: &str = "SELECT COUNT(*) AS jobs, COALESCE(SUM(cost_us), 0) AS cost_us FROM (SELECT cost_us FROM jobs \
+     WHERE state = 'queued' AND tenant = $1 AND (rank, id) < ($2, $3) LIMIT $4) AS before";
+
+impl SqliteStore {
+    /// Number of queued jobs of a tenant that come before this one, and their expected solve time in µs, counted no
+    /// further than `limit` jobs; and the number of tenants with queued jobs.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn queued_before(
+        &self,
+        job: &Job,
+        limit: u32,
+    ) -> Result<(u64, u64, usize), JobsError> {
+        let row = sqlx::query(BEFORE)
+            .bind(&job.tenant)
+            .bind(job.priority.rank())
+            .bind(job.id.to_string())
+            .bind(limit)
+            .fetch_one(&self.readers)
+            .await?;
+        let tenants = self.queued_tenants().await?.len();
+        Ok((
+            read_count(&row, "jobs")?,
+            read_count(&row, "cost_us")?,
+            tenants,
+        ))
+    }
+
+    /// Number of queued jobs, of a tenant or of all.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn queued(&self, tenant: Option<&str>) -> Result<u64, JobsError> {
+        let row = sqlx::query(
+            "SELECT COALESCE(SUM(number), 0) AS queued FROM job_counts \
+             WHERE state = 'queued' AND (tenant = $1 OR $1 IS NULL)",
+        )
+        .bind(tenant)
+        .fetch_one(&self.readers)
+        .await?;
+        Ok(u64::try_from(row.try_get::<i64, _>("queued")?).unwrap_or(0))
+    }
+}
+
+/// Size of a file, 0 if there is none.
+pub(crate) async fn size(file: &Path) -> u64 {
+    tokio::fs::metadata(file)
+        .await
+        .map_or(0, |about| about.len())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::jobs::store::sqlite::lists::tests::plan;
+
+    #[tokio::test]
+    async fn figures_are_read_from_indices_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = SqliteStore::open(&folder.path().join("jobs.db"))
+            .await
+            .unwrap();
+        let steps = plan(&store, RESULT_BYTES).await;
+        assert!(steps[0].contains("COVERING INDEX"), "{steps:?}");
+        let steps = plan(&store, COUNT).await;
+        assert_eq!(steps, ["SCAN job_counts"], "a row per state and tenant");
+    }
+
+    #[tokio::test]
+    async fn a_place_in_the_queue_is_read_from_an_index_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = SqliteStore::open(&folder.path().join("jobs.db"))
+            .await
+            .unwrap();
+        let steps = plan(&store, BEFORE).await;
+        let seeks = |step: &String| step.contains("COVERING INDEX jobs_queued (tenant=?");
+        assert!(steps.iter().any(seeks), "{steps:?}");
+    }
+}

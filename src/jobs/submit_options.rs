@@ -1,0 +1,78 @@
+//! What a client may wish for its jobs besides their answers: which of them come first, by when they must have ended, and
+//! that nothing earlier is used again.
+
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// Which of its queued jobs a tenant wants solved first. Among tenants it means nothing: they take turns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Priority {
+    /// Before all others.
+    High,
+    /// Oldest first.
+    #[default]
+    Normal,
+    /// When nothing else of the tenant is queued.
+    Low,
+}
+
+impl Priority {
+    /// Every priority, the first to be solved first.
+    pub const ALL: [Priority; 3] = [Priority::High, Priority::Normal, Priority::Low];
+
+    /// The word for it in the API.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Priority::High => "high",
+            Priority::Normal => "normal",
+            Priority::Low => "low",
+        }
+    }
+
+    /// The priority of that name, if there is one.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Priority> {
+        Priority::ALL.into_iter().find(|one| one.name() == name)
+    }
+
+    /// The number for it in the database: its place in [`Priority::ALL`].
+    pub(crate) fn rank(self) -> i64 {
+        match self {
+            Priority::High => 0,
+            Priority::Normal => 1,
+            Priority::Low => 2,
+        }
+    }
+
+    pub(crate) fn from_rank(rank: i64) -> Option<Priority> {
+        Priority::ALL.into_iter().find(|one| one.rank() == rank)
+    }
+}
+
+/// What a client wishes for one job or for all of a batch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct SubmitOptions {
+    /// Its place among the queued jobs of the tenant.
+    pub priority: Priority,
+    /// Time after the submission within which it must have ended; `None`: it may take any time.
+    pub ends_within: Option<Duration>,
+    /// It is solved even if an identical case was solved before.
+    pub bypass_cache: bool,
+}
+
+impl SubmitOptions {
+    /// The digest of a submission, for its idempotency key: of what is asked and of the wishes that come with it.
+    pub(crate) fn digest(&self, asked: &[u8; 32]) -> [u8; 32] {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(asked);
+        hasher.update(&self.priority.rank().to_le_bytes());
+        let within = self.ends_within.map_or(u128::MAX, |time| time.as_millis());
+        hasher.update(&within.to_le_bytes());
+        hasher.update(&[u8::from(self.bypass_cache)]);
+        *hasher.finalize().as_bytes()
+    }
+}

@@ -1,0 +1,280 @@
+//! Jobs that were claimed together, on their way through one solver thread. A single job is a group of one.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use tokio::sync::mpsc::UnboundedReceiver;
+use uuid::Uuid;
+
+use crate::jobs::store::types::Claim;
+use crate::jobs::worker::attempt_control::{AttemptControl, StopReason};
+use crate::jobs::worker::gate::Gate;
+use crate::jobs::worker::lease::GroupLease;
+use crate::jobs::worker::outcome::Outcome;
+use crate::jobs::worker::running::RunningEntry;
+use crate::jobs::worker::slices::SlicedCase;
+use crate::jobs::worker::solver_thread::SolverThread;
+
+/// One claimed job.
+#[derive(Debug)]
+pub(crate) struct Member {
+    pub(crate) claim: Claim,
+    pub(crate) watch: Arc<AttemptControl>,
+    pub(crate) phase: Phase,
+    /// What it goes on with, once it is known.
+    pub(crate) sweep: Option<Box<SlicedCase>>,
+    pub(crate) _listed: RunningEntry,
+}
+
+/// Where a claimed job stands.
+#[derive(Debug)]
+pub(crate) enum Phase {
+    /// It is to be solved, or is being solved.
+    Solving,
+    /// Its solve is over.
+    Solved(Outcome),
+    /// It was not begun and goes back to the queue.
+    NotBegun,
+    /// It is equal to this earlier job of the group and waits for its answer.
+    WaitingFor(Uuid),
+    /// Nothing is left to be done.
+    Done,
+}
+
+/// What a worker spent its time on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum TimeSpentOn {
+    /// Jobs that came from the queue for the first time.
+    New,
+    /// A sweep that had been in the queue between two of its slices.
+    Begun,
+    /// A solve that had waited at its gate.
+    Parked,
+}
+
+/// Claimed jobs with the thread that solves them one after the other.
+#[derive(Debug)]
+pub(crate) struct Attempt {
+    pub(crate) tenant: Arc<str>,
+    pub(crate) members: Vec<Member>,
+    pub(crate) lease: GroupLease,
+    pub(crate) gate: Arc<Gate>,
+    /// It was running when a process died, and is solved while nothing else is.
+    pub(crate) suspect: bool,
+    /// What its time is spent on.
+    pub(crate) on: TimeSpentOn,
+    /// Begin of its turn.
+    pub(crate) turn_began: Instant,
+    /// Solver time spent on what it is at.
+    pub(crate) spent: Duration,
+    pub(crate) solver: Option<Solver>,
+}
+
+/// What comes from the thread.
+#[derive(Debug)]
+pub(crate) struct Solver {
+    pub(crate) thread: SolverThread,
+    pub(crate) outcomes: UnboundedReceiver<(usize, Outcome)>,
+    /// Nothing more shall be begun.
+    pub(crate) closed: Arc<AtomicBool>,
+}
+
+impl Attempt {
+    /// Has it been handed to a thread?
+    pub(crate) fn begun(&self) -> bool {
+        self.solver.is_some()
+    }
+
+    /// The places of the members that are to be solved.
+    pub(crate) fn to_solve(&self) -> Vec<usize> {
+        let members = self.members.iter().enumerate();
+        let solving = members.filter(|(_, member)| matches!(member.phase, Phase::Solving));
+        solving.map(|(place, _)| place).collect()
+    }
+
+    /// Waits for the next outcome; `false` when there will be no more.
+    pub(crate) async fn next_outcome(&mut self) -> bool {
+        let Some(solver) = &mut self.solver else {
+            return false;
+        };
+        match solver.outcomes.recv().await {
+            Some((place, outcome)) => {
+                self.members[place].phase = Phase::Solved(outcome);
+                self.lease.alive();
+                true
+            }
+            None => false,
+        }
+    }
+
+    /// Nothing more is begun: what the thread has not taken up goes back to the queue. To be called while the thread waits
+    /// at the gate, has ended, or is left behind.
+    pub(crate) fn close(&mut self) {
+        if let Some(solver) = &mut self.solver {
+            solver.closed.store(true, Ordering::Release);
+            while let Ok((place, outcome)) = solver.outcomes.try_recv() {
+                self.members[place].phase = Phase::Solved(outcome);
+            }
+        }
+        for member in &mut self.members {
+            if matches!(member.phase, Phase::Solving) && !member.watch.is_taken_up() {
+                member.phase = Phase::NotBegun;
+            }
+        }
+    }
+
+    /// The solver does not stop: what it is at counts as abandoned. Returns its thread, which is to be left behind.
+    pub(crate) fn abandon(&mut self) -> Option<SolverThread> {
+        self.close();
+        for member in &mut self.members {
+            if matches!(member.phase, Phase::Solving) {
+                member.phase = Phase::Solved(Outcome::Abandoned);
+            }
+        }
+        self.take_thread()
+    }
+
+    /// The thread, once it has nothing more to do.
+    pub(crate) fn take_thread(&mut self) -> Option<SolverThread> {
+        self.solver.take().map(|solver| solver.thread)
+    }
+
+    /// Are there members that wait behind another of this attempt? A sweep that is about to begin its next slice waits
+    /// behind nobody.
+    pub(crate) fn has_more_to_begin(&self) -> bool {
+        let solving = self
+            .members
+            .iter()
+            .filter(|member| matches!(member.phase, Phase::Solving));
+        let waiting = solving.clone().filter(|member| !member.watch.is_taken_up());
+        solving.count() > 1 && waiting.count() > 0
+    }
+
+    /// Tells the member that the solver is at to stop, and lets it begin no other.
+    pub(crate) fn stop_begun(&self, reason: StopReason) {
+        if let Some(solver) = &self.solver {
+            solver.closed.store(true, Ordering::Release);
+        }
+        for member in &self.members {
+            if matches!(member.phase, Phase::Solving) && member.watch.is_taken_up() {
+                member.watch.stop(reason);
+            }
+        }
+    }
+
+    /// Tells every member to stop.
+    pub(crate) fn stop(&self, reason: StopReason) {
+        for member in &self.members {
+            member.watch.stop(reason);
+        }
+    }
+
+    /// Was it told to stop, or has its solver ended, while it waited?
+    pub(crate) fn is_stopped(&self) -> bool {
+        let stopped = |member: &Member| {
+            matches!(member.phase, Phase::Solving) && member.watch.reason().is_some()
+        };
+        self.members.iter().any(stopped)
+    }
+
+    /// Bytes that its solver is estimated to hold.
+    pub(crate) fn memory_bytes(&self) -> u64 {
+        let bytes = self
+            .members
+            .iter()
+            .map(|member| member.watch.memory_bytes());
+        bytes.max().unwrap_or(0)
+    }
+
+    /// Claims of the members that are in the phase that `is` tells.
+    pub(crate) fn claims(&self, is: impl Fn(&Phase) -> bool) -> Vec<Claim> {
+        let members = self.members.iter().filter(|member| is(&member.phase));
+        members.map(|member| member.claim.clone()).collect()
+    }
+
+    /// Members with these ids need nothing more.
+    pub(crate) fn done(&mut self, ids: &[Uuid]) {
+        self.lease.let_go(ids);
+        for member in &mut self.members {
+            if ids.contains(&member.claim.id) {
+                member.phase = Phase::Done;
+            }
+        }
+    }
+
+    /// Members equal to an earlier one wait for its answer.
+    pub(crate) fn set_aside_duplicates(&mut self) {
+        let mut firsts = HashMap::new();
+        for member in &mut self.members {
+            let Some(key) = member.claim.cache_key else {
+                continue;
+            };
+            if !matches!(member.phase, Phase::Solving) {
+                continue;
+            }
+            let first = *firsts.entry(key).or_insert(member.claim.id);
+            if first != member.claim.id {
+                member.phase = Phase::WaitingFor(first);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::jobs::worker::lease::HeldLeases;
+    use crate::jobs::worker::running::RunningAttempts;
+
+    fn attempt(jobs: u32) -> Attempt {
+        let gate = Arc::new(Gate::default());
+        let claim = || Claim {
+            id: Uuid::now_v7(),
+            attempt: 1,
+            lease_number: 1,
+            method: "auto".to_owned(),
+            traceparent: None,
+            cache_key: None,
+            suspect: false,
+            slices: 0,
+        };
+        let member = |claim: Claim| {
+            let watch = Arc::new(AttemptControl::new(gate.clone()));
+            Member {
+                _listed: RunningAttempts::default().enter(claim.id, &watch),
+                claim,
+                watch,
+                phase: Phase::Solving,
+                sweep: None,
+            }
+        };
+        let heartbeat = tokio::spawn(std::future::pending::<()>()).abort_handle();
+        Attempt {
+            tenant: "t".into(),
+            members: (0..jobs).map(|_| member(claim())).collect(),
+            lease: GroupLease::new(Arc::new(HeldLeases::new(Vec::new())), heartbeat),
+            gate,
+            suspect: false,
+            on: TimeSpentOn::New,
+            turn_began: Instant::now(),
+            spent: Duration::ZERO,
+            solver: None,
+        }
+    }
+
+    #[tokio::test]
+    async fn a_sweep_between_two_slices_waits_behind_nobody() {
+        let alone = attempt(1);
+        assert!(
+            !alone.has_more_to_begin(),
+            "its thread has yet to come to it"
+        );
+        let group = attempt(2);
+        group.members[0].watch.take_up();
+        assert!(group.has_more_to_begin());
+        group.members[1].watch.take_up();
+        assert!(!group.has_more_to_begin());
+    }
+}

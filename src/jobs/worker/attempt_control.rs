@@ -1,0 +1,208 @@
+//! How a running job is followed and stopped: flags shared by the solver's thread and the async side.
+
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use crate::contact::monitor::{Monitor, Stop};
+use crate::jobs::worker::gate::Gate;
+
+/// Why a running solve was told to stop. The first reason given stays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum StopReason {
+    /// The client cancelled the job.
+    Cancel = 1,
+    /// The service shuts down; the job goes back to the queue.
+    Shutdown = 2,
+    /// The lease is lost; whatever comes out is discarded.
+    Lost = 3,
+    /// The deadline of the job has passed.
+    Deadline = 4,
+    /// It takes longer than was thought, and nobody can wait for it; the job goes back to the queue.
+    TooLong = 5,
+}
+
+/// One attempt at a job, seen from both sides. The solver ticks, the async side reads and stops.
+#[derive(Debug, Default)]
+pub struct AttemptControl {
+    reason: AtomicU8,
+    ticks: AtomicU64,
+    progress: AtomicU64,
+    clock: Mutex<SolveClock>,
+    taken_up: AtomicBool,
+    memory_bytes: AtomicU64,
+    gate: Arc<Gate>,
+}
+
+/// How long a solve has taken.
+#[derive(Debug, Default)]
+struct SolveClock {
+    /// Before it last went on.
+    spent: Duration,
+    /// Since when it goes on, and how long it had waited at the gate by then.
+    since: Option<(Instant, Duration)>,
+}
+
+impl AttemptControl {
+    /// A watch over a solver that has to pass this gate.
+    #[must_use]
+    pub fn new(gate: Arc<Gate>) -> AttemptControl {
+        AttemptControl {
+            gate,
+            ..AttemptControl::default()
+        }
+    }
+
+    /// The solver's thread has come to this job.
+    pub fn take_up(&self) {
+        self.taken_up.store(true, Ordering::Release);
+    }
+
+    /// The solver's thread has not come to this job, or has yet to come again.
+    pub fn set_aside(&self) {
+        self.taken_up.store(false, Ordering::Release);
+    }
+
+    /// Has the solver's thread come to this job?
+    #[must_use]
+    pub fn is_taken_up(&self) -> bool {
+        self.taken_up.load(Ordering::Acquire)
+    }
+
+    /// Notes what the solve is estimated to hold.
+    pub fn set_memory_bytes(&self, bytes: u64) {
+        self.memory_bytes.store(bytes, Ordering::Release);
+    }
+
+    /// What the solve is estimated to hold; 0 before that is known.
+    #[must_use]
+    pub fn memory_bytes(&self) -> u64 {
+        self.memory_bytes.load(Ordering::Acquire)
+    }
+
+    /// Starts the clock of the solve, against which `contact` holds the time limit of the case, at the time that was spent
+    /// before. It goes on until [`AttemptControl::pause`]; a clock that goes is left alone.
+    pub fn begin(&self, spent: Duration) {
+        let waited = self.gate.waited();
+        let mut clock = self.clock();
+        if clock.since.is_none() {
+            *clock = SolveClock {
+                spent,
+                since: Some((Instant::now(), waited)),
+            };
+        }
+    }
+
+    /// Stops the clock and returns the time spent in all.
+    pub fn pause(&self) -> Duration {
+        let spent = self.elapsed();
+        *self.clock() = SolveClock { spent, since: None };
+        spent
+    }
+
+    fn clock(&self) -> MutexGuard<'_, SolveClock> {
+        self.clock.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Tells the solver to stop at its next tick.
+    pub fn stop(&self, reason: StopReason) {
+        // A second reason changes nothing: the solver is stopping already.
+        let _ = self
+            .reason
+            .compare_exchange(0, reason as u8, Ordering::AcqRel, Ordering::Acquire);
+        self.gate.nudge();
+    }
+
+    /// Why the solver was told to stop, if it was.
+    #[must_use]
+    pub fn reason(&self) -> Option<StopReason> {
+        match self.reason.load(Ordering::Acquire) {
+            1 => Some(StopReason::Cancel),
+            2 => Some(StopReason::Shutdown),
+            3 => Some(StopReason::Lost),
+            4 => Some(StopReason::Deadline),
+            5 => Some(StopReason::TooLong),
+            _ => None,
+        }
+    }
+
+    /// How often the solver has ticked; a figure that stands still means a solver that does.
+    #[must_use]
+    pub fn ticks(&self) -> u64 {
+        self.ticks.load(Ordering::Acquire)
+    }
+
+    /// Progress as last reported, 0 to 1.
+    #[must_use]
+    pub fn progress(&self) -> f64 {
+        f64::from_bits(self.progress.load(Ordering::Acquire))
+    }
+}
+
+impl Monitor for AttemptControl {
+    fn tick(&self, progress: f64) -> ControlFlow<Stop> {
+        self.ticks.fetch_add(1, Ordering::AcqRel);
+        if progress.is_finite() {
+            self.progress
+                .store(progress.clamp(0.0, 1.0).to_bits(), Ordering::Release);
+        }
+        self.gate.pass(|| self.reason().is_some());
+        if self.reason().is_some() {
+            return ControlFlow::Break(Stop::Cancelled);
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn elapsed(&self) -> Duration {
+        let waited = self.gate.waited();
+        let clock = self.clock();
+        let since = clock.since.map_or(Duration::ZERO, |(since, before)| {
+            // Time at the gate belongs to others.
+            since.elapsed().saturating_sub(waited - before)
+        });
+        clock.spent + since
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_reason_to_stop_stays() {
+        let watch = AttemptControl::default();
+        assert_eq!(watch.tick(0.5), ControlFlow::Continue(()));
+        watch.stop(StopReason::Cancel);
+        watch.stop(StopReason::Shutdown);
+        assert_eq!(watch.reason(), Some(StopReason::Cancel));
+        assert_eq!(watch.tick(0.6), ControlFlow::Break(Stop::Cancelled));
+        assert_eq!(watch.ticks(), 2);
+    }
+
+    #[test]
+    fn the_clock_counts_the_solve_and_what_was_spent_before() {
+        let watch = AttemptControl::default();
+        assert_eq!(watch.elapsed(), Duration::ZERO);
+        let before = Duration::from_secs(100);
+        watch.begin(before);
+        let first = watch.elapsed();
+        watch.begin(Duration::ZERO);
+        assert!(first >= before && watch.elapsed() >= first);
+        let spent = watch.pause();
+        std::thread::sleep(Duration::from_millis(2));
+        assert_eq!(watch.elapsed(), spent, "nothing is solved meanwhile");
+        watch.begin(spent);
+        assert!(watch.elapsed() >= spent);
+    }
+
+    #[test]
+    fn progress_stays_a_fraction() {
+        let watch = AttemptControl::default();
+        let _ = watch.tick(7.0);
+        assert!((watch.progress() - 1.0).abs() < f64::EPSILON);
+        let _ = watch.tick(f64::NAN);
+        assert!((watch.progress() - 1.0).abs() < f64::EPSILON);
+    }
+}

@@ -1,0 +1,111 @@
+//! The beginning of an attempt: its jobs are listed as running, their leases kept, its work handed to a thread.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use tokio::sync::mpsc::unbounded_channel;
+
+use crate::jobs::job_trace::JobTrace;
+use crate::jobs::model::{Failure, FailureKind};
+use crate::jobs::shared::Shared;
+use crate::jobs::store::types::Claim;
+use crate::jobs::worker::attempt::{Attempt, Member, Phase, Solver, TimeSpentOn};
+use crate::jobs::worker::attempt_control::AttemptControl;
+use crate::jobs::worker::gate::Gate;
+use crate::jobs::worker::heartbeat;
+use crate::jobs::worker::outcome::{Outcome, Work};
+use crate::jobs::worker::solve::solve_guarded;
+use crate::jobs::worker::solver_thread::{SolverThread, Task};
+
+/// A group that takes longer hands back what it has not begun.
+const GROUP_TIME: Duration = Duration::from_millis(400);
+
+/// Lists claimed jobs as running and keeps their leases from now on.
+pub(crate) fn take_up(shared: &Arc<Shared>, tenant: Arc<str>, claims: Vec<Claim>) -> Attempt {
+    let gate = Arc::new(Gate::default());
+    let suspect = claims.iter().any(|claim| claim.suspect);
+    let on = match claims.iter().any(|claim| claim.slices > 0) {
+        true => TimeSpentOn::Begun,
+        false => TimeSpentOn::New,
+    };
+    let members: Vec<Member> = claims
+        .into_iter()
+        .map(|claim| {
+            let watch = Arc::new(AttemptControl::new(gate.clone()));
+            Member {
+                _listed: shared.running.enter(claim.id, &watch),
+                claim,
+                watch,
+                phase: Phase::Solving,
+                sweep: None,
+            }
+        })
+        .collect();
+    let held = members
+        .iter()
+        .map(|one| (one.claim.clone(), one.watch.clone()));
+    Attempt {
+        tenant,
+        lease: heartbeat::start(shared, held.collect()),
+        members,
+        gate,
+        suspect,
+        on,
+        turn_began: Instant::now(),
+        spent: Duration::ZERO,
+        solver: None,
+    }
+}
+
+/// Hands the work for the members at these places to a thread.
+pub(crate) fn begin(
+    shared: &Arc<Shared>,
+    attempt: &mut Attempt,
+    thread: SolverThread,
+    work: Vec<(usize, Work)>,
+) {
+    attempt.spent = Duration::ZERO;
+    let (reply, outcomes) = unbounded_channel();
+    let closed = Arc::new(AtomicBool::new(false));
+    let work: Vec<_> = work
+        .into_iter()
+        .map(|(place, work)| {
+            let member = &attempt.members[place];
+            member.watch.set_aside();
+            let traced = shared.job_trace(&member.claim);
+            (place, member.watch.clone(), work, traced)
+        })
+        .collect();
+    let task: Task = {
+        let (shared, closed) = (shared.clone(), closed.clone());
+        Box::new(move || {
+            let start = Instant::now();
+            for (number, (place, watch, work, traced)) in work.into_iter().enumerate() {
+                let late = number > 0 && start.elapsed() > GROUP_TIME;
+                if late || closed.load(Ordering::Acquire) || shared.stopping.is_cancelled() {
+                    break;
+                }
+                watch.take_up();
+                let from_queue = matches!(work, Work::New(..));
+                let solve = || solve_guarded(&shared, &watch, work);
+                let outcome = JobTrace::solving(traced.as_ref(), from_queue, solve);
+                // An abandoned attempt has nobody listening.
+                let _ = reply.send((place, outcome));
+            }
+        })
+    };
+    if thread.give(task) {
+        attempt.solver = Some(Solver {
+            thread,
+            outcomes,
+            closed,
+        });
+        return;
+    }
+    // The thread is gone, which no panic of a solver can do.
+    let died = || Failure::new(FailureKind::Internal, "the solver thread had died");
+    for place in attempt.to_solve() {
+        attempt.members[place].phase = Phase::Solved(Outcome::Broken(died()));
+    }
+}

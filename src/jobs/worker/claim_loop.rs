@@ -1,0 +1,91 @@
+//! What a worker does next: a new claim, or a solve that waits for its next turn.
+
+use std::sync::Arc;
+
+use crate::jobs::error::JobsError;
+use crate::jobs::store::types::{Claim, ClaimKind, ClaimRequest};
+use crate::jobs::worker::attempt::Attempt;
+use crate::jobs::worker::begin;
+use crate::jobs::worker::fair_turns::LongSolve;
+use crate::jobs::worker::pool::Worker;
+
+/// Largest sum of expected solve times in a group, in µs.
+const GROUP_COST_US: u64 = 200_000;
+
+impl Worker {
+    /// What to work on next, by the turns of the tenants.
+    pub(crate) async fn next_turn(&self) -> Result<Option<Attempt>, JobsError> {
+        let shared = &self.shared;
+        let turns = &shared.turns;
+        if let Some(attempt) = turns.resume_stopped() {
+            return Ok(Some(attempt));
+        }
+        if shared.draining.is_cancelled() {
+            return Ok(turns.resume_any());
+        }
+        let tenants = shared.store.queued_tenants().await?;
+        let slice = shared.options.slice;
+        for tenant in turns.order(tenants) {
+            let long_first = turns.queue_had_its_share(&tenant, slice);
+            if long_first && let Some(attempt) = self.next_long(&tenant).await? {
+                return Ok(Some(attempt));
+            }
+            let claims = self.claim(&tenant, ClaimKind::New).await?;
+            if !claims.is_empty() {
+                return Ok(Some(begin::take_up(shared, tenant, claims)));
+            }
+            if let Some(attempt) = self.next_long(&tenant).await? {
+                return Ok(Some(attempt));
+            }
+        }
+        Ok(None)
+    }
+
+    /// A solve of a tenant that waits for its next turn, at its gate or in the queue.
+    async fn next_long(&self, tenant: &Arc<str>) -> Result<Option<Attempt>, JobsError> {
+        let shared = &self.shared;
+        for long in shared.turns.long_ones(tenant) {
+            match long {
+                LongSolve::Parked => {
+                    if let Some(attempt) = shared.turns.resume(tenant) {
+                        return Ok(Some(attempt));
+                    }
+                }
+                LongSolve::Begun => {
+                    let claims = self.claim(tenant, ClaimKind::Begun).await?;
+                    if !claims.is_empty() {
+                        return Ok(Some(begin::take_up(shared, tenant.clone(), claims)));
+                    }
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    async fn claim(&self, tenant: &str, kind: ClaimKind) -> Result<Vec<Claim>, JobsError> {
+        let shared = &self.shared;
+        let options = &shared.options;
+        let full = shared.turns.parked().0 >= options.parked_max;
+        let slice_us = u64::try_from(options.slice.as_micros()).unwrap_or(u64::MAX);
+        let skip = shared.unfinished_batches().closed_to_workers();
+        let request = ClaimRequest {
+            worker: &self.name,
+            tenant,
+            kind,
+            jobs: options.group_max.max(1),
+            cost_us: GROUP_COST_US,
+            // With no gate free, only what should be done, or come to its next cut, within a slice.
+            each_slice_us: full.then_some(slice_us),
+            workers: options.workers,
+            lease_until: shared.lease_until(),
+            now: shared.now_ms(),
+            late_before: shared.now_ms().saturating_sub(shared.clock_step().ms),
+            skip: &skip,
+        };
+        let mut claims = shared.store.claim(&request).await?;
+        if !options.cache {
+            claims.iter_mut().for_each(|claim| claim.cache_key = None);
+        }
+        Ok(claims)
+    }
+}

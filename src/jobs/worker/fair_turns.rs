@@ -1,0 +1,186 @@
+//! Whose turn is it? Tenants share solver seconds; within a tenant long solves and the queue take turns.
+//!
+//! The seconds are kept in memory, by the process that spends them, and fade: what counts is the last minutes.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use crate::jobs::worker::attempt::{Attempt, TimeSpentOn};
+
+/// Time after which a solver second counts half.
+const HALF_LIFE: Duration = Duration::from_secs(60);
+
+/// Less than this is forgotten, in s.
+const FORGOTTEN: f64 = 1e-6;
+
+/// Solver seconds of tenants and the attempts that wait at their gates.
+#[derive(Debug, Default)]
+pub(crate) struct FairTurns(Mutex<Inner>);
+
+#[derive(Debug, Default)]
+struct Inner {
+    used: HashMap<Arc<str>, Used>,
+    parked: Vec<Attempt>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Used {
+    /// As of `at`.
+    seconds: f64,
+    at: Instant,
+    /// Seconds that new jobs of the tenant have had since one of its long solves had a turn.
+    queue_since: f64,
+    /// That was one that had waited at its gate.
+    parked_was_last: bool,
+}
+
+impl Used {
+    fn now(&self) -> f64 {
+        let lives = self.at.elapsed().as_secs_f64() / HALF_LIFE.as_secs_f64();
+        self.seconds * 0.5_f64.powf(lives)
+    }
+}
+
+/// One of the two kinds of long solves that wait.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum LongSolve {
+    /// At its gate, with all that it has in memory.
+    Parked,
+    /// In the queue, between two slices.
+    Begun,
+}
+
+impl FairTurns {
+    /// Puts solver time on the account of a tenant.
+    pub(crate) fn charge(&self, tenant: &Arc<str>, time: Duration, spent: TimeSpentOn) {
+        let mut inner = self.lock();
+        let now = Instant::now();
+        let used = inner.used.entry(tenant.clone()).or_insert(Used {
+            seconds: 0.0,
+            at: now,
+            queue_since: 0.0,
+            parked_was_last: false,
+        });
+        used.seconds = used.now() + time.as_secs_f64();
+        used.at = now;
+        match spent {
+            TimeSpentOn::New => used.queue_since += time.as_secs_f64(),
+            TimeSpentOn::Parked | TimeSpentOn::Begun => {
+                used.queue_since = 0.0;
+                used.parked_was_last = spent == TimeSpentOn::Parked;
+            }
+        }
+        inner.used.retain(|_, used| used.now() > FORGOTTEN);
+    }
+
+    /// Tenants in the order of their turns: whoever has used the least comes first.
+    pub(crate) fn order(&self, mut tenants: Vec<Arc<str>>) -> Vec<Arc<str>> {
+        let inner = self.lock();
+        tenants.extend(inner.parked.iter().map(|attempt| attempt.tenant.clone()));
+        let mut keyed: Vec<_> = tenants
+            .into_iter()
+            .map(|tenant| (inner.used.get(&tenant).map_or(0.0, Used::now), tenant))
+            .collect();
+        keyed.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
+        keyed.dedup_by(|a, b| a.1 == b.1);
+        keyed.into_iter().map(|(_, tenant)| tenant).collect()
+    }
+
+    /// Has the queue of this tenant had its share beside the long solves, of a slice each?
+    pub(crate) fn queue_had_its_share(&self, tenant: &str, slice: Duration) -> bool {
+        let inner = self.lock();
+        let used = inner.used.get(tenant);
+        used.is_some_and(|used| used.queue_since >= slice.as_secs_f64())
+    }
+
+    /// The kinds of long solves of this tenant in the order of their turns: they take turns too.
+    pub(crate) fn long_ones(&self, tenant: &str) -> [LongSolve; 2] {
+        let inner = self.lock();
+        match inner
+            .used
+            .get(tenant)
+            .is_some_and(|used| used.parked_was_last)
+        {
+            true => [LongSolve::Begun, LongSolve::Parked],
+            false => [LongSolve::Parked, LongSolve::Begun],
+        }
+    }
+
+    /// An attempt waits at its gate from now on.
+    pub(crate) fn park(&self, attempt: Attempt) {
+        self.lock().parked.push(attempt);
+    }
+
+    /// The attempt of a tenant that waits longest.
+    pub(crate) fn resume(&self, tenant: &str) -> Option<Attempt> {
+        let mut inner = self.lock();
+        let place = inner
+            .parked
+            .iter()
+            .position(|attempt| *attempt.tenant == *tenant)?;
+        Some(inner.parked.remove(place))
+    }
+
+    /// An attempt that was told to stop, or whose solver has ended: it needs no solver time.
+    pub(crate) fn resume_stopped(&self) -> Option<Attempt> {
+        let mut inner = self.lock();
+        let place = inner.parked.iter().position(Attempt::is_stopped)?;
+        Some(inner.parked.remove(place))
+    }
+
+    /// Any attempt that waits.
+    pub(crate) fn resume_any(&self) -> Option<Attempt> {
+        self.lock().parked.pop()
+    }
+
+    /// Number of attempts that wait, and the bytes that they are estimated to hold.
+    pub(crate) fn parked(&self) -> (usize, u64) {
+        let inner = self.lock();
+        let bytes = inner.parked.iter().map(Attempt::memory_bytes).sum();
+        (inner.parked.len(), bytes)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Inner> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(tenants: &[Arc<str>]) -> Vec<&str> {
+        tenants.iter().map(AsRef::as_ref).collect()
+    }
+
+    #[test]
+    fn whoever_has_used_the_least_seconds_comes_first() {
+        let turns = FairTurns::default();
+        let tenants: Vec<Arc<str>> = ["a", "b", "c"].map(Arc::from).to_vec();
+        assert_eq!(names(&turns.order(tenants.clone())), ["a", "b", "c"]);
+        turns.charge(&tenants[0], Duration::from_secs(100), TimeSpentOn::New);
+        turns.charge(&tenants[1], Duration::from_secs(1), TimeSpentOn::New);
+        assert_eq!(names(&turns.order(tenants.clone())), ["c", "b", "a"]);
+        // Many short jobs weigh what they take, not how many they are.
+        for _ in 0..1000 {
+            turns.charge(&tenants[2], Duration::from_micros(10), TimeSpentOn::New);
+        }
+        assert_eq!(names(&turns.order(tenants)), ["c", "b", "a"]);
+    }
+
+    #[test]
+    fn queue_and_long_solves_of_a_tenant_take_turns() {
+        let turns = FairTurns::default();
+        let (tenant, slice): (Arc<str>, _) = ("a".into(), Duration::from_secs(2));
+        assert!(!turns.queue_had_its_share("a", slice));
+        turns.charge(&tenant, slice, TimeSpentOn::New);
+        assert!(turns.queue_had_its_share("a", slice));
+        turns.charge(&tenant, slice, TimeSpentOn::Parked);
+        assert!(!turns.queue_had_its_share("a", slice));
+        // So do those at a gate and those in the queue.
+        assert_eq!(turns.long_ones("a"), [LongSolve::Begun, LongSolve::Parked]);
+        turns.charge(&tenant, slice, TimeSpentOn::Begun);
+        assert_eq!(turns.long_ones("a"), [LongSolve::Parked, LongSolve::Begun]);
+    }
+}

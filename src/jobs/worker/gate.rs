@@ -1,0 +1,131 @@
+//! Where a solver waits while others have their turn.
+//!
+//! The solver's thread passes the gate at every tick. A closed gate holds it there, with everything that it has in memory,
+//! until the gate is opened again; the time it waits is no time of its solve.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use tokio::sync::Notify;
+
+/// A gate for the thread of one attempt.
+#[derive(Debug, Default)]
+pub struct Gate {
+    closed: AtomicBool,
+    waiting: Mutex<GateWait>,
+    /// Wakes the solver.
+    opened: Condvar,
+    /// Tells the async side that the solver waits.
+    reached: Notify,
+}
+
+#[derive(Debug, Default)]
+struct GateWait {
+    since: Option<Instant>,
+    /// Earlier waits, all together.
+    before: Duration,
+}
+
+impl Gate {
+    /// Holds the solver at its next tick.
+    pub(crate) fn close(&self) {
+        self.closed.store(true, Ordering::Release);
+    }
+
+    /// Lets the solver go on.
+    pub(crate) fn open(&self) {
+        self.closed.store(false, Ordering::Release);
+        drop(self.lock());
+        self.opened.notify_all();
+    }
+
+    /// Wakes a waiting solver, so that it looks again whether it was told to stop.
+    pub(crate) fn nudge(&self) {
+        drop(self.lock());
+        self.opened.notify_all();
+    }
+
+    /// The solver passes: waits while the gate is closed and nobody has told the solver to stop.
+    pub(crate) fn pass(&self, stopped: impl Fn() -> bool) {
+        if !self.closed.load(Ordering::Acquire) {
+            return;
+        }
+        let mut waiting = self.lock();
+        let since = Instant::now();
+        waiting.since = Some(since);
+        self.reached.notify_one();
+        while self.closed.load(Ordering::Acquire) && !stopped() {
+            waiting = self
+                .opened
+                .wait(waiting)
+                .unwrap_or_else(PoisonError::into_inner);
+        }
+        waiting.since = None;
+        waiting.before += since.elapsed();
+    }
+
+    /// The solver waits.
+    pub(crate) fn holds(&self) -> bool {
+        self.lock().since.is_some()
+    }
+
+    /// Resolves once the solver waits.
+    pub(crate) async fn reached(&self) {
+        while !self.holds() {
+            self.reached.notified().await;
+        }
+    }
+
+    /// How long the solver has waited in all.
+    pub(crate) fn waited(&self) -> Duration {
+        let waiting = self.lock();
+        let now = waiting
+            .since
+            .map_or(Duration::ZERO, |since| since.elapsed());
+        waiting.before + now
+    }
+
+    fn lock(&self) -> MutexGuard<'_, GateWait> {
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::sync::atomic::AtomicU32;
+
+    use super::*;
+
+    #[tokio::test]
+    async fn a_closed_gate_holds_the_solver_and_its_clock() {
+        let gate = Arc::new(Gate::default());
+        let passed = Arc::new(AtomicU32::new(0));
+        let stop = Arc::new(AtomicBool::new(false));
+        gate.close();
+        let solver = std::thread::spawn({
+            let (gate, passed, stop) = (gate.clone(), passed.clone(), stop.clone());
+            move || {
+                while !stop.load(Ordering::SeqCst) {
+                    gate.pass(|| stop.load(Ordering::SeqCst));
+                    passed.fetch_add(1, Ordering::SeqCst);
+                }
+            }
+        });
+        gate.reached().await;
+        assert_eq!(passed.load(Ordering::SeqCst), 0);
+        std::thread::sleep(Duration::from_millis(5));
+        gate.open();
+        while passed.load(Ordering::SeqCst) == 0 {
+            std::thread::yield_now();
+        }
+        assert!(gate.waited() >= Duration::from_millis(5));
+        // A solver that is told to stop does not wait for its turn.
+        gate.close();
+        gate.reached().await;
+        stop.store(true, Ordering::SeqCst);
+        gate.nudge();
+        solver.join().unwrap();
+    }
+}

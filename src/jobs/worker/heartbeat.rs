@@ -1,0 +1,69 @@
+//! Renews the leases of an attempt while its solver ticks.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use tokio::time::{MissedTickBehavior, interval};
+
+use crate::jobs::shared::{Shared, heartbeat};
+use crate::jobs::store::types::{Claim, Renewal};
+use crate::jobs::worker::attempt_control::{AttemptControl, StopReason};
+use crate::jobs::worker::lease::{GroupLease, HeldLeases};
+
+/// Starts the heartbeat of jobs that were claimed just now.
+pub(crate) fn start(shared: &Arc<Shared>, leases: Vec<(Claim, Arc<AttemptControl>)>) -> GroupLease {
+    let held = Arc::new(HeldLeases::new(leases));
+    let heartbeat = tokio::spawn(beat(shared.clone(), held.clone())).abort_handle();
+    GroupLease::new(held, heartbeat)
+}
+
+async fn beat(shared: Arc<Shared>, kept: Arc<HeldLeases>) {
+    let mut beat = interval(heartbeat(&shared));
+    beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let lease_ms = shared.lease_ms();
+    let mut until = shared.steady_ms().saturating_add(lease_ms);
+    let mut seen = 0;
+    loop {
+        beat.tick().await;
+        let held: Vec<_> = kept.leases().clone();
+        let ticks = kept.ticks();
+        let moves = ticks != seen || !kept.solving.load(Ordering::Acquire);
+        let now = shared.steady_ms();
+        if moves && !held.is_empty() {
+            let beats: Vec<_> = held
+                .iter()
+                .map(|(claim, watch)| (claim, watch.progress()))
+                .collect();
+            let renewed = shared.store.renew(&beats, now.saturating_add(lease_ms));
+            match renewed.await {
+                Ok(renewals) => {
+                    seen = ticks;
+                    until = now.saturating_add(lease_ms);
+                    for ((_, watch), renewal) in held.iter().zip(renewals) {
+                        match renewal {
+                            Renewal::Held {
+                                cancel_requested: true,
+                            } => watch.stop(StopReason::Cancel),
+                            Renewal::Held { .. } => {}
+                            Renewal::Lost => watch.stop(StopReason::Lost),
+                        }
+                    }
+                }
+                Err(error) => {
+                    tracing::warn!(%error, "leases could not be renewed");
+                    if error.storage_fault().is_some() {
+                        // What cannot be written cannot give the jobs away either.
+                        seen = ticks;
+                        until = now.saturating_add(lease_ms);
+                    }
+                }
+            }
+        }
+        if now >= until && kept.solving.load(Ordering::Acquire) {
+            for (_, watch) in &held {
+                watch.stop(StopReason::Lost);
+            }
+            kept.lost.cancel();
+        }
+    }
+}

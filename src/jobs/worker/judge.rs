@@ -1,0 +1,176 @@
+//! What becomes of a job after an attempt: from the outcome of the solver and from what it was told, in one place.
+
+use crate::contact::error::SolveError;
+use crate::contact::remark::entry::RemarkEntry;
+use crate::jobs::codec::result::EncodedResult;
+use crate::jobs::model::{Failure, FailureKind, too_late};
+use crate::jobs::store::types::{Ending, SliceRecord};
+use crate::jobs::worker::attempt_control::StopReason;
+use crate::jobs::worker::outcome::{INTERNAL, Outcome};
+use crate::jobs::worker::slices::SlicedCase;
+
+/// What follows from the outcome of an attempt.
+pub(crate) enum Verdict {
+    /// There is a part of an answer to keep, if any, and more to be solved: now, or by somebody else later.
+    GoOn {
+        sweep: Box<SlicedCase>,
+        part: Option<(SliceRecord, EncodedResult)>,
+        stopped: Option<StopReason>,
+    },
+    /// There is an answer to keep.
+    Keep {
+        result: EncodedResult,
+        remarks: Vec<RemarkEntry>,
+        field_patches: u32,
+    },
+    /// The job ends without one.
+    End(Ending),
+    /// The job goes back to the queue, its attempt uncounted.
+    HandBack,
+    /// As before; its solve takes longer than was thought.
+    HandBackAsLong,
+    /// The lease is gone.
+    Lost,
+}
+
+/// What follows from the outcome of an attempt; the one place that decides it.
+pub(crate) fn judge(outcome: Outcome, reason: Option<StopReason>) -> Verdict {
+    let failed = |reason: String| {
+        tracing::error!(reason, "a job fails inside the service");
+        Verdict::End(Ending::Failed(Failure::new(
+            FailureKind::Internal,
+            INTERNAL,
+        )))
+    };
+    match outcome {
+        Outcome::Solved { .. } | Outcome::Slice { .. } if reason == Some(StopReason::Lost) => {
+            Verdict::Lost
+        }
+        // A slice counts like an answer where somebody wants the whole.
+        Outcome::Slice { sweep, part }
+            if matches!(
+                reason,
+                None | Some(StopReason::Shutdown | StopReason::TooLong)
+            ) =>
+        {
+            Verdict::GoOn {
+                sweep,
+                part,
+                stopped: reason,
+            }
+        }
+        Outcome::Solved {
+            result,
+            remarks,
+            field_patches,
+        } => Verdict::Keep {
+            result,
+            remarks,
+            field_patches,
+        },
+        Outcome::Unsolved(SolveError::Cancelled) | Outcome::Abandoned | Outcome::Slice { .. } => {
+            match reason {
+                Some(StopReason::Cancel) => Verdict::End(Ending::Cancelled),
+                Some(StopReason::Shutdown) => Verdict::HandBack,
+                Some(StopReason::TooLong) => Verdict::HandBackAsLong,
+                Some(StopReason::Lost) => Verdict::Lost,
+                Some(StopReason::Deadline) => Verdict::End(Ending::Failed(too_late())),
+                None => failed("the solver stopped although nobody asked it to".to_owned()),
+            }
+        }
+        Outcome::Unsolved(error) => match Failure::of_solve(&error) {
+            Some(failure) => Verdict::End(Ending::Failed(failure)),
+            None => failed(error.to_string()),
+        },
+        Outcome::Refused(error) => {
+            failed(format!("the stored case is no longer accepted: {error}"))
+        }
+        Outcome::Broken(failure) => Verdict::End(Ending::Failed(failure)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::error::CaseError;
+
+    fn problem() -> crate::contact::case::problem::Problem {
+        let case = serde_json::json!({
+            "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
+            "friction": { "coefficient": 0.3 },
+            "contact": { "type": "radii", "rolling_mm": 460, "lateral_mm": 300 },
+            "load": { "normal_force_n": 100_000 },
+            "motion": [{ "creepage_x": 0.001 }, { "creepage_x": 0.002 }]
+        });
+        crate::contact::check(&case, &crate::contact::case::limits::Limits::default()).unwrap()
+    }
+
+    /// What becomes of a job, as a word.
+    fn fate(outcome: Outcome, reason: Option<StopReason>) -> &'static str {
+        match judge(outcome, reason) {
+            Verdict::Keep { .. } => "kept",
+            Verdict::GoOn { stopped: None, .. } => "goes on",
+            Verdict::GoOn { .. } => "part kept",
+            Verdict::End(ending) => ending.state().name(),
+            Verdict::HandBack => "back",
+            Verdict::HandBackAsLong => "back, long",
+            Verdict::Lost => "lost",
+        }
+    }
+
+    #[test]
+    fn every_outcome_has_one_consequence_whatever_the_solver_was_told() {
+        let reasons = [
+            None,
+            Some(StopReason::Cancel),
+            Some(StopReason::Shutdown),
+            Some(StopReason::Lost),
+            Some(StopReason::Deadline),
+            Some(StopReason::TooLong),
+        ];
+        let solved = || Outcome::Solved {
+            result: EncodedResult {
+                solution: "{}".into(),
+                fields: None,
+            },
+            remarks: Vec::new(),
+            field_patches: 0,
+        };
+        let slice = || Outcome::Slice {
+            sweep: Box::new(SlicedCase::new(problem(), vec![0..1, 1..2], &[])),
+            part: None,
+        };
+        let broken = || Outcome::Broken(Failure::new(FailureKind::Panic, "boom"));
+        let stopped = || Outcome::Unsolved(SolveError::Cancelled);
+        let late = || Outcome::Refused(CaseError(Vec::new()));
+        for reason in reasons {
+            // An answer counts even if it came while the solver was told to stop, unless the job is somebody else's.
+            let kept = if reason == Some(StopReason::Lost) {
+                "lost"
+            } else {
+                "kept"
+            };
+            assert_eq!(fate(solved(), reason), kept, "{reason:?}");
+            // A slice is kept where the whole is still wanted.
+            let part = match reason {
+                None => "goes on",
+                Some(StopReason::Shutdown | StopReason::TooLong) => "part kept",
+                Some(StopReason::Lost) => "lost",
+                Some(StopReason::Cancel) => "cancelled",
+                Some(StopReason::Deadline) => "failed",
+            };
+            assert_eq!(fate(slice(), reason), part, "{reason:?}");
+            let told = match reason {
+                None | Some(StopReason::Deadline) => "failed",
+                Some(StopReason::Cancel) => "cancelled",
+                Some(StopReason::Shutdown) => "back",
+                Some(StopReason::Lost) => "lost",
+                Some(StopReason::TooLong) => "back, long",
+            };
+            assert_eq!(fate(stopped(), reason), told, "{reason:?}");
+            assert_eq!(fate(Outcome::Abandoned, reason), told, "{reason:?}");
+            assert_eq!(fate(broken(), reason), "failed", "{reason:?}");
+            assert_eq!(fate(late(), reason), "failed", "{reason:?}");
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! What a solver thread is given and what comes back.
+
+use crate::contact::error::{CaseError, SolveError};
+use crate::contact::remark::entry::RemarkEntry;
+use crate::jobs::codec::result::EncodedResult;
+use crate::jobs::model::Failure;
+use crate::jobs::store::types::{SliceRecord, StoredCase};
+use crate::jobs::worker::slices::SlicedCase;
+
+/// What came out of the solver thread.
+#[derive(Debug)]
+pub(crate) enum Outcome {
+    /// The answer in its stored form.
+    Solved {
+        result: EncodedResult,
+        remarks: Vec<RemarkEntry>,
+        field_patches: u32,
+    },
+    /// The next slice of a sweep, in its stored form, if one was solved; there is more to be done.
+    Slice {
+        sweep: Box<SlicedCase>,
+        part: Option<(SliceRecord, EncodedResult)>,
+    },
+    /// The solver gave up or was stopped.
+    Unsolved(SolveError),
+    /// The case no longer passes its checks.
+    Refused(CaseError),
+    /// The fault is ours.
+    Broken(Failure),
+    /// The solver did not listen and was left behind.
+    Abandoned,
+}
+
+/// What is to be done for a job.
+#[derive(Debug)]
+pub(crate) enum Work {
+    /// Check the case, of which this is stored, and solve what comes next.
+    New(StoredCase, Vec<SliceRecord>),
+    /// Solve the next slice.
+    Next(Box<SlicedCase>),
+    /// All slices are solved: put the parts of the answer together.
+    Join(Box<SlicedCase>, Vec<EncodedResult>),
+}
+
+/// What clients are told of a failure of the service itself.
+pub(crate) const INTERNAL: &str = "the job could not be solved because of a fault of the service; its log has the reason under the id of the job";

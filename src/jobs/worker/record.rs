@@ -1,0 +1,297 @@
+//! What becomes of claimed jobs: answers that are known, results that are stored, ends that are written, and the rest
+//! that goes back to the queue.
+
+use std::collections::{HashMap, HashSet};
+use std::time::SystemTime;
+
+use uuid::Uuid;
+
+use crate::jobs::codec::result::EncodedResult;
+use crate::jobs::error::JobsError;
+use crate::jobs::model::{Failure, FailureKind, State};
+use crate::jobs::store::types::{Claim, Ending, ReleaseReason, StoredResult};
+use crate::jobs::worker::attempt::{Attempt, Phase};
+use crate::jobs::worker::attempt_control::StopReason;
+use crate::jobs::worker::judge::{Verdict, judge};
+use crate::jobs::worker::pool::{StepReport, Worker};
+use crate::jobs::worker::slice_storage::SliceFate;
+
+impl Worker {
+    /// Ends those of the claimed jobs whose result has been there since they were queued.
+    pub(crate) async fn answer_known(
+        &self,
+        attempt: &mut Attempt,
+        step: &mut StepReport,
+    ) -> Result<(), JobsError> {
+        let claims = attempt.claims(|phase| matches!(phase, Phase::Solving));
+        let keys: Vec<_> = claims.iter().filter_map(|claim| claim.cache_key).collect();
+        let sources = self.shared.store.sources(&keys).await?;
+        let known = claims.into_iter().filter_map(|claim| {
+            let source = *sources.get(&claim.cache_key?)?;
+            Some((claim, source))
+        });
+        self.answer_with(attempt, known.collect(), step).await
+    }
+
+    /// Ends claimed jobs with the results of these others; where there is none, the job goes back to the queue.
+    async fn answer_with(
+        &self,
+        attempt: &mut Attempt,
+        pairs: Vec<(Claim, Uuid)>,
+        step: &mut StepReport,
+    ) -> Result<(), JobsError> {
+        if pairs.is_empty() {
+            return Ok(());
+        }
+        let shared = &self.shared;
+        let from = shared.options.tracer.is_some().then(SystemTime::now);
+        let ended = shared
+            .write_with_retries(|| shared.store.finish_with_sources(&pairs, shared.now_ms()))
+            .await?;
+        let ids: Vec<_> = ended.iter().copied().collect();
+        shared.metrics.cache_lookup(ids.len() as u64, 0);
+        if let Some(from) = from {
+            let claims = pairs.iter().map(|(claim, _)| claim);
+            for claim in claims.filter(|claim| ended.contains(&claim.id)) {
+                if let Some(traced) = shared.job_trace(claim) {
+                    traced.waited_until(from);
+                    traced.stored(from, State::Succeeded.name());
+                }
+            }
+        }
+        shared.ended_cached(&ids);
+        attempt.done(&ids);
+        step.ended
+            .extend(ids.into_iter().map(|id| (id, State::Succeeded)));
+        let back = pairs.into_iter().map(|(claim, _)| claim);
+        let back: Vec<_> = back.filter(|claim| !ended.contains(&claim.id)).collect();
+        self.release(attempt, &back, ReleaseReason::SolveItself, step)
+            .await
+    }
+
+    /// Writes down what became of the members that are over.
+    pub(crate) async fn record(
+        &self,
+        attempt: &mut Attempt,
+        step: &mut StepReport,
+    ) -> Result<(), JobsError> {
+        let shared = &self.shared;
+        let from = shared.options.tracer.is_some().then(SystemTime::now);
+        let mut sorted = Sorted::default();
+        for place in 0..attempt.members.len() {
+            let phase = &mut attempt.members[place].phase;
+            if !matches!(phase, Phase::Solved(_)) {
+                continue;
+            }
+            if let Phase::Solved(outcome) = std::mem::replace(phase, Phase::Done) {
+                let reason = attempt.members[place].watch.reason();
+                self.sort(attempt, place, judge(outcome, reason), &mut sorted)
+                    .await;
+            }
+        }
+        attempt.done(&sorted.lost);
+        step.lost.append(&mut sorted.lost);
+        let Sorted {
+            ends,
+            mut back,
+            long,
+            ..
+        } = sorted;
+        self.finish(attempt, ends, from, step).await?;
+        back.extend(attempt.claims(|phase| matches!(phase, Phase::NotBegun)));
+        self.release(attempt, &back, ReleaseReason::NotBegun, step)
+            .await?;
+        let slice_us = u64::try_from(attempt.spent.as_micros()).unwrap_or(u64::MAX);
+        self.release(attempt, &long, ReleaseReason::Long { slice_us }, step)
+            .await?;
+        self.settle_duplicates(attempt, step).await
+    }
+
+    /// Stores what there is to be stored of a member, and says what is to be written down of it.
+    async fn sort(
+        &self,
+        attempt: &mut Attempt,
+        place: usize,
+        verdict: Verdict,
+        sorted: &mut Sorted,
+    ) {
+        let claim = attempt.members[place].claim.clone();
+        let stored = match verdict {
+            Verdict::Lost => return sorted.lost.push(claim.id),
+            Verdict::HandBack => return sorted.back.push(claim),
+            Verdict::HandBackAsLong => return sorted.long.push(claim),
+            Verdict::End(ending) => Ok(ending),
+            Verdict::GoOn {
+                sweep,
+                part,
+                stopped,
+            } => match self.keep_slice(attempt, place, sweep, part).await {
+                Ok(SliceFate::Lost) => return sorted.lost.push(claim.id),
+                Ok(SliceFate::Stored) => match stopped {
+                    Some(StopReason::TooLong) => return sorted.long.push(claim),
+                    Some(_) => return sorted.back.push(claim),
+                    None if self.makes_room(attempt).await => return sorted.back.push(claim),
+                    None => return attempt.members[place].phase = Phase::Solving,
+                },
+                Err(error) => Err(error),
+            },
+            Verdict::Keep {
+                result,
+                remarks,
+                field_patches,
+            } => self
+                .place(&claim, result)
+                .await
+                .map(|result| Ending::Succeeded {
+                    remarks,
+                    result,
+                    field_patches,
+                }),
+        };
+        match stored {
+            Ok(ending) => sorted.ends.push((claim, ending)),
+            // The service stops while the disk takes nothing.
+            Err(error) if error.storage_fault().is_some() => sorted.back.push(claim),
+            Err(error) => sorted.ends.push((claim, not_stored(&error))),
+        }
+    }
+
+    async fn finish(
+        &self,
+        attempt: &mut Attempt,
+        ends: Vec<(Claim, Ending)>,
+        from: Option<SystemTime>,
+        step: &mut StepReport,
+    ) -> Result<(), JobsError> {
+        if ends.is_empty() {
+            return Ok(());
+        }
+        let shared = &self.shared;
+        // A database that fails for a while does not cost the results.
+        let ended = shared
+            .write_with_retries(|| shared.store.finish(&ends, shared.now_ms()))
+            .await?;
+        for (claim, ending) in &ends {
+            if ended.contains(&claim.id) {
+                if let (Some(from), Some(traced)) = (from, shared.job_trace(claim)) {
+                    traced.stored(from, ending.state().name());
+                }
+                shared.metrics.ending(ending);
+                shared.announce(claim.id);
+                step.ended.push((claim.id, ending.state()));
+            } else {
+                step.lost.push(claim.id);
+                if let Ending::Succeeded {
+                    result: StoredResult::Blob(key, _),
+                    ..
+                } = ending
+                {
+                    self.abandon_blob(key).await;
+                }
+            }
+        }
+        let ids: Vec<_> = ends.iter().map(|(claim, _)| claim.id).collect();
+        attempt.done(&ids);
+        if ends.iter().any(|(claim, _)| claim.slices > 0) {
+            shared.collect_blobs().await;
+        }
+        Ok(())
+    }
+
+    /// Leaves a result that no job refers to, to be removed.
+    pub(crate) async fn abandon_blob(&self, key: &str) {
+        if let Err(error) = self.shared.store.abandon_blob(key).await {
+            tracing::warn!(key, %error, "a result without a job is left until the next start");
+        }
+    }
+
+    /// Members that waited for an equal one get its answer, or go back if it will not come.
+    async fn settle_duplicates(
+        &self,
+        attempt: &mut Attempt,
+        step: &mut StepReport,
+    ) -> Result<(), JobsError> {
+        let still: HashSet<Uuid> = attempt
+            .claims(|phase| matches!(phase, Phase::Solving))
+            .iter()
+            .map(|claim| claim.id)
+            .collect();
+        let firsts: HashMap<Uuid, Uuid> = attempt
+            .members
+            .iter()
+            .filter_map(|member| match member.phase {
+                Phase::WaitingFor(first) if !still.contains(&first) => {
+                    Some((member.claim.id, first))
+                }
+                _ => None,
+            })
+            .collect();
+        let twins = attempt.claims(|phase| matches!(phase, Phase::WaitingFor(_)));
+        let pairs = twins.into_iter().filter_map(|claim| {
+            let first = *firsts.get(&claim.id)?;
+            Some((claim, first))
+        });
+        self.answer_with(attempt, pairs.collect(), step).await
+    }
+
+    /// Puts a result where it is kept: a small one goes into the database with the end of its job.
+    async fn place(&self, claim: &Claim, result: EncodedResult) -> Result<StoredResult, JobsError> {
+        let shared = &self.shared;
+        if result.bytes() <= shared.options.small_result_max_bytes {
+            return Ok(StoredResult::Inline(result));
+        }
+        let bytes = result.bytes() as u64;
+        let key = shared
+            .write_with_retries(|| shared.blobs.put(claim, result.clone()))
+            .await?;
+        Ok(StoredResult::Blob(key, bytes))
+    }
+
+    pub(crate) async fn release(
+        &self,
+        attempt: &mut Attempt,
+        claims: &[Claim],
+        why: ReleaseReason,
+        step: &mut StepReport,
+    ) -> Result<(), JobsError> {
+        if claims.is_empty() {
+            return Ok(());
+        }
+        let shared = &self.shared;
+        let released = shared.store.release(claims, why, shared.now_ms()).await?;
+        for (id, state) in &released {
+            if state.ended() {
+                shared.metrics.ended(*state, 1);
+                shared.announce(*id);
+                step.ended.push((*id, *state));
+            } else {
+                step.handed_back.push(*id);
+            }
+        }
+        let kept: HashSet<_> = released.iter().map(|(id, _)| *id).collect();
+        let lost = claims.iter().map(|claim| claim.id);
+        step.lost.extend(lost.filter(|id| !kept.contains(id)));
+        let ids: Vec<_> = claims.iter().map(|claim| claim.id).collect();
+        attempt.done(&ids);
+        shared.wake.notify_one();
+        Ok(())
+    }
+}
+
+/// What is to be written down of the members of an attempt.
+#[derive(Default)]
+struct Sorted {
+    ends: Vec<(Claim, Ending)>,
+    back: Vec<Claim>,
+    long: Vec<Claim>,
+    lost: Vec<Uuid>,
+}
+
+/// The end of a job whose result could not be stored.
+fn not_stored(error: &JobsError) -> Ending {
+    tracing::error!(%error, "result could not be stored");
+    Ending::Failed(Failure::new(
+        FailureKind::Internal,
+        "the result could not be stored; the log of the service says why",
+    ))
+}

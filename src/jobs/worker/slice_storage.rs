@@ -1,0 +1,100 @@
+//! Slices of a sweep between two turns of the solver: stored when they are solved, read when the sweep is whole.
+
+use uuid::Uuid;
+
+use crate::jobs::codec::result::EncodedResult;
+use crate::jobs::error::JobsError;
+use crate::jobs::store::types::{NewSlice, SliceRecord, StoredResult};
+use crate::jobs::submit::microseconds;
+use crate::jobs::worker::attempt::Attempt;
+use crate::jobs::worker::outcome::Work;
+use crate::jobs::worker::pool::Worker;
+use crate::jobs::worker::slices::SlicedCase;
+
+/// What became of a slice that was to be stored.
+pub(crate) enum SliceFate {
+    /// It is stored.
+    Stored,
+    /// The lease is gone.
+    Lost,
+}
+
+impl Worker {
+    /// Stores a solved slice of a member, which goes on from there.
+    pub(crate) async fn keep_slice(
+        &self,
+        attempt: &mut Attempt,
+        place: usize,
+        mut sweep: Box<SlicedCase>,
+        part: Option<(SliceRecord, EncodedResult)>,
+    ) -> Result<SliceFate, JobsError> {
+        let shared = &self.shared;
+        let member = &mut attempt.members[place];
+        if let Some((note, part)) = part {
+            let claim = &member.claim;
+            let (number, done) = (note.number, sweep.done_after_next());
+            let result = match part.bytes() <= shared.options.small_result_max_bytes {
+                true => StoredResult::Inline(part),
+                false => {
+                    let bytes = part.bytes() as u64;
+                    let put = || shared.blobs.put_slice(claim, number, part.clone());
+                    StoredResult::Blob(shared.write_with_retries(put).await?, bytes)
+                }
+            };
+            let slice = NewSlice {
+                rest_us: u64::from(microseconds(sweep.problem.cost().seconds * (1.0 - done))),
+                note,
+                result,
+                done,
+            };
+            let added = shared
+                .write_with_retries(|| shared.store.add_slice(claim, &slice))
+                .await?;
+            if !added {
+                if let StoredResult::Blob(key, _) = &slice.result {
+                    self.abandon_blob(key).await;
+                }
+                return Ok(SliceFate::Lost);
+            }
+            tracing::debug!(job = %claim.id, number, done, "slice stored");
+            sweep.advance(slice.note.spent);
+            member.claim.slices = number + 1;
+        }
+        member.sweep = Some(sweep);
+        Ok(SliceFate::Stored)
+    }
+
+    /// What is to be done next for a sweep.
+    pub(crate) async fn next_of(
+        &self,
+        id: Uuid,
+        mut sweep: Box<SlicedCase>,
+    ) -> Result<Work, JobsError> {
+        if sweep.next().is_some() {
+            return Ok(Work::Next(sweep));
+        }
+        match self.parts(id).await {
+            Ok(parts) => Ok(Work::Join(sweep, parts)),
+            Err(error) if error.storage_fault().is_some() => Err(error),
+            Err(error) => {
+                tracing::error!(job = %id, %error, "slices cannot be read; the sweep is solved again");
+                sweep.begin_again();
+                Ok(Work::Next(sweep))
+            }
+        }
+    }
+
+    /// The stored parts of the answer of a sweep.
+    async fn parts(&self, id: Uuid) -> Result<Vec<EncodedResult>, JobsError> {
+        let shared = &self.shared;
+        let placed = shared.store.slice_results(id).await?;
+        let mut parts = Vec::with_capacity(placed.len());
+        for part in placed {
+            parts.push(match part {
+                StoredResult::Inline(part) => part,
+                StoredResult::Blob(key, _) => shared.blobs.whole(&key).await?,
+            });
+        }
+        Ok(parts)
+    }
+}

@@ -1,0 +1,145 @@
+//! A case on its way, slice by slice: where it is cut, what is solved already, and how the parts become the whole answer.
+//!
+//! The cuts depend on the case alone, so that a slice that was stored by a process that died serves the next one.
+
+use std::ops::Range;
+use std::time::Duration;
+
+use crate::contact::case::problem::Problem;
+use crate::jobs::store::types::SliceRecord;
+
+/// A checked case with its slices, of which the first `done` are stored.
+#[derive(Debug)]
+pub(crate) struct SlicedCase {
+    pub(crate) problem: Problem,
+    slices: Vec<Range<usize>>,
+    done: usize,
+    /// Solver time up to the end of what is stored.
+    pub(crate) spent: Duration,
+}
+
+impl SlicedCase {
+    /// A case cut here, of which this is stored. What was cut elsewhere, or solved by another solver, is left aside.
+    pub(crate) fn new(
+        problem: Problem,
+        slices: Vec<Range<usize>>,
+        stored: &[SliceRecord],
+    ) -> SlicedCase {
+        let fits = |(place, (note, slice)): (usize, (&SliceRecord, &Range<usize>))| {
+            note.number as usize == place
+                && note.motions as usize == slice.end
+                && note.digest == problem.digest
+        };
+        let pairs = stored.iter().zip(&slices).enumerate();
+        let done = pairs.take_while(|pair| fits(*pair)).count();
+        let last = done.checked_sub(1).and_then(|last| stored.get(last));
+        SlicedCase {
+            spent: last.map_or(Duration::ZERO, |note| note.spent),
+            problem,
+            slices,
+            done,
+        }
+    }
+
+    /// There is one slice: the whole.
+    pub(crate) fn is_one(&self) -> bool {
+        self.slices.len() <= 1
+    }
+
+    /// The slice to be solved next, if there is one.
+    pub(crate) fn next(&self) -> Option<Range<usize>> {
+        self.slices.get(self.done).cloned()
+    }
+
+    /// What is to be noted of the next slice, solved when the job had taken so long.
+    pub(crate) fn note(&self, spent: Duration) -> SliceRecord {
+        let motions = self.next().map_or(0, |slice| slice.end);
+        SliceRecord {
+            number: u32::try_from(self.done).unwrap_or(u32::MAX),
+            motions: u32::try_from(motions).unwrap_or(u32::MAX),
+            digest: self.problem.digest.clone(),
+            spent,
+        }
+    }
+
+    /// Part of the motions that is done once the next slice is, 0 to 1.
+    pub(crate) fn done_after_next(&self) -> f64 {
+        let motions = self.next().map_or(0, |slice| slice.end);
+        motions as f64 / self.problem.motions.len().max(1) as f64
+    }
+
+    /// The next slice is stored.
+    pub(crate) fn advance(&mut self, spent: Duration) {
+        self.done += 1;
+        self.spent = spent;
+    }
+
+    /// What is stored cannot be used.
+    pub(crate) fn begin_again(&mut self) {
+        self.done = 0;
+    }
+
+    /// Are these parts as many as there are slices?
+    pub(crate) fn is_whole(&self, parts: usize) -> bool {
+        parts == self.slices.len()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+    use crate::contact;
+    use crate::contact::case::limits::Limits;
+
+    fn problem() -> Problem {
+        let case = json!({
+            "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
+            "friction": { "coefficient": 0.3 },
+            "contact": { "type": "radii", "rolling_mm": 460, "lateral_mm": 300 },
+            "load": { "normal_force_n": 100_000 },
+            "motion": { "sweep": { "creepage_x": { "from": 0.0005, "to": 0.003, "points": 7 } } },
+            "solver": { "mesh": { "strips": 6, "cells": 6 } },
+            "outputs": ["resultants", "zones", "tractions", "slip", "pressure"]
+        });
+        contact::check(&case, &Limits::default()).unwrap()
+    }
+
+    fn note(number: u32, motions: u32, problem: &Problem) -> SliceRecord {
+        SliceRecord {
+            number,
+            motions,
+            digest: problem.digest.clone(),
+            spent: Duration::from_secs(u64::from(motions)),
+        }
+    }
+
+    #[test]
+    fn only_what_was_cut_here_and_solved_by_this_solver_counts_as_done() {
+        let problem = problem();
+        let cuts = || vec![0..3, 3..5, 5..7];
+        let sweep = |stored: &[SliceRecord]| SlicedCase::new(problem.clone(), cuts(), stored);
+        let good = [note(0, 3, &problem), note(1, 5, &problem)];
+        let going = sweep(&good);
+        assert_eq!(
+            (going.next(), going.spent),
+            (Some(5..7), Duration::from_secs(5))
+        );
+        assert_eq!(going.note(Duration::ZERO).motions, 7);
+        assert!((going.done_after_next() - 1.0).abs() < f64::EPSILON);
+        assert_eq!(sweep(&[]).next(), Some(0..3));
+        // Cut elsewhere, a hole, another solver.
+        assert_eq!(sweep(&[note(0, 2, &problem)]).next(), Some(0..3));
+        assert_eq!(sweep(&good[1..]).next(), Some(0..3));
+        let other = SliceRecord {
+            digest: "of another revision".to_owned(),
+            ..good[1].clone()
+        };
+        let half = sweep(&[good[0].clone(), other]);
+        assert_eq!(
+            (half.next(), half.spent),
+            (Some(3..5), Duration::from_secs(3))
+        );
+    }
+}

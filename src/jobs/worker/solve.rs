@@ -1,0 +1,254 @@
+//! What a solver thread does for one job: check, solve, encode.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Duration;
+
+use bytes::Bytes;
+
+use crate::contact::error::SolveError;
+use crate::contact::monitor::Monitor;
+use crate::contact::solution::words::{Fields, PatchFields, Solution};
+use crate::jobs::codec::encode::encode;
+use crate::jobs::codec::result::EncodedResult;
+use crate::jobs::error::JobsError;
+use crate::jobs::model::{Failure, FailureKind};
+use crate::jobs::shared::Shared;
+use crate::jobs::store::types::{SliceRecord, StoredCase};
+use crate::jobs::worker::attempt_control::AttemptControl;
+use crate::jobs::worker::outcome::{INTERNAL, Outcome, Work};
+use crate::jobs::worker::slices::SlicedCase;
+
+/// Does the work; a panic becomes a failure and the thread stays usable.
+pub(crate) fn solve_guarded(shared: &Shared, watch: &AttemptControl, work: Work) -> Outcome {
+    let done = catch_unwind(AssertUnwindSafe(|| match work {
+        Work::New(stored, notes) => check_and_solve(shared, watch, &stored, &notes),
+        Work::Next(sweep) => solve_next(shared, watch, sweep),
+        Work::Join(sweep, parts) => join_parts(shared, watch, sweep, &parts),
+    }));
+    done.unwrap_or_else(|payload| {
+        // What a defect says of the program is for the log, not for clients.
+        tracing::error!(reason = panic_text(payload.as_ref()), "the solver panicked");
+        let detail = "the solver stopped on a defect of its own; the service's log has the reason";
+        Outcome::Broken(Failure::new(FailureKind::Panic, detail))
+    })
+}
+
+fn internal(reason: &str) -> Outcome {
+    tracing::error!(reason, "a job fails inside the service");
+    Outcome::Broken(Failure::new(FailureKind::Internal, INTERNAL))
+}
+
+fn check_and_solve(
+    shared: &Shared,
+    watch: &AttemptControl,
+    stored: &StoredCase,
+    notes: &[SliceRecord],
+) -> Outcome {
+    let case = match stored.value() {
+        Ok(case) => case,
+        Err(error) => return internal(&error.to_string()),
+    };
+    let mut problem = match (shared.engine.check)(&case, &shared.options.limits) {
+        Ok(problem) => problem,
+        Err(error) => return Outcome::Refused(error),
+    };
+    let limit = shared.options.time_limit;
+    problem.time_limit = Some(problem.time_limit.map_or(limit, |time| time.min(limit)));
+    watch.set_memory_bytes(problem.cost().bytes);
+    let slices = (shared.engine.slices)(&problem);
+    solve_next(
+        shared,
+        watch,
+        Box::new(SlicedCase::new(problem, slices, notes)),
+    )
+}
+
+fn solve_next(shared: &Shared, watch: &AttemptControl, sweep: Box<SlicedCase>) -> Outcome {
+    let Some(slice) = sweep.next() else {
+        return Outcome::Slice { sweep, part: None };
+    };
+    watch.begin(sweep.spent);
+    let solved = (shared.engine.solve)(&sweep.problem, slice, watch);
+    let spent = watch.pause();
+    let (solution, fields) = match solved {
+        Ok(answer) => answer,
+        Err(error) => return Outcome::Unsolved(error),
+    };
+    if sweep.is_one() {
+        return whole(shared, &sweep, spent, solution, &fields);
+    }
+    match encoded(&solution, &fields) {
+        Ok(part) => Outcome::Slice {
+            part: Some((sweep.note(spent), part)),
+            sweep,
+        },
+        Err(reason) => internal(&reason),
+    }
+}
+
+fn join_parts(
+    shared: &Shared,
+    watch: &AttemptControl,
+    mut sweep: Box<SlicedCase>,
+    parts: &[EncodedResult],
+) -> Outcome {
+    let joined = match sweep.is_whole(parts.len()) {
+        true => join(parts, || watch.tick(1.0).is_continue()),
+        false => Err(JobsError::Damaged(
+            "slices of a sweep are missing".to_owned(),
+        )),
+    };
+    match joined {
+        Ok(Some((solution, fields))) => whole(shared, &sweep, sweep.spent, solution, &fields),
+        Ok(None) => Outcome::Unsolved(SolveError::Cancelled),
+        Err(error) => {
+            tracing::error!(%error, "the slices of a sweep cannot be used; it is solved again");
+            sweep.begin_again();
+            Outcome::Slice { sweep, part: None }
+        }
+    }
+}
+
+/// The outcome of a case that is solved whole.
+pub(crate) fn whole(
+    shared: &Shared,
+    sweep: &SlicedCase,
+    spent: Duration,
+    solution: Solution,
+    fields: &Fields,
+) -> Outcome {
+    let seconds = spent.as_secs_f64();
+    let method = sweep.problem.method_asked;
+    shared.metrics.solved(method, &solution, seconds);
+    match encoded(&solution, fields) {
+        Ok(result) => Outcome::Solved {
+            result,
+            field_patches: u32::try_from(fields.patches.len()).unwrap_or(u32::MAX),
+            remarks: solution.remarks,
+        },
+        Err(reason) => internal(&reason),
+    }
+}
+
+/// An answer, or a part of one, in its stored form.
+fn encoded(solution: &Solution, fields: &Fields) -> Result<EncodedResult, String> {
+    let packed = match fields.patches.len() {
+        0 => None,
+        _ => Some(encode(fields).map_err(|e| format!("the fields cannot be packed: {e}"))?),
+    };
+    let json = serde_json::to_vec(solution)
+        .map_err(|error| format!("the solution cannot be written as JSON: {error}"))?;
+    Ok(EncodedResult {
+        solution: Bytes::from(json),
+        fields: packed.map(Bytes::from),
+    })
+}
+
+/// Puts the parts of an answer together, in the order of their slices. `go_on` is asked before each part.
+///
+/// # Errors
+/// A part cannot be read, or does not fit to the others. `None` if `go_on` said no.
+fn join(
+    parts: &[EncodedResult],
+    go_on: impl Fn() -> bool,
+) -> Result<Option<(Solution, Fields)>, JobsError> {
+    let mut whole: Option<(Solution, Fields)> = None;
+    for part in parts {
+        if !go_on() {
+            return Ok(None);
+        }
+        let (solution, fields) = read(part)?;
+        match &mut whole {
+            None => whole = Some((solution, fields)),
+            Some((all, all_fields)) => {
+                if all.patches.len() != solution.patches.len()
+                    || all_fields.patches.len() != fields.patches.len()
+                {
+                    let reason = "the slices of a sweep have different patches";
+                    return Err(JobsError::Damaged(reason.to_owned()));
+                }
+                all.append(solution);
+                all_fields.append(fields);
+            }
+        }
+    }
+    let none = || JobsError::Damaged("a sweep without slices".to_owned());
+    whole.ok_or_else(none).map(Some)
+}
+
+fn read(part: &EncodedResult) -> Result<(Solution, Fields), JobsError> {
+    let damaged = |error: serde_json::Error| JobsError::Damaged(format!("a slice: {error}"));
+    let solution: Solution = serde_json::from_slice(&part.solution).map_err(damaged)?;
+    let patches = match &part.fields {
+        None => Vec::new(),
+        Some(_) => (0..solution.patches.len())
+            .map(|patch| part.patch_fields(patch, None))
+            .collect::<Result<Vec<PatchFields>, JobsError>>()?,
+    };
+    Ok((solution, Fields { patches }))
+}
+
+fn panic_text(payload: &(dyn Any + Send)) -> &str {
+    payload
+        .downcast_ref::<&str>()
+        .copied()
+        .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("no message")
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+    use crate::contact;
+    use crate::contact::case::limits::Limits;
+    use crate::contact::monitor::Unmonitored;
+    use crate::jobs::engine::Engine;
+
+    #[test]
+    fn parts_read_from_where_they_were_stored_are_the_answer_bit_for_bit() {
+        let case = json!({
+            "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
+            "friction": { "coefficient": 0.3 },
+            "contact": { "type": "radii", "rolling_mm": 460, "lateral_mm": 300 },
+            "load": { "normal_force_n": 100_000 },
+            "motion": { "sweep": { "creepage_x": { "from": 0.0005, "to": 0.003, "points": 7 } } },
+            "solver": { "mesh": { "strips": 6, "cells": 6 } },
+            "outputs": ["resultants", "zones", "tractions", "slip", "pressure"]
+        });
+        let problem = contact::check(&case, &Limits::default()).unwrap();
+        let engine = Engine::contact();
+        let mut parts = Vec::new();
+        let mut whole: Option<(Solution, Fields)> = None;
+        for cut in [0..3, 3..5, 5..7] {
+            let (solution, fields) = (engine.solve)(&problem, cut, &Unmonitored).unwrap();
+            parts.push(EncodedResult {
+                solution: Bytes::from(serde_json::to_vec(&solution).unwrap()),
+                fields: Some(Bytes::from(encode(&fields).unwrap())),
+            });
+            match &mut whole {
+                None => whole = Some((solution, fields)),
+                Some((all, all_fields)) => {
+                    all.append(solution);
+                    all_fields.append(fields);
+                }
+            }
+        }
+        let (solution, fields) = join(&parts, || true).unwrap().unwrap();
+        let (expected, expected_fields) = whole.unwrap();
+        assert_eq!(solution.total.len(), 7);
+        assert_eq!(
+            serde_json::to_vec(&solution).unwrap(),
+            serde_json::to_vec(&expected).unwrap()
+        );
+        assert_eq!(encode(&fields).unwrap(), encode(&expected_fields).unwrap());
+        assert!(join(&parts, || false).unwrap().is_none());
+        parts[1].fields = None;
+        assert!(matches!(join(&parts, || true), Err(JobsError::Damaged(_))));
+        parts[1].solution = Bytes::from_static(b"{");
+        assert!(join(&parts, || true).is_err());
+        assert!(join(&[], || true).is_err());
+    }
+}

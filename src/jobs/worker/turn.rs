@@ -1,0 +1,289 @@
+//! Take whose turn it is, solve for a slice of time, record what became of it.
+//!
+//! A turn is either a new claim, of a job or of a group of small ones, or a solve that waits at its gate. The async side
+//! claims and finishes; the arithmetic runs on a thread of the attempt's own, one at a time for each worker. When a slice
+//! is over and somebody else waits, the solver is held at its gate and the worker takes the next turn. A solver that does
+//! not listen any more is left behind with its thread, and the worker goes on with a new one.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use tokio::time::{MissedTickBehavior, interval};
+
+use crate::jobs::error::JobsError;
+use crate::jobs::shared::Shared;
+use crate::jobs::store::types::ReleaseReason;
+use crate::jobs::worker::attempt::{Attempt, Phase};
+use crate::jobs::worker::attempt_control::StopReason;
+use crate::jobs::worker::begin;
+use crate::jobs::worker::outcome::Work;
+use crate::jobs::worker::pool::{StepReport, Turn, Worker};
+use crate::jobs::worker::solver_thread::{Counted, SolverThread};
+
+/// How long a solver that was told to stop may go on before its thread is left behind.
+const STOP_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// How often a worker looks whether somebody waits for the solver.
+const YIELD_CHECK_INTERVAL: Duration = Duration::from_millis(200);
+
+impl Worker {
+    pub(crate) async fn turn(
+        &mut self,
+        attempt: &mut Attempt,
+        step: &mut StepReport,
+    ) -> Result<Turn, JobsError> {
+        let start = Instant::now();
+        if !attempt.begun() {
+            self.answer_known(attempt, step).await?;
+            attempt.set_aside_duplicates();
+        }
+        attempt.turn_began = start;
+        // A sweep comes back with every slice.
+        let turn = loop {
+            let turn = self.solve(attempt).await?;
+            attempt.close();
+            if matches!(turn, Turn::Over) {
+                self.thread = attempt.take_thread().or(self.thread.take());
+            }
+            self.record(attempt, step).await?;
+            if matches!(turn, Turn::Held) || attempt.to_solve().is_empty() {
+                break turn;
+            }
+        };
+        let seconds = start.elapsed().as_secs_f64();
+        let worker = &self.name;
+        match (attempt.members.as_slice(), &turn) {
+            ([member], Turn::Over) => {
+                let (job, attempt) = (member.claim.id, member.claim.attempt);
+                let state = step
+                    .ended
+                    .first()
+                    .map_or("not ended", |(_, state)| state.name());
+                tracing::info!(%job, attempt, worker, seconds, state, "job ended");
+            }
+            ([member], Turn::Held) => {
+                tracing::debug!(job = %member.claim.id, worker, seconds, "job waits for its next turn");
+            }
+            (members, _) => {
+                let (jobs, ended) = (members.len(), step.ended.len());
+                tracing::info!(worker, jobs, ended, seconds, "group ended");
+            }
+        }
+        Ok(turn)
+    }
+
+    /// Has the solver work for a slice, or for as long as nobody else waits.
+    async fn solve(&mut self, attempt: &mut Attempt) -> Result<Turn, JobsError> {
+        let shared = self.shared.clone();
+        if attempt.to_solve().is_empty() {
+            return Ok(Turn::Over);
+        }
+        // Shared by all that is solved, except by what may have killed a process before.
+        let _alone = if attempt.suspect {
+            let _waits = SuspectWaits::new(&shared);
+            Solo::Alone(shared.solo.clone().write_owned().await)
+        } else {
+            Solo::Beside(shared.solo.clone().read_owned().await)
+        };
+        if attempt.begun() || attempt.suspect {
+            let solving = attempt.claims(|phase| matches!(phase, Phase::Solving));
+            shared
+                .write_with_retries(|| shared.store.set_solving(&solving, true))
+                .await?;
+        }
+        if !attempt.begun() {
+            self.begin(attempt).await?;
+        }
+        let _working = shared.metrics.working();
+        attempt.lease.solving(true);
+        attempt.gate.open();
+        let turn = self.until_over(attempt).await;
+        attempt.lease.solving(false);
+        if matches!(turn, Turn::Held) {
+            attempt.close();
+            let held = attempt.claims(|phase| matches!(phase, Phase::Solving));
+            shared
+                .write_with_retries(|| shared.store.set_solving(&held, false))
+                .await?;
+        }
+        Ok(turn)
+    }
+
+    async fn begin(&mut self, attempt: &mut Attempt) -> Result<(), JobsError> {
+        let places = attempt.to_solve();
+        let members = places.iter().map(|place| &attempt.members[*place]);
+        let new = members.filter(|member| member.sweep.is_none());
+        let ids: Vec<_> = new.map(|member| member.claim.id).collect();
+        // Read after registering: a cancellation is either seen here or finds the watch.
+        let mut cases = self.shared.store.cases(&ids).await?;
+        let mut work = Vec::with_capacity(places.len());
+        for place in places {
+            let member = &mut attempt.members[place];
+            if let Some(sweep) = member.sweep.take() {
+                work.push((place, self.next_of(member.claim.id, sweep).await?));
+                continue;
+            }
+            match cases.remove(&member.claim.id) {
+                Some((case, cancel_requested)) => {
+                    if cancel_requested {
+                        member.watch.stop(StopReason::Cancel);
+                    }
+                    let notes = match member.claim.slices {
+                        0 => Vec::new(),
+                        _ => self.shared.store.slice_notes(member.claim.id).await?,
+                    };
+                    work.push((place, Work::New(case, notes)));
+                }
+                None => member.phase = Phase::Done,
+            }
+        }
+        let thread = match self.thread.take() {
+            Some(thread) => thread,
+            None => SolverThread::start(&self.name)?,
+        };
+        begin::begin(&self.shared, attempt, thread, work);
+        Ok(())
+    }
+
+    /// Waits until the solver is done or held, and sees to it that one of them comes.
+    async fn until_over(&self, attempt: &mut Attempt) -> Turn {
+        let shared = &self.shared;
+        let spent = attempt.on;
+        let (start, mut charged) = (Instant::now(), Instant::now());
+        let turn_began = attempt.turn_began;
+        let slice = shared.options.slice;
+        let mut look = interval(YIELD_CHECK_INTERVAL.min(slice.max(Duration::from_millis(1))));
+        look.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut told = None;
+        let mut closed = false;
+        let gate = attempt.gate.clone();
+        let lost = attempt.lease.lost().clone();
+        let turn = loop {
+            tokio::select! {
+                biased;
+                more = attempt.next_outcome() => if !more {
+                    break Turn::Over;
+                },
+                () = gate.reached(), if closed => break Turn::Held,
+                () = shared.stopping.cancelled(), if told.is_none() => {
+                    attempt.stop(StopReason::Shutdown);
+                    gate.open();
+                    (told, closed) = (Some(Instant::now()), false);
+                }
+                () = lost.cancelled(), if told.is_none() => told = Some(Instant::now()),
+                _ = look.tick() => {
+                    shared.turns.charge(&attempt.tenant, charged.elapsed(), spent);
+                    charged = Instant::now();
+                    if told.is_some_and(|since| since.elapsed() >= STOP_TIMEOUT) {
+                        tracing::warn!("the solver does not stop; its thread is left behind");
+                        self.leave_behind(attempt.abandon());
+                        break Turn::Over;
+                    }
+                    if told.is_none() && !closed && turn_began.elapsed() >= slice
+                        && (attempt.has_more_to_begin() || self.somebody_waits().await) {
+                        closed = self.hold(attempt);
+                    }
+                }
+            }
+        };
+        shared
+            .turns
+            .charge(&attempt.tenant, charged.elapsed(), spent);
+        attempt.spent += start.elapsed();
+        turn
+    }
+
+    /// Shall a sweep that is at a cut go back to the queue? It has had a good part of a slice by then, so that the next is
+    /// hardly ever interrupted within one of its own.
+    pub(crate) async fn makes_room(&self, attempt: &Attempt) -> bool {
+        let slice = self.shared.options.slice;
+        attempt.turn_began.elapsed() >= slice / 2 && self.somebody_waits().await
+    }
+
+    /// Closes the gate, if there is room for one more solver that waits; a job that came although there was none, because
+    /// it was thought to be short, goes back.
+    fn hold(&self, attempt: &Attempt) -> bool {
+        let options = &self.shared.options;
+        let (parked, bytes) = self.shared.turns.parked();
+        if parked >= options.parked_max {
+            attempt.stop_begun(StopReason::TooLong);
+            return false;
+        }
+        if bytes.saturating_add(attempt.memory_bytes()) > options.parked_bytes_max {
+            return false;
+        }
+        attempt.gate.close();
+        true
+    }
+
+    /// Is there anything else that could have the solver?
+    async fn somebody_waits(&self) -> bool {
+        let shared = &self.shared;
+        if shared.suspects_waiting.load(Ordering::Acquire) > 0 {
+            return true;
+        }
+        if shared.draining.is_cancelled() {
+            return shared.turns.parked().0 > 0;
+        }
+        shared.turns.parked().0 > 0 || shared.store.queued(None).await.is_ok_and(|jobs| jobs > 0)
+    }
+
+    /// Leaves a thread behind whose solver does not listen. Too many of them end the process, in good order: only that ends
+    /// them.
+    fn leave_behind(&self, thread: Option<SolverThread>) {
+        let Some(thread) = thread else { return };
+        let shared = &self.shared;
+        let left = shared.abandoned.fetch_add(1, Ordering::AcqRel) + 1;
+        // The thread drops the other end of this with itself.
+        let _ = thread.left.set(Counted(shared.abandoned.clone()));
+        drop(thread);
+        let most = shared.options.abandoned_max;
+        tracing::error!(left, most, "a solver thread was left behind");
+        if left > most {
+            shared.broken.cancel();
+        }
+    }
+
+    /// Gives back what is still held after the table failed in between.
+    pub(crate) async fn give_up(&mut self, attempt: &mut Attempt) {
+        attempt.stop(StopReason::Shutdown);
+        attempt.gate.open();
+        if attempt.begun() {
+            let ended = async { while attempt.next_outcome().await {} };
+            if tokio::time::timeout(STOP_TIMEOUT, ended).await.is_err() {
+                self.leave_behind(attempt.abandon());
+            } else {
+                self.thread = attempt.take_thread();
+            }
+        }
+        let held = attempt.claims(|phase| !matches!(phase, Phase::Done));
+        let mut step = StepReport::default();
+        let released = self.release(attempt, &held, ReleaseReason::NotBegun, &mut step);
+        if let Err(error) = released.await {
+            tracing::warn!(%error, "claimed jobs could not be given back; their leases will run out");
+        }
+    }
+}
+
+/// The right to solve: beside others, or alone.
+enum Solo {
+    Beside(#[expect(dead_code, reason = "held")] tokio::sync::OwnedRwLockReadGuard<()>),
+    Alone(#[expect(dead_code, reason = "held")] tokio::sync::OwnedRwLockWriteGuard<()>),
+}
+
+/// Somebody waits to solve alone, so that others make room.
+struct SuspectWaits(Arc<Shared>);
+
+impl SuspectWaits {
+    fn new(shared: &Arc<Shared>) -> SuspectWaits {
+        shared.suspects_waiting.fetch_add(1, Ordering::AcqRel);
+        SuspectWaits(shared.clone())
+    }
+}
+
+impl Drop for SuspectWaits {
+    fn drop(&mut self) {
+        self.0.suspects_waiting.fetch_sub(1, Ordering::AcqRel);
+    }
+}
