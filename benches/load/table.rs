@@ -2,10 +2,13 @@
 //! 200 000 jobs.
 
 use std::collections::{BTreeMap, HashSet};
+use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 use bytes::Bytes;
 use railhead::jobs::State;
+use railhead::jobs::store::Store;
 use railhead::jobs::store::list::Filter;
 use railhead::jobs::store::sqlite::database::SqliteStore;
 use railhead::jobs::store::types::{
@@ -27,9 +30,8 @@ const TENANT: &str = "anonymous";
 /// A claim with 1 and with 64 workers in turn, of the same queue.
 pub async fn claims() -> Vec<Row> {
     let folder = tempfile::tempdir().expect("a folder");
-    let store = SqliteStore::open(&folder.path().join("jobs.db")).await;
-    let store = store.expect("a table");
-    fill(&store, QUEUED).await;
+    let store = open(folder.path()).await;
+    fill(&*store, QUEUED).await;
     let (mut one, mut many) = (Vec::new(), Vec::new());
     for number in 0..CLAIMS {
         for (workers, times) in [(1, &mut one), (64, &mut many)] {
@@ -66,9 +68,8 @@ pub async fn claims() -> Vec<Row> {
 /// Lists whose filters match nothing, beside one that fills its page.
 pub async fn lists() -> Vec<Row> {
     let folder = tempfile::tempdir().expect("a folder");
-    let store = SqliteStore::open(&folder.path().join("jobs.db")).await;
-    let store = store.expect("a table");
-    let batch = fill(&store, LISTED).await;
+    let store = open(folder.path()).await;
+    let batch = fill(&*store, LISTED).await;
     let filters = filters(batch);
     let mut rows = Vec::new();
     for (name, filter, expected) in filters {
@@ -158,7 +159,12 @@ fn times(seconds: &[f64]) -> String {
 }
 
 /// Queues so many small jobs with one label as a batch.
-async fn fill(store: &SqliteStore, jobs: usize) -> Uuid {
+async fn open(folder: &Path) -> Arc<dyn Store> {
+    let store = SqliteStore::open(&folder.join("jobs.db")).await;
+    Arc::new(store.expect("a table"))
+}
+
+async fn fill(store: &dyn Store, jobs: usize) -> Uuid {
     let batch = NewBatch {
         id: Uuid::now_v7(),
         tenant: TENANT.into(),
@@ -176,7 +182,7 @@ async fn fill(store: &SqliteStore, jobs: usize) -> Uuid {
         let some: Vec<_> = (start..start + CHUNK)
             .map(|index| (u32::try_from(index).expect("an index"), job()))
             .collect();
-        store.enqueue_many(id, &some).await.expect("jobs");
+        store.fill_batch(id, &some).await.expect("jobs");
     }
     store.complete_batch(id).await.expect("the batch");
     id

@@ -1,12 +1,12 @@
 //! What can go wrong between a client's wish and a job.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use thiserror::Error;
 
 use crate::contact::error::CaseError;
 use crate::jobs::model::{Job, State};
+use crate::jobs::store::error::StoreError;
 
 /// Every way a call of [`Jobs`](crate::jobs::Jobs) can fail.
 #[derive(Debug, Error)]
@@ -103,12 +103,9 @@ pub enum JobsError {
     /// A solver thread could not be started.
     #[error("a solver thread could not be started: {0}")]
     Thread(std::io::Error),
-    /// The database failed.
+    /// The job table failed.
     #[error("the job table failed: {0}")]
-    Database(#[from] sqlx::Error),
-    /// Jobs that were to be stored together could not be; nothing of them was stored.
-    #[error(transparent)]
-    Together(Arc<JobsError>),
+    Store(#[from] StoreError),
     /// The job table is damaged.
     #[error(
         "the job table is damaged ({0}); a copy of a folder in use is no backup: restore one that `railhead backup` made"

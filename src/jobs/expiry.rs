@@ -33,10 +33,10 @@ impl Jobs {
 
     /// Why there is nothing with this id for this tenant: `unknown`, or that it has expired.
     pub(crate) async fn missing(&self, id: Uuid, unknown: JobsError) -> JobsError {
-        match self.shared.store.has_expired(id, &self.tenant).await {
+        match self.shared.store.has_expired(&self.tenant, id).await {
             Ok(true) => JobsError::Expired,
             Ok(false) => unknown,
-            Err(error) => error,
+            Err(error) => error.into(),
         }
     }
 }

@@ -13,6 +13,7 @@ use crate::jobs::error::JobsError;
 use crate::jobs::model::{Job, QueuePlace, State};
 use crate::jobs::options::Options;
 use crate::jobs::shared::Shared;
+use crate::jobs::store::error::StoreError;
 use crate::jobs::store::list::{Filter, Page};
 use crate::jobs::store::types::Deleted;
 use crate::jobs::worker::attempt_control::StopReason;
@@ -69,9 +70,8 @@ impl Jobs {
     /// # Errors
     /// [`JobsError::NotFound`], [`JobsError::Expired`], or a failed database.
     pub async fn get(&self, id: Uuid) -> Result<Job, JobsError> {
-        let job = self.shared.store.get(id).await?;
-        // What belongs to another tenant is answered like what does not exist.
-        match job.filter(|job| *job.tenant == *self.tenant) {
+        let job = self.shared.store.job(&self.tenant, id).await?;
+        match job {
             Some(job) => self.unexpired(job),
             None => Err(self.missing(id, JobsError::NotFound).await),
         }
@@ -87,15 +87,15 @@ impl Jobs {
             return Ok(job);
         }
         let store = &self.shared.store;
-        let (before, cost_us, tenants) = store.queued_before(&job, PLACES_COUNTED).await?;
-        if let Ok(position) = u32::try_from(before)
+        let ahead = store.queued_before(&job, PLACES_COUNTED).await?;
+        if let Ok(position) = u32::try_from(ahead.jobs)
             && position < PLACES_COUNTED
         {
             #[expect(clippy::cast_precision_loss, reason = "rough")]
-            let seconds = cost_us as f64 * 1e-6;
+            let seconds = ahead.cost_us as f64 * 1e-6;
             // Each of the tenants has as much solver time as this one, until its own queue is empty.
             #[expect(clippy::cast_precision_loss, reason = "rough")]
-            let share = tenants.max(1) as f64 / self.shared.options.workers.max(1) as f64;
+            let share = ahead.tenants.max(1) as f64 / self.shared.options.workers.max(1) as f64;
             job.queue = Some(QueuePlace {
                 position,
                 starts_in_s: seconds * share,
@@ -114,9 +114,13 @@ impl Jobs {
         cursor: Option<&str>,
         limit: u32,
     ) -> Result<Page, JobsError> {
+        let after = match cursor {
+            Some(cursor) => Some(filter.read_cursor(cursor).ok_or(JobsError::BadCursor)?),
+            None => None,
+        };
         let store = &self.shared.store;
         let mut page = store
-            .list(&self.tenant, filter, cursor, limit.clamp(1, PAGE_MAX))
+            .list(&self.tenant, filter, after, limit.clamp(1, PAGE_MAX))
             .await?;
         let jobs = page.jobs.into_iter();
         page.jobs = jobs.filter_map(|job| self.unexpired(job).ok()).collect();
@@ -134,7 +138,7 @@ impl Jobs {
         let job = self
             .shared
             .store
-            .cancel(id, now)
+            .cancel(&self.tenant, id, now)
             .await?
             .ok_or(JobsError::NotFound)?;
         if job.state.ended() {
@@ -155,7 +159,7 @@ impl Jobs {
     /// [`JobsError::NotEnded`], [`JobsError::NotFound`], or a failed database.
     pub async fn delete(&self, id: Uuid) -> Result<(), JobsError> {
         self.get(id).await?;
-        match self.shared.store.delete(id).await? {
+        match self.shared.store.delete(&self.tenant, id).await? {
             Deleted::NotEnded(state) => Err(JobsError::NotEnded(state)),
             Deleted::NotFound => Err(JobsError::NotFound),
             Deleted::Done => {
@@ -173,9 +177,9 @@ impl Jobs {
         if self.shared.draining.is_cancelled() {
             return Err(JobsError::Draining);
         }
-        timeout(READY_WITHIN, self.shared.store.ping())
+        timeout(READY_WITHIN, self.shared.store.ready(false))
             .await
-            .unwrap_or(Err(JobsError::Database(sqlx::Error::PoolTimedOut)))?;
+            .unwrap_or_else(|_| Err(StoreError::timed_out()))?;
         self.shared.require_storage().await
     }
 }

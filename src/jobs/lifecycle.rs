@@ -76,7 +76,7 @@ impl Jobs {
         }
         let blobs = Blobs::open(&options.data_dir)?;
         let unfinished_batches = UnfinishedBatches {
-            abandoned: store.incomplete_batches().await?.into_iter().collect(),
+            abandoned: store.unfinished_batches().await?.into_iter().collect(),
             ..UnfinishedBatches::default()
         };
         let (ended, _) = broadcast::channel(1024);
@@ -85,7 +85,7 @@ impl Jobs {
             shared: Arc::new(Shared {
                 options,
                 engine,
-                store,
+                store: Arc::new(store),
                 blobs,
                 wake: Notify::new(),
                 ended,

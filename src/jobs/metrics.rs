@@ -125,7 +125,7 @@ impl Metrics {
     /// A job ended in this way.
     pub(crate) fn ending(&self, ending: &Ending) {
         match ending {
-            Ending::Succeeded { .. } => self.ended(State::Succeeded, 1),
+            Ending::Succeeded { .. } | Ending::Cached { .. } => self.ended(State::Succeeded, 1),
             Ending::Cancelled => self.ended(State::Cancelled, 1),
             Ending::Failed(failure) => self.failed(failure.kind),
         }

@@ -27,7 +27,7 @@ impl Jobs {
         let stats = match self.shared.store.stats().await {
             Err(error) if error.storage_fault().is_some() => {
                 // The alert for this must not fail with it.
-                self.shared.observe_storage::<()>(&Err(error));
+                self.shared.observe_storage::<()>(&Err(error.into()));
                 return Ok(());
             }
             stats => stats?,

@@ -67,5 +67,5 @@ pub use crate::jobs::error::JobsError;
 pub use crate::jobs::handle::{Jobs, PAGE_MAX};
 pub use crate::jobs::model::{Failure, FailureKind, Job, QueuePlace, State};
 pub use crate::jobs::options::Options;
-pub use crate::jobs::storage_fault::StorageFault;
+pub use crate::jobs::store::error::StorageFault;
 pub use crate::jobs::store::list::{Filter, Page};

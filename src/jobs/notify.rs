@@ -97,9 +97,13 @@ impl Jobs {
     /// # Errors
     /// As [`Jobs::get`].
     pub(crate) async fn recent(&self, id: Uuid, age: Duration) -> Result<Job, JobsError> {
-        let look = self.shared.store.get(id);
-        let job = self.shared.recent_jobs.at(id, age, look).await?;
-        match job.filter(|job| *job.tenant == *self.tenant) {
+        let look = self.shared.store.job(&self.tenant, id);
+        let job = self
+            .shared
+            .recent_jobs
+            .at(&self.tenant, id, age, look)
+            .await?;
+        match job {
             Some(job) => self.unexpired(job),
             None => Err(self.missing(id, JobsError::NotFound).await),
         }
@@ -107,9 +111,13 @@ impl Jobs {
 
     /// The same of a batch.
     async fn recent_batch(&self, id: Uuid, age: Duration) -> Result<Batch, JobsError> {
-        let look = self.shared.store.batch(id);
-        let batch = self.shared.recent_batches.at(id, age, look).await?;
-        match batch.filter(|batch| *batch.tenant == *self.tenant) {
+        let look = self.shared.store.batch(&self.tenant, id);
+        let batch = self
+            .shared
+            .recent_batches
+            .at(&self.tenant, id, age, look)
+            .await?;
+        match batch {
             Some(batch) => Ok(batch),
             None => Err(self.missing(id, JobsError::BatchNotFound).await),
         }

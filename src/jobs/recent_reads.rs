@@ -8,10 +8,12 @@ use std::time::Duration;
 use tokio::time::Instant;
 use uuid::Uuid;
 
+/// Whose thing, and which.
+type OwnedId = (Arc<str>, Uuid);
 type Look<T> = Arc<tokio::sync::Mutex<Option<(Instant, T)>>>;
 
 /// The last looks at things that somebody follows.
-pub(crate) struct RecentReads<T>(Mutex<HashMap<Uuid, Look<T>>>);
+pub(crate) struct RecentReads<T>(Mutex<HashMap<OwnedId, Look<T>>>);
 
 impl<T> Default for RecentReads<T> {
     fn default() -> Self {
@@ -29,13 +31,14 @@ impl<T: Clone> RecentReads<T> {
     /// What a look finds, or found not longer than `age` ago. While one looks the others wait for what it finds.
     pub(crate) async fn at<E>(
         &self,
+        tenant: &Arc<str>,
         id: Uuid,
         age: Duration,
         look: impl Future<Output = Result<T, E>>,
     ) -> Result<T, E> {
         let last = {
             let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-            Arc::clone(all.entry(id).or_default())
+            Arc::clone(all.entry((tenant.clone(), id)).or_default())
         };
         let mut seen = last.lock().await;
         if let Some((when, found)) = seen.as_ref()
@@ -74,17 +77,18 @@ mod tests {
     async fn a_thousand_who_look_for_the_same_are_a_few_looks() {
         let looks = Arc::new(RecentReads::<u64>::default());
         let asked = Arc::new(AtomicU64::new(0));
+        let tenant: Arc<str> = "t".into();
         let (id, age) = (Uuid::now_v7(), Duration::from_millis(200));
         for round in 1..=2 {
             let before = asked.load(Ordering::SeqCst);
             let all = (0..1000).map(|_| {
-                let (looks, asked) = (looks.clone(), asked.clone());
+                let (looks, asked, tenant) = (looks.clone(), asked.clone(), tenant.clone());
                 tokio::spawn(async move {
                     let look = async {
                         tokio::time::sleep(Duration::from_millis(5)).await;
                         Ok::<_, ()>(asked.fetch_add(1, Ordering::SeqCst) + 1)
                     };
-                    looks.at(id, age, look).await
+                    looks.at(&tenant, id, age, look).await
                 })
             });
             for found in all.collect::<Vec<_>>() {
@@ -96,9 +100,11 @@ mod tests {
             tokio::time::sleep(age).await;
         }
         // A look that fails is nobody else's answer, and what nobody follows is forgotten.
-        let failed = looks.at(id, age, async { Err::<u64, _>("away") }).await;
+        let failed = looks
+            .at(&tenant, id, age, async { Err::<u64, _>("away") })
+            .await;
         assert_eq!(failed, Err("away"));
-        let other = looks.at(Uuid::now_v7(), age, async { Ok::<_, ()>(7) });
+        let other = looks.at(&tenant, Uuid::now_v7(), age, async { Ok::<_, ()>(7) });
         assert_eq!(other.await, Ok(7));
         tokio::time::sleep(5 * age).await;
         looks.forget(age);

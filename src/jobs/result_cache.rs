@@ -34,7 +34,7 @@ impl Jobs {
         if keys.is_empty() {
             return Ok(());
         }
-        let sources = self.shared.store.sources(&keys).await?;
+        let sources = self.shared.store.cached(&keys).await?;
         let (mut hits, now) = (0, self.shared.now_ms());
         for job in jobs {
             let source = job.cache_key.and_then(|key| sources.get(&key));

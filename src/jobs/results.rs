@@ -5,11 +5,10 @@ use uuid::Uuid;
 
 use crate::contact::case::words::Output;
 use crate::contact::solution::words::{PatchFields, Solution};
-use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::Job;
-use crate::jobs::store::types::ResultRef;
+use crate::jobs::store::types::{ResultRef, StoredResult};
 
 /// Solutions from this size on are read off the threads that answer requests.
 const LARGE_BYTES: usize = 64 << 10;
@@ -32,9 +31,9 @@ impl Jobs {
     /// [`JobsError::NotFound`], or a failed database.
     pub async fn case(&self, id: Uuid) -> Result<Bytes, JobsError> {
         self.get(id).await?;
-        let cases = self.shared.store.cases(&[id]).await?;
+        let case = self.shared.store.case(&self.tenant, id).await?;
         // It was there a moment ago.
-        let (case, _) = cases.into_values().next().ok_or(JobsError::Expired)?;
+        let case = case.ok_or(JobsError::Expired)?;
         if case.template.is_none() {
             return Ok(case.body);
         }
@@ -69,12 +68,12 @@ impl Jobs {
     /// As [`Jobs::solution`].
     pub async fn answer_bytes(&self, id: Uuid) -> Result<usize, JobsError> {
         let (_, stored) = self.stored(id).await?;
-        match &stored.key {
-            Some(key) => match self.shared.blobs.solution_bytes(key).await {
+        match &stored.result {
+            StoredResult::Blob(key, _) => match self.shared.blobs.solution_bytes(key).await {
                 Err(error) => Err(self.gone_meanwhile(id, error).await),
                 read => read,
             },
-            None => Ok(self.shared.options.small_result_max_bytes),
+            StoredResult::Inline(result) => Ok(result.solution.len()),
         }
     }
 
@@ -84,12 +83,12 @@ impl Jobs {
     /// As [`Jobs::solution`].
     pub async fn answer(&self, id: Uuid) -> Result<FetchedResult, JobsError> {
         let (job, stored) = self.stored(id).await?;
-        let solution = match &stored.key {
-            Some(key) => match self.shared.blobs.solution(key).await {
+        let solution = match &stored.result {
+            StoredResult::Blob(key, _) => match self.shared.blobs.solution(key).await {
                 Ok(text) => text,
                 Err(error) => return Err(self.gone_meanwhile(id, error).await),
             },
-            None => self.small(&stored).await?.solution,
+            StoredResult::Inline(result) => result.solution.clone(),
         };
         Ok(FetchedResult {
             solution,
@@ -140,12 +139,14 @@ impl Jobs {
                 patches: stored.field_patches,
             });
         }
-        match &stored.key {
-            Some(key) => match self.shared.blobs.patch_fields(key, patch, point).await {
-                Err(error) => Err(self.gone_meanwhile(id, error).await),
-                read => read,
-            },
-            None => self.small(&stored).await?.patch_fields(patch, point),
+        match &stored.result {
+            StoredResult::Blob(key, _) => {
+                match self.shared.blobs.patch_fields(key, patch, point).await {
+                    Err(error) => Err(self.gone_meanwhile(id, error).await),
+                    read => read,
+                }
+            }
+            StoredResult::Inline(result) => result.patch_fields(patch, point),
         }
     }
 
@@ -164,17 +165,10 @@ impl Jobs {
         }
     }
 
-    /// A result that lies in the database.
-    async fn small(&self, stored: &ResultRef) -> Result<EncodedResult, JobsError> {
-        let result = self.shared.store.small_result(stored.job).await?;
-        // It was there a moment ago.
-        result.ok_or(JobsError::Expired)
-    }
-
     /// Where the result of a job lies.
     async fn stored(&self, id: Uuid) -> Result<(Job, ResultRef), JobsError> {
-        let found = self.shared.store.result(id).await?;
-        let Some((job, stored)) = found.filter(|(job, _)| *job.tenant == *self.tenant) else {
+        let found = self.shared.store.result(&self.tenant, id).await?;
+        let Some((job, stored)) = found else {
             return Err(self.missing(id, JobsError::NotFound).await);
         };
         let job = self.unexpired(job)?;

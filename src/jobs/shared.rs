@@ -21,7 +21,7 @@ use crate::jobs::model::Job;
 use crate::jobs::options::Options;
 use crate::jobs::quota::StagedBytes;
 use crate::jobs::recent_reads::RecentReads;
-use crate::jobs::store::sqlite::database::SqliteStore;
+use crate::jobs::store::Store;
 use crate::jobs::worker::fair_turns::FairTurns;
 use crate::jobs::worker::running::RunningAttempts;
 
@@ -33,7 +33,7 @@ pub(crate) const POLL_INTERVAL: Duration = Duration::from_secs(1);
 pub(crate) struct Shared {
     pub(crate) options: Options,
     pub(crate) engine: Engine,
-    pub(crate) store: SqliteStore,
+    pub(crate) store: Arc<dyn Store>,
     pub(crate) blobs: Blobs,
     /// Wakes an idle worker; a hint only, workers also look by themselves.
     pub(crate) wake: Notify,

@@ -4,27 +4,15 @@ use std::error::Error;
 use std::io;
 
 use crate::jobs::error::JobsError;
-
-/// Why the disk takes nothing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StorageFault {
-    /// No space is left, or a quota is used up.
-    Full,
-    /// It is read-only, it fails, the job table is damaged, or locked by another process, or the results cannot be reached.
-    Unwritable,
-}
+use crate::jobs::store::error::StorageFault;
 
 impl JobsError {
     /// The trouble with the disk behind this error, if that is what it is.
     #[must_use]
     pub fn storage_fault(&self) -> Option<StorageFault> {
         match self {
-            JobsError::Database(sqlx::Error::Database(error)) => of_sqlite(error.code()?.as_ref()),
-            JobsError::Database(sqlx::Error::PoolTimedOut) => Some(StorageFault::Unwritable),
-            JobsError::Database(sqlx::Error::Io(source)) | JobsError::DataDir { source, .. } => {
-                of_io(source)
-            }
-            JobsError::Together(error) => error.storage_fault(),
+            JobsError::Store(error) => error.storage_fault(),
+            JobsError::DataDir { source, .. } => of_io(source),
             JobsError::Blobs(object_store::Error::NotFound { .. }) => None,
             JobsError::Blobs(error) => {
                 let mut cause: Option<&(dyn Error + 'static)> = Some(error);
@@ -42,26 +30,7 @@ impl JobsError {
     }
 }
 
-/// The low byte of a code of SQLite is its kind.
-fn of_sqlite(code: &str) -> Option<StorageFault> {
-    const BUSY: u32 = 5;
-    const LOCKED: u32 = 6;
-    const READONLY: u32 = 8;
-    const IOERR: u32 = 10;
-    const FULL: u32 = 13;
-    const CORRUPT: u32 = 11;
-    const CANTOPEN: u32 = 14;
-    const NOTADB: u32 = 26;
-    match code.parse::<u32>().ok()? & 0xff {
-        FULL => Some(StorageFault::Full),
-        BUSY | LOCKED | READONLY | IOERR | CORRUPT | CANTOPEN | NOTADB => {
-            Some(StorageFault::Unwritable)
-        }
-        _ => None,
-    }
-}
-
-fn of_io(error: &io::Error) -> Option<StorageFault> {
+pub(crate) fn of_io(error: &io::Error) -> Option<StorageFault> {
     use io::ErrorKind::{
         FileTooLarge, PermissionDenied, QuotaExceeded, ReadOnlyFilesystem, StorageFull,
     };
@@ -77,16 +46,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn extended_codes_and_wrapped_causes_are_recognised() {
-        assert_eq!(of_sqlite("13"), Some(StorageFault::Full));
-        // SQLITE_IOERR_WRITE, SQLITE_READONLY_DBMOVED.
-        assert_eq!(of_sqlite("778"), Some(StorageFault::Unwritable));
-        assert_eq!(of_sqlite("1032"), Some(StorageFault::Unwritable));
-        // SQLITE_CORRUPT_INDEX, SQLITE_NOTADB.
-        assert_eq!(of_sqlite("779"), Some(StorageFault::Unwritable));
-        assert_eq!(of_sqlite("26"), Some(StorageFault::Unwritable));
-        // SQLITE_CONSTRAINT_PRIMARYKEY.
-        assert_eq!(of_sqlite("1555"), None);
+    fn wrapped_causes_are_recognised() {
         let wrapped = JobsError::Blobs(object_store::Error::Generic {
             store: "a test",
             source: Box::new(io::Error::from(io::ErrorKind::StorageFull)),

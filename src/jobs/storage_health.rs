@@ -20,7 +20,11 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 
 impl Jobs {
     /// Passes a failed submission on; trouble with the disk makes the service not ready until a write succeeds.
-    pub(crate) fn observe_write<T>(&self, written: Result<T, JobsError>) -> Result<T, JobsError> {
+    pub(crate) fn observe_write<T, E: Into<JobsError>>(
+        &self,
+        written: Result<T, E>,
+    ) -> Result<T, JobsError> {
+        let written = written.map_err(Into::into);
         self.shared.observe_storage(&written);
         written
     }
@@ -50,20 +54,21 @@ impl Shared {
 
     /// Writes, again and again: a few times if the database fails for a moment, for as long as it takes if the disk is
     /// full or cannot be written. Gives up when the service stops.
-    pub(crate) async fn write_with_retries<T, F>(
+    pub(crate) async fn write_with_retries<T, E, F>(
         &self,
         mut write: impl FnMut() -> F,
     ) -> Result<T, JobsError>
     where
-        F: Future<Output = Result<T, JobsError>>,
+        F: Future<Output = Result<T, E>>,
+        E: Into<JobsError>,
     {
         let (mut pause, mut tries) = (FIRST_PAUSE, 1);
         loop {
-            let written = write().await;
+            let written = write().await.map_err(Into::into);
             self.observe_storage(&written);
             let Err(error) = &written else { return written };
             let waits = error.storage_fault().is_some() && !self.stopping.is_cancelled();
-            let again = matches!(error, JobsError::Database(_)) && tries < WRITE_TRIES;
+            let again = matches!(error, JobsError::Store(_)) && tries < WRITE_TRIES;
             if !waits && !again {
                 return written;
             }
@@ -82,7 +87,7 @@ impl Shared {
         if !self.storage_failing.load(Ordering::Relaxed) {
             return Ok(());
         }
-        let written = self.store.touch().await;
+        let written = self.store.ready(true).await.map_err(JobsError::from);
         self.observe_storage(&written);
         written
     }

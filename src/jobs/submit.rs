@@ -81,7 +81,11 @@ impl Jobs {
             .map_err(|error| JobsError::Damaged(error.to_string()))?;
         drop(turn);
         if let Some((key, digest)) = &idempotency
-            && let Some(enqueued) = self.shared.store.by_key(&self.tenant, key, digest).await?
+            && let Some(enqueued) = self
+                .shared
+                .store
+                .job_by_key(&self.tenant, key, digest)
+                .await?
         {
             match self.of_enqueued(enqueued) {
                 // The job is over and only waits for its removal: the key is free.
@@ -90,27 +94,14 @@ impl Jobs {
             }
         }
         let problem = problem?;
-        let (cost_us, slice_us) = (cost_us(&problem), self.slice_us(&problem));
-        let outputs = problem.outputs.clone();
-        let id = Uuid::now_v7();
+        let body = Bytes::from(body.map_err(|error| JobsError::Damaged(error.to_string()))?);
         let mut new = NewJob {
-            id,
-            tenant: self.tenant.clone(),
-            created_at: created_at(id),
-            name: problem.name,
-            labels: problem.labels,
-            method: problem.method.name().to_owned(),
-            outputs: outputs_text(&outputs),
-            cost_us,
-            slice_us,
-            cache_key: self.cache_key(&problem.digest),
-            source: None,
-            body: Bytes::from(body.map_err(|error| JobsError::Damaged(error.to_string()))?),
-            row: false,
             idempotency,
             traceparent,
             options,
+            ..self.new_job(problem, body)
         };
+        let id = new.id;
         if !options.bypass_cache {
             self.find_sources(std::iter::once(&mut new)).await?;
         }
@@ -124,6 +115,29 @@ impl Jobs {
         self.shared.wake.notify_one();
         tracing::info!(job = %job.id, method = new.method, "job queued");
         Ok((job, replayed))
+    }
+
+    /// A checked case as a job about to be queued.
+    fn new_job(&self, problem: Problem, body: Bytes) -> NewJob {
+        let id = Uuid::now_v7();
+        NewJob {
+            id,
+            tenant: self.tenant.clone(),
+            created_at: created_at(id),
+            method: problem.method.name().to_owned(),
+            outputs: outputs_text(&problem.outputs),
+            cost_us: cost_us(&problem),
+            slice_us: self.slice_us(&problem),
+            cache_key: self.cache_key(&problem.digest),
+            source: None,
+            body,
+            row: false,
+            idempotency: None,
+            traceparent: None,
+            options: SubmitOptions::default(),
+            name: problem.name,
+            labels: problem.labels,
+        }
     }
 
     /// Expected solve time of the longest slice of a case in µs.

@@ -12,6 +12,7 @@ use railhead::jobs::store::types::QueueBounds;
 
 use crate::errors::assert_problem;
 use crate::server::{Answer, Server, Setup};
+use crate::store::open_sqlite;
 use crate::support::{Service, case, endless_case, open, pause, tick_forever};
 
 pub fn lines(cases: &[Value]) -> String {
@@ -365,49 +366,10 @@ async fn a_batch_outlives_two_kills_and_every_case_is_answered_once() {
 }
 
 #[tokio::test]
-async fn jobs_of_a_group_that_died_are_retried_alone_and_uncounted() {
-    use crate::store::claim_up_to;
-    use railhead::jobs::store::sqlite::database::SqliteStore;
-    let folder = tempfile::tempdir().unwrap();
-    let store = SqliteStore::open(&folder.path().join("jobs.db"))
-        .await
-        .unwrap();
-    for _ in 0..3 {
-        store
-            .enqueue(&crate::store::new_job(), QueueBounds::NONE)
-            .await
-            .unwrap();
-    }
-    let group = claim_up_to(&store, 0, 10, 8).await;
-    assert_eq!(group.len(), 3);
-    assert_eq!(store.reap(10, 10, 1).await.unwrap().len(), 3);
-    let ends: Vec<_> = group
-        .iter()
-        .map(|claim| (claim.clone(), crate::store::success()))
-        .collect();
-    assert!(store.finish(&ends, 11).await.unwrap().is_empty(), "fenced");
-    for claim in &group {
-        let alone = claim_up_to(&store, 20, 10, 8).await;
-        assert_eq!(alone.len(), 1);
-        assert_eq!((alone[0].id, alone[0].attempt), (claim.id, 1));
-        assert_eq!((alone[0].lease_number, alone[0].suspect), (2, true));
-    }
-    // Alone, the one attempt that is allowed counts.
-    let ended = store.reap(30, 30, 1).await.unwrap();
-    assert!(
-        ended.iter().all(|(_, state)| state.name() == "failed"),
-        "{ended:?}"
-    );
-}
-
-#[tokio::test]
 async fn an_incomplete_batch_is_gone_after_a_restart() {
-    use railhead::jobs::store::sqlite::database::SqliteStore;
     use railhead::jobs::store::types::{BatchBegun, NewBatch};
     let folder = tempfile::tempdir().unwrap();
-    let store = SqliteStore::open(&folder.path().join("jobs.db"))
-        .await
-        .unwrap();
+    let store = open_sqlite(&folder.path().join("jobs.db")).await;
     let new = NewBatch {
         id: uuid::Uuid::now_v7(),
         tenant: "anonymous".into(),
@@ -422,7 +384,7 @@ async fn an_incomplete_batch_is_gone_after_a_restart() {
     assert_eq!(begun.unwrap(), BatchBegun::Created);
     let job = crate::store::new_job();
     let id = job.id;
-    store.enqueue_many(new.id, &[(0, job)]).await.unwrap();
+    store.fill_batch(new.id, &[(0, job)]).await.unwrap();
     store.close().await;
     let jobs = open(Options::new(folder.path()), solve).await;
     assert!(jobs.get(id).await.is_err());

@@ -42,6 +42,7 @@ mod shutdown;
 mod slow_clients;
 mod storage;
 mod store;
+mod store_jobs;
 mod store_keys;
 mod store_lists;
 mod store_model;

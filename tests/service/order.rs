@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 use crate::batches::small;
 use crate::errors::assert_problem;
 use crate::server::{Server, Setup};
-use crate::store::{Table, new_job};
+use crate::store::{StoreKind, Table, new_job};
 use crate::support::{case, pause, tick_forever};
 
 const DAY_MS: i64 = 24 * 3600 * 1000;
@@ -33,7 +33,7 @@ fn wishing(tenant: &str, priority: Priority) -> NewJob {
 
 #[tokio::test]
 async fn jobs_are_claimed_by_priority_and_then_by_age() {
-    let table = Table::new().await;
+    let table = Table::new(StoreKind::Sqlite).await;
     let mut added = Vec::new();
     for priority in [
         Priority::Low,

@@ -7,7 +7,6 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use railhead::jobs::clock::Clock;
-use railhead::jobs::store::sqlite::database::SqliteStore;
 use railhead::jobs::store::types::NewJob;
 use railhead::jobs::{Jobs, JobsError, Options};
 use serde_json::{Value, json};
@@ -17,6 +16,7 @@ use railhead::jobs::store::types::QueueBounds;
 use crate::errors::assert_problem;
 use crate::results::path_of;
 use crate::server::{Server, Setup};
+use crate::store::open_sqlite;
 use crate::store::{claim_up_to, finish_one, new_job, success};
 use crate::support::{case, endless_case, pause};
 
@@ -198,14 +198,14 @@ async fn the_database_shrinks_when_its_jobs_go() {
     const CASE_BYTES: usize = 400 << 10;
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("jobs.db");
-    let store = SqliteStore::open(&file).await.unwrap();
+    let store = open_sqlite(&file).await;
     for _ in 0..JOBS {
         let body = Bytes::from(vec![b' '; CASE_BYTES]);
         let new = NewJob { body, ..new_job() };
         store.enqueue(&new, QueueBounds::NONE).await.unwrap();
-        let claim = claim_up_to(&store, 0, 1000, 1).await.pop().unwrap();
+        let claim = claim_up_to(&*store, 0, 1000, 1).await.pop().unwrap();
         let now = Clock::system().now_ms();
-        finish_one(&store, &claim, &success(), now).await.unwrap();
+        finish_one(&*store, &claim, &success(), now).await.unwrap();
     }
     store.close().await;
     let size = || std::fs::metadata(&file).unwrap().len();

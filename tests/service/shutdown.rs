@@ -6,13 +6,13 @@ use std::time::Duration;
 use railhead::contact::case::problem::Problem;
 use railhead::contact::monitor::Monitor;
 use railhead::contact::solve;
-use railhead::jobs::store::sqlite::database::SqliteStore;
 use railhead::jobs::{FailureKind, Jobs, JobsError, Options, State};
 use reqwest::Method;
 use sqlx::Connection;
 use tokio::sync::mpsc::unbounded_channel;
 
 use crate::store::claim_up_to;
+use crate::store::open_sqlite;
 use crate::support::{Service, case, endless_case, jobs_with, long_case, open, pause};
 
 #[tokio::test]
@@ -104,11 +104,9 @@ async fn a_job_that_kills_every_process_fails_in_the_end() {
     jobs.shutdown(Duration::ZERO).await;
     for attempt in 1..=3 {
         // A process that claims the job and dies: nothing after the claim reaches the table.
-        let store = SqliteStore::open(&folder.path().join("jobs.db"))
-            .await
-            .unwrap();
+        let store = open_sqlite(&folder.path().join("jobs.db")).await;
         assert_eq!(
-            claim_up_to(&store, 0, i64::MAX / 2, 1)
+            claim_up_to(&*store, 0, i64::MAX / 2, 1)
                 .await
                 .pop()
                 .unwrap()

@@ -2,9 +2,10 @@
 
 use std::collections::BTreeSet;
 
+use railhead::jobs::State;
 use railhead::jobs::store::types::{Enqueued, NewJob, QueueBounds};
 
-use crate::store::{Table, new_job};
+use crate::store::{StoreKind, Table, conformance, new_job};
 
 pub fn keyed(key: &str, digest: u8) -> NewJob {
     NewJob {
@@ -13,9 +14,8 @@ pub fn keyed(key: &str, digest: u8) -> NewJob {
     }
 }
 
-#[tokio::test]
-async fn one_idempotency_key_makes_one_job() {
-    let table = Table::new().await;
+async fn one_idempotency_key_makes_one_job(kind: StoreKind) {
+    let table = Table::new(kind).await;
     let tries = (0..16).map(|_| {
         let store = table.store.clone();
         tokio::spawn(async move {
@@ -40,7 +40,7 @@ async fn one_idempotency_key_makes_one_job() {
         }
     }
     assert_eq!((created, ids.len()), (1, 1));
-    assert_eq!(table.store.queued(None).await.unwrap(), 1);
+    assert_eq!(table.store.stats().await.unwrap().jobs[&State::Queued], 1);
 
     assert_eq!(
         table
@@ -53,7 +53,7 @@ async fn one_idempotency_key_makes_one_job() {
     assert_eq!(
         table
             .store
-            .by_key("anonymous", "k", &[2; 32])
+            .job_by_key("anonymous", "k", &[2; 32])
             .await
             .unwrap(),
         Some(Enqueued::Conflict)
@@ -61,7 +61,7 @@ async fn one_idempotency_key_makes_one_job() {
     assert_eq!(
         table
             .store
-            .by_key("anonymous", "other", &[1; 32])
+            .job_by_key("anonymous", "other", &[1; 32])
             .await
             .unwrap(),
         None
@@ -74,4 +74,8 @@ async fn one_idempotency_key_makes_one_job() {
             .unwrap(),
         Enqueued::Created(_)
     ));
+}
+
+conformance! {
+    one_idempotency_key_makes_one_job,
 }

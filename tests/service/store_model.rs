@@ -1,19 +1,21 @@
 //! Does the job table behave like a plain model of it, whatever is asked in whatever order?
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use bytes::Bytes;
 use proptest::prelude::*;
 use railhead::jobs::State;
-use railhead::jobs::store::sqlite::database::SqliteStore;
+use railhead::jobs::store::Store;
 use railhead::jobs::store::types::QueueBounds;
+use railhead::jobs::store::types::Reap;
 use railhead::jobs::store::types::{
     Claim, Deleted, Ending, NewJob, ReleaseReason, Renewal, StoredResult,
 };
 use railhead::jobs::submit_options::SubmitOptions;
 use uuid::Uuid;
 
-use crate::store::{claim_up_to, finish_one};
+use crate::store::{claim_up_to, finish_one, open_sqlite};
 
 const LEASE: i64 = 10;
 const ATTEMPTS_MAX: u32 = 2;
@@ -57,7 +59,7 @@ fn moves() -> impl Strategy<Value = Move> {
 
 /// The table and its model, side by side.
 struct Pair {
-    store: SqliteStore,
+    store: Arc<dyn Store>,
     rows: BTreeMap<Uuid, Row>,
     ids: Vec<Uuid>,
     claims: Vec<Claim>,
@@ -126,7 +128,7 @@ impl Pair {
     }
 
     async fn claim(&mut self) {
-        let claim = claim_up_to(&self.store, self.now, LEASE, 1).await.pop();
+        let claim = claim_up_to(&*self.store, self.now, LEASE, 1).await.pop();
         let oldest = self
             .rows
             .iter_mut()
@@ -151,7 +153,13 @@ impl Pair {
     async fn reap(&mut self) {
         let mut taken = self
             .store
-            .reap(self.now, self.now, ATTEMPTS_MAX)
+            .reap(
+                Reap::Expired {
+                    lease_until: self.now,
+                },
+                self.now,
+                ATTEMPTS_MAX,
+            )
             .await
             .unwrap();
         taken.sort_unstable();
@@ -192,7 +200,7 @@ impl Pair {
         } else {
             Ending::Cancelled
         };
-        let job = finish_one(&self.store, &claim, &ending, self.now).await;
+        let job = finish_one(&*self.store, &claim, &ending, self.now).await;
         let held = self.held(&claim);
         assert_eq!(job.is_some(), held.is_some());
         if let Some(row) = held {
@@ -224,7 +232,7 @@ impl Pair {
     }
 
     async fn cancel(&mut self, id: Uuid) {
-        let job = self.store.cancel(id, self.now).await.unwrap();
+        let job = self.store.cancel("anonymous", id, self.now).await.unwrap();
         let row = self.rows.get_mut(&id);
         assert_eq!(job.is_some(), row.is_some());
         if let Some(row) = row.filter(|row| !row.state.ended()) {
@@ -241,7 +249,7 @@ impl Pair {
             Some(row) if row.state.ended() => Deleted::Done,
             Some(row) => Deleted::NotEnded(row.state),
         };
-        assert_eq!(self.store.delete(id).await.unwrap(), expected);
+        assert_eq!(self.store.delete("anonymous", id).await.unwrap(), expected);
         if expected == (Deleted::Done) {
             self.rows.remove(&id);
         }
@@ -250,7 +258,7 @@ impl Pair {
     /// The table says of every job what the model says, and the moves seen are allowed ones.
     async fn compare(&self, before: &BTreeMap<Uuid, Row>) {
         for id in &self.ids {
-            let job = self.store.get(*id).await.unwrap();
+            let job = self.store.job("anonymous", *id).await.unwrap();
             let seen = job.map(|job| (job.state, job.attempt));
             assert_eq!(seen, self.rows.get(id).map(|row| (row.state, row.attempt)));
             if let (Some(old), Some(new)) = (before.get(id), self.rows.get(id)) {
@@ -270,7 +278,7 @@ proptest! {
         runtime.block_on(async {
             let folder = tempfile::tempdir().unwrap();
             let mut pair = Pair {
-                store: SqliteStore::open(&folder.path().join("jobs.db")).await.unwrap(),
+                store: open_sqlite(&folder.path().join("jobs.db")).await,
                 rows: BTreeMap::new(),
                 ids: Vec::new(),
                 claims: Vec::new(),

@@ -5,18 +5,22 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use railhead::jobs::codec::result::EncodedResult;
-use railhead::jobs::store::sqlite::database::SqliteStore;
+use railhead::jobs::store::Store;
 use railhead::jobs::store::types::Moment;
+use railhead::jobs::store::types::NewJob;
+use railhead::jobs::store::types::Reap;
 use railhead::jobs::store::types::SliceRecord;
 use railhead::jobs::store::types::{
     Claim, ClaimKind, ClaimRequest, Ending, NewSlice, ReleaseReason, StoredResult,
 };
+use railhead::jobs::submit_options::SubmitOptions;
 use railhead::jobs::{Failure, State};
+use uuid::Uuid;
 
-use crate::store::{Table, claim_up_to, new_job, success};
+use crate::store::{StoreKind, Table, claim_up_to, conformance, finish_one, new_job, success};
 
 /// Claims a job of which some slices are solved.
-async fn claim_begun(store: &SqliteStore, now: i64) -> Option<Claim> {
+async fn claim_begun(store: &dyn Store, now: i64) -> Option<Claim> {
     let request = ClaimRequest {
         worker: "w",
         tenant: "anonymous",
@@ -33,8 +37,8 @@ async fn claim_begun(store: &SqliteStore, now: i64) -> Option<Claim> {
     store.claim(&request).await.unwrap().pop()
 }
 
-/// The file, for what no store would do.
-async fn other_writer(table: &Table) -> sqlx::SqlitePool {
+/// The file, for what no store tells.
+async fn other_connection(table: &Table) -> sqlx::SqlitePool {
     let file = table.folder.path().join("jobs.db");
     sqlx::SqlitePool::connect(&format!("sqlite:{}", file.display()))
         .await
@@ -61,15 +65,16 @@ fn slice(number: u32, key: Option<&str>) -> NewSlice {
     }
 }
 
-#[tokio::test]
-async fn a_stored_slice_is_fenced_and_stored_once_and_begins_the_count_of_attempts_anew() {
-    let table = Table::new().await;
-    let store = &table.store;
+async fn a_stored_slice_is_fenced_and_stored_once_and_begins_the_count_of_attempts_anew(
+    kind: StoreKind,
+) {
+    let table = Table::new(kind).await;
+    let store = &*table.store;
     let id = table.add(new_job()).await.id;
     // Two attempts die alone.
     for _ in 0..2 {
         claim_up_to(store, 0, 1000, 1).await;
-        store.reap_dead(1, 5).await.unwrap();
+        store.reap(Reap::Dead, 1, 5).await.unwrap();
     }
     let old = table.claim(2).await.unwrap();
     assert_eq!((old.attempt, old.slices), (3, 0));
@@ -77,14 +82,14 @@ async fn a_stored_slice_is_fenced_and_stored_once_and_begins_the_count_of_attemp
         assert!(store.add_slice(&old, &slice(0, Some("a"))).await.unwrap());
     }
     assert!(store.add_slice(&old, &slice(1, None)).await.unwrap());
-    let job = store.get(id).await.unwrap().unwrap();
+    let job = store.job("anonymous", id).await.unwrap().unwrap();
     assert_eq!((job.attempt, job.progress), (1, 0.5));
     let why = ReleaseReason::NotBegun;
     store
         .release(std::slice::from_ref(&old), why, 3)
         .await
         .unwrap();
-    let job = store.get(id).await.unwrap().unwrap();
+    let job = store.job("anonymous", id).await.unwrap().unwrap();
     assert_eq!(
         (job.state, job.attempt, job.progress),
         (State::Queued, 0, 0.5)
@@ -97,23 +102,24 @@ async fn a_stored_slice_is_fenced_and_stored_once_and_begins_the_count_of_attemp
     assert!(tenants.is_empty(), "it is no new job");
     let claim = claim_begun(store, 4).await.unwrap();
     assert_eq!((claim.attempt, claim.slices), (1, 2));
-    let notes = store.slice_notes(id).await.unwrap();
+    let notes = store.slices(id).await.unwrap();
     assert_eq!(notes, [slice(0, None).note, slice(1, None).note]);
     // Another solver begins again: what was there from its number on is replaced.
     let mut other = slice(0, Some("b"));
     other.note.digest = "e".to_owned();
     assert!(store.add_slice(&claim, &other).await.unwrap());
-    assert_eq!(store.slice_notes(id).await.unwrap(), [other.note]);
+    assert_eq!(store.slices(id).await.unwrap(), [other.note]);
     assert_eq!(store.released_blobs(&[], 9).await.unwrap(), ["a"]);
     assert_eq!(
-        store.known_blobs(&["a".into(), "b".into()]).await.unwrap(),
-        ["b"]
+        store
+            .orphans(&[(Uuid::now_v7(), "a".into()), (Uuid::now_v7(), "b".into())])
+            .await
+            .unwrap(),
+        ["a"]
     );
 }
 
-#[tokio::test]
-async fn whatever_ends_a_job_releases_its_slices() {
-    let lost = || Ending::Failed(Failure::worker_lost(1));
+async fn whatever_ends_a_job_releases_its_slices(kind: StoreKind) {
     for end in [
         "succeeded",
         "failed",
@@ -122,49 +128,86 @@ async fn whatever_ends_a_job_releases_its_slices() {
         "reaped",
         "late",
     ] {
-        let table = Table::new().await;
-        let store = &table.store;
-        let id = table.add(new_job()).await.id;
-        let claim = table.claim(0).await.unwrap();
-        assert!(store.add_slice(&claim, &slice(0, Some("a"))).await.unwrap());
-        assert!(store.add_slice(&claim, &slice(1, None)).await.unwrap());
-        match end {
-            "succeeded" => drop(table.finish(&claim, &success(), 1).await.unwrap()),
-            "failed" => drop(table.finish(&claim, &lost(), 1).await.unwrap()),
-            "cancelled" => drop(table.finish(&claim, &Ending::Cancelled, 1).await.unwrap()),
-            "cancelled queued" => {
-                store
-                    .release(&[claim], ReleaseReason::NotBegun, 1)
-                    .await
-                    .unwrap();
-                store.cancel(id, 2).await.unwrap();
-            }
-            "reaped" => drop(store.reap_dead(1, 1).await.unwrap()),
-            _ => {
-                store
-                    .release(&[claim], ReleaseReason::NotBegun, 1)
-                    .await
-                    .unwrap();
-                sqlx::query("UPDATE jobs SET deadline = 5")
-                    .execute(&other_writer(&table).await)
-                    .await
-                    .unwrap();
-                let moment = Moment {
-                    now: 6,
-                    set_at: 0,
-                    unset: 6,
-                };
-                let late = store.fail_late(&Failure::worker_lost(1), moment).await;
-                assert_eq!(late.unwrap(), [id]);
-            }
-        }
-        assert!(store.get(id).await.unwrap().unwrap().state.ended(), "{end}");
-        assert!(store.slice_notes(id).await.unwrap().is_empty(), "{end}");
-        assert_eq!(store.released_blobs(&[], 9).await.unwrap(), ["a"], "{end}");
-        let blobs: i64 = sqlx::query_scalar("SELECT COUNT(*) FROM blobs")
-            .fetch_one(&other_writer(&table).await)
-            .await
-            .unwrap();
-        assert_eq!(blobs, i64::from(end == "succeeded"), "{end}");
+        the_end_releases_slices(kind, end).await;
     }
+}
+
+async fn the_end_releases_slices(kind: StoreKind, end: &str) {
+    let table = Table::new(kind).await;
+    let store = &*table.store;
+    let new = NewJob {
+        options: SubmitOptions {
+            ends_within: Some(Duration::from_secs(1)),
+            ..SubmitOptions::default()
+        },
+        ..new_job()
+    };
+    let created_at = new.created_at;
+    let id = table.add(new).await.id;
+    let claim = table.claim(0).await.unwrap();
+    assert!(store.add_slice(&claim, &slice(0, Some("a"))).await.unwrap());
+    assert!(store.add_slice(&claim, &slice(1, None)).await.unwrap());
+    end_it(store, &claim, end, created_at).await;
+    assert!(
+        store
+            .job("anonymous", id)
+            .await
+            .unwrap()
+            .unwrap()
+            .state
+            .ended(),
+        "{end}"
+    );
+    assert!(store.slices(id).await.unwrap().is_empty(), "{end}");
+    assert_eq!(store.released_blobs(&[], 9).await.unwrap(), ["a"], "{end}");
+    match kind {
+        StoreKind::Sqlite => {
+            let blobs: i64 = sqlx::query_scalar("SELECT COUNT(*) FROM blobs")
+                .fetch_one(&other_connection(&table).await)
+                .await
+                .unwrap();
+            assert_eq!(blobs, i64::from(end == "succeeded"), "{end}");
+        }
+    }
+}
+
+/// Ends a claimed job in one of the ways there are.
+async fn end_it(store: &dyn Store, claim: &Claim, end: &str, created_at: i64) {
+    let lost = || Ending::Failed(Failure::worker_lost(1));
+    match end {
+        "succeeded" => drop(finish_one(store, claim, &success(), 1).await.unwrap()),
+        "failed" => drop(finish_one(store, claim, &lost(), 1).await.unwrap()),
+        "cancelled" => drop(
+            finish_one(store, claim, &Ending::Cancelled, 1)
+                .await
+                .unwrap(),
+        ),
+        "cancelled queued" => {
+            store
+                .release(std::slice::from_ref(claim), ReleaseReason::NotBegun, 1)
+                .await
+                .unwrap();
+            store.cancel("anonymous", claim.id, 2).await.unwrap();
+        }
+        "reaped" => drop(store.reap(Reap::Dead, 1, 1).await.unwrap()),
+        _ => {
+            store
+                .release(std::slice::from_ref(claim), ReleaseReason::NotBegun, 1)
+                .await
+                .unwrap();
+            let now = created_at + 2000;
+            let moment = Moment {
+                now,
+                set_at: 0,
+                unset: now,
+            };
+            let late = store.pass_deadlines(&Failure::worker_lost(1), moment).await;
+            assert_eq!(late.unwrap().ended, [claim.id]);
+        }
+    }
+}
+
+conformance! {
+    a_stored_slice_is_fenced_and_stored_once_and_begins_the_count_of_attempts_anew,
+    whatever_ends_a_job_releases_its_slices,
 }

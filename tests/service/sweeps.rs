@@ -9,13 +9,13 @@ use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::{Monitor, Unmonitored};
 use railhead::contact::solution::words::{PatchFields, Solution};
 use railhead::jobs::engine::Engine;
-use railhead::jobs::store::sqlite::database::SqliteStore;
 use railhead::jobs::{FailureKind, Jobs, Options, State};
 use reqwest::Method;
 use serde_json::{Value, json};
 use uuid::Uuid;
 
 use crate::batches::small;
+use crate::store::open_sqlite;
 use crate::support::{Service, long_case, pause};
 
 const AT_MOST: Duration = Duration::from_secs(60);
@@ -210,8 +210,8 @@ async fn the_time_limit_counts_every_slice_and_every_process() {
     jobs.start().unwrap();
     let id = jobs.submit(sweep("held", 11), None).await.unwrap().id;
     until_slices(&jobs, id, 4.0 / 11.0).await;
-    let about = SqliteStore::open(&shop.folder.path().join("jobs.db")).await;
-    let spent = about.unwrap().slice_notes(id).await.unwrap()[1].spent;
+    let about = open_sqlite(&shop.folder.path().join("jobs.db")).await;
+    let spent = about.slices(id).await.unwrap()[1].spent;
     assert!(
         spent > Duration::ZERO && spent < Duration::from_millis(600),
         "{spent:?}"
@@ -314,10 +314,8 @@ async fn a_killed_process_costs_a_sweep_no_more_than_the_slice_it_was_at() {
     service.kill();
 
     // What the dead process did not come to say is in its table.
-    let store = SqliteStore::open(&folder.path().join("jobs.db"))
-        .await
-        .unwrap();
-    let stored = store.slice_notes(id.parse().unwrap()).await.unwrap().len();
+    let store = open_sqlite(&folder.path().join("jobs.db")).await;
+    let stored = store.slices(id.parse().unwrap()).await.unwrap().len();
     store.close().await;
     assert!((2..slices).contains(&stored), "{stored} of {slices}");
 

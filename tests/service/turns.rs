@@ -7,12 +7,14 @@ use std::time::Duration;
 use railhead::contact::case::problem::Problem;
 use railhead::contact::monitor::Monitor;
 use railhead::contact::solve;
+use railhead::jobs::store::types::Reap;
 use railhead::jobs::store::types::{ClaimKind, QueueBounds, ReleaseReason};
 use railhead::jobs::{Jobs, Options, State};
 use serde_json::json;
 
 use crate::batches::small;
-use crate::store::{Table, claim_up_to, new_job, success};
+use crate::store::open_sqlite;
+use crate::store::{StoreKind, Table, claim_up_to, new_job, success};
 use crate::support::{case, open};
 
 const AT_MOST: Duration = Duration::from_secs(60);
@@ -161,16 +163,16 @@ async fn a_waiting_solve_can_be_cancelled_and_is_handed_back_at_the_end() {
 
 #[tokio::test]
 async fn a_bystander_of_a_dead_process_counts_no_attempt() {
-    let table = Table::new().await;
-    let store = &table.store;
+    let table = Table::new(StoreKind::Sqlite).await;
+    let store = &*table.store;
     let ids = [table.add(new_job()).await.id, table.add(new_job()).await.id];
     for _ in 0..2 {
         assert_eq!(claim_up_to(store, 0, 1000, 1).await.len(), 1);
     }
     // Both were being solved: nobody knows which of them it was.
-    assert_eq!(store.reap_dead(1, 1).await.unwrap().len(), 2);
+    assert_eq!(store.reap(Reap::Dead, 1, 1).await.unwrap().len(), 2);
     for id in ids {
-        let job = store.get(id).await.unwrap().unwrap();
+        let job = store.job("anonymous", id).await.unwrap().unwrap();
         assert_eq!((job.state, job.attempt), (State::Queued, 0));
     }
     // Now each comes alone, and is marked when it is solved alone.
@@ -178,16 +180,24 @@ async fn a_bystander_of_a_dead_process_counts_no_attempt() {
     assert_eq!((suspect.len(), suspect[0].suspect), (1, true));
     let waiting = claim_up_to(store, 2, 1000, 8).await;
     store.set_solving(&suspect, true).await.unwrap();
-    let mut taken = store.reap_dead(3, 1).await.unwrap();
+    let mut taken = store.reap(Reap::Dead, 3, 1).await.unwrap();
     taken.sort_unstable();
     assert_eq!(taken, [(ids[0], State::Failed), (ids[1], State::Queued)]);
     assert_eq!(waiting[0].id, ids[1]);
-    assert_eq!(store.get(ids[1]).await.unwrap().unwrap().attempt, 0);
+    assert_eq!(
+        store
+            .job("anonymous", ids[1])
+            .await
+            .unwrap()
+            .unwrap()
+            .attempt,
+        0
+    );
     // One that waited at its gate is no suspect either.
     let other = claim_up_to(store, 4, 1000, 1).await;
     store.set_solving(&other, false).await.unwrap();
     assert_eq!(
-        store.reap_dead(5, 1).await.unwrap(),
+        store.reap(Reap::Dead, 5, 1).await.unwrap(),
         [(ids[1], State::Queued)]
     );
 }
@@ -197,9 +207,7 @@ async fn a_suspect_is_solved_while_nothing_else_is() {
     let shop = shop(|options| options.workers = 3).await;
     let jobs = &shop.jobs;
     let folder = shop._folder.path().join("jobs.db");
-    let store = railhead::jobs::store::sqlite::database::SqliteStore::open(&folder)
-        .await
-        .unwrap();
+    let store = open_sqlite(&folder).await;
     let mut ids = Vec::new();
     for number in 0..3 {
         ids.push(
@@ -210,9 +218,9 @@ async fn a_suspect_is_solved_while_nothing_else_is() {
         );
     }
     for _ in 0..3 {
-        claim_up_to(&store, 0, 1000, 1).await;
+        claim_up_to(&*store, 0, 1000, 1).await;
     }
-    store.reap_dead(1, 5).await.unwrap();
+    store.reap(Reap::Dead, 1, 5).await.unwrap();
     jobs.start().unwrap();
     for id in &ids {
         until_running(jobs, *id).await;
@@ -229,8 +237,8 @@ async fn a_suspect_is_solved_while_nothing_else_is() {
 
 #[tokio::test]
 async fn a_job_that_was_longer_than_thought_is_known_as_long() {
-    let table = Table::new().await;
-    let store = &table.store;
+    let table = Table::new(StoreKind::Sqlite).await;
+    let store = &*table.store;
     let id = table.add(new_job()).await.id;
     let claims = claim_up_to(store, 0, 1000, 1).await;
     let long = ReleaseReason::Long {
@@ -264,9 +272,9 @@ async fn a_job_that_was_longer_than_thought_is_known_as_long() {
     assert_eq!((claims.len(), claims[0].attempt), (1, 1));
     let ends = [(claims[0].clone(), success())];
     assert_eq!(store.finish(&ends, 3).await.unwrap().len(), 1);
-    assert_eq!(store.queued(None).await.unwrap(), 0);
+    assert_eq!(store.stats().await.unwrap().jobs[&State::Queued], 0);
     store.enqueue(&new_job(), QueueBounds::NONE).await.unwrap();
-    assert_eq!(store.queued(Some("anonymous")).await.unwrap(), 1);
+    assert_eq!(store.stats().await.unwrap().jobs[&State::Queued], 1);
 }
 
 #[tokio::test]

@@ -105,6 +105,16 @@ fn outside_libraries_stay_in_their_rooms() {
 }
 
 #[test]
+fn databases_stay_in_the_folders_of_their_stores() {
+    let sources = Sources::below(&["src"]);
+    let found = mentions(&sources, "src/", &["sqlx", "SqlitePool", "SqliteRow"]);
+    let outside = found
+        .into_iter()
+        .filter(|place| !place.starts_with("src/jobs/store/sqlite/"));
+    assert_eq!(outside.collect::<Vec<_>>(), Vec::<String>::new());
+}
+
+#[test]
 fn forbidden_words_are_found_and_comments_are_not_code() {
     let planted = Sources::planted(&[
         (

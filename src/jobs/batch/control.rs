@@ -19,8 +19,8 @@ impl Jobs {
     /// # Errors
     /// [`JobsError::BatchNotFound`], or a failed database.
     pub async fn batch(&self, id: Uuid) -> Result<Batch, JobsError> {
-        let batch = self.shared.store.batch(id).await?;
-        match batch.filter(|batch| *batch.tenant == *self.tenant) {
+        let batch = self.shared.store.batch(&self.tenant, id).await?;
+        match batch {
             Some(batch) => Ok(batch),
             None => Err(self.missing(id, JobsError::BatchNotFound).await),
         }
@@ -36,7 +36,9 @@ impl Jobs {
         loop {
             let now = self.shared.now_ms();
             let store = &self.shared.store;
-            let changed = store.cancel_batch(id, CANCELLED_AT_ONCE, now).await?;
+            let changed = store
+                .cancel_batch(&self.tenant, id, CANCELLED_AT_ONCE, now)
+                .await?;
             for (job, state) in &changed {
                 if state.ended() {
                     self.shared.metrics.ended(*state, 1);
@@ -62,14 +64,14 @@ impl Jobs {
         if ended < all {
             return Err(JobsError::BatchNotEnded(all - ended));
         }
-        loop {
-            let gone = self.shared.store.delete_ended(id, DELETED_AT_ONCE).await?;
+        let store = &self.shared.store;
+        while !store
+            .delete_batch(&self.tenant, id, DELETED_AT_ONCE)
+            .await?
+        {
             self.shared.collect_blobs().await;
-            if gone < u64::from(DELETED_AT_ONCE) {
-                break;
-            }
         }
-        self.shared.store.delete_empty_batch(id).await?;
+        self.shared.collect_blobs().await;
         tracing::info!(batch = %id, jobs = all, "batch deleted");
         Ok(())
     }

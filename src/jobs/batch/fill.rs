@@ -154,7 +154,7 @@ impl Jobs {
                     let traceparent = traceparent.clone();
                     (
                         staged.index,
-                        self.new_job(staged, case, options, traceparent),
+                        self.staged_job(staged, case, options, traceparent),
                     )
                 })
                 .collect();
@@ -162,7 +162,7 @@ impl Jobs {
                 self.find_sources(some.iter_mut().map(|(_, job)| job))
                     .await?;
             }
-            let ended = self.shared.store.enqueue_many(new.id, &some).await?;
+            let ended = self.shared.store.fill_batch(new.id, &some).await?;
             self.shared.ended_cached(&ended);
         }
         self.shared.store.complete_batch(new.id).await?;
@@ -179,7 +179,7 @@ impl Jobs {
         }
     }
 
-    fn new_job(
+    fn staged_job(
         &self,
         staged: StagedCase,
         case: Vec<u8>,

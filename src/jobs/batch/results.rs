@@ -34,7 +34,11 @@ impl Jobs {
         loop {
             // Subscribe first, then look: what ends in between is announced.
             let mut ended = self.shared.ended.subscribe();
-            let mut lines = self.shared.store.batch_items(id, after, limit).await?;
+            let mut lines = self
+                .shared
+                .store
+                .batch_items(&self.tenant, id, after, limit)
+                .await?;
             lines.retain(|line| *line.job.tenant == *self.tenant);
             let waiting = Instant::now() < until && !self.shared.draining.is_cancelled();
             if waiting {

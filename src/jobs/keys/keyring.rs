@@ -69,7 +69,7 @@ impl Keyring {
     /// # Errors
     /// The database failed.
     pub async fn list(&self) -> Result<Vec<Key>, JobsError> {
-        self.store.keys().await
+        Ok(self.store.keys().await?)
     }
 
     /// Revokes a key by its id; `None` if there is none.
@@ -77,7 +77,7 @@ impl Keyring {
     /// # Errors
     /// The database failed.
     pub async fn revoke(&self, id: &str) -> Result<Option<Key>, JobsError> {
-        self.store.revoke_key(id, Clock::system().now_ms()).await
+        Ok(self.store.revoke_key(id, Clock::system().now_ms()).await?)
     }
 
     /// Closes the data folder.

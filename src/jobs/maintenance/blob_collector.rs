@@ -55,15 +55,9 @@ async fn sweep(shared: &Shared) -> Result<usize, JobsError> {
     let mut removed = 0;
     for month in shared.blobs.months().await? {
         for some in shared.blobs.keys(&month).await?.chunks(SWEEP_CHUNK) {
-            let (ids, keys): (Vec<_>, Vec<_>) = some.iter().cloned().unzip();
-            // In this order: what a running job has written is known by its key before the job no longer runs.
-            let running = shared.store.running(&ids).await?;
-            let known = shared.store.known_blobs(&keys).await?;
-            for (id, key) in some {
-                if !running.contains(id) && !known.contains(key) {
-                    shared.blobs.remove(key).await?;
-                    removed += 1;
-                }
+            for key in shared.store.orphans(some).await? {
+                shared.blobs.remove(&key).await?;
+                removed += 1;
             }
         }
     }

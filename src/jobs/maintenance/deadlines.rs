@@ -33,19 +33,20 @@ async fn enforce_deadlines(shared: &Shared) -> Result<(), JobsError> {
         set_at: leap.at,
         unset: now.saturating_sub(leap.ms),
     };
-    let late = shared.store.late(moment).await?;
-    let mut more = late.queued;
-    while more {
-        let ended = shared.store.fail_late(&too_late(), moment).await?;
-        for id in &ended {
+    let failure = too_late();
+    loop {
+        let overdue = shared.store.pass_deadlines(&failure, moment).await?;
+        for id in &overdue.ended {
             tracing::info!(job = %id, "deadline passed, job ended");
             shared.metrics.failed(FailureKind::DeadlinePassed);
             shared.announce(*id);
         }
-        more = !ended.is_empty();
-    }
-    for id in late.running {
-        stop(shared, id);
+        if overdue.ended.is_empty() {
+            for id in overdue.running {
+                stop(shared, id);
+            }
+            break;
+        }
     }
     Ok(())
 }

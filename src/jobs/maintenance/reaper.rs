@@ -5,6 +5,7 @@ use std::sync::atomic::Ordering;
 
 use crate::jobs::model::{FailureKind, State};
 use crate::jobs::shared::{Shared, heartbeat};
+use crate::jobs::store::types::Reap;
 
 /// Takes jobs whose lease has run out from their workers, three times per lease, until the service drains.
 pub(crate) async fn reap_expired(shared: Arc<Shared>) {
@@ -33,9 +34,11 @@ pub(crate) async fn reap_expired(shared: Arc<Shared>) {
         if now < quiet_until {
             continue;
         }
-        let reaped = shared
-            .store
-            .reap(now, shared.now_ms(), shared.options.attempts_max);
+        let reaped = shared.store.reap(
+            Reap::Expired { lease_until: now },
+            shared.now_ms(),
+            shared.options.attempts_max,
+        );
         match reaped.await {
             Ok(taken) => {
                 for (id, state) in taken {

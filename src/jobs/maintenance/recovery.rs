@@ -7,6 +7,7 @@ use std::time::Duration;
 use crate::jobs::error::JobsError;
 use crate::jobs::maintenance::disk_reserve;
 use crate::jobs::shared::Shared;
+use crate::jobs::store::types::Reap;
 
 /// Time between two tries to do what a full disk did not allow.
 const RECOVER_EVERY: Duration = Duration::from_secs(1);
@@ -49,7 +50,11 @@ impl Shared {
             return Ok(());
         }
         let attempts_max = self.options.attempts_max;
-        let taken = self.store.reap_dead(self.now_ms(), attempts_max).await;
+        let taken = self
+            .store
+            .reap(Reap::Dead, self.now_ms(), attempts_max)
+            .await;
+        let taken = taken.map_err(JobsError::from);
         self.observe_storage(&taken);
         for (id, state) in taken? {
             tracing::info!(job = %id, state = state.name(), "job of a dead process taken back");

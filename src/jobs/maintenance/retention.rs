@@ -72,7 +72,7 @@ impl Shared {
             }
         }
         self.collect_blobs().await;
-        while self.store.shrink(SPARE_PAGES, SHRINK_PAGES).await? {
+        while self.store.compact(SPARE_PAGES, SHRINK_PAGES).await? {
             tokio::time::sleep(BREATH).await;
         }
         Ok(removed)

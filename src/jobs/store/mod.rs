@@ -1,5 +1,284 @@
-//! What a job table must promise. One database is one folder here.
+//! What a job table must promise: [`Store`]. One database is one folder here.
+//!
+//! Promises of every call:
+//!
+//! - It is one transaction: if it fails, it changed nothing. What has returned survives the death of the process.
+//! - A call on behalf of a tenant names the tenant in its statement. What belongs to another tenant is treated like what
+//!   does not exist.
+//! - The present is an argument (epoch milliseconds), so that tests need no clock. Leases are measured with a clock of
+//!   their own, which nobody sets.
+//! - A write after a claim names the fencing token of the claim ([`Claim::lease_number`]). Once the job has been given away
+//!   or has ended the write changes nothing and says so. The token only grows, also when an attempt is released
+//!   uncounted.
+//! - States change only as [`State::may_become`] allows.
+//! - Work on many rows comes in portions with a limit, so that other writers are not held up.
+//! - Errors are [`StoreError`], sorted by what the caller can do.
+//!
+//! `tests/service/store*.rs` hold every store to this.
 
+pub mod error;
 pub mod list;
 pub mod sqlite;
 pub mod types;
+
+use std::collections::{HashMap, HashSet};
+use std::fmt::Debug;
+use std::sync::Arc;
+
+use async_trait::async_trait;
+use uuid::Uuid;
+
+use crate::jobs::batch::model::{Batch, BatchItem};
+use crate::jobs::keys::key::Key;
+use crate::jobs::model::{Failure, Job, State};
+use crate::jobs::store::error::StoreError;
+use crate::jobs::store::list::{Filter, Page};
+use crate::jobs::store::types::{
+    BatchBegun, CacheKey, Claim, ClaimRequest, Deleted, Ending, Enqueued, Moment, NewBatch, NewJob,
+    NewSlice, Overdue, QueueAhead, QueueBounds, Reap, Refusal, ReleaseReason, Renewal, ResultRef,
+    RetentionRule, SliceRecord, Stats, StoredCase, StoredResult,
+};
+
+/// A job table, which also keeps API keys.
+#[async_trait]
+pub trait Store: KeyStore + Send + Sync + Debug {
+    // Health.
+
+    /// Makes a round trip; with `write` the round trip writes, although it changes nothing.
+    async fn ready(&self, write: bool) -> Result<(), StoreError>;
+
+    /// Counts and sizes, read from indices alone.
+    async fn stats(&self) -> Result<Stats, StoreError>;
+
+    /// Closes every connection. Later calls fail.
+    async fn close(&self);
+
+    // Submission.
+
+    /// Inserts a job if the bounds leave it a place, or finds the job for which its idempotency key stands. A job with a
+    /// cached result ends at once and needs no place; if its source has gone meanwhile, the job is queued. A caller that
+    /// stops waiting does not stop the call.
+    async fn enqueue(&self, new: &NewJob, bounds: QueueBounds) -> Result<Enqueued, StoreError>;
+
+    /// The job for which an idempotency key of a tenant stands, or the conflict if it stands for another digest.
+    async fn job_by_key(
+        &self,
+        tenant: &str,
+        key: &str,
+        digest: &[u8; 32],
+    ) -> Result<Option<Enqueued>, StoreError>;
+
+    /// Frees an idempotency key of a tenant.
+    async fn forget_key(&self, tenant: &str, key: &str) -> Result<(), StoreError>;
+
+    /// Reserves up to `most` more places in the queue for a batch that is being received; returns how many.
+    async fn reserve(
+        &self,
+        batch: Uuid,
+        tenant: &str,
+        most: u32,
+        bounds: QueueBounds,
+    ) -> Result<Result<u32, Refusal>, StoreError>;
+
+    /// What [`Store::begin_batch`] would answer because of the idempotency key; `None` if the key is free.
+    async fn batch_by_key(
+        &self,
+        new: &NewBatch,
+        living: &HashSet<Uuid>,
+    ) -> Result<Option<BatchBegun>, StoreError>;
+
+    /// Begins to fill a batch, or finds the one for which its idempotency key stands. Afterwards exactly the places of its
+    /// jobs are reserved. A key of an unfinished batch that is not in `living` is free.
+    async fn begin_batch(
+        &self,
+        new: &NewBatch,
+        living: &HashSet<Uuid>,
+        bounds: QueueBounds,
+    ) -> Result<BatchBegun, StoreError>;
+
+    /// Inserts jobs of a batch, with their indices in it, on its reserved places. Returns those that ended at once with a
+    /// cached result.
+    async fn fill_batch(
+        &self,
+        batch: Uuid,
+        jobs: &[(u32, NewJob)],
+    ) -> Result<Vec<Uuid>, StoreError>;
+
+    /// Acknowledges a batch: from now on it is found, and survives the process.
+    async fn complete_batch(&self, batch: Uuid) -> Result<(), StoreError>;
+
+    /// Removes up to `limit` jobs of a batch that was never acknowledged, and the batch after the last of them; `true` once
+    /// nothing is left. The first call frees its places and its key.
+    async fn drop_batch(&self, batch: Uuid, limit: u32) -> Result<bool, StoreError>;
+
+    /// The batches that are not acknowledged.
+    async fn unfinished_batches(&self) -> Result<Vec<Uuid>, StoreError>;
+
+    // Reading.
+
+    /// A job.
+    async fn job(&self, tenant: &str, id: Uuid) -> Result<Option<Job>, StoreError>;
+
+    /// One page of the jobs of a tenant, newest first, from the first job older than `after`. It reads no more rows than it
+    /// returns, up to a constant.
+    async fn list(
+        &self,
+        tenant: &str,
+        filter: &Filter,
+        after: Option<Uuid>,
+        limit: u32,
+    ) -> Result<Page, StoreError>;
+
+    /// An acknowledged batch with its counts.
+    async fn batch(&self, tenant: &str, id: Uuid) -> Result<Option<Batch>, StoreError>;
+
+    /// The jobs of a batch after the job `after`, in the order in which they were sent; small solutions are read with them.
+    async fn batch_items(
+        &self,
+        tenant: &str,
+        id: Uuid,
+        after: Option<Uuid>,
+        limit: u32,
+    ) -> Result<Vec<BatchItem>, StoreError>;
+
+    /// The case of a job as it was submitted.
+    async fn case(&self, tenant: &str, id: Uuid) -> Result<Option<StoredCase>, StoreError>;
+
+    /// A job with its result: a small one itself, a large one by the key of its blob.
+    async fn result(
+        &self,
+        tenant: &str,
+        id: Uuid,
+    ) -> Result<Option<(Job, Option<ResultRef>)>, StoreError>;
+
+    /// For each of these keys that a succeeded job carries, one such job.
+    async fn cached(&self, keys: &[CacheKey]) -> Result<HashMap<CacheKey, Uuid>, StoreError>;
+
+    /// What comes before a queued job among the jobs of its tenant, counted no further than `limit` jobs.
+    async fn queued_before(&self, job: &Job, limit: u32) -> Result<QueueAhead, StoreError>;
+
+    /// Was there a job or a batch of this tenant that has expired?
+    async fn has_expired(&self, tenant: &str, id: Uuid) -> Result<bool, StoreError>;
+
+    // Control.
+
+    /// Cancels a queued job at once, and marks a running one as to be cancelled; an ended one stays as it is. Returns the
+    /// job as it then is.
+    async fn cancel(&self, tenant: &str, id: Uuid, now: i64) -> Result<Option<Job>, StoreError>;
+
+    /// The same for up to `limit` jobs of a batch; returns those that changed.
+    async fn cancel_batch(
+        &self,
+        tenant: &str,
+        id: Uuid,
+        limit: u32,
+        now: i64,
+    ) -> Result<Vec<(Uuid, State)>, StoreError>;
+
+    /// Removes an ended job with all that hangs on it; its blob goes with the last reference to it.
+    async fn delete(&self, tenant: &str, id: Uuid) -> Result<Deleted, StoreError>;
+
+    /// Removes up to `limit` ended jobs of a batch, and the batch with its last job; `true` once no ended job is left.
+    async fn delete_batch(&self, tenant: &str, id: Uuid, limit: u32) -> Result<bool, StoreError>;
+
+    // Workers.
+
+    /// Tenants that have queued jobs.
+    async fn queued_tenants(&self) -> Result<Vec<Arc<str>>, StoreError>;
+
+    /// Claims the first queued job of a tenant, by priority and then by age, together with those behind it that are small
+    /// enough, in their order. A suspect comes alone. No two claims of a job have the same token.
+    async fn claim(&self, request: &ClaimRequest<'_>) -> Result<Vec<Claim>, StoreError>;
+
+    /// The cases of claimed jobs, each with whether its client has cancelled it.
+    async fn claimed_cases(
+        &self,
+        ids: &[Uuid],
+    ) -> Result<HashMap<Uuid, (StoredCase, bool)>, StoreError>;
+
+    /// Extends leases and stores progress; the answers are in the order of the claims.
+    async fn renew(
+        &self,
+        claims: &[(&Claim, f64)],
+        lease_until: i64,
+    ) -> Result<Vec<Renewal>, StoreError>;
+
+    /// Notes that claimed jobs are being solved, or that they wait for their turn; each stands for itself from now on.
+    async fn set_solving(&self, claims: &[Claim], solving: bool) -> Result<(), StoreError>;
+
+    /// Stores a solved slice in place of what there was from its number on; `false` if the lease is lost. Attempts are
+    /// counted from the last slice. The same call again changes nothing.
+    async fn add_slice(&self, claim: &Claim, slice: &NewSlice) -> Result<bool, StoreError>;
+
+    /// The stored slices of a job in their order. Whatever ends a job removes its slices.
+    async fn slices(&self, id: Uuid) -> Result<Vec<SliceRecord>, StoreError>;
+
+    /// The parts of the answer that the slices of a job are, in their order.
+    async fn slice_results(&self, id: Uuid) -> Result<Vec<StoredResult>, StoreError>;
+
+    /// Ends claimed jobs, all in one transaction; returns those that ended. Of the others the lease is lost, or the source
+    /// of their cached result has gone.
+    async fn finish(&self, ends: &[(Claim, Ending)], now: i64)
+    -> Result<HashSet<Uuid>, StoreError>;
+
+    /// Gives claimed jobs back to the queue without counting their attempts; those that the client has cancelled end.
+    /// Returns those that were still held, with their new states.
+    async fn release(
+        &self,
+        claims: &[Claim],
+        why: ReleaseReason,
+        now: i64,
+    ) -> Result<Vec<(Uuid, State)>, StoreError>;
+
+    // Maintenance.
+
+    /// Takes running jobs from their workers: to `cancelled` if the client asked for that, to `failed` if `attempts_max` are
+    /// used up, else back to the queue. An attempt counts only for a job that was solved alone; the others come alone
+    /// next time. Returns them with their new states.
+    async fn reap(
+        &self,
+        which: Reap,
+        now: i64,
+        attempts_max: u32,
+    ) -> Result<Vec<(Uuid, State)>, StoreError>;
+
+    /// Ends some of the queued jobs whose deadline has passed with this failure, and names the running ones. To be called
+    /// again until it ends none.
+    async fn pass_deadlines(
+        &self,
+        failure: &Failure,
+        moment: Moment,
+    ) -> Result<Overdue, StoreError>;
+
+    /// Removes expired jobs and leaves tombstones, removes empty batches of that age, and old tombstones. Returns the number
+    /// of jobs removed.
+    async fn expire(&self, rule: RetentionRule) -> Result<u64, StoreError>;
+
+    /// Keys of large results that nobody refers to any more, at most `limit`; those in `done` are forgotten first.
+    async fn released_blobs(&self, done: &[String], limit: u32) -> Result<Vec<String>, StoreError>;
+
+    /// Leaves a large result that was written and that no job will refer to, to be removed.
+    async fn abandon_blob(&self, key: &str) -> Result<(), StoreError>;
+
+    /// Those of these large results that no job refers to, and whose job is not running and might still do so.
+    async fn orphans(&self, results: &[(Uuid, String)]) -> Result<Vec<String>, StoreError>;
+
+    /// Gives up to `step` free pages back to the file system if there are more than `spare`; says whether it did.
+    async fn compact(&self, spare: i64, step: u32) -> Result<bool, StoreError>;
+}
+
+/// Where API keys are kept.
+#[async_trait]
+pub trait KeyStore: Send + Sync + Debug {
+    /// Stores a key. It fails if there is one with the same id.
+    async fn add_key(&self, key: &Key) -> Result<(), StoreError>;
+
+    /// A key by its id.
+    async fn key(&self, id: &str) -> Result<Option<Key>, StoreError>;
+
+    /// All keys, oldest first, with the revoked ones.
+    async fn keys(&self) -> Result<Vec<Key>, StoreError>;
+
+    /// Revokes a key; `None` if there is none. A key that was revoked before keeps its time.
+    async fn revoke_key(&self, id: &str, now: i64) -> Result<Option<Key>, StoreError>;
+}

@@ -259,6 +259,11 @@ pub enum Ending {
     Failed(Failure),
     /// The client no longer wanted it.
     Cancelled,
+    /// It gets the result of this succeeded job; the attempt does not count.
+    Cached {
+        /// Whose result it gets.
+        source: Uuid,
+    },
 }
 
 impl Ending {
@@ -266,7 +271,7 @@ impl Ending {
     #[must_use]
     pub fn state(&self) -> State {
         match self {
-            Ending::Succeeded { .. } => State::Succeeded,
+            Ending::Succeeded { .. } | Ending::Cached { .. } => State::Succeeded,
             Ending::Failed(_) => State::Failed,
             Ending::Cancelled => State::Cancelled,
         }
@@ -283,8 +288,8 @@ pub enum StoredResult {
 }
 
 impl StoredResult {
-    /// A result that was read from the database.
-    pub(crate) fn read(solution: Vec<u8>, fields: Option<Vec<u8>>) -> StoredResult {
+    /// A small result as the database has it.
+    pub(crate) fn inline(solution: Vec<u8>, fields: Option<Vec<u8>>) -> StoredResult {
         StoredResult::Inline(EncodedResult {
             solution: solution.into(),
             fields: fields.map(Bytes::from),
@@ -301,13 +306,11 @@ impl StoredResult {
     }
 }
 
-/// Where a result lies.
+/// A result with what is needed to show it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ResultRef {
-    /// The job.
-    pub job: Uuid,
-    /// Key of a large result; `None` if it lies in the database.
-    pub key: Option<String>,
+    /// Where it is, or itself.
+    pub result: StoredResult,
     /// Patches with stored fields; 0 if there is no fields object.
     pub field_patches: usize,
     /// The outputs the case asks for, as the JSON list of their names.
@@ -373,4 +376,36 @@ pub struct SliceRecord {
     pub digest: String,
     /// Solver time of the job up to its end.
     pub spent: Duration,
+}
+
+/// Which running jobs are taken from their workers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reap {
+    /// Those whose lease ended at or before this time.
+    Expired {
+        /// By the clock that leases are measured with.
+        lease_until: i64,
+    },
+    /// All of them: the one process that runs jobs of this table has died.
+    Dead,
+}
+
+/// Jobs whose deadline has passed.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Overdue {
+    /// Those that were queued and have been ended.
+    pub ended: Vec<Uuid>,
+    /// Those that are running.
+    pub running: Vec<Uuid>,
+}
+
+/// What comes before a queued job.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct QueueAhead {
+    /// Jobs of its tenant.
+    pub jobs: u64,
+    /// Their expected solve time in µs.
+    pub cost_us: u64,
+    /// Tenants with queued jobs, its own included.
+    pub tenants: usize,
 }

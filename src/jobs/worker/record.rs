@@ -25,7 +25,7 @@ impl Worker {
     ) -> Result<(), JobsError> {
         let claims = attempt.claims(|phase| matches!(phase, Phase::Solving));
         let keys: Vec<_> = claims.iter().filter_map(|claim| claim.cache_key).collect();
-        let sources = self.shared.store.sources(&keys).await?;
+        let sources = self.shared.store.cached(&keys).await?;
         let known = claims.into_iter().filter_map(|claim| {
             let source = *sources.get(&claim.cache_key?)?;
             Some((claim, source))
@@ -45,8 +45,12 @@ impl Worker {
         }
         let shared = &self.shared;
         let from = shared.options.tracer.is_some().then(SystemTime::now);
+        let ends: Vec<_> = pairs
+            .iter()
+            .map(|(claim, source)| (claim.clone(), Ending::Cached { source: *source }))
+            .collect();
         let ended = shared
-            .write_with_retries(|| shared.store.finish_with_sources(&pairs, shared.now_ms()))
+            .write_with_retries(|| shared.store.finish(&ends, shared.now_ms()))
             .await?;
         let ids: Vec<_> = ended.iter().copied().collect();
         shared.metrics.cache_lookup(ids.len() as u64, 0);

@@ -116,7 +116,7 @@ impl Worker {
         let new = members.filter(|member| member.sweep.is_none());
         let ids: Vec<_> = new.map(|member| member.claim.id).collect();
         // Read after registering: a cancellation is either seen here or finds the watch.
-        let mut cases = self.shared.store.cases(&ids).await?;
+        let mut cases = self.shared.store.claimed_cases(&ids).await?;
         let mut work = Vec::with_capacity(places.len());
         for place in places {
             let member = &mut attempt.members[place];
@@ -131,7 +131,7 @@ impl Worker {
                     }
                     let notes = match member.claim.slices {
                         0 => Vec::new(),
-                        _ => self.shared.store.slice_notes(member.claim.id).await?,
+                        _ => self.shared.store.slices(member.claim.id).await?,
                     };
                     work.push((place, Work::New(case, notes)));
                 }
@@ -226,7 +226,12 @@ impl Worker {
         if shared.draining.is_cancelled() {
             return shared.turns.parked().0 > 0;
         }
-        shared.turns.parked().0 > 0 || shared.store.queued(None).await.is_ok_and(|jobs| jobs > 0)
+        shared.turns.parked().0 > 0
+            || shared
+                .store
+                .queued_tenants()
+                .await
+                .is_ok_and(|tenants| !tenants.is_empty())
     }
 
     /// Leaves a thread behind whose solver does not listen. Too many of them end the process, in good order: only that ends

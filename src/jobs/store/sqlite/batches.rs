@@ -9,8 +9,8 @@ use sqlx::{Row, SqliteConnection};
 use uuid::Uuid;
 
 use crate::jobs::batch::model::{Batch, BatchItem, ItemResult};
-use crate::jobs::error::JobsError;
 use crate::jobs::model::{State, created_at};
+use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::blobs::release_blobs;
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::insert::insert_jobs;
@@ -23,7 +23,8 @@ use crate::jobs::store::types::{BatchBegun, NewBatch, NewJob, QueueBounds, Refus
 const CANCEL: &str = "UPDATE jobs SET state = CASE WHEN state = 'queued' THEN 'cancelled' ELSE state END, \
      ended_at = CASE WHEN state = 'queued' THEN $1 ELSE NULL END, \
      cancel_requested = 1, version = version + 1 \
-     WHERE id IN (SELECT id FROM jobs WHERE batch_id = $2 AND ended_at IS NULL AND cancel_requested = 0 LIMIT $3) \
+     WHERE id IN (SELECT id FROM jobs WHERE batch_id = (SELECT id FROM batches WHERE id = $2 AND tenant = $4) \
+     AND ended_at IS NULL AND cancel_requested = 0 LIMIT $3) \
      RETURNING id, state";
 
 impl SqliteStore {
@@ -32,13 +33,13 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed; nothing was stored.
-    pub async fn reserve(
+    pub(crate) async fn reserve(
         &self,
         id: Uuid,
         tenant: &str,
         most: u32,
         bounds: QueueBounds,
-    ) -> Result<Result<u32, Refusal>, JobsError> {
+    ) -> Result<Result<u32, Refusal>, StoreError> {
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         let mut places = Places::new(&mut transaction, bounds);
         let places = match places.take(tenant, u64::from(most)).await? {
@@ -64,11 +65,11 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn batch_by_key(
+    pub(crate) async fn batch_by_key(
         &self,
         new: &NewBatch,
         living: &HashSet<Uuid>,
-    ) -> Result<Option<BatchBegun>, JobsError> {
+    ) -> Result<Option<BatchBegun>, StoreError> {
         let mut connection = self.readers.acquire().await?;
         by_key(&mut connection, new, living).await
     }
@@ -78,12 +79,12 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed; nothing was stored.
-    pub async fn begin_batch(
+    pub(crate) async fn begin_batch(
         &self,
         new: &NewBatch,
         living: &HashSet<Uuid>,
         bounds: QueueBounds,
-    ) -> Result<BatchBegun, JobsError> {
+    ) -> Result<BatchBegun, StoreError> {
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         if let Some(begun) = by_key(&mut transaction, new, living).await? {
             return Ok(begun);
@@ -143,11 +144,11 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed; nothing was stored.
-    pub async fn enqueue_many(
+    pub(crate) async fn fill_batch(
         &self,
         batch: Uuid,
         jobs: &[(u32, NewJob)],
-    ) -> Result<Vec<Uuid>, JobsError> {
+    ) -> Result<Vec<Uuid>, StoreError> {
         let jobs: Vec<_> = jobs
             .iter()
             .map(|(index, job)| (Some(*index), job))
@@ -167,7 +168,7 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn complete_batch(&self, id: Uuid) -> Result<(), JobsError> {
+    pub(crate) async fn complete_batch(&self, id: Uuid) -> Result<(), StoreError> {
         sqlx::query("UPDATE batches SET complete = 1, reserved = 0 WHERE id = $1")
             .bind(id.to_string())
             .execute(&self.writer)
@@ -180,7 +181,7 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed; nothing changed.
-    pub async fn drop_batch(&self, id: Uuid, limit: u32) -> Result<bool, JobsError> {
+    pub(crate) async fn drop_batch(&self, id: Uuid, limit: u32) -> Result<bool, StoreError> {
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         for statement in [
             "UPDATE batches SET reserved = 0 WHERE id = $1 AND complete = 0 AND reserved > 0",
@@ -216,7 +217,7 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn incomplete_batches(&self) -> Result<Vec<Uuid>, JobsError> {
+    pub(crate) async fn unfinished_batches(&self) -> Result<Vec<Uuid>, StoreError> {
         let rows = sqlx::query("SELECT id FROM batches WHERE complete = 0")
             .fetch_all(&self.readers)
             .await?;
@@ -227,11 +228,12 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn batch(&self, id: Uuid) -> Result<Option<Batch>, JobsError> {
+    pub(crate) async fn batch(&self, tenant: &str, id: Uuid) -> Result<Option<Batch>, StoreError> {
         let row = sqlx::query(
-            "SELECT id, tenant, created_at, count, rejected FROM batches WHERE id = $1 AND complete = 1",
+            "SELECT id, tenant, created_at, count, rejected FROM batches WHERE id = $1 AND complete = 1 AND tenant = $2",
         )
         .bind(id.to_string())
+        .bind(tenant)
         .fetch_optional(&self.readers)
         .await?;
         let Some(row) = row else { return Ok(None) };
@@ -261,16 +263,18 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed; nothing changed.
-    pub async fn cancel_batch(
+    pub(crate) async fn cancel_batch(
         &self,
+        tenant: &str,
         id: Uuid,
         limit: u32,
         now: i64,
-    ) -> Result<Vec<(Uuid, State)>, JobsError> {
+    ) -> Result<Vec<(Uuid, State)>, StoreError> {
         let rows = sqlx::query(CANCEL)
             .bind(now)
             .bind(id.to_string())
             .bind(limit)
+            .bind(tenant)
             .fetch_all(&self.writer)
             .await?;
         rows.iter()
@@ -278,59 +282,62 @@ impl SqliteStore {
             .collect()
     }
 
-    /// Removes up to `limit` ended jobs of a batch; returns how many.
-    ///
-    /// # Errors
-    /// The database failed; nothing changed.
-    pub async fn delete_ended(&self, id: Uuid, limit: u32) -> Result<u64, JobsError> {
+    /// Removes up to `limit` ended jobs of a batch, and the batch with its last job; `true` once no ended job is left.
+    pub(crate) async fn delete_batch(
+        &self,
+        tenant: &str,
+        id: Uuid,
+        limit: u32,
+    ) -> Result<bool, StoreError> {
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         let gone = sqlx::query(
-            "DELETE FROM jobs WHERE id IN (SELECT id FROM jobs WHERE batch_id = $1 AND \
+            "DELETE FROM jobs WHERE id IN (SELECT id FROM jobs \
+             WHERE batch_id = (SELECT id FROM batches WHERE id = $1 AND tenant = $3) AND \
              state IN ('succeeded', 'failed', 'cancelled') ORDER BY id LIMIT $2) RETURNING blob_id",
         )
         .bind(id.to_string())
         .bind(limit)
+        .bind(tenant)
         .fetch_all(&mut *transaction)
         .await?;
         release_blobs(&mut transaction, read_blob_ids(&gone)?).await?;
+        let last = gone.len() < limit as usize;
+        if last {
+            sqlx::query(
+                "DELETE FROM batches WHERE id = $1 AND tenant = $2 AND complete = 1 \
+                 AND NOT EXISTS (SELECT 1 FROM jobs WHERE batch_id = $1)",
+            )
+            .bind(id.to_string())
+            .bind(tenant)
+            .execute(&mut *transaction)
+            .await?;
+        }
         transaction.commit().await?;
-        Ok(gone.len() as u64)
-    }
-
-    /// Removes a complete batch that has no job left; says whether it did.
-    ///
-    /// # Errors
-    /// The database failed; nothing changed.
-    pub async fn delete_empty_batch(&self, id: Uuid) -> Result<bool, JobsError> {
-        let gone = sqlx::query(
-            "DELETE FROM batches WHERE id = $1 AND complete = 1 AND NOT EXISTS (SELECT 1 FROM jobs WHERE batch_id = $1)",
-        )
-        .bind(id.to_string())
-        .execute(&self.writer)
-        .await?;
-        Ok(gone.rows_affected() > 0)
+        Ok(last)
     }
 
     /// The next jobs of a batch in the order they were sent, with the solutions that lie in the database.
     ///
     /// # Errors
     /// The database failed.
-    pub async fn batch_items(
+    pub(crate) async fn batch_items(
         &self,
+        tenant: &str,
         id: Uuid,
         after: Option<Uuid>,
         limit: u32,
-    ) -> Result<Vec<BatchItem>, JobsError> {
+    ) -> Result<Vec<BatchItem>, StoreError> {
         let rows = sqlx::query(concat!(
             "SELECT ",
             job_columns!(),
             ", batch_index, outputs, blob_key, solution FROM jobs \
              LEFT JOIN (SELECT id AS blob, key AS blob_key, solution FROM blobs) ON blob = blob_id \
-             WHERE batch_id = $1 AND id > $2 ORDER BY id LIMIT $3"
+             WHERE batch_id = (SELECT id FROM batches WHERE id = $1 AND tenant = $4) AND id > $2 ORDER BY id LIMIT $3"
         ))
         .bind(id.to_string())
         .bind(after.map_or_else(String::new, |id| id.to_string()))
         .bind(limit)
+        .bind(tenant)
         .fetch_all(&self.readers)
         .await?;
         rows.iter()
@@ -352,7 +359,7 @@ async fn by_key(
     connection: &mut SqliteConnection,
     new: &NewBatch,
     living: &HashSet<Uuid>,
-) -> Result<Option<BatchBegun>, JobsError> {
+) -> Result<Option<BatchBegun>, StoreError> {
     let Some((key, digest)) = &new.idempotency else {
         return Ok(None);
     };

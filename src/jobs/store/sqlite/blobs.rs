@@ -4,9 +4,13 @@
 //! blob ends: it is called in every transaction that drops references. Only the slices of sweeps have blobs of their own, which
 //! nobody else refers to; triggers of the table remove them in the transaction in which their job ends.
 
+use crate::jobs::store::sqlite::rows::push_list;
+use crate::jobs::store::sqlite::rows::read_id;
 use sqlx::{QueryBuilder, Row, Sqlite, SqliteConnection};
+use std::collections::HashSet;
+use uuid::Uuid;
 
-use crate::jobs::error::JobsError;
+use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::types::StoredResult;
 
@@ -17,7 +21,7 @@ const VALUES_PER_STATEMENT: usize = 250;
 pub(crate) async fn insert_blobs(
     connection: &mut SqliteConnection,
     results: &[&StoredResult],
-) -> Result<Vec<i64>, JobsError> {
+) -> Result<Vec<i64>, StoreError> {
     if results.is_empty() {
         return Ok(Vec::new());
     }
@@ -54,7 +58,7 @@ pub(crate) async fn insert_blobs(
 pub(crate) async fn release_blobs(
     connection: &mut SqliteConnection,
     mut ids: Vec<i64>,
-) -> Result<(), JobsError> {
+) -> Result<(), StoreError> {
     ids.sort_unstable();
     ids.dedup();
     for some in ids.chunks(VALUES_PER_STATEMENT) {
@@ -80,7 +84,7 @@ pub(crate) async fn release_blobs(
 async fn leave_to_collector(
     connection: &mut SqliteConnection,
     keys: &[String],
-) -> Result<(), JobsError> {
+) -> Result<(), StoreError> {
     for some in keys.chunks(VALUES_PER_STATEMENT) {
         let mut leave = QueryBuilder::<Sqlite>::new("INSERT INTO blob_outbox (key) ");
         leave.push_values(some, |mut row, key| {
@@ -97,11 +101,11 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed; nothing changed.
-    pub async fn released_blobs(
+    pub(crate) async fn released_blobs(
         &self,
         done: &[String],
         limit: u32,
-    ) -> Result<Vec<String>, JobsError> {
+    ) -> Result<Vec<String>, StoreError> {
         for some in done.chunks(VALUES_PER_STATEMENT) {
             let mut forget = QueryBuilder::<Sqlite>::new("DELETE FROM blob_outbox WHERE key IN (");
             push_keys(&mut forget, some);
@@ -118,27 +122,47 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed; the sweep at the next start will find the result.
-    pub async fn abandon_blob(&self, key: &str) -> Result<(), JobsError> {
+    pub(crate) async fn abandon_blob(&self, key: &str) -> Result<(), StoreError> {
         let mut connection = self.writer.acquire().await?;
         leave_to_collector(&mut connection, &[key.to_owned()]).await
     }
+}
 
-    /// Those of these keys that a blob has.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub async fn known_blobs(&self, keys: &[String]) -> Result<Vec<String>, JobsError> {
-        let mut known = Vec::new();
-        for some in keys.chunks(VALUES_PER_STATEMENT) {
+impl SqliteStore {
+    /// Those of these large results that no job refers to, and whose job is not running.
+    pub(crate) async fn orphans(
+        &self,
+        results: &[(Uuid, String)],
+    ) -> Result<Vec<String>, StoreError> {
+        let mut orphans = Vec::new();
+        for some in results.chunks(VALUES_PER_STATEMENT) {
+            // In this order: what a running job has written is known by its key before the job no longer runs.
+            let running = self.running(some).await?;
             let mut look = QueryBuilder::<Sqlite>::new("SELECT key FROM blobs WHERE key IN (");
-            push_keys(&mut look, some);
-            known.extend(
-                look.build_query_scalar::<String>()
-                    .fetch_all(&self.readers)
-                    .await?,
-            );
+            let keys: Vec<String> = some.iter().map(|(_, key)| key.clone()).collect();
+            push_keys(&mut look, &keys);
+            let known: HashSet<String> = look
+                .build_query_scalar::<String>()
+                .fetch_all(&self.readers)
+                .await?
+                .into_iter()
+                .collect();
+            let orphaned = some
+                .iter()
+                .filter(|(id, key)| !running.contains(id) && !known.contains(key));
+            orphans.extend(orphaned.map(|(_, key)| key.clone()));
         }
-        Ok(known)
+        Ok(orphans)
+    }
+
+    async fn running(&self, results: &[(Uuid, String)]) -> Result<HashSet<Uuid>, StoreError> {
+        let mut query =
+            QueryBuilder::<Sqlite>::new("SELECT id FROM jobs WHERE state = 'running' AND id IN (");
+        let ids: Vec<Uuid> = results.iter().map(|(id, _)| *id).collect();
+        push_list(&mut query, &ids);
+        query.push(")");
+        let rows = query.build().fetch_all(&self.readers).await?;
+        rows.iter().map(read_id).collect()
     }
 }
 

@@ -5,7 +5,7 @@
 use sqlx::{QueryBuilder, Sqlite, SqliteConnection};
 use uuid::Uuid;
 
-use crate::jobs::error::JobsError;
+use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::rows::read_id;
 use crate::jobs::store::types::NewJob;
 
@@ -18,7 +18,7 @@ pub(crate) const SOURCE: &str =
 pub(crate) async fn end_with_sources(
     connection: &mut SqliteConnection,
     jobs: impl Iterator<Item = &NewJob>,
-) -> Result<Vec<Uuid>, JobsError> {
+) -> Result<Vec<Uuid>, StoreError> {
     let pairs: Vec<_> = jobs
         .filter_map(|job| {
             let (source, at) = job.source?;
@@ -46,7 +46,7 @@ pub(crate) struct Pair {
 pub(crate) async fn end_pairs(
     connection: &mut SqliteConnection,
     pairs: &[Pair],
-) -> Result<Vec<Uuid>, JobsError> {
+) -> Result<Vec<Uuid>, StoreError> {
     if pairs.is_empty() {
         return Ok(Vec::new());
     }

@@ -7,7 +7,7 @@ use sqlx::sqlite::SqliteRow;
 use sqlx::{AssertSqlSafe, QueryBuilder, Row, Sqlite};
 use uuid::Uuid;
 
-use crate::jobs::error::JobsError;
+use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::{push_list, read_cache_key, read_count, read_id};
 use crate::jobs::store::types::{Claim, ClaimKind, ClaimRequest};
@@ -35,7 +35,7 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn queued_tenants(&self) -> Result<Vec<Arc<str>>, JobsError> {
+    pub(crate) async fn queued_tenants(&self) -> Result<Vec<Arc<str>>, StoreError> {
         let rows = sqlx::query(QUEUED_TENANTS).fetch_all(&self.readers).await?;
         rows.iter()
             .map(|row| Ok(row.try_get::<String, _>("tenant")?.into()))
@@ -47,7 +47,7 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed; nothing changed.
-    pub async fn claim(&self, request: &ClaimRequest<'_>) -> Result<Vec<Claim>, JobsError> {
+    pub(crate) async fn claim(&self, request: &ClaimRequest<'_>) -> Result<Vec<Claim>, StoreError> {
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         let (peek, at_most) = match request.kind {
             ClaimKind::New => (PEEK, PEEK_JOBS),
@@ -107,7 +107,7 @@ fn choose(
     queued: &[SqliteRow],
     waiting: usize,
     request: &ClaimRequest<'_>,
-) -> Result<Vec<Uuid>, JobsError> {
+) -> Result<Vec<Uuid>, StoreError> {
     let share = waiting
         .max(queued.len())
         .div_ceil(request.workers.max(1))
@@ -129,7 +129,7 @@ fn choose(
     Ok(ids)
 }
 
-fn read_claim(row: &SqliteRow) -> Result<Claim, JobsError> {
+fn read_claim(row: &SqliteRow) -> Result<Claim, StoreError> {
     Ok(Claim {
         id: read_id(row)?,
         attempt: row.try_get("attempt")?,

@@ -16,6 +16,7 @@ use sqlx::sqlite::{
 use sqlx::{Connection, SqliteConnection};
 
 use crate::jobs::error::JobsError;
+use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::group_commit::GroupCommit;
 use crate::jobs::store::sqlite::schema::{make_or_require, mark, require};
 
@@ -114,17 +115,6 @@ impl SqliteStore {
         }
     }
 
-    /// A round trip to the database.
-    ///
-    /// # Errors
-    /// The database does not answer.
-    pub async fn ping(&self) -> Result<(), JobsError> {
-        sqlx::query("SELECT 1 FROM jobs LIMIT 1")
-            .fetch_optional(&self.readers)
-            .await?;
-        Ok(())
-    }
-
     /// Writes a copy of the database, as it is at one moment, to a new file that nobody else may read.
     ///
     /// # Errors
@@ -138,12 +128,15 @@ impl SqliteStore {
         Ok(())
     }
 
-    /// Writes a page that is as it was.
-    ///
-    /// # Errors
-    /// The database cannot be written.
-    pub async fn touch(&self) -> Result<(), JobsError> {
-        mark(&self.writer).await
+    /// A round trip; with `write` it writes a page that stays as it was.
+    pub(crate) async fn ready(&self, write: bool) -> Result<(), StoreError> {
+        if write {
+            return Ok(mark(&self.writer).await?);
+        }
+        sqlx::query("SELECT 1 FROM jobs LIMIT 1")
+            .fetch_optional(&self.readers)
+            .await?;
+        Ok(())
     }
 }
 

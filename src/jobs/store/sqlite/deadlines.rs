@@ -1,9 +1,10 @@
 //! Jobs of the embedded table whose deadline has passed.
 
+use crate::jobs::store::types::Overdue;
 use uuid::Uuid;
 
-use crate::jobs::error::JobsError;
 use crate::jobs::model::{Failure, State};
+use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::{read_id, read_state, to_json};
 use crate::jobs::store::types::Moment;
@@ -19,46 +20,34 @@ const FAIL_LATE: &str = "UPDATE jobs SET state = 'failed', failure = $4, ended_a
 /// Jobs ended in one transaction.
 const AT_ONCE: i64 = 1000;
 
-/// Jobs whose deadline has passed.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Overdue {
-    /// There are queued ones.
-    pub queued: bool,
-    /// The running ones.
-    pub running: Vec<Uuid>,
-}
-
 impl SqliteStore {
-    /// The jobs that have not ended at their deadline.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub async fn late(&self, moment: Moment) -> Result<Overdue, JobsError> {
+    /// Ends some of the queued jobs whose deadline has passed with this failure, and names the running ones.
+    pub(crate) async fn pass_deadlines(
+        &self,
+        failure: &Failure,
+        moment: Moment,
+    ) -> Result<Overdue, StoreError> {
+        // Hardly ever is one late, and reading holds nobody up.
         let rows = sqlx::query(LATE)
             .bind(moment.now)
             .bind(moment.set_at)
             .bind(moment.unset)
             .fetch_all(&self.readers)
             .await?;
-        let mut late = Overdue::default();
+        let (mut queued, mut overdue) = (false, Overdue::default());
         for row in &rows {
             match read_state(row)? {
-                State::Queued => late.queued = true,
-                _ => late.running.push(read_id(row)?),
+                State::Queued => queued = true,
+                _ => overdue.running.push(read_id(row)?),
             }
         }
-        Ok(late)
+        if queued {
+            overdue.ended = self.fail_late(failure, moment).await?;
+        }
+        Ok(overdue)
     }
 
-    /// Ends some of the queued ones among them with this failure; returns them, and none once there are no more.
-    ///
-    /// # Errors
-    /// The database failed; nothing changed.
-    pub async fn fail_late(
-        &self,
-        failure: &Failure,
-        moment: Moment,
-    ) -> Result<Vec<Uuid>, JobsError> {
+    async fn fail_late(&self, failure: &Failure, moment: Moment) -> Result<Vec<Uuid>, StoreError> {
         let rows = sqlx::query(FAIL_LATE)
             .bind(moment.now)
             .bind(moment.set_at)

@@ -2,7 +2,7 @@
 
 use tokio::sync::oneshot;
 
-use crate::jobs::error::JobsError;
+use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::group_commit::{Submission, by_key};
 use crate::jobs::store::types::{Enqueued, NewJob, QueueBounds};
@@ -13,8 +13,12 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed; nothing was stored.
-    pub async fn enqueue(&self, new: &NewJob, bounds: QueueBounds) -> Result<Enqueued, JobsError> {
-        let gone = || JobsError::Database(sqlx::Error::WorkerCrashed);
+    pub(crate) async fn enqueue(
+        &self,
+        new: &NewJob,
+        bounds: QueueBounds,
+    ) -> Result<Enqueued, StoreError> {
+        let gone = || StoreError::from(sqlx::Error::WorkerCrashed);
         let (reply, answer) = oneshot::channel();
         let waiting = Submission {
             new: new.clone(),
@@ -33,7 +37,7 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed; nothing changed.
-    pub async fn forget_key(&self, tenant: &str, key: &str) -> Result<(), JobsError> {
+    pub(crate) async fn forget_key(&self, tenant: &str, key: &str) -> Result<(), StoreError> {
         sqlx::query("DELETE FROM idempotency_keys WHERE of_tenant = $1 AND key = $2")
             .bind(tenant)
             .bind(key)
@@ -46,12 +50,12 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn by_key(
+    pub(crate) async fn job_by_key(
         &self,
         tenant: &str,
         key: &str,
         digest: &[u8; 32],
-    ) -> Result<Option<Enqueued>, JobsError> {
+    ) -> Result<Option<Enqueued>, StoreError> {
         let mut connection = self.readers.acquire().await?;
         by_key(&mut connection, tenant, key, digest).await
     }

@@ -3,7 +3,7 @@
 use sqlx::{QueryBuilder, Sqlite};
 use uuid::Uuid;
 
-use crate::jobs::error::JobsError;
+use crate::jobs::store::error::StoreError;
 use crate::jobs::store::list::first_id_at;
 use crate::jobs::store::sqlite::blobs::release_blobs;
 use crate::jobs::store::sqlite::database::SqliteStore;
@@ -20,7 +20,7 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed; nothing changed.
-    pub async fn expire(&self, expiry: RetentionRule) -> Result<u64, JobsError> {
+    pub(crate) async fn expire(&self, expiry: RetentionRule) -> Result<u64, StoreError> {
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         let young = first_id_at(expiry.ended_before.saturating_add(1)).to_string();
         let rows = sqlx::query(EXPIRED)
@@ -75,7 +75,7 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn has_expired(&self, id: Uuid, tenant: &str) -> Result<bool, JobsError> {
+    pub(crate) async fn has_expired(&self, tenant: &str, id: Uuid) -> Result<bool, StoreError> {
         let found = sqlx::query("SELECT 1 FROM tombstones WHERE id = $1 AND tenant = $2")
             .bind(id.to_string())
             .bind(tenant)
@@ -88,7 +88,7 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn shrink(&self, spare: i64, step: u32) -> Result<bool, JobsError> {
+    pub(crate) async fn compact(&self, spare: i64, step: u32) -> Result<bool, StoreError> {
         let free: i64 = sqlx::query_scalar("PRAGMA freelist_count")
             .fetch_one(&self.readers)
             .await?;

@@ -6,14 +6,15 @@ use crate::jobs::store::sqlite::cached::end_pairs;
 use crate::jobs::store::sqlite::rows::read_cache_key;
 use crate::jobs::store::types::CacheKey;
 use sqlx::Row;
+use sqlx::SqliteConnection;
 use std::collections::HashMap;
 use std::collections::HashSet;
 
 use sqlx::{QueryBuilder, Sqlite};
 use uuid::Uuid;
 
-use crate::jobs::error::JobsError;
 use crate::jobs::model::State;
+use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::blobs::{insert_blobs, release_blobs};
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::fence;
@@ -26,55 +27,34 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed; nothing changed.
-    pub async fn finish(
+    pub(crate) async fn finish(
         &self,
         ends: &[(Claim, Ending)],
         now: i64,
-    ) -> Result<HashSet<Uuid>, JobsError> {
+    ) -> Result<HashSet<Uuid>, StoreError> {
         if ends.is_empty() {
             return Ok(HashSet::new());
         }
+        let pairs: Vec<Pair> = ends
+            .iter()
+            .filter_map(|(claim, ending)| match ending {
+                Ending::Cached { source } => Some(Pair {
+                    job: claim.id,
+                    source: *source,
+                    at: now,
+                    lease_number: Some(fence(claim)),
+                }),
+                _ => None,
+            })
+            .collect();
         let rows = ends
             .iter()
+            .filter(|(_, ending)| !matches!(ending, Ending::Cached { .. }))
             .map(|(claim, ending)| Ok((claim, EndRow::of(ending)?)))
-            .collect::<Result<Vec<_>, JobsError>>()?;
+            .collect::<Result<Vec<_>, StoreError>>()?;
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
-        let results: Vec<_> = rows.iter().filter_map(|(_, end)| end.result).collect();
-        let mut blobs = insert_blobs(&mut transaction, &results).await?.into_iter();
-        let mut update = QueryBuilder::<Sqlite>::new(
-            "WITH done (id, lease_number, state, remarks, failure, blob, patches) AS (",
-        );
-        let mut inserted = Vec::with_capacity(results.len());
-        update.push_values(&rows, |mut row, (claim, end)| {
-            let blob = end.result.and_then(|_| blobs.next());
-            inserted.extend(blob);
-            row.push_bind(claim.id.to_string())
-                .push_bind(fence(claim))
-                .push_bind(end.state.name())
-                .push_bind(&end.remarks)
-                .push_bind(&end.failure)
-                .push_bind(blob)
-                .push_bind(end.field_patches);
-        });
-        update.push(") UPDATE jobs SET state = done.state, ended_at = ");
-        update.push_bind(now);
-        update.push(
-            ", remarks = done.remarks, failure = done.failure, blob_id = done.blob, \
-             field_patches = done.patches, \
-             progress = CASE WHEN done.state = 'succeeded' THEN 1.0 ELSE progress END, \
-             lease_until = NULL, worker = NULL, solving = 0, version = version + 1 \
-             FROM done WHERE jobs.id = done.id AND jobs.lease_number = done.lease_number \
-             AND jobs.state = 'running' RETURNING id",
-        );
-        let ended = update.build().fetch_all(&mut *transaction).await?;
-        let ended = ended
-            .iter()
-            .map(read_id)
-            .collect::<Result<HashSet<_>, _>>()?;
-        if ended.len() < rows.len() {
-            // The results of those whose lease was lost have no owner.
-            release_blobs(&mut transaction, inserted).await?;
-        }
+        let mut ended = end_solved(&mut transaction, &rows, now).await?;
+        ended.extend(end_pairs(&mut transaction, &pairs).await?);
         transaction.commit().await?;
         Ok(ended)
     }
@@ -85,7 +65,10 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn sources(&self, keys: &[CacheKey]) -> Result<HashMap<CacheKey, Uuid>, JobsError> {
+    pub(crate) async fn cached(
+        &self,
+        keys: &[CacheKey],
+    ) -> Result<HashMap<CacheKey, Uuid>, StoreError> {
         if keys.is_empty() {
             return Ok(HashMap::new());
         }
@@ -106,31 +89,54 @@ impl SqliteStore {
         }
         Ok(sources)
     }
+}
 
-    /// Ends claimed jobs with the results of their sources, as long as their leases are held. Returns those that ended; the
-    /// source of another is gone, or its lease is lost.
-    ///
-    /// # Errors
-    /// The database failed; nothing changed.
-    pub async fn finish_with_sources(
-        &self,
-        pairs: &[(Claim, Uuid)],
-        now: i64,
-    ) -> Result<HashSet<Uuid>, JobsError> {
-        let pairs: Vec<_> = pairs
-            .iter()
-            .map(|(claim, source)| Pair {
-                job: claim.id,
-                source: *source,
-                at: now,
-                lease_number: Some(fence(claim)),
-            })
-            .collect();
-        let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
-        let ended = end_pairs(&mut transaction, &pairs).await?;
-        transaction.commit().await?;
-        Ok(ended.into_iter().collect())
+/// Ends jobs with what their solves gave, as long as their leases are held; returns them.
+async fn end_solved(
+    connection: &mut SqliteConnection,
+    rows: &[(&Claim, EndRow<'_>)],
+    now: i64,
+) -> Result<HashSet<Uuid>, StoreError> {
+    if rows.is_empty() {
+        return Ok(HashSet::new());
     }
+    let results: Vec<_> = rows.iter().filter_map(|(_, end)| end.result).collect();
+    let mut blobs = insert_blobs(connection, &results).await?.into_iter();
+    let mut update = QueryBuilder::<Sqlite>::new(
+        "WITH done (id, lease_number, state, remarks, failure, blob, patches) AS (",
+    );
+    let mut inserted = Vec::with_capacity(results.len());
+    update.push_values(rows, |mut row, (claim, end)| {
+        let blob = end.result.and_then(|_| blobs.next());
+        inserted.extend(blob);
+        row.push_bind(claim.id.to_string())
+            .push_bind(fence(claim))
+            .push_bind(end.state.name())
+            .push_bind(&end.remarks)
+            .push_bind(&end.failure)
+            .push_bind(blob)
+            .push_bind(end.field_patches);
+    });
+    update.push(") UPDATE jobs SET state = done.state, ended_at = ");
+    update.push_bind(now);
+    update.push(
+        ", remarks = done.remarks, failure = done.failure, blob_id = done.blob, \
+         field_patches = done.patches, \
+         progress = CASE WHEN done.state = 'succeeded' THEN 1.0 ELSE progress END, \
+         lease_until = NULL, worker = NULL, solving = 0, version = version + 1 \
+         FROM done WHERE jobs.id = done.id AND jobs.lease_number = done.lease_number \
+         AND jobs.state = 'running' RETURNING id",
+    );
+    let ended = update.build().fetch_all(&mut *connection).await?;
+    let ended = ended
+        .iter()
+        .map(read_id)
+        .collect::<Result<HashSet<_>, _>>()?;
+    if ended.len() < rows.len() {
+        // The results of those whose lease was lost have no owner.
+        release_blobs(connection, inserted).await?;
+    }
+    Ok(ended)
 }
 
 /// The end of a job in the form the database takes.
@@ -143,7 +149,7 @@ pub(crate) struct EndRow<'a> {
 }
 
 impl EndRow<'_> {
-    pub(crate) fn of(ending: &Ending) -> Result<EndRow<'_>, JobsError> {
+    pub(crate) fn of(ending: &Ending) -> Result<EndRow<'_>, StoreError> {
         let mut row = EndRow {
             state: State::Cancelled,
             remarks: "[]".to_owned(),
@@ -166,7 +172,8 @@ impl EndRow<'_> {
                 row.state = State::Failed;
                 row.failure = Some(to_json(failure)?);
             }
-            Ending::Cancelled => {}
+            // The latter is written elsewhere.
+            Ending::Cancelled | Ending::Cached { .. } => {}
         }
         Ok(row)
     }

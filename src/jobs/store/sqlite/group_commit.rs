@@ -2,15 +2,13 @@
 //! which takes longer than everything else about them.
 
 use std::collections::{HashMap, HashSet};
-use std::sync::Arc;
 
 use sqlx::sqlite::SqlitePool;
 use sqlx::{Row, SqliteConnection};
 use tokio::sync::{mpsc, oneshot};
-use uuid::Uuid;
 
-use crate::jobs::error::JobsError;
 use crate::jobs::model::{Job, State};
+use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::insert::insert_jobs;
 use crate::jobs::store::sqlite::quota::{Places, with_living_source};
 use crate::jobs::store::sqlite::rows::GET;
@@ -32,7 +30,7 @@ pub(crate) const BY_KEY: &str = concat!(
 pub(crate) struct Submission {
     pub(crate) new: NewJob,
     pub(crate) bounds: QueueBounds,
-    pub(crate) reply: oneshot::Sender<Result<Enqueued, JobsError>>,
+    pub(crate) reply: oneshot::Sender<Result<Enqueued, StoreError>>,
 }
 
 /// The way to the task that stores jobs; it ends with the last of these.
@@ -88,9 +86,8 @@ async fn store_some(writer: &SqlitePool, group: Vec<Submission>) {
         }
         // What is wrong with the disk is wrong for all of them.
         Err(error) if alone || error.storage_fault().is_some() => {
-            let error = Arc::new(error);
             for waiting in group {
-                let _ = waiting.reply.send(Err(JobsError::Together(error.clone())));
+                let _ = waiting.reply.send(Err(error.clone()));
             }
         }
         Err(_) => {
@@ -108,7 +105,7 @@ async fn store_together(
     writer: &SqlitePool,
     jobs: &[&NewJob],
     bounds: QueueBounds,
-) -> Result<Vec<Enqueued>, JobsError> {
+) -> Result<Vec<Enqueued>, StoreError> {
     let mut transaction = writer.begin_with("BEGIN IMMEDIATE").await?;
     let mut known = HashMap::new();
     for job in jobs {
@@ -145,7 +142,7 @@ async fn store_together(
             .await?;
         }
         let as_it_is = if ended.contains(&job.id) {
-            read_back(&mut transaction, job.id).await?
+            read_back(&mut transaction, job).await?
         } else {
             queued(job)
         };
@@ -157,8 +154,8 @@ async fn store_together(
         .collect()
 }
 
-fn lost() -> JobsError {
-    JobsError::Damaged("a job was stored and not answered".to_owned())
+fn lost() -> StoreError {
+    StoreError::Corrupt("a job was stored and not answered".to_owned())
 }
 
 /// What an idempotency key of a tenant stands for, if it was used.
@@ -167,7 +164,7 @@ pub(crate) async fn by_key(
     tenant: &str,
     key: &str,
     digest: &[u8; 32],
-) -> Result<Option<Enqueued>, JobsError> {
+) -> Result<Option<Enqueued>, StoreError> {
     let row = sqlx::query(BY_KEY)
         .bind(tenant)
         .bind(key)
@@ -182,9 +179,10 @@ pub(crate) async fn by_key(
     }))
 }
 
-async fn read_back(connection: &mut SqliteConnection, id: Uuid) -> Result<Job, JobsError> {
+async fn read_back(connection: &mut SqliteConnection, job: &NewJob) -> Result<Job, StoreError> {
     let row = sqlx::query(GET)
-        .bind(id.to_string())
+        .bind(job.id.to_string())
+        .bind(&*job.tenant)
         .fetch_one(connection)
         .await?;
     read_job(&row)

@@ -3,7 +3,7 @@
 use sqlx::{QueryBuilder, Sqlite, SqliteConnection};
 use uuid::Uuid;
 
-use crate::jobs::error::JobsError;
+use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::cached::end_with_sources;
 use crate::jobs::store::sqlite::rows::to_json;
 use crate::jobs::store::types::{CacheKey, NewJob};
@@ -17,7 +17,7 @@ pub(crate) async fn insert_jobs(
     connection: &mut SqliteConnection,
     batch: Option<Uuid>,
     jobs: &[(Option<u32>, &NewJob)],
-) -> Result<Vec<Uuid>, JobsError> {
+) -> Result<Vec<Uuid>, StoreError> {
     let mut ended = Vec::new();
     let batch = batch.map(|id| id.to_string());
     for some in jobs.chunks(ROWS_PER_STATEMENT) {

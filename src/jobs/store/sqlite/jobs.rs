@@ -1,13 +1,16 @@
 //! What clients ask of one job.
 
 use crate::jobs::store::sqlite::rows::GET;
+use crate::jobs::store::sqlite::rows::read_count;
+use crate::jobs::store::types::StoredCase;
+use crate::jobs::store::types::StoredResult;
+use bytes::Bytes;
 
 use sqlx::Row;
 use uuid::Uuid;
 
-use crate::jobs::codec::result::EncodedResult;
-use crate::jobs::error::JobsError;
 use crate::jobs::model::Job;
+use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::blobs::release_blobs;
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::{job_columns, read_blob_id, read_job};
@@ -19,21 +22,27 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed; nothing changed.
-    pub async fn cancel(&self, id: Uuid, now: i64) -> Result<Option<Job>, JobsError> {
+    pub(crate) async fn cancel(
+        &self,
+        tenant: &str,
+        id: Uuid,
+        now: i64,
+    ) -> Result<Option<Job>, StoreError> {
         let row = sqlx::query(concat!(
             "UPDATE jobs SET state = CASE WHEN state = 'queued' THEN 'cancelled' ELSE state END, \
              ended_at = CASE WHEN state = 'queued' THEN $1 ELSE NULL END, \
              cancel_requested = 1, version = version + 1 \
-             WHERE id = $2 AND cancel_requested = 0 AND state IN ('queued', 'running') RETURNING ",
+             WHERE id = $2 AND tenant = $3 AND cancel_requested = 0 AND state IN ('queued', 'running') RETURNING ",
             job_columns!()
         ))
         .bind(now)
         .bind(id.to_string())
+        .bind(tenant)
         .fetch_optional(&self.writer)
         .await?;
         match row {
             Some(row) => read_job(&row).map(Some),
-            None => self.get(id).await,
+            None => self.job(tenant, id).await,
         }
     }
 
@@ -41,12 +50,13 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed; nothing changed.
-    pub async fn delete(&self, id: Uuid) -> Result<Deleted, JobsError> {
+    pub(crate) async fn delete(&self, tenant: &str, id: Uuid) -> Result<Deleted, StoreError> {
         let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         let gone = sqlx::query(
-            "DELETE FROM jobs WHERE id = $1 AND state IN ('succeeded', 'failed', 'cancelled') RETURNING blob_id",
+            "DELETE FROM jobs WHERE id = $1 AND tenant = $2 AND state IN ('succeeded', 'failed', 'cancelled') RETURNING blob_id",
         )
         .bind(id.to_string())
+        .bind(tenant)
         .fetch_optional(&mut *transaction)
         .await?;
         if let Some(row) = gone {
@@ -55,7 +65,7 @@ impl SqliteStore {
             return Ok(Deleted::Done);
         }
         drop(transaction);
-        let job = self.get(id).await?;
+        let job = self.job(tenant, id).await?;
         Ok(job.map_or(Deleted::NotFound, |job| Deleted::NotEnded(job.state)))
     }
 
@@ -63,60 +73,74 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn get(&self, id: Uuid) -> Result<Option<Job>, JobsError> {
+    pub(crate) async fn job(&self, tenant: &str, id: Uuid) -> Result<Option<Job>, StoreError> {
         let row = sqlx::query(GET)
             .bind(id.to_string())
+            .bind(tenant)
             .fetch_optional(&self.readers)
             .await?;
         row.as_ref().map(read_job).transpose()
     }
 
-    /// The result of a job that lies in the database: its solution and its fields.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub async fn small_result(&self, id: Uuid) -> Result<Option<EncodedResult>, JobsError> {
-        let row = sqlx::query(
-            "SELECT solution, fields FROM jobs JOIN blobs ON blobs.id = jobs.blob_id \
-             WHERE jobs.id = $1 AND key IS NULL",
-        )
-        .bind(id.to_string())
-        .fetch_optional(&self.readers)
-        .await?;
-        let Some(row) = row else { return Ok(None) };
-        let solution: Vec<u8> = row.try_get("solution")?;
-        let fields: Option<Vec<u8>> = row.try_get("fields")?;
-        Ok(Some(EncodedResult {
-            solution: solution.into(),
-            fields: fields.map(Into::into),
-        }))
-    }
-
-    /// A job with the place of its result, if it has one.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub async fn result(&self, id: Uuid) -> Result<Option<(Job, Option<ResultRef>)>, JobsError> {
+    /// A job with its result, if it has one.
+    pub(crate) async fn result(
+        &self,
+        tenant: &str,
+        id: Uuid,
+    ) -> Result<Option<(Job, Option<ResultRef>)>, StoreError> {
         let row = sqlx::query(concat!(
             "SELECT ",
             job_columns!(),
-            ", blob_id, field_patches, outputs, (SELECT key FROM blobs WHERE blobs.id = blob_id) AS key \
-             FROM jobs WHERE id = $1"
+            ", blob_id, field_patches, outputs, blob_key, blob_bytes, solution, fields FROM jobs LEFT JOIN \
+             (SELECT id AS blob, key AS blob_key, bytes AS blob_bytes, solution, fields FROM blobs) ON blob = blob_id \
+             WHERE id = $1 AND tenant = $2"
         ))
         .bind(id.to_string())
+        .bind(tenant)
         .fetch_optional(&self.readers)
         .await?;
         let Some(row) = row else { return Ok(None) };
+        let job = read_job(&row)?;
+        if read_blob_id(&row)?.is_none() {
+            return Ok(Some((job, None)));
+        }
         let patches: u32 = row.try_get("field_patches")?;
-        let stored = match read_blob_id(&row)? {
-            None => None,
-            Some(_) => Some(ResultRef {
-                job: id,
-                key: row.try_get("key")?,
-                field_patches: patches as usize,
-                outputs: row.try_get("outputs")?,
-            }),
+        let result = match row.try_get::<Option<String>, _>("blob_key")? {
+            Some(key) => StoredResult::Blob(key, read_count(&row, "blob_bytes")?),
+            None => StoredResult::inline(row.try_get("solution")?, row.try_get("fields")?),
         };
-        Ok(Some((read_job(&row)?, stored)))
+        let stored = ResultRef {
+            result,
+            field_patches: patches as usize,
+            outputs: row.try_get("outputs")?,
+        };
+        Ok(Some((job, Some(stored))))
+    }
+
+    /// The case of a job as it was submitted.
+    pub(crate) async fn case(
+        &self,
+        tenant: &str,
+        id: Uuid,
+    ) -> Result<Option<StoredCase>, StoreError> {
+        let row = sqlx::query(
+            "SELECT row, cases.body, batch_templates.body AS template FROM jobs JOIN cases ON cases.job_id = jobs.id \
+             LEFT JOIN batch_templates ON batch_templates.batch_id = jobs.batch_id \
+             WHERE jobs.id = $1 AND tenant = $2",
+        )
+        .bind(id.to_string())
+        .bind(tenant)
+        .fetch_optional(&self.readers)
+        .await?;
+        let Some(row) = row else { return Ok(None) };
+        let body: Vec<u8> = row.try_get("body")?;
+        let template: Option<Vec<u8>> = match row.try_get("row")? {
+            true => row.try_get("template")?,
+            false => None,
+        };
+        Ok(Some(StoredCase {
+            template: template.map(Bytes::from),
+            body: body.into(),
+        }))
     }
 }

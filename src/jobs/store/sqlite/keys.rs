@@ -3,8 +3,8 @@
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
-use crate::jobs::error::JobsError;
 use crate::jobs::keys::key::Key;
+use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::database::SqliteStore;
 
 const ALL: &str = "SELECT id, hash, tenant, name, created_at, revoked_at FROM api_keys";
@@ -17,7 +17,7 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed, or there is a key with this id.
-    pub async fn add_key(&self, key: &Key) -> Result<(), JobsError> {
+    pub(crate) async fn add_key(&self, key: &Key) -> Result<(), StoreError> {
         sqlx::query(
             "INSERT INTO api_keys (id, hash, tenant, name, created_at, revoked_at) VALUES ($1, $2, $3, $4, $5, $6)",
         )
@@ -36,7 +36,7 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn key(&self, id: &str) -> Result<Option<Key>, JobsError> {
+    pub(crate) async fn key(&self, id: &str) -> Result<Option<Key>, StoreError> {
         let row = sqlx::query(ONE)
             .bind(id)
             .fetch_optional(&self.readers)
@@ -48,7 +48,7 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn keys(&self) -> Result<Vec<Key>, JobsError> {
+    pub(crate) async fn keys(&self) -> Result<Vec<Key>, StoreError> {
         let rows = sqlx::query(ALL).fetch_all(&self.readers).await?;
         let mut keys = rows.iter().map(read_key).collect::<Result<Vec<_>, _>>()?;
         keys.sort_by(|a, b| (a.created_at, &a.id).cmp(&(b.created_at, &b.id)));
@@ -59,7 +59,7 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn revoke_key(&self, id: &str, now: i64) -> Result<Option<Key>, JobsError> {
+    pub(crate) async fn revoke_key(&self, id: &str, now: i64) -> Result<Option<Key>, StoreError> {
         sqlx::query("UPDATE api_keys SET revoked_at = $1 WHERE id = $2 AND revoked_at IS NULL")
             .bind(now)
             .bind(id)
@@ -69,13 +69,13 @@ impl SqliteStore {
     }
 }
 
-fn read_key(row: &SqliteRow) -> Result<Key, JobsError> {
+fn read_key(row: &SqliteRow) -> Result<Key, StoreError> {
     let hash: Vec<u8> = row.try_get("hash")?;
     let tenant: String = row.try_get("tenant")?;
     Ok(Key {
         id: row.try_get("id")?,
         hash: blake3::Hash::from_slice(&hash)
-            .map_err(|error| JobsError::Damaged(format!("hash of a key: {error}")))?,
+            .map_err(|error| StoreError::Corrupt(format!("hash of a key: {error}")))?,
         tenant: tenant.into(),
         name: row.try_get("name")?,
         created_at: row.try_get("created_at")?,

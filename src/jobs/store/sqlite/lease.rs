@@ -1,14 +1,14 @@
 //! What workers write while they hold a lease.
 
 use crate::jobs::store::sqlite::rows::fence;
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 use bytes::Bytes;
 use sqlx::{QueryBuilder, Row, Sqlite};
 use uuid::Uuid;
 
-use crate::jobs::error::JobsError;
 use crate::jobs::model::State;
+use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::{push_list, read_id, read_state};
 use crate::jobs::store::types::{Claim, ReleaseReason, Renewal, StoredCase};
@@ -18,10 +18,10 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn cases(
+    pub(crate) async fn claimed_cases(
         &self,
         ids: &[Uuid],
-    ) -> Result<HashMap<Uuid, (StoredCase, bool)>, JobsError> {
+    ) -> Result<HashMap<Uuid, (StoredCase, bool)>, StoreError> {
         let mut query = QueryBuilder::<Sqlite>::new(
             "SELECT id, row, body, batch_id, cancel_requested FROM cases JOIN jobs ON jobs.id = cases.job_id \
              WHERE job_id IN (",
@@ -35,10 +35,15 @@ impl SqliteStore {
             let mut template = None;
             if row.try_get("row")? {
                 let batch: String = row.try_get("batch_id")?;
-                if !templates.contains_key(&batch) {
-                    templates.insert(batch.clone(), self.template(&batch).await?);
+                if !templates.contains_key(&batch)
+                    && let Some(read) = self.template(&batch).await?
+                {
+                    templates.insert(batch.clone(), read);
                 }
                 template = templates.get(&batch).cloned();
+                if template.is_none() {
+                    continue;
+                }
             }
             let body: Vec<u8> = row.try_get("body")?;
             let case = StoredCase {
@@ -50,25 +55,25 @@ impl SqliteStore {
         Ok(cases)
     }
 
-    async fn template(&self, batch: &str) -> Result<Bytes, JobsError> {
+    async fn template(&self, batch: &str) -> Result<Option<Bytes>, StoreError> {
         let body: Option<Vec<u8>> =
             sqlx::query_scalar("SELECT body FROM batch_templates WHERE batch_id = $1")
                 .bind(batch)
                 .fetch_optional(&self.readers)
                 .await?;
         // It goes with the last job of its batch.
-        body.map(Bytes::from).ok_or(JobsError::Expired)
+        Ok(body.map(Bytes::from))
     }
 
     /// Extends leases and notes the progress. The answers are in the order of the claims.
     ///
     /// # Errors
     /// The database failed; the leases stand as they were.
-    pub async fn renew(
+    pub(crate) async fn renew(
         &self,
         claims: &[(&Claim, f64)],
         lease_until: i64,
-    ) -> Result<Vec<Renewal>, JobsError> {
+    ) -> Result<Vec<Renewal>, StoreError> {
         let mut query = QueryBuilder::<Sqlite>::new("WITH held (id, lease_number, now_at) AS (");
         query.push_values(claims, |mut row, (claim, progress)| {
             row.push_bind(claim.id.to_string())
@@ -100,7 +105,11 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed; nothing changed.
-    pub async fn set_solving(&self, claims: &[Claim], solving: bool) -> Result<(), JobsError> {
+    pub(crate) async fn set_solving(
+        &self,
+        claims: &[Claim],
+        solving: bool,
+    ) -> Result<(), StoreError> {
         if claims.is_empty() {
             return Ok(());
         }
@@ -117,12 +126,12 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed; nothing changed.
-    pub async fn release(
+    pub(crate) async fn release(
         &self,
         claims: &[Claim],
         why: ReleaseReason,
         now: i64,
-    ) -> Result<Vec<(Uuid, State)>, JobsError> {
+    ) -> Result<Vec<(Uuid, State)>, StoreError> {
         if claims.is_empty() {
             return Ok(Vec::new());
         }
@@ -155,19 +164,6 @@ impl SqliteStore {
         rows.iter()
             .map(|row| Ok((read_id(row)?, read_state(row)?)))
             .collect()
-    }
-
-    /// Those of these jobs that are running.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub async fn running(&self, ids: &[Uuid]) -> Result<HashSet<Uuid>, JobsError> {
-        let mut query =
-            QueryBuilder::<Sqlite>::new("SELECT id FROM jobs WHERE state = 'running' AND id IN (");
-        push_list(&mut query, ids);
-        query.push(")");
-        let rows = query.build().fetch_all(&self.readers).await?;
-        rows.iter().map(read_id).collect()
     }
 }
 

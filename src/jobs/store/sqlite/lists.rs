@@ -3,7 +3,7 @@
 use sqlx::{QueryBuilder, Sqlite};
 use uuid::Uuid;
 
-use crate::jobs::error::JobsError;
+use crate::jobs::store::error::StoreError;
 use crate::jobs::store::list::{Filter, Page};
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::{job_columns, read_job};
@@ -13,17 +13,13 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The cursor is not one of this filter, or the database failed.
-    pub async fn list(
+    pub(crate) async fn list(
         &self,
         tenant: &str,
         filter: &Filter,
-        cursor: Option<&str>,
+        after: Option<Uuid>,
         limit: u32,
-    ) -> Result<Page, JobsError> {
-        let after = match cursor {
-            Some(cursor) => Some(filter.read_cursor(cursor).ok_or(JobsError::BadCursor)?),
-            None => None,
-        };
+    ) -> Result<Page, StoreError> {
         let mut query = page_query(tenant, filter, after, limit);
         let rows = query.build().fetch_all(&self.readers).await?;
         let mut jobs = rows.iter().map(read_job).collect::<Result<Vec<_>, _>>()?;
@@ -72,11 +68,16 @@ fn page_query(
         and(&mut query, "value = ", value.clone());
     }
     if let Some(batch) = filter.batch {
+        // Nothing of a batch of another tenant is walked.
         let column = match filter.label {
-            Some(_) => "batch_id || '' = ",
-            None => "batch_id = ",
+            Some(_) => "batch_id || '' = (SELECT id FROM batches WHERE id = ",
+            None => "batch_id = (SELECT id FROM batches WHERE id = ",
         };
         and(&mut query, column, batch.to_string());
+        query
+            .push(" AND tenant = ")
+            .push_bind(tenant.to_owned())
+            .push(")");
     }
     if let Some(state) = filter.state {
         let column = match (&filter.label, filter.batch) {
@@ -142,7 +143,7 @@ pub(crate) mod tests {
     }
 
     #[tokio::test]
-    async fn the_list_of_a_batch_walks_its_index() {
+    async fn the_list_of_a_batch_walks_its_index_and_nothing_of_the_batch_of_another_tenant() {
         let folder = tempfile::tempdir().unwrap();
         let store = SqliteStore::open(&folder.path().join("jobs.db"))
             .await
@@ -160,7 +161,12 @@ pub(crate) mod tests {
                 Some(_) => "jobs_by_batch_and_state (batch_id=? AND state=?",
             };
             assert!(steps[0].contains(seek), "{steps:?}");
-            assert_eq!(steps.len(), 1, "{steps:?}");
+            // The batch is sought first, among those of the tenant: of another tenant's nothing is walked.
+            let owner = [
+                "SCALAR SUBQUERY 1",
+                "SEARCH batches USING PRIMARY KEY (id=?)",
+            ];
+            assert_eq!(steps[1..], owner, "{steps:?}");
         }
     }
 

@@ -3,10 +3,12 @@
 pub mod batches;
 pub mod blobs;
 pub mod cached;
+pub mod calls;
 pub mod claim;
 pub mod database;
 pub mod deadlines;
 pub mod enqueue;
+pub mod errors;
 pub mod expire;
 pub mod finish;
 pub mod group_commit;

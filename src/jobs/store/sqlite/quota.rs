@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use sqlx::{QueryBuilder, Sqlite, SqliteConnection};
 use uuid::Uuid;
 
-use crate::jobs::error::JobsError;
+use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::rows::{push_list, read_count, read_id};
 use crate::jobs::store::types::{NewJob, QueueBounds, Refusal};
 
@@ -38,7 +38,7 @@ impl Places<'_> {
         &mut self,
         tenant: &str,
         most: u64,
-    ) -> Result<Result<u64, Refusal>, JobsError> {
+    ) -> Result<Result<u64, Refusal>, StoreError> {
         let all = match self.all {
             Some(all) => all,
             None => taken(self.connection, None).await?,
@@ -70,7 +70,7 @@ impl Places<'_> {
     }
 }
 
-async fn taken(connection: &mut SqliteConnection, tenant: Option<&str>) -> Result<u64, JobsError> {
+async fn taken(connection: &mut SqliteConnection, tenant: Option<&str>) -> Result<u64, StoreError> {
     let row = sqlx::query(TAKEN)
         .bind(tenant)
         .fetch_one(connection)
@@ -82,7 +82,7 @@ async fn taken(connection: &mut SqliteConnection, tenant: Option<&str>) -> Resul
 pub(crate) async fn with_living_source(
     connection: &mut SqliteConnection,
     jobs: &[&NewJob],
-) -> Result<HashSet<Uuid>, JobsError> {
+) -> Result<HashSet<Uuid>, StoreError> {
     let sources: Vec<_> = jobs.iter().filter_map(|job| Some(job.source?.0)).collect();
     if sources.is_empty() {
         return Ok(HashSet::new());

@@ -1,9 +1,10 @@
 //! Takes jobs from workers whose lease has run out, and from a dead process.
 
+use crate::jobs::store::types::Reap;
 use uuid::Uuid;
 
-use crate::jobs::error::JobsError;
 use crate::jobs::model::{Failure, State};
+use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::{read_id, read_state, to_json};
 
@@ -32,48 +33,34 @@ pub(crate) const REAP_BYSTANDERS: &str = "UPDATE jobs SET \
      RETURNING id, state";
 
 impl SqliteStore {
-    /// Takes running jobs whose lease ended at or before `lease_until` from their workers: to `cancelled` if that was
-    /// asked for, to `failed` if the attempts are used up, else back to the queue. Returns them with their new state.
-    ///
-    /// # Errors
-    /// The database failed; nothing changed.
-    pub async fn reap(
+    /// Takes running jobs from their workers; see [`Reap`].
+    pub(crate) async fn reap(
         &self,
-        lease_until: i64,
+        which: Reap,
         now: i64,
         attempts_max: u32,
-    ) -> Result<Vec<(Uuid, State)>, JobsError> {
-        let rows = sqlx::query(REAP)
+    ) -> Result<Vec<(Uuid, State)>, StoreError> {
+        let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
+        let mut rows = Vec::new();
+        let lease_until = match which {
+            Reap::Expired { lease_until } => lease_until,
+            Reap::Dead => {
+                let bystanders = sqlx::query(REAP_BYSTANDERS).bind(now);
+                rows = bystanders.fetch_all(&mut *transaction).await?;
+                i64::MAX
+            }
+        };
+        let expired = sqlx::query(REAP)
             .bind(attempts_max)
             .bind(to_json(&Failure::worker_lost(attempts_max))?)
             .bind(now)
             .bind(lease_until)
-            .fetch_all(&self.writer)
+            .fetch_all(&mut *transaction)
             .await?;
+        transaction.commit().await?;
+        rows.extend(expired);
         rows.iter()
             .map(|row| Ok((read_id(row)?, read_state(row)?)))
             .collect()
-    }
-
-    /// Takes all running jobs from a process that died. The attempt counts only for a job that was being solved while no
-    /// other was; the others that were being solved come alone next time.
-    ///
-    /// # Errors
-    /// The database failed; nothing changed.
-    pub async fn reap_dead(
-        &self,
-        now: i64,
-        attempts_max: u32,
-    ) -> Result<Vec<(Uuid, State)>, JobsError> {
-        let rows = sqlx::query(REAP_BYSTANDERS)
-            .bind(now)
-            .fetch_all(&self.writer)
-            .await?;
-        let mut taken = rows
-            .iter()
-            .map(|row| Ok((read_id(row)?, read_state(row)?)))
-            .collect::<Result<Vec<_>, JobsError>>()?;
-        taken.extend(self.reap(i64::MAX, now, attempts_max).await?);
-        Ok(taken)
     }
 }

@@ -7,8 +7,8 @@ use sqlx::sqlite::SqliteRow;
 use sqlx::{QueryBuilder, Row, Sqlite};
 use uuid::Uuid;
 
-use crate::jobs::error::JobsError;
 use crate::jobs::model::{Job, State};
+use crate::jobs::store::error::StoreError;
 use crate::jobs::store::types::CacheKey;
 use crate::jobs::submit_options::Priority;
 
@@ -21,7 +21,7 @@ macro_rules! job_columns {
 pub(crate) use job_columns;
 
 /// Reads a row that has the columns of `job_columns`.
-pub(crate) fn read_job(row: &SqliteRow) -> Result<Job, JobsError> {
+pub(crate) fn read_job(row: &SqliteRow) -> Result<Job, StoreError> {
     let failure: Option<String> = row.try_get("failure")?;
     let batch: Option<String> = row.try_get("batch_id")?;
     Ok(Job {
@@ -34,9 +34,9 @@ pub(crate) fn read_job(row: &SqliteRow) -> Result<Job, JobsError> {
             .as_deref()
             .map(Uuid::try_parse)
             .transpose()
-            .map_err(|error| JobsError::Damaged(format!("batch id: {error}")))?,
+            .map_err(|error| StoreError::Corrupt(format!("batch id: {error}")))?,
         priority: Priority::from_rank(row.try_get("rank")?)
-            .ok_or_else(|| JobsError::Damaged("a rank is none of 0 to 2".to_owned()))?,
+            .ok_or_else(|| StoreError::Corrupt("a rank is none of 0 to 2".to_owned()))?,
         created_at: row.try_get("created_at")?,
         started_at: row.try_get("started_at")?,
         ended_at: row.try_get("ended_at")?,
@@ -52,26 +52,26 @@ pub(crate) fn read_job(row: &SqliteRow) -> Result<Job, JobsError> {
     })
 }
 
-pub(crate) fn read_id(row: &SqliteRow) -> Result<Uuid, JobsError> {
+pub(crate) fn read_id(row: &SqliteRow) -> Result<Uuid, StoreError> {
     let text: &str = row.try_get("id")?;
-    Uuid::try_parse(text).map_err(|error| JobsError::Damaged(format!("job id {text:?}: {error}")))
+    Uuid::try_parse(text).map_err(|error| StoreError::Corrupt(format!("job id {text:?}: {error}")))
 }
 
 /// The key of identical cases, if the row has one.
-pub(crate) fn read_cache_key(row: &SqliteRow) -> Result<Option<CacheKey>, JobsError> {
+pub(crate) fn read_cache_key(row: &SqliteRow) -> Result<Option<CacheKey>, StoreError> {
     let key: Option<Vec<u8>> = row.try_get("cache_key")?;
     key.map(CacheKey::try_from)
         .transpose()
-        .map_err(|_| JobsError::Damaged("a reuse key has a wrong length".to_owned()))
+        .map_err(|_| StoreError::Corrupt("a reuse key has a wrong length".to_owned()))
 }
 
 /// The blob a row refers to.
-pub(crate) fn read_blob_id(row: &SqliteRow) -> Result<Option<i64>, JobsError> {
+pub(crate) fn read_blob_id(row: &SqliteRow) -> Result<Option<i64>, StoreError> {
     Ok(row.try_get("blob_id")?)
 }
 
 /// The blobs that rows refer to.
-pub(crate) fn read_blob_ids(rows: &[SqliteRow]) -> Result<Vec<i64>, JobsError> {
+pub(crate) fn read_blob_ids(rows: &[SqliteRow]) -> Result<Vec<i64>, StoreError> {
     let ids = rows
         .iter()
         .map(read_blob_id)
@@ -79,22 +79,22 @@ pub(crate) fn read_blob_ids(rows: &[SqliteRow]) -> Result<Vec<i64>, JobsError> {
     Ok(ids.into_iter().flatten().collect())
 }
 
-pub(crate) fn read_state(row: &SqliteRow) -> Result<State, JobsError> {
+pub(crate) fn read_state(row: &SqliteRow) -> Result<State, StoreError> {
     let name: &str = row.try_get("state")?;
-    State::from_name(name).ok_or_else(|| JobsError::Damaged(format!("job state {name:?}")))
+    State::from_name(name).ok_or_else(|| StoreError::Corrupt(format!("job state {name:?}")))
 }
 
-pub(crate) fn read_count(row: &SqliteRow, column: &str) -> Result<u64, JobsError> {
+pub(crate) fn read_count(row: &SqliteRow, column: &str) -> Result<u64, StoreError> {
     let count: i64 = row.try_get(column)?;
-    u64::try_from(count).map_err(|_| JobsError::Damaged(format!("{column} is {count}")))
+    u64::try_from(count).map_err(|_| StoreError::Corrupt(format!("{column} is {count}")))
 }
 
-pub(crate) fn to_json<T: Serialize>(value: &T) -> Result<String, JobsError> {
-    serde_json::to_string(value).map_err(|error| JobsError::Damaged(error.to_string()))
+pub(crate) fn to_json<T: Serialize>(value: &T) -> Result<String, StoreError> {
+    serde_json::to_string(value).map_err(|error| StoreError::Corrupt(error.to_string()))
 }
 
-fn from_json<T: DeserializeOwned>(text: &str) -> Result<T, JobsError> {
-    serde_json::from_str(text).map_err(|error| JobsError::Damaged(format!("{text:.80}: {error}")))
+fn from_json<T: DeserializeOwned>(text: &str) -> Result<T, StoreError> {
+    serde_json::from_str(text).map_err(|error| StoreError::Corrupt(format!("{text:.80}: {error}")))
 }
 
 /// Ids as the list of an `IN`, without the brackets.
@@ -111,4 +111,8 @@ pub(crate) fn fence(claim: &Claim) -> i64 {
 }
 
 /// One job.
-pub(crate) const GET: &str = concat!("SELECT ", job_columns!(), " FROM jobs WHERE id = $1");
+pub(crate) const GET: &str = concat!(
+    "SELECT ",
+    job_columns!(),
+    " FROM jobs WHERE id = $1 AND tenant = $2"
+);

@@ -55,7 +55,7 @@ pub(crate) async fn require(pool: &SqlitePool) -> Result<(), JobsError> {
 }
 
 /// Writes the mark of the form again: a page that stays as it was.
-pub(crate) async fn mark(writer: &SqlitePool) -> Result<(), JobsError> {
+pub(crate) async fn mark(writer: &SqlitePool) -> sqlx::Result<()> {
     sqlx::raw_sql(sqlx::AssertSqlSafe(format!("PRAGMA user_version = {FORM}")))
         .execute(writer)
         .await?;

@@ -5,7 +5,7 @@ use std::time::Duration;
 use sqlx::Row;
 use uuid::Uuid;
 
-use crate::jobs::error::JobsError;
+use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::blobs::insert_blobs;
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::fence;
@@ -28,7 +28,11 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed; nothing changed.
-    pub async fn add_slice(&self, claim: &Claim, slice: &NewSlice) -> Result<bool, JobsError> {
+    pub(crate) async fn add_slice(
+        &self,
+        claim: &Claim,
+        slice: &NewSlice,
+    ) -> Result<bool, StoreError> {
         let id = claim.id.to_string();
         let note = &slice.note;
         let spent_us = i64::try_from(note.spent.as_micros()).unwrap_or(i64::MAX);
@@ -81,7 +85,7 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn slice_notes(&self, id: Uuid) -> Result<Vec<SliceRecord>, JobsError> {
+    pub(crate) async fn slices(&self, id: Uuid) -> Result<Vec<SliceRecord>, StoreError> {
         let rows = sqlx::query(NOTES)
             .bind(id.to_string())
             .fetch_all(&self.readers)
@@ -102,7 +106,7 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn slice_results(&self, id: Uuid) -> Result<Vec<StoredResult>, JobsError> {
+    pub(crate) async fn slice_results(&self, id: Uuid) -> Result<Vec<StoredResult>, StoreError> {
         let rows = sqlx::query(RESULTS)
             .bind(id.to_string())
             .fetch_all(&self.readers)
@@ -112,7 +116,7 @@ impl SqliteStore {
                 if let Some(key) = row.try_get::<Option<String>, _>("key")? {
                     return Ok(StoredResult::Blob(key, read_count(row, "bytes")?));
                 }
-                Ok(StoredResult::read(
+                Ok(StoredResult::inline(
                     row.try_get("solution")?,
                     row.try_get("fields")?,
                 ))

@@ -1,13 +1,13 @@
 //! What an operator wants to know of the embedded job table: how many jobs, how old, how large.
 
 use crate::jobs::model::Job;
-use sqlx::Row;
+use crate::jobs::store::types::QueueAhead;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::Path;
 
-use crate::jobs::error::JobsError;
 use crate::jobs::model::State;
+use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::{read_count, read_state};
 use crate::jobs::store::types::Stats;
@@ -21,7 +21,7 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn stats(&self) -> Result<Stats, JobsError> {
+    pub(crate) async fn stats(&self) -> Result<Stats, StoreError> {
         let rows = sqlx::query(COUNT).fetch_all(&self.readers).await?;
         let mut jobs: BTreeMap<State, u64> =
             State::ALL.into_iter().map(|state| (state, 0)).collect();
@@ -56,11 +56,11 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn queued_before(
+    pub(crate) async fn queued_before(
         &self,
         job: &Job,
         limit: u32,
-    ) -> Result<(u64, u64, usize), JobsError> {
+    ) -> Result<QueueAhead, StoreError> {
         let row = sqlx::query(BEFORE)
             .bind(&job.tenant)
             .bind(job.priority.rank())
@@ -69,26 +69,11 @@ impl SqliteStore {
             .fetch_one(&self.readers)
             .await?;
         let tenants = self.queued_tenants().await?.len();
-        Ok((
-            read_count(&row, "jobs")?,
-            read_count(&row, "cost_us")?,
+        Ok(QueueAhead {
+            jobs: read_count(&row, "jobs")?,
+            cost_us: read_count(&row, "cost_us")?,
             tenants,
-        ))
-    }
-
-    /// Number of queued jobs, of a tenant or of all.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub async fn queued(&self, tenant: Option<&str>) -> Result<u64, JobsError> {
-        let row = sqlx::query(
-            "SELECT COALESCE(SUM(number), 0) AS queued FROM job_counts \
-             WHERE state = 'queued' AND (tenant = $1 OR $1 IS NULL)",
-        )
-        .bind(tenant)
-        .fetch_one(&self.readers)
-        .await?;
-        Ok(u64::try_from(row.try_get::<i64, _>("queued")?).unwrap_or(0))
+        })
     }
 }
 

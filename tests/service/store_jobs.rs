@@ -1,0 +1,411 @@
+//! Does a store keep its promises about single jobs, claims and leases?
+
+use crate::store_keys::keyed;
+use bytes::Bytes;
+use railhead::jobs::store::list::Filter;
+use railhead::jobs::store::types::Reap;
+use railhead::jobs::store::types::{Deleted, Ending, Enqueued, NewJob, QueueBounds, Renewal};
+use railhead::jobs::{FailureKind, State};
+use uuid::Uuid;
+
+use crate::store::*;
+
+async fn a_job_comes_back_as_it_was_queued(kind: StoreKind) {
+    let table = Table::new(kind).await;
+    let new = NewJob {
+        body: Bytes::from_static("{\"name\":\"Weiche ½\"}".as_bytes()),
+        ..labelled("line", "A12")
+    };
+    let job = table.add(new.clone()).await;
+    assert_eq!(
+        table.store.job("anonymous", new.id).await.unwrap(),
+        Some(job.clone())
+    );
+    assert_eq!(job.state, State::Queued);
+    assert_eq!((job.name, job.labels), (new.name, new.labels));
+    assert_eq!(
+        (job.created_at, job.started_at, job.ended_at),
+        (new.created_at, None, None)
+    );
+    assert_eq!((job.attempt, job.failure), (0, None));
+    assert_eq!(table.case(new.id).await, Some((new.body, false)));
+    assert_eq!(
+        table.store.job("anonymous", Uuid::now_v7()).await.unwrap(),
+        None
+    );
+    assert_eq!(table.case(Uuid::now_v7()).await, None);
+}
+
+async fn jobs_are_claimed_oldest_first_and_each_once(kind: StoreKind) {
+    let table = Table::new(kind).await;
+    let mut ids = Vec::new();
+    for _ in 0..60 {
+        ids.push(table.add(new_job()).await.id);
+    }
+    let first = table.claim(0).await.unwrap();
+    assert_eq!(
+        (first.id, first.attempt, first.lease_number),
+        (ids[0], 1, 1)
+    );
+
+    let claimers = (0..8).map(|_| {
+        let store = table.store.clone();
+        tokio::spawn(async move {
+            let mut claimed = Vec::new();
+            while let Some(claim) = claim_up_to(&*store, 0, LEASE, 1).await.pop() {
+                claimed.push(claim.id);
+            }
+            claimed
+        })
+    });
+    let mut claimed = Vec::new();
+    for claimer in claimers.collect::<Vec<_>>() {
+        let ids = claimer.await.unwrap();
+        assert!(
+            ids.is_sorted(),
+            "each claimer meets the jobs in their order"
+        );
+        claimed.extend(ids);
+    }
+    claimed.sort_unstable();
+    assert_eq!(claimed, ids[1..]);
+}
+
+async fn a_job_ends_once_and_says_how(kind: StoreKind) {
+    let table = Table::new(kind).await;
+    for (ending, state) in [
+        (success(), State::Succeeded),
+        (failure(), State::Failed),
+        (Ending::Cancelled, State::Cancelled),
+    ] {
+        table.add(new_job()).await;
+        let claim = table.claim(5).await.unwrap();
+        let job = table.finish(&claim, &ending, 9).await.unwrap();
+        assert_eq!(
+            (job.state, job.started_at, job.ended_at),
+            (state, Some(5), Some(9))
+        );
+        assert_eq!(job.failure.is_some(), state == State::Failed);
+        let (_, stored) = table
+            .store
+            .result("anonymous", claim.id)
+            .await
+            .unwrap()
+            .unwrap();
+        assert_eq!(stored.is_some(), state == State::Succeeded);
+        if state == State::Succeeded {
+            assert_eq!(job.remarks, [remark()]);
+            assert!((job.progress - 1.0).abs() < f64::EPSILON);
+            assert_eq!(stored.unwrap().field_patches, 2);
+        }
+        for late in [success(), failure(), Ending::Cancelled] {
+            assert_eq!(table.finish(&claim, &late, 10).await, None);
+        }
+        assert_eq!(table.state(claim.id).await, state);
+    }
+}
+
+async fn a_lease_ends_at_its_time_and_not_before(kind: StoreKind) {
+    let table = Table::new(kind).await;
+    let id = table.add(new_job()).await.id;
+    let claim = table.claim(100).await.unwrap();
+    assert_eq!(
+        table
+            .store
+            .reap(Reap::Expired { lease_until: 1_099 }, 1_099, 5)
+            .await
+            .unwrap(),
+        []
+    );
+    let renewed = table.renew(&claim, 0.25, 1_000).await;
+    assert_eq!(
+        renewed,
+        Renewal::Held {
+            cancel_requested: false
+        }
+    );
+    assert_eq!(
+        table
+            .store
+            .reap(Reap::Expired { lease_until: 1_999 }, 1_999, 5)
+            .await
+            .unwrap(),
+        []
+    );
+    assert_eq!(
+        table
+            .store
+            .reap(Reap::Expired { lease_until: 2_000 }, 2_000, 5)
+            .await
+            .unwrap(),
+        [(id, State::Queued)]
+    );
+    let job = table.store.job("anonymous", id).await.unwrap().unwrap();
+    assert_eq!(
+        (job.state, job.attempt, job.started_at),
+        (State::Queued, 1, None)
+    );
+}
+
+async fn a_worker_that_lost_its_lease_changes_nothing(kind: StoreKind) {
+    let table = Table::new(kind).await;
+    let id = table.add(new_job()).await.id;
+    let stale = table.claim(0).await.unwrap();
+    table
+        .store
+        .reap(Reap::Expired { lease_until: LEASE }, LEASE, 5)
+        .await
+        .unwrap();
+    let queued = table.store.job("anonymous", id).await.unwrap();
+    for claimed_again in [false, true] {
+        if claimed_again {
+            assert_eq!(table.claim(LEASE).await.unwrap().attempt, 2);
+        }
+        let before = table.store.job("anonymous", id).await.unwrap();
+        assert_eq!(before == queued, !claimed_again);
+        assert_eq!(table.renew(&stale, 0.9, LEASE).await, Renewal::Lost);
+        assert_eq!(table.finish(&stale, &success(), LEASE).await, None);
+        assert_eq!(table.release(&stale, LEASE).await, None);
+        assert_eq!(table.store.job("anonymous", id).await.unwrap(), before);
+    }
+}
+
+async fn an_attempt_handed_back_does_not_count_but_still_fences(kind: StoreKind) {
+    let table = Table::new(kind).await;
+    let id = table.add(new_job()).await.id;
+    let first = table.claim(0).await.unwrap();
+    assert_eq!(table.release(&first, 1).await, Some(State::Queued));
+    let queued = table.store.job("anonymous", id).await.unwrap().unwrap();
+    assert_eq!((queued.attempt, queued.started_at), (0, None));
+
+    let second = table.claim(2).await.unwrap();
+    assert_eq!((second.attempt, second.lease_number), (1, 2));
+    assert_eq!(table.finish(&first, &success(), 3).await, None);
+    assert!(table.finish(&second, &success(), 3).await.is_some());
+}
+
+async fn a_job_that_loses_every_worker_fails_after_the_allowed_attempts(kind: StoreKind) {
+    let table = Table::new(kind).await;
+    let id = table.add(new_job()).await.id;
+    for attempt in 1..=3 {
+        assert_eq!(table.claim(0).await.unwrap().attempt, attempt);
+        let expected = if attempt < 3 {
+            State::Queued
+        } else {
+            State::Failed
+        };
+        assert_eq!(
+            table
+                .store
+                .reap(Reap::Expired { lease_until: LEASE }, 7_000, 3)
+                .await
+                .unwrap(),
+            [(id, expected)]
+        );
+    }
+    let job = table.store.job("anonymous", id).await.unwrap().unwrap();
+    assert_eq!(job.failure.unwrap().kind, FailureKind::WorkerLost);
+    assert_eq!((job.attempt, job.ended_at), (3, Some(7_000)));
+    assert_eq!(table.claim(0).await, None);
+}
+
+async fn cancelling_ends_a_queued_job_asks_a_running_one_and_leaves_an_ended_one(kind: StoreKind) {
+    let table = Table::new(kind).await;
+    let queued = table.add(new_job()).await;
+    let cancelled = table
+        .store
+        .cancel("anonymous", queued.id, 4)
+        .await
+        .unwrap()
+        .unwrap();
+    assert_eq!(
+        (cancelled.state, cancelled.ended_at),
+        (State::Cancelled, Some(4))
+    );
+    assert_eq!(table.claim(0).await, None);
+    assert_eq!(
+        table.store.cancel("anonymous", queued.id, 5).await.unwrap(),
+        Some(cancelled)
+    );
+
+    let running = table.add(new_job()).await.id;
+    let claim = table.claim(0).await.unwrap();
+    let asked = table
+        .store
+        .cancel("anonymous", running, 6)
+        .await
+        .unwrap()
+        .unwrap();
+    assert_eq!((asked.state, asked.ended_at), (State::Running, None));
+    assert_eq!(
+        table.store.cancel("anonymous", running, 7).await.unwrap(),
+        Some(asked)
+    );
+    assert!(table.case(running).await.unwrap().1);
+    let renewed = table.renew(&claim, 0.5, 8).await;
+    assert_eq!(
+        renewed,
+        Renewal::Held {
+            cancel_requested: true
+        }
+    );
+    let ended = table.finish(&claim, &success(), 9).await;
+    assert_eq!(
+        table.store.cancel("anonymous", running, 10).await.unwrap(),
+        ended
+    );
+    assert_eq!(
+        table
+            .store
+            .cancel("anonymous", Uuid::now_v7(), 0)
+            .await
+            .unwrap(),
+        None
+    );
+}
+
+async fn a_cancelled_job_never_goes_back_to_the_queue(kind: StoreKind) {
+    let table = Table::new(kind).await;
+    let lost = table.add(new_job()).await.id;
+    table.claim(0).await.unwrap();
+    table.store.cancel("anonymous", lost, 1).await.unwrap();
+    assert_eq!(
+        table
+            .store
+            .reap(Reap::Expired { lease_until: LEASE }, LEASE, 1)
+            .await
+            .unwrap(),
+        [(lost, State::Cancelled)]
+    );
+
+    let released = table.add(new_job()).await.id;
+    let claim = table.claim(0).await.unwrap();
+    table.store.cancel("anonymous", released, 1).await.unwrap();
+    assert_eq!(table.release(&claim, 2).await, Some(State::Cancelled));
+    for id in [lost, released] {
+        let job = table.store.job("anonymous", id).await.unwrap().unwrap();
+        assert_eq!((job.state, job.failure), (State::Cancelled, None));
+        assert!(job.ended_at.is_some());
+    }
+}
+
+async fn only_an_ended_job_can_be_deleted_and_all_that_hung_on_it_goes(kind: StoreKind) {
+    let table = Table::new(kind).await;
+    let new = NewJob {
+        idempotency: Some(("k".to_owned(), [1; 32])),
+        ..labelled("line", "A12")
+    };
+    let id = table.add(new).await.id;
+    assert_eq!(
+        table.store.delete("anonymous", id).await.unwrap(),
+        Deleted::NotEnded(State::Queued)
+    );
+    let claim = table.claim(0).await.unwrap();
+    assert_eq!(
+        table.store.delete("anonymous", id).await.unwrap(),
+        Deleted::NotEnded(State::Running)
+    );
+    table.finish(&claim, &success(), 1).await;
+    assert_eq!(
+        table.store.delete("anonymous", id).await.unwrap(),
+        Deleted::Done
+    );
+    assert_eq!(
+        table.store.delete("anonymous", id).await.unwrap(),
+        Deleted::NotFound
+    );
+
+    assert_eq!(table.case(id).await, None);
+    assert_eq!(
+        table
+            .store
+            .job_by_key("anonymous", "k", &[1; 32])
+            .await
+            .unwrap(),
+        None
+    );
+    let filter = Filter {
+        label: Some(("line".to_owned(), "A12".to_owned())),
+        ..Filter::default()
+    };
+    assert_eq!(
+        table
+            .store
+            .list("anonymous", &filter, None, 10)
+            .await
+            .unwrap()
+            .jobs,
+        []
+    );
+    let released = table.store.released_blobs(&[], 10).await.unwrap();
+    assert_eq!(released, ["results/1"], "its result is left to be removed");
+    let released = table.store.released_blobs(&released, 10).await.unwrap();
+    assert!(released.is_empty(), "what was removed is forgotten");
+}
+
+async fn the_table_outlives_its_process(kind: StoreKind) {
+    let table = Table::new(kind).await;
+    let id = table.add(keyed("k", 1)).await.id;
+    let claim = table.claim(0).await.unwrap();
+    let before = table.store.job("anonymous", id).await.unwrap();
+    // Not closed: the second opening finds what a killed process would leave.
+    let again = table.open_again().await;
+    assert_eq!(again.job("anonymous", id).await.unwrap(), before);
+    assert!(
+        matches!(again.enqueue(&keyed("k", 1), QueueBounds::NONE).await.unwrap(), Enqueued::Existing(job) if job.id == id)
+    );
+    assert!(finish_one(&*again, &claim, &success(), 1).await.is_some());
+}
+
+async fn jobs_of_a_group_that_died_are_retried_alone_and_uncounted(kind: StoreKind) {
+    let table = Table::new(kind).await;
+    let store = &*table.store;
+    for _ in 0..3 {
+        store.enqueue(&new_job(), QueueBounds::NONE).await.unwrap();
+    }
+    let group = claim_up_to(store, 0, 10, 8).await;
+    assert_eq!(group.len(), 3);
+    assert_eq!(
+        store
+            .reap(Reap::Expired { lease_until: 10 }, 10, 1)
+            .await
+            .unwrap()
+            .len(),
+        3
+    );
+    let ends: Vec<_> = group
+        .iter()
+        .map(|claim| (claim.clone(), success()))
+        .collect();
+    assert!(store.finish(&ends, 11).await.unwrap().is_empty(), "fenced");
+    for claim in &group {
+        let alone = claim_up_to(store, 20, 10, 8).await;
+        assert_eq!(alone.len(), 1);
+        assert_eq!((alone[0].id, alone[0].attempt), (claim.id, 1));
+        assert_eq!((alone[0].lease_number, alone[0].suspect), (2, true));
+    }
+    // Alone, the one attempt that is allowed counts.
+    let ended = store
+        .reap(Reap::Expired { lease_until: 30 }, 30, 1)
+        .await
+        .unwrap();
+    assert!(
+        ended.iter().all(|(_, state)| state.name() == "failed"),
+        "{ended:?}"
+    );
+}
+
+conformance! {
+    jobs_of_a_group_that_died_are_retried_alone_and_uncounted,
+    a_job_comes_back_as_it_was_queued,
+    jobs_are_claimed_oldest_first_and_each_once,
+    a_job_ends_once_and_says_how,
+    a_lease_ends_at_its_time_and_not_before,
+    a_worker_that_lost_its_lease_changes_nothing,
+    an_attempt_handed_back_does_not_count_but_still_fences,
+    a_job_that_loses_every_worker_fails_after_the_allowed_attempts,
+    cancelling_ends_a_queued_job_asks_a_running_one_and_leaves_an_ended_one,
+    a_cancelled_job_never_goes_back_to_the_queue,
+    only_an_ended_job_can_be_deleted_and_all_that_hung_on_it_goes,
+    the_table_outlives_its_process,
+}
