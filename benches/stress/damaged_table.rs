@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
-use crate::damaged::{Counts, Damage, held_out, rows_of, tuned_on};
+use crate::damaged::{Damage, held_out, tuned_on};
+use crate::damaged_trials::{Counts, rows_of};
 
 /// Places on each pair.
 const PLACES: usize = 12;

@@ -8,6 +8,7 @@ mod condition;
 mod contacts;
 mod damaged;
 mod damaged_table;
+mod damaged_trials;
 mod laws;
 #[path = "../../tests/physics/profile_reference_files.rs"]
 mod profile_reference_files;

@@ -81,7 +81,7 @@ pub(crate) fn solve(
         let remark = Remark::NormalForcesAloneBalance {};
         at_rest.wheel.remarks.push(remark.into());
     }
-    Ok(at_rest.found(problem, contact, answers))
+    at_rest.found(problem, contact, answers)
 }
 
 /// Who judges a wheel at rest before and after its motions are solved.
@@ -186,7 +186,7 @@ impl WheelSolve<'_> {
             counted = next_share((counted, share), before);
         }
         let answers = exit.judged(last, tolerance, share, &mut at_rest.wheel)?;
-        Ok(at_rest.found(problem, contact, answers))
+        at_rest.found(problem, contact, answers)
     }
 }
 
@@ -308,19 +308,19 @@ impl Rest {
         problem: &Problem,
         contact: &WheelTask,
         answers: Vec<(Solution, Fields)>,
-    ) -> Found {
+    ) -> Result<Found, SolveError> {
         let part = match problem.resolution {
             Resolution::Target(target) => target,
             Resolution::Mesh(_) => UNCOUPLED,
         };
         let remark = contact.uncoupled(&self.wheel, part);
         self.wheel.remarks.extend(remark.map(RemarkEntry::from));
-        let (solution, fields) = merge(problem, &contact.geometry, &self.wheel, answers);
-        Found {
+        let (solution, fields) = merge(problem, &contact.geometry, &self.wheel, answers)?;
+        Ok(Found {
             wheel: self.wheel,
             solution,
             fields,
-        }
+        })
     }
 
     /// A later rest, with the work of both.

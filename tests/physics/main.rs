@@ -8,6 +8,8 @@ mod cases;
 mod convergence_domain;
 #[path = "../../benches/stress/damaged.rs"]
 mod damaged;
+#[path = "../../benches/stress/damaged_trials.rs"]
+mod damaged_trials;
 mod equations;
 mod fastsim;
 mod forces;

@@ -4,7 +4,8 @@
 
 use serde_json::json;
 
-use crate::damaged::{Counts, Damage, Pair, held_out, rows_of, tuned_on};
+use crate::damaged::{Damage, Pair, held_out, tuned_on};
+use crate::damaged_trials::{Counts, rows_of};
 
 /// The counts of all kinds of damage together, or of one with the advised smoothing.
 fn trials(pairs: &[Pair], seed: u64, places: usize, kind: Option<usize>) -> Counts {

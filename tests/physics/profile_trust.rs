@@ -7,7 +7,7 @@ use railhead::contact::solution::words::Solution;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 
-use crate::damaged::{Damage, blamed, linear, pressure_max, resampled, with};
+use crate::damaged::{Damage, blamed, linear, normal, off_normal, pressure_max, resampled, with};
 use crate::profile_cases::{generated, put};
 use crate::profile_shapes::{rail_60e1, s1002};
 use crate::random::Random;
@@ -329,4 +329,112 @@ fn what_is_known_before_the_solve_is_in_the_check() {
     assert!(quality.wheel.noise_um.expect("noise") < 0.1, "{quality:?}");
     let plain = check(&on_rail(&rail_60e1()), &Limits::default()).expect("a case");
     assert!(problem.cost().seconds > plain.cost().seconds);
+}
+
+/// Points of both profiles this far apart in mm, with white noise of a deviation in mm.
+fn coarse(spacing: f64, noise: f64, seed: u64) -> Value {
+    let mut random = Random(seed);
+    let [rail, wheel] = [rail_60e1(), s1002()].map(|points| {
+        let points = resampled(&points, spacing);
+        off_normal(&points, |_, _| noise * normal(&mut random))
+    });
+    with(&tread(), &rail, &wheel, "auto")
+}
+
+fn smoothings(found: &Solution) -> [f64; 2] {
+    let quality = found.patches[0].quality.clone().expect("a quality");
+    [quality.rail.smoothing_mm, quality.wheel.smoothing_mm]
+}
+
+fn has(found: &Solution, code: &str) -> bool {
+    found.remarks.iter().any(|remark| remark.code == code)
+}
+
+#[test]
+fn auto_smooths_the_noise_of_coarse_points_and_what_that_leaves_open_is_known() {
+    let sound = solved(&on_rail(&rail_60e1()));
+    let limit = 0.3 * sound.patches.iter().map(|p| p.normal_force_n).sum::<f64>();
+    for seed in 1..=4 {
+        let found = solved(&coarse(1.7, 0.005, seed));
+        let used = smoothings(&found);
+        assert!(used.iter().all(|length| *length > 4.0), "{seed}: {used:?}");
+        let open = found.total[0].profile_uncertainty.expect("an uncertainty");
+        let pressure = (pressure_max(&found) - pressure_max(&sound)).abs();
+        assert!(
+            pressure < open.pressure_max_mpa,
+            "{seed}: {pressure} {open:?}"
+        );
+        let force = (found.total[0].force_x_n - sound.total[0].force_x_n).abs();
+        assert!(
+            force < open.force_x_n.min(0.06 * limit),
+            "{seed}: {force} {open:?}"
+        );
+    }
+    // True points as far apart are left as they are, without a word.
+    let clean = solved(&coarse(1.7, 0.0, 1));
+    assert_eq!(smoothings(&clean), [0.0; 2]);
+    assert!(!has(&clean, "smoothing-undecided"), "{:?}", clean.remarks);
+}
+
+#[test]
+fn auto_says_so_where_points_are_too_far_apart_to_tell_noise_from_shape() {
+    let auto = accepted(&coarse(5.0, 0.005, 1));
+    let mut plain = auto.clone();
+    for body in ["rail", "wheel"] {
+        plain["contact"][body]["smoothing_mm"] = json!(0.0);
+    }
+    let (auto, plain) = (solved(&auto), solved(&plain));
+    let undecided = auto
+        .remarks
+        .iter()
+        .filter(|r| r.code == "smoothing-undecided");
+    assert_eq!(undecided.count(), 2, "{:?}", auto.remarks);
+    assert!(!has(&auto, "smoothing-chosen") && !has(&plain, "smoothing-undecided"));
+    let open = |found: &Solution| {
+        let open = found.total[0].profile_uncertainty.expect("an uncertainty");
+        open.pressure_max_mpa / pressure_max(found)
+    };
+    assert!(
+        open(&auto) >= open(&plain),
+        "{} {}",
+        open(&auto),
+        open(&plain)
+    );
+    assert!(open(&auto) > 0.05, "{}", open(&auto));
+}
+
+#[test]
+fn a_hole_is_blamed_where_the_curve_over_it_is_open_or_it_may_hide_an_arc() {
+    let points = resampled(&rail_60e1(), 0.25);
+    let at = |shift: f64, force: f64, rail: &[[f64; 2]]| {
+        let mut case = put(
+            &accepted(&on_rail(rail)),
+            "contact",
+            json!({ "lateral_shift_mm": shift }),
+        );
+        case["load"] = json!({ "vertical_force_n": force });
+        solved(&case)
+    };
+    // On the arc of 300 mm the curve between the ends of a hole is known, at its end toward that of 80 mm it is not.
+    for (shift, force, length, told) in [
+        (1.0, 1e3, 6.0, false),
+        (1.0, 1e3, 14.0, true),
+        (-1.0, 4e3, 4.0, true),
+    ] {
+        let sound = at(shift, force, &points);
+        let middle = sound.patches[0].position.expect("a place").rail_mm[0];
+        let rail = without(&points, middle - 0.5 * length, middle + 0.5 * length);
+        let found = at(shift, force, &rail);
+        let quality = found.patches[0].quality.clone().expect("a quality").rail;
+        assert!(quality.spacing_over_width > 1.2, "{quality:?}");
+        assert_eq!(
+            !blamed(&found).is_empty(),
+            told,
+            "{length}: {:?}",
+            found.remarks
+        );
+        let error = (pressure_max(&found) / pressure_max(&sound) - 1.0).abs();
+        assert!(told || error < 0.01, "{error}");
+        assert!(force < 2e3 || error > 0.1, "{error}");
+    }
 }

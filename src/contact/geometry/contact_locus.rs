@@ -278,7 +278,9 @@ impl<'g> ContactLocus<'g> {
 
 /// The gap with its surfaces bent apart beyond the limits toward other gaps, `[lower, upper]` across in mm: what touches there
 /// belongs to those, in frames of their own.
-fn apart(mut gap: LocalGap, [lower, upper]: [Option<f64>; 2]) -> LocalGap {
+fn apart(mut gap: LocalGap, limits: [Option<f64>; 2]) -> LocalGap {
+    let [lower, upper] = limits;
+    gap.limits = limits;
     for (v, row) in gap.y.iter().zip(&mut gap.gap) {
         let below = lower.map_or(0.0, |end| end - v);
         let above = upper.map_or(0.0, |end| v - end);

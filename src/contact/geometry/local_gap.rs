@@ -44,6 +44,8 @@ pub struct LocalGap {
     pub gap: Vec<Vec<f64>>,
     /// Samples over which the wheel's surface was not found although its profile goes on; the gap opens there.
     pub missed: Vec<[f64; 2]>,
+    /// Lines across, lower and upper, beyond which the surfaces were bent apart: what touches there belongs to other gaps.
+    pub limits: [Option<f64>; 2],
 }
 
 impl LocalGap {
@@ -94,6 +96,7 @@ impl LocalGap {
             y,
             gap,
             missed,
+            limits: [None; 2],
         })
     }
 
@@ -169,7 +172,18 @@ impl<'g> RailInFrame<'g> {
             && v <= self.samples[self.samples.len() - 1][0]
     }
 
-    /// Height over the plane at v, and the parameter there, by bracketed secant steps along the curve and a halving after every
+    /// The place over v, where the rail reaches that far.
+    fn over(&self, [u, v]: [f64; 2]) -> Result<[f64; 2], SurfaceMissed> {
+        if self.reaches(v) {
+            return Ok(self.height(v));
+        }
+        Err(SurfaceMissed {
+            at: [u, v],
+            exit: SurfaceExit::RailTurnsAway,
+        })
+    }
+
+    /// Height over the plane at v, which the rail reaches, and the parameter there, by bracketed secant steps along the curve and a halving after every
     /// second one: v runs steadily along the chosen part of the curve, so that the bracket of 0.1 mm holds one place and is
     /// narrower than the tolerance before the steps are used up.
     fn height(&self, v: f64) -> [f64; 2] {
@@ -363,11 +377,11 @@ impl WheelRail {
     /// mm, with the wheel's centre at the height `centre`.
     ///
     /// # Errors
-    /// The wheel has no point there, or none was found.
+    /// Rail or wheel have no point there, or none was found.
     pub fn moved(&self, frame: &Frame, by: [f64; 2], centre: f64) -> Result<Frame, SurfaceMissed> {
         let [u, v] = by;
         let [tangent, normal] = frame.axes();
-        let [height, rail] = RailInFrame::new(self, frame).height(v);
+        let [height, rail] = RailInFrame::new(self, frame).over(by)?;
         let surface = WheelInFrame {
             geometry: self,
             frame,
@@ -386,9 +400,12 @@ impl WheelRail {
     }
 
     /// Parameter of the rail's curve over the place `y` in mm across the plane of a frame.
-    #[must_use]
-    pub fn rail_over(&self, frame: &Frame, y: f64) -> f64 {
-        RailInFrame::new(self, frame).height(y)[1]
+    ///
+    /// # Errors
+    /// The rail ends or turns away from the plane before.
+    pub fn rail_over(&self, frame: &Frame, y: f64) -> Result<f64, SurfaceMissed> {
+        let [_, rail] = RailInFrame::new(self, frame).over([0.0, y])?;
+        Ok(rail)
     }
 
     /// Overlap in mm of the undeformed bodies along the normal at the origin of a frame, with the wheel's centre at the

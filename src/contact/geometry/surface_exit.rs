@@ -1,6 +1,6 @@
-//! How the search for a point of the wheel's surface over the plane of contact ends.
+//! How the search for a point of the bodies' surfaces over the plane of contact ends.
 
-/// Newton's method found no point of the wheel over a place of the plane of contact.
+/// No point of a body was found over a place of the plane of contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceMissed {
     /// The place `[x, y]` in the frame, in mm.
@@ -9,7 +9,7 @@ pub struct SurfaceMissed {
     pub exit: SurfaceExit,
 }
 
-/// How the search for a point of the wheel's surface ends.
+/// How the search for a point of a surface ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SurfaceExit {
     /// The last step was too small to matter.
@@ -18,6 +18,8 @@ pub enum SurfaceExit {
     BeyondProfile,
     /// The steps were used up.
     StepsUsedUp,
+    /// The rail ends or turns away from the plane of contact before.
+    RailTurnsAway,
 }
 
 impl SurfaceExit {
@@ -34,6 +36,7 @@ impl SurfaceExit {
             SurfaceExit::Converged => "the point was found",
             SurfaceExit::BeyondProfile => "the search left the wheel's profile",
             SurfaceExit::StepsUsedUp => "the steps were used up",
+            SurfaceExit::RailTurnsAway => "the rail ends or turns away before",
         }
     }
 }
@@ -41,9 +44,13 @@ impl SurfaceExit {
 impl std::fmt::Display for SurfaceMissed {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         let [x, y] = self.at;
+        let body = match self.exit {
+            SurfaceExit::RailTurnsAway => "rail",
+            _ => "wheel",
+        };
         write!(
             f,
-            "the wheel's surface was not found over the place x = {x:.3} mm, y = {y:.3} mm of the plane of contact: {}",
+            "the {body}'s surface was not found over the place x = {x:.3} mm, y = {y:.3} mm of the plane of contact: {}",
             self.exit.reason()
         )
     }

@@ -125,17 +125,15 @@ impl Gathering {
 
     /// Where a share of the density lies to the left; `from` is a place left of it.
     fn place(self, share: f64, from: f64) -> f64 {
-        if share <= 0.0 {
-            return -1.0;
-        }
-        if share >= 1.0 {
-            return 1.0;
+        if share <= 0.0 || share >= 1.0 {
+            return 2.0 * share.clamp(0.0, 1.0) - 1.0;
         }
         let goal = share * self.cumulated(1.0);
         let (mut low, mut high) = (from, 1.0);
         let mut t = from + (goal - self.cumulated(from)) / self.density(from).min(2.0);
-        for _ in 0..60 {
-            if t <= low || t >= high {
+        // The sum rises steadily, so that the bracket holds one place: after sixty halvings it is narrower than the last digit.
+        for step in 0..120 {
+            if t <= low || t >= high || step >= 60 {
                 t = 0.5 * (low + high);
             }
             let excess = self.cumulated(t) - goal;

@@ -103,15 +103,16 @@ impl Cubic {
         }
     }
 
-    /// The root in a monotone piece with a change of sign: Newton's steps, and halving where they leave the bracket, so
-    /// that it cannot be misled.
+    /// The root in a monotone piece with a change of sign: Newton's steps, and halving where they leave the bracket or have not
+    /// ended after sixty, as at a triple root. Sixty halvings leave less than the last digit of the bracket, so that the search cannot fail.
     fn root(&self, mut low: f64, mut high: f64) -> f64 {
-        const STEPS: usize = 60;
+        const NEWTON_STEPS: usize = 60;
+        const STEPS: usize = 2 * NEWTON_STEPS;
         const CLOSE: f64 = 4.0 * f64::EPSILON;
         let [_, c1, c2, c3] = self.coefficients;
         let positive_at_high = self.value(high) > 0.0;
         let mut at = 0.5 * (low + high);
-        for _ in 0..STEPS {
+        for step in 0..STEPS {
             let value = self.value(at);
             if (value > 0.0) == positive_at_high {
                 high = at;
@@ -119,7 +120,7 @@ impl Cubic {
                 low = at;
             }
             let next = at - value / (c1 + at * (2.0 * c2 + 3.0 * at * c3));
-            let next = if next > low && next < high {
+            let next = if next > low && next < high && step < NEWTON_STEPS {
                 next
             } else {
                 0.5 * (low + high)
@@ -260,6 +261,19 @@ mod tests {
                 (changes[0].0 - root).abs() < 1e-11 && changes[0].1,
                 "{changes:?}"
             );
+        }
+    }
+
+    #[test]
+    fn a_triple_root_is_found_as_well_as_a_single_one() {
+        for root in [0.3, 0.77, 1.2] {
+            let curve = |x: f64| (x - root).powi(3);
+            let slope = |x: f64| 3.0 * (x - root).powi(2);
+            let ends = [0.25, 1.5];
+            let cubic = Cubic::with_slopes(&AXIS, 3, ends.map(curve), ends.map(slope));
+            let changes: Vec<(f64, bool)> = cubic.sign_changes().collect();
+            // The value is rounded to 1e-17 there, of which the third root is taken.
+            assert!((changes[0].0 - root).abs() < 2e-5, "{root}: {changes:?}");
         }
     }
 

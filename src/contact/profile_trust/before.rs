@@ -22,6 +22,13 @@ pub fn grain(profile: &Profile) -> Grain {
     }
 }
 
+/// Do the points of a profile tell how noisy they are, or whether they lie on a polygon?
+pub fn tells_noise(profile: &Profile) -> bool {
+    let points = profile.points();
+    let whole = [0, points.at.len()];
+    noise::noise(points, whole).is_some() || noise::polygon(points, whole).is_some()
+}
+
 /// The quality of both profiles as far as it is known before the solve, with the contact modulus in MPa.
 #[must_use]
 pub fn quality(geometry: &WheelRail, modulus: f64) -> PairQuality {

@@ -10,7 +10,7 @@ use crate::contact::geometry::profile_quality::shape;
 use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::wheel_height::search::PressedGap;
-use crate::contact::profile_trust::finding::{Cause, Finding};
+use crate::contact::profile_trust::finding::{AMBIGUOUS, Cause, Finding};
 use crate::contact::profile_trust::quality::{PatchQuality, ProfileQuality};
 
 /// A body is blamed for its share of that from here on.
@@ -23,6 +23,11 @@ const COARSE_MAX: f64 = 1.5;
 const CHORD_MIN: f64 = 1.0;
 /// A straight stretch may have its points as far apart as it likes: below this ambiguity, relative to the pressure.
 const AMBIGUOUS_LEAST: f64 = 0.02;
+/// Up to this length in mm a chord is judged by its ambiguity alone, however narrow the patch is: the arcs of heads and treads are 10 to 50 mm
+/// long, so that a longer one may hide an arc that neither of the two curves through the points knows of.
+/// Population: holes and coarse points at 384 places on the pairs of the thresholds, seeds 1001 to 1004 and 2001 to 2012 of the class *damaged
+/// profile*: with this bound 38 of 487 right and 165 of 174 wrong answers are told, with 0 mm 43 and 166.
+const CHORD_HIDES_ARC: f64 = 10.0;
 /// Ambiguity relative to the largest pressure that makes a job fail.
 const AMBIGUOUS_MAX: f64 = 0.5;
 /// Pressures in MPa below this do no harm; what is open of them makes no job fail.
@@ -41,6 +46,8 @@ pub struct FoundPatch<'a> {
     pub across: [f64; 2],
     /// Largest pressure in MPa.
     pub pressure: f64,
+    /// Its part of the normal forces of all patches.
+    pub load_share: f64,
     /// Its number in the answer.
     pub number: usize,
 }
@@ -183,6 +190,7 @@ fn roughness(own: &Under, both: f64, advised: f64, modulus: f64, patch: FoundPat
         pressure: own.rough(),
         share: both / patch.pressure.max(PRESSURE_LIGHT),
         left: own.noise_left(modulus) / patch.pressure,
+        load_share: patch.load_share,
         everywhere: found.roughness.everywhere / patch.pressure,
         chord: found.chord.map(|s| own.y(s)),
         chord_length: found.chord[1] - found.chord[0],
@@ -197,9 +205,15 @@ fn roughness(own: &Under, both: f64, advised: f64, modulus: f64, patch: FoundPat
 /// Points too far apart for the width of the patch.
 fn spacing(own: &Under, patch: FoundPatch) -> Option<Finding> {
     let found = &own.found;
-    let open = found.roughness.ambiguity > AMBIGUOUS_LEAST * patch.pressure;
     let length = found.chord[1] - found.chord[0];
-    let wide = found.over_width > COARSE && open || found.over_width > COARSE_MAX;
+    let hides_arc = length > CHORD_HIDES_ARC;
+    let least = if hides_arc {
+        AMBIGUOUS_LEAST
+    } else {
+        AMBIGUOUS
+    };
+    let open = found.roughness.ambiguity > least * patch.pressure;
+    let wide = found.over_width > COARSE && open || found.over_width > COARSE_MAX && hides_arc;
     let wide = wide && length > CHORD_MIN;
     wide.then(|| Finding {
         body: own.body,
@@ -208,6 +222,7 @@ fn spacing(own: &Under, patch: FoundPatch) -> Option<Finding> {
         pressure: own.rough(),
         share: own.rough() / patch.pressure,
         left: 0.0,
+        load_share: patch.load_share,
         everywhere: 0.0,
         chord: found.chord.map(|s| own.y(s)),
         chord_length: found.chord[1] - found.chord[0],
@@ -246,6 +261,7 @@ fn place(own: &Under, patch: FoundPatch) -> Option<Finding> {
         pressure: 0.0,
         share: 0.0,
         left: 0.0,
+        load_share: patch.load_share,
         everywhere: 0.0,
         chord: y,
         chord_length: 0.0,

@@ -22,7 +22,8 @@ pub struct ProfileQuality {
     pub y_mm: [f64; 2],
     /// Largest distance of neighbouring points under the patch in mm.
     pub spacing_mm: f64,
-    /// The same over the width of the patch. From 1 on a remark says so, from 1.5 on the job fails.
+    /// The same over the width of the patch. From 1 on a remark says so, from 1.5 on the job fails, where the points leave the curve open
+    /// or are more than 10 mm apart.
     pub spacing_over_width: f64,
     /// Standard deviation of the noise of the points along the normal in µm; absent where they lie too far apart to tell.
     #[serde(skip_serializing_if = "Option::is_none", default)]

@@ -26,13 +26,28 @@ pub(crate) fn remarks(contact: &WheelTask) -> Vec<RemarkEntry> {
     let chosen = profiles.zip(contact.trust.auto).filter(|(_, auto)| *auto);
     chosen
         .map(|((profile, body), _)| {
-            let remark = Remark::SmoothingChosen {
-                profile: body.name(),
-                smoothing_mm: profile.smoothing(),
+            let remark = if before::tells_noise(profile) {
+                Remark::SmoothingChosen {
+                    profile: body.name(),
+                    smoothing_mm: profile.smoothing(),
+                }
+            } else {
+                Remark::SmoothingUndecided {
+                    profile: body.name(),
+                    spacing_mm: profile.usual_chord(),
+                }
             };
             remark.into()
         })
         .collect()
+}
+
+/// Was a smoothing to be chosen from points that do not tell their noise?
+pub(crate) fn undecided(contact: &WheelTask) -> bool {
+    let profiles = contact.geometry.profiles().into_iter();
+    profiles
+        .zip(contact.trust.auto)
+        .any(|(profile, auto)| auto && !before::tells_noise(profile))
 }
 
 /// The contact with the smoothing settled where the case leaves it to the noise: first for a pressure of 1200 MPa, then for the largest one

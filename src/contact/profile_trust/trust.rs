@@ -10,7 +10,7 @@ use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::profile::{Body, Profile};
 use crate::contact::geometry::profile_quality::holes::{Hole, holes};
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::wheel_height::search::{PressedWheel, WheelTask};
+use crate::contact::normal::wheel_height::search::{PressedGap, PressedWheel, WheelTask};
 use crate::contact::profile_trust::finding::{Cause, Finding};
 use crate::contact::profile_trust::judge::{FoundPatch, judge};
 use crate::contact::profile_trust::quality::{PatchQuality, ProfileQuality};
@@ -51,9 +51,10 @@ pub(crate) fn solve(
     for (patch, quality) in solution.patches.iter_mut().zip(qualities) {
         patch.quality = Some(quality);
     }
-    let suspicious = findings.iter().any(|finding| {
+    let rough = findings.iter().any(|finding| {
         finding.of_roughness() && finding.has_evidence() && finding.share > uncertainty::HARMLESS
     });
+    let suspicious = rough || settle::undecided(contact);
     let changes = uncertainty::add(
         operators,
         problem,
@@ -149,6 +150,7 @@ impl Judgement<'_> {
         let contact = self.contact;
         let (mut qualities, mut findings) = (Vec::new(), Vec::new());
         let mut width: f64 = 0.0;
+        let load: f64 = wheel.patches.iter().map(PressedGap::normal_force).sum();
         for gap in &wheel.patches {
             for patch in gap.field.patches() {
                 let [.., from, to] = patch.extent;
@@ -157,6 +159,7 @@ impl Judgement<'_> {
                     centre: wheel.centre,
                     across: [from, to],
                     pressure: patch.pressure_max,
+                    load_share: patch.normal_force / load,
                     number: qualities.len(),
                 };
                 let (quality, own) = judge(&contact.geometry, place, contact.contact_modulus)?;
@@ -228,6 +231,7 @@ impl Judgement<'_> {
             pressure: 0.0,
             share: 0.0,
             left: 0.0,
+            load_share: 0.0,
             everywhere: 0.0,
             chord: y,
             chord_length: length,

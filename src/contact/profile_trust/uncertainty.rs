@@ -15,6 +15,7 @@ use crate::contact::coupling::Judge;
 use crate::contact::error::SolveError;
 use crate::contact::geometry::profile::Profile;
 use crate::contact::geometry::profile_quality::flattening::noise_pressure;
+use crate::contact::geometry::profile_quality::points::SMOOTHING_ADVISED;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::wheel_height::search::{PressedWheel, WheelTask};
 use crate::contact::profile_trust::quality::{ProfileQuality, ProfileUncertainty};
@@ -26,8 +27,9 @@ use crate::contact::solution::words::{PatchSolution, Solution};
 
 /// Companions are solved with these multiples of the smoothing.
 const COMPANIONS: [f64; 2] = [0.4, 2.0];
-/// Smoothing of a companion where there is none, in mm.
+/// Smoothing of a companion where there is none, in mm, and in chords of coarse points, which a shorter one would leave as they are.
 const COMPANION_LEAST: f64 = 2.0;
+const COMPANION_CHORDS: f64 = 2.0;
 /// Waves and noise worth less than this part of the pressure need no companion.
 pub(crate) const HARMLESS: f64 = 0.03;
 /// Added to the differences: relative to the largest pressure, and to μN.
@@ -186,7 +188,12 @@ fn readings(contact: &WheelTask, solution: &Solution) -> Vec<[f64; 2]> {
         advised[1] = advised[1].max(quality.wheel.smoothing_suggested_mm);
     }
     if used == [0.0; 2] {
-        return vec![advised.map(|length| length.max(COMPANION_LEAST))];
+        let chords = contact.geometry.profiles().map(Profile::usual_chord);
+        let least = chords.map(|chord| {
+            let [_, most] = SMOOTHING_ADVISED;
+            (COMPANION_CHORDS * chord).clamp(COMPANION_LEAST, most)
+        });
+        return vec![[0, 1].map(|k| advised[k].max(least[k]))];
     }
     let with = |factor: f64| {
         [0, 1].map(|k| {

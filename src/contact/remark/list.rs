@@ -123,6 +123,20 @@ remarks! {
     advice: "Nothing; give `smoothing_mm` as a number to use the same for other cases.",
     detail: format!("{profile}: smoothed by {smoothing_mm:.2} mm, chosen from the noise of its points"),
 
+    /// The points of a profile are too few or too far apart to tell their noise from its shape, so that `smoothing_mm: "auto"` chose no smoothing.
+    SmoothingUndecided {
+        /// Whose.
+        profile: &'static str = "rail",
+        /// Median distance of its points.
+        spacing_mm: f64 = 4.0,
+    }
+    code: "smoothing-undecided",
+    severity: Warning,
+    advice: "Send points that lie nearer to each other, 0.25 mm at gauge corner and flange, or give `smoothing_mm` as a number.",
+    detail: format!(
+        "{profile}: points {spacing_mm:.1} mm apart do not tell noise from shape, so that no smoothing could be chosen; none is in use"
+    ),
+
     /// One point of a profile near the contact is off the curve of its neighbours.
     ProfileOutlier {
         /// Whose.
@@ -323,6 +337,20 @@ remarks! {
     advice: "Better points help, a smaller target does not.",
     detail: format!(
         "the profiles leave {:.1} % of μN open, more than the target of {:.1} %", 100.0 * uncertainty, 100.0 * target
+    ),
+
+    /// A patch reaches the line on the rail at which the contact was divided between two planes of contact. It ends there by that division, not
+    /// as a contact does: if its largest pressure lies on that line, it grows with the fineness of the grid.
+    PatchCut {
+        /// y of the line on the cross-section of the rail.
+        rail_y_mm: f64 = -18.4,
+    }
+    code: "patch-cut",
+    severity: Warning,
+    advice: "Do not use pressures near that line, nor the largest one if `gap-rough` stands beside this. Two patches have grown into one that bends; under less load they are two.",
+    detail: format!(
+        "the patch reaches the line y = {rail_y_mm:.2} mm on the rail, where the contact is divided between two planes: its edge and its \
+         pressure there are those of the division"
     ),
 
     /// The rail turns over the contact by so much that a plane of contact and half-spaces describe it roughly.
@@ -596,67 +624,4 @@ remarks! {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::collections::BTreeSet;
-
-    use super::*;
-    use crate::contact::remark::entry::RemarkEntry;
-
-    #[test]
-    fn every_code_is_listed_once_and_documented() {
-        let kinds = Remark::kinds();
-        assert_eq!(kinds.len(), Remark::examples().len());
-        let codes: BTreeSet<_> = kinds.iter().map(|kind| kind.code).collect();
-        assert_eq!(codes.len(), kinds.len(), "a code stands twice");
-        for kind in kinds {
-            let words = kind.code.split('-');
-            let kebab =
-                |word: &str| !word.is_empty() && word.chars().all(|c| c.is_ascii_lowercase());
-            assert!(
-                words.into_iter().all(kebab),
-                "{} is no kebab-case",
-                kind.code
-            );
-            for text in [kind.meaning, kind.advice] {
-                assert!(
-                    text.len() > 15 && text.ends_with('.'),
-                    "{}: {text}",
-                    kind.code
-                );
-            }
-            assert!(
-                kind.example.len() > 15 && !kind.example.ends_with('.'),
-                "{}: {}",
-                kind.code,
-                kind.example
-            );
-        }
-    }
-
-    #[test]
-    fn figures_have_names_of_their_own() {
-        let members = serde_json::to_value(RemarkEntry {
-            patch: Some(0),
-            point: Some(0),
-            also_at_points: vec![[1, 2]],
-            pointer: Some(String::new()),
-            ..Remark::GapRough {}.into()
-        });
-        let members = members.unwrap();
-        for (kind, example) in Remark::kinds().iter().zip(Remark::examples()) {
-            assert!(
-                kind.figures.iter().all(|name| members.get(name).is_none()),
-                "{} has a figure named as a member of every remark",
-                kind.code
-            );
-            let given = example.figures();
-            let left_out = kind.figures.len() - given.len();
-            // Of optional figures at least one is shown.
-            assert!(
-                left_out == 0 || !given.is_empty(),
-                "{}: {given:?}",
-                kind.code
-            );
-        }
-    }
-}
+mod tests;

@@ -2,6 +2,7 @@
 
 use crate::contact::case::problem::Problem;
 use crate::contact::geometry::contact_locus::Frame;
+use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::wheel_height::search::{PressedGap, PressedWheel};
 use crate::contact::remark::entry::{RemarkEntry, merged};
@@ -24,13 +25,15 @@ const FRAME: &str = "every patch in its own axes: x along rolling (leading edge 
 /// `total` holds the sums in track axes: `F_x`, `F_y cos α + N sin α` across, `F_y sin α − N cos α` upward, with the contact angle α and
 /// the normal force N, and the moment about the vertical line through the load centre of all patches, to which a part adds
 /// `M_z cos α` and its forces times their distance.
-#[must_use]
+///
+/// # Errors
+/// Rail or wheel were not found over the load centre of a patch, or the rail over its ends.
 pub fn merge(
     problem: &Problem,
     geometry: &WheelRail,
     wheel: &PressedWheel,
     answers: Vec<(Solution, Fields)>,
-) -> (Solution, Fields) {
+) -> Result<(Solution, Fields), SurfaceMissed> {
     let parts: Vec<Part> = wheel.patches.iter().map(Part::new).collect();
     let origin = load_centre(&parts);
     let motions = answers.first().map_or(0, |(first, _)| first.total.len());
@@ -52,13 +55,11 @@ pub fn merge(
         let own = gap.remarks.iter().chain(&solution.remarks);
         remarks.extend(own.map(|remark| in_wheel(remark, before, alone)));
         for (k, patch) in solution.patches.iter_mut().enumerate() {
-            // Every load centre was found when the gap was solved, up to the correction of the height.
-            let place = geometry
-                .moved(&gap.frame, gap.field.load_centre(Some(k)), wheel.centre)
-                .unwrap_or(gap.frame);
+            let centre = gap.field.load_centre(Some(k));
+            let place = geometry.moved(&gap.frame, centre, wheel.centre)?;
             patch.position = Some(position(geometry, &place, &gap.frame));
             let [.., y_min, y_max] = patch.extent_mm;
-            let turn = turn(geometry, gap, [y_min, y_max]);
+            let turn = turn(geometry, gap, [y_min, y_max])?;
             if turn > TURN_USUAL_MAX {
                 let remark = Remark::ContactTurns { turn_rad: turn };
                 remarks.push(remark.at_patch(before + k));
@@ -89,7 +90,7 @@ pub fn merge(
         frame: FRAME.to_owned(),
         ..solution
     };
-    (solution, fields)
+    Ok((solution, fields))
 }
 
 /// A remark on a part of the contact whose first patch has this number in the whole; one on the part as such is given to that
@@ -106,13 +107,14 @@ fn in_wheel(remark: &RemarkEntry, first: usize, alone: bool) -> RemarkEntry {
 }
 
 /// By how much the rail's inclination changes over a patch, in rad.
-fn turn(geometry: &WheelRail, gap: &PressedGap, across: [f64; 2]) -> f64 {
-    let [low, high] = across.map(|y| {
-        let rail = geometry.rail_over(&gap.frame, y);
+fn turn(geometry: &WheelRail, gap: &PressedGap, across: [f64; 2]) -> Result<f64, SurfaceMissed> {
+    let inclination = |y: f64| {
+        let rail = geometry.rail_over(&gap.frame, y)?;
         let [y, z] = geometry.rail_at(rail).tangent();
-        (z / y).atan()
-    });
-    (high - low).abs()
+        Ok((z / y).atan())
+    };
+    let [low, high] = across;
+    Ok((inclination(high)? - inclination(low)?).abs())
 }
 
 /// A part of the contact in track axes.

@@ -7,12 +7,27 @@ const NOISE_CHORDS: usize = 4;
 const NOISE_SPAN_MAX: f64 = 3.0;
 /// Windows that a median needs.
 const WINDOWS_MIN: usize = 12;
+/// Windows of coarse points that a quartile needs, and their greatest length in mm.
+const COARSE_WINDOWS_MIN: usize = 30;
+const COARSE_SPAN_MAX: f64 = 12.0;
+/// A quarter of the absolute values of a normal variable of deviation 1 are less.
+const QUARTILE_OF_NORMAL: f64 = 0.3186;
+/// What the quartile makes of shape, in mm for points 1 mm apart; it grows with the fourth power of their distance.
+///
+/// Population: sound rails and wheels of the class *damaged profile* with true points 0.8 to 4 mm apart: 0.002 to 0.1 µm at 1 mm, each of them
+/// below this; noise of 1 µm at 1.7 mm, 3 µm at 2.5 mm is above it.
+const COARSE_SHAPE: f64 = 6e-5;
+/// Up to this distance of the points in mm the shape of sound profiles makes less than 0.2 µm, worth 1 % of a usual pressure.
+const COARSE_TELLS: f64 = 1.8;
 /// Median of the absolute value of a normal variable of deviation 1.
 pub const MEDIAN_OF_NORMAL: f64 = 0.6745;
 /// A point is odd from this many local medians and this distance in mm on.
 /// Population: seeded damage of the stress bench (class *damaged profile*); outliers of 2 µm may be worth half of the largest pressure.
 const ODD_MEDIANS: f64 = 12.0;
 const ODD_MIN: f64 = 1.2e-3;
+/// Points farther apart than this, in mm, are off by the square of their distance more where the curvature jumps: arcs that meet, the
+/// polynomials of a tread.
+const ODD_SPACING: f64 = 0.25;
 const ODD_WINDOW: usize = 15;
 /// Longest stretch in mm over which six neighbours are taken for points of one cubic.
 const ODD_SPAN_MAX: f64 = 3.5;
@@ -49,36 +64,60 @@ pub struct Step {
 /// The fourth divided difference of five neighbours, `Σ w_i h_i` with `w_i = 1/Π_{j≠i}(t_i − t_j)` and `Σ w_i² = 1`, vanishes on every
 /// cubic; of white noise of deviation s it has the deviation s. The median of its size over 0.6745 is s, whatever single
 /// outliers do. (Correlated noise, as an instrument leaves that filters, is not seen.)
+///
+/// Over points more than 0.75 mm apart half of the windows may see arcs meet. There the lower quartile over 0.3186 is s, if it is more
+/// than the shape itself makes of it.
 #[must_use]
 pub fn noise(points: Points, range: [usize; 2]) -> Option<f64> {
-    let mut found = Vec::new();
+    let (mut fine, mut coarse) = (Vec::new(), Vec::new());
+    let mut length = 0.0;
     for window in points.at[range[0]..range[1]].windows(NOISE_CHORDS + 1) {
-        let local = in_chord(window);
-        let span = local[NOISE_CHORDS][0] - local[0][0];
-        if span > NOISE_SPAN_MAX || span <= 0.0 {
+        let Some((span, difference)) = fourth_difference(window) else {
             continue;
-        }
-        let weight = |i: usize| -> f64 {
-            let others = (0..=NOISE_CHORDS).filter(|j| *j != i);
-            1.0 / others
-                .map(|j| (local[i][0] - local[j][0]) / span)
-                .product::<f64>()
         };
-        let weights: Vec<f64> = (0..=NOISE_CHORDS).map(weight).collect();
-        let length = weights.iter().map(|w| w * w).sum::<f64>().sqrt();
-        let sum: f64 = weights.iter().zip(&local).map(|(w, at)| w * at[1]).sum();
-        if (sum / length).is_finite() {
-            found.push((sum / length).abs());
+        if span <= NOISE_SPAN_MAX {
+            fine.push(difference);
+        } else if span <= COARSE_SPAN_MAX {
+            coarse.push(difference);
+            length += span;
         }
     }
-    (found.len() >= WINDOWS_MIN).then(|| median(&mut found) / MEDIAN_OF_NORMAL)
+    if fine.len() >= WINDOWS_MIN {
+        return Some(median(&mut fine) / MEDIAN_OF_NORMAL);
+    }
+    if coarse.len() < COARSE_WINDOWS_MIN {
+        return None;
+    }
+    let spacing = length / (NOISE_CHORDS * coarse.len()) as f64;
+    coarse.sort_by(f64::total_cmp);
+    let found = coarse[coarse.len() / 4] / QUARTILE_OF_NORMAL;
+    // What shape makes of points that lie near enough is harmless as well.
+    (spacing <= COARSE_TELLS || found > COARSE_SHAPE * spacing.powi(4)).then_some(found)
+}
+
+/// Length of the chord over five points in mm, and the size of their normalised fourth divided difference in mm.
+fn fourth_difference(window: &[[f64; 2]]) -> Option<(f64, f64)> {
+    let local = in_chord(window);
+    let span = local[NOISE_CHORDS][0] - local[0][0];
+    let weight = |i: usize| -> f64 {
+        let others = (0..=NOISE_CHORDS).filter(|j| *j != i);
+        1.0 / others
+            .map(|j| (local[i][0] - local[j][0]) / span)
+            .product::<f64>()
+    };
+    let weights: Vec<f64> = (0..=NOISE_CHORDS).map(weight).collect();
+    let length = weights.iter().map(|w| w * w).sum::<f64>().sqrt();
+    let sum: f64 = weights.iter().zip(&local).map(|(w, at)| w * at[1]).sum();
+    let difference = (sum / length).abs();
+    (span > 0.0 && difference.is_finite()).then_some((span, difference))
 }
 
 /// The farthest outlier and the largest step of a range: points that stand out from the cubic through their six neighbours (least
-/// squares) by more than 12 local medians, 1.2 µm at least, and more than the points beside them.
+/// squares) by more than 12 local medians, 1.2 µm at least (more where points are coarse), and more than the points beside them.
 ///
 /// A step of the height h between two points puts both off by h/2, to either side; an outlier puts its neighbours off by 0.43 of its
-/// own distance. Where two arcs meet, the curvature jumps by some 0.06/mm, which puts points 0.25 mm apart off by 0.2 µm.
+/// own distance. Where two arcs meet, the curvature jumps by some 0.06/mm, which puts points 0.25 mm apart off by 0.2 µm, by the square of
+/// their distance more where they lie farther apart.
 #[must_use]
 pub fn oddities(points: Points, range: [usize; 2]) -> (Option<Outlier>, Option<Step>) {
     let around = [
@@ -93,7 +132,9 @@ pub fn oddities(points: Points, range: [usize; 2]) -> (Option<Outlier>, Option<S
     for here in range[0] - around[0]..range[1] - around[0] {
         let own = size(here);
         let near = here.saturating_sub(3)..(here + 4).min(off.len());
-        if own < ODD_MIN || near.clone().any(|j| size(j) > own) {
+        let here_spacing = spacing_around(points, around[0] + here);
+        let least = ODD_MIN * (here_spacing / ODD_SPACING).powi(2).max(1.0);
+        if own < least || near.clone().any(|j| size(j) > own) {
             continue;
         }
         let far = here.saturating_sub(ODD_WINDOW)..(here + ODD_WINDOW + 1).min(off.len());
@@ -128,6 +169,12 @@ pub fn oddities(points: Points, range: [usize; 2]) -> (Option<Outlier>, Option<S
         }
     }
     (outlier, step)
+}
+
+/// Mean distance in mm of the seven points about one, as far as they are there.
+fn spacing_around(points: Points, k: usize) -> f64 {
+    let (first, last) = (k.saturating_sub(3), (k + 3).min(points.along.len() - 1));
+    (points.along[last] - points.along[first]) / (last - first).max(1) as f64
 }
 
 /// How far a point lies above the cubic through its six neighbours (least squares), in mm.
@@ -326,6 +373,21 @@ mod tests {
         let clean = with(&arc(400), noise).expect("enough points");
         assert!(clean < 1e-7, "{clean}");
         assert_eq!(with(&arc(8), noise), None, "too few to tell");
+    }
+
+    #[test]
+    fn coarse_points_tell_noise_that_is_more_than_what_their_shape_looks_like() {
+        let every = |step: usize| arc(400).into_iter().step_by(step);
+        let mut noisy: Vec<[f64; 2]> = every(6).collect();
+        let numbers = normal(noisy.len());
+        noisy
+            .iter_mut()
+            .zip(&numbers)
+            .for_each(|(at, n)| at[1] += 0.005 * n);
+        let found = with(&noisy, noise).expect("1.8 mm tell 5 µm");
+        assert!((found / 0.005 - 1.0).abs() < 0.5, "{found}");
+        let clean: Vec<[f64; 2]> = every(10).collect();
+        assert_eq!(with(&clean, noise), None, "3 mm and no noise");
     }
 
     #[test]

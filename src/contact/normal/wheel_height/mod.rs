@@ -1,4 +1,5 @@
 //! The height of a wheel above the rail at which normal forces carry its load.
 
 pub mod bracket;
+pub mod gap_remarks;
 pub mod search;

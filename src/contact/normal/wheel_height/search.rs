@@ -9,7 +9,6 @@ use std::f64::consts::PI;
 
 use crate::contact::geometry::contact_locus::{ContactLocus, Frame};
 use crate::contact::geometry::local_gap::{Detail, LocalGap};
-use crate::contact::geometry::surface_exit::SurfaceExit;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::answer::{NormalError, NormalWork};
@@ -19,6 +18,7 @@ use crate::contact::normal::hertz::Pressing;
 use crate::contact::normal::neighbours::{Neighbour, neglected};
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::normal::wheel_height::bracket::{Bracket, HeightExit};
+use crate::contact::normal::wheel_height::gap_remarks::{cut_patches, missed_beside};
 use crate::contact::profile_trust::trust::Trust;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
@@ -35,7 +35,6 @@ const CORRECTED: f64 = 1.0 / 3.0;
 const NEAR: f64 = 0.02;
 /// A patch that overlaps by less than this part of the deepest overlap carries nothing to speak of (about its power 3/2).
 const DEPTH_SHARE_MIN: f64 = 2e-3;
-
 /// What presses the wheel on the rail.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum WheelLoad {
@@ -392,6 +391,10 @@ impl WheelTask {
         };
         let mut remarks = found.remarks;
         remarks.extend(missed_beside(gap, &found.field));
+        if fineness.detail == Detail::Fine {
+            let cut = cut_patches(&self.geometry, gap, &found.field);
+            remarks.extend(cut.map_err(|miss| NormalError::NoAnswer(miss.to_string()))?);
+        }
         let moved = |to: [f64; 2]| {
             let place = self.geometry.moved(&gap.frame, to, centre);
             place.map_err(|miss| NormalError::NoAnswer(miss.to_string()))
@@ -449,30 +452,6 @@ impl WheelTask {
         // The power 3/2 of Hertz's contacts is a bound for anything that grows as it is pressed.
         slope.max(carried / found.lowering)
     }
-}
-
-/// A remark on samples of a gap over which the wheel's surface was not found, if some lie in a patch or next to it: elsewhere
-/// the bodies are apart all the same.
-fn missed_beside(gap: &LocalGap, field: &PressureField) -> Option<RemarkEntry> {
-    let spacing = |axis: &[f64]| axis[1] - axis[0];
-    let [along, across] = [spacing(&gap.x), spacing(&gap.y)];
-    let patches = field.patches();
-    let beside = |[x, y]: &[f64; 2]| {
-        patches.iter().any(|patch| {
-            let [x_min, x_max, y_min, y_max] = patch.extent;
-            (x_min - along..=x_max + along).contains(x)
-                && (y_min - across..=y_max + across).contains(y)
-        })
-    };
-    let count = gap.missed.iter().filter(|place| beside(place)).count();
-    let share = count as f64 / (gap.x.len() * gap.y.len()) as f64;
-    let remark = Remark::IterationInexact {
-        iteration: "samples of the wheel's surface over the plane of contact",
-        reason: SurfaceExit::StepsUsedUp.reason(),
-        residual: share,
-        tolerance: 0.0,
-    };
-    (count > 0).then(|| remark.into())
 }
 
 /// Deepest overlap of a gap in mm.
