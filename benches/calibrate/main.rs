@@ -3,7 +3,7 @@
 //! `cargo bench --bench calibrate` prints the tables for the halves of every class (the first for fitting, the second for
 //! checking); with names of classes (`ellipse smooth jump gap profiles`) those alone. Truths come from
 //! `tests/data/finer_meshes.json`; `-- truths [classes]` finds the missing ones, some seconds each; `-- continuity`
-//! prints how the estimate changes along a sweep.
+//! prints how the estimate changes along a sweep, `-- case gap 42` one case as JSON.
 
 mod continuity;
 mod finer;
@@ -39,6 +39,15 @@ fn main() {
         return;
     }
     let has = |name: &str| arguments.iter().any(|argument| argument == name);
+    if let [_, "case", class, number, ..] | ["case", class, number, ..] =
+        arguments.iter().map(String::as_str).collect::<Vec<_>>()[..]
+    {
+        let class = CLASSES.into_iter().find(|known| known.name() == class);
+        if let (Some(class), Ok(number)) = (class, number.parse()) {
+            println!("{}", case(class, number));
+        }
+        return;
+    }
     if has("continuity") {
         continuity::table();
         return;

@@ -226,6 +226,32 @@ pub fn relative(case: &Value, solution: &Solution) -> ([f64; 3], f64) {
     (relative, estimate)
 }
 
+/// Largest difference of F_x/μN, F_y/μN and M_z/(μN√(A/π)) of two answers to one case, about the middle of the load of the second and in
+/// its units: moments about a distant origin would tell the difference of the areas.
+pub fn difference(case: &Value, answer: &Solution, exact: &Solution) -> f64 {
+    let friction = case["friction"]["coefficient"].as_f64().unwrap_or(0.0);
+    let (mut load, mut area, mut centre) = (0.0, 0.0, [0.0; 2]);
+    for patch in &exact.patches {
+        let [x_min, x_max, y_min, y_max] = patch.extent_mm;
+        load += patch.normal_force_n;
+        area += patch.area_mm2;
+        centre[0] += 0.5 * (x_min + x_max) * patch.normal_force_n;
+        centre[1] += 0.5 * (y_min + y_max) * patch.normal_force_n;
+    }
+    let centre = centre.map(|moment| moment / load);
+    let sum = |solution: &Solution| {
+        let total = &solution.total[0];
+        let sum = Resultants {
+            force_x: total.force_x_n,
+            force_y: total.force_y_n,
+            moment_z: total.moment_z_n_mm,
+        };
+        sum.about(centre)
+    };
+    let length = (area / std::f64::consts::PI).sqrt();
+    sum(answer).distance(&sum(exact), friction * load, length)
+}
+
 /// Power that the cells turn to heat over what the motion puts in, minus 1, where enough slips to tell.
 pub fn energy(solution: &Solution, fields: &Fields) -> Option<f64> {
     let mut heat = 0.0;

@@ -1,8 +1,8 @@
 //! Stability: thousands of cases from all over the allowed ground, every answer held against the laws of contact.
 //!
 //! `cargo bench --bench stress [-- cases seed]` prints the table and writes it to `docs/stability.md`; it ends with an error if a
-//! case crashes, hangs or breaks a law. `-- --only creep-map`, `-- --only sweep-with-zones` and `-- --only damaged-profile` print one
-//! section.
+//! case crashes, hangs or breaks a law. `-- --only` with `times`, `creep-map`, `sweep-with-zones` or `damaged-profile` prints one
+//! section, `-- --case 1511` one case as JSON.
 
 mod condition;
 mod contacts;
@@ -16,6 +16,7 @@ mod profile_reference_files;
 mod profile_shapes;
 mod random;
 mod sweeps;
+mod times;
 mod trial;
 
 use std::collections::BTreeMap;
@@ -43,6 +44,7 @@ struct Row {
     from_liu_hsu: Vec<f64>,
     /// True error and estimate.
     errors: Vec<(f64, f64)>,
+    times: times::Times,
 }
 
 /// What went wrong, in words.
@@ -59,15 +61,26 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().collect();
     if let Some(at) = arguments.iter().position(|argument| argument == "--only") {
         let section = match arguments.get(at + 1).map(String::as_str) {
+            Some("times") => times::table(CASES / 2, SEED + 1),
             Some("creep-map") => sweeps::creep_maps(),
             Some("sweep-with-zones") => sweeps::with_zones(),
             Some("damaged-profile") => damaged_table::tables(SEED),
             _ => {
-                eprintln!("--only takes creep-map, sweep-with-zones or damaged-profile");
+                eprintln!("--only takes times, creep-map, sweep-with-zones or damaged-profile");
                 return ExitCode::FAILURE;
             }
         };
         println!("{section}");
+        return ExitCode::SUCCESS;
+    }
+    if let Some(at) = arguments.iter().position(|argument| argument == "--case") {
+        let number = arguments.get(at + 1).and_then(|text| text.parse().ok());
+        let found = number.and_then(|number: usize| samples(number + 1, SEED).nth(number));
+        let Some(sample) = found else {
+            eprintln!("--case takes the number of a case");
+            return ExitCode::FAILURE;
+        };
+        println!("{}", sample.case);
         return ExitCode::SUCCESS;
     }
     let mut numbers = std::env::args()
@@ -111,6 +124,7 @@ impl Row {
         self.energy.extend(trial.energy.map(f64::abs));
         self.from_liu_hsu.extend(trial.from_liu_hsu);
         self.errors.extend(trial.error);
+        self.times.extend(trial.times);
     }
 }
 
@@ -205,6 +219,9 @@ fn report(count: usize, seed: u64, rows: &BTreeMap<&str, Row>, troubles: &Troubl
          largest difference of F_x/μN, F_y/μN, M_z/(μN√(A/π)) from the paper's method on the same mesh, where both converge.\n\n",
     );
     text.push_str(&accuracy(rows));
+    text.push_str(&times::section(
+        rows.iter().map(|(kind, row)| (*kind, &row.times)),
+    ));
     text.push_str(&sweeps::creep_maps());
     text.push_str(&sweeps::with_zones());
     text.push_str(&condition::section());

@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
+use cpu_time::ThreadTime;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::{Monitor, Stop};
@@ -12,7 +13,7 @@ use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 
 use super::contacts::{Sample, reversed, scaled};
-use super::laws::{broken, energy, relative};
+use super::laws::{broken, difference, energy, relative};
 
 /// A solve that takes longer hangs.
 const HANGS_AFTER: Duration = Duration::from_secs(60);
@@ -53,6 +54,8 @@ pub struct Trial {
     pub from_liu_hsu: Option<f64>,
     /// True error and estimate.
     pub error: Option<(f64, f64)>,
+    /// Processor seconds taken, and expected.
+    pub times: Option<[f64; 2]>,
 }
 
 struct Clock(Instant);
@@ -71,18 +74,32 @@ impl Monitor for Clock {
 }
 
 fn attempt(case: &Value) -> Result<(Solution, Fields), End> {
+    attempt_timed(case).map(|(answer, _)| answer)
+}
+
+/// Processor seconds that a case takes, and the expected ones.
+pub fn timed(case: &Value) -> Option<[f64; 2]> {
+    attempt_timed(case).ok().map(|(_, times)| times)
+}
+
+fn attempt_timed(case: &Value) -> Result<((Solution, Fields), [f64; 2]), End> {
     let limits = Limits {
         memory_bytes: 4 << 30,
         ..Limits::default()
     };
-    let work = || -> Result<(Solution, Fields), End> {
+    let work = || -> Result<((Solution, Fields), [f64; 2]), End> {
         let problem = check(case, &limits).map_err(|error| End::Refused(error.to_string()))?;
-        solve(&problem, &Clock(Instant::now())).map_err(|error| match error {
+        let began = ThreadTime::now();
+        let answer = solve(&problem, &Clock(Instant::now())).map_err(|error| match error {
             SolveError::NormalProblem { reason } => End::Refused(reason),
             SolveError::Unmeshable { .. } => End::Refused(error.to_string()),
             SolveError::NotConverged { .. } => End::NotConverged(error.to_string()),
             error => End::Failed(format!("hangs: {error}")),
-        })
+        })?;
+        Ok((
+            answer,
+            [began.elapsed().as_secs_f64(), problem.cost().seconds],
+        ))
     };
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| Err(End::Failed("crashes".to_owned())))
 }
@@ -97,9 +114,13 @@ pub fn trial(sample: &Sample) -> Trial {
         energy: None,
         from_liu_hsu: None,
         error: None,
+        times: None,
     };
-    let (solution, fields) = match attempt(&sample.case) {
-        Ok(answer) => answer,
+    let (solution, fields) = match attempt_timed(&sample.case) {
+        Ok((answer, times)) => {
+            trial.times = Some(times);
+            answer
+        }
         Err(end) => {
             trial.end = end;
             return trial;
@@ -149,9 +170,8 @@ pub fn trial(sample: &Sample) -> Trial {
         finer["solver"] = json!({ "target_error": (target / FINER).max(3e-4) });
         finer["outputs"] = json!(["resultants"]);
         if let Ok((exact, _)) = attempt(&finer) {
-            let exact = relative(&finer, &exact);
-            let error = distance(found.0, exact.0);
-            trial.error = Some((error, found.1 + exact.1));
+            let error = difference(&finer, &solution, &exact);
+            trial.error = Some((error, found.1 + relative(&finer, &exact).1));
         }
     }
     trial

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::contact::case::problem::Problem;
+use crate::contact::case::solve_time::SolveTime;
 use crate::contact::error::SolveError;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::remark::entry::merged;
@@ -26,7 +27,7 @@ const NORMAL_TIMES: f64 = 10.0;
 #[must_use]
 pub fn slices(problem: &Problem) -> Vec<Range<usize>> {
     let motions = problem.motions.len();
-    let (whole, normal) = (problem.cost().seconds, problem.normal_seconds());
+    let SolveTime { whole, normal } = problem.solve_time();
     let each = (whole - normal).max(0.0) / motions as f64;
     let wanted = SLICE_SECONDS.max(NORMAL_TIMES * normal) / each.max(f64::MIN_POSITIVE);
     // Nearly equal parts, so that no short one is left over.

@@ -1,6 +1,6 @@
 //! The checks of a case: every part by itself, all faults at once.
 
-use crate::contact::case::cost::CostInput;
+use crate::contact::case::cost::SizeInput;
 use crate::contact::case::limits::Limits;
 use crate::contact::case::motions::ExpandedMotions;
 use crate::contact::case::resolution::resolution;
@@ -73,7 +73,7 @@ impl CheckedParts {
             faults.extend(expanded.faults(motion, limit, of_profiles));
         }
         if let Some(solver) = given.solver {
-            let size = CostInput {
+            let size = SizeInput {
                 method: solver.method.into(),
                 resolution: resolution(solver),
                 // What is not known counts as the least it can be.
@@ -81,7 +81,6 @@ impl CheckedParts {
                     .as_ref()
                     .map_or_else(|| vec![1.0], |(region, _)| cost::segments(region)),
                 motions: motions.as_ref().map_or(1, |m| m.motions.len()),
-                forces: motions.as_ref().map_or_else(Vec::new, |m| m.forces.clone()),
                 fields: given
                     .outputs
                     .iter()
@@ -89,9 +88,6 @@ impl CheckedParts {
                 ellipse: region
                     .as_ref()
                     .and_then(|(region, _)| cost::length_over_width(region)),
-                normal_seconds: region
-                    .as_ref()
-                    .map_or(0.0, |(region, _)| cost::normal_seconds(region)),
             };
             faults.extend(size.faults(limits));
         }

@@ -1,14 +1,11 @@
-//! What a case will cost, estimated from its finest mesh before it is queued.
+//! What a case will cost, estimated before it is queued: memory from its finest mesh, time from its motions (`solve_time.rs`).
 
 use crate::contact::case::limits::Limits;
 use crate::contact::case::problem::Problem;
 use crate::contact::case::words::Output;
 use crate::contact::error::Fault;
-use crate::contact::half_space::strip_operator::kind::Precision;
 use crate::contact::normal::region::Region;
-use crate::contact::profile_trust::before;
 use crate::contact::rolling::methods::method::Method;
-use crate::contact::rolling::motion::PrescribedForces;
 use crate::contact::rolling::operator_store::OperatorKind;
 use crate::contact::rolling::refinement::levels::LEVELS_KEPT;
 use crate::contact::rolling::refinement::mesh_policy::{CELLS_MAX, MeshPolicy};
@@ -18,20 +15,6 @@ use crate::contact::rolling::task::precision_of;
 /// Cells of the finest mesh for a target of 0.02, on average, and how they grow as it falls.
 const TARGET_CELLS: f64 = 160.0;
 const TARGET_GROWTH: f64 = 0.65;
-/// Time of one solve for a target of 0.005 in s, how steeply it grows as the target falls, and the target below which the largest
-/// mesh is the end: medians of 50 Hertz contacts with random motions, which spread by a factor of 3 (`cargo bench --bench stress -- --only
-/// creep-map` prints estimates beside times).
-const TARGET_SECONDS: f64 = 1.6e-3;
-const TARGET_USUAL: f64 = 0.005;
-const TARGET_STEEP: f64 = 1.5;
-const TARGET_LEAST: f64 = 2e-4;
-/// How much longer products in double precision take, and part of a lone solve that one within a sweep takes.
-const DOUBLE_TIMES: f64 = 2.5;
-const SWEEP_SHARE: f64 = 0.4;
-/// Explicit meshes with so many cells have matrices that no cache holds.
-const MESH_CELLS_SLOW: f64 = 1600.0;
-/// Time to gather and pack values per cell, in s.
-const FIELDS_SECONDS_PER_CELL: f64 = 3e-7;
 /// Cells that a patch has at least.
 const PATCH_CELLS_MIN: f64 = 64.0;
 /// Patches of a longer shape are not for the fast solver: its preconditioner knows each strip for itself, and where strips lie closer than
@@ -40,8 +23,6 @@ const PATCH_CELLS_MIN: f64 = 64.0;
 const LENGTH_OVER_WIDTH_MAX: f64 = 60.0;
 /// Cells the dense method may use.
 const LIU_HSU_CELLS_MAX: f64 = 1000.0;
-/// Solves that the search for a prescribed force takes beside the last, on average.
-const TRIALS: f64 = 6.0;
 /// Dense square matrices the method of Liu and Hsu holds at once.
 const LIU_HSU_MATRICES: f64 = 4.0;
 /// Doubles per cell of the finest mesh that an iteration holds: the Krylov space, iterates and buffers.
@@ -55,9 +36,9 @@ const MOTION_BYTES: f64 = 2000.0;
 /// Bytes per cell and motion of fields, in the answer and in their stored form.
 const FIELDS_BYTES_PER_CELL: f64 = 160.0;
 
-/// What decides how much a solve costs.
+/// What decides how much memory a solve takes.
 #[derive(Debug, Clone)]
-pub(crate) struct CostInput {
+pub(crate) struct SizeInput {
     pub(crate) method: Method,
     pub(crate) resolution: Resolution,
     /// Segments per strip, for each patch.
@@ -65,28 +46,14 @@ pub(crate) struct CostInput {
     pub(crate) motions: usize,
     /// Values per cell are kept motion by motion.
     pub(crate) fields: bool,
-    /// Forces prescribed in place of creepages, motion by motion.
-    pub(crate) forces: Vec<PrescribedForces>,
     /// Length over width of an ellipse; nothing for other regions.
     pub(crate) ellipse: Option<f64>,
-    /// Time to find region and pressure, in s.
-    pub(crate) normal_seconds: f64,
-}
-
-/// Time to find region and pressure, in s: that of a gap, or of the few heights of a wheel with a gap or two at each, once more for every other
-/// reading of its profiles.
-pub(crate) fn normal_seconds(region: &Region) -> f64 {
-    match region {
-        Region::Ellipse(_) | Region::Grid(_) => 0.0,
-        Region::Gap(contact) => 0.005 * contact.summits() as f64,
-        Region::Profiles(contact) => 0.04 * f64::from(1 + before::readings_expected(contact)),
-    }
 }
 
 /// Segments per strip of every patch; of a gap, whose patches are not known yet, one for every summit.
 pub(crate) fn segments(region: &Region) -> Vec<f64> {
     match region {
-        Region::Gap(contact) => vec![1.0; contact.summits()],
+        Region::Gap(contact) => vec![1.0; contact.outlook().summits],
         Region::Ellipse(_) | Region::Grid(_) | Region::Profiles(_) => region.segments_per_strip(),
     }
 }
@@ -104,95 +71,44 @@ impl Problem {
     /// the answer. What the process keeps for all cases, the operator store, comes on top. Seconds are rough.
     #[must_use]
     pub fn cost(&self) -> Cost {
-        CostInput {
+        Cost {
+            bytes: self.size_input().bytes() as u64,
+            seconds: self.solve_time().whole,
+        }
+    }
+
+    /// What decides how much memory this takes.
+    pub(crate) fn size_input(&self) -> SizeInput {
+        let fields = |output: &Output| *output != Output::Resultants;
+        SizeInput {
             method: self.method,
             resolution: self.resolution,
             segments: segments(&self.region),
             motions: self.motions.len(),
-            fields: self
-                .outputs
-                .iter()
-                .any(|output| *output != Output::Resultants),
-            forces: self.forces.clone(),
+            fields: self.outputs.iter().any(fields),
             ellipse: length_over_width(&self.region),
-            normal_seconds: normal_seconds(&self.region),
         }
-        .cost()
     }
 }
 
-impl CostInput {
-    fn cost(&self) -> Cost {
-        let (cells, segments) = self.finest();
-        let motions = self.motions as f64;
-        let prescribed = self
-            .forces
-            .iter()
-            .filter(|forces| **forces != [None; 2])
-            .count();
-        let solves = motions + TRIALS * prescribed as f64;
-        let each = self.solve_seconds(cells);
-        let first = self.first_seconds(cells);
-        let fields = if self.fields {
-            FIELDS_SECONDS_PER_CELL * motions * self.usual_cells(cells)
+impl SizeInput {
+    /// Cells of the finest mesh over all patches.
+    pub(crate) fn cells(&self) -> f64 {
+        self.finest().0
+    }
+
+    /// Cells whose values are kept of each motion.
+    pub(crate) fn field_cells(&self) -> f64 {
+        if self.fields {
+            self.usual_cells(self.cells())
         } else {
             0.0
-        };
-        let seconds = first + each * solves + fields;
-        Cost {
-            bytes: self.bytes(cells, segments) as u64,
-            seconds: seconds + self.normal_seconds,
         }
-    }
-
-    /// Time of a solve in s that others of the same sweep came before.
-    fn solve_seconds(&self, cells: f64) -> f64 {
-        match (self.method, self.resolution) {
-            (Method::BoundaryElement, Resolution::Target(target)) => {
-                SWEEP_SHARE * self.target_seconds(target, cells)
-            }
-            (Method::BoundaryElement, Resolution::Mesh(_)) => {
-                // Large matrices come from slower memory.
-                let cache_misses = (cells / MESH_CELLS_SLOW).min(1.0);
-                1e-9 * cells * cells * (15.0 + 60.0 * cache_misses)
-            }
-            (Method::LiuHsu, _) => 1.5e-9 * (2.0 * cells).powi(3),
-            (Method::Fastsim, _) => 1e-5 + 5e-9 * cells,
-        }
-    }
-
-    /// Time in s that the first solve takes beside what every solve takes.
-    fn first_seconds(&self, cells: f64) -> f64 {
-        match (self.method, self.resolution) {
-            (Method::BoundaryElement, Resolution::Target(target)) => {
-                (1.0 - SWEEP_SHARE) * self.target_seconds(target, cells)
-            }
-            (Method::BoundaryElement, Resolution::Mesh(_)) => 1e-8 * cells * cells,
-            (Method::LiuHsu, _) => 4e-8 * cells * cells,
-            (Method::Fastsim, _) => 1e-7 * cells,
-        }
-    }
-
-    /// Time of a solve alone, in s, that is refined to a target.
-    fn target_seconds(&self, target: f64, cells: f64) -> f64 {
-        let precision = match precision_of(self.resolution) {
-            Precision::Single => 1.0,
-            Precision::Double => DOUBLE_TIMES,
-        };
-        let smooth = (TARGET_USUAL / target.max(TARGET_LEAST)).powf(TARGET_STEEP);
-        let refined = TARGET_SECONDS * smooth * precision * self.segments.iter().sum::<f64>();
-        // Many patches have more cells than any target asks for, and need more steps.
-        let crowded = self.segments.len() as f64 * PATCH_CELLS_MIN;
-        let crowd = if crowded > f64::from(CELLS_MAX) / 4.0 {
-            3e-7 * cells.max(crowded).powi(2)
-        } else {
-            0.0
-        };
-        2e-4 + refined.max(crowd)
     }
 
     /// Peak memory in bytes.
-    fn bytes(&self, cells: f64, segments: f64) -> f64 {
+    fn bytes(&self) -> f64 {
+        let (cells, segments) = self.finest();
         let motions = self.motions as f64;
         let operator = match self.method {
             Method::Fastsim => 0.0,
@@ -259,7 +175,7 @@ impl CostInput {
                 ),
             });
         }
-        let bytes = self.cost().bytes;
+        let bytes = self.bytes() as u64;
         if bytes > limits.memory_bytes {
             let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
             faults.push(Fault {

@@ -13,4 +13,5 @@ pub mod problem;
 pub mod profiles;
 pub mod read;
 pub mod resolution;
+pub mod solve_time;
 pub mod words;

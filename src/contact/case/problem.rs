@@ -12,7 +12,7 @@ use crate::contact::case::limits::Limits;
 use crate::contact::case::motions::ExpandedMotions;
 use crate::contact::case::resolution::resolution;
 use crate::contact::case::words::{Case, MethodName, Output};
-use crate::contact::case::{cost, plausibility, profiles};
+use crate::contact::case::{plausibility, profiles};
 use crate::contact::error::CaseError;
 use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::half_space::elasticity::Elasticity;
@@ -156,12 +156,6 @@ impl Problem {
             forces: self.forces[range].to_vec(),
             ..self.clone()
         }
-    }
-
-    /// Estimated time to find region and pressure, in s.
-    #[must_use]
-    pub fn normal_seconds(&self) -> f64 {
-        cost::normal_seconds(&self.region)
     }
 
     /// Is this output asked for?

@@ -1,44 +1,74 @@
-//! About how many patches will a rough gap fall apart into? A look at the samples, before anything is solved.
+//! What will the contact of a gap be like? A look at the samples, before anything is solved.
 
+use crate::contact::normal::gap::constants::{TARGET_POWER, TARGET_USUAL};
+use crate::contact::normal::gap::search_box::reach;
 use crate::contact::normal::gap::task::GapTask;
-use crate::contact::normal::hertz::{Ellipse, Pressing};
 
 /// Valleys less deep than this part of the approach are pressed flat.
 const DEPTH: f64 = 0.05;
 /// More patches than this are not told apart by any grid.
 const SUMMITS_MAX: usize = 48;
+/// Half-length of the contact over that of the box it is looked for in, which is made for 1.3 times the approach: Hertz's edge
+/// lies where the gap is half the approach.
+const CONTACT_OVER_BOX: f64 = 0.62;
+/// The sum of second differences of a parabola's samples over the depth of the box, times their number.
+const TURNS_SMOOTH: f64 = 8.0;
+
+/// What is known of a contact before it is solved.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GapOutlook {
+    /// Half-length along rolling and half-width of everything that touches, in mm.
+    pub half: [f64; 2],
+    /// Approach beyond the least gap, in mm.
+    pub depth: f64,
+    /// Summits of the bodies that are likely to touch, at least 1.
+    pub summits: usize,
+    /// How much the gap turns across rolling, over a parabola, its sharpest bend left out.
+    pub turns: f64,
+}
 
 impl GapTask {
-    /// Summits of the bodies that are likely to touch: least values of the gap within the approach of a smooth contact of the same
-    /// extent, with deeper valleys between them. At least 1.
+    /// What the contact will be like: its size, and how many summits touch, with valleys between them that are not pressed flat.
     #[must_use]
-    pub fn summits(&self) -> usize {
-        let [x, y] = self.gap.samples();
-        let lowest = self.gap.extremes()[0];
-        let Some(approach) = self.smooth_approach() else {
-            return 1;
+    pub fn outlook(&self) -> GapOutlook {
+        let reach = reach(&self.gap, self.pressing, self.contact_modulus);
+        let depth = reach.level - reach.least;
+        let samples = self.gap.samples();
+        let within = |k: usize| -> Vec<f64> {
+            let [low, high] = reach.window[k];
+            let inside = samples[k].iter().filter(|at| (low..=high).contains(*at));
+            inside.copied().collect()
         };
+        let middle = |k: usize| [0.5 * (reach.window[k][0] + reach.window[k][1])];
         // Along the middle line of either axis.
-        let middle = |axis: &[f64]| axis.get(axis.len() / 2).copied().unwrap_or(0.0);
-        let lines = [self.gap.on(&[middle(x)], y), self.gap.on(x, &[middle(y)])];
-        let valleys = |line: &Vec<f64>| valleys(line, lowest + approach, DEPTH * approach);
-        let most = lines.iter().map(valleys).max().unwrap_or(1);
-        most.clamp(1, SUMMITS_MAX)
+        let (x, y) = (within(0), within(1));
+        let lines = [self.gap.on(&x, &middle(1)), self.gap.on(&middle(0), &y)];
+        let summits = lines
+            .iter()
+            .map(|line| valleys(line, reach.level, DEPTH * depth))
+            .max();
+        let bends = lines[1]
+            .windows(3)
+            .map(|w| (w[0] - 2.0 * w[1] + w[2]).abs());
+        // A ridge between two summits is one sharp bend, and no roughness.
+        let (all, sharpest) = bends.fold((0.0, 0.0_f64), |(all, sharpest), bend| {
+            (all + bend, sharpest.max(bend))
+        });
+        GapOutlook {
+            half: reach
+                .window
+                .map(|[low, high]| 0.5 * CONTACT_OVER_BOX * (high - low)),
+            depth,
+            summits: summits.unwrap_or(1).clamp(1, SUMMITS_MAX),
+            turns: (all - sharpest) / depth * y.len() as f64 / TURNS_SMOOTH,
+        }
     }
 
-    /// Approach of a smooth contact with the curvatures of the whole gap.
-    fn smooth_approach(&self) -> Option<f64> {
-        if let Pressing::Approach(approach) = self.pressing {
-            return Some(approach);
-        }
-        let [low, high] = self.gap.extremes();
-        let [_, y] = self.gap.samples();
-        let half = 0.5 * (y.last()? - y.first()?);
-        let radius = 0.5 * half * half / (high - low);
-        let usable = radius.is_finite() && radius > 0.0;
-        let ellipse =
-            |radius| Ellipse::of_radii(radius, radius, self.pressing, self.contact_modulus);
-        usable.then(|| ellipse(radius).approach)
+    /// How many times longer region and pressure take for a target than usually: as the cells of the last grid.
+    #[must_use]
+    pub fn growth(&self, target: Option<f64>) -> f64 {
+        let target = target.unwrap_or(TARGET_USUAL).min(TARGET_USUAL);
+        (target / TARGET_USUAL).powf(2.0 * TARGET_POWER)
     }
 }
 

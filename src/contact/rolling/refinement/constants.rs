@@ -33,7 +33,7 @@ pub const STRIPS_FEW: f64 = 3.5;
 /// Factor where a smooth pressure is given in samples, and the power of the cells that it falls with in place of [`DECAY`]. 80 grids
 /// at targets of 0.02, 0.005 and 0.001: .99, .96 and .95 covered, estimates 4.4, 3.6 and 3.7 times the error in the median
 /// (`cargo bench --bench calibrate`); 1 and .12 cover no more and give 5.8, 4.3 and 4.0; .72 and −.05 give 3.8 but cover .925.
-pub const SAMPLED: f64 = 0.78;
+pub const SAMPLED: f64 = 0.74;
 /// The power; see [`SAMPLED`].
 pub const SAMPLED_DECAY: f64 = 0.05;
 /// Factor where the pressure jumps from one sample to the next (20 grids of the first half: .95, .85 and 1.0 covered at three

@@ -4,7 +4,7 @@ use crate::contact::error::SolveError;
 use crate::contact::mesh::size::MeshSize;
 use crate::contact::monitor::Monitor;
 use crate::contact::rolling::answer::{LevelAnswer, LevelFailure, Work};
-use crate::contact::rolling::mesh_plan::{MeshPlan, Regime};
+use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::methods::boundary_element::solve as boundary_element;
 use crate::contact::rolling::methods::liu_hsu::on_level;
 use crate::contact::rolling::methods::method::Method;
@@ -119,7 +119,6 @@ pub fn solve_level(
         tolerance: task.tolerance(),
     };
     let indicators = Indicators::of_level(task, level, &tangential, &summed, circumstances);
-    let resultants = extrapolated(task, level, &summed, before);
     levels.sweep.remember(number, motion, &tangential);
     levels.path.push(number);
     let mut work = coarser.as_ref().map_or(Work::default(), |point| point.work);
@@ -131,7 +130,7 @@ pub fn solve_level(
         saturated: false,
         tangential,
         level: number,
-        resultants,
+        resultants: summed.clone(),
         summed,
         errors: indicators.errors(),
         work,
@@ -172,28 +171,6 @@ fn finer_for_sums(
     let [strips, cells] = [level.plan.size.strips, level.plan.size.cells].map(|n| 2 * n);
     let size = MeshSize { strips, cells };
     StripMesh::new(task, MeshPlan { size, ..level.plan }).ok()
-}
-
-/// The resultants of every patch, extrapolated from two levels: between meshes made for stick, errors fall as 1/N. The dense method and
-/// meshes gathered about a pole have no such record.
-fn extrapolated(
-    task: &RollingTask,
-    level: &StripMesh,
-    summed: &[Resultants],
-    before: Option<CoarserLevel>,
-) -> Vec<Resultants> {
-    let sticking = |regime| matches!(regime, Regime::Sticking { .. });
-    let like = before.filter(|b| sticking(b.regime) && sticking(level.plan.regime));
-    let Some(before) = like.filter(|_| task.target().is_some()) else {
-        return summed.to_vec();
-    };
-    let patches = task.footprint.patches();
-    let pairs = summed.iter().zip(before.summed).zip(patches);
-    pairs
-        .map(|((fine, coarse), patch)| {
-            fine.beyond(*coarse, before.share, task.friction.limit(patch))
-        })
-        .collect()
 }
 
 /// `auto` is the fast solver today.

@@ -10,3 +10,14 @@ pub enum Resolution {
     /// An explicit mesh.
     Mesh(MeshSize),
 }
+
+impl Resolution {
+    /// The target, if there is one.
+    #[must_use]
+    pub fn target(self) -> Option<f64> {
+        match self {
+            Resolution::Target(target) => Some(target),
+            Resolution::Mesh(_) => None,
+        }
+    }
+}
