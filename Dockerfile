@@ -6,16 +6,15 @@ FROM ${BUILDER} AS build
 WORKDIR /src
 # The dependencies are a layer of their own, compiled for an empty program: a change in src does not build them again.
 COPY Cargo.toml Cargo.lock ./
-COPY benches ./benches
-RUN mkdir src \
-    && echo 'fn main() {}' > src/main.rs \
-    && touch src/lib.rs \
+COPY src/contact/Cargo.toml src/contact/
+RUN echo 'fn main() {}' > src/main.rs \
+    && touch src/lib.rs src/contact/lib.rs \
     && cargo build --release --locked --bin railhead
 COPY api ./api
 COPY src ./src
 # Copied files keep their dates, which may be older than the empty program's: cargo must see that they are new.
 # Line tables are most of the program's size; a panic names its place without them.
-RUN touch src/main.rs src/lib.rs \
+RUN touch src/main.rs src/lib.rs src/contact/lib.rs \
     && cargo build --release --locked --bin railhead \
     && install -d /out/data \
     && strip --strip-debug -o /out/railhead target/release/railhead

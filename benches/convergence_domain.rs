@@ -1,5 +1,7 @@
 //! Prints where `liu_hsu` converges, by rule, mesh and region. Nothing is timed but the whole row.
 
+extern crate railhead_contact as railhead;
+
 #[allow(
     dead_code,
     reason = "only the sweep is used here; the tests use the rest"

@@ -3,6 +3,8 @@
 //! `cargo bench --bench gaps` prints for every case: the share of both problems in the time of a default solve in µs, and
 //! the errors of approach, area and largest pressure against the converged reference.
 
+extern crate railhead_contact as railhead;
+
 mod machine;
 
 use std::hint::black_box;
@@ -21,7 +23,10 @@ fn main() {
     println!();
     println!("| case | normal, µs | tangential, µs | approach | area | largest pressure |");
     println!("|---|---|---|---|---|---|");
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/gap_grids.json");
+    let folder = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../tests/data/gap_grids.json"
+    );
     let text = std::fs::read_to_string(folder).expect("reference data");
     let cases: Vec<Value> = serde_json::from_str(&text).expect("reference data are JSON");
     let (mut normal, mut tangential) = (Vec::new(), Vec::new());

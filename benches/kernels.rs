@@ -1,5 +1,7 @@
 //! What the pieces of a solve cost: rows of the influence, one product, a whole level, by mesh and storage.
 
+extern crate railhead_contact as railhead;
+
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};

@@ -3,6 +3,8 @@
 //! `cargo bench --bench worn` needs the reference files beside the checkout (or `RAILHEAD_REFERENCE`). It ends with an error if
 //! more than one state in a hundred has no answer.
 
+extern crate railhead_contact as railhead;
+
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -68,7 +70,10 @@ fn solved(case: &Value) -> Result<Solution, String> {
 fn pair() -> Option<[Value; 2]> {
     let folder = std::env::var_os("RAILHEAD_REFERENCE").map(PathBuf::from);
     let folder = folder.unwrap_or_else(|| {
-        PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/reference"))
+        PathBuf::from(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../../shared/reference"
+        ))
     });
     let file = |name: &str| {
         let text = std::fs::read_to_string(folder.join("extended/profiles").join(name)).ok()?;

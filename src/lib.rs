@@ -29,7 +29,8 @@
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
 pub mod cli;
-pub mod contact;
 pub mod http;
 pub mod jobs;
 pub mod telemetry;
+
+pub use railhead_contact::contact;

@@ -5,6 +5,8 @@
 //! `tests/data/finer_meshes.json`; `-- truths [classes]` finds the missing ones, some seconds each; `-- continuity`
 //! prints how the estimate changes along a sweep, `-- case gap 42` one case as JSON.
 
+extern crate railhead_contact as railhead;
+
 mod continuity;
 mod finer;
 mod population;

@@ -3,6 +3,8 @@
 //!
 //! `cargo bench --bench figures` writes `docs/paper-figures/*.svg` and prints what they show in numbers.
 
+extern crate railhead_contact as railhead;
+
 mod drawing;
 
 use std::path::{Path, PathBuf};
@@ -40,7 +42,7 @@ fn main() {
 }
 
 fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).to_owned()
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).to_owned()
 }
 
 /// An example solved on the fine mesh, with the paper's units.

@@ -198,7 +198,10 @@ fn wheels(lu: f64) -> String {
                     | case | patches | LU | rest, LU | heights | tangential estimate |\n|---|---|---|---|---|---|\n"
         .to_owned();
     let example = |name: &str| -> Value {
-        let path = format!("{}/api/examples/{name}", env!("CARGO_MANIFEST_DIR"));
+        let path = format!(
+            "{}/api/examples/{name}",
+            concat!(env!("CARGO_MANIFEST_DIR"), "/../..")
+        );
         let text = std::fs::read_to_string(path).expect("an example");
         serde_json::from_str(&text).expect("an example is JSON")
     };

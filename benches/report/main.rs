@@ -4,6 +4,8 @@
 //! `cargo bench --bench report`. Times are of the thread, not of the wall, and in units of one 500 × 500 f64 LU (faer,
 //! factored in place) of the same run. Without the reference cases of `tests/data` nothing is written.
 
+extern crate railhead_contact as railhead;
+
 #[path = "../machine.rs"]
 mod machine;
 
@@ -43,7 +45,7 @@ fn main() {
     let mut text = HEAD.to_owned();
     let _ = writeln!(text, "{:.2} ms here.\n", 1e3 * lu);
     let cases = questions::hertz_cases();
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("docs");
     let pictures = folder.join("accuracy-and-speed");
     std::fs::create_dir_all(&pictures).expect("a folder for the pictures");
     text.push_str(&targets::section(&cases, lu));

@@ -20,7 +20,10 @@ pub const CLASSES: [&str; 5] = [
 
 /// A stored list of reference data.
 pub fn stored(name: &str) -> Vec<Value> {
-    let path = format!("{}/tests/data/{name}.json", env!("CARGO_MANIFEST_DIR"));
+    let path = format!(
+        "{}/tests/data/{name}.json",
+        concat!(env!("CARGO_MANIFEST_DIR"), "/../..")
+    );
     let text = std::fs::read_to_string(path).expect("reference data");
     serde_json::from_str(&text).expect("reference data are JSON")
 }

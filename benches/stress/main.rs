@@ -4,6 +4,8 @@
 //! case crashes, hangs or breaks a law. `-- --only` with `times`, `creep-map`, `sweep-with-zones` or `damaged-profile` prints one
 //! section, `-- --case 1511` one case as JSON.
 
+extern crate railhead_contact as railhead;
+
 mod condition;
 mod contacts;
 mod damaged;
@@ -101,7 +103,7 @@ fn main() -> ExitCode {
     let mut text = report(count, seed, &rows, &troubles);
     text.push_str(&damaged_table::tables(SEED));
     println!("{text}");
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/stability.md");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/stability.md");
     std::fs::write(path, text).expect("docs can be written");
     if troubles.failed.is_empty() && troubles.broken.is_empty() {
         ExitCode::SUCCESS

@@ -123,7 +123,10 @@ fn the_examples_are_reference_cases_sampled_as_a_measurement_is() {
         ("area-132re-crown.case.json", "rad_area_y15_60kN"),
         ("two-patches.case.json", "two_offset"),
     ] {
-        let path = format!("{}/api/examples/{file}", env!("CARGO_MANIFEST_DIR"));
+        let path = format!(
+            "{}/api/examples/{file}",
+            concat!(env!("CARGO_MANIFEST_DIR"), "/../..")
+        );
         let text = std::fs::read_to_string(path).expect("an example");
         let question: Value = serde_json::from_str(&text).expect("JSON");
         let cases = GapReference::profiles();

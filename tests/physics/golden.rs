@@ -28,7 +28,7 @@ struct Golden {
 }
 
 fn path() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/golden.json")
+    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("tests/data/golden.json")
 }
 
 fn case(contact: Value, motion: Value, solver: Value) -> Value {
@@ -148,7 +148,7 @@ pub fn cases() -> Vec<(String, Value)> {
     for name in ["wheel-rail", "wheel-rail-flange"] {
         let file = format!(
             "{}/api/examples/{name}.case.json",
-            env!("CARGO_MANIFEST_DIR")
+            concat!(env!("CARGO_MANIFEST_DIR"), "/../..")
         );
         let text = std::fs::read_to_string(file).expect("an example");
         cases.push((

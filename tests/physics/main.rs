@@ -1,5 +1,7 @@
 //! Does the physics hold?
 
+extern crate railhead_contact as railhead;
+
 mod answers;
 mod carter;
 mod case_faults;

@@ -202,7 +202,7 @@ fn a_wheel_on_two_patches_side_by_side_always_comes_to_rest() {
 #[test]
 fn patches_in_gaps_of_their_own_are_told_with_what_they_would_exchange() {
     let path = concat!(
-        env!("CARGO_MANIFEST_DIR"),
+        concat!(env!("CARGO_MANIFEST_DIR"), "/../.."),
         "/api/examples/wheel-rail-flange.case.json"
     );
     let text = std::fs::read_to_string(path).expect("an example");

@@ -6,7 +6,10 @@ use std::path::PathBuf;
 pub fn reference_file(name: &str) -> Option<String> {
     let folder = std::env::var_os("RAILHEAD_REFERENCE").map(PathBuf::from);
     let folder = folder.unwrap_or_else(|| {
-        PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/reference"))
+        PathBuf::from(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../../shared/reference"
+        ))
     });
     std::fs::read_to_string(folder.join(name)).ok()
 }

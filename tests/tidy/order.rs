@@ -26,6 +26,7 @@ const ORDER: &[&str] = &[
     "contact::profile_trust",
     "contact::slices",
     "contact",
+    "contact::lib",
     "jobs::clock",
     "jobs::clock_steps",
     "jobs::codec::fields",

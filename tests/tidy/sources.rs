@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 pub struct Sources(pub BTreeMap<String, String>);
 
 pub fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
 }
 
 impl Sources {

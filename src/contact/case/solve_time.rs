@@ -202,9 +202,12 @@ impl PatchGuess {
         let spin = unit * c * motion.spin_per_mm.abs();
         let tractions = Tractions::of(creepage, spin);
         let ratio = self.half[0] / self.half[1];
-        let slender = (ratio / SLENDER).max(1.0).powf(LONG_POWER)
-            * (1.0 / ratio).max(1.0).powf(WIDE_POWER);
-        (tractions, self.times * slender * tractions.time().at(target))
+        let slender =
+            (ratio / SLENDER).max(1.0).powf(LONG_POWER) * (1.0 / ratio).max(1.0).powf(WIDE_POWER);
+        (
+            tractions,
+            self.times * slender * tractions.time().at(target),
+        )
     }
 }
 
@@ -288,9 +291,9 @@ impl Problem {
             Precision::Double => DOUBLE_TIMES,
         };
         let one = |motion: &Motion| {
-            let each = patches.iter().map(|patch| {
-                patch.seconds(target, &self.elasticity, self.friction, motion)
-            });
+            let each = patches
+                .iter()
+                .map(|patch| patch.seconds(target, &self.elasticity, self.friction, motion));
             each.fold((Tractions::Stick, 0.0), |(_, sum), (tractions, seconds)| {
                 (tractions, sum + seconds)
             })

@@ -47,7 +47,10 @@ fn round(value: &mut Value) {
 
 /// The shipped examples that have an answer.
 fn examples() -> Vec<(String, Value)> {
-    let folder = format!("{}/api/examples", env!("CARGO_MANIFEST_DIR"));
+    let folder = format!(
+        "{}/api/examples",
+        concat!(env!("CARGO_MANIFEST_DIR"), "/../..")
+    );
     let mut cases = Vec::new();
     for entry in std::fs::read_dir(folder).expect("the examples") {
         let path = entry.expect("an entry").path();
