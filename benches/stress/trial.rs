@@ -58,6 +58,21 @@ pub struct Trial {
     pub times: Option<[f64; 2]>,
 }
 
+impl Trial {
+    fn new() -> Trial {
+        Trial {
+            end: End::Solved,
+            iterations: None,
+            residual: None,
+            broken: Vec::new(),
+            energy: None,
+            from_liu_hsu: None,
+            error: None,
+            times: None,
+        }
+    }
+}
+
 struct Clock(Instant);
 
 impl Monitor for Clock {
@@ -102,16 +117,7 @@ pub fn attempt_timed(case: &Value) -> Result<((Solution, Fields), [f64; 2]), End
 
 /// Solves a sample and whatever it is compared with.
 pub fn trial(sample: &Sample) -> Trial {
-    let mut trial = Trial {
-        end: End::Solved,
-        iterations: None,
-        residual: None,
-        broken: Vec::new(),
-        energy: None,
-        from_liu_hsu: None,
-        error: None,
-        times: None,
-    };
+    let mut trial = Trial::new();
     let (solution, fields) = match attempt_timed(&sample.case) {
         Ok((answer, times)) => {
             trial.times = Some(times);
