@@ -151,6 +151,9 @@ fn tables(class: Class, truths: &Truths, each: bool) {
         for (name, half) in ["fit", "check"].iter().zip(&halves) {
             row(name, target, half);
         }
+        let [mut both, check] = halves;
+        both.extend(check);
+        row("both", target, &both);
     }
 }
 
@@ -163,12 +166,12 @@ fn row(name: &str, target: f64, outcomes: &[Outcome]) {
         values.sort_by(f64::total_cmp);
         values
     };
+    // Between two values, their mean by nearness.
     let at = |values: &[f64], part: f64| {
-        let last = values.len().saturating_sub(1) as f64;
-        values
-            .get((part * last).round() as usize)
-            .copied()
-            .unwrap_or(f64::NAN)
+        let place = part * values.len().saturating_sub(1) as f64;
+        let value = |k: f64| values.get(k as usize).copied().unwrap_or(f64::NAN);
+        let [low, high] = [place.floor(), place.ceil()].map(value);
+        low + (place - place.floor()) * (high - low)
     };
     let clear = outcomes.iter().filter(|o| o.error > o.uncertainty);
     let ratios = sorted(clear.map(|o| o.estimate / o.error).collect());
