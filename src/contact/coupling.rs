@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use crate::contact::answer;
+use crate::contact::answer::answer;
 use crate::contact::case::problem::Problem;
 use crate::contact::case::words::Output;
 use crate::contact::error::SolveError;
@@ -14,8 +14,9 @@ use crate::contact::geometry::wheelset::{WheelsetMotion, creepages};
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::region::Region;
 use crate::contact::normal::wheel_height::search::{
-    Accuracy, NormalPass, PressedGap, PressedWheel, WheelLoad, WheelTask,
+    Accuracy, NormalPass, PressedGap, PressedWheel,
 };
+use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::motion::Motion;

@@ -2,6 +2,7 @@
 //!
 //! Units everywhere: mm, N, MPa, rad; creepages are dimensionless, spin is in 1/mm.
 
+pub mod answer;
 pub mod case;
 pub mod coupling;
 pub mod error;
@@ -18,6 +19,8 @@ pub mod remark;
 pub mod rolling;
 pub mod slices;
 pub mod solution;
+pub mod stages;
+pub mod time_limit;
 
 use std::sync::Arc;
 
@@ -28,17 +31,9 @@ use crate::contact::case::problem::Problem;
 use crate::contact::case::read::draft;
 use crate::contact::error::{CaseError, SolveError};
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::region::Region;
-use crate::contact::profile_trust::trust;
-use crate::contact::rolling::force_control;
 use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::rolling::refinement::level_solve::MotionAnswer;
-use crate::contact::rolling::refinement::levels::Levels;
 use crate::contact::slices::{slices, solve_slice};
-use crate::contact::solution::assemble::Assembly;
-use crate::contact::solution::finish::{finish, share_seconds};
 use crate::contact::solution::words::{Fields, Solution};
-use crate::contact::time_limit::TimeLimit;
 
 /// Reads and checks a case.
 ///
@@ -87,58 +82,3 @@ pub fn solve_with(
     };
     Ok(answer)
 }
-
-/// Solves all motions of a problem one after the other, as long as one slice.
-fn solve_whole(
-    operators: &Arc<OperatorStore>,
-    problem: &Problem,
-    monitor: &dyn Monitor,
-) -> Result<(Solution, Fields), SolveError> {
-    let began = monitor.elapsed();
-    let answer = if let Region::Profiles(contact) = &problem.region {
-        trust::solve(operators, problem, contact, monitor)?
-    } else {
-        let watch = TimeLimit::new(monitor, problem.time_limit, problem.motions.len());
-        let pressed = problem.pressed(&watch);
-        let pressed = pressed.map_err(|error| watch.explained(error, problem))?;
-        answer(operators, pressed.as_ref(), &watch)?
-    };
-    finish(problem, answer, monitor.elapsed().saturating_sub(began))
-}
-
-/// Solves every motion of a problem whose region and pressure are known.
-fn answer(
-    operators: &Arc<OperatorStore>,
-    problem: &Problem,
-    watch: &TimeLimit,
-) -> Result<(Solution, Fields), SolveError> {
-    let answer = motions(operators, problem, watch);
-    let (mut solution, fields) = answer.map_err(|error| watch.explained(error, problem))?;
-    share_seconds(&mut solution);
-    Ok((solution, fields))
-}
-
-fn motions(
-    operators: &Arc<OperatorStore>,
-    problem: &Problem,
-    watch: &TimeLimit,
-) -> Result<(Solution, Fields), SolveError> {
-    let footprint = problem.footprint();
-    let task = problem.rolling_task(&footprint);
-    let mut levels = Levels::new(&task, operators);
-    let mut assembly = Assembly::new(problem);
-    let mut before: Option<MotionAnswer> = None;
-    for index in 0..problem.motions.len() {
-        let mut point = force_control::solve(&task, &mut levels, index, before.as_ref(), watch)?;
-        if index == 0 {
-            // What all motions share is charged to the first.
-            point.seconds += problem.normal.map_or(0.0, |normal| normal.seconds);
-        }
-        assembly.add(&levels, &point);
-        levels.trim();
-        before = Some(point);
-        watch.advance();
-    }
-    Ok(assembly.finish())
-}
-pub mod time_limit;

@@ -14,7 +14,7 @@ use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::remark::entry::merged;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::solution::words::{Fields, Solution};
-use crate::contact::solve_whole;
+use crate::contact::stages::solve_whole;
 
 /// Estimated time of a slice in s: short for those who wait behind it, long beside what a cut costs (a first motion without a start,
 /// and region and pressure once more).

@@ -10,6 +10,7 @@ pub mod motions;
 pub mod plausibility;
 pub mod press;
 pub mod problem;
+pub mod profile_points;
 pub mod profiles;
 pub mod read;
 pub mod resolution;

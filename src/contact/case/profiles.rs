@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::contact::case::problem::Problem;
+use crate::contact::case::profile_points;
 use crate::contact::case::words::{
     Contact, CrossSection, Load, Motions, Smoothing, SmoothingWord, Wheelset,
 };
@@ -13,11 +14,9 @@ use crate::contact::geometry::profile::{Body, Profile, Reading};
 use crate::contact::geometry::wheel_rail::{Placement, WheelRail};
 use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::normal::region::Region;
-use crate::contact::normal::wheel_height::search::{WheelLoad, WheelTask};
-use crate::contact::profile_trust::before;
-use crate::contact::profile_trust::quality::PairQuality;
-use crate::contact::profile_trust::trust::Trust;
+use crate::contact::normal::wheel_height::task::{ProfileTrust, WheelLoad, WheelTask};
 use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::solution::profile_quality::PairQuality;
 
 /// The region of a wheel on a rail, yet to be found, with its remarks; `None` without faults where the load or the contact
 /// modulus in MPa is not known.
@@ -35,8 +34,8 @@ pub(crate) fn region(
     }
     let mut remarks = geometry.remarks();
     let [rail, wheel] = geometry.profiles();
-    remarks.extend(before::misplaced(rail, Body::Rail));
-    remarks.extend(before::misplaced(wheel, Body::Wheel));
+    remarks.extend(profile_points::misplaced(rail, Body::Rail));
+    remarks.extend(profile_points::misplaced(wheel, Body::Wheel));
     let loading = load.and_then(loading);
     let (Some(loading), Some(contact_modulus)) = (loading, contact_modulus) else {
         return Ok(None);
@@ -57,7 +56,10 @@ impl Problem {
         let Region::Profiles(contact) = &self.region else {
             return None;
         };
-        Some(before::quality(&contact.geometry, contact.contact_modulus))
+        Some(profile_points::quality(
+            &contact.geometry,
+            contact.contact_modulus,
+        ))
     }
 }
 
@@ -143,7 +145,8 @@ fn wheel_rail(contact: &Contact) -> Result<WheelRail, Vec<Fault>> {
 
 /// Faults of two profiles that both look like the other body's; one of them alone may be an unusual shape.
 fn exchanged(rail: &Profile, wheel: &Profile) -> Result<(), Vec<Fault>> {
-    let both = before::misplaced(rail, Body::Rail).zip(before::misplaced(wheel, Body::Wheel));
+    let both = profile_points::misplaced(rail, Body::Rail)
+        .zip(profile_points::misplaced(wheel, Body::Wheel));
     let Some((rail, wheel)) = both else {
         return Ok(());
     };
@@ -159,7 +162,7 @@ fn exchanged(rail: &Profile, wheel: &Profile) -> Result<(), Vec<Fault>> {
     ])
 }
 
-fn trust(contact: &Contact) -> Trust {
+fn trust(contact: &Contact) -> ProfileTrust {
     let Contact::Profiles {
         rail,
         wheel,
@@ -167,10 +170,10 @@ fn trust(contact: &Contact) -> Trust {
         ..
     } = contact
     else {
-        return Trust::default();
+        return ProfileTrust::default();
     };
     let auto = |section: &CrossSection| matches!(section.smoothing_mm, Smoothing::ByNoise(_));
-    Trust {
+    ProfileTrust {
         auto: [auto(rail), auto(wheel)],
         accept_rough: *accept_rough_profiles,
     }

@@ -6,6 +6,7 @@
 //! times, class by class.
 
 use crate::contact::case::problem::Problem;
+use crate::contact::case::profile_points;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::half_space::strip_operator::kind::Precision;
 use crate::contact::normal::gap::summits::GapOutlook;
@@ -13,8 +14,7 @@ use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::hertz::{Ellipse, Pressing};
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::region::Region;
-use crate::contact::normal::wheel_height::search::{WheelLoad, WheelTask};
-use crate::contact::profile_trust::before;
+use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
 use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::refinement::mesh_policy::CELLS_MAX;
@@ -235,7 +235,7 @@ fn guesses(region: &Region, target: Option<f64>) -> (Vec<PatchGuess>, f64) {
             (vec![patch; outlook.summits], seconds)
         }
         Region::Profiles(task) => {
-            let solves = f64::from(1 + before::readings_expected(task));
+            let solves = f64::from(1 + profile_points::readings_expected(task));
             (vec![PatchGuess::of_wheel(task)], WHEEL * solves)
         }
     }

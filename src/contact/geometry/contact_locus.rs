@@ -6,8 +6,9 @@
 //! area (power 5/2 on a line), with the mean inclination of the rail. In that frame the gap is taken along the normal, exactly: the
 //! wheel as surface of revolution, the rail as cylinder.
 
+use crate::contact::geometry::frame::Frame;
+use crate::contact::geometry::grouping::{Grouping, Overlap};
 use crate::contact::geometry::local_gap::{Detail, LocalGap};
-use crate::contact::geometry::overlaps::{Grouping, Overlap};
 use crate::contact::geometry::wheel_rail::WheelRail;
 
 /// Spacing of the search across and along the curves, in mm.
@@ -42,36 +43,6 @@ pub(crate) struct LocusPoint {
     pub(crate) clearance: f64,
     pub(crate) rail: f64,
     pub(crate) wheel: f64,
-}
-
-/// The frame of a patch in track axes: z of the frame is the normal out of the rail.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame {
-    /// Origin on the rail's surface, `[x, y, z]` in mm.
-    pub origin: [f64; 3],
-    /// Turn about x from the track's axes, in rad.
-    pub angle: f64,
-    /// Parameter of the origin on the rail's curve.
-    pub rail: f64,
-    /// Parameter of the opposite point on the wheel's curve.
-    pub wheel: f64,
-}
-
-impl Frame {
-    /// Unit vectors in track axes: tangent (y of the frame) and normal (z of the frame), as `[y, z]`.
-    #[must_use]
-    pub fn axes(&self) -> [[f64; 2]; 2] {
-        let (sin, cos) = self.angle.sin_cos();
-        [[cos, sin], [-sin, cos]]
-    }
-
-    /// Coordinates across and along the normal of a point of the rail's curve.
-    pub(crate) fn across(&self, geometry: &WheelRail, rail: f64) -> [f64; 2] {
-        let [y, z] = geometry.rail_at(rail).at;
-        let from = [y - self.origin[1], z - self.origin[2]];
-        self.axes()
-            .map(|axis| axis[0] * from[0] + axis[1] * from[1])
-    }
 }
 
 impl<'g> ContactLocus<'g> {

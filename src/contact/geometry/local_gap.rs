@@ -1,6 +1,6 @@
 //! The gap of one patch in its own frame: the wheel as surface of revolution over the rail as cylinder.
 
-use crate::contact::geometry::contact_locus::Frame;
+use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::surface_exit::{SurfaceExit, SurfaceMissed};
 use crate::contact::geometry::wheel_rail::WheelRail;
 

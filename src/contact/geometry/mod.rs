@@ -3,6 +3,8 @@
 pub mod contact_locus;
 pub mod crossing;
 pub mod formats;
+pub mod frame;
+pub mod grouping;
 pub mod local_gap;
 pub mod overlaps;
 pub mod profile;

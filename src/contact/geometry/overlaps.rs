@@ -5,6 +5,7 @@
 //! holds for every height.
 
 use crate::contact::geometry::contact_locus::{ContactLocus, LocusPoint, STEP};
+use crate::contact::geometry::grouping::{Grouping, Overlap};
 
 /// Overlaps nearer to each other than this along the rail, in mm, whose mean inclinations differ less, in rad, share one gap:
 /// there they influence each other. (CONTACT keeps apart what is 8 mm or 30° from each other.)
@@ -16,41 +17,12 @@ const TOGETHER_ANGLE: f64 = 0.5;
 const VALLEY: f64 = 0.35;
 const THIN: f64 = 0.4;
 
-/// Lines that overlap: the first and the last one, and what lies beyond either end.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Overlap {
-    pub(crate) ends: [usize; 2],
-    /// The overlap goes on beyond this end, in another gap.
-    pub(crate) cut: [bool; 2],
-    /// Another gap lies on this side, next to this one or farther away.
-    pub(crate) near: [bool; 2],
-}
-
 /// Lowerings in mm at which overlaps are divided among gaps: this one times a power of the ratio. Loads that lower the wheel by 0.05 to
 /// 0.2 mm, as all usual ones do, share one division, so that forces do not jump along a sweep of loads or heights either.
 const GROUPED_AT: f64 = 0.1;
 const GROUPED_RATIO: f64 = 4.0;
 /// Groups grow into one where the overlap between them is deeper than this part of the lobes on both sides.
 const MERGED: f64 = 0.6;
-
-/// Which lines share a gap, as it was decided at one height of the wheel.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Grouping {
-    /// First and last line of every gap, from smaller to larger y.
-    groups: Vec<[usize; 2]>,
-}
-
-impl Grouping {
-    /// The group with which an overlap has most lines in common.
-    fn of(&self, [first, last]: [usize; 2]) -> Option<usize> {
-        let common = |k: &usize| {
-            let [low, high] = self.groups[*k];
-            (high.min(last) + 1).saturating_sub(low.max(first))
-        };
-        let most = (0..self.groups.len()).max_by_key(common)?;
-        (common(&most) > 0).then_some(most)
-    }
-}
 
 impl ContactLocus<'_> {
     /// The same with the overlaps divided among gaps, at every height, as near the lowering that is given in mm.

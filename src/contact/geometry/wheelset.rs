@@ -6,7 +6,7 @@
 //! `ν_x = v_x / V`, `ν_y = v · t / V`, `φ = ω · n / V`. Free rolling at the radius r has `Ω = V / r`, positive.
 //! Source: Kalker 1990, section 1.3; the same as in the Manchester contact benchmark.
 
-use crate::contact::geometry::contact_locus::Frame;
+use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
 

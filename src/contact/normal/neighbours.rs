@@ -6,7 +6,7 @@
 
 use std::f64::consts::PI;
 
-use crate::contact::geometry::contact_locus::Frame;
+use crate::contact::geometry::frame::Frame;
 
 /// One gap as far as its neighbours feel it.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -10,7 +10,7 @@ use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::hertz::{Ellipse, Pressing};
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::field::PressureField;
-use crate::contact::normal::wheel_height::search::WheelTask;
+use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::remark::entry::RemarkEntry;
 
 /// Pressures in MPa, lengths in mm and ratios of semi-axes beyond which a patch is a mistake rather than a contact.

@@ -11,7 +11,7 @@ use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::wheel_height::search::PressedGap;
 use crate::contact::profile_trust::finding::{AMBIGUOUS, Cause, Finding};
-use crate::contact::profile_trust::quality::{PatchQuality, ProfileQuality};
+use crate::contact::solution::profile_quality::{PatchQuality, ProfileQuality};
 
 /// A body is blamed for its share of that from here on.
 const BLAMED: f64 = 0.6;

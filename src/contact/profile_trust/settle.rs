@@ -1,18 +1,18 @@
 //! `smoothing_mm: "auto"`: the smoothing that suits the noise of the profiles and the pressure between them.
 
 use crate::contact::case::problem::Problem;
+use crate::contact::case::profile_points;
+use crate::contact::case::profile_points::PRESSURE_USUAL;
 use crate::contact::error::SolveError;
 use crate::contact::geometry::profile::Body;
 use crate::contact::geometry::profile_quality::points::advised_smoothing;
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::wheel_height::search::{Accuracy, NormalPass, WheelTask};
-use crate::contact::profile_trust::before;
+use crate::contact::normal::wheel_height::search::{Accuracy, NormalPass};
+use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::time_limit::TimeLimit;
 
-/// Pressure in MPa for the first choice.
-pub(crate) const PRESSURE_USUAL: f64 = 1200.0;
 /// By which part the rest for that pressure may miss the force: the length goes with its power −2/9.
 const TOLERANCE: f64 = 0.1;
 
@@ -26,7 +26,7 @@ pub(crate) fn remarks(contact: &WheelTask) -> Vec<RemarkEntry> {
     let chosen = profiles.zip(contact.trust.auto).filter(|(_, auto)| *auto);
     chosen
         .map(|((profile, body), _)| {
-            let remark = if before::tells_noise(profile) {
+            let remark = if profile_points::tells_noise(profile) {
                 Remark::SmoothingChosen {
                     profile: body.name(),
                     smoothing_mm: profile.smoothing(),
@@ -47,7 +47,7 @@ pub(crate) fn undecided(contact: &WheelTask) -> bool {
     let profiles = contact.geometry.profiles().into_iter();
     profiles
         .zip(contact.trust.auto)
-        .any(|(profile, auto)| auto && !before::tells_noise(profile))
+        .any(|(profile, auto)| auto && !profile_points::tells_noise(profile))
 }
 
 /// The contact with the smoothing settled where the case leaves it to the noise: first for a pressure of 1200 MPa, then for the largest one
@@ -65,7 +65,7 @@ pub(crate) fn settled(
         return Ok(None);
     }
     let modulus = contact.contact_modulus;
-    let grains = contact.geometry.profiles().map(before::grain);
+    let grains = contact.geometry.profiles().map(profile_points::grain);
     let chosen = |pressure: f64| {
         let advised = advised_smoothing(grains, modulus, pressure);
         let [rail, wheel] = contact.geometry.profiles();

@@ -10,22 +10,14 @@ use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::profile::{Body, Profile};
 use crate::contact::geometry::profile_quality::holes::{Hole, holes};
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::wheel_height::search::{PressedGap, PressedWheel, WheelTask};
+use crate::contact::normal::wheel_height::search::{PressedGap, PressedWheel};
+use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::profile_trust::finding::{Cause, Finding};
 use crate::contact::profile_trust::judge::{FoundPatch, judge};
-use crate::contact::profile_trust::quality::{PatchQuality, ProfileQuality};
 use crate::contact::profile_trust::{settle, uncertainty};
 use crate::contact::rolling::operator_store::OperatorStore;
+use crate::contact::solution::profile_quality::{PatchQuality, ProfileQuality};
 use crate::contact::solution::words::{Fields, Solution};
-
-/// What a case says about the trust in its profiles.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Trust {
-    /// The smoothing of rail and wheel follows from their noise.
-    pub auto: [bool; 2],
-    /// Profiles are solved that are too rough or too coarse for an answer that can be relied on.
-    pub accept_rough: bool,
-}
 
 /// Solves a problem whose region is a wheel on a rail, and judges its profiles.
 ///

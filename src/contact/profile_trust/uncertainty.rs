@@ -17,12 +17,13 @@ use crate::contact::geometry::profile::Profile;
 use crate::contact::geometry::profile_quality::flattening::noise_pressure;
 use crate::contact::geometry::profile_quality::points::SMOOTHING_ADVISED;
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::normal::wheel_height::search::{PressedWheel, WheelTask};
-use crate::contact::profile_trust::quality::{ProfileQuality, ProfileUncertainty};
+use crate::contact::normal::wheel_height::search::PressedWheel;
+use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::solution::profile_quality::{ProfileQuality, ProfileUncertainty};
 use crate::contact::solution::words::{PatchSolution, Solution};
 
 /// Companions are solved with these multiples of the smoothing.

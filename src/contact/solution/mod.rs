@@ -3,5 +3,6 @@
 pub mod assemble;
 pub mod finish;
 pub mod finite;
+pub mod profile_quality;
 pub mod track_axes;
 pub mod words;

@@ -1,7 +1,7 @@
 //! The answers for the parts of a wheel–rail contact put together, with their places and the sums in track axes.
 
 use crate::contact::case::problem::Problem;
-use crate::contact::geometry::contact_locus::Frame;
+use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::wheel_height::search::{PressedGap, PressedWheel};

@@ -8,8 +8,8 @@ use utoipa::ToSchema;
 
 use crate::contact::case::words::{MethodName, MotionWords};
 use crate::contact::post::zone::Zone;
-use crate::contact::profile_trust::quality::{PatchQuality, ProfileUncertainty};
 use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::solution::profile_quality::{PatchQuality, ProfileUncertainty};
 
 /// The answer to one case, without fields.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]

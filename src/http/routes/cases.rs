@@ -6,8 +6,8 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::contact::case::words::{Case, MethodName, Output};
-use crate::contact::profile_trust::quality::PairQuality;
 use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::solution::profile_quality::PairQuality;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::json::JsonBody;
 use crate::http::limits::memory::Memory;

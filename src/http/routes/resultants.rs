@@ -7,7 +7,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::contact::case::words::MotionWords;
-use crate::contact::profile_trust::quality::ProfileUncertainty;
+use crate::contact::solution::profile_quality::ProfileUncertainty;
 use crate::contact::solution::words::{ErrorEstimate, Origin, Solution, Total};
 use crate::http::extract::accept::{Format, choose, one_of};
 use crate::http::extract::caller::Caller;

@@ -3,3 +3,4 @@
 pub mod bracket;
 pub mod gap_remarks;
 pub mod search;
+pub mod task;

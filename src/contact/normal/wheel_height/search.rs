@@ -7,9 +7,9 @@
 
 use std::f64::consts::PI;
 
-use crate::contact::geometry::contact_locus::{ContactLocus, Frame};
+use crate::contact::geometry::contact_locus::ContactLocus;
+use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::local_gap::{Detail, LocalGap};
-use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::answer::{NormalError, NormalWork};
 use crate::contact::normal::gap::surface::GapSurface;
@@ -19,7 +19,7 @@ use crate::contact::normal::neighbours::{Neighbour, neglected};
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::normal::wheel_height::bracket::{Bracket, HeightExit};
 use crate::contact::normal::wheel_height::gap_remarks::{cut_patches, missed_beside};
-use crate::contact::profile_trust::trust::Trust;
+use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 
@@ -35,30 +35,6 @@ const CORRECTED: f64 = 1.0 / 3.0;
 const NEAR: f64 = 0.02;
 /// A patch that overlaps by less than this part of the deepest overlap carries nothing to speak of (about its power 3/2).
 const DEPTH_SHARE_MIN: f64 = 2e-3;
-/// What presses the wheel on the rail.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum WheelLoad {
-    /// Vertical force in N.
-    Vertical(f64),
-    /// Sum of the normal forces of all patches in N.
-    Normal(f64),
-    /// The wheel is lowered by so many mm below first touch.
-    Lowering(f64),
-}
-
-/// A wheel over its rail, and what presses them together.
-#[derive(Debug, Clone, PartialEq)]
-pub struct WheelTask {
-    /// Wheel and rail in place.
-    pub geometry: WheelRail,
-    /// The load.
-    pub loading: WheelLoad,
-    /// Contact modulus `E* = G/(1−ν)` in MPa.
-    pub contact_modulus: f64,
-    /// What the case says about the trust in the profiles.
-    pub trust: Trust,
-}
-
 /// The wheel at rest on its rail.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PressedWheel {

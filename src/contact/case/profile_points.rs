@@ -5,11 +5,13 @@ use crate::contact::geometry::profile_quality::noise;
 use crate::contact::geometry::profile_quality::points::{Grain, advised_smoothing};
 use crate::contact::geometry::profile_quality::shape::{Looks, looks_like};
 use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::normal::wheel_height::search::WheelTask;
-use crate::contact::profile_trust::quality::{PairQuality, SectionQuality};
-use crate::contact::profile_trust::settle::PRESSURE_USUAL;
+use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
+use crate::contact::solution::profile_quality::{PairQuality, SectionQuality};
+
+/// Pressure in MPa that profiles are judged for before their contact is known.
+pub(crate) const PRESSURE_USUAL: f64 = 1200.0;
 
 /// Noise and spacing of a whole profile.
 pub fn grain(profile: &Profile) -> Grain {

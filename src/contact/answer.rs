@@ -1,0 +1,53 @@
+//! Solves the motions of a problem whose region and pressure are known, one after the other.
+
+use std::sync::Arc;
+
+use crate::contact::case::problem::Problem;
+use crate::contact::error::SolveError;
+use crate::contact::rolling::force_control;
+use crate::contact::rolling::operator_store::OperatorStore;
+use crate::contact::rolling::refinement::level_solve::MotionAnswer;
+use crate::contact::rolling::refinement::levels::Levels;
+use crate::contact::solution::assemble::Assembly;
+use crate::contact::solution::finish::share_seconds;
+use crate::contact::solution::words::{Fields, Solution};
+use crate::contact::time_limit::TimeLimit;
+
+/// Solves every motion of a problem whose region and pressure are known.
+///
+/// # Errors
+/// Why a motion has no answer; or the monitor stopped the work.
+pub(crate) fn answer(
+    operators: &Arc<OperatorStore>,
+    problem: &Problem,
+    watch: &TimeLimit,
+) -> Result<(Solution, Fields), SolveError> {
+    let answer = motions(operators, problem, watch);
+    let (mut solution, fields) = answer.map_err(|error| watch.explained(error, problem))?;
+    share_seconds(&mut solution);
+    Ok((solution, fields))
+}
+
+fn motions(
+    operators: &Arc<OperatorStore>,
+    problem: &Problem,
+    watch: &TimeLimit,
+) -> Result<(Solution, Fields), SolveError> {
+    let footprint = problem.footprint();
+    let task = problem.rolling_task(&footprint);
+    let mut levels = Levels::new(&task, operators);
+    let mut assembly = Assembly::new(problem);
+    let mut before: Option<MotionAnswer> = None;
+    for index in 0..problem.motions.len() {
+        let mut point = force_control::solve(&task, &mut levels, index, before.as_ref(), watch)?;
+        if index == 0 {
+            // What all motions share is charged to the first.
+            point.seconds += problem.normal.map_or(0.0, |normal| normal.seconds);
+        }
+        assembly.add(&levels, &point);
+        levels.trim();
+        before = Some(point);
+        watch.advance();
+    }
+    Ok(assembly.finish())
+}
