@@ -28,6 +28,7 @@ mod manners;
 #[cfg(target_os = "linux")]
 mod memory;
 mod metrics;
+mod model;
 mod order;
 mod ownership;
 mod pictures;
@@ -46,6 +47,7 @@ mod store_jobs;
 mod store_keys;
 mod store_lists;
 mod store_model;
+mod store_moves;
 mod store_slices;
 mod support;
 mod sweeps;

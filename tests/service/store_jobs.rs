@@ -395,7 +395,24 @@ async fn jobs_of_a_group_that_died_are_retried_alone_and_uncounted(kind: StoreKi
     );
 }
 
+async fn an_end_that_is_written_again_because_its_answer_was_lost_keeps_its_result(
+    kind: StoreKind,
+) {
+    let table = Table::new(kind).await;
+    table.add(new_job()).await;
+    let claim = table.claim(0).await.unwrap();
+    assert!(table.finish(&claim, &success(), 1).await.is_some());
+    // The worker takes the job for lost and leaves the result to be removed.
+    assert_eq!(table.finish(&claim, &success(), 2).await, None);
+    table.store.abandon_blob("results/1").await.unwrap();
+    assert!(table.store.released_blobs(&[], 9).await.unwrap().is_empty());
+    table.store.delete("anonymous", claim.id).await.unwrap();
+    let released = table.store.released_blobs(&[], 9).await.unwrap();
+    assert_eq!(released, ["results/1"]);
+}
+
 conformance! {
+    an_end_that_is_written_again_because_its_answer_was_lost_keeps_its_result,
     jobs_of_a_group_that_died_are_retried_alone_and_uncounted,
     a_job_comes_back_as_it_was_queued,
     jobs_are_claimed_oldest_first_and_each_once,

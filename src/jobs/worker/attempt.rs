@@ -1,4 +1,17 @@
 //! Jobs that were claimed together, on their way through one solver thread. A single job is a group of one.
+//!
+//! The phases of a member ([`Phase`]); [`judge`](crate::jobs::worker::judge) decides what follows from an outcome:
+//!
+//! ```text
+//! Solving ─┬─ Solved(outcome) ─┬─ Store, End ──── the end is written ──────▶ Done
+//!          │                   ├─ StoreSlice ─┬── next slice ──────────────▶ Solving
+//!          │                   │              └── others wait: released ───▶ Done
+//!          │                   ├─ Release ─────── released ────────────────▶ Done
+//!          │                   └─ Discard ─────── the lease is lost ───────▶ Done
+//!          ├─ NotBegun ────────────────────────── released ────────────────▶ Done
+//!          └─ WaitingFor(first) ─┬─────────────── ends with its answer ────▶ Done
+//!                                └─────────────── no answer: released ─────▶ Done
+//! ```
 
 use std::collections::HashMap;
 use std::sync::Arc;

@@ -1,4 +1,5 @@
-//! What becomes of a job after an attempt: from the outcome of the solver and from what it was told, in one place.
+//! What follows for a job from the outcome of its solver and from the reason for which the solver was told to stop. This is the
+//! one place that decides it.
 
 use crate::contact::error::SolveError;
 use crate::contact::remark::entry::RemarkEntry;
@@ -11,26 +12,27 @@ use crate::jobs::worker::slices::SlicedCase;
 
 /// What follows from the outcome of an attempt.
 pub(crate) enum Verdict {
-    /// There is a part of an answer to keep, if any, and more to be solved: now, or by somebody else later.
-    GoOn {
+    /// Store a solved slice, if there is one; the case is not solved whole. With a reason to stop it is released then, without
+    /// one the next slice is solved.
+    StoreSlice {
         sweep: Box<SlicedCase>,
         part: Option<(SliceRecord, EncodedResult)>,
         stopped: Option<StopReason>,
     },
-    /// There is an answer to keep.
-    Keep {
+    /// Store the answer, then end.
+    Store {
         result: EncodedResult,
         remarks: Vec<RemarkEntry>,
         field_patches: u32,
     },
-    /// The job ends without one.
+    /// End without an answer.
     End(Ending),
-    /// The job goes back to the queue, its attempt uncounted.
-    HandBack,
-    /// As before; its solve takes longer than was thought.
-    HandBackAsLong,
-    /// The lease is gone.
-    Lost,
+    /// Give the job back to the queue, its attempt uncounted.
+    Release,
+    /// The same, and note that a slice of it takes longer than was expected.
+    ReleaseAsLong,
+    /// The lease is lost: discard whatever there is.
+    Discard,
 }
 
 /// What follows from the outcome of an attempt; the one place that decides it.
@@ -44,7 +46,7 @@ pub(crate) fn judge(outcome: Outcome, reason: Option<StopReason>) -> Verdict {
     };
     match outcome {
         Outcome::Solved { .. } | Outcome::Slice { .. } if reason == Some(StopReason::Lost) => {
-            Verdict::Lost
+            Verdict::Discard
         }
         // A slice counts like an answer where somebody wants the whole.
         Outcome::Slice { sweep, part }
@@ -53,7 +55,7 @@ pub(crate) fn judge(outcome: Outcome, reason: Option<StopReason>) -> Verdict {
                 None | Some(StopReason::Shutdown | StopReason::TooLong)
             ) =>
         {
-            Verdict::GoOn {
+            Verdict::StoreSlice {
                 sweep,
                 part,
                 stopped: reason,
@@ -63,7 +65,7 @@ pub(crate) fn judge(outcome: Outcome, reason: Option<StopReason>) -> Verdict {
             result,
             remarks,
             field_patches,
-        } => Verdict::Keep {
+        } => Verdict::Store {
             result,
             remarks,
             field_patches,
@@ -71,9 +73,9 @@ pub(crate) fn judge(outcome: Outcome, reason: Option<StopReason>) -> Verdict {
         Outcome::Unsolved(SolveError::Cancelled) | Outcome::Abandoned | Outcome::Slice { .. } => {
             match reason {
                 Some(StopReason::Cancel) => Verdict::End(Ending::Cancelled),
-                Some(StopReason::Shutdown) => Verdict::HandBack,
-                Some(StopReason::TooLong) => Verdict::HandBackAsLong,
-                Some(StopReason::Lost) => Verdict::Lost,
+                Some(StopReason::Shutdown) => Verdict::Release,
+                Some(StopReason::TooLong) => Verdict::ReleaseAsLong,
+                Some(StopReason::Lost) => Verdict::Discard,
                 Some(StopReason::Deadline) => Verdict::End(Ending::Failed(too_late())),
                 None => failed("the solver stopped although nobody asked it to".to_owned()),
             }
@@ -108,13 +110,13 @@ mod tests {
     /// What becomes of a job, as a word.
     fn fate(outcome: Outcome, reason: Option<StopReason>) -> &'static str {
         match judge(outcome, reason) {
-            Verdict::Keep { .. } => "kept",
-            Verdict::GoOn { stopped: None, .. } => "goes on",
-            Verdict::GoOn { .. } => "part kept",
+            Verdict::Store { .. } => "kept",
+            Verdict::StoreSlice { stopped: None, .. } => "goes on",
+            Verdict::StoreSlice { .. } => "part kept",
             Verdict::End(ending) => ending.state().name(),
-            Verdict::HandBack => "back",
-            Verdict::HandBackAsLong => "back, long",
-            Verdict::Lost => "lost",
+            Verdict::Release => "back",
+            Verdict::ReleaseAsLong => "back, long",
+            Verdict::Discard => "lost",
         }
     }
 

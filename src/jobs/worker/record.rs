@@ -121,11 +121,11 @@ impl Worker {
     ) {
         let claim = attempt.members[place].claim.clone();
         let stored = match verdict {
-            Verdict::Lost => return sorted.lost.push(claim.id),
-            Verdict::HandBack => return sorted.back.push(claim),
-            Verdict::HandBackAsLong => return sorted.long.push(claim),
+            Verdict::Discard => return sorted.lost.push(claim.id),
+            Verdict::Release => return sorted.back.push(claim),
+            Verdict::ReleaseAsLong => return sorted.long.push(claim),
             Verdict::End(ending) => Ok(ending),
-            Verdict::GoOn {
+            Verdict::StoreSlice {
                 sweep,
                 part,
                 stopped,
@@ -139,7 +139,7 @@ impl Worker {
                 },
                 Err(error) => Err(error),
             },
-            Verdict::Keep {
+            Verdict::Store {
                 result,
                 remarks,
                 field_patches,

@@ -3,6 +3,7 @@
 //! No worker claims a job of a batch while it is being filled ([`skip`](crate::jobs::store::types::ClaimRequest::skip)). A batch that a dead process left incomplete was never
 //! acknowledged and is removed with its jobs.
 
+use crate::jobs::store::sqlite::blob_refs::drop_slices_of_ended;
 use std::collections::{BTreeMap, HashSet};
 
 use sqlx::{Row, SqliteConnection};
@@ -11,7 +12,7 @@ use uuid::Uuid;
 use crate::jobs::batch::model::{Batch, BatchItem, ItemResult};
 use crate::jobs::model::{State, created_at};
 use crate::jobs::store::error::StoreError;
-use crate::jobs::store::sqlite::blobs::release_blobs;
+use crate::jobs::store::sqlite::blob_refs::release_blobs;
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::insert::insert_jobs;
 use crate::jobs::store::sqlite::quota::Places;
@@ -25,7 +26,7 @@ const CANCEL: &str = "UPDATE jobs SET state = CASE WHEN state = 'queued' THEN 'c
      cancel_requested = 1, version = version + 1 \
      WHERE id IN (SELECT id FROM jobs WHERE batch_id = (SELECT id FROM batches WHERE id = $2 AND tenant = $4) \
      AND ended_at IS NULL AND cancel_requested = 0 LIMIT $3) \
-     RETURNING id, state";
+     RETURNING id, state, slices";
 
 impl SqliteStore {
     /// Reserves places in the queue for a batch that is being staged, at most `most`, beside those that it has; returns how
@@ -270,13 +271,16 @@ impl SqliteStore {
         limit: u32,
         now: i64,
     ) -> Result<Vec<(Uuid, State)>, StoreError> {
+        let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         let rows = sqlx::query(CANCEL)
             .bind(now)
             .bind(id.to_string())
             .bind(limit)
             .bind(tenant)
-            .fetch_all(&self.writer)
+            .fetch_all(&mut *transaction)
             .await?;
+        drop_slices_of_ended(&mut transaction, &rows).await?;
+        transaction.commit().await?;
         rows.iter()
             .map(|row| Ok((read_id(row)?, read_state(row)?)))
             .collect()

@@ -1,100 +1,16 @@
-//! Results in the embedded job table, and who refers to them.
-//!
-//! A blob is a row; jobs refer to it, lending a result is one more reference. `release_blobs` is the only place where a
-//! blob ends: it is called in every transaction that drops references. Only the slices of sweeps have blobs of their own, which
-//! nobody else refers to; triggers of the table remove them in the transaction in which their job ends.
+//! Large results that nobody refers to any more.
 
+use crate::jobs::store::sqlite::blob_refs::VALUES_PER_STATEMENT;
+use crate::jobs::store::sqlite::blob_refs::leave_to_collector;
+use crate::jobs::store::sqlite::blob_refs::push_keys;
 use crate::jobs::store::sqlite::rows::push_list;
 use crate::jobs::store::sqlite::rows::read_id;
-use sqlx::{QueryBuilder, Row, Sqlite, SqliteConnection};
+use sqlx::{QueryBuilder, Sqlite};
 use std::collections::HashSet;
 use uuid::Uuid;
 
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::database::SqliteStore;
-use crate::jobs::store::types::StoredResult;
-
-/// Values bound in one statement; far below the bound of SQLite.
-const VALUES_PER_STATEMENT: usize = 250;
-
-/// Stores results within the caller's transaction; the ids of their blobs are in the order of the results.
-pub(crate) async fn insert_blobs(
-    connection: &mut SqliteConnection,
-    results: &[&StoredResult],
-) -> Result<Vec<i64>, StoreError> {
-    if results.is_empty() {
-        return Ok(Vec::new());
-    }
-    // The ids are given here, not by the database: rows of one statement may come back in any order. An id is never used
-    // twice, so that a reader cannot meet the result of another job under it.
-    let last: Option<i64> =
-        sqlx::query_scalar("SELECT seq FROM sqlite_sequence WHERE name = 'blobs'")
-            .fetch_optional(&mut *connection)
-            .await?;
-    let mut next = last.unwrap_or(0);
-    let mut ids = Vec::with_capacity(results.len());
-    for some in results.chunks(VALUES_PER_STATEMENT) {
-        let mut insert =
-            QueryBuilder::<Sqlite>::new("INSERT INTO blobs (id, key, bytes, solution, fields) ");
-        insert.push_values(some, |mut row, result| {
-            next += 1;
-            ids.push(next);
-            let (key, inside) = match result {
-                StoredResult::Blob(key, _) => (Some(key.as_str()), None),
-                StoredResult::Inline(result) => (None, Some(result)),
-            };
-            row.push_bind(next)
-                .push_bind(key)
-                .push_bind(i64::try_from(result.bytes()).unwrap_or(i64::MAX))
-                .push_bind(inside.map(|result| result.solution.as_ref()))
-                .push_bind(inside.and_then(|result| result.fields.as_deref()));
-        });
-        insert.build().execute(&mut *connection).await?;
-    }
-    Ok(ids)
-}
-
-/// Removes those of these blobs that no job refers to any more; the keys of the large ones enter the outbox.
-pub(crate) async fn release_blobs(
-    connection: &mut SqliteConnection,
-    mut ids: Vec<i64>,
-) -> Result<(), StoreError> {
-    ids.sort_unstable();
-    ids.dedup();
-    for some in ids.chunks(VALUES_PER_STATEMENT) {
-        let mut free = QueryBuilder::<Sqlite>::new("DELETE FROM blobs WHERE id IN (");
-        let mut list = free.separated(", ");
-        for id in some {
-            list.push_bind(*id);
-        }
-        free.push(
-            ") AND NOT EXISTS (SELECT 1 FROM jobs WHERE jobs.blob_id = blobs.id) RETURNING key",
-        );
-        let gone = free.build().fetch_all(&mut *connection).await?;
-        let keys = gone
-            .iter()
-            .map(|row| row.try_get::<Option<String>, _>("key"));
-        let keys = keys.collect::<Result<Vec<_>, _>>()?;
-        let keys: Vec<String> = keys.into_iter().flatten().collect();
-        leave_to_collector(connection, &keys).await?;
-    }
-    Ok(())
-}
-
-async fn leave_to_collector(
-    connection: &mut SqliteConnection,
-    keys: &[String],
-) -> Result<(), StoreError> {
-    for some in keys.chunks(VALUES_PER_STATEMENT) {
-        let mut leave = QueryBuilder::<Sqlite>::new("INSERT INTO blob_outbox (key) ");
-        leave.push_values(some, |mut row, key| {
-            row.push_bind(key);
-        });
-        leave.push(" ON CONFLICT DO NOTHING");
-        leave.build().execute(&mut *connection).await?;
-    }
-    Ok(())
-}
 
 impl SqliteStore {
     /// Keys of large results that are to be removed, at most `limit`; those in `done` are forgotten first.
@@ -166,14 +82,6 @@ impl SqliteStore {
     }
 }
 
-fn push_keys(query: &mut QueryBuilder<Sqlite>, keys: &[String]) {
-    let mut list = query.separated(", ");
-    for key in keys {
-        list.push_bind(key.clone());
-    }
-    query.push(")");
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -186,7 +94,8 @@ mod tests {
         let store = SqliteStore::open(&folder.path().join("jobs.db"))
             .await
             .unwrap();
-        let free = "DELETE FROM blobs WHERE id IN (1, 2) AND NOT EXISTS (SELECT 1 FROM jobs WHERE jobs.blob_id = blobs.id)";
+        let free = "DELETE FROM blobs WHERE id IN (1, 2) AND NOT EXISTS (SELECT 1 FROM jobs WHERE jobs.blob_id = blobs.id) \
+            AND NOT EXISTS (SELECT 1 FROM job_slices WHERE job_slices.blob_id = blobs.id)";
         let known = "SELECT key FROM blobs WHERE key IN ('a', 'b')";
         for (statement, seek) in [
             (free, "jobs_by_blob (blob_id=?"),

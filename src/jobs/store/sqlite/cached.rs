@@ -2,6 +2,7 @@
 //!
 //! A result is lent: the other job refers to the same blob, which is kept for as long as any job refers to it.
 
+use crate::jobs::store::sqlite::blob_refs::drop_slices_of_ended;
 use sqlx::{QueryBuilder, Sqlite, SqliteConnection};
 use uuid::Uuid;
 
@@ -58,9 +59,10 @@ pub(crate) async fn end_pairs(
          attempt = jobs.attempt - (pairs.lease_number IS NOT NULL) \
          FROM pairs JOIN jobs AS source ON source.id = pairs.source AND source.state = 'succeeded' \
          WHERE jobs.id = pairs.job AND (jobs.state = 'queued' AND pairs.lease_number IS NULL \
-         OR jobs.state = 'running' AND jobs.lease_number = pairs.lease_number) RETURNING id",
+         OR jobs.state = 'running' AND jobs.lease_number = pairs.lease_number) RETURNING jobs.id AS id, jobs.state AS state, jobs.slices AS slices",
     );
     let rows = update.build().fetch_all(&mut *connection).await?;
+    drop_slices_of_ended(connection, &rows).await?;
     rows.iter().map(read_id).collect()
 }
 

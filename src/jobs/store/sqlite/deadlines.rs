@@ -1,5 +1,7 @@
 //! Jobs of the embedded table whose deadline has passed.
 
+use crate::jobs::store::sqlite::blob_refs::drop_slices_of_ended;
+use crate::jobs::store::sqlite::rows::read_move;
 use crate::jobs::store::types::Overdue;
 use uuid::Uuid;
 
@@ -15,7 +17,7 @@ const LATE: &str = "SELECT id, state FROM jobs WHERE deadline <= $1 AND deadline
 
 const FAIL_LATE: &str = "UPDATE jobs SET state = 'failed', failure = $4, ended_at = $1, version = version + 1 \
      WHERE id IN (SELECT id FROM jobs WHERE deadline <= $1 AND deadline IS NOT NULL AND ended_at IS NULL \
-     AND (created_at >= $2 OR deadline <= $3) AND state || '' = 'queued' LIMIT $5) RETURNING id";
+     AND (created_at >= $2 OR deadline <= $3) AND state || '' = 'queued' LIMIT $5) RETURNING id, state, slices";
 
 /// Jobs ended in one transaction.
 const AT_ONCE: i64 = 1000;
@@ -48,15 +50,20 @@ impl SqliteStore {
     }
 
     async fn fail_late(&self, failure: &Failure, moment: Moment) -> Result<Vec<Uuid>, StoreError> {
+        let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         let rows = sqlx::query(FAIL_LATE)
             .bind(moment.now)
             .bind(moment.set_at)
             .bind(moment.unset)
             .bind(to_json(failure)?)
             .bind(AT_ONCE)
-            .fetch_all(&self.writer)
+            .fetch_all(&mut *transaction)
             .await?;
-        rows.iter().map(read_id).collect()
+        drop_slices_of_ended(&mut transaction, &rows).await?;
+        transaction.commit().await?;
+        rows.iter()
+            .map(|row| Ok(read_move(row, State::Queued)?.0))
+            .collect()
     }
 }
 

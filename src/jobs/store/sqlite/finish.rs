@@ -1,9 +1,11 @@
 //! Ends of claimed jobs in the embedded job table: one transaction, and so one write to the disk, for all of them.
 
+use crate::jobs::store::sqlite::blob_refs::drop_slices_of_ended;
 use crate::jobs::store::sqlite::cached::Pair;
 use crate::jobs::store::sqlite::cached::SOURCE;
 use crate::jobs::store::sqlite::cached::end_pairs;
 use crate::jobs::store::sqlite::rows::read_cache_key;
+use crate::jobs::store::sqlite::rows::read_move;
 use crate::jobs::store::types::CacheKey;
 use sqlx::Row;
 use sqlx::SqliteConnection;
@@ -15,7 +17,7 @@ use uuid::Uuid;
 
 use crate::jobs::model::State;
 use crate::jobs::store::error::StoreError;
-use crate::jobs::store::sqlite::blobs::{insert_blobs, release_blobs};
+use crate::jobs::store::sqlite::blob_refs::{insert_blobs, release_blobs};
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::fence;
 use crate::jobs::store::sqlite::rows::{read_id, to_json};
@@ -125,13 +127,14 @@ async fn end_solved(
          progress = CASE WHEN done.state = 'succeeded' THEN 1.0 ELSE progress END, \
          lease_until = NULL, worker = NULL, solving = 0, version = version + 1 \
          FROM done WHERE jobs.id = done.id AND jobs.lease_number = done.lease_number \
-         AND jobs.state = 'running' RETURNING id",
+         AND jobs.state = 'running' RETURNING id, jobs.state AS state, slices",
     );
     let ended = update.build().fetch_all(&mut *connection).await?;
+    drop_slices_of_ended(connection, &ended).await?;
     let ended = ended
         .iter()
-        .map(read_id)
-        .collect::<Result<HashSet<_>, _>>()?;
+        .map(|row| Ok(read_move(row, State::Running)?.0))
+        .collect::<Result<HashSet<_>, StoreError>>()?;
     if ended.len() < rows.len() {
         // The results of those whose lease was lost have no owner.
         release_blobs(connection, inserted).await?;

@@ -1,5 +1,6 @@
 //! What clients ask of one job.
 
+use crate::jobs::store::sqlite::blob_refs::drop_slices_of_ended;
 use crate::jobs::store::sqlite::rows::GET;
 use crate::jobs::store::sqlite::rows::read_count;
 use crate::jobs::store::types::StoredCase;
@@ -11,7 +12,7 @@ use uuid::Uuid;
 
 use crate::jobs::model::Job;
 use crate::jobs::store::error::StoreError;
-use crate::jobs::store::sqlite::blobs::release_blobs;
+use crate::jobs::store::sqlite::blob_refs::release_blobs;
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::{job_columns, read_blob_id, read_job};
 use crate::jobs::store::types::{Deleted, ResultRef};
@@ -28,20 +29,24 @@ impl SqliteStore {
         id: Uuid,
         now: i64,
     ) -> Result<Option<Job>, StoreError> {
+        let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
         let row = sqlx::query(concat!(
             "UPDATE jobs SET state = CASE WHEN state = 'queued' THEN 'cancelled' ELSE state END, \
              ended_at = CASE WHEN state = 'queued' THEN $1 ELSE NULL END, \
              cancel_requested = 1, version = version + 1 \
              WHERE id = $2 AND tenant = $3 AND cancel_requested = 0 AND state IN ('queued', 'running') RETURNING ",
-            job_columns!()
+            job_columns!(),
+            ", slices"
         ))
         .bind(now)
         .bind(id.to_string())
         .bind(tenant)
-        .fetch_optional(&self.writer)
+        .fetch_all(&mut *transaction)
         .await?;
-        match row {
-            Some(row) => read_job(&row).map(Some),
+        drop_slices_of_ended(&mut transaction, &row).await?;
+        transaction.commit().await?;
+        match row.first() {
+            Some(row) => read_job(row).map(Some),
             None => self.job(tenant, id).await,
         }
     }

@@ -1,6 +1,8 @@
 //! What workers write while they hold a lease.
 
+use crate::jobs::store::sqlite::blob_refs::drop_slices_of_ended;
 use crate::jobs::store::sqlite::rows::fence;
+use crate::jobs::store::sqlite::rows::read_move;
 use std::collections::HashMap;
 
 use bytes::Bytes;
@@ -10,7 +12,7 @@ use uuid::Uuid;
 use crate::jobs::model::State;
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::database::SqliteStore;
-use crate::jobs::store::sqlite::rows::{push_list, read_id, read_state};
+use crate::jobs::store::sqlite::rows::{push_list, read_id};
 use crate::jobs::store::types::{Claim, ReleaseReason, Renewal, StoredCase};
 
 impl SqliteStore {
@@ -159,10 +161,13 @@ impl SqliteStore {
         query
             .push(" ELSE NULL END")
             .push(OF_HELD)
-            .push("jobs.id AS id, state");
-        let rows = query.build().fetch_all(&self.writer).await?;
+            .push("jobs.id AS id, state, slices");
+        let mut transaction = self.writer.begin_with("BEGIN IMMEDIATE").await?;
+        let rows = query.build().fetch_all(&mut *transaction).await?;
+        drop_slices_of_ended(&mut transaction, &rows).await?;
+        transaction.commit().await?;
         rows.iter()
-            .map(|row| Ok((read_id(row)?, read_state(row)?)))
+            .map(|row| read_move(row, State::Running))
             .collect()
     }
 }

@@ -1,12 +1,14 @@
 //! Takes jobs from workers whose lease has run out, and from a dead process.
 
+use crate::jobs::store::sqlite::blob_refs::drop_slices_of_ended;
+use crate::jobs::store::sqlite::rows::read_move;
 use crate::jobs::store::types::Reap;
 use uuid::Uuid;
 
 use crate::jobs::model::{Failure, State};
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::database::SqliteStore;
-use crate::jobs::store::sqlite::rows::{read_id, read_state, to_json};
+use crate::jobs::store::sqlite::rows::to_json;
 
 /// Those whose worker is silent: single ones count the attempt, those of a group do not and come alone next time.
 pub(crate) const REAP: &str = "UPDATE jobs SET \
@@ -18,7 +20,7 @@ pub(crate) const REAP: &str = "UPDATE jobs SET \
      attempt = CASE WHEN group_size > 1 THEN attempt - 1 ELSE attempt END, \
      suspect = CASE WHEN group_size > 1 THEN 1 ELSE suspect END, \
      progress = done, lease_until = NULL, worker = NULL, solving = 0, version = version + 1 \
-     WHERE state = 'running' AND lease_until <= $4 RETURNING id, state";
+     WHERE state = 'running' AND lease_until <= $4 RETURNING id, state, slices";
 
 /// Those of a dead process that were not what it died of, or not certainly: none counts, and those that were being solved
 /// come alone next time. Left are those that were solved alone.
@@ -30,7 +32,7 @@ pub(crate) const REAP_BYSTANDERS: &str = "UPDATE jobs SET \
      progress = done, lease_until = NULL, worker = NULL, solving = 0, version = version + 1 \
      WHERE state = 'running' AND (solving = 0 OR group_size > 1 \
          OR (SELECT COUNT(*) FROM jobs AS other WHERE other.state = 'running' AND other.solving = 1) > 1) \
-     RETURNING id, state";
+     RETURNING id, state, slices";
 
 impl SqliteStore {
     /// Takes running jobs from their workers; see [`Reap`].
@@ -57,10 +59,11 @@ impl SqliteStore {
             .bind(lease_until)
             .fetch_all(&mut *transaction)
             .await?;
-        transaction.commit().await?;
         rows.extend(expired);
+        drop_slices_of_ended(&mut transaction, &rows).await?;
+        transaction.commit().await?;
         rows.iter()
-            .map(|row| Ok((read_id(row)?, read_state(row)?)))
+            .map(|row| read_move(row, State::Running))
             .collect()
     }
 }

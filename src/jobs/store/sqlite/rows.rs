@@ -84,6 +84,13 @@ pub(crate) fn read_state(row: &SqliteRow) -> Result<State, StoreError> {
     State::from_name(name).ok_or_else(|| StoreError::Corrupt(format!("job state {name:?}")))
 }
 
+/// The id of a row and its state, into which a job that was in `from` has moved.
+pub(crate) fn read_move(row: &SqliteRow, from: State) -> Result<(Uuid, State), StoreError> {
+    let to = read_state(row)?;
+    debug_assert!(from.may_become(to), "{from:?} became {to:?}");
+    Ok((read_id(row)?, to))
+}
+
 pub(crate) fn read_count(row: &SqliteRow, column: &str) -> Result<u64, StoreError> {
     let count: i64 = row.try_get(column)?;
     u64::try_from(count).map_err(|_| StoreError::Corrupt(format!("{column} is {count}")))

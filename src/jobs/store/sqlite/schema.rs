@@ -12,8 +12,8 @@ const SCHEMA: &str = include_str!("schema.sql");
 /// Marks a file as a job table of this service ("rhjb").
 const APPLICATION: i64 = 0x7268_6a62;
 
-/// The form that this version reads and writes; grows with every change of `schema.sql` after the first release.
-const FORM: i64 = 1;
+/// The version of `schema.sql` that is read and written; it grows with every change of that file.
+const FORM: i64 = 2;
 
 /// Makes the tables in an empty file.
 ///

@@ -95,7 +95,7 @@ CREATE TRIGGER job_moves_with_labels AFTER UPDATE OF state ON jobs WHEN OLD.stat
     UPDATE job_labels SET state = NEW.state WHERE job_id = NEW.id;
 END;
 
--- Results. A small one lies here, a large one in the folder of results under its key. A blob that no job refers to is
+-- Results. A small one lies here, a large one in the folder of results under its key. A blob that nothing refers to is
 -- removed in the transaction that drops the last reference; the key of a large one is then left to the collector.
 CREATE TABLE blobs (
     id       INTEGER NOT NULL PRIMARY KEY AUTOINCREMENT,
@@ -111,8 +111,8 @@ CREATE TABLE blob_outbox (
     key TEXT NOT NULL PRIMARY KEY
 ) STRICT, WITHOUT ROWID;
 
--- Solved slices of sweeps that are not yet solved whole. Each has a blob of its own, which nobody else refers to. They go in
--- the transaction in which their job ends, whatever ends it.
+-- Solved slices of jobs that are not solved whole. They refer to blobs as jobs do, and go in the transaction in which their
+-- job ends, whatever ends it.
 CREATE TABLE job_slices (
     job_id   TEXT    NOT NULL REFERENCES jobs (id) ON DELETE CASCADE,
     number   INTEGER NOT NULL, -- among the slices of the case, from 0
@@ -123,15 +123,6 @@ CREATE TABLE job_slices (
     PRIMARY KEY (job_id, number)
 ) STRICT, WITHOUT ROWID;
 CREATE INDEX job_slices_by_blob ON job_slices (blob_id);
-CREATE TRIGGER slice_goes AFTER DELETE ON job_slices BEGIN
-    INSERT INTO blob_outbox (key) SELECT key FROM blobs WHERE id = OLD.blob_id AND key IS NOT NULL
-        ON CONFLICT (key) DO NOTHING;
-    DELETE FROM blobs WHERE id = OLD.blob_id;
-END;
-CREATE TRIGGER job_ends_with_its_slices AFTER UPDATE OF state ON jobs WHEN NEW.slices > 0
-    AND NEW.state IN ('succeeded', 'failed', 'cancelled') BEGIN
-    DELETE FROM job_slices WHERE job_id = NEW.id;
-END;
 
 CREATE TABLE batches (
     id         TEXT    NOT NULL PRIMARY KEY,

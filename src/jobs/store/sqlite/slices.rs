@@ -1,12 +1,13 @@
 //! Solved slices of jobs that are not solved whole.
 
+use crate::jobs::store::sqlite::rows::read_blob_ids;
 use std::time::Duration;
 
 use sqlx::Row;
 use uuid::Uuid;
 
 use crate::jobs::store::error::StoreError;
-use crate::jobs::store::sqlite::blobs::insert_blobs;
+use crate::jobs::store::sqlite::blob_refs::{insert_blobs, release_blobs};
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::fence;
 use crate::jobs::store::sqlite::rows::read_count;
@@ -58,11 +59,14 @@ impl SqliteStore {
         .fetch_optional(&mut *transaction)
         .await?;
         if there.is_none() {
-            sqlx::query("DELETE FROM job_slices WHERE job_id = $1 AND number >= $2")
-                .bind(&id)
-                .bind(note.number)
-                .execute(&mut *transaction)
-                .await?;
+            let replaced = sqlx::query(
+                "DELETE FROM job_slices WHERE job_id = $1 AND number >= $2 RETURNING blob_id",
+            )
+            .bind(&id)
+            .bind(note.number)
+            .fetch_all(&mut *transaction)
+            .await?;
+            release_blobs(&mut transaction, read_blob_ids(&replaced)?).await?;
             let blobs = insert_blobs(&mut transaction, &[&slice.result]).await?;
             sqlx::query(
                 "INSERT INTO job_slices (job_id, number, motions, digest, spent_us, blob_id) \

@@ -1,0 +1,302 @@
+//! A plain model of a job table: rows in a map, and what each call makes of them.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use railhead::jobs::State;
+use railhead::jobs::store::types::{CacheKey, Refusal};
+use uuid::Uuid;
+
+/// Attempts at a job before it fails.
+pub const ATTEMPTS_MAX: u32 = 2;
+/// Bounds of the queue: of all tenants, and of one.
+pub const BOUNDS: (u64, u64) = (14, 9);
+
+#[derive(Debug, Clone)]
+pub struct Row {
+    pub tenant: &'static str,
+    pub state: State,
+    pub rank: u8,
+    pub deadline: Option<i64>,
+    pub cache_key: Option<CacheKey>,
+    pub batch: Option<Uuid>,
+    pub attempt: u32,
+    pub lease_number: u64,
+    pub lease_until: i64,
+    pub group_size: usize,
+    pub solving: bool,
+    pub suspect: bool,
+    pub cancel_requested: bool,
+    pub ended_at: i64,
+    pub cached: bool,
+    /// Key of the result.
+    pub blob: Option<String>,
+    /// Keys of the stored slices.
+    pub slices: Vec<String>,
+    /// Slices were ever stored.
+    pub begun: bool,
+}
+
+#[derive(Debug, Clone)]
+pub struct BatchRow {
+    pub tenant: &'static str,
+    pub count: u32,
+    pub filled: u32,
+    pub complete: bool,
+}
+
+#[derive(Debug, Clone, Default)]
+pub struct Model {
+    pub rows: BTreeMap<Uuid, Row>,
+    pub batches: BTreeMap<Uuid, BatchRow>,
+    pub expired: BTreeSet<Uuid>,
+}
+
+impl Row {
+    pub fn new(tenant: &'static str, rank: u8) -> Row {
+        Row {
+            tenant,
+            state: State::Queued,
+            rank,
+            deadline: None,
+            cache_key: None,
+            batch: None,
+            attempt: 0,
+            lease_number: 0,
+            lease_until: 0,
+            group_size: 1,
+            solving: false,
+            suspect: false,
+            cancel_requested: false,
+            ended_at: 0,
+            cached: false,
+            blob: None,
+            slices: Vec::new(),
+            begun: false,
+        }
+    }
+
+    /// The one way in which a state changes here.
+    pub fn become_state(&mut self, state: State, now: i64) {
+        assert!(self.state.may_become(state), "{:?} → {state:?}", self.state);
+        self.state = state;
+        if state.ended() {
+            self.ended_at = now;
+            self.slices.clear();
+        }
+    }
+
+    pub fn claimed(&mut self, group_size: usize, lease_until: i64) {
+        self.become_state(State::Running, 0);
+        self.attempt += 1;
+        self.lease_number += 1;
+        self.lease_until = lease_until;
+        self.group_size = group_size;
+        self.solving = !self.suspect;
+    }
+
+    /// Back to the queue without counting the attempt, unless it is to be cancelled.
+    pub fn released(&mut self, now: i64) {
+        self.attempt -= 1;
+        self.solving = false;
+        let state = match self.cancel_requested {
+            true => State::Cancelled,
+            false => State::Queued,
+        };
+        self.become_state(state, now);
+    }
+
+    /// Its lease has run out.
+    pub fn reaped(&mut self, now: i64) {
+        if self.group_size > 1 {
+            self.suspect = true;
+            return self.released(now);
+        }
+        self.solving = false;
+        let state = match (self.cancel_requested, self.attempt >= ATTEMPTS_MAX) {
+            (true, _) => State::Cancelled,
+            (false, true) => State::Failed,
+            (false, false) => State::Queued,
+        };
+        self.become_state(state, now);
+    }
+
+    pub fn cancelled(&mut self, now: i64) {
+        if self.state.ended() {
+            return;
+        }
+        self.cancel_requested = true;
+        if self.state == State::Queued {
+            self.become_state(State::Cancelled, now);
+        }
+    }
+
+    pub fn is_late(&self, now: i64) -> bool {
+        self.deadline.is_some_and(|deadline| deadline <= now)
+    }
+}
+
+impl Model {
+    /// Queued jobs and reserved places, of a tenant or of all.
+    fn taken(&self, tenant: Option<&str>) -> u64 {
+        let of = |other: &str| tenant.is_none_or(|tenant| tenant == other);
+        let rows = self.rows.values();
+        let queued = rows.filter(|row| row.state == State::Queued && of(row.tenant));
+        let batches = self.batches.values();
+        let reserved = batches.filter(|batch| !batch.complete && of(batch.tenant));
+        let reserved = reserved.map(|batch| u64::from(batch.count - batch.filled));
+        queued.count() as u64 + reserved.sum::<u64>()
+    }
+
+    /// Is there room for so many more?
+    pub fn admit(&self, tenant: &str, jobs: u64) -> Result<(), Refusal> {
+        let of_tenant = self.taken(Some(tenant));
+        let places = jobs
+            .min(BOUNDS.0.saturating_sub(self.taken(None)))
+            .min(BOUNDS.1.saturating_sub(of_tenant));
+        match places == jobs {
+            true => Ok(()),
+            false if of_tenant + places >= BOUNDS.1 => Err(Refusal::Quota),
+            false => Err(Refusal::Queue),
+        }
+    }
+
+    /// The batches whose jobs no worker may take.
+    pub fn filling(&self) -> Vec<Uuid> {
+        let batches = self.batches.iter();
+        let filling = batches.filter(|(_, batch)| !batch.complete);
+        filling.map(|(id, _)| *id).collect()
+    }
+
+    /// The ids that a claim takes, in their order.
+    pub fn choose(&self, tenant: &str, jobs: usize, begun: bool, now: i64) -> Vec<Uuid> {
+        let filling = self.filling();
+        let rows = self.rows.iter().filter(|(_, row)| {
+            row.state == State::Queued
+                && row.tenant == tenant
+                && row.begun == begun
+                && !row.is_late(now)
+                && row.batch.is_none_or(|batch| !filling.contains(&batch))
+        });
+        let mut queued: Vec<_> = rows.map(|(id, row)| (row.rank, *id, row.suspect)).collect();
+        queued.sort_unstable();
+        let most = if begun { 1 } else { jobs };
+        let mut chosen = Vec::new();
+        for (_, id, suspect) in queued.into_iter().take(most) {
+            if suspect && !chosen.is_empty() {
+                break;
+            }
+            chosen.push(id);
+            if suspect {
+                break;
+            }
+        }
+        chosen
+    }
+
+    /// The row a claim still holds.
+    pub fn held(&mut self, id: Uuid, lease_number: u64) -> Option<&mut Row> {
+        self.rows
+            .get_mut(&id)
+            .filter(|row| row.state == State::Running && row.lease_number == lease_number)
+    }
+
+    /// A dead process leaves its jobs: those that were not solved alone count no attempt.
+    pub fn reap_dead(&mut self, now: i64) -> BTreeMap<Uuid, State> {
+        let running = |row: &&Row| row.state == State::Running;
+        let solving = self.rows.values().filter(running).filter(|row| row.solving);
+        let solving = solving.count();
+        self.take_back(|row| {
+            if !row.solving || row.group_size > 1 || solving > 1 {
+                row.suspect |= row.solving;
+                row.released(now);
+            } else {
+                row.reaped(now);
+            }
+        })
+    }
+
+    pub fn reap_expired(&mut self, now: i64) -> BTreeMap<Uuid, State> {
+        self.take_back(|row| {
+            if row.lease_until <= now {
+                row.reaped(now);
+            }
+        })
+    }
+
+    fn take_back(&mut self, take: impl Fn(&mut Row)) -> BTreeMap<Uuid, State> {
+        let mut taken = BTreeMap::new();
+        for (id, row) in &mut self.rows {
+            if row.state == State::Running {
+                take(row);
+                if row.state != State::Running {
+                    taken.insert(*id, row.state);
+                }
+            }
+        }
+        taken
+    }
+
+    /// The succeeded jobs that carry this key.
+    pub fn sources(&self, key: CacheKey) -> Vec<Uuid> {
+        let rows = self.rows.iter();
+        let sources =
+            rows.filter(|(_, row)| row.state == State::Succeeded && row.cache_key == Some(key));
+        sources.map(|(id, _)| *id).collect()
+    }
+
+    /// The job gets the result of another, if that is there.
+    pub fn share(&mut self, id: Uuid, source: Uuid, now: i64) -> bool {
+        let Some(blob) = self
+            .rows
+            .get(&source)
+            .filter(|row| row.state == State::Succeeded)
+            .map(|row| row.blob.clone())
+        else {
+            return false;
+        };
+        let Some(row) = self.rows.get_mut(&id) else {
+            return false;
+        };
+        (row.blob, row.cached, row.cache_key) = (blob, true, None);
+        row.solving = false;
+        // A submission that is answered at once was never queued for anybody to see.
+        (row.state, row.ended_at) = (State::Succeeded, now);
+        row.slices.clear();
+        true
+    }
+
+    /// Keys of the results that something refers to.
+    pub fn referenced(&self) -> BTreeSet<String> {
+        let rows = self.rows.values();
+        rows.flat_map(|row| row.blob.iter().chain(&row.slices).cloned())
+            .collect()
+    }
+
+    /// Removes what had ended before, oldest first, at most so many.
+    pub fn expire(&mut self, ended_before: i64, jobs: usize) -> u64 {
+        let old = |id: &Uuid| i64::try_from(id.as_u128() >> 80).unwrap() <= ended_before;
+        let gone: Vec<Uuid> = self
+            .rows
+            .iter()
+            .filter(|(id, row)| row.state.ended() && row.ended_at <= ended_before && old(id))
+            .map(|(id, _)| *id)
+            .take(jobs)
+            .collect();
+        for id in &gone {
+            self.rows.remove(id);
+        }
+        let rows = &self.rows;
+        let empty = |id: &Uuid| !rows.values().any(|row| row.batch == Some(*id));
+        let batches: Vec<Uuid> = self
+            .batches
+            .iter()
+            .filter(|(id, batch)| batch.complete && old(id) && empty(id))
+            .map(|(id, _)| *id)
+            .collect();
+        for id in &batches {
+            self.batches.remove(id);
+        }
+        self.expired.extend(gone.iter().chain(&batches));
+        gone.len() as u64
+    }
+}
