@@ -1,10 +1,10 @@
-//! What time is it? The system's clock, or one that a test turns.
+//! The clocks of the service: those of the system, or those that a test sets.
 
 use std::fmt;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// A clock of wall time, with one beside it that nobody turns. Clones show the same times.
+/// A wall clock, and beside it a steady clock, which is never set. Clones show the same times.
 #[derive(Clone)]
 pub struct Clock {
     wall: Arc<dyn Fn() -> i64 + Send + Sync>,
@@ -34,7 +34,7 @@ impl Clock {
         }
     }
 
-    /// A clock that shows what `now_ms` says, and is set by somebody while time passes as it always does.
+    /// A wall clock that shows what `now_ms` says, beside the steady clock of the system: as when the wall clock is set.
     #[must_use]
     pub fn that_is_set(now_ms: impl Fn() -> i64 + Send + Sync + 'static) -> Clock {
         Clock {

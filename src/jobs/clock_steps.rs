@@ -1,5 +1,5 @@
-//! Wall clocks that are set while the service runs. A clock that leaps forward makes nothing late or old at once: what
-//! began before the leap is judged as if the clock had not leapt.
+//! Wall clocks that are set while the service runs. A step forward makes nothing late or old at once: what began before the
+//! step is judged as if the clock had not been set.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -8,13 +8,13 @@ use crate::jobs::clock::Clock;
 /// A smaller difference between the clocks, in ms, is no leap.
 const LEAP_MS: i64 = 60_000;
 
-/// What was seen of the clocks.
+/// The steps of the wall clock, as seen so far.
 #[derive(Debug, Default)]
 pub(crate) struct ClockSteps(Mutex<Seen>);
 
 #[derive(Debug, Default)]
 struct Seen {
-    /// Wall clock less steady clock when they were looked at last.
+    /// Wall clock less steady clock when they were read last.
     offset: Option<i64>,
     leap: ClockStep,
 }
@@ -40,7 +40,7 @@ impl ClockStep {
 }
 
 impl ClockSteps {
-    /// Looks at the clocks.
+    /// Reads the clocks and notes whether the wall clock was set.
     pub(crate) fn look(&self, clock: &Clock) -> ClockStep {
         let mut seen = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let wall = clock.now_ms();

@@ -1,4 +1,4 @@
-//! What can go wrong between a client's wish and a job.
+//! Errors of this room.
 
 use std::path::PathBuf;
 

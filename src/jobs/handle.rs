@@ -21,13 +21,13 @@ use crate::jobs::worker::attempt_control::StopReason;
 /// Longest list page.
 pub const PAGE_MAX: u32 = 1000;
 
-/// Places of the queue beyond which a job is not told its own.
+/// Beyond this place in the queue the place of a job is not given.
 const PLACES_COUNTED: u32 = 10_000;
 
 /// How long a readiness check waits for the database.
 const READY_WITHIN: Duration = Duration::from_secs(2);
 
-/// Jobs: submit, look, list, wait, cancel, fetch. A cheap handle; clones share everything.
+/// Submits, reads, lists, cancels and deletes jobs, and waits for them. A cheap handle; clones share everything.
 #[derive(Debug, Clone)]
 pub struct Jobs {
     pub(crate) shared: Arc<Shared>,
@@ -65,7 +65,7 @@ impl Jobs {
         (self.shared.engine.check)(case, &self.shared.options.limits)
     }
 
-    /// Looks at a job.
+    /// A job.
     ///
     /// # Errors
     /// [`JobsError::NotFound`], [`JobsError::Expired`], or a failed database.
@@ -146,9 +146,9 @@ impl Jobs {
                 self.shared.metrics.ended(State::Cancelled, 1);
             }
             self.shared.announce(id);
-        } else if let Some(watch) = self.shared.running.get(id) {
-            // A worker that registers later reads the wish from the table.
-            watch.stop(StopReason::Cancel);
+        } else if let Some(control) = self.shared.running.get(id) {
+            // A worker that lists its attempt later reads the request from the store.
+            control.stop(StopReason::Cancel);
         }
         Ok(self.dated(job))
     }

@@ -17,7 +17,7 @@ use crate::jobs::trace::{SubmitSpan, TRACEPARENT, Tracer};
 use crate::jobs::worker::outcome::Outcome;
 
 impl Jobs {
-    /// What makes the spans, if somebody collects them.
+    /// What makes the spans, if they are collected.
     #[must_use]
     pub fn tracer(&self) -> Option<&Tracer> {
         self.shared.options.tracer.as_ref()

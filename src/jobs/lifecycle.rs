@@ -37,7 +37,7 @@ use crate::jobs::worker::running::RunningAttempts;
 /// The file that says that the job table was closed in good order.
 const CLOSED: &str = "closed";
 
-/// How long a shutdown waits for workers that were told to stop, beyond their own patience.
+/// How long a shutdown waits for workers that were told to stop.
 const STOPPED_WITHIN: Duration = Duration::from_secs(10);
 
 impl Jobs {
@@ -51,7 +51,7 @@ impl Jobs {
         Jobs::open_with(options, Engine::contact()).await
     }
 
-    /// As [`Jobs::open`], with another recipe.
+    /// As [`Jobs::open`], with another engine.
     ///
     /// # Errors
     /// As [`Jobs::open`].
@@ -166,7 +166,7 @@ impl Jobs {
         &self.shared.broken
     }
 
-    /// Announces the end: not ready any more, no new claims, nobody waits any longer. Running jobs go on.
+    /// Begins to drain: the service is not ready, nothing is claimed, waiting calls return. Running jobs go on.
     pub fn drain(&self) {
         self.shared.draining.cancel();
     }

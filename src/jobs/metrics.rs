@@ -142,7 +142,7 @@ impl Metrics {
         self.ended.get_or_create(&state_label(state)).inc_by(jobs);
     }
 
-    /// Earlier results were looked for.
+    /// Cached results were asked for.
     pub(crate) fn cache_lookup(&self, hits: u64, misses: u64) {
         self.cache_hits.inc_by(hits);
         self.cache_misses.inc_by(misses);

@@ -14,7 +14,7 @@ impl Jobs {
         self.shared.metrics.register(registry);
     }
 
-    /// Brings those figures up to date that are read from the store and not counted as they happen.
+    /// Updates the metrics that are read from the store, not counted as they happen.
     ///
     /// # Errors
     /// The database failed.

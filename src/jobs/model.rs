@@ -1,4 +1,4 @@
-//! A job: its identity, its states and the moves between them.
+//! A job: its identity, its states and the transitions between them.
 
 use std::collections::BTreeMap;
 
@@ -50,7 +50,7 @@ pub struct Job {
     pub cached: bool,
     /// Grows with every change that a client can see.
     pub version: u64,
-    /// Its place among the queued jobs; only of a queued job that was looked at by itself.
+    /// Its place in the queue; only filled for a queued job that is read by itself.
     pub queue: Option<QueuePlace>,
 }
 
@@ -105,7 +105,7 @@ pub struct Failure {
 pub enum FailureKind {
     /// The iteration ended without meeting its tolerance.
     NotConverged,
-    /// The contact has no answer that the method could look for; the detail says why.
+    /// The contact has no solution that the method could find; the detail says why.
     Unsolvable,
     /// The time limit of the case was reached.
     OutOfTime,
@@ -192,7 +192,7 @@ impl State {
 }
 
 impl Failure {
-    /// A failure without figures.
+    /// A failure without numbers.
     #[must_use]
     pub fn new(kind: FailureKind, detail: impl Into<String>) -> Failure {
         Failure {
@@ -250,7 +250,7 @@ pub(crate) fn created_at(id: Uuid) -> i64 {
     i64::try_from(id.as_u128() >> 80).unwrap_or(0)
 }
 
-/// Why a job that came too late has no answer.
+/// The failure of a job that had not ended by its deadline.
 pub(crate) fn too_late() -> Failure {
     Failure::new(
         FailureKind::DeadlinePassed,

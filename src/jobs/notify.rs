@@ -1,7 +1,7 @@
-//! Following jobs and batches: the next change after the one that was seen.
+//! Waiting for jobs and batches: for their end, or for the next change after a known one.
 //!
-//! The table is the truth and is looked at; announcements only bring a look forward. Nothing is queued for a follower, so
-//! one that does not come back costs nothing.
+//! The store is read to find out; announcements only make the next read earlier. Nothing is queued for a client, so that one
+//! that does not come back costs nothing.
 
 use std::time::Duration;
 
@@ -14,10 +14,10 @@ use crate::jobs::handle::Jobs;
 use crate::jobs::model::Job;
 use crate::jobs::shared::POLL_INTERVAL;
 
-/// Shortest time between two looks of one follower.
+/// Shortest time between two reads of one waiting caller.
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// Time between two looks at a batch, for each job of it; counting them takes time too.
+/// Time between two reads of a batch for each of its jobs: counting them takes time.
 const PAUSE_PER_JOB: Duration = Duration::from_micros(10);
 
 impl Jobs {
@@ -31,11 +31,11 @@ impl Jobs {
         id: Uuid,
         seen: Option<u64>,
     ) -> Result<Option<Job>, JobsError> {
-        // Subscribe first, then look: what ends in between is announced.
+        // Subscribe first, then read: what ends in between is announced.
         let mut ended = self.shared.ended.subscribe();
         let mut announced = true;
         loop {
-            // A look that others had a moment ago serves, unless something was announced since.
+            // What others read a moment ago serves, unless something was announced since.
             let job = match announced {
                 true => self.get(id).await?,
                 false => self.recent(id, PAUSE).await?,
@@ -49,7 +49,7 @@ impl Jobs {
             let again = Instant::now() + POLL_INTERVAL;
             let end = async {
                 sleep(PAUSE).await;
-                // A lagging receiver may have missed the announcement, so it looks again as well.
+                // A lagging receiver may have missed the announcement, so it reads again as well.
                 while ended.recv().await.is_ok_and(|ended| ended != id) {}
             };
             tokio::select! {
@@ -92,7 +92,7 @@ impl Jobs {
 }
 
 impl Jobs {
-    /// As [`Jobs::get`], as the job was a moment ago: one look serves all who follow it.
+    /// As [`Jobs::get`], as the job was a moment ago: one read serves all who follow it.
     ///
     /// # Errors
     /// As [`Jobs::get`].
@@ -132,7 +132,7 @@ impl Jobs {
     /// [`JobsError::NotFound`], or a failed database.
     pub async fn wait(&self, id: Uuid, at_most: Duration) -> Result<Job, JobsError> {
         let until = Instant::now() + at_most;
-        // Subscribe first, then look: what ends in between is announced.
+        // Subscribe first, then read: what ends in between is announced.
         let mut ended = self.shared.ended.subscribe();
         loop {
             let job = self.get(id).await?;
@@ -140,7 +140,7 @@ impl Jobs {
                 return Ok(job);
             }
             let announced = async {
-                // A lagging receiver may have missed the announcement, so it looks again as well.
+                // A lagging receiver may have missed the announcement, so it reads again as well.
                 while ended.recv().await.is_ok_and(|ended| ended != id) {}
             };
             tokio::select! {

@@ -17,7 +17,7 @@ pub struct Options {
     pub workers: usize,
     /// What one case may use.
     pub limits: Limits,
-    /// How long a worker may be silent before its job is given away.
+    /// How long a worker may go without a heartbeat before its job is given to another.
     pub lease: Duration,
     /// Longest solver time of a case, also of one that names no `time_limit_s`.
     pub time_limit: Duration,
@@ -47,7 +47,7 @@ pub struct Options {
     pub retention: Option<Duration>,
     /// What leases, ends and expiries are measured with.
     pub clock: Clock,
-    /// What makes spans of jobs, if somebody collects them.
+    /// What makes spans of jobs, if they are collected.
     pub tracer: Option<Tracer>,
 }
 

@@ -1,4 +1,4 @@
-//! What was looked up a moment ago, for all who look for the same: however many follow a batch, the table is asked once.
+//! What was read a moment ago, for all who ask for the same: however many clients follow a batch, the store is asked once.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -12,7 +12,7 @@ use uuid::Uuid;
 type OwnedId = (Arc<str>, Uuid);
 type Look<T> = Arc<tokio::sync::Mutex<Option<(Instant, T)>>>;
 
-/// The last looks at things that somebody follows.
+/// The last reads of what clients follow.
 pub(crate) struct RecentReads<T>(Mutex<HashMap<OwnedId, Look<T>>>);
 
 impl<T> Default for RecentReads<T> {
@@ -28,7 +28,7 @@ impl<T> fmt::Debug for RecentReads<T> {
 }
 
 impl<T: Clone> RecentReads<T> {
-    /// What a look finds, or found not longer than `age` ago. While one looks the others wait for what it finds.
+    /// What a read finds, or found not longer than `age` ago. While one caller reads, the others wait for its answer.
     pub(crate) async fn at<E>(
         &self,
         tenant: &Arc<str>,
@@ -54,7 +54,7 @@ impl<T: Clone> RecentReads<T> {
         Ok(found)
     }
 
-    /// Forgets what nobody looks at any more.
+    /// Forgets what is not read any more.
     fn forget(&self, age: Duration) {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         all.retain(|_, look| {
@@ -99,7 +99,7 @@ mod tests {
             assert!(looked <= 20, "round {round}: {looked}");
             tokio::time::sleep(age).await;
         }
-        // A look that fails is nobody else's answer, and what nobody follows is forgotten.
+        // A failed read is the answer of its caller alone, and what is not followed is forgotten.
         let failed = looks
             .at(&tenant, id, age, async { Err::<u64, _>("away") })
             .await;

@@ -25,7 +25,7 @@ use crate::jobs::store::Store;
 use crate::jobs::worker::fair_turns::FairTurns;
 use crate::jobs::worker::running::RunningAttempts;
 
-/// How often a waiting caller looks again although nothing was announced.
+/// How often a waiting caller reads again although nothing was announced.
 pub(crate) const POLL_INTERVAL: Duration = Duration::from_secs(1);
 
 /// What every handle and every worker shares.
@@ -35,9 +35,9 @@ pub(crate) struct Shared {
     pub(crate) engine: Engine,
     pub(crate) store: Arc<dyn Store>,
     pub(crate) blobs: Blobs,
-    /// Wakes an idle worker; a hint only, workers also look by themselves.
+    /// Wakes an idle worker; a hint only, workers also poll.
     pub(crate) wake: Notify,
-    /// Announces ended jobs; a hint only, waiting callers also look by themselves.
+    /// Announces ended jobs; a hint only, waiting callers also poll.
     pub(crate) ended: broadcast::Sender<Uuid>,
     /// The attempts of this process.
     pub(crate) running: RunningAttempts,
@@ -55,12 +55,12 @@ pub(crate) struct Shared {
     pub(crate) checks: Semaphore,
     /// Bytes of batches that are being received.
     pub(crate) staged: StagedBytes,
-    /// Batches that are being received or filled, and those of which only remains are left.
+    /// Batches that are being received or filled, and those that are to be removed.
     pub(crate) batches: Mutex<UnfinishedBatches>,
-    /// Batches and jobs that somebody follows, as they were a moment ago.
+    /// Batches and jobs that clients follow, as they were a moment ago.
     pub(crate) recent_batches: RecentReads<Option<Batch>>,
     pub(crate) recent_jobs: RecentReads<Option<Job>>,
-    /// What became of the wall clock.
+    /// Steps of the wall clock.
     pub(crate) leaps: ClockSteps,
     /// Whose turn it is, and solves that wait for theirs.
     pub(crate) turns: FairTurns,
@@ -84,7 +84,7 @@ impl Shared {
         self.options.clock.now_ms()
     }
 
-    /// Milliseconds of a clock that nobody turns; leases are measured with it.
+    /// Milliseconds of the steady clock, with which leases are measured.
     pub(crate) fn steady_ms(&self) -> i64 {
         self.options.clock.steady_ms()
     }
@@ -106,7 +106,7 @@ impl Shared {
 
     /// Tells waiting callers that a job has ended.
     pub(crate) fn announce(&self, id: Uuid) {
-        // Nobody listening is no error.
+        // It is no error if no caller waits.
         let _ = self.ended.send(id);
     }
 }
@@ -118,7 +118,7 @@ impl Shared {
     }
 }
 
-/// Time between two heartbeats of a worker, and between two looks of the reaper.
+/// Time between two heartbeats of a worker, and between two rounds of the reaper.
 pub(crate) fn heartbeat(shared: &Shared) -> Duration {
     (shared.options.lease / 3).max(Duration::from_millis(1))
 }

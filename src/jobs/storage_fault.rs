@@ -7,7 +7,7 @@ use crate::jobs::error::JobsError;
 use crate::jobs::store::error::StorageFault;
 
 impl JobsError {
-    /// The trouble with the disk behind this error, if that is what it is.
+    /// The fault of the storage behind this error, if that is what it is.
     #[must_use]
     pub fn storage_fault(&self) -> Option<StorageFault> {
         match self {

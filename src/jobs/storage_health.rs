@@ -1,4 +1,4 @@
-//! What becomes of jobs while the disk is full or cannot be written: nothing new is accepted, nothing accepted is lost.
+//! Jobs while the disk is full or cannot be written: nothing new is accepted, and nothing that was accepted is lost.
 //!
 //! A result that cannot be stored stays in memory, its worker waits with it and tries again.
 
@@ -19,7 +19,7 @@ const FIRST_PAUSE: Duration = Duration::from_millis(50);
 const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 
 impl Jobs {
-    /// Passes a failed submission on; trouble with the disk makes the service not ready until a write succeeds.
+    /// Passes the outcome of a write on. After a fault of the storage the service is not ready until a write succeeds.
     pub(crate) fn observe_write<T, E: Into<JobsError>>(
         &self,
         written: Result<T, E>,

@@ -1,4 +1,4 @@
-//! Submission of single jobs: check, idempotency key, known answers, queue.
+//! Submission of single jobs: check, idempotency key, cached result, queue.
 
 use std::sync::Arc;
 
@@ -35,7 +35,7 @@ impl Jobs {
         submitted.await.map(|(job, _)| job)
     }
 
-    /// As [`Jobs::submit`], with wishes; also says whether the job is that of an earlier submission with the same
+    /// As [`Jobs::submit`], with options; also says whether the job is that of an earlier submission with the same
     /// idempotency key.
     ///
     /// # Errors

@@ -1,5 +1,5 @@
-//! What a client may wish for its jobs besides their answers: which of them come first, by when they must have ended, and
-//! that nothing earlier is used again.
+//! What a client may ask for its jobs besides their answers: their priority, their deadline, and that no earlier result is
+//! used.
 
 use std::time::Duration;
 
@@ -53,7 +53,7 @@ impl Priority {
     }
 }
 
-/// What a client wishes for one job or for all of a batch.
+/// Options of a submission: of one job, or of all jobs of a batch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct SubmitOptions {
     /// Its place among the queued jobs of the tenant.
@@ -65,7 +65,7 @@ pub struct SubmitOptions {
 }
 
 impl SubmitOptions {
-    /// The digest of a submission, for its idempotency key: of what is asked and of the wishes that come with it.
+    /// The digest of a submission for its idempotency key: of the case or cases, and of these options.
     pub(crate) fn digest(&self, asked: &[u8; 32]) -> [u8; 32] {
         let mut hasher = blake3::Hasher::new();
         hasher.update(asked);

@@ -7,7 +7,7 @@ use crate::jobs::error::JobsError;
 use crate::jobs::shared::Shared;
 
 impl Shared {
-    /// From now on nobody fills this batch, nobody is shown its jobs, and no worker takes one.
+    /// From now on this batch is not filled, its jobs are not shown, and no worker takes one.
     pub(crate) fn abandon(&self, id: Uuid) {
         let mut batches = self.unfinished_batches();
         batches.forget(id);

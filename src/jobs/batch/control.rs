@@ -1,4 +1,4 @@
-//! Batches as a whole: looked at, cancelled, deleted.
+//! Batches as a whole: read, cancelled, deleted.
 
 use uuid::Uuid;
 
@@ -14,7 +14,7 @@ pub(crate) const DELETED_AT_ONCE: u32 = 500;
 const CANCELLED_AT_ONCE: u32 = 2000;
 
 impl Jobs {
-    /// Looks at a batch.
+    /// A batch with its counts.
     ///
     /// # Errors
     /// [`JobsError::BatchNotFound`], or a failed database.
@@ -43,8 +43,8 @@ impl Jobs {
                 if state.ended() {
                     self.shared.metrics.ended(*state, 1);
                     self.shared.announce(*job);
-                } else if let Some(watch) = self.shared.running.get(*job) {
-                    watch.stop(StopReason::Cancel);
+                } else if let Some(control) = self.shared.running.get(*job) {
+                    control.stop(StopReason::Cancel);
                 }
             }
             if changed.len() < CANCELLED_AT_ONCE as usize {

@@ -22,11 +22,11 @@ const CHUNK_JOBS: usize = 1000;
 /// Bytes of cases queued in one transaction, the last case beyond them included.
 const CHUNK_BYTES: usize = 4 << 20;
 
-/// Shortest and longest pause between two looks at a batch that another request is filling.
+/// Shortest and longest pause between two reads of a batch that another request is filling.
 const FILLING_PAUSE: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(1));
 
 impl Jobs {
-    /// Queues the good cases of a draft. Once this returns all of them survive the death of the process; if it fails,
+    /// Queues the good cases of an upload. Once this returns all of them survive the death of the process; if it fails,
     /// none of them will be there. Workers begin once all are there. Also says whether the batch is that of an
     /// earlier submission with the same idempotency key.
     ///
@@ -170,7 +170,7 @@ impl Jobs {
         Ok(())
     }
 
-    /// Ends a draft that is not wanted any more, at once if the disk allows it.
+    /// Removes what is left of a failed upload, at once if the disk allows it.
     async fn give_up(&self, mut draft: BatchUpload) {
         if draft.in_table {
             self.shared.abandon(draft.id);

@@ -1,4 +1,4 @@
-//! Batches: many jobs queued together, followed, read and cancelled as one.
+//! The results of a batch, page by page, in the order of its cases.
 
 use std::time::Duration;
 
@@ -13,7 +13,7 @@ use crate::jobs::shared::POLL_INTERVAL;
 /// Solutions read at once: once they are this large together, the rest is left for the next page.
 const PAGE_BYTES: usize = 1 << 20;
 
-/// Pause between two looks at a job that a reader of results waits for.
+/// Pause between two reads of a job that a reader of results waits for.
 const REREAD_PAUSE: Duration = Duration::from_millis(10);
 
 impl Jobs {
@@ -32,7 +32,7 @@ impl Jobs {
     ) -> Result<Vec<BatchItem>, JobsError> {
         let until = until.unwrap_or_else(Instant::now);
         loop {
-            // Subscribe first, then look: what ends in between is announced.
+            // Subscribe first, then read: what ends in between is announced.
             let mut ended = self.shared.ended.subscribe();
             let mut lines = self
                 .shared
@@ -57,14 +57,14 @@ impl Jobs {
                             .is_ok_and(|job| !job.state.ended())
                     {
                         let look = until.min(Instant::now() + POLL_INTERVAL);
-                        // A lagging receiver may have missed the announcement, so it looks again as well.
+                        // A lagging receiver may have missed the announcement, so it reads again as well.
                         let announced =
                             async { while ended.recv().await.is_ok_and(|ended| ended != first) {} };
                         tokio::select! {
                             _ = timeout_at(look, announced) => {}
                             () = self.shared.draining.cancelled() => {}
                         }
-                        // Many jobs end in the same moment; one look serves all of them.
+                        // Many jobs end in the same moment; one read serves all of them.
                         tokio::time::sleep(REREAD_PAUSE).await;
                         ended = ended.resubscribe();
                     }

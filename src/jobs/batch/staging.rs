@@ -24,12 +24,12 @@ pub(crate) struct StagedCase {
     pub(crate) digest: String,
 }
 
-/// Cards and cases, first in, first out.
+/// Staged cases, first in, first out.
 #[derive(Debug)]
 pub(crate) struct Staging(BufWriter<File>);
 
 impl Staging {
-    /// Makes an empty spool in a folder.
+    /// Makes an empty staging file in a folder.
     pub(crate) fn new(folder: &Path) -> Result<Staging> {
         let path = folder.join(format!("spool-{}", uuid::Uuid::now_v7()));
         let file = File::options()
@@ -59,7 +59,7 @@ impl Staging {
     }
 }
 
-/// A spool being emptied.
+/// A staging file that is being read.
 #[derive(Debug)]
 pub(crate) struct StagingReader(BufReader<File>);
 

@@ -11,7 +11,7 @@ pub(crate) struct UnfinishedBatches {
     pub(crate) living: HashSet<Uuid>,
     /// Those of them whose jobs are being queued: no worker takes one before all are there.
     pub(crate) filling: HashSet<Uuid>,
-    /// Given up; what is left of them is solved and shown to nobody, and removed as soon as the disk allows it.
+    /// Given up: their jobs are neither solved nor shown, and are removed as soon as the disk allows it.
     pub(crate) abandoned: HashSet<Uuid>,
 }
 

@@ -1,4 +1,4 @@
-//! Batches in the making: cases are checked and staged while they arrive, on places reserved for them, and then queued.
+//! Batches that are being received: cases are checked and staged while they arrive, on places reserved in the queue.
 
 use bytes::Bytes;
 use serde_json::Value;
@@ -32,7 +32,7 @@ pub struct FaultyCase {
     pub faults: Vec<Fault>,
 }
 
-/// A batch in the making: checked cases wait in a file of the data folder. Dropping it gives everything back.
+/// A batch that is being received: checked cases wait in a file of the data folder. Dropping it gives everything back.
 #[derive(Debug)]
 pub struct BatchUpload {
     jobs: Jobs,
@@ -46,7 +46,7 @@ pub struct BatchUpload {
     pub rejected: u32,
     /// The first faulty ones.
     pub faulty: Vec<FaultyCase>,
-    /// What is wished for all jobs.
+    /// Options of all its jobs.
     pub options: SubmitOptions,
     /// Places in the queue reserved so far.
     reserved: u32,

@@ -6,7 +6,7 @@ use std::time::Instant;
 /// The tenant of requests without a key.
 pub const ANONYMOUS: &str = "anonymous";
 
-/// The tenant whose keys may read the figures of the whole service.
+/// The tenant whose keys may read the metrics of the whole service.
 pub const OPERATOR: &str = "operator";
 
 /// Longest name of a tenant in characters.

@@ -7,7 +7,7 @@ use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::keys::key::{Key, MARK};
 
-/// How long a key that was found good is not looked up again; a revoked one stops within this time.
+/// How long a valid key is not read again; a revoked one stops working within this time.
 const TRUSTED_FOR: Duration = Duration::from_secs(1);
 
 /// Keys remembered at most.
@@ -35,7 +35,7 @@ impl Jobs {
         {
             return Ok((key.hash == hash).then(|| key.clone()));
         }
-        // Taken before the look: what is revoked meanwhile is not trusted for longer.
+        // Taken before the read: a key that is revoked meanwhile is not trusted for longer.
         let now = Instant::now();
         let found = self.shared.store.key(id).await?;
         let good = found.filter(|key| key.hash == hash && key.revoked_at.is_none());

@@ -5,14 +5,14 @@ use std::sync::Arc;
 use crate::jobs::error::JobsError;
 use crate::jobs::shared::Shared;
 
-/// Jobs looked up in one statement by the sweep.
+/// Results checked in one call by the sweep for orphans.
 const SWEEP_CHUNK: usize = 500;
 
 /// Results taken from the outbox at once.
 const COLLECT_CHUNK: u32 = 500;
 
 impl Shared {
-    /// Removes large results that nobody refers to any more; what cannot be removed now is tried again later.
+    /// Removes large results that no job refers to any more. What cannot be removed now is tried again later.
     pub(crate) async fn collect_blobs(&self) {
         let mut done = Vec::new();
         loop {

@@ -11,7 +11,7 @@ use crate::jobs::shared::Shared;
 use crate::jobs::store::types::Moment;
 use crate::jobs::worker::attempt_control::StopReason;
 
-/// Time between two looks for jobs whose deadline has passed.
+/// Time between two checks for jobs whose deadline has passed.
 const DEADLINE_INTERVAL: Duration = Duration::from_secs(1);
 
 /// Ends jobs whose deadline has passed, once a second until the service drains: queued ones at once, running ones at
@@ -52,7 +52,7 @@ async fn enforce_deadlines(shared: &Shared) -> Result<(), JobsError> {
 }
 
 fn stop(shared: &Shared, id: Uuid) {
-    if let Some(watch) = shared.running.get(id) {
-        watch.stop(StopReason::Deadline);
+    if let Some(control) = shared.running.get(id) {
+        control.stop(StopReason::Deadline);
     }
 }

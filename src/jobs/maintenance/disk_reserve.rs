@@ -1,11 +1,11 @@
-//! A little room on the disk that is kept for a start on a full one: the job table cannot be opened without a new file beside it.
+//! A file that reserves room for a start on a full disk: the job table cannot be opened without a new file beside it.
 
 use std::fs::{DirBuilder, File};
 use std::io::{Result, Write};
 use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
 use std::path::Path;
 
-/// Makes a folder that nobody else may read, if there is none, whatever the umask.
+/// Makes a folder with mode 0700, whatever the umask, if there is none.
 pub(crate) fn make_private_folder(path: &Path) -> std::io::Result<()> {
     DirBuilder::new().recursive(true).mode(0o700).create(path)
 }

@@ -12,7 +12,7 @@ use crate::jobs::store::types::Reap;
 /// Time between two tries to do what a full disk did not allow.
 const RECOVER_EVERY: Duration = Duration::from_secs(1);
 
-/// Time between two looks whether there is room in reserve.
+/// Time between two checks of the disk reserve.
 const RESERVE_EVERY: Duration = Duration::from_secs(60);
 
 /// Takes back what a dead process left, and removes what is left of batches that were given up, again and again for as

@@ -1,7 +1,7 @@
 //! How long ended jobs are kept, and what is done with those that have expired.
 //!
-//! An expired job is removed with its case and its result. Its id is remembered for a while, so that a client that
-//! comes too late is told so, and not that the job never was.
+//! An expired job is removed with its case and its result. Its id is kept for a while, so that a client that comes too late
+//! gets "expired" and not "not found".
 
 use std::sync::Arc;
 use std::time::Duration;

@@ -1,8 +1,4 @@
-//! What a job table must promise: the words its calls are made of. One database is one file here.
-//!
-//! Every call takes the current time as an argument (epoch milliseconds), so that tests need no clock. Every write
-//! after a claim names the claim's lease number; a write whose lease number is no longer the job's changes nothing
-//! and says so. The lease number only grows, also when an attempt is handed back uncounted.
+//! The types that the calls of a store take and return.
 
 use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
@@ -52,7 +48,7 @@ pub struct NewJob {
     pub idempotency: Option<(String, [u8; 32])>,
     /// W3C trace context of its submission, if its trace is collected.
     pub traceparent: Option<Arc<str>>,
-    /// What else the client wishes.
+    /// Options of the submission.
     pub options: SubmitOptions,
 }
 
@@ -65,7 +61,7 @@ impl NewJob {
     }
 }
 
-/// Bounds of the queue: of queued jobs together with the places reserved for batches under way.
+/// Bounds of the queue: of queued jobs together with the places reserved for batches that are being filled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct QueueBounds {
     /// Of all tenants.
@@ -317,7 +313,7 @@ pub struct ResultRef {
     pub outputs: String,
 }
 
-/// What became of a wish to delete a job.
+/// The answer to a call that deletes a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Deleted {
     /// The row and all that hung on it are gone.
@@ -352,7 +348,7 @@ pub struct RetentionRule {
     pub jobs: u32,
 }
 
-/// Figures of a job table.
+/// Statistics of a job table.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Stats {
     /// Number of jobs in each state; every state is there.

@@ -34,10 +34,10 @@ use crate::jobs::worker::solver_thread::SolverThread;
 #[derive(Debug)]
 pub(crate) struct Member {
     pub(crate) claim: Claim,
-    pub(crate) watch: Arc<AttemptControl>,
+    pub(crate) control: Arc<AttemptControl>,
     pub(crate) phase: Phase,
     /// What it goes on with, once it is known.
-    pub(crate) sweep: Option<Box<SlicedCase>>,
+    pub(crate) sliced: Option<Box<SlicedCase>>,
     pub(crate) _listed: RunningEntry,
 }
 
@@ -132,7 +132,7 @@ impl Attempt {
             }
         }
         for member in &mut self.members {
-            if matches!(member.phase, Phase::Solving) && !member.watch.is_taken_up() {
+            if matches!(member.phase, Phase::Solving) && !member.control.is_taken_up() {
                 member.phase = Phase::NotBegun;
             }
         }
@@ -161,7 +161,9 @@ impl Attempt {
             .members
             .iter()
             .filter(|member| matches!(member.phase, Phase::Solving));
-        let waiting = solving.clone().filter(|member| !member.watch.is_taken_up());
+        let waiting = solving
+            .clone()
+            .filter(|member| !member.control.is_taken_up());
         solving.count() > 1 && waiting.count() > 0
     }
 
@@ -171,8 +173,8 @@ impl Attempt {
             solver.closed.store(true, Ordering::Release);
         }
         for member in &self.members {
-            if matches!(member.phase, Phase::Solving) && member.watch.is_taken_up() {
-                member.watch.stop(reason);
+            if matches!(member.phase, Phase::Solving) && member.control.is_taken_up() {
+                member.control.stop(reason);
             }
         }
     }
@@ -180,14 +182,14 @@ impl Attempt {
     /// Tells every member to stop.
     pub(crate) fn stop(&self, reason: StopReason) {
         for member in &self.members {
-            member.watch.stop(reason);
+            member.control.stop(reason);
         }
     }
 
     /// Was it told to stop, or has its solver ended, while it waited?
     pub(crate) fn is_stopped(&self) -> bool {
         let stopped = |member: &Member| {
-            matches!(member.phase, Phase::Solving) && member.watch.reason().is_some()
+            matches!(member.phase, Phase::Solving) && member.control.reason().is_some()
         };
         self.members.iter().any(stopped)
     }
@@ -197,7 +199,7 @@ impl Attempt {
         let bytes = self
             .members
             .iter()
-            .map(|member| member.watch.memory_bytes());
+            .map(|member| member.control.memory_bytes());
         bytes.max().unwrap_or(0)
     }
 
@@ -254,13 +256,13 @@ mod tests {
             slices: 0,
         };
         let member = |claim: Claim| {
-            let watch = Arc::new(AttemptControl::new(gate.clone()));
+            let control = Arc::new(AttemptControl::new(gate.clone()));
             Member {
-                _listed: RunningAttempts::default().enter(claim.id, &watch),
+                _listed: RunningAttempts::default().enter(claim.id, &control),
                 claim,
-                watch,
+                control,
                 phase: Phase::Solving,
-                sweep: None,
+                sliced: None,
             }
         };
         let heartbeat = tokio::spawn(std::future::pending::<()>()).abort_handle();
@@ -285,9 +287,9 @@ mod tests {
             "its thread has yet to come to it"
         );
         let group = attempt(2);
-        group.members[0].watch.take_up();
+        group.members[0].control.take_up();
         assert!(group.has_more_to_begin());
-        group.members[1].watch.take_up();
+        group.members[1].control.take_up();
         assert!(!group.has_more_to_begin());
     }
 }

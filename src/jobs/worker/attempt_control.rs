@@ -1,4 +1,4 @@
-//! How a running job is followed and stopped: flags shared by the solver's thread and the async side.
+//! The control block of one attempt: flags that the solver's thread and the async side share.
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
@@ -20,11 +20,11 @@ pub enum StopReason {
     Lost = 3,
     /// The deadline of the job has passed.
     Deadline = 4,
-    /// It takes longer than was thought, and nobody can wait for it; the job goes back to the queue.
+    /// It takes longer than was expected, and no gate is free to hold it; the job goes back to the queue.
     TooLong = 5,
 }
 
-/// One attempt at a job, seen from both sides. The solver ticks, the async side reads and stops.
+/// One attempt at a job. The solver ticks; the async side reads the progress and stops it.
 #[derive(Debug, Default)]
 pub struct AttemptControl {
     reason: AtomicU8,
@@ -46,7 +46,7 @@ struct SolveClock {
 }
 
 impl AttemptControl {
-    /// A watch over a solver that has to pass this gate.
+    /// The control of an attempt whose solver passes this gate.
     #[must_use]
     pub fn new(gate: Arc<Gate>) -> AttemptControl {
         AttemptControl {
@@ -128,7 +128,7 @@ impl AttemptControl {
         }
     }
 
-    /// How often the solver has ticked; a figure that stands still means a solver that does.
+    /// How often the solver has ticked. If this stands still, so does the solver.
     #[must_use]
     pub fn ticks(&self) -> u64 {
         self.ticks.load(Ordering::Acquire)
@@ -172,37 +172,37 @@ mod tests {
 
     #[test]
     fn the_first_reason_to_stop_stays() {
-        let watch = AttemptControl::default();
-        assert_eq!(watch.tick(0.5), ControlFlow::Continue(()));
-        watch.stop(StopReason::Cancel);
-        watch.stop(StopReason::Shutdown);
-        assert_eq!(watch.reason(), Some(StopReason::Cancel));
-        assert_eq!(watch.tick(0.6), ControlFlow::Break(Stop::Cancelled));
-        assert_eq!(watch.ticks(), 2);
+        let control = AttemptControl::default();
+        assert_eq!(control.tick(0.5), ControlFlow::Continue(()));
+        control.stop(StopReason::Cancel);
+        control.stop(StopReason::Shutdown);
+        assert_eq!(control.reason(), Some(StopReason::Cancel));
+        assert_eq!(control.tick(0.6), ControlFlow::Break(Stop::Cancelled));
+        assert_eq!(control.ticks(), 2);
     }
 
     #[test]
     fn the_clock_counts_the_solve_and_what_was_spent_before() {
-        let watch = AttemptControl::default();
-        assert_eq!(watch.elapsed(), Duration::ZERO);
+        let control = AttemptControl::default();
+        assert_eq!(control.elapsed(), Duration::ZERO);
         let before = Duration::from_secs(100);
-        watch.begin(before);
-        let first = watch.elapsed();
-        watch.begin(Duration::ZERO);
-        assert!(first >= before && watch.elapsed() >= first);
-        let spent = watch.pause();
+        control.begin(before);
+        let first = control.elapsed();
+        control.begin(Duration::ZERO);
+        assert!(first >= before && control.elapsed() >= first);
+        let spent = control.pause();
         std::thread::sleep(Duration::from_millis(2));
-        assert_eq!(watch.elapsed(), spent, "nothing is solved meanwhile");
-        watch.begin(spent);
-        assert!(watch.elapsed() >= spent);
+        assert_eq!(control.elapsed(), spent, "nothing is solved meanwhile");
+        control.begin(spent);
+        assert!(control.elapsed() >= spent);
     }
 
     #[test]
     fn progress_stays_a_fraction() {
-        let watch = AttemptControl::default();
-        let _ = watch.tick(7.0);
-        assert!((watch.progress() - 1.0).abs() < f64::EPSILON);
-        let _ = watch.tick(f64::NAN);
-        assert!((watch.progress() - 1.0).abs() < f64::EPSILON);
+        let control = AttemptControl::default();
+        let _ = control.tick(7.0);
+        assert!((control.progress() - 1.0).abs() < f64::EPSILON);
+        let _ = control.tick(f64::NAN);
+        assert!((control.progress() - 1.0).abs() < f64::EPSILON);
     }
 }

@@ -32,19 +32,19 @@ pub(crate) fn take_up(shared: &Arc<Shared>, tenant: Arc<str>, claims: Vec<Claim>
     let members: Vec<Member> = claims
         .into_iter()
         .map(|claim| {
-            let watch = Arc::new(AttemptControl::new(gate.clone()));
+            let control = Arc::new(AttemptControl::new(gate.clone()));
             Member {
-                _listed: shared.running.enter(claim.id, &watch),
+                _listed: shared.running.enter(claim.id, &control),
                 claim,
-                watch,
+                control,
                 phase: Phase::Solving,
-                sweep: None,
+                sliced: None,
             }
         })
         .collect();
     let held = members
         .iter()
-        .map(|one| (one.claim.clone(), one.watch.clone()));
+        .map(|one| (one.claim.clone(), one.control.clone()));
     Attempt {
         tenant,
         lease: heartbeat::start(shared, held.collect()),
@@ -72,25 +72,25 @@ pub(crate) fn begin(
         .into_iter()
         .map(|(place, work)| {
             let member = &attempt.members[place];
-            member.watch.set_aside();
+            member.control.set_aside();
             let traced = shared.job_trace(&member.claim);
-            (place, member.watch.clone(), work, traced)
+            (place, member.control.clone(), work, traced)
         })
         .collect();
     let task: Task = {
         let (shared, closed) = (shared.clone(), closed.clone());
         Box::new(move || {
             let start = Instant::now();
-            for (number, (place, watch, work, traced)) in work.into_iter().enumerate() {
+            for (number, (place, control, work, traced)) in work.into_iter().enumerate() {
                 let late = number > 0 && start.elapsed() > GROUP_TIME;
                 if late || closed.load(Ordering::Acquire) || shared.stopping.is_cancelled() {
                     break;
                 }
-                watch.take_up();
+                control.take_up();
                 let from_queue = matches!(work, Work::New(..));
-                let solve = || solve_guarded(&shared, &watch, work);
+                let solve = || solve_guarded(&shared, &control, work);
                 let outcome = JobTrace::solving(traced.as_ref(), from_queue, solve);
-                // An abandoned attempt has nobody listening.
+                // Nothing receives the outcomes of an abandoned attempt.
                 let _ = reply.send((place, outcome));
             }
         })

@@ -40,13 +40,13 @@ impl Gate {
         self.opened.notify_all();
     }
 
-    /// Wakes a waiting solver, so that it looks again whether it was told to stop.
+    /// Wakes a waiting solver, so that it checks again whether it was told to stop.
     pub(crate) fn nudge(&self) {
         drop(self.lock());
         self.opened.notify_all();
     }
 
-    /// The solver passes: waits while the gate is closed and nobody has told the solver to stop.
+    /// Called by the solver: waits while the gate is closed and the solver has not been told to stop.
     pub(crate) fn pass(&self, stopped: impl Fn() -> bool) {
         if !self.closed.load(Ordering::Acquire) {
             return;

@@ -32,20 +32,20 @@ async fn beat(shared: Arc<Shared>, kept: Arc<HeldLeases>) {
         if moves && !held.is_empty() {
             let beats: Vec<_> = held
                 .iter()
-                .map(|(claim, watch)| (claim, watch.progress()))
+                .map(|(claim, control)| (claim, control.progress()))
                 .collect();
             let renewed = shared.store.renew(&beats, now.saturating_add(lease_ms));
             match renewed.await {
                 Ok(renewals) => {
                     seen = ticks;
                     until = now.saturating_add(lease_ms);
-                    for ((_, watch), renewal) in held.iter().zip(renewals) {
+                    for ((_, control), renewal) in held.iter().zip(renewals) {
                         match renewal {
                             Renewal::Held {
                                 cancel_requested: true,
-                            } => watch.stop(StopReason::Cancel),
+                            } => control.stop(StopReason::Cancel),
                             Renewal::Held { .. } => {}
-                            Renewal::Lost => watch.stop(StopReason::Lost),
+                            Renewal::Lost => control.stop(StopReason::Lost),
                         }
                     }
                 }
@@ -60,8 +60,8 @@ async fn beat(shared: Arc<Shared>, kept: Arc<HeldLeases>) {
             }
         }
         if now >= until && kept.solving.load(Ordering::Acquire) {
-            for (_, watch) in &held {
-                watch.stop(StopReason::Lost);
+            for (_, control) in &held {
+                control.stop(StopReason::Lost);
             }
             kept.lost.cancel();
         }

@@ -15,7 +15,7 @@ pub(crate) enum Verdict {
     /// Store a solved slice, if there is one; the case is not solved whole. With a reason to stop it is released then, without
     /// one the next slice is solved.
     StoreSlice {
-        sweep: Box<SlicedCase>,
+        sliced: Box<SlicedCase>,
         part: Option<(SliceRecord, EncodedResult)>,
         stopped: Option<StopReason>,
     },
@@ -35,7 +35,7 @@ pub(crate) enum Verdict {
     Discard,
 }
 
-/// What follows from the outcome of an attempt; the one place that decides it.
+/// What follows from an outcome and the reason for which the solver was stopped, if it was.
 pub(crate) fn judge(outcome: Outcome, reason: Option<StopReason>) -> Verdict {
     let failed = |reason: String| {
         tracing::error!(reason, "a job fails inside the service");
@@ -48,15 +48,15 @@ pub(crate) fn judge(outcome: Outcome, reason: Option<StopReason>) -> Verdict {
         Outcome::Solved { .. } | Outcome::Slice { .. } if reason == Some(StopReason::Lost) => {
             Verdict::Discard
         }
-        // A slice counts like an answer where somebody wants the whole.
-        Outcome::Slice { sweep, part }
+        // A slice is kept like an answer as long as the whole is still wanted.
+        Outcome::Slice { sliced, part }
             if matches!(
                 reason,
                 None | Some(StopReason::Shutdown | StopReason::TooLong)
             ) =>
         {
             Verdict::StoreSlice {
-                sweep,
+                sliced,
                 part,
                 stopped: reason,
             }
@@ -139,7 +139,7 @@ mod tests {
             field_patches: 0,
         };
         let slice = || Outcome::Slice {
-            sweep: Box::new(SlicedCase::new(problem(), vec![0..1, 1..2], &[])),
+            sliced: Box::new(SlicedCase::new(problem(), vec![0..1, 1..2], &[])),
             part: None,
         };
         let broken = || Outcome::Broken(Failure::new(FailureKind::Panic, "boom"));

@@ -83,7 +83,11 @@ impl HeldLeases {
     }
 
     pub(crate) fn ticks(&self) -> u64 {
-        let ticks: u64 = self.leases().iter().map(|(_, watch)| watch.ticks()).sum();
+        let ticks: u64 = self
+            .leases()
+            .iter()
+            .map(|(_, control)| control.ticks())
+            .sum();
         ticks + self.begun.load(Ordering::Acquire)
     }
 }

@@ -18,7 +18,7 @@ pub(crate) enum Outcome {
     },
     /// The next slice of a sweep, in its stored form, if one was solved; there is more to be done.
     Slice {
-        sweep: Box<SlicedCase>,
+        sliced: Box<SlicedCase>,
         part: Option<(SliceRecord, EncodedResult)>,
     },
     /// The solver gave up or was stopped.
@@ -42,5 +42,5 @@ pub(crate) enum Work {
     Join(Box<SlicedCase>, Vec<EncodedResult>),
 }
 
-/// What clients are told of a failure of the service itself.
+/// What clients read of a failure of the service itself.
 pub(crate) const INTERNAL: &str = "the job could not be solved because of a fault of the service; its log has the reason under the id of the job";

@@ -12,7 +12,7 @@ use crate::jobs::shared::Shared;
 use crate::jobs::worker::attempt::{Phase, TimeSpentOn};
 use crate::jobs::worker::solver_thread::SolverThread;
 
-/// How often an idle worker looks for jobs although nobody woke it.
+/// How often an idle worker asks for jobs although nothing has woken it.
 const POLL_INTERVAL: Duration = Duration::from_secs(1);
 
 /// One worker. It has at most one solver at work.
@@ -75,7 +75,7 @@ impl Worker {
         }
     }
 
-    /// Takes one turn and sees what was claimed for it to its end, its return to the queue, its loss, or its gate.
+    /// Takes one turn: claims or resumes, solves, and writes down what became of each job. The pool calls this, and tests do.
     ///
     /// # Errors
     /// The database failed; claimed jobs are given back if that is possible, or taken back when their leases run out.

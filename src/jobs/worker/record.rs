@@ -88,7 +88,7 @@ impl Worker {
                 continue;
             }
             if let Phase::Solved(outcome) = std::mem::replace(phase, Phase::Done) {
-                let reason = attempt.members[place].watch.reason();
+                let reason = attempt.members[place].control.reason();
                 self.sort(attempt, place, judge(outcome, reason), &mut sorted)
                     .await;
             }
@@ -126,10 +126,10 @@ impl Worker {
             Verdict::ReleaseAsLong => return sorted.long.push(claim),
             Verdict::End(ending) => Ok(ending),
             Verdict::StoreSlice {
-                sweep,
+                sliced,
                 part,
                 stopped,
-            } => match self.keep_slice(attempt, place, sweep, part).await {
+            } => match self.keep_slice(attempt, place, sliced, part).await {
                 Ok(SliceFate::Lost) => return sorted.lost.push(claim.id),
                 Ok(SliceFate::Stored) => match stopped {
                     Some(StopReason::TooLong) => return sorted.long.push(claim),
@@ -230,8 +230,8 @@ impl Worker {
                 _ => None,
             })
             .collect();
-        let twins = attempt.claims(|phase| matches!(phase, Phase::WaitingFor(_)));
-        let pairs = twins.into_iter().filter_map(|claim| {
+        let duplicates = attempt.claims(|phase| matches!(phase, Phase::WaitingFor(_)));
+        let pairs = duplicates.into_iter().filter_map(|claim| {
             let first = *firsts.get(&claim.id)?;
             Some((claim, first))
         });

@@ -25,14 +25,14 @@ impl Worker {
         &self,
         attempt: &mut Attempt,
         place: usize,
-        mut sweep: Box<SlicedCase>,
+        mut sliced: Box<SlicedCase>,
         part: Option<(SliceRecord, EncodedResult)>,
     ) -> Result<SliceFate, JobsError> {
         let shared = &self.shared;
         let member = &mut attempt.members[place];
         if let Some((note, part)) = part {
             let claim = &member.claim;
-            let (number, done) = (note.number, sweep.done_after_next());
+            let (number, done) = (note.number, sliced.done_after_next());
             let result = match part.bytes() <= shared.options.small_result_max_bytes {
                 true => StoredResult::Inline(part),
                 false => {
@@ -42,7 +42,7 @@ impl Worker {
                 }
             };
             let slice = NewSlice {
-                rest_us: u64::from(microseconds(sweep.problem.cost().seconds * (1.0 - done))),
+                rest_us: u64::from(microseconds(sliced.problem.cost().seconds * (1.0 - done))),
                 note,
                 result,
                 done,
@@ -57,10 +57,10 @@ impl Worker {
                 return Ok(SliceFate::Lost);
             }
             tracing::debug!(job = %claim.id, number, done, "slice stored");
-            sweep.advance(slice.note.spent);
+            sliced.advance(slice.note.spent);
             member.claim.slices = number + 1;
         }
-        member.sweep = Some(sweep);
+        member.sliced = Some(sliced);
         Ok(SliceFate::Stored)
     }
 
@@ -68,18 +68,18 @@ impl Worker {
     pub(crate) async fn next_of(
         &self,
         id: Uuid,
-        mut sweep: Box<SlicedCase>,
+        mut sliced: Box<SlicedCase>,
     ) -> Result<Work, JobsError> {
-        if sweep.next().is_some() {
-            return Ok(Work::Next(sweep));
+        if sliced.next().is_some() {
+            return Ok(Work::Next(sliced));
         }
         match self.parts(id).await {
-            Ok(parts) => Ok(Work::Join(sweep, parts)),
+            Ok(parts) => Ok(Work::Join(sliced, parts)),
             Err(error) if error.storage_fault().is_some() => Err(error),
             Err(error) => {
                 tracing::error!(job = %id, %error, "slices cannot be read; the sweep is solved again");
-                sweep.begin_again();
-                Ok(Work::Next(sweep))
+                sliced.begin_again();
+                Ok(Work::Next(sliced))
             }
         }
     }

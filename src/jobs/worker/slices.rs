@@ -119,24 +119,24 @@ mod tests {
     fn only_what_was_cut_here_and_solved_by_this_solver_counts_as_done() {
         let problem = problem();
         let cuts = || vec![0..3, 3..5, 5..7];
-        let sweep = |stored: &[SliceRecord]| SlicedCase::new(problem.clone(), cuts(), stored);
+        let sliced = |stored: &[SliceRecord]| SlicedCase::new(problem.clone(), cuts(), stored);
         let good = [note(0, 3, &problem), note(1, 5, &problem)];
-        let going = sweep(&good);
+        let going = sliced(&good);
         assert_eq!(
             (going.next(), going.spent),
             (Some(5..7), Duration::from_secs(5))
         );
         assert_eq!(going.note(Duration::ZERO).motions, 7);
         assert!((going.done_after_next() - 1.0).abs() < f64::EPSILON);
-        assert_eq!(sweep(&[]).next(), Some(0..3));
+        assert_eq!(sliced(&[]).next(), Some(0..3));
         // Cut elsewhere, a hole, another solver.
-        assert_eq!(sweep(&[note(0, 2, &problem)]).next(), Some(0..3));
-        assert_eq!(sweep(&good[1..]).next(), Some(0..3));
+        assert_eq!(sliced(&[note(0, 2, &problem)]).next(), Some(0..3));
+        assert_eq!(sliced(&good[1..]).next(), Some(0..3));
         let other = SliceRecord {
             digest: "of another revision".to_owned(),
             ..good[1].clone()
         };
-        let half = sweep(&[good[0].clone(), other]);
+        let half = sliced(&[good[0].clone(), other]);
         assert_eq!(
             (half.next(), half.spent),
             (Some(3..5), Duration::from_secs(3))

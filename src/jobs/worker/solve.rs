@@ -20,11 +20,11 @@ use crate::jobs::worker::outcome::{INTERNAL, Outcome, Work};
 use crate::jobs::worker::slices::SlicedCase;
 
 /// Does the work; a panic becomes a failure and the thread stays usable.
-pub(crate) fn solve_guarded(shared: &Shared, watch: &AttemptControl, work: Work) -> Outcome {
+pub(crate) fn solve_guarded(shared: &Shared, control: &AttemptControl, work: Work) -> Outcome {
     let done = catch_unwind(AssertUnwindSafe(|| match work {
-        Work::New(stored, notes) => check_and_solve(shared, watch, &stored, &notes),
-        Work::Next(sweep) => solve_next(shared, watch, sweep),
-        Work::Join(sweep, parts) => join_parts(shared, watch, sweep, &parts),
+        Work::New(stored, notes) => check_and_solve(shared, control, &stored, &notes),
+        Work::Next(sliced) => solve_next(shared, control, sliced),
+        Work::Join(sliced, parts) => join_parts(shared, control, sliced, &parts),
     }));
     done.unwrap_or_else(|payload| {
         // What a defect says of the program is for the log, not for clients.
@@ -41,7 +41,7 @@ fn internal(reason: &str) -> Outcome {
 
 fn check_and_solve(
     shared: &Shared,
-    watch: &AttemptControl,
+    control: &AttemptControl,
     stored: &StoredCase,
     notes: &[SliceRecord],
 ) -> Outcome {
@@ -55,33 +55,33 @@ fn check_and_solve(
     };
     let limit = shared.options.time_limit;
     problem.time_limit = Some(problem.time_limit.map_or(limit, |time| time.min(limit)));
-    watch.set_memory_bytes(problem.cost().bytes);
+    control.set_memory_bytes(problem.cost().bytes);
     let slices = (shared.engine.slices)(&problem);
     solve_next(
         shared,
-        watch,
+        control,
         Box::new(SlicedCase::new(problem, slices, notes)),
     )
 }
 
-fn solve_next(shared: &Shared, watch: &AttemptControl, sweep: Box<SlicedCase>) -> Outcome {
-    let Some(slice) = sweep.next() else {
-        return Outcome::Slice { sweep, part: None };
+fn solve_next(shared: &Shared, control: &AttemptControl, sliced: Box<SlicedCase>) -> Outcome {
+    let Some(slice) = sliced.next() else {
+        return Outcome::Slice { sliced, part: None };
     };
-    watch.begin(sweep.spent);
-    let solved = (shared.engine.solve)(&sweep.problem, slice, watch);
-    let spent = watch.pause();
+    control.begin(sliced.spent);
+    let solved = (shared.engine.solve)(&sliced.problem, slice, control);
+    let spent = control.pause();
     let (solution, fields) = match solved {
         Ok(answer) => answer,
         Err(error) => return Outcome::Unsolved(error),
     };
-    if sweep.is_one() {
-        return whole(shared, &sweep, spent, solution, &fields);
+    if sliced.is_one() {
+        return whole(shared, &sliced, spent, solution, &fields);
     }
     match encoded(&solution, &fields) {
         Ok(part) => Outcome::Slice {
-            part: Some((sweep.note(spent), part)),
-            sweep,
+            part: Some((sliced.note(spent), part)),
+            sliced,
         },
         Err(reason) => internal(&reason),
     }
@@ -89,23 +89,23 @@ fn solve_next(shared: &Shared, watch: &AttemptControl, sweep: Box<SlicedCase>) -
 
 fn join_parts(
     shared: &Shared,
-    watch: &AttemptControl,
-    mut sweep: Box<SlicedCase>,
+    control: &AttemptControl,
+    mut sliced: Box<SlicedCase>,
     parts: &[EncodedResult],
 ) -> Outcome {
-    let joined = match sweep.is_whole(parts.len()) {
-        true => join(parts, || watch.tick(1.0).is_continue()),
+    let joined = match sliced.is_whole(parts.len()) {
+        true => join(parts, || control.tick(1.0).is_continue()),
         false => Err(JobsError::Damaged(
             "slices of a sweep are missing".to_owned(),
         )),
     };
     match joined {
-        Ok(Some((solution, fields))) => whole(shared, &sweep, sweep.spent, solution, &fields),
+        Ok(Some((solution, fields))) => whole(shared, &sliced, sliced.spent, solution, &fields),
         Ok(None) => Outcome::Unsolved(SolveError::Cancelled),
         Err(error) => {
             tracing::error!(%error, "the slices of a sweep cannot be used; it is solved again");
-            sweep.begin_again();
-            Outcome::Slice { sweep, part: None }
+            sliced.begin_again();
+            Outcome::Slice { sliced, part: None }
         }
     }
 }
@@ -113,13 +113,13 @@ fn join_parts(
 /// The outcome of a case that is solved whole.
 pub(crate) fn whole(
     shared: &Shared,
-    sweep: &SlicedCase,
+    sliced: &SlicedCase,
     spent: Duration,
     solution: Solution,
     fields: &Fields,
 ) -> Outcome {
     let seconds = spent.as_secs_f64();
-    let method = sweep.problem.method_asked;
+    let method = sliced.problem.method_asked;
     shared.metrics.solved(method, &solution, seconds);
     match encoded(&solution, fields) {
         Ok(result) => Outcome::Solved {

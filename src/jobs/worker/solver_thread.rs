@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use crate::jobs::error::JobsError;
 
-/// Tasks from this length on leave enough free memory behind to be worth a look at the whole heap.
+/// After tasks of at least this length free memory is given back to the system, which takes a walk over the whole heap.
 const LONG: Duration = Duration::from_secs(1);
 
 /// Stack of a solver thread.

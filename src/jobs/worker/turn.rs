@@ -24,7 +24,7 @@ use crate::jobs::worker::solver_thread::{Counted, SolverThread};
 /// How long a solver that was told to stop may go on before its thread is left behind.
 const STOP_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// How often a worker looks whether somebody waits for the solver.
+/// How often a worker checks whether other work waits for the solver.
 const YIELD_CHECK_INTERVAL: Duration = Duration::from_millis(200);
 
 impl Worker {
@@ -39,7 +39,7 @@ impl Worker {
             attempt.set_aside_duplicates();
         }
         attempt.turn_began = start;
-        // A sweep comes back with every slice.
+        // A sliced case comes back after each slice.
         let turn = loop {
             let turn = self.solve(attempt).await?;
             attempt.close();
@@ -73,7 +73,7 @@ impl Worker {
         Ok(turn)
     }
 
-    /// Has the solver work for a slice, or for as long as nobody else waits.
+    /// Lets the solver work for one slice of time, or for as long as no other work waits.
     async fn solve(&mut self, attempt: &mut Attempt) -> Result<Turn, JobsError> {
         let shared = self.shared.clone();
         if attempt.to_solve().is_empty() {
@@ -113,21 +113,21 @@ impl Worker {
     async fn begin(&mut self, attempt: &mut Attempt) -> Result<(), JobsError> {
         let places = attempt.to_solve();
         let members = places.iter().map(|place| &attempt.members[*place]);
-        let new = members.filter(|member| member.sweep.is_none());
+        let new = members.filter(|member| member.sliced.is_none());
         let ids: Vec<_> = new.map(|member| member.claim.id).collect();
-        // Read after registering: a cancellation is either seen here or finds the watch.
+        // Read after the attempt was listed: a cancellation is either seen here or finds the control of the attempt.
         let mut cases = self.shared.store.claimed_cases(&ids).await?;
         let mut work = Vec::with_capacity(places.len());
         for place in places {
             let member = &mut attempt.members[place];
-            if let Some(sweep) = member.sweep.take() {
-                work.push((place, self.next_of(member.claim.id, sweep).await?));
+            if let Some(sliced) = member.sliced.take() {
+                work.push((place, self.next_of(member.claim.id, sliced).await?));
                 continue;
             }
             match cases.remove(&member.claim.id) {
                 Some((case, cancel_requested)) => {
                     if cancel_requested {
-                        member.watch.stop(StopReason::Cancel);
+                        member.control.stop(StopReason::Cancel);
                     }
                     let notes = match member.claim.slices {
                         0 => Vec::new(),
@@ -146,7 +146,7 @@ impl Worker {
         Ok(())
     }
 
-    /// Waits until the solver is done or held, and sees to it that one of them comes.
+    /// Waits until the solver is done or is held at its gate; stops or holds it when its time is up.
     async fn until_over(&self, attempt: &mut Attempt) -> Turn {
         let shared = &self.shared;
         let spent = attempt.on;
@@ -194,8 +194,8 @@ impl Worker {
         turn
     }
 
-    /// Shall a sweep that is at a cut go back to the queue? It has had a good part of a slice by then, so that the next is
-    /// hardly ever interrupted within one of its own.
+    /// Does a case that has just stored a slice go back to the queue? Only after half a slice of time, so that the next slice is
+    /// hardly ever interrupted.
     pub(crate) async fn makes_room(&self, attempt: &Attempt) -> bool {
         let slice = self.shared.options.slice;
         attempt.turn_began.elapsed() >= slice / 2 && self.somebody_waits().await
@@ -217,7 +217,7 @@ impl Worker {
         true
     }
 
-    /// Is there anything else that could have the solver?
+    /// Does other work wait for the solver?
     async fn somebody_waits(&self) -> bool {
         let shared = &self.shared;
         if shared.suspects_waiting.load(Ordering::Acquire) > 0 {
@@ -250,7 +250,7 @@ impl Worker {
         }
     }
 
-    /// Gives back what is still held after the table failed in between.
+    /// Releases what is still held after the store has failed.
     pub(crate) async fn give_up(&mut self, attempt: &mut Attempt) {
         attempt.stop(StopReason::Shutdown);
         attempt.gate.open();
@@ -277,7 +277,7 @@ enum Solo {
     Alone(#[expect(dead_code, reason = "held")] tokio::sync::OwnedRwLockWriteGuard<()>),
 }
 
-/// Somebody waits to solve alone, so that others make room.
+/// A suspect waits to be solved alone, so that the others make room.
 struct SuspectWaits(Arc<Shared>);
 
 impl SuspectWaits {

@@ -225,7 +225,7 @@ impl SqliteStore {
         rows.iter().map(read_id).collect()
     }
 
-    /// Looks at a complete batch.
+    /// A complete batch with its counts.
     ///
     /// # Errors
     /// The database failed.
@@ -379,7 +379,7 @@ async fn by_key(
     let stored: Vec<u8> = row.try_get("digest")?;
     let (id, complete): (_, bool) = (read_id(&row)?, row.try_get("complete")?);
     Ok(match (stored == digest, complete) {
-        // Nobody fills it any more, and it was never acknowledged.
+        // It is not filled any more, and it was never acknowledged.
         (_, false) if !living.contains(&id) => None,
         (false, _) => Some(BatchBegun::Conflict),
         (true, true) => Some(BatchBegun::Existing(id)),

@@ -1,6 +1,5 @@
-//! Results that are used again: finding the job that has one, and ending another job with it.
-//!
-//! A result is lent: the other job refers to the same blob, which is kept for as long as any job refers to it.
+//! Cached results: a job ends with the result of another. It then refers to the same blob, which is kept for as long as any
+//! job refers to it.
 
 use crate::jobs::store::sqlite::blob_refs::drop_slices_of_ended;
 use sqlx::{QueryBuilder, Sqlite, SqliteConnection};

@@ -1,4 +1,4 @@
-//! What workers ask of the embedded job table: claim, renew, hand back, and take from the dead. Always for a set of jobs.
+//! Claims: the next group of queued jobs of a tenant.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::{push_list, read_cache_key, read_count, read_id};
 use crate::jobs::store::types::{Claim, ClaimKind, ClaimRequest};
 
-/// Queued jobs looked at in one claim, whatever the number of workers.
+/// Queued jobs read in one claim, whatever the number of workers.
 const PEEK_JOBS: i64 = 256;
 
 /// Tenants with queued jobs: a row per tenant.

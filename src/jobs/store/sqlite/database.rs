@@ -1,7 +1,7 @@
 //! The job table on one machine, embedded: SQLite with one writing connection and a pool of readers.
 //!
-//! One writer, because SQLite's busy handler has no queue and starves somebody when several connections write; the
-//! pool's own queue is fair. `synchronous=FULL`, because a job that was acknowledged must survive a power cut. Every
+//! There is one writing connection, because SQLite's busy handler has no queue: of several writers one starves. The queue of
+//! the pool is fair. `synchronous=FULL`, because a job that was acknowledged must survive a power cut. Every
 //! transaction that writes begins with `BEGIN IMMEDIATE`: a deferred one that reads first fails at once when it
 //! turns into a writer. The statements keep to what PostgreSQL understands too.
 
@@ -101,7 +101,7 @@ impl SqliteStore {
         self.writer.close().await;
     }
 
-    /// Looks through the whole file for damage.
+    /// Checks the whole file for damage.
     ///
     /// # Errors
     /// [`JobsError::TableDamaged`], or the database failed.
@@ -115,7 +115,7 @@ impl SqliteStore {
         }
     }
 
-    /// Writes a copy of the database, as it is at one moment, to a new file that nobody else may read.
+    /// Writes a copy of the database, as it is at one moment, to a new file with mode 0600.
     ///
     /// # Errors
     /// The file is there already or cannot be written.
@@ -140,7 +140,7 @@ impl SqliteStore {
     }
 }
 
-/// Makes an empty file that nobody else may read, if there is none; what SQLite puts beside it gets the same mode.
+/// Makes an empty file with mode 0600, if there is none; what SQLite puts beside it gets the same mode.
 fn make_private(file: &Path) -> Result<(), JobsError> {
     let made = std::fs::OpenOptions::new()
         .create_new(true)

@@ -29,7 +29,7 @@ impl SqliteStore {
         failure: &Failure,
         moment: Moment,
     ) -> Result<Overdue, StoreError> {
-        // Hardly ever is one late, and reading holds nobody up.
+        // Late jobs are rare, and a read holds no writer up.
         let rows = sqlx::query(LATE)
             .bind(moment.now)
             .bind(moment.set_at)

@@ -10,7 +10,7 @@ use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::{push_list, read_blob_ids, read_id};
 use crate::jobs::store::types::RetentionRule;
 
-/// Ids grow with the time of submission, so the oldest rows are looked at and no others.
+/// Ids grow with the time of submission, so that only the oldest rows are read.
 const EXPIRED: &str = "SELECT id, blob_id FROM jobs \
      WHERE id < $1 AND ended_at <= $2 ORDER BY id LIMIT $3";
 

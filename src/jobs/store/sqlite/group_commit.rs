@@ -80,7 +80,7 @@ async fn store_some(writer: &SqlitePool, group: Vec<Submission>) {
     match stored {
         Ok(answers) => {
             for (waiting, answer) in group.into_iter().zip(answers) {
-                // Nobody waiting any more is no error.
+                // The submitter may have stopped waiting.
                 let _ = waiting.reply.send(Ok(answer));
             }
         }

@@ -74,7 +74,7 @@ impl SqliteStore {
         Ok(job.map_or(Deleted::NotFound, |job| Deleted::NotEnded(job.state)))
     }
 
-    /// Looks at one job.
+    /// One job.
     ///
     /// # Errors
     /// The database failed.

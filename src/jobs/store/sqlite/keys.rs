@@ -32,7 +32,7 @@ impl SqliteStore {
         Ok(())
     }
 
-    /// Looks a key up.
+    /// A key by its id.
     ///
     /// # Errors
     /// The database failed.

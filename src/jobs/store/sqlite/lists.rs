@@ -34,8 +34,8 @@ impl SqliteStore {
     }
 }
 
-/// The statement of one page. A label is looked up in its own table, which is sorted by job within each label, so
-/// that every form of the list walks an index from its young end and stops at the limit.
+/// The statement of one page. Labels have a table of their own, sorted by job within each label, so that every kind of list
+/// walks an index from its newest entry and stops at the limit.
 fn page_query(
     tenant: &str,
     filter: &Filter,

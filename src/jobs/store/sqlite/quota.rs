@@ -1,4 +1,5 @@
-//! How much of the queue is taken: counted by the database itself, judged in the transaction that inserts.
+//! How much of the queue is taken: counted by triggers of the database, compared with the bounds in the transaction that
+//! inserts.
 
 use std::collections::{HashMap, HashSet};
 
@@ -9,7 +10,7 @@ use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::rows::{push_list, read_count, read_id};
 use crate::jobs::store::types::{NewJob, QueueBounds, Refusal};
 
-/// Queued jobs of a tenant (all of them if it is NULL) and the places reserved for batches under way.
+/// Queued jobs of a tenant (of all tenants if it is NULL) and the places reserved for batches that are being filled.
 const TAKEN: &str = "SELECT (SELECT COALESCE(SUM(number), 0) FROM job_counts \
      WHERE state = 'queued' AND (tenant = $1 OR $1 IS NULL)) + \
      (SELECT COALESCE(SUM(reserved), 0) FROM batches WHERE complete = 0 AND (tenant = $1 OR $1 IS NULL)) AS taken";
@@ -23,7 +24,7 @@ pub(crate) struct Places<'a> {
 }
 
 impl Places<'_> {
-    /// Nothing is looked at before the first place is asked for.
+    /// Nothing is read before the first place is asked for.
     pub(crate) fn new(connection: &mut SqliteConnection, bounds: QueueBounds) -> Places<'_> {
         Places {
             connection,

@@ -10,7 +10,8 @@ use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::to_json;
 
-/// Those whose worker is silent: single ones count the attempt, those of a group do not and come alone next time.
+/// Those whose lease has run out: a job that was claimed alone counts the attempt; those of a group do not, and come alone next
+/// time.
 pub(crate) const REAP: &str = "UPDATE jobs SET \
      state = CASE WHEN cancel_requested = 1 THEN 'cancelled' \
          WHEN group_size = 1 AND attempt >= $1 THEN 'failed' ELSE 'queued' END, \
@@ -22,8 +23,8 @@ pub(crate) const REAP: &str = "UPDATE jobs SET \
      progress = done, lease_until = NULL, worker = NULL, solving = 0, version = version + 1 \
      WHERE state = 'running' AND lease_until <= $4 RETURNING id, state, slices";
 
-/// Those of a dead process that were not what it died of, or not certainly: none counts, and those that were being solved
-/// come alone next time. Left are those that were solved alone.
+/// Those of a dead process that were not, or not certainly, the cause of its death: none counts the attempt, and those that
+/// were being solved come alone next time. What is left was solved alone.
 pub(crate) const REAP_BYSTANDERS: &str = "UPDATE jobs SET \
      state = CASE WHEN cancel_requested = 1 THEN 'cancelled' ELSE 'queued' END, \
      ended_at = CASE WHEN cancel_requested = 1 THEN $1 ELSE NULL END, \

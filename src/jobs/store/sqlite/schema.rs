@@ -1,6 +1,5 @@
-//! The form of the embedded job table: made in an empty file, asked for in every other.
-//!
-//! There is one form. A file of another version is refused and left as it is.
+//! The schema of the embedded job table: made in an empty file, required in every other. A file of another version is refused
+//! and left as it is.
 
 use sqlx::sqlite::SqlitePool;
 
@@ -37,7 +36,7 @@ pub(crate) async fn make_or_require(writer: &SqlitePool) -> Result<(), JobsError
     Ok(())
 }
 
-/// Looks whether a file is a job table of this form; changes nothing.
+/// Requires that a file is a job table of this version; changes nothing.
 ///
 /// # Errors
 /// [`JobsError::OtherForm`], or the database failed.
@@ -54,7 +53,7 @@ pub(crate) async fn require(pool: &SqlitePool) -> Result<(), JobsError> {
     Err(JobsError::OtherForm)
 }
 
-/// Writes the mark of the form again: a page that stays as it was.
+/// Writes the number of the version again: a page that stays as it was.
 pub(crate) async fn mark(writer: &SqlitePool) -> sqlx::Result<()> {
     sqlx::raw_sql(sqlx::AssertSqlSafe(format!("PRAGMA user_version = {FORM}")))
         .execute(writer)

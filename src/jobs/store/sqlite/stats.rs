@@ -1,4 +1,4 @@
-//! What an operator wants to know of the embedded job table: how many jobs, how old, how large.
+//! Statistics of the embedded job table: how many jobs, how old, how large; and what comes before a queued job.
 
 use crate::jobs::model::Job;
 use crate::jobs::store::types::QueueAhead;
@@ -17,7 +17,7 @@ const COUNT: &str = "SELECT state, SUM(number) AS jobs FROM job_counts GROUP BY 
 const RESULT_BYTES: &str = "SELECT COALESCE(SUM(bytes), 0) FROM blobs WHERE key IS NOT NULL";
 
 impl SqliteStore {
-    /// The figures as they are now.
+    /// Counts and sizes as they are now.
     ///
     /// # Errors
     /// The database failed.
