@@ -7,8 +7,9 @@ use railhead::contact::case::limits::Limits;
 use railhead::contact::case::problem::Problem;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Unmonitored;
+use railhead::contact::normal::footprint::Footprint;
+use railhead::contact::normal::normal_task::NormalTask;
 use railhead::contact::normal::patch::Patch;
-use railhead::contact::normal::region::Region;
 use railhead::contact::rolling::mesh_plan::Regime;
 use railhead::contact::rolling::refinement::level_solve::{MotionTask, solve_level};
 use railhead::contact::rolling::refinement::levels::Levels;
@@ -41,18 +42,18 @@ pub fn find(class: Class, case: &Value) -> Result<Truth, String> {
     fine["solver"] = json!({ "target_error": TARGET_GAP });
     let problem = contact::check(&fine, &Limits::default()).map_err(|e| e.to_string())?;
     let pressed = problem.pressed(&Unmonitored).map_err(|e| e.to_string())?;
-    let (value, change) = two_meshes(&pressed).map_err(|e| e.to_string())?;
-    let frame = frame_of(&pressed);
+    let (value, change) = two_meshes(&problem, &pressed.footprint).map_err(|e| e.to_string())?;
+    let frame = frame_of(&problem, &pressed.footprint);
     let mut uncertainty = change + LEAST;
     let value = frame.relative(value);
-    if matches!(problem.region, Region::Gap(_)) {
+    if matches!(problem.task, NormalTask::Gap(_)) {
         // The change from a coarser normal problem, which errs about three times as much.
         let mut coarse = case.clone();
         coarse["solver"] = json!({ "target_error": 0.001 });
         let problem = contact::check(&coarse, &Limits::default()).map_err(|e| e.to_string())?;
         let coarse = problem.pressed(&Unmonitored).map_err(|e| e.to_string())?;
-        let other = [&pressed, &coarse].map(|problem| {
-            one_mesh(problem, 256)
+        let other = [&pressed, &coarse].map(|pressed| {
+            one_mesh(&problem, &pressed.footprint, 256)
                 .map(|(sum, _)| frame.relative(sum))
                 .map_err(|e| e.to_string())
         });
@@ -70,8 +71,8 @@ pub fn find(class: Class, case: &Value) -> Result<Truth, String> {
 }
 
 /// Units and centre of a problem's resultants.
-fn frame_of(problem: &Problem) -> Frame {
-    let patches = problem.region.patches();
+fn frame_of(problem: &Problem, footprint: &Footprint) -> Frame {
+    let patches = footprint.patches();
     let load: f64 = patches.iter().map(|p| p.normal_force).sum();
     let area: f64 = patches.iter().map(|p| p.area).sum();
     let middle = |k: usize| {
@@ -86,10 +87,10 @@ fn frame_of(problem: &Problem) -> Frame {
 }
 
 /// The sum of the resultants from two fine meshes, and half of what they say is left, relative to μN.
-fn two_meshes(problem: &Problem) -> Result<(Resultants, f64), SolveError> {
-    let frame = frame_of(problem);
-    let (coarse, coarse_cells) = one_mesh(problem, CELLS[0])?;
-    let (fine, fine_cells) = one_mesh(problem, CELLS[1])?;
+fn two_meshes(problem: &Problem, footprint: &Footprint) -> Result<(Resultants, f64), SolveError> {
+    let frame = frame_of(problem, footprint);
+    let (coarse, coarse_cells) = one_mesh(problem, footprint, CELLS[0])?;
+    let (fine, fine_cells) = one_mesh(problem, footprint, CELLS[1])?;
     let share = 1.0 / (fine_cells as f64 / coarse_cells as f64 - 1.0);
     let beyond = fine.beyond(coarse, share, frame.limit);
     let half = |a: f64, b: f64| 0.5 * (a + b);
@@ -103,7 +104,11 @@ fn two_meshes(problem: &Problem) -> Result<(Resultants, f64), SolveError> {
 }
 
 /// The sum of the resultants on a mesh of so many cells, in double precision, and how many there are.
-fn one_mesh(problem: &Problem, cells: u32) -> Result<(Resultants, usize), SolveError> {
+fn one_mesh(
+    problem: &Problem,
+    footprint: &Footprint,
+    cells: u32,
+) -> Result<(Resultants, usize), SolveError> {
     let mut exact = problem.clone();
     exact.resolution = Resolution::Mesh(contact::mesh::size::MeshSize {
         strips: 8,
@@ -113,8 +118,7 @@ fn one_mesh(problem: &Problem, cells: u32) -> Result<(Resultants, usize), SolveE
         index: 0,
         motion: problem.motions[0],
     };
-    let footprint = exact.footprint();
-    let task = exact.rolling_task(&footprint);
+    let task = exact.rolling_task(footprint);
     let mut levels = Levels::new(&task, &Arc::default());
     let plan = levels.policy.plan(64, Regime::Unknown);
     let mut solved = solve_level(&task, &mut levels, asked, plan, None, &Unmonitored)?;

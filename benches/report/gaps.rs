@@ -6,7 +6,7 @@ use std::hint::black_box;
 
 use railhead::contact::case::problem::Problem;
 use railhead::contact::monitor::Unmonitored;
-use railhead::contact::normal::region::Region;
+use railhead::contact::normal::normal_task::NormalTask;
 use railhead::contact::normal::wheel_height::search::{Accuracy, NormalPass};
 use railhead::contact::solution::words::Solution;
 use serde_json::{Value, json};
@@ -238,7 +238,7 @@ fn wheels(lu: f64) -> String {
 
 /// Seconds to bring the wheel of a problem to rest, and the heights looked at.
 fn at_rest(problem: &Problem) -> (f64, u32) {
-    let Region::Profiles(contact) = &problem.region else {
+    let NormalTask::Wheel(contact) = &problem.task else {
         unreachable!("the examples give profiles")
     };
     let wanted = NormalPass {

@@ -44,7 +44,7 @@ pub fn section(lu: f64, pictures: &Path) -> String {
             index: 0,
             motion: problem.motions[0],
         };
-        let footprint = problem.footprint();
+        let footprint = problem.pressed(&Unmonitored).expect("a contact").footprint;
         let task = problem.rolling_task(&footprint);
         let mut levels = Levels::new(&task, &Arc::default());
         let point = refine::solve(&task, &mut levels, asked, &Unmonitored).expect("an answer");

@@ -23,7 +23,7 @@ fn condition(a_over_b: f64, strips: u32, cells: u32, rule: Rule) -> f64 {
         "solver": { "mesh": { "strips": strips, "cells": cells } },
     });
     let problem = check(&case, &Limits::default()).expect("a valid case");
-    let footprint = problem.footprint();
+    let footprint = problem.pressed(&Unmonitored).expect("a contact").footprint;
     let level = StripMesh::new(
         &problem.rolling_task(&footprint),
         MeshSize { strips, cells },

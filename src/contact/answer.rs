@@ -1,7 +1,8 @@
-//! Solves the motions of a problem whose region and pressure are known, one after the other.
+//! Solves the motions of a problem on its footprint, one after the other.
 
 use std::sync::Arc;
 
+use crate::contact::case::press::Pressed;
 use crate::contact::case::problem::Problem;
 use crate::contact::error::SolveError;
 use crate::contact::rolling::force_control;
@@ -13,16 +14,17 @@ use crate::contact::solution::finish::share_seconds;
 use crate::contact::solution::words::{Fields, Solution};
 use crate::contact::time_limit::TimeLimit;
 
-/// Solves every motion of a problem whose region and pressure are known.
+/// Solves every motion of a problem on a footprint.
 ///
 /// # Errors
 /// Why a motion has no answer; or the monitor stopped the work.
 pub(crate) fn answer(
     operators: &Arc<OperatorStore>,
     problem: &Problem,
+    pressed: &Pressed,
     watch: &TimeLimit,
 ) -> Result<(Solution, Fields), SolveError> {
-    let answer = motions(operators, problem, watch);
+    let answer = motions(operators, problem, pressed, watch);
     let (mut solution, fields) = answer.map_err(|error| watch.explained(error, problem))?;
     share_seconds(&mut solution);
     Ok((solution, fields))
@@ -31,18 +33,18 @@ pub(crate) fn answer(
 fn motions(
     operators: &Arc<OperatorStore>,
     problem: &Problem,
+    pressed: &Pressed,
     watch: &TimeLimit,
 ) -> Result<(Solution, Fields), SolveError> {
-    let footprint = problem.footprint();
-    let task = problem.rolling_task(&footprint);
+    let task = problem.rolling_task(&pressed.footprint);
     let mut levels = Levels::new(&task, operators);
-    let mut assembly = Assembly::new(problem);
+    let mut assembly = Assembly::new(problem, pressed);
     let mut before: Option<MotionAnswer> = None;
     for index in 0..problem.motions.len() {
         let mut point = force_control::solve(&task, &mut levels, index, before.as_ref(), watch)?;
         if index == 0 {
             // What all motions share is charged to the first.
-            point.seconds += problem.normal.map_or(0.0, |normal| normal.seconds);
+            point.seconds += pressed.report.map_or(0.0, |report| report.seconds);
         }
         assembly.add(&levels, &point);
         levels.trim();

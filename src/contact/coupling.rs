@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use crate::contact::answer::answer;
+use crate::contact::case::press::Pressed;
 use crate::contact::case::problem::Problem;
 use crate::contact::case::words::Output;
 use crate::contact::error::SolveError;
@@ -12,7 +13,7 @@ use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::geometry::wheelset::{WheelsetMotion, creepages};
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::region::Region;
+use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::wheel_height::search::{
     Accuracy, NormalPass, PressedGap, PressedWheel,
 };
@@ -358,10 +359,15 @@ impl Rest {
                 None => problem.motions.clone(),
                 Some(wheelset) => vec![self.motion(gap, &contact.geometry, wheelset)?],
             };
-            let region = Region::Grid(gap.field.clone());
             let load_error = self.wheel.load_error.hypot(self.unbalanced);
-            let part = problem.of_part(region, motions, normal, load_error)?;
-            let answered = answer(operators, &part, &watch);
+            let pressed = Pressed {
+                footprint: Footprint::computed(gap.field.clone(), load_error),
+                report: Some(normal),
+                remarks: Vec::new(),
+            };
+            problem.fits(&pressed.footprint)?;
+            let part = problem.of_part(motions);
+            let answered = answer(operators, &part, &pressed, &watch);
             answers.push(answered.map_err(|error| of_gap(error, gap, &contact.geometry))?);
         }
         Ok(answers)

@@ -6,7 +6,7 @@ use crate::contact::answer::answer;
 use crate::contact::case::problem::Problem;
 use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::region::Region;
+use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::profile_trust::trust;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::solution::finish::finish;
@@ -23,13 +23,13 @@ pub(crate) fn solve_whole(
     monitor: &dyn Monitor,
 ) -> Result<(Solution, Fields), SolveError> {
     let began = monitor.elapsed();
-    let answer = if let Region::Profiles(contact) = &problem.region {
+    let answer = if let NormalTask::Wheel(contact) = &problem.task {
         trust::solve(operators, problem, contact, monitor)?
     } else {
         let watch = TimeLimit::new(monitor, problem.time_limit, problem.motions.len());
         let pressed = problem.pressed(&watch);
         let pressed = pressed.map_err(|error| watch.explained(error, problem))?;
-        answer(operators, pressed.as_ref(), &watch)?
+        answer(operators, problem, &pressed, &watch)?
     };
     finish(problem, answer, monitor.elapsed().saturating_sub(began))
 }

@@ -162,7 +162,7 @@ proptest! {
             prop_assert!(!problem.motions.is_empty() && !problem.outputs.is_empty());
             prop_assert!(problem.cost().bytes <= Limits::default().memory_bytes);
             prop_assert!(problem.cost().seconds.is_finite());
-            for patch in problem.region.patches() {
+            for patch in problem.task.patches() {
                 prop_assert!(patch.normal_force.is_finite() && patch.normal_force > 0.0, "{patch:?}");
                 prop_assert!(patch.area.is_finite() && patch.area > 0.0, "{patch:?}");
             }

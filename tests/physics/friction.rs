@@ -53,7 +53,7 @@ fn one_rule(contact: &Ellipse, rule: Rule) -> Cells {
         strips: 12,
         cells: 12,
     };
-    let footprint = problem.footprint();
+    let footprint = problem.pressed(&Unmonitored).expect("a contact").footprint;
     let level = StripMesh::new(&problem.rolling_task(&footprint), size).expect("a mesh");
     let motion: Motion = level.scale.motion(&problem.motions[0]);
     let operator = level.operator(&Unmonitored).expect("never stopped");

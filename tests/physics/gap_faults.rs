@@ -38,7 +38,7 @@ fn sound_gaps_are_accepted_without_being_solved() {
     for case in [crown(), bowl()] {
         assert_eq!(faults(&case), []);
         let problem = check(&case, &Limits::default()).unwrap();
-        assert!(problem.region.patches().is_empty() && problem.cost().seconds < 1.0);
+        assert!(problem.task.patches().is_empty() && problem.cost().seconds < 1.0);
     }
 }
 

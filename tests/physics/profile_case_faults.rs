@@ -43,7 +43,7 @@ fn a_sound_wheel_on_a_rail_is_accepted_without_being_solved() {
     let case = generated();
     assert_eq!(faults(&case), []);
     let problem = check(&case, &Limits::default()).unwrap();
-    assert!(problem.region.patches().is_empty() && problem.cost().seconds < 1.0);
+    assert!(problem.task.patches().is_empty() && problem.cost().seconds < 1.0);
     assert_eq!(problem.motions.len(), 1);
 }
 

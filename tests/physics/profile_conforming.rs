@@ -4,7 +4,7 @@
 use railhead::contact::case::limits::Limits;
 use railhead::contact::check;
 use railhead::contact::geometry::wheel_rail::WheelRail;
-use railhead::contact::normal::region::Region;
+use railhead::contact::normal::normal_task::NormalTask;
 use railhead::contact::solution::words::Solution;
 use serde_json::{Value, json};
 
@@ -41,7 +41,7 @@ fn clearance(y: f64) -> f64 {
 /// Wheel and rail of a case in place.
 fn geometry(case: &Value) -> WheelRail {
     let problem = check(case, &Limits::default()).expect("a case");
-    let Region::Profiles(contact) = &problem.region else {
+    let NormalTask::Wheel(contact) = &problem.task else {
         unreachable!("profiles were given")
     };
     contact.geometry.clone()

@@ -32,7 +32,7 @@ fn distance_to_plain_newton(contact: &Ellipse) -> f64 {
         strips: STRIPS,
         cells: CELLS,
     };
-    let footprint = problem.footprint();
+    let footprint = problem.pressed(&Unmonitored).expect("a contact").footprint;
     let level = StripMesh::new(&problem.rolling_task(&footprint), size).expect("a mesh");
     let motion = level.scale.motion(&problem.motions[0]);
     let shortened =

@@ -270,10 +270,10 @@ mod tests {
         let planted = Sources::planted(&[
             (
                 "src/contact/mesh/strips.rs",
-                "use crate::contact::normal::region::Region;",
+                "use crate::contact::normal::hertz::Ellipse;",
             ),
             (
-                "src/contact/normal/region.rs",
+                "src/contact/normal/hertz.rs",
                 "use crate::contact::mesh::strips::Mesh;",
             ),
             ("src/contact/unheard_of.rs", ""),
@@ -283,7 +283,7 @@ mod tests {
         assert_eq!(
             names(&order(&planted)),
             [
-                "contact::mesh::strips uses contact::normal::region",
+                "contact::mesh::strips uses contact::normal::hertz",
                 "contact::unheard_of has no place in the order",
                 "jobs::clock uses http",
             ]

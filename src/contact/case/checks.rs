@@ -5,10 +5,10 @@ use crate::contact::case::limits::Limits;
 use crate::contact::case::motions::ExpandedMotions;
 use crate::contact::case::resolution::resolution;
 use crate::contact::case::words::{Contact, Load, Material, Motions, Output, Solver};
-use crate::contact::case::{cost, motions, profiles};
+use crate::contact::case::{contact_task, cost, motions, profiles};
 use crate::contact::error::Fault;
 use crate::contact::half_space::elasticity::Elasticity;
-use crate::contact::normal::region::Region;
+use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 
@@ -29,7 +29,7 @@ pub(crate) struct PartialCase<'a> {
 
 /// Faults of the parts of a case that can be checked although others are faulty.
 pub(crate) fn faults_of(given: PartialCase, limits: &Limits) -> Vec<Fault> {
-    // Without its load a region cannot be told; that is a fault already. Profiles are looked at all the same.
+    // Without its load a patch cannot be told; that is a fault already. Profiles are looked at all the same.
     let without_load = matches!(
         given.contact,
         Some(Contact::PressureGrid { .. } | Contact::Profiles { .. })
@@ -44,7 +44,7 @@ pub(crate) fn faults_of(given: PartialCase, limits: &Limits) -> Vec<Fault> {
 #[derive(Debug)]
 pub(crate) struct CheckedParts {
     pub(crate) elasticity: Option<Elasticity>,
-    pub(crate) region: Option<(Region, Vec<RemarkEntry>)>,
+    pub(crate) task: Option<(NormalTask, Vec<RemarkEntry>)>,
     pub(crate) motions: Option<ExpandedMotions>,
 }
 
@@ -53,22 +53,22 @@ impl CheckedParts {
         let mut faults = Vec::new();
         let elasticity = given.material.map(Elasticity::combine);
         let elasticity = elasticity.and_then(|elasticity| collect_fault(elasticity, &mut faults));
-        let region = region(given.contact, given.load, elasticity.as_ref(), limits);
-        let region = match (region, given.contact) {
+        let task = normal_task(given.contact, given.load, elasticity.as_ref(), limits);
+        let task = match (task, given.contact) {
             (None, Some(contact @ Contact::Profiles { .. })) => {
                 let modulus = elasticity.map(|elasticity| elasticity.contact_modulus());
-                profiles::region(contact, given.load, modulus).unwrap_or_else(|found| {
+                profiles::task(contact, given.load, modulus).unwrap_or_else(|found| {
                     faults.extend(found);
                     None
                 })
             }
-            (region, _) => region.and_then(|region| collect_fault(region, &mut faults)),
+            (task, _) => task.and_then(|task| collect_fault(task, &mut faults)),
         };
         let motions = given.motion.map(|motion| motions::expand(motion, limits));
         let motions = motions.and_then(|motions| collect_fault(motions, &mut faults));
         if let (Some(expanded), Some(motion)) = (&motions, given.motion) {
             let of_profiles = matches!(given.contact, Some(Contact::Profiles { .. }));
-            let force = normal_force(region.as_ref().map(|(region, _)| region), given.load);
+            let force = normal_force(task.as_ref().map(|(task, _)| task), given.load);
             let limit = given.friction.zip(force).map(|(mu, force)| mu * force);
             faults.extend(expanded.faults(motion, limit, of_profiles));
         }
@@ -77,23 +77,23 @@ impl CheckedParts {
                 method: solver.method.into(),
                 resolution: resolution(solver),
                 // What is not known counts as the least it can be.
-                segments: region
+                segments: task
                     .as_ref()
-                    .map_or_else(|| vec![1.0], |(region, _)| cost::segments(region)),
+                    .map_or_else(|| vec![1.0], |(task, _)| cost::segments(task)),
                 motions: motions.as_ref().map_or(1, |m| m.motions.len()),
                 fields: given
                     .outputs
                     .iter()
                     .any(|output| *output != Output::Resultants),
-                ellipse: region
+                ellipse: task
                     .as_ref()
-                    .and_then(|(region, _)| cost::length_over_width(region)),
+                    .and_then(|(task, _)| cost::length_over_width(task)),
             };
             faults.extend(size.faults(limits));
         }
         let parts = CheckedParts {
             elasticity,
-            region,
+            task,
             motions,
         };
         (parts, faults)
@@ -112,13 +112,13 @@ fn collect_fault<T>(result: Result<T, Fault>, faults: &mut Vec<Fault>) -> Option
     result.map_err(|fault| faults.push(fault)).ok()
 }
 
-/// The region and its remarks, if all that it depends on is known; profiles are left to [`profiles::region`].
-pub(crate) fn region(
+/// The normal task and its remarks, if all that it depends on is known; profiles are left to [`profiles::task`].
+pub(crate) fn normal_task(
     contact: Option<&Contact>,
     load: Option<&Load>,
     elasticity: Option<&Elasticity>,
     limits: &Limits,
-) -> Option<Result<(Region, Vec<RemarkEntry>), Fault>> {
+) -> Option<Result<(NormalTask, Vec<RemarkEntry>), Fault>> {
     let contact = contact.filter(|contact| !matches!(contact, Contact::Profiles { .. }))?;
     if let Contact::PressureGrid {
         x_mm,
@@ -126,7 +126,7 @@ pub(crate) fn region(
         pressure_mpa,
     } = contact
     {
-        return Some(Region::prescribed(
+        return Some(contact_task::given(
             x_mm,
             y_mm,
             pressure_mpa,
@@ -138,17 +138,17 @@ pub(crate) fn region(
     };
     let modulus = elasticity?.contact_modulus();
     if let Contact::GapProfile { .. } | Contact::GapGrid { .. } = contact {
-        let region = Region::gap(contact, load, modulus, limits.samples_max);
-        return Some(region.map(|region| (region, Vec::new())));
+        let task = contact_task::gap(contact, load, modulus, limits.samples_max);
+        return Some(task.map(|task| (task, Vec::new())));
     }
-    let region = Region::hertz(contact, load, modulus);
-    Some(region.map(|region| (region, Vec::new())))
+    let task = contact_task::hertz(contact, load, modulus);
+    Some(task.map(|task| (task, Vec::new())))
 }
 
 /// The normal force of all patches in N, where it is known before the patches are.
-fn normal_force(region: Option<&Region>, load: Option<&Load>) -> Option<f64> {
+fn normal_force(task: Option<&NormalTask>, load: Option<&Load>) -> Option<f64> {
     let given = load.and_then(|load| load.normal_force_n);
-    let patches = region.map(Region::patches).unwrap_or_default();
+    let patches = task.map(NormalTask::patches).unwrap_or_default();
     let sum = || patches.iter().map(|patch| patch.normal_force).sum();
     given.or_else(|| (!patches.is_empty()).then(sum))
 }

@@ -4,7 +4,7 @@ use crate::contact::case::limits::Limits;
 use crate::contact::case::problem::Problem;
 use crate::contact::case::words::Output;
 use crate::contact::error::Fault;
-use crate::contact::normal::region::Region;
+use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::operator_store::OperatorKind;
 use crate::contact::rolling::refinement::levels::LEVELS_KEPT;
@@ -51,18 +51,19 @@ pub(crate) struct SizeInput {
 }
 
 /// Segments per strip of every patch; of a gap, whose patches are not known yet, one for every summit.
-pub(crate) fn segments(region: &Region) -> Vec<f64> {
-    match region {
-        Region::Gap(contact) => vec![1.0; contact.outlook().summits],
-        Region::Ellipse(_) | Region::Grid(_) | Region::Profiles(_) => region.segments_per_strip(),
+pub(crate) fn segments(task: &NormalTask) -> Vec<f64> {
+    match task {
+        NormalTask::Gap(contact) => vec![1.0; contact.outlook().summits],
+        NormalTask::Given(field) => field.segments_per_strip(),
+        NormalTask::Hertz(_) | NormalTask::Wheel(_) => vec![1.0],
     }
 }
 
 /// Half-length along rolling over half-width of an ellipse.
-pub(crate) fn length_over_width(region: &Region) -> Option<f64> {
-    match region {
-        Region::Ellipse(ellipse) => Some(ellipse.a / ellipse.b),
-        Region::Gap(_) | Region::Grid(_) | Region::Profiles(_) => None,
+pub(crate) fn length_over_width(task: &NormalTask) -> Option<f64> {
+    match task {
+        NormalTask::Hertz(ellipse) => Some(ellipse.a / ellipse.b),
+        NormalTask::Gap(_) | NormalTask::Given(_) | NormalTask::Wheel(_) => None,
     }
 }
 
@@ -83,10 +84,10 @@ impl Problem {
         SizeInput {
             method: self.method,
             resolution: self.resolution,
-            segments: segments(&self.region),
+            segments: segments(&self.task),
             motions: self.motions.len(),
             fields: self.outputs.iter().any(fields),
-            ellipse: length_over_width(&self.region),
+            ellipse: length_over_width(&self.task),
         }
     }
 }
@@ -107,7 +108,7 @@ impl SizeInput {
     }
 
     /// Peak memory in bytes.
-    fn bytes(&self) -> f64 {
+    pub(crate) fn bytes(&self) -> f64 {
         let (cells, segments) = self.finest();
         let motions = self.motions as f64;
         let operator = match self.method {

@@ -1,6 +1,7 @@
 //! The question: the words a client writes, how they are read, and what they become once checked.
 
 pub mod checks;
+pub mod contact_task;
 pub mod conversions;
 pub mod cost;
 pub mod digest;

@@ -1,53 +1,59 @@
-//! Finds region and pressure where a case gives a gap, and asks on for one patch of many.
+//! From question to footprint: finds patches and pressures where a case gives a gap.
 
-use std::borrow::Cow;
-
+use crate::contact::case::cost::SizeInput;
 use crate::contact::case::problem::Problem;
 use crate::contact::error::SolveError;
 use crate::contact::friction::law::FrictionLaw;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::answer::{NormalError, NormalWork};
 use crate::contact::normal::footprint::Footprint;
-use crate::contact::normal::region::Region;
-use crate::contact::rolling::motion::Motion;
+use crate::contact::normal::normal_task::NormalTask;
+use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::rolling::task::RollingTask;
 use crate::contact::solution::words::NormalReport;
 
+/// The solved normal problem of one frame.
+#[derive(Debug, Clone)]
+pub struct Pressed {
+    /// Patches and pressures.
+    pub footprint: Footprint,
+    /// How they were found, where they were not known beforehand.
+    pub report: Option<NormalReport>,
+    /// What is to be said of them.
+    pub remarks: Vec<RemarkEntry>,
+}
+
 impl Problem {
-    /// The problem with region and pressure known; solves the normal problem if they are not.
+    /// Patches and pressures; of a gap they are found.
     ///
     /// # Errors
-    /// Why there is no region and pressure; or the monitor stopped the work.
-    pub fn pressed(&self, monitor: &dyn Monitor) -> Result<Cow<'_, Problem>, SolveError> {
-        let Region::Gap(contact) = &self.region else {
-            return Ok(Cow::Borrowed(self));
-        };
-        let began = monitor.elapsed();
-        let found = contact.solve_for(self.target(), monitor)?;
-        let mut problem = self.clone();
-        problem.region = Region::Grid(found.field);
-        problem.remarks.extend(found.remarks);
-        let seconds = (monitor.elapsed() - began).as_secs_f64();
-        problem.normal = Some(found.report.with_time(seconds));
-        problem.fits()?;
-        Ok(Cow::Owned(problem))
-    }
-
-    /// The solved normal problem.
+    /// Why there are none, or why the tangential problem on them needs too much memory; or the monitor stopped the work.
     ///
     /// # Panics
-    /// If region and pressure are not known yet.
-    #[must_use]
-    pub fn footprint(&self) -> Footprint {
-        match &self.region {
-            Region::Ellipse(ellipse) => Footprint::hertz(*ellipse),
-            Region::Grid(field) if self.normal.is_some() => {
-                Footprint::computed(field.clone(), self.load_error)
-            }
-            Region::Grid(field) => Footprint::given(field.clone()),
-            Region::Gap(_) | Region::Profiles(_) => unreachable!("the normal problem is solved"),
-        }
+    /// On a wheel, whose patches have a frame each: see [`stages`](crate::contact::stages).
+    pub fn pressed(&self, monitor: &dyn Monitor) -> Result<Pressed, SolveError> {
+        let known = |footprint| Pressed {
+            footprint,
+            report: None,
+            remarks: Vec::new(),
+        };
+        let task = match &self.task {
+            NormalTask::Hertz(ellipse) => return Ok(known(Footprint::hertz(*ellipse))),
+            NormalTask::Given(field) => return Ok(known(Footprint::given(field.clone()))),
+            NormalTask::Gap(task) => task,
+            NormalTask::Wheel(_) => unreachable!("a wheel is brought to rest first"),
+        };
+        let began = monitor.elapsed();
+        let found = task.solve_for(self.target(), monitor)?;
+        let seconds = (monitor.elapsed() - began).as_secs_f64();
+        let pressed = Pressed {
+            footprint: Footprint::computed(found.field, 0.0),
+            report: Some(found.report.with_time(seconds)),
+            remarks: found.remarks,
+        };
+        self.fits(&pressed.footprint)?;
+        Ok(pressed)
     }
 
     /// What is asked of the tangential problem on a footprint.
@@ -76,40 +82,25 @@ impl Problem {
         }
     }
 
-    /// The same question about a part of the contact whose region, pressure and motions are known; without remarks.
-    ///
-    /// # Errors
-    /// The part needs more memory than is allowed.
-    pub fn of_part(
-        &self,
-        region: Region,
-        motions: Vec<Motion>,
-        normal: NormalReport,
-        load_error: f64,
-    ) -> Result<Problem, SolveError> {
-        let part = Problem {
-            region,
-            motions,
-            wheelset: None,
-            remarks: Vec::new(),
-            normal: Some(normal),
-            load_error,
-            ..self.clone()
-        };
-        part.fits().map(|()| part)
-    }
-
     /// Does a solve stay within the memory allowed? How many patches and segments there are is known only when they are
     /// found.
-    fn fits(&self) -> Result<(), SolveError> {
-        let bytes = self.cost().bytes;
+    ///
+    /// # Errors
+    /// It needs more.
+    pub(crate) fn fits(&self, footprint: &Footprint) -> Result<(), SolveError> {
+        let segments = footprint.segments_per_strip();
+        let (patches, sum) = (footprint.patches().len(), segments.iter().sum::<f64>());
+        let bytes = SizeInput {
+            segments,
+            ellipse: None,
+            ..self.size_input()
+        }
+        .bytes() as u64;
         if bytes > self.memory_bytes {
             return Err(SolveError::NormalProblem {
                 reason: format!(
-                    "the contact falls apart into {} patches with {:.1} segments per strip, which need about {} MiB; at \
+                    "the contact falls apart into {patches} patches with {sum:.1} segments per strip, which need about {} MiB; at \
                      most {} MiB are allowed for one case",
-                    self.region.patches().len(),
-                    self.region.segments_per_strip().iter().sum::<f64>(),
                     bytes >> 20,
                     self.memory_bytes >> 20
                 ),

@@ -1,4 +1,4 @@
-//! The question as checked numbers: materials combined, region and pressure known, limits enforced.
+//! The question as checked numbers: materials combined, limits enforced.
 //!
 //! A [`Problem`] cannot exist unchecked: [`Problem::new`] is the only way to make one.
 
@@ -16,12 +16,11 @@ use crate::contact::case::{plausibility, profiles};
 use crate::contact::error::CaseError;
 use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::half_space::elasticity::Elasticity;
-use crate::contact::normal::region::Region;
+use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::rolling::methods::method::{Method, TractionBound};
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::refinement::resolution::Resolution;
-use crate::contact::solution::words::NormalReport;
 
 /// Which motions of a case a problem asks about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,8 +42,8 @@ pub struct Problem {
     pub elasticity: Elasticity,
     /// Coulomb's friction coefficient μ.
     pub friction: f64,
-    /// Contact region and pressure.
-    pub region: Region,
+    /// Where patches and pressures come from.
+    pub task: NormalTask,
     /// The motions, in the order of the case; never empty.
     pub motions: Vec<Motion>,
     /// Which motions of the case these are: all of them, unless this is a slice.
@@ -68,10 +67,6 @@ pub struct Problem {
     pub outputs: Vec<Output>,
     /// Remarks that go into the answer.
     pub remarks: Vec<RemarkEntry>,
-    /// How region and pressure were found, where they were not known beforehand.
-    pub normal: Option<NormalReport>,
-    /// By how much, relatively, the load of region and pressure may differ from the one wanted.
-    pub load_error: f64,
     /// Memory the solve may use, in bytes.
     pub memory_bytes: u64,
     /// Hexadecimal digest of everything that determines the answer, the solver version included.
@@ -94,13 +89,13 @@ impl Problem {
             outputs: &case.outputs,
         };
         let (parts, mut faults) = CheckedParts::check(given, limits);
-        if faults.is_empty() && parts.region.is_none() {
+        if faults.is_empty() && parts.task.is_none() {
             faults.push(missing_load());
         }
-        let (true, Some(elasticity), Some((region, remarks)), Some(motions)) = (
+        let (true, Some(elasticity), Some((task, remarks)), Some(motions)) = (
             faults.is_empty(),
             parts.elasticity,
-            parts.region,
+            parts.task,
             parts.motions,
         ) else {
             return Err(CaseError(faults));
@@ -114,7 +109,7 @@ impl Problem {
             true => &motions,
             false => &[],
         };
-        let implausible = plausibility::of_case(&case.contact, &region.patches(), given);
+        let implausible = plausibility::of_case(&case.contact, &task.patches(), given);
         let remarks = merged(of_case.chain(remarks).chain(implausible));
         let digest = digest(case, &elasticity, &motions, &forces);
         Ok(Problem {
@@ -122,7 +117,7 @@ impl Problem {
             labels: case.labels.clone(),
             elasticity,
             friction: case.friction.coefficient,
-            region,
+            task,
             part: MotionPart {
                 before: 0,
                 all: motions.len(),
@@ -137,8 +132,6 @@ impl Problem {
             time_limit: case.solver.time_limit_s.map(Duration::from_secs_f64),
             outputs: case.outputs.clone(),
             remarks,
-            normal: None,
-            load_error: 0.0,
             memory_bytes: limits.memory_bytes,
             digest,
         })
@@ -154,6 +147,17 @@ impl Problem {
             },
             motions: self.motions[range.clone()].to_vec(),
             forces: self.forces[range].to_vec(),
+            ..self.clone()
+        }
+    }
+
+    /// The same question about a part of the contact with motions of its own; without remarks.
+    #[must_use]
+    pub(crate) fn of_part(&self, motions: Vec<Motion>) -> Problem {
+        Problem {
+            motions,
+            wheelset: None,
+            remarks: Vec::new(),
             ..self.clone()
         }
     }

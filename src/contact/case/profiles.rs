@@ -13,21 +13,21 @@ use crate::contact::geometry::formats::format as formats;
 use crate::contact::geometry::profile::{Body, Profile, Reading};
 use crate::contact::geometry::wheel_rail::{Placement, WheelRail};
 use crate::contact::geometry::wheelset::WheelsetMotion;
-use crate::contact::normal::region::Region;
+use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::wheel_height::task::{ProfileTrust, WheelLoad, WheelTask};
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::solution::profile_quality::PairQuality;
 
-/// The region of a wheel on a rail, yet to be found, with its remarks; `None` without faults where the load or the contact
+/// The task of a wheel on a rail with its remarks; `None` without faults where the load or the contact
 /// modulus in MPa is not known.
 ///
 /// # Errors
 /// Every fault of the two cross-sections; or that they cannot meet.
-pub(crate) fn region(
+pub(crate) fn task(
     contact: &Contact,
     load: Option<&Load>,
     contact_modulus: Option<f64>,
-) -> Result<Option<(Region, Vec<RemarkEntry>)>, Vec<Fault>> {
+) -> Result<Option<(NormalTask, Vec<RemarkEntry>)>, Vec<Fault>> {
     let geometry = wheel_rail(contact)?;
     if let Err(detail) = ContactLocus::new(&geometry) {
         return Err(vec![fault("/contact".to_owned(), detail)]);
@@ -46,14 +46,14 @@ pub(crate) fn region(
         contact_modulus,
         trust: trust(contact),
     };
-    Ok(Some((Region::Profiles(Arc::new(contact)), remarks)))
+    Ok(Some((NormalTask::Wheel(Arc::new(contact)), remarks)))
 }
 
 impl Problem {
     /// How far the points of the profiles can be trusted, as far as that is known without the contact; only of a wheel on a rail.
     #[must_use]
     pub fn quality(&self) -> Option<PairQuality> {
-        let Region::Profiles(contact) = &self.region else {
+        let NormalTask::Wheel(contact) = &self.task else {
             return None;
         };
         Some(profile_points::quality(

@@ -12,8 +12,8 @@ use crate::contact::half_space::strip_operator::kind::Precision;
 use crate::contact::normal::gap::summits::GapOutlook;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::hertz::{Ellipse, Pressing};
+use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::patch::Patch;
-use crate::contact::normal::region::Region;
 use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
 use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::motion::Motion;
@@ -211,11 +211,11 @@ impl PatchGuess {
     }
 }
 
-/// Patches of a region, and the time in s to find region and pressure.
-fn guesses(region: &Region, target: Option<f64>) -> (Vec<PatchGuess>, f64) {
-    match region {
-        Region::Ellipse(ellipse) => (vec![PatchGuess::of_ellipse(ellipse)], 0.0),
-        Region::Grid(field) => {
+/// Patches of a contact, and the time in s to find region and pressure.
+fn guesses(task: &NormalTask, target: Option<f64>) -> (Vec<PatchGuess>, f64) {
+    match task {
+        NormalTask::Hertz(ellipse) => (vec![PatchGuess::of_ellipse(ellipse)], 0.0),
+        NormalTask::Given(field) => {
             let times = if field.jump().is_some() {
                 JUMP_TIMES
             } else {
@@ -228,13 +228,13 @@ fn guesses(region: &Region, target: Option<f64>) -> (Vec<PatchGuess>, f64) {
             };
             (patches.iter().map(guess).collect(), 0.0)
         }
-        Region::Gap(task) => {
+        NormalTask::Gap(task) => {
             let outlook = task.outlook();
             let patch = PatchGuess::of_gap(task, &outlook);
             let seconds = gap_seconds(&outlook) * task.growth(target);
             (vec![patch; outlook.summits], seconds)
         }
-        Region::Profiles(task) => {
+        NormalTask::Wheel(task) => {
             let solves = f64::from(1 + profile_points::readings_expected(task));
             (vec![PatchGuess::of_wheel(task)], WHEEL * solves)
         }
@@ -264,7 +264,7 @@ impl Problem {
     /// Estimated time of this case.
     #[must_use]
     pub fn solve_time(&self) -> SolveTime {
-        let (patches, normal) = guesses(&self.region, self.resolution.target());
+        let (patches, normal) = guesses(&self.task, self.resolution.target());
         let tangential = match (self.method, self.resolution) {
             (Method::BoundaryElement, Resolution::Target(target)) => {
                 self.to_target(&patches, target)

@@ -5,7 +5,7 @@ pub mod footprint;
 pub mod gap;
 pub mod hertz;
 pub mod neighbours;
+pub mod normal_task;
 pub mod patch;
 pub mod pressure_field;
-pub mod region;
 pub mod wheel_height;

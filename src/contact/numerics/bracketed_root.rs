@@ -1,7 +1,5 @@
 //! Where an increasing function of one place is 0: between bounds that are found on the way.
 
-use crate::contact::error::SolveError;
-
 /// The farthest place: a hundred times the creepage at which everything slips by the cubic law.
 pub(crate) const PLACE_MAX: f64 = 65.0;
 /// Places tried.
@@ -50,10 +48,10 @@ pub(crate) struct Root {
 
 /// Goes from `start` until the sign changes, then between the bounds by the Illinois rule (regula falsi that halves the value of
 /// a bound that stays). `f` gives the value at a place and sets the size below which it counts as 0.
-pub(crate) fn find_root(
+pub(crate) fn find_root<E>(
     start: f64,
-    mut f: impl FnMut(f64, &mut f64) -> Result<f64, SolveError>,
-) -> Result<Root, SolveError> {
+    mut f: impl FnMut(f64, &mut f64) -> Result<f64, E>,
+) -> Result<Root, E> {
     let mut tolerance = 0.0;
     let (mut low, mut high): (Option<[f64; 2]>, Option<[f64; 2]>) = (None, None);
     let mut place = start.clamp(-PLACE_MAX, PLACE_MAX);
@@ -110,7 +108,7 @@ mod tests {
     fn search(tolerance: f64, f: impl Fn(f64) -> f64) -> Root {
         let look = |at: f64, least: &mut f64| {
             *least = tolerance;
-            Ok(f(at))
+            Ok::<f64, ()>(f(at))
         };
         find_root(0.1, look).unwrap()
     }

@@ -221,7 +221,7 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
                     place[k] = at;
                     let off = self.trial(place)?[k];
                     *tolerance = self.tolerance();
-                    Ok(off)
+                    Ok::<f64, SolveError>(off)
                 })?;
                 place[k] = root.place;
                 self.end(root.exit);
@@ -276,11 +276,11 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
             let inner = find_root(along, |at, tolerance| {
                 off = self.trial([at, across])?;
                 *tolerance = 0.3 * self.tolerance();
-                Ok(off[0])
+                Ok::<f64, SolveError>(off[0])
             })?;
             (along, exit_along) = (inner.place, inner.exit);
             *tolerance = self.tolerance();
-            Ok(off[1])
+            Ok::<f64, SolveError>(off[1])
         })?;
         // What keeps its sign is out of reach, however the other search ended.
         let exits = [root.exit, exit_along];

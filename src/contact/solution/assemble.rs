@@ -1,9 +1,9 @@
 //! From stage results to the answer a client reads: units put back, only what was asked for.
 
+use crate::contact::case::press::Pressed;
 use crate::contact::case::problem::Problem;
 use crate::contact::case::words::Output;
 use crate::contact::normal::patch::Patch;
-use crate::contact::normal::region::Region;
 use crate::contact::post::zone::Zone;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
@@ -28,6 +28,7 @@ const FRAME: &str = "x along rolling (leading edge at larger x), y to the left, 
 #[derive(Debug)]
 pub struct Assembly<'a> {
     problem: &'a Problem,
+    pressed: &'a Pressed,
     patches: Vec<Patch>,
     /// Motion by motion, for every patch.
     points: Vec<Vec<PointSolution>>,
@@ -41,14 +42,16 @@ pub struct Assembly<'a> {
 impl<'a> Assembly<'a> {
     /// No motion yet.
     #[must_use]
-    pub fn new(problem: &'a Problem) -> Assembly<'a> {
-        let patches = problem.region.patches();
+    pub fn new(problem: &'a Problem, pressed: &'a Pressed) -> Assembly<'a> {
+        let patches = pressed.footprint.patches().to_vec();
+        let remarks = problem.remarks.iter().chain(&pressed.remarks);
         Assembly {
             problem,
+            pressed,
             points: vec![Vec::new(); patches.len()],
             patches,
             total: Vec::new(),
-            remarks: problem.remarks.clone(),
+            remarks: remarks.cloned().collect(),
             fields: Fields::default(),
             levels: Vec::new(),
         }
@@ -101,16 +104,15 @@ impl<'a> Assembly<'a> {
             patches: patches.map(patch_solution).collect(),
             total: self.total,
             remarks: merged(self.remarks),
-            normal: problem.normal,
+            normal: self.pressed.report,
             wheel_lowering_mm: None,
             origin: Origin {
                 x_mm: 0.0,
                 y_mm: 0.0,
-                meaning: match problem.region {
-                    Region::Ellipse(_) => "centre of the contact ellipse",
-                    Region::Gap(_) | Region::Profiles(_) | Region::Grid(_) => {
-                        "origin of the given coordinates, for all patches"
-                    }
+                meaning: if self.pressed.footprint.is_closed_form() {
+                    "centre of the contact ellipse"
+                } else {
+                    "origin of the given coordinates, for all patches"
                 }
                 .to_owned(),
             },

@@ -3,7 +3,7 @@
 use crate::contact::mesh::strips::Chord;
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
-use crate::contact::normal::pressure_field::jumps::Jump;
+use crate::contact::normal::pressure_field::jump::Jump;
 use crate::contact::normal::pressure_field::sample_grid::PATCHES_MAX;
 use crate::contact::remark::entry::RemarkEntry;
 

@@ -1,7 +1,7 @@
 //! A pressure on one grid of samples, with its patches.
 
-use crate::contact::normal::pressure_field::jumps::Jump;
-use crate::contact::normal::pressure_field::patch_shape::PatchShape;
+use crate::contact::normal::pressure_field::jump::Jump;
+use crate::contact::normal::pressure_field::patch_cells::PatchShape;
 use crate::contact::normal::pressure_field::sample_grid::SampleGrid;
 
 /// Pressure samples on one rectangular grid and the patches they form.

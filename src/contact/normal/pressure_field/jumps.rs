@@ -1,21 +1,13 @@
 //! How well samples resolve a pressure: cells across a patch, and jumps from one sample to the next.
 
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
+use crate::contact::normal::pressure_field::jump::Jump;
 use crate::contact::normal::pressure_field::sample_grid::PADDING;
 
 /// A fall of the squared pressure over one interval beyond what the interval before lets expect, relative to the largest
 /// squared pressure, from which on it is a jump. An edge of Hertz's kind expects all of its fall; powers of a lens from 0.5
 /// to 1.5 reach 0.21 on 12 samples a side, a hole 0.9.
 const JUMP: f64 = 0.35;
-
-/// A place where a pressure falls from one sample to the next as no edge of a contact does.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Jump {
-    /// Coordinates in mm, halfway between the two samples.
-    pub at: [f64; 2],
-    /// The fall over the largest pressure.
-    pub fall: f64,
-}
 
 impl GridPressure {
     /// Spacings of the grid across each patch, along the axis that has fewer.

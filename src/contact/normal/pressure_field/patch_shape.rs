@@ -1,11 +1,11 @@
 //! What is known of each patch of a grid as a whole: force, extent, area, and remarks.
 
 use std::f64::consts::PI;
-use std::ops::RangeInclusive;
 
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::components::NOWHERE;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
+use crate::contact::normal::pressure_field::patch_cells::PatchShape;
 use crate::contact::normal::pressure_field::sample_grid::PADDING;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
@@ -13,15 +13,6 @@ use crate::contact::remark::list::Remark;
 /// A patch with fewer samples along or across has an uncertain edge, and a force off by more than about 2 %: measured
 /// on Hertz's pressure, the sum of the samples is off by up to 2 % with 9 of them, 0.5 % with 18.
 const SAMPLES_ACROSS_MIN: usize = 8;
-
-/// One patch and the cells it may occupy.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct PatchShape {
-    pub(crate) patch: Patch,
-    pub(crate) columns: RangeInclusive<usize>,
-    pub(crate) rows: RangeInclusive<usize>,
-    pub(crate) segments_per_strip: f64,
-}
 
 impl GridPressure {
     /// Patches without their region: force, rows and columns come from the samples.

@@ -16,7 +16,7 @@ use crate::contact::rolling::refinement::error_estimate::{
     CoarserLevel, EstimateContext, Indicators, RelativeErrors,
 };
 use crate::contact::rolling::refinement::levels::Levels;
-use crate::contact::rolling::refinement::refine::slender;
+use crate::contact::rolling::refinement::slender::slender;
 use crate::contact::rolling::refinement::warm_start::{Start, nested_start};
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::strip_mesh::StripMesh;

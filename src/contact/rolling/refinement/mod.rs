@@ -10,4 +10,5 @@ pub mod levels;
 pub mod mesh_policy;
 pub mod refine;
 pub mod resolution;
+pub mod slender;
 pub mod warm_start;

@@ -3,7 +3,6 @@
 use crate::contact::error::SolveError;
 use crate::contact::mesh::size::MeshSize;
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::patch::Patch;
 use crate::contact::rolling::answer::Work;
 use crate::contact::rolling::mesh_plan::{MeshPlan, Regime};
 use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;
@@ -22,8 +21,6 @@ use crate::contact::rolling::task::RollingTask;
 /// A mesh of so many cells is worth a start on a coarser one, whose sides are no shorter than this.
 const CELLS_NESTED: u64 = 1000;
 const SIDE_HALVED: u32 = 8;
-/// Patches longer along rolling than so many times their width are named where a solve does not converge; nearly all of them are solved.
-const SLENDER: f64 = 20.0;
 
 /// Solves a motion, from the coarsest level up to the first that meets the target, each started from
 /// the one before.
@@ -102,27 +99,6 @@ pub fn on_levels(
         judge(task, levels, asked, solved, None, monitor)?;
     }
     Ok(solved.map(|solved| solved.point))
-}
-
-/// The patch that is longest along rolling for its width, as a clause, if it may be the reason why there is no answer.
-pub(crate) fn slender(task: &RollingTask) -> Option<String> {
-    let ratio = |patch: &Patch| {
-        let [x_min, x_max, y_min, y_max] = patch.extent;
-        (x_max - x_min) / (y_max - y_min)
-    };
-    let patches = task.footprint.patches();
-    let (number, patch) = patches
-        .iter()
-        .enumerate()
-        .max_by(|(_, a), (_, b)| ratio(a).total_cmp(&ratio(b)))?;
-    let [x_min, x_max, y_min, y_max] = patch.extent;
-    (ratio(patch) > SLENDER).then(|| {
-        format!(
-            "patch {number} at x {x_min:.2} to {x_max:.2} mm, y {y_min:.3} to {y_max:.3} mm is {:.0} times as long along \
-             rolling as wide, which fastsim solves in any case",
-            ratio(patch)
-        )
-    })
 }
 
 /// Solves a motion from the coarsest mesh, or where the last motion of a sweep ended, up to the first mesh that meets the target.

@@ -1,0 +1,34 @@
+//! What is asked of the normal problem: where patches and pressures come from.
+
+use std::sync::Arc;
+
+use crate::contact::normal::gap::task::GapTask;
+use crate::contact::normal::hertz::Ellipse;
+use crate::contact::normal::patch::Patch;
+use crate::contact::normal::pressure_field::field::PressureField;
+use crate::contact::normal::wheel_height::task::WheelTask;
+
+/// What is known of a contact before it is solved. Solved, it is a [`Footprint`](crate::contact::normal::footprint::Footprint).
+#[derive(Debug, Clone, PartialEq)]
+pub enum NormalTask {
+    /// Hertz's ellipse, in closed form.
+    Hertz(Ellipse),
+    /// A pressure on a grid, as it was given.
+    Given(PressureField),
+    /// A gap: patches and pressures have to be found.
+    Gap(Box<GapTask>),
+    /// A wheel on a rail: the places of its patches have to be found first, each in a frame of its own.
+    Wheel(Arc<WheelTask>),
+}
+
+impl NormalTask {
+    /// The patches, in order of their smallest y; none where they have to be found.
+    #[must_use]
+    pub fn patches(&self) -> Vec<Patch> {
+        match self {
+            NormalTask::Hertz(ellipse) => vec![ellipse.patch()],
+            NormalTask::Given(field) => field.patches(),
+            NormalTask::Gap(_) | NormalTask::Wheel(_) => Vec::new(),
+        }
+    }
+}

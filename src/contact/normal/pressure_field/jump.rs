@@ -1,0 +1,10 @@
+//! A jump of a sampled pressure.
+
+/// A place where a pressure falls from one sample to the next as no edge of a contact does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Jump {
+    /// Coordinates in mm, halfway between the two samples.
+    pub at: [f64; 2],
+    /// The fall over the largest pressure.
+    pub fall: f64,
+}
