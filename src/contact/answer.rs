@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::contact::case::press::Pressed;
+use crate::contact::case::press::PressedContact;
 use crate::contact::case::problem::Problem;
 use crate::contact::error::SolveError;
 use crate::contact::rolling::force_control;
@@ -21,7 +21,7 @@ use crate::contact::time_limit::TimeLimit;
 pub(crate) fn answer(
     operators: &Arc<OperatorStore>,
     problem: &Problem,
-    pressed: &Pressed,
+    pressed: &PressedContact,
     watch: &TimeLimit,
 ) -> Result<(Solution, Fields), SolveError> {
     let answer = motions(operators, problem, pressed, watch);
@@ -33,7 +33,7 @@ pub(crate) fn answer(
 fn motions(
     operators: &Arc<OperatorStore>,
     problem: &Problem,
-    pressed: &Pressed,
+    pressed: &PressedContact,
     watch: &TimeLimit,
 ) -> Result<(Solution, Fields), SolveError> {
     let task = problem.rolling_task(&pressed.footprint);

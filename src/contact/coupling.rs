@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use crate::contact::answer::answer;
-use crate::contact::case::press::Pressed;
+use crate::contact::case::press::PressedContact;
 use crate::contact::case::problem::Problem;
 use crate::contact::case::words::Output;
 use crate::contact::error::SolveError;
@@ -360,7 +360,7 @@ impl Rest {
                 Some(wheelset) => vec![self.motion(gap, &contact.geometry, wheelset)?],
             };
             let load_error = self.wheel.load_error.hypot(self.unbalanced);
-            let pressed = Pressed {
+            let pressed = PressedContact {
                 footprint: Footprint::computed(gap.field.clone(), load_error),
                 report: Some(normal),
                 remarks: Vec::new(),

@@ -1,11 +1,11 @@
 //! The checks of a case: every part by itself, all faults at once.
 
-use crate::contact::case::cost::SizeInput;
 use crate::contact::case::limits::Limits;
 use crate::contact::case::motions::ExpandedMotions;
 use crate::contact::case::resolution::resolution;
+use crate::contact::case::size::SizeInput;
 use crate::contact::case::words::{Contact, Load, Material, Motions, Output, Solver};
-use crate::contact::case::{contact_task, cost, motions, profiles};
+use crate::contact::case::{contact_task, motions, profiles, size};
 use crate::contact::error::Fault;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::normal::normal_task::NormalTask;
@@ -79,7 +79,7 @@ impl CheckedParts {
                 // What is not known counts as the least it can be.
                 segments: task
                     .as_ref()
-                    .map_or_else(|| vec![1.0], |(task, _)| cost::segments(task)),
+                    .map_or_else(|| vec![1.0], |(task, _)| size::segments(task)),
                 motions: motions.as_ref().map_or(1, |m| m.motions.len()),
                 fields: given
                     .outputs
@@ -87,7 +87,7 @@ impl CheckedParts {
                     .any(|output| *output != Output::Resultants),
                 ellipse: task
                     .as_ref()
-                    .and_then(|(task, _)| cost::length_over_width(task)),
+                    .and_then(|(task, _)| size::length_over_width(task)),
             };
             faults.extend(size.faults(limits));
         }

@@ -1,7 +1,7 @@
 //! From question to footprint: finds patches and pressures where a case gives a gap.
 
-use crate::contact::case::cost::SizeInput;
 use crate::contact::case::problem::Problem;
+use crate::contact::case::size::SizeInput;
 use crate::contact::error::SolveError;
 use crate::contact::friction::law::FrictionLaw;
 use crate::contact::monitor::Monitor;
@@ -15,7 +15,7 @@ use crate::contact::solution::words::NormalReport;
 
 /// The solved normal problem of one frame.
 #[derive(Debug, Clone)]
-pub struct Pressed {
+pub struct PressedContact {
     /// Patches and pressures.
     pub footprint: Footprint,
     /// How they were found, where they were not known beforehand.
@@ -32,8 +32,8 @@ impl Problem {
     ///
     /// # Panics
     /// On a wheel, whose patches have a frame each: see [`stages`](crate::contact::stages).
-    pub fn pressed(&self, monitor: &dyn Monitor) -> Result<Pressed, SolveError> {
-        let known = |footprint| Pressed {
+    pub fn pressed(&self, monitor: &dyn Monitor) -> Result<PressedContact, SolveError> {
+        let known = |footprint| PressedContact {
             footprint,
             report: None,
             remarks: Vec::new(),
@@ -47,7 +47,7 @@ impl Problem {
         let began = monitor.elapsed();
         let found = task.solve_for(self.target(), monitor)?;
         let seconds = (monitor.elapsed() - began).as_secs_f64();
-        let pressed = Pressed {
+        let pressed = PressedContact {
             footprint: Footprint::computed(found.field, 0.0),
             report: Some(found.report.with_time(seconds)),
             remarks: found.remarks,

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use crate::contact::case::problem::Problem;
 use crate::contact::case::profile_points;
 use crate::contact::case::words::{
     Contact, CrossSection, Load, Motions, Smoothing, SmoothingWord, Wheelset,
@@ -16,7 +15,6 @@ use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::wheel_height::task::{ProfileTrust, WheelLoad, WheelTask};
 use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::solution::profile_quality::PairQuality;
 
 /// The task of a wheel on a rail with its remarks; `None` without faults where the load or the contact
 /// modulus in MPa is not known.
@@ -47,20 +45,6 @@ pub(crate) fn task(
         trust: trust(contact),
     };
     Ok(Some((NormalTask::Wheel(Arc::new(contact)), remarks)))
-}
-
-impl Problem {
-    /// How far the points of the profiles can be trusted, as far as that is known without the contact; only of a wheel on a rail.
-    #[must_use]
-    pub fn quality(&self) -> Option<PairQuality> {
-        let NormalTask::Wheel(contact) = &self.task else {
-            return None;
-        };
-        Some(profile_points::quality(
-            &contact.geometry,
-            contact.contact_modulus,
-        ))
-    }
 }
 
 /// The motion of the wheelset, if the case gives it instead of creepages.

@@ -1,6 +1,6 @@
 //! From stage results to the answer a client reads: units put back, only what was asked for.
 
-use crate::contact::case::press::Pressed;
+use crate::contact::case::press::PressedContact;
 use crate::contact::case::problem::Problem;
 use crate::contact::case::words::Output;
 use crate::contact::normal::patch::Patch;
@@ -28,7 +28,7 @@ const FRAME: &str = "x along rolling (leading edge at larger x), y to the left, 
 #[derive(Debug)]
 pub struct Assembly<'a> {
     problem: &'a Problem,
-    pressed: &'a Pressed,
+    pressed: &'a PressedContact,
     patches: Vec<Patch>,
     /// Motion by motion, for every patch.
     points: Vec<Vec<PointSolution>>,
@@ -42,7 +42,7 @@ pub struct Assembly<'a> {
 impl<'a> Assembly<'a> {
     /// No motion yet.
     #[must_use]
-    pub fn new(problem: &'a Problem, pressed: &'a Pressed) -> Assembly<'a> {
+    pub fn new(problem: &'a Problem, pressed: &'a PressedContact) -> Assembly<'a> {
         let patches = pressed.footprint.patches().to_vec();
         let remarks = problem.remarks.iter().chain(&pressed.remarks);
         Assembly {

@@ -1,0 +1,196 @@
+//! How much memory a case will take, estimated from its finest mesh, and the faults of one that is too large.
+
+use crate::contact::case::limits::Limits;
+use crate::contact::error::Fault;
+use crate::contact::normal::normal_task::NormalTask;
+use crate::contact::rolling::methods::method::Method;
+use crate::contact::rolling::operator_store::OperatorKind;
+use crate::contact::rolling::refinement::levels::LEVELS_KEPT;
+use crate::contact::rolling::refinement::mesh_policy::{CELLS_MAX, MeshPolicy};
+use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::rolling::task::precision_of;
+
+/// Cells of the finest mesh for a target of 0.02, on average, and how they grow as it falls.
+const TARGET_CELLS: f64 = 160.0;
+const TARGET_GROWTH: f64 = 0.65;
+/// Cells that a patch has at least.
+const PATCH_CELLS_MIN: f64 = 64.0;
+/// Patches of a longer shape are not for the fast solver: its preconditioner knows each strip for itself, and where strips lie closer than
+/// the cells in them are long, linear systems no longer converge. Ellipses up to 70 under 20 loads and motions did, from 100 on
+/// some did not (`cargo bench --bench stress` goes to 50). Wide patches need no bound: b/a 1000 converges in a few steps.
+const LENGTH_OVER_WIDTH_MAX: f64 = 60.0;
+/// Cells the dense method may use.
+const LIU_HSU_CELLS_MAX: f64 = 1000.0;
+/// Dense square matrices the method of Liu and Hsu holds at once.
+const LIU_HSU_MATRICES: f64 = 4.0;
+/// Doubles per cell of the finest mesh that an iteration holds: the Krylov space, iterates and buffers.
+const VECTORS_PER_CELL: f64 = 64.0;
+/// Bytes per cell of a level that is kept: two meshes, pressure, area and bound, and what two motions left on it.
+const LEVEL_BYTES_PER_CELL: f64 = 200.0;
+/// Levels that one motion is solved on at most.
+const LEVELS_PER_MOTION: f64 = 4.0;
+/// Bytes of a motion in the answer, for each patch, and of its text.
+const MOTION_BYTES: f64 = 2000.0;
+/// Bytes per cell and motion of fields, in the answer and in their stored form.
+const FIELDS_BYTES_PER_CELL: f64 = 160.0;
+
+/// What decides how much memory a solve takes.
+#[derive(Debug, Clone)]
+pub(crate) struct SizeInput {
+    pub(crate) method: Method,
+    pub(crate) resolution: Resolution,
+    /// Segments per strip, for each patch.
+    pub(crate) segments: Vec<f64>,
+    pub(crate) motions: usize,
+    /// Values per cell are kept motion by motion.
+    pub(crate) fields: bool,
+    /// Length over width of an ellipse; nothing for other regions.
+    pub(crate) ellipse: Option<f64>,
+}
+
+/// Segments per strip of every patch; of a gap, whose patches are not known yet, one for every summit.
+pub(crate) fn segments(task: &NormalTask) -> Vec<f64> {
+    match task {
+        NormalTask::Gap(contact) => vec![1.0; contact.outlook().summits],
+        NormalTask::Given(field) => field.segments_per_strip(),
+        NormalTask::Hertz(_) | NormalTask::Wheel(_) => vec![1.0],
+    }
+}
+
+/// Half-length along rolling over half-width of an ellipse.
+pub(crate) fn length_over_width(task: &NormalTask) -> Option<f64> {
+    match task {
+        NormalTask::Hertz(ellipse) => Some(ellipse.a / ellipse.b),
+        NormalTask::Gap(_) | NormalTask::Given(_) | NormalTask::Wheel(_) => None,
+    }
+}
+
+impl SizeInput {
+    /// Cells of the finest mesh over all patches.
+    pub(crate) fn cells(&self) -> f64 {
+        self.finest().0
+    }
+
+    /// Cells whose values are kept of each motion.
+    pub(crate) fn field_cells(&self) -> f64 {
+        if self.fields {
+            self.usual_cells(self.cells())
+        } else {
+            0.0
+        }
+    }
+
+    /// Peak memory in bytes.
+    pub(crate) fn bytes(&self) -> f64 {
+        let (cells, segments) = self.finest();
+        let motions = self.motions as f64;
+        let operator = match self.method {
+            Method::Fastsim => 0.0,
+            Method::BoundaryElement | Method::LiuHsu => {
+                let kind = OperatorKind {
+                    poisson_ratio: 0.0,
+                    // Cells that gather about a pole are not.
+                    folded: self.ellipse.is_some()
+                        && matches!(self.resolution, Resolution::Mesh(_)),
+                    precision: precision_of(self.resolution),
+                };
+                let each = (cells / segments.max(1.0)).ceil();
+                kind.bytes(segments.ceil() as usize, each as usize) as f64
+            }
+        };
+        let solve = match self.method {
+            // Factored blocks of two unknowns per cell.
+            Method::BoundaryElement => 32.0 * cells * cells / segments.max(1.0),
+            Method::LiuHsu => (2.0 * cells).powi(2) * 8.0 * LIU_HSU_MATRICES,
+            Method::Fastsim => 0.0,
+        };
+        let levels = (LEVELS_PER_MOTION * motions).min(LEVELS_KEPT as f64);
+        let patches = self.segments.len() as f64;
+        let fields = if self.fields {
+            // Many motions need twice the average at most.
+            motions * cells.min(2.0 * self.usual_cells(cells)) * FIELDS_BYTES_PER_CELL
+        } else {
+            0.0
+        };
+        operator
+            + solve
+            + cells * (8.0 * VECTORS_PER_CELL + levels * LEVEL_BYTES_PER_CELL)
+            + motions * patches * MOTION_BYTES
+            + fields
+    }
+
+    /// Faults of a case that is too large for the limits or for its method.
+    pub(crate) fn faults(&self, limits: &Limits) -> Vec<Fault> {
+        let pointer = match self.resolution {
+            Resolution::Mesh(_) => "/solver/mesh",
+            Resolution::Target(_) => "/contact",
+        };
+        let mut faults = Vec::new();
+        let (cells, _) = self.finest();
+        if self.method == Method::LiuHsu && cells > LIU_HSU_CELLS_MAX {
+            faults.push(Fault {
+                pointer: pointer.to_owned(),
+                detail: format!(
+                    "{cells:.0} cells over all patches; at most {LIU_HSU_CELLS_MAX} are allowed with liu_hsu, \
+                     use boundary_element for more"
+                ),
+            });
+        }
+        let fast = matches!(self.method, Method::BoundaryElement);
+        if let Some(ratio) = self
+            .ellipse
+            .filter(|ratio| fast && *ratio > LENGTH_OVER_WIDTH_MAX)
+        {
+            faults.push(Fault {
+                pointer: "/contact".to_owned(),
+                detail: format!(
+                    "a patch {ratio:.1} times as long along rolling as wide; boundary_element solves up to \
+                     {LENGTH_OVER_WIDTH_MAX} times, fastsim any"
+                ),
+            });
+        }
+        let bytes = self.bytes() as u64;
+        if bytes > limits.memory_bytes {
+            let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
+            faults.push(Fault {
+                pointer: pointer.to_owned(),
+                detail: format!(
+                    "{cells:.0} cells over all patches and {} motions need about {:.0} MiB; at most {:.0} MiB are \
+                     allowed for one case",
+                    self.motions,
+                    mebibytes(bytes),
+                    mebibytes(limits.memory_bytes)
+                ),
+            });
+        }
+        faults
+    }
+
+    /// Cells and segments of the finest mesh over all patches.
+    fn finest(&self) -> (f64, f64) {
+        let per_strip: f64 = self.segments.iter().sum();
+        let fixed = MeshPolicy::fixed_sizes(self.resolution, self.method);
+        let size = match (self.resolution, fixed.as_deref().and_then(<[_]>::last)) {
+            (_, Some(size)) => *size,
+            (Resolution::Mesh(size), None) => size,
+            (Resolution::Target(_), None) => {
+                // The cells are shared out among the patches; hollow ones have several segments in a strip.
+                let share =
+                    (f64::from(CELLS_MAX) / self.segments.len() as f64).max(PATCH_CELLS_MIN);
+                return (share * per_strip, share.sqrt() * per_strip);
+            }
+        };
+        let segments = f64::from(size.strips) * per_strip;
+        (segments * f64::from(size.cells), segments)
+    }
+
+    /// Cells that set the time: those of the mesh, or what the target costs on average.
+    fn usual_cells(&self, finest: f64) -> f64 {
+        match (self.resolution, self.method) {
+            (Resolution::Target(target), Method::BoundaryElement) => {
+                finest.min(TARGET_CELLS * (0.02 / target).powf(TARGET_GROWTH))
+            }
+            _ => finest,
+        }
+    }
+}
