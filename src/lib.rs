@@ -13,7 +13,7 @@
 //!
 //! Inside [`contact`] a case passes these stages, each a folder that returns a type of its own:
 //!
-//! 1. [`contact::case`]: [`contact::check`] turns the text into a [`Case`](contact::case::words::Case), names every fault at once,
+//! 1. [`contact::case`]: [`contact::check`] turns the text into a [`Case`](contact::case::words::question::Case), names every fault at once,
 //!    and makes a [`Problem`](contact::case::problem::Problem) of checked numbers.
 //! 2. [`contact::normal`]: patches and pressures, known in closed form or found from a gap or from profiles
 //!    ([`contact::geometry`]): a [`Footprint`](contact::normal::footprint::Footprint).

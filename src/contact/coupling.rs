@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::contact::answer::answer;
 use crate::contact::case::press::PressedContact;
 use crate::contact::case::problem::Problem;
-use crate::contact::case::words::Output;
+use crate::contact::case::words::solver::Output;
 use crate::contact::error::SolveError;
 use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::surface_exit::SurfaceMissed;

@@ -9,7 +9,7 @@ use prometheus_client::metrics::histogram::Histogram;
 use prometheus_client::metrics::info::Info;
 use prometheus_client::registry::Registry;
 
-use crate::contact::case::words::MethodName;
+use crate::contact::case::words::solver::MethodName;
 use crate::contact::solution::words::Solution;
 use crate::jobs::model::{FailureKind, State};
 use crate::jobs::store::types::Ending;

@@ -3,7 +3,7 @@
 use bytes::Bytes;
 use uuid::Uuid;
 
-use crate::contact::case::words::Output;
+use crate::contact::case::words::solver::Output;
 use crate::contact::solution::words::{PatchFields, Solution};
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;

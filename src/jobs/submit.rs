@@ -8,7 +8,7 @@ use serde_json::Value;
 use uuid::Uuid;
 
 use crate::contact::case::problem::Problem;
-use crate::contact::case::words::Output;
+use crate::contact::case::words::solver::Output;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::idempotency;

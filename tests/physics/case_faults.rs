@@ -1,6 +1,7 @@
 //! A bad case is refused with every fault: where it is, what was given, what is allowed.
 
-use railhead::contact::case::words::{Case, Output};
+use railhead::contact::case::words::question::Case;
+use railhead::contact::case::words::solver::Output;
 use railhead::contact::rolling::refinement::resolution::Resolution;
 use serde_json::{Value, json};
 

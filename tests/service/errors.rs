@@ -363,6 +363,7 @@ async fn every_kind_of_problem_explains_itself() {
         include_str!("order.rs"),
         include_str!("requests.rs"),
         include_str!("retention.rs"),
+        include_str!("shares.rs"),
         include_str!("storage.rs")
     );
     let untested: Vec<&String> = seen

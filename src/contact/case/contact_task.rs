@@ -1,6 +1,6 @@
 //! What a case asks of the normal problem: from the words of contact and load to a checked task. Profiles: see `profiles.rs`.
 
-use crate::contact::case::words::{Contact, Load};
+use crate::contact::case::words::contact::{Contact, Load};
 use crate::contact::error::Fault;
 use crate::contact::normal::gap::surface::GapSurface;
 use crate::contact::normal::gap::task::GapTask;

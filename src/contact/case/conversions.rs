@@ -1,6 +1,7 @@
 //! Between the words of a case and the types of the numerics: a change of a solver does not change the contract.
 
-use crate::contact::case::words::{MeshSizeWords, MethodName, MotionWords, TractionBoundName};
+use crate::contact::case::words::motion::MotionWords;
+use crate::contact::case::words::solver::{MeshSizeWords, MethodName, TractionBoundName};
 use crate::contact::mesh::size::MeshSize;
 use crate::contact::rolling::methods::method::{Method, TractionBound};
 use crate::contact::rolling::motion::Motion;

@@ -2,7 +2,7 @@
 
 use crate::contact::case::problem::Problem;
 use crate::contact::case::size::{SizeInput, length_over_width, segments};
-use crate::contact::case::words::Output;
+use crate::contact::case::words::solver::Output;
 
 impl Problem {
     /// Estimated cost of solving this: the operator of the finest mesh and what stands beside it, the matrices of the dense method,

@@ -3,10 +3,10 @@
 use serde::Serialize;
 
 use crate::contact::case::resolution::resolution;
-use crate::contact::case::words::{
-    Case, Contact, Load, MeshSizeWords, MethodName, MotionWords, Motions, Output,
-    TractionBoundName, Wheelset,
-};
+use crate::contact::case::words::contact::{Contact, Load};
+use crate::contact::case::words::motion::{MotionWords, Motions, Wheelset};
+use crate::contact::case::words::question::Case;
+use crate::contact::case::words::solver::{MeshSizeWords, MethodName, Output, TractionBoundName};
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::refinement::resolution::Resolution;

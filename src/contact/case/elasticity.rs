@@ -1,6 +1,6 @@
 //! Combines the elastic constants of two bodies into those of the pair.
 
-use crate::contact::case::words::{Elastic, Material};
+use crate::contact::case::words::material::{Elastic, Material};
 use crate::contact::error::Fault;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::remark::list::Remark;

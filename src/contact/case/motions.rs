@@ -1,7 +1,7 @@
 //! Writes out the motions of a case: sweeps become lists.
 
 use crate::contact::case::limits::Limits;
-use crate::contact::case::words::{AskedMotion, Combine, Motions, Range, Sweep};
+use crate::contact::case::words::motion::{AskedMotion, Combine, Motions, Range, Sweep};
 use crate::contact::error::Fault;
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 

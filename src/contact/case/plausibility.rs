@@ -1,6 +1,6 @@
 //! Is what comes out a contact that the theory is meant for? Remarks for all kinds of contact; nothing is refused here.
 
-use crate::contact::case::words::Contact;
+use crate::contact::case::words::contact::Contact;
 use crate::contact::normal::patch::Patch;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;

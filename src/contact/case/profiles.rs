@@ -3,9 +3,8 @@
 use std::sync::Arc;
 
 use crate::contact::case::profile_points;
-use crate::contact::case::words::{
-    Contact, CrossSection, Load, Motions, Smoothing, SmoothingWord, Wheelset,
-};
+use crate::contact::case::words::contact::{Contact, CrossSection, Load, Smoothing, SmoothingWord};
+use crate::contact::case::words::motion::{Motions, Wheelset};
 use crate::contact::error::Fault;
 use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::formats::format as formats;

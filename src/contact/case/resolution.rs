@@ -1,6 +1,6 @@
 //! The resolution a case asks for.
 
-use crate::contact::case::words::{MethodName, Solver};
+use crate::contact::case::words::solver::{MethodName, Solver};
 use crate::contact::rolling::methods::fastsim;
 use crate::contact::rolling::refinement::resolution::Resolution;
 

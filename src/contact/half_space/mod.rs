@@ -4,3 +4,4 @@ pub mod elasticity;
 pub mod grid_operator;
 pub mod kernels;
 pub mod strip_operator;
+pub mod transforms;

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::contact::case::problem::Problem;
-use crate::contact::case::words::Output;
+use crate::contact::case::words::solver::Output;
 use crate::contact::coupling;
 use crate::contact::coupling::Judge;
 use crate::contact::error::SolveError;

@@ -3,7 +3,7 @@
 /// Declares the enum `Remark`. The documentation of a variant is its meaning for the client; every figure has a value for the
 /// example; `detail` is an expression of the figures (as references) that gives the sentence.
 macro_rules! remarks {
-    ($(
+    (; $(
         $(#[doc = $meaning:literal])+
         $name:ident {
             $( $(#[doc = $about:literal])+ $figure:ident: $kind:ty = $example:expr, )*

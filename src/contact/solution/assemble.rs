@@ -2,7 +2,7 @@
 
 use crate::contact::case::press::PressedContact;
 use crate::contact::case::problem::Problem;
-use crate::contact::case::words::Output;
+use crate::contact::case::words::solver::Output;
 use crate::contact::normal::patch::Patch;
 use crate::contact::post::zone::Zone;
 use crate::contact::remark::entry::{RemarkEntry, merged};

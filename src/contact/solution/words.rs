@@ -6,7 +6,8 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::contact::case::words::{MethodName, MotionWords};
+use crate::contact::case::words::motion::MotionWords;
+use crate::contact::case::words::solver::MethodName;
 use crate::contact::post::zone::Zone;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::solution::profile_quality::{PatchQuality, ProfileUncertainty};

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::Case;
+use crate::contact::case::words::question::Case;
 use crate::http::dto::job::rfc3339;
 use crate::http::dto::problem::Fault;
 use crate::jobs::batch::model::Batch;

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::Output;
+use crate::contact::case::words::solver::Output;
 use crate::contact::post::resample::{resample, resample_zone};
 use crate::contact::post::zone::Zone;
 use crate::contact::solution::words::{PatchCells, PointFields};

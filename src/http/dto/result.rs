@@ -7,7 +7,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::contact::case::words::Output;
+use crate::contact::case::words::solver::Output;
 use crate::contact::solution::words::Solution;
 use crate::http::problem::error::ApiError;
 use crate::jobs::results::FetchedResult;

@@ -5,7 +5,8 @@ use axum::extract::State;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::{Case, MethodName, Output};
+use crate::contact::case::words::question::Case;
+use crate::contact::case::words::solver::{MethodName, Output};
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::solution::profile_quality::PairQuality;
 use crate::http::extract::caller::Caller;

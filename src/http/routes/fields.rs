@@ -8,7 +8,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::contact::case::words::Output;
+use crate::contact::case::words::solver::Output;
 use crate::http::dto::cells::{Cells, GriddedField, gridded, per_cell};
 use crate::http::dto::result::name_of;
 use crate::http::extract::accept::{Format, choose, one_of};

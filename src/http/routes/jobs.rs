@@ -11,7 +11,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::contact::case::words::Case;
+use crate::contact::case::words::question::Case;
 use crate::http::dto::job::JobAnswer;
 use crate::http::extract::accept::Format;
 use crate::http::extract::caller::Caller;

@@ -5,7 +5,7 @@ use axum::http::{HeaderMap, HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
 use uuid::Uuid;
 
-use crate::contact::case::words::Output;
+use crate::contact::case::words::solver::Output;
 use crate::contact::solution::words::PointSolution;
 use crate::http::extract::accept::Format;
 use crate::http::extract::caller::Caller;

@@ -6,7 +6,7 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::MotionWords;
+use crate::contact::case::words::motion::MotionWords;
 use crate::contact::solution::profile_quality::ProfileUncertainty;
 use crate::contact::solution::words::{ErrorEstimate, Origin, Solution, Total};
 use crate::http::extract::accept::{Format, choose, one_of};

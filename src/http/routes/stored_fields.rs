@@ -2,7 +2,7 @@
 
 use uuid::Uuid;
 
-use crate::contact::case::words::Output;
+use crate::contact::case::words::solver::Output;
 use crate::contact::solution::words::{PatchCells, PointFields};
 use crate::http::dto::result::name_of;
 use crate::http::problem::catalogue::problems;

@@ -7,7 +7,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::contact::case::words::Output;
+use crate::contact::case::words::solver::Output;
 use crate::contact::post::outlines::outline::{outlines, patch_outline};
 use crate::contact::post::zone::Zone;
 use crate::http::dto::cells::{Cells, GriddedField, gridded, per_cell};

@@ -5,7 +5,7 @@ use serde_json::Value;
 use crate::contact::case::read::object::{Interval, Object, shown};
 use crate::contact::case::read::profiles;
 use crate::contact::case::read::samples::{Quantity, axis, line, samples};
-use crate::contact::case::words::{Contact, Load};
+use crate::contact::case::words::contact::{Contact, Load};
 
 const RADIUS: Interval = Interval::positive(1e9, "mm");
 const SEMI_AXIS: Interval = Interval::positive(1e6, "mm");

@@ -11,9 +11,11 @@ use crate::contact::case::checks::{PartialCase, faults_of};
 use crate::contact::case::limits::Limits;
 use crate::contact::case::read::object::{Faults, Interval, Object, has_controls, join, shown};
 use crate::contact::case::read::{contact, material, motion, solver};
-use crate::contact::case::words::{
-    Case, Contact, Friction, Load, Material, Motions, Output, Solver,
-};
+use crate::contact::case::words::contact::{Contact, Load};
+use crate::contact::case::words::material::{Friction, Material};
+use crate::contact::case::words::motion::Motions;
+use crate::contact::case::words::question::Case;
+use crate::contact::case::words::solver::{Output, Solver};
 use crate::contact::error::{CaseError, Fault};
 
 const NAME_LENGTH_MAX: usize = 200;

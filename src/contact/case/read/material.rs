@@ -1,7 +1,7 @@
 //! Reads `material`: one set of elastic constants, or one for each body.
 
 use crate::contact::case::read::object::{Interval, Object};
-use crate::contact::case::words::{Elastic, Material};
+use crate::contact::case::words::material::{Elastic, Material};
 
 const MODULUS: Interval = Interval::positive(1e12, "MPa");
 const POISSON_RATIO: Interval = Interval::closed(0.0, 0.5, "");

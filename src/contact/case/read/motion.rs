@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use crate::contact::case::read::object::{Faults, Interval, Object, join, shown};
-use crate::contact::case::words::{AskedMotion, Combine, Motions, Range, Sweep, Wheelset};
+use crate::contact::case::words::motion::{AskedMotion, Combine, Motions, Range, Sweep, Wheelset};
 
 const CREEPAGE: Interval = Interval::closed(-1e6, 1e6, "");
 const SPIN: Interval = Interval::closed(-1e6, 1e6, "1/mm");

@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use crate::contact::case::read::object::{Interval, Object, join, number, shown};
-use crate::contact::case::words::{Contact, CrossSection, Smoothing, SmoothingWord};
+use crate::contact::case::words::contact::{Contact, CrossSection, Smoothing, SmoothingWord};
 use crate::contact::geometry::formats::format::Format;
 use crate::contact::geometry::profile::{POINTS_MAX, POINTS_MIN};
 use crate::contact::geometry::wheel_rail::Side;

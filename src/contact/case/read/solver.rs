@@ -2,7 +2,9 @@
 
 use crate::contact::case::read::object::{Interval, Object, join, shown, word};
 use crate::contact::case::resolution::TARGET_ERROR_DEFAULT;
-use crate::contact::case::words::{MeshSizeWords, MethodName, Output, Solver, TractionBoundName};
+use crate::contact::case::words::solver::{
+    MeshSizeWords, MethodName, Output, Solver, TractionBoundName,
+};
 
 const TARGET_ERROR: Interval = Interval::closed(1e-4, 0.5, "");
 const TIME_LIMIT: Interval = Interval::positive(86_400.0, "s");

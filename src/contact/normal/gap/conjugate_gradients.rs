@@ -4,7 +4,8 @@
 //! δ prescribed (Polonsky and Keer 1999). Cells may differ in size: scalar products are weighted with their areas, and
 //! distances are scaled by what a cell's own pressure displaces, so that small cells take no more iterations than large ones.
 
-use crate::contact::half_space::grid_operator::{GridOperator, Width};
+use crate::contact::half_space::grid_operator::GridOperator;
+use crate::contact::half_space::transforms::Width;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::hertz::Pressing;
 

@@ -1,6 +1,6 @@
 //! Draws a scene as SVG: heat map or zones, the border of the stick zone, arrows, axes in mm and a scale.
 
-use crate::contact::case::words::Output;
+use crate::contact::case::words::solver::Output;
 use crate::http::render::picture::frame::{Frame, WIDTH};
 use crate::http::render::picture::layers;
 use crate::http::render::picture::scene::{Scene, extent, heat};

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::contact::case::words::Output;
+use crate::contact::case::words::solver::Output;
 use crate::contact::post::outlines::outline::{outlines, patch_outline};
 use crate::contact::post::resample::resample;
 use crate::contact::post::zone::Zone;

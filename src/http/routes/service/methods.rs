@@ -5,7 +5,7 @@ use axum::extract::State;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::{MethodName, Output};
+use crate::contact::case::words::solver::{MethodName, Output};
 use crate::http::extract::caller::AnyTenant;
 use crate::http::options::HttpOptions;
 use crate::http::problem::catalogue::PlainProblems;

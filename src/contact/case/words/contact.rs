@@ -1,0 +1,177 @@
+//! Where the bodies touch, and how hard they are pressed together.
+
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::contact::geometry::formats::format::Format;
+use crate::contact::geometry::wheel_rail::Side;
+
+/// Where the bodies touch.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[serde(tag = "type", rename_all = "snake_case")]
+pub enum Contact {
+    /// Relative radii of curvature: an elliptic patch after Hertz.
+    Radii {
+        /// Relative radius in the rolling direction, in mm.
+        #[schema(exclusive_minimum = 0.0)]
+        rolling_mm: f64,
+        /// Relative radius across the rolling direction, in mm.
+        #[schema(exclusive_minimum = 0.0)]
+        lateral_mm: f64,
+    },
+    /// An elliptic patch with Hertz's pressure.
+    Ellipse {
+        /// Semi-axis along the rolling direction, in mm.
+        #[schema(exclusive_minimum = 0.0)]
+        a_mm: f64,
+        /// Semi-axis across the rolling direction, in mm.
+        #[schema(exclusive_minimum = 0.0)]
+        b_mm: f64,
+    },
+    /// A gap measured across the rolling direction between bodies that are circular along it:
+    /// `x²/(2 rolling_mm) + gap(y)`. Region and pressure are found.
+    GapProfile {
+        /// Relative radius in the rolling direction, in mm.
+        #[schema(exclusive_minimum = 0.0)]
+        rolling_mm: f64,
+        /// Strictly increasing coordinates across, in mm.
+        y_mm: Vec<f64>,
+        /// Distance of the undeformed surfaces at `y_mm` and x = 0, in mm; any constant may be added.
+        gap_mm: Vec<f64>,
+    },
+    /// Any gap on a grid. Region and pressure are found; outside the grid there is no contact.
+    GapGrid {
+        /// Strictly increasing coordinates along the rolling direction, in mm.
+        x_mm: Vec<f64>,
+        /// Strictly increasing coordinates across, in mm.
+        y_mm: Vec<f64>,
+        /// Distance of the undeformed surfaces, in mm: `gap_mm[j][i]` at `(x_mm[i], y_mm[j])`; any constant may be added.
+        gap_mm: Vec<Vec<f64>>,
+    },
+    /// A given pressure on a grid; its positive part is the contact region, which may have several patches.
+    PressureGrid {
+        /// Strictly increasing coordinates along the rolling direction, in mm.
+        x_mm: Vec<f64>,
+        /// Strictly increasing coordinates across, in mm.
+        y_mm: Vec<f64>,
+        /// `pressure_mpa[j][i]` at `(x_mm[i], y_mm[j])`, not negative, 0 outside the contact.
+        pressure_mpa: Vec<Vec<f64>>,
+    },
+    /// A wheel on a rail, by their cross-sections. Every patch is found, and solved in a frame of its own.
+    Profiles {
+        /// Cross-section of the rail.
+        #[schema(inline = false)]
+        rail: Box<CrossSection>,
+        /// Cross-section of the wheel.
+        #[schema(inline = false)]
+        wheel: Box<CrossSection>,
+        /// Which wheel of the wheelset, seen along rolling.
+        side: Side,
+        /// Radius of the wheel where z of its cross-section is 0, in mm.
+        #[schema(exclusive_minimum = 0.0)]
+        rolling_radius_mm: f64,
+        /// Distance of the gauge faces of the two rails, in mm; 1435 when left out.
+        #[schema(required = false)]
+        gauge_mm: f64,
+        /// Depth below the top of the rail at which the gauge is measured, in mm; 14 when left out.
+        #[schema(required = false)]
+        gauge_height_mm: f64,
+        /// Turn of the rail about the origin of its cross-section, in rad, positive with its top toward the track centre; 0
+        /// when left out.
+        #[schema(required = false)]
+        cant_rad: f64,
+        /// Distance of the backs of the two flanges, in mm; 1360 when left out.
+        #[schema(required = false)]
+        flange_back_distance_mm: f64,
+        /// y of the back of the flange in the wheel's cross-section, in mm; -70 when left out.
+        #[schema(required = false)]
+        flange_back_position_mm: f64,
+        /// Shift of the wheelset to the left, in mm; 0 when left out.
+        #[schema(required = false)]
+        lateral_shift_mm: f64,
+        /// Yaw of the wheelset in rad, positive from x to y; 0 when left out.
+        #[schema(required = false)]
+        yaw_rad: f64,
+        /// Roll of the wheelset in rad, positive from y to z; 0 when left out.
+        #[schema(required = false)]
+        roll_rad: f64,
+        /// Solve also where the points of a profile are so coarse or rough under the contact that an answer would mislead, or where rail and
+        /// wheel seem exchanged; otherwise the job fails and says where. `false` when left out.
+        #[serde(skip_serializing_if = "is_false")]
+        #[schema(required = false)]
+        accept_rough_profiles: bool,
+    },
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
+}
+
+/// A cross-section of a rail or a wheel, as points or as the text of a file; exactly one of the two.
+///
+/// y is positive to the field side and z positive down unless `mirror_y` and `mirror_z`, the file or the shape itself say otherwise.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct CrossSection {
+    /// Points `[y, z]` in mm, in order along the cross-section.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub points_mm: Option<Vec<[f64; 2]>>,
+    /// Format of `text`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub format: Option<Format>,
+    /// What the file says; its text, never a path.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub text: Option<String>,
+    /// y of the points is positive to the track centre. Left out, the file tells; then a wheel's flange, and a rail is as
+    /// above.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub mirror_y: Option<bool>,
+    /// z of the points is positive up. Left out, the file tells, then the shape.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub mirror_z: Option<bool>,
+    /// Waves shorter than about this along the cross-section are smoothed away, in mm; 0 (none) when left out. `auto`: what suits the noise of
+    /// the points and the pressure, 2 to 8 mm or none; the answer says what was used.
+    #[schema(required = false)]
+    pub smoothing_mm: Smoothing,
+}
+
+/// How a cross-section is smoothed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum Smoothing {
+    /// By a cut wavelength in mm; 0 for none.
+    Length(f64),
+    /// By what suits the noise and the pressure.
+    ByNoise(SmoothingWord),
+}
+
+/// A smoothing that the service chooses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SmoothingWord {
+    /// From the noise of the points and the pressure.
+    Auto,
+}
+
+/// How hard the bodies are pressed together; exactly one member is given.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct Load {
+    /// Normal force in N, more than 0. For `profiles` the sum over all patches, each along its own normal.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    pub normal_force_n: Option<f64>,
+    /// Vertical force of the wheel on the rail in N, more than 0; for `profiles` only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    pub vertical_force_n: Option<f64>,
+    /// Approach of distant points in mm. For `radii` and `ellipse` it counts from first touch and is more than 0; for gaps it
+    /// counts from gap = 0 of the given data and is more than the least gap; for `profiles` the wheel is lowered by it, vertically
+    /// from first touch.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub approach_mm: Option<f64>,
+}

@@ -1,0 +1,43 @@
+//! What the bodies are made of, and how they rub.
+
+use serde::Serialize;
+use utoipa::ToSchema;
+
+/// Elastic constants: one set for both bodies, or one for each.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum Material {
+    /// Both bodies are of the same material.
+    Same(Elastic),
+    /// The bodies differ; they are combined as in quasi-identical contact.
+    Pair {
+        /// The lower body (body 2, the rail).
+        lower: Elastic,
+        /// The upper body (body 1, the wheel).
+        upper: Elastic,
+    },
+}
+
+/// Isotropic linear elasticity. Exactly one of the two moduli is given.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct Elastic {
+    /// Shear modulus G in MPa, more than 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    pub shear_modulus_mpa: Option<f64>,
+    /// Young's modulus E in MPa, more than 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    pub young_modulus_mpa: Option<f64>,
+    /// Poisson's ratio, 0 to 0.5.
+    #[schema(minimum = 0.0, maximum = 0.5)]
+    pub poisson_ratio: f64,
+}
+
+/// Coulomb friction with one coefficient.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct Friction {
+    /// Friction coefficient: 0 (frictionless), or 1e-12 to 100.
+    #[schema(minimum = 0.0, maximum = 100.0)]
+    pub coefficient: f64,
+}

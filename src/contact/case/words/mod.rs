@@ -1,0 +1,7 @@
+//! The words of a case: units in the names, no arithmetic.
+
+pub mod contact;
+pub mod material;
+pub mod motion;
+pub mod question;
+pub mod solver;

@@ -1,0 +1,141 @@
+//! How the bodies roll: one motion, a list, a sweep or a wheelset.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// Rolling motion of the upper body relative to the lower one, divided by the rolling speed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = Motion)]
+pub struct MotionWords {
+    /// Longitudinal creepage, dimensionless.
+    #[schema(required = false)]
+    pub creepage_x: f64,
+    /// Lateral creepage, dimensionless.
+    #[schema(required = false)]
+    pub creepage_y: f64,
+    /// Spin in 1/mm.
+    #[schema(required = false)]
+    pub spin_per_mm: f64,
+}
+
+/// A motion as a case asks for it: creepages and spin, where a tangential force may stand in place of its creepage. The creepage that
+/// gives the force is found and reported with the answer.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct AskedMotion {
+    /// Longitudinal creepage, dimensionless; 0 when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub creepage_x: Option<f64>,
+    /// Lateral creepage, dimensionless; 0 when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub creepage_y: Option<f64>,
+    /// Spin in 1/mm.
+    #[schema(required = false)]
+    pub spin_per_mm: f64,
+    /// Longitudinal force on the lower body in N, over all patches, at most μN. Excludes `creepage_x`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_x_n: Option<f64>,
+    /// Lateral force on the lower body in N, over all patches, at most μN. Excludes `creepage_y`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_y_n: Option<f64>,
+}
+
+/// One motion, a list of motions on the same patch, or a sweep.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum Motions {
+    /// One motion; components left out are 0, but at least one is written.
+    One(AskedMotion),
+    /// Several motions on the same patch, solved in order.
+    Many(Vec<AskedMotion>),
+    /// Motions generated from ranges.
+    Sweep {
+        /// What varies, and what stays.
+        sweep: Sweep,
+    },
+    /// The motion of the wheelset, from which every patch gets its own creepages; for `profiles` only.
+    Wheelset {
+        /// How the wheelset moves.
+        wheelset: Wheelset,
+    },
+}
+
+/// Motion of a wheelset. Exactly one of `angular_velocity_rad_per_s` and `free_rolling_radius_mm` is given.
+///
+/// With the speed V, the axle e, the angular velocity ω = Ω e + (roll rate, 0, yaw rate) and r from the wheelset's centre to the
+/// patch, the wheel's material moves with v = (V, lateral velocity, 0) + ω × r; the creepages of a patch with the tangent t and the
+/// normal n are v_x / V, v · t / V and the spin ω · n / V.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct Wheelset {
+    /// Speed V along x in mm/s, more than 0.
+    #[schema(exclusive_minimum = 0.0)]
+    pub speed_mm_per_s: f64,
+    /// Angular velocity Ω about the axle in rad/s, positive for rolling forward.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub angular_velocity_rad_per_s: Option<f64>,
+    /// Radius in mm at which the wheel would roll freely: Ω is the speed divided by it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    pub free_rolling_radius_mm: Option<f64>,
+    /// Velocity of the centre to the left in mm/s; 0 when left out.
+    #[schema(required = false)]
+    pub lateral_velocity_mm_per_s: f64,
+    /// Rate of the yaw in rad/s; 0 when left out.
+    #[schema(required = false)]
+    pub yaw_rate_rad_per_s: f64,
+    /// Rate of the roll in rad/s; 0 when left out.
+    #[schema(required = false)]
+    pub roll_rate_rad_per_s: f64,
+}
+
+/// Ranges of the motion's components. A component left out is 0.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct Sweep {
+    /// Longitudinal creepage.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub creepage_x: Option<Range>,
+    /// Lateral creepage.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub creepage_y: Option<Range>,
+    /// Spin in 1/mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub spin_per_mm: Option<Range>,
+    /// Longitudinal force on the lower body in N, in place of `creepage_x`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub force_x_n: Option<Range>,
+    /// Lateral force on the lower body in N, in place of `creepage_y`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub force_y_n: Option<Range>,
+    /// `together` (default): all ranges have the same number of points and run side by side; `grid`: every
+    /// combination, the last named component fastest, a force in the place of its creepage.
+    #[schema(required = false)]
+    pub combine: Combine,
+}
+
+/// How several ranges of a sweep are combined.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Combine {
+    /// Side by side; all ranges have equally many points.
+    #[default]
+    Together,
+    /// Every combination.
+    Grid,
+}
+
+/// Equally spaced values, both ends included.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct Range {
+    /// First value.
+    pub from: f64,
+    /// Last value.
+    pub to: f64,
+    /// Number of values, at least 1.
+    #[schema(minimum = 1)]
+    pub points: u32,
+}

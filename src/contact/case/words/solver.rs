@@ -1,0 +1,87 @@
+//! How to solve, how exactly, and what to compute.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// How to solve, and how exactly.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct Solver {
+    /// The method.
+    #[schema(required = false)]
+    pub method: MethodName,
+    /// Allowed error of the resultants relative to μN (moment: μN√(A/π)), 1e-4 to 0.5. Excludes `mesh`.
+    ///
+    /// Most cases reach 0.001, few 1e-4: one that ends above its target has `target_met: false` and the remark `target-missed`.
+    /// 0.005 when left out, but for `fastsim`, whose stated error no target changes: without one it has no `target_met`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, minimum = 0.0001, maximum = 0.5)]
+    pub target_error: Option<f64>,
+    /// An explicit mesh instead of a target.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub mesh: Option<MeshSizeWords>,
+    /// How much traction `fastsim` lets friction carry where; `elliptic` when left out. For no other method.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub traction_bound: Option<TractionBoundName>,
+    /// Give up after this many seconds of solving.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    pub time_limit_s: Option<f64>,
+}
+
+/// The methods a client can choose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = Method)]
+pub enum MethodName {
+    /// The best method for the case (today always `boundary_element`).
+    #[default]
+    Auto,
+    /// Semismooth Newton on the projected equations, strip-preconditioned GMRES.
+    BoundaryElement,
+    /// The method of Liu and Hsu: Newton–Raphson with two initial guesses.
+    LiuHsu,
+    /// Kalker's simplified theory: a draft in microseconds.
+    Fastsim,
+}
+
+/// Where `fastsim` lets tractions slip.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = TractionBound)]
+pub enum TractionBoundName {
+    /// At μ times the pressure, for an ellipse Hertz's semi-ellipsoid.
+    #[default]
+    Elliptic,
+    /// At the square of the pressure, scaled to carry the same μN: for an ellipse Kalker's paraboloid, 4/3 as high in the middle.
+    Parabolic,
+}
+
+/// An explicit mesh: equal strips, cosine-graded cells along x, no clustering.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[schema(as = MeshSize)]
+pub struct MeshSizeWords {
+    /// Strips across each patch.
+    #[schema(minimum = 1)]
+    pub strips: u32,
+    /// Cells along x in each strip.
+    #[schema(minimum = 1)]
+    pub cells: u32,
+}
+
+/// What a case may ask for; nothing else is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Output {
+    /// Forces, moment, dissipated power.
+    Resultants,
+    /// Stick and slip zones: cells, areas, outlines.
+    Zones,
+    /// Tractions per cell.
+    Tractions,
+    /// Pressure per cell.
+    Pressure,
+    /// Slip per cell.
+    Slip,
+}

@@ -1,0 +1,97 @@
+//! Remarks on motions and on their forces.
+
+/// Gives these remarks to the next macro that is named, behind those of the groups before.
+macro_rules! motion_remarks {
+    ($next:ident $(, $further:ident)*; $($before:tt)*) => {
+        $next! {
+            $($further),*;
+            $($before)*
+
+            /// Creepages are so large that they are no small part of the rolling speed any more.
+            CreepageLarge {
+                /// Longitudinal creepage.
+                creepage_x: f64 = 5.0,
+                /// Lateral creepage.
+                creepage_y: f64 = 0.0,
+                /// Spin times √(area/π) of the patch; absent where the patch is not known yet.
+                spin_times_length: Option<f64> = Some(0.002),
+                /// The largest that passes without a remark.
+                usual_max: f64 = 0.2,
+            }
+            code: "creepage-large",
+            severity: Warning,
+            advice: "Check the unit (creepages are ratios, spin is in 1/mm). Forces of sliding like this follow from heat and wear as well.",
+            detail: {
+                let spin = spin_times_length.map_or_else(String::new, |spin| format!(", spin times length of the patch {spin:.3e}"));
+                format!("the creepages are {creepage_x:.3e} and {creepage_y:.3e}{spin}; the theory is for small ones, up to {usual_max}")
+            },
+
+            /// The second discretisation rule did not converge; forces come from the first alone.
+            SecondRuleFailed {}
+            code: "second-rule-failed",
+            severity: Warning,
+            advice: "Use the forces with their larger error estimate, or try another mesh.",
+            detail: "the trapezoid rule did not converge; forces come from the three-point rule and their error is larger".to_owned(),
+
+            /// The error is not known to be below the target.
+            TargetMissed {
+                /// Estimated error relative to μN; absent if it is unknown.
+                estimate: Option<f64> = Some(2.3e-3),
+                /// The target.
+                target: f64 = 1e-3,
+            }
+            code: "target-missed",
+            severity: Warning,
+            advice: "Use the numbers with the error estimate beside them, or ask for a larger target.",
+            detail: match estimate {
+                Some(estimate) => format!(
+                    "the error relative to μN is estimated at {estimate:.2e}, the target was {target}"
+                ),
+                None => format!("the error relative to μN is unknown, the target was {target}"),
+            },
+
+            /// No creepage gives the prescribed force; the nearest force found is answered.
+            ForceUnreachable {
+                /// Force asked for along rolling; absent if it was free.
+                wanted_x_n: Option<f64> = Some(29_000.0),
+                /// Force asked for across; absent if it was free.
+                wanted_y_n: Option<f64> = None,
+                /// Force found along rolling.
+                found_x_n: f64 = 28_100.0,
+                /// Force found across.
+                found_y_n: f64 = -350.0,
+            }
+            code: "force-unreachable",
+            severity: Warning,
+            advice: "Ask for less: spin takes its share of μN. The motion has `saturated: true`.",
+            detail: {
+                let wanted = |force: &Option<f64>| {
+                    force.map_or_else(|| "free".to_owned(), |force| format!("{force} N"))
+                };
+                format!(
+                    "no creepage gives the force asked for (x: {}, y: {}); the nearest found is {found_x_n:.6e} N, {found_y_n:.6e} N",
+                    wanted(wanted_x_n), wanted(wanted_y_n)
+                )
+            },
+
+            /// An iteration ended before it met its tolerance, and its result was used all the same.
+            IterationInexact {
+                /// Which iteration.
+                iteration: &'static str = "force control",
+                /// How it ended, as a clause.
+                reason: &'static str = "the trials were used up",
+                /// Its last residual, in the measure of the iteration.
+                residual: f64 = 3e-5,
+                /// The residual that was wanted.
+                tolerance: f64 = 2e-6,
+            }
+            code: "iteration-inexact",
+            severity: Warning,
+            advice: "Judge by `residual` against `tolerance` whether the answer is still good enough; it is not part of the error estimate.",
+            detail: format!(
+                "{iteration} ended before its tolerance was met: {reason}; the residual is {residual:.2e}, {tolerance:.2e} was wanted"
+            ),
+        }
+    };
+}
+pub(crate) use motion_remarks;

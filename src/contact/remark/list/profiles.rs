@@ -1,0 +1,266 @@
+//! Remarks on the profiles of rail and wheel: how they were read, and how well their points describe them.
+
+/// Gives these remarks to the next macro that is named, behind those of the groups before.
+macro_rules! profile_remarks {
+    ($next:ident $(, $further:ident)*; $($before:tt)*) => {
+        $next! {
+            $($further),*;
+            $($before)*
+
+            /// The shape of a profile says that its z is positive up; it was mirrored.
+            ProfileZMirrored {
+                /// Whose.
+                profile: &'static str = "rail",
+            }
+            code: "profile-z-mirrored",
+            severity: Info,
+            advice: "State `mirror_z` to say so yourself.",
+            detail: format!("{profile}: z was found to be positive up and has been mirrored"),
+
+            /// The flange of a wheel was found at positive y; y was mirrored.
+            ProfileYMirrored {
+                /// Whose.
+                profile: &'static str = "wheel",
+            }
+            code: "profile-y-mirrored",
+            severity: Info,
+            advice: "State `mirror_y` to say so yourself.",
+            detail: format!("{profile}: the flange was found at positive y, so that y has been mirrored"),
+
+            /// Points of a profile that lie nearly at the same place were merged.
+            ProfilePointsMerged {
+                /// Whose.
+                profile: &'static str = "rail",
+                /// Points left out.
+                count: usize = 11,
+                /// Points nearer than this are one.
+                nearer_than_mm: f64 = 0.001,
+            }
+            code: "profile-points-merged",
+            severity: Info,
+            advice: "Nothing: files that repeat points at the joints of arcs are common.",
+            detail: format!("{profile}: {count} points nearer than {nearer_than_mm} mm to another one were merged"),
+
+            /// Points of a profile that ran back between their neighbours were dropped.
+            ProfilePointsDropped {
+                /// Whose.
+                profile: &'static str = "rail",
+                /// Points left out.
+                count: usize = 2,
+            }
+            code: "profile-points-dropped",
+            severity: Warning,
+            advice: "Check the measurement where pieces are joined.",
+            detail: format!("{profile}: {count} points that ran back (zig-zag) were dropped"),
+
+            /// One or two points at an end of a profile, far from all others, were dropped.
+            ProfileEndDropped {
+                /// Whose.
+                profile: &'static str = "wheel",
+                /// Points left out.
+                count: usize = 1,
+                /// Their distance from the next point.
+                distance_mm: f64 = 67.0,
+            }
+            code: "profile-end-dropped",
+            severity: Info,
+            advice: "Nothing if the profile ends there; else check the file.",
+            detail: format!("{profile}: {count} stray points at an end, {distance_mm:.1} mm from the next one, were dropped"),
+
+            /// A profile has the shape of the other body.
+            ProfileOfOtherBody {
+                /// Which.
+                profile: &'static str = "rail",
+                /// What it looks like.
+                like: &'static str = "a wheel with its flange",
+            }
+            code: "profile-of-other-body",
+            severity: Warning,
+            advice: "Check that rail and wheel were not exchanged. Where both look like the other the case is refused.",
+            detail: format!("the profile given as {profile} looks like {like}; were rail and wheel exchanged?"),
+
+            /// The smoothing of a profile was chosen from its noise and the pressure, as the case asked for.
+            SmoothingChosen {
+                /// Whose.
+                profile: &'static str = "rail",
+                /// Cut wavelength; 0 for none.
+                smoothing_mm: f64 = 3.4,
+            }
+            code: "smoothing-chosen",
+            severity: Info,
+            advice: "Nothing; give `smoothing_mm` as a number to use the same for other cases.",
+            detail: format!("{profile}: smoothed by {smoothing_mm:.2} mm, chosen from the noise of its points"),
+
+            /// The points of a profile are too few or too far apart to tell their noise from its shape, so that `smoothing_mm: "auto"` chose no smoothing.
+            SmoothingUndecided {
+                /// Whose.
+                profile: &'static str = "rail",
+                /// Median distance of its points.
+                spacing_mm: f64 = 4.0,
+            }
+            code: "smoothing-undecided",
+            severity: Warning,
+            advice: "Send points that lie nearer to each other, 0.25 mm at gauge corner and flange, or give `smoothing_mm` as a number.",
+            detail: format!(
+                "{profile}: points {spacing_mm:.1} mm apart do not tell noise from shape, so that no smoothing could be chosen; none is in use"
+            ),
+
+            /// One point of a profile near the contact is off the curve of its neighbours.
+            ProfileOutlier {
+                /// Whose.
+                profile: &'static str = "rail",
+                /// Where on the profile.
+                at_y_mm: f64 = -3.2,
+                /// Distance from the curve.
+                distance_um: f64 = 200.0,
+                /// Roughness of this profile as the pressure that flattens it.
+                waviness_mpa: f64 = 900.0,
+                /// That of both profiles over the largest pressure.
+                share: f64 = 0.4,
+            }
+            code: "profile-outlier",
+            severity: Warning,
+            advice: "Remove or correct the point; smoothing spreads it.",
+            detail: format!(
+                "the {profile}'s point at y = {at_y_mm:.2} mm is {distance_um:.1} µm off the curve of its neighbours, worth {waviness_mpa:.0} MPa: \
+                 remove or correct it"
+            ),
+
+            /// A profile jumps between two points near the contact.
+            ProfileStep {
+                /// Whose.
+                profile: &'static str = "rail",
+                /// Where on the profile.
+                at_y_mm: f64 = -3.2,
+                /// Height, positive upward with y.
+                height_um: f64 = 50.0,
+                /// Roughness of this profile as the pressure that flattens it.
+                waviness_mpa: f64 = 900.0,
+                /// That of both profiles over the largest pressure.
+                share: f64 = 0.4,
+            }
+            code: "profile-step",
+            severity: Warning,
+            advice: "Measure this part again, or join the pieces better: no smoothing heals a step, and forces are off as well.",
+            detail: format!(
+                "the {profile}'s points jump by {:.1} µm at y = {at_y_mm:.2} mm, worth {waviness_mpa:.0} MPa: no smoothing heals a step, measure \
+                 this part again", height_um.abs()
+            ),
+
+            /// The points of a profile lie on straight chords between fewer points, as linear resampling leaves them.
+            ProfilePolygon {
+                /// Whose.
+                profile: &'static str = "rail",
+                /// Where on the profile, from and to.
+                y_mm: [f64; 2] = [-6.0, 5.0],
+                /// Length of the chords.
+                chord_mm: f64 = 0.5,
+                /// Roughness of this profile as the pressure that flattens it.
+                waviness_mpa: f64 = 200.0,
+                /// That of both profiles over the largest pressure.
+                share: f64 = 0.15,
+                /// Smoothing that is advised.
+                smoothing_mm: Option<f64> = Some(2.5),
+            }
+            code: "profile-polygon",
+            severity: Warning,
+            advice: "Send the points as measured, without resampling, or give the `smoothing_mm` named here.",
+            detail: format!(
+                "the {profile}'s points under the patch (y {:.1} to {:.1} mm) lie on straight chords of {chord_mm:.2} mm, as linear resampling leaves \
+                 them; the kinks are worth {waviness_mpa:.0} MPa: send the points as measured{}",
+                y_mm[0], y_mm[1],
+                smoothing_mm.map_or_else(String::new, |length| format!(", or give smoothing_mm: {length}"))
+            ),
+
+            /// Noise of the points of a profile, of the measurement or of rounding, is worth a good part of the pressure.
+            ProfileNoise {
+                /// Whose.
+                profile: &'static str = "rail",
+                /// Where on the profile, from and to.
+                y_mm: [f64; 2] = [-6.0, 5.0],
+                /// Standard deviation along the normal.
+                noise_um: f64 = 1.9,
+                /// Mean distance of the points.
+                spacing_mm: f64 = 0.25,
+                /// Step of which all heights are multiples, if there is one.
+                rounding_mm: Option<f64> = Some(0.01),
+                /// Roughness of this profile as the pressure that flattens it.
+                waviness_mpa: f64 = 210.0,
+                /// That of both profiles over the largest pressure.
+                share: f64 = 0.17,
+                /// Smoothing that is advised.
+                smoothing_mm: Option<f64> = Some(4.0),
+            }
+            code: "profile-noise",
+            severity: Warning,
+            advice: "Give the `smoothing_mm` named here, or `\"auto\"`; send points with more decimals where they were rounded.",
+            detail: format!(
+                "noise of {noise_um:.2} µm{} at points {spacing_mm:.2} mm apart makes waves on the {profile} (y {:.1} to {:.1} mm) worth \
+                 {waviness_mpa:.0} MPa{}",
+                rounding_mm.map_or_else(String::new, |step| format!(" (heights rounded to {step} mm)")),
+                y_mm[0], y_mm[1],
+                smoothing_mm.map_or_else(String::new, |length| format!(": give smoothing_mm: {length}"))
+            ),
+
+            /// Waves of a profile that are neither noise nor a single fault are worth a good part of the pressure.
+            ProfileWaves {
+                /// Whose.
+                profile: &'static str = "wheel",
+                /// Where on the profile, from and to.
+                y_mm: [f64; 2] = [-6.0, 5.0],
+                /// Their length at most.
+                shorter_than_mm: f64 = 3.0,
+                /// Roughness of this profile as the pressure that flattens it.
+                waviness_mpa: f64 = 210.0,
+                /// That of both profiles over the largest pressure.
+                share: f64 = 0.17,
+            }
+            code: "profile-waves",
+            severity: Warning,
+            advice: "Where they come from the measurement, smooth them with a `smoothing_mm` of about their length; real waves are part of the answer.",
+            detail: format!(
+                "waves on the {profile} shorter than {shorter_than_mm:.1} mm (y {:.1} to {:.1} mm) are worth {waviness_mpa:.0} MPa: smooth them with \
+                 smoothing_mm where they come from the measurement", y_mm[0], y_mm[1]
+            ),
+
+            /// The points of a profile under the contact are so far apart that the curve between them is open.
+            ProfileSpacing {
+                /// Whose.
+                profile: &'static str = "rail",
+                /// The widest distance of neighbouring points, from and to.
+                y_mm: [f64; 2] = [-4.1, 3.9],
+                /// Its length.
+                spacing_mm: f64 = 8.0,
+                /// The same over the width of the patch.
+                spacing_over_width: f64 = 0.8,
+                /// Pressure that flattens the difference of two curves through the points.
+                ambiguity_mpa: f64 = 400.0,
+            }
+            code: "profile-spacing",
+            severity: Warning,
+            advice: "Send points 0.5 mm apart on the tread, 0.25 mm at gauge corner and flange.",
+            detail: format!(
+                "the {profile}'s points are {spacing_mm:.1} mm apart where it touches (y {:.1} to {:.1} mm), {spacing_over_width:.2} times the width of the \
+                 patch; the curve between them is open by {ambiguity_mpa:.0} MPa: send more points there", y_mm[0], y_mm[1]
+            ),
+
+            /// A profile has a stretch without points near the contact over which the bodies may touch as well.
+            ProfileHole {
+                /// Whose.
+                profile: &'static str = "rail",
+                /// The stretch, from and to.
+                y_mm: [f64; 2] = [-25.0, 25.0],
+                /// Its length.
+                hole_mm: f64 = 50.0,
+            }
+            code: "profile-hole",
+            severity: Warning,
+            advice: "Send the points there: the contact may be elsewhere than found.",
+            detail: format!(
+                "the {profile} has no points from y {:.1} to {:.1} mm ({hole_mm:.1} mm), where the bodies may touch: the contact may be elsewhere than \
+                 found; send the points there", y_mm[0], y_mm[1]
+            ),
+        }
+    };
+}
+pub(crate) use profile_remarks;

@@ -1,0 +1,119 @@
+//! Remarks on the contact of a wheel and a rail: where it is, and what its model leaves out.
+
+/// Gives these remarks to the next macro that is named, behind those of the groups before.
+macro_rules! wheel_remarks {
+    ($next:ident $(, $further:ident)*; $($before:tt)*) => {
+        $next! {
+            $($further),*;
+            $($before)*
+
+            /// The contact is on the tip of the flange, as on a wheel that climbs or has derailed.
+            ContactOnFlangeTip {
+                /// Whose.
+                profile: &'static str = "wheel",
+                /// Where on the profile, from and to.
+                y_mm: [f64; 2] = [-58.0, -52.0],
+            }
+            code: "contact-on-flange-tip",
+            severity: Warning,
+            advice: "Check lateral shift, gauge, flange-back distance and position.",
+            detail: format!(
+                "the contact at y {:.1} to {:.1} mm of the {profile} is on the tip of its flange, as on a wheel that climbs or has derailed: check lateral \
+                 shift, gauge and flange-back distance", y_mm[0], y_mm[1]
+            ),
+
+            /// The contact is near the end of a profile, so that part of it may be cut off.
+            ContactAtProfileEnd {
+                /// Whose.
+                profile: &'static str = "wheel",
+                /// Where on the profile, from and to.
+                y_mm: [f64; 2] = [52.0, 58.0],
+                /// What is left of the profile beyond the contact.
+                left_mm: f64 = 2.0,
+            }
+            code: "contact-at-profile-end",
+            severity: Warning,
+            advice: "Check lateral shift and gauge, or send at least 5 mm of profile beyond the contact.",
+            detail: format!(
+                "the contact at y {:.1} to {:.1} mm of the {profile} is {left_mm:.1} mm from the end of its profile: check lateral shift and gauge, or send \
+                 a longer profile", y_mm[0], y_mm[1]
+            ),
+
+            /// The target is smaller than what the measurement of the profiles leaves open: a finer solve says nothing more.
+            TargetBelowProfileUncertainty {
+                /// The target, relative to μN.
+                target: f64 = 1e-3,
+                /// What the profiles leave open of the forces, relative to μN.
+                uncertainty: f64 = 0.02,
+            }
+            code: "target-below-profile-uncertainty",
+            severity: Info,
+            advice: "Better points help, a smaller target does not.",
+            detail: format!(
+                "the profiles leave {:.1} % of μN open, more than the target of {:.1} %", 100.0 * uncertainty, 100.0 * target
+            ),
+
+            /// A patch reaches the line on the rail at which the contact was divided between two planes of contact. It ends there by that division, not
+            /// as a contact does: if its largest pressure lies on that line, it grows with the fineness of the grid.
+            PatchCut {
+                /// y of the line on the cross-section of the rail.
+                rail_y_mm: f64 = -18.4,
+            }
+            code: "patch-cut",
+            severity: Warning,
+            advice: "Do not use pressures near that line, nor the largest one if `gap-rough` stands beside this. Two patches have grown into one that bends; under less load they are two.",
+            detail: format!(
+                "the patch reaches the line y = {rail_y_mm:.2} mm on the rail, where the contact is divided between two planes: its edge and its \
+                 pressure there are those of the division"
+            ),
+
+            /// The rail turns over the contact by so much that a plane of contact and half-spaces describe it roughly.
+            ContactTurns {
+                /// Change of the rail's inclination over the patch.
+                turn_rad: f64 = 0.5,
+            }
+            code: "contact-turns",
+            severity: Warning,
+            advice: "Take pressures and the direction of forces as approximate: conformal contact is not modelled.",
+            detail: format!(
+                "the rail turns by {turn_rad:.2} rad over the contact, which a plane of contact and half-spaces describe roughly"
+            ),
+
+            /// The force jumps at the height of the wheel that carries the load, where patches merge; forces were scaled to the load.
+            ForceJumps {
+                /// Load over force found.
+                factor: f64 = 1.004,
+            }
+            code: "force-jumps",
+            severity: Warning,
+            advice: "Vary the lateral place of the wheel a little to see how far the answer depends on it.",
+            detail: format!(
+                "the force jumps at this height of the wheel, where patches merge; forces were scaled by {factor:.4}"
+            ),
+
+            /// Patches lie in gaps of their own, where they do not press on each other's half-space, and that could matter.
+            PatchesUncoupled {
+                /// By how much the force of a patch would change, relative to the load.
+                share: f64 = 0.012,
+                /// Least distance of two load centres.
+                distance_mm: f64 = 38.0,
+            }
+            code: "patches-uncoupled",
+            severity: Warning,
+            advice: "Expect that a part of the load moves from one patch to the other; this is not part of the error estimate.",
+            detail: format!(
+                "patches {distance_mm:.1} mm apart are solved as if each were alone; pressing on each other they would exchange {:.1} % of the load",
+                100.0 * share
+            ),
+
+            /// Several motions share their patches, so that the vertical load is balanced by normal forces alone.
+            NormalForcesAloneBalance {}
+            code: "normal-forces-alone-balance",
+            severity: Warning,
+            advice: "Ask for the motions in cases of their own if friction is to carry its share of the load.",
+            detail: "normal forces alone balance the vertical force, because several motions share their patches; the total of a motion has its \
+                     friction on top".to_owned(),
+        }
+    };
+}
+pub(crate) use wheel_remarks;

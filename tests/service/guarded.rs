@@ -1,0 +1,88 @@
+//! A service that asks for keys, with some made.
+
+use railhead::jobs::Options;
+use railhead::jobs::keys::keyring::Keyring;
+use reqwest::Method;
+use serde_json::{Value, json};
+
+use crate::server::{Answer, Server, Setup};
+use crate::support::{case, pause};
+
+/// A service with keys of two tenants and of the operator.
+pub struct Guarded {
+    pub server: Server,
+    pub north: String,
+    pub south: String,
+    pub operator: String,
+}
+
+impl Guarded {
+    pub async fn start(mut setup: Setup, change: impl FnOnce(&mut Options)) -> Guarded {
+        change(&mut setup.options);
+        setup.http.anonymous = false;
+        let keys = Keyring::open(&setup.options.data_dir).await.unwrap();
+        let make = async |tenant: &str| keys.create(tenant, None).await.unwrap().1;
+        let (north, south) = (make("north").await, make("south").await);
+        let operator = make("operator").await;
+        let server = setup.start().await;
+        Guarded {
+            server,
+            north,
+            south,
+            operator,
+        }
+    }
+
+    pub async fn send(
+        &self,
+        key: &str,
+        method: Method,
+        path: &str,
+        body: Option<&Value>,
+    ) -> Answer {
+        let shape = |request: reqwest::RequestBuilder| {
+            let request = request.bearer_auth(key);
+            match body {
+                Some(body) => request.json(body),
+                None => request,
+            }
+        };
+        self.server.send(method, path, shape).await
+    }
+
+    pub async fn get(&self, key: &str, path: &str) -> Answer {
+        self.send(key, Method::GET, path, None).await
+    }
+
+    pub async fn submit(&self, key: &str, case: &Value) -> String {
+        let answer = self.send(key, Method::POST, "/v1/jobs", Some(case)).await;
+        assert_eq!(answer.status, 202, "{}", answer.text);
+        answer.header("location").unwrap().to_owned()
+    }
+
+    pub async fn batch(&self, key: &str, cases: &[Value]) -> String {
+        let cases = json!(cases);
+        let answer = self
+            .send(key, Method::POST, "/v1/batches", Some(&cases))
+            .await;
+        assert_eq!(answer.status, 202, "{}", answer.text);
+        answer.header("location").unwrap().to_owned()
+    }
+
+    pub async fn until_ended(&self, key: &str, path: &str) -> Value {
+        loop {
+            let job = self.get(key, path).await.json;
+            if job["state"] != "queued" && job["state"] != "running" {
+                return job;
+            }
+            pause().await;
+        }
+    }
+}
+
+/// A case with this normal force.
+pub fn loaded(newtons: u32) -> Value {
+    let mut case = case("one of many");
+    case["load"]["normal_force_n"] = json!(newtons);
+    case
+}
