@@ -12,9 +12,9 @@ use std::path::{Path, PathBuf};
 use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::post::outlines::outline::{outlines, patch_outline};
-use railhead::contact::post::zone::Zone;
 use railhead::contact::rolling::motion::Motion;
 use railhead::contact::solution::words::{Fields, PatchFields, Solution};
+use railhead::contact::solution::zone::Zone;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 

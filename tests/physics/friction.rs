@@ -112,7 +112,7 @@ fn answered(contact: &Ellipse, n: u32) -> Cells {
             .as_ref()
             .expect("was asked for")
             .iter()
-            .map(|z| *z == railhead::contact::post::zone::Zone::Slip)
+            .map(|z| *z == railhead::contact::solution::zone::Zone::Slip)
             .collect(),
         largest: [
             vx.hypot(vy) + phi.abs() * contact.a_mm.max(contact.b_mm),

@@ -1,8 +1,8 @@
 //! The examples that redraw the figures of Liu and Hsu's paper show what the paper says, on a patch without symmetry.
 
 use railhead::contact::post::outlines::outline::outlines;
-use railhead::contact::post::zone::Zone;
 use railhead::contact::solution::words::{Fields, Solution};
+use railhead::contact::solution::zone::Zone;
 use serde_json::{Value, json};
 
 use crate::reference::solve;

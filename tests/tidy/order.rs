@@ -17,7 +17,7 @@ const ORDER: &[&str] = &[
     "contact::friction",
     "contact::rolling",
     "contact::case::words",
-    "contact::post::zone",
+    "contact::solution::zone",
     "contact::solution::profile_quality",
     "contact::solution::words",
     "contact::post",
@@ -127,6 +127,7 @@ pub const DOOR: &[&str] = &[
     "contact::monitor",
     "contact::post",
     "contact::remark",
+    "contact::rolling::operator_store",
     "contact::slices",
     "contact::solution",
 ];

@@ -10,7 +10,11 @@ pub const FILE_LINES_MAX: usize = 450;
 /// Lines of a function at most, from `fn` to its closing brace.
 pub const FUNCTION_LINES_MAX: usize = 70;
 /// Where types of `contact` may have a form as JSON.
-const WORDS: [&str; 2] = ["src/contact/case/words/", "src/contact/solution/"];
+const WORDS: [&str; 3] = [
+    "src/contact/case/words/",
+    "src/contact/remark/",
+    "src/contact/solution/",
+];
 
 /// What breaks a rule, and by how much where that can be counted.
 pub type Findings = BTreeMap<String, usize>;
@@ -56,7 +60,7 @@ pub const RULES: [Rule; 9] = [
     },
     Rule {
         name: "words",
-        asks: "in `contact` only the words of case and solution derive serde's traits",
+        asks: "in `contact` only the words of case, remarks and solution derive serde's traits",
         find: words,
     },
     Rule {

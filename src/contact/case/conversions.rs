@@ -1,10 +1,32 @@
 //! Between the words of a case and the types of the numerics: a change of a solver does not change the contract.
 
+use crate::contact::case::words::contact::{FormatName, SideName};
 use crate::contact::case::words::motion::MotionWords;
 use crate::contact::case::words::solver::{MeshSizeWords, MethodName, TractionBoundName};
+use crate::contact::geometry::formats::format::Format;
+use crate::contact::geometry::wheel_rail::Side;
 use crate::contact::mesh::size::MeshSize;
 use crate::contact::rolling::methods::method::{Method, TractionBound};
 use crate::contact::rolling::motion::Motion;
+
+impl From<SideName> for Side {
+    fn from(name: SideName) -> Side {
+        match name {
+            SideName::Left => Side::Left,
+            SideName::Right => Side::Right,
+        }
+    }
+}
+
+impl From<FormatName> for Format {
+    fn from(name: FormatName) -> Format {
+        match name {
+            FormatName::Columns => Format::Columns,
+            FormatName::Simpack => Format::Simpack,
+            FormatName::Miniprof => Format::Miniprof,
+        }
+    }
+}
 
 impl From<MotionWords> for Motion {
     fn from(words: MotionWords) -> Motion {

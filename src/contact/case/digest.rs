@@ -1,12 +1,10 @@
 //! Which cases have the same answer? A digest of everything that determines it, the solver's revision included.
 
-use serde::Serialize;
-
 use crate::contact::case::resolution::resolution;
-use crate::contact::case::words::contact::{Contact, Load};
-use crate::contact::case::words::motion::{MotionWords, Motions, Wheelset};
+use crate::contact::case::words::canonical::Canonical;
+use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::question::Case;
-use crate::contact::case::words::solver::{MeshSizeWords, MethodName, Output, TractionBoundName};
+use crate::contact::case::words::solver::TractionBoundName;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::refinement::resolution::Resolution;
@@ -14,29 +12,6 @@ use crate::contact::rolling::refinement::resolution::Resolution;
 /// Raised whenever a change moves numbers that clients get: equal cases share one answer, and answers of an older revision are not theirs.
 /// `tests/physics/golden.rs` fails if numbers move without it, and says how to record the new ones.
 pub const SOLVER_REVISION: u32 = 11;
-
-/// Everything that determines the answer, in a fixed order; name and labels do not.
-#[derive(Serialize)]
-struct Canonical<'a> {
-    solver_version: &'static str,
-    solver_revision: u32,
-    elasticity: [f64; 3],
-    friction: f64,
-    contact: &'a Contact,
-    load: Option<&'a Load>,
-    motions: Vec<MotionWords>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    forces: Option<&'a [PrescribedForces]>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    wheelset: Option<&'a Wheelset>,
-    method: MethodName,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    traction_bound: Option<TractionBoundName>,
-    target_error: Option<f64>,
-    mesh: Option<MeshSizeWords>,
-    time_limit_s: Option<f64>,
-    outputs: &'a [Output],
-}
 
 /// Hexadecimal BLAKE3 digest of the canonical case.
 pub(crate) fn digest(

@@ -111,7 +111,7 @@ fn wheel_rail(contact: &Contact) -> Result<WheelRail, Vec<Fault>> {
         exchanged(&rail, &wheel)?;
     }
     let placement = Placement {
-        side: *side,
+        side: (*side).into(),
         rolling_radius: *rolling_radius_mm,
         gauge: *gauge_mm,
         gauge_height: *gauge_height_mm,
@@ -174,7 +174,7 @@ fn profile(body: Body, section: &CrossSection) -> Result<Profile, Fault> {
     };
     if let (Some(format), Some(text)) = (section.format, &section.text) {
         let refuse = |detail| fault(format!("/contact/{name}/text"), detail);
-        let contents = formats::read(format, text).map_err(refuse)?;
+        let contents = formats::read(format.into(), text).map_err(refuse)?;
         let is_wheel = body == Body::Wheel;
         if contents.wheel.is_some_and(|wheel| wheel != is_wheel) {
             let other = if is_wheel { "rail" } else { "wheel" };

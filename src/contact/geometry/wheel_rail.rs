@@ -6,15 +6,11 @@
 //! radius `r − z` at the distance `d/2 − p + y` from the centre along the axle, with the flange-back distance d and the
 //! flange-back position p. Conventions of the Manchester contact benchmark (Shackleton and Iwnicki 2008).
 
-use serde::Serialize;
-use utoipa::ToSchema;
-
 use crate::contact::geometry::profile::{CurvePoint, Profile};
 use crate::contact::remark::entry::RemarkEntry;
 
 /// Left or right rail, seen along rolling.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
     /// y of the track is positive there.
     Left,

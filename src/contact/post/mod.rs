@@ -3,4 +3,3 @@
 pub mod outlines;
 pub mod resample;
 pub mod strip_segments;
-pub mod zone;

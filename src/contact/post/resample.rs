@@ -1,8 +1,8 @@
 //! Cell values brought onto a regular grid, for pictures and for programs that want arrays.
 
 use crate::contact::post::strip_segments::{StoredSegment, Strips};
-use crate::contact::post::zone::Zone;
 use crate::contact::solution::words::PatchCells;
+use crate::contact::solution::zone::Zone;
 
 /// Values on a regular grid; `None` outside the patch.
 #[derive(Debug, Clone, PartialEq)]

@@ -102,33 +102,17 @@ impl StripMesh {
         operators: Arc<CaseOperators>,
     ) -> Result<StripMesh, SolveError> {
         let plan: MeshPlan = plan.into();
-        let size = plan.size;
         let Elasticity {
             shear_modulus,
             poisson_ratio,
             ..
         } = *task.elasticity;
         let (footprint, patches) = (task.footprint, task.footprint.patches());
-        let mut fitted: Vec<StripChord> = Vec::new();
-        for (k, patch) in patches.iter().enumerate() {
-            let [low, high] = [patch.extent[2], patch.extent[3]];
-            let strips = match plan.pole() {
-                Some([_, y]) => strips_about(y, low, high, size.strips as usize),
-                None => equal_strips(low, high, size.strips as usize),
-            };
-            let chords = strip_chords::chords(footprint, k, &strips);
-            if chords.is_empty() {
-                return Err(SolveError::Unmeshable {
-                    patch: k,
-                    strips: size.strips,
-                });
-            }
-            fitted.extend(chords);
-        }
+        let fitted = fitted_chords(footprint, &plan)?;
         let chords: Vec<Chord> = fitted.iter().map(|f| f.chord).collect();
         let grading = match plan.pole() {
-            Some([x, _]) => Grading::about(x, size.cells as usize),
-            None => Grading::cosine(size.cells as usize),
+            Some([x, _]) => Grading::about(x, plan.size.cells as usize),
+            None => Grading::cosine(plan.size.cells as usize),
         };
         let mut mesh = Mesh::new(&chords, &grading);
         if plan.pole().is_some() {
@@ -235,6 +219,25 @@ impl StripMesh {
         }
         values
     }
+}
+
+/// The strips of all patches, fitted to the region.
+fn fitted_chords(footprint: &Footprint, plan: &MeshPlan) -> Result<Vec<StripChord>, SolveError> {
+    let strips = plan.size.strips;
+    let mut fitted = Vec::new();
+    for (k, patch) in footprint.patches().iter().enumerate() {
+        let [low, high] = [patch.extent[2], patch.extent[3]];
+        let edges = match plan.pole() {
+            Some([_, y]) => strips_about(y, low, high, strips as usize),
+            None => equal_strips(low, high, strips as usize),
+        };
+        let chords = strip_chords::chords(footprint, k, &edges);
+        if chords.is_empty() {
+            return Err(SolveError::Unmeshable { patch: k, strips });
+        }
+        fitted.extend(chords);
+    }
+    Ok(fitted)
 }
 
 /// Mean pressures of the cells, scaled so that the cells carry the load of their strip where the region is not Hertz's

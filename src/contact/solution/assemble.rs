@@ -4,7 +4,6 @@ use crate::contact::case::press::PressedContact;
 use crate::contact::case::problem::Problem;
 use crate::contact::case::words::solver::Output;
 use crate::contact::normal::patch::Patch;
-use crate::contact::post::zone::Zone;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::motion::Motion;
@@ -17,6 +16,7 @@ use crate::contact::solution::words::{
     CombinedMaterial, ErrorEstimate, Fields, MeshReport, NormalisedMotion, Origin, PatchCells,
     PatchFields, PatchSolution, PointFields, PointSolution, Solution, SolverReport, Total,
 };
+use crate::contact::solution::zone::Zone;
 
 /// Remarks that are gathered before repetitions are dropped.
 const REMARKS_AT_ONCE: usize = 1000;

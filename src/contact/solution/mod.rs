@@ -6,3 +6,4 @@ pub mod finite;
 pub mod profile_quality;
 pub mod track_axes;
 pub mod words;
+pub mod zone;

@@ -8,9 +8,9 @@ use utoipa::ToSchema;
 
 use crate::contact::case::words::motion::MotionWords;
 use crate::contact::case::words::solver::MethodName;
-use crate::contact::post::zone::Zone;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::solution::profile_quality::{PatchQuality, ProfileUncertainty};
+use crate::contact::solution::zone::Zone;
 
 /// The answer to one case, without fields.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]

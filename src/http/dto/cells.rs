@@ -5,8 +5,8 @@ use utoipa::ToSchema;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::post::resample::{resample, resample_zone};
-use crate::contact::post::zone::Zone;
 use crate::contact::solution::words::{PatchCells, PointFields};
+use crate::contact::solution::zone::Zone;
 
 /// Values per cell, strip by strip from smaller to larger y, in each strip from smaller to larger x. All arrays have
 /// the same length; those of other fields are absent.

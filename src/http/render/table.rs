@@ -2,7 +2,7 @@
 
 use utoipa::ToSchema;
 
-use crate::contact::post::zone::Zone;
+use crate::contact::solution::zone::Zone;
 use crate::http::dto::cells::{Cells, GriddedField};
 
 /// A file, byte for byte.

@@ -9,7 +9,7 @@ use uuid::Uuid;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::post::outlines::outline::{outlines, patch_outline};
-use crate::contact::post::zone::Zone;
+use crate::contact::solution::zone::Zone;
 use crate::http::dto::cells::{Cells, GriddedField, gridded, per_cell};
 use crate::http::extract::accept::Format;
 use crate::http::extract::caller::Caller;

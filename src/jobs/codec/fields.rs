@@ -17,8 +17,8 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use crate::contact::post::zone::Zone;
 use crate::contact::solution::words::{PatchCells, PatchFields, PointFields};
+use crate::contact::solution::zone::Zone;
 
 pub(crate) const MAGIC: &[u8; 8] = b"RHFIELD2";
 

@@ -3,16 +3,16 @@
 use serde_json::Value;
 
 use crate::contact::case::read::object::{Interval, Object, join, number, shown};
-use crate::contact::case::words::contact::{Contact, CrossSection, Smoothing, SmoothingWord};
-use crate::contact::geometry::formats::format::Format;
+use crate::contact::case::words::contact::{
+    Contact, CrossSection, FormatName, SideName, Smoothing, SmoothingWord,
+};
 use crate::contact::geometry::profile::{POINTS_MAX, POINTS_MIN};
-use crate::contact::geometry::wheel_rail::Side;
 
-const SIDES: [(&str, Side); 2] = [("left", Side::Left), ("right", Side::Right)];
-const FORMATS: [(&str, Format); 3] = [
-    ("columns", Format::Columns),
-    ("simpack", Format::Simpack),
-    ("miniprof", Format::Miniprof),
+const SIDES: [(&str, SideName); 2] = [("left", SideName::Left), ("right", SideName::Right)];
+const FORMATS: [(&str, FormatName); 3] = [
+    ("columns", FormatName::Columns),
+    ("simpack", FormatName::Simpack),
+    ("miniprof", FormatName::Miniprof),
 ];
 const ROLLING_RADIUS: Interval = Interval::positive(1e5, "mm");
 const DISTANCE: Interval = Interval::positive(1e5, "mm");

@@ -3,9 +3,6 @@
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::contact::geometry::formats::format::Format;
-use crate::contact::geometry::wheel_rail::Side;
-
 /// Where the bodies touch.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[serde(tag = "type", rename_all = "snake_case")]
@@ -66,7 +63,7 @@ pub enum Contact {
         #[schema(inline = false)]
         wheel: Box<CrossSection>,
         /// Which wheel of the wheelset, seen along rolling.
-        side: Side,
+        side: SideName,
         /// Radius of the wheel where z of its cross-section is 0, in mm.
         #[schema(exclusive_minimum = 0.0)]
         rolling_radius_mm: f64,
@@ -119,7 +116,7 @@ pub struct CrossSection {
     /// Format of `text`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
-    pub format: Option<Format>,
+    pub format: Option<FormatName>,
     /// What the file says; its text, never a path.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
@@ -174,4 +171,28 @@ pub struct Load {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub approach_mm: Option<f64>,
+}
+
+/// Left or right rail, seen along rolling.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = Side)]
+pub enum SideName {
+    /// y of the track is positive there.
+    Left,
+    /// y of the track is negative there.
+    Right,
+}
+
+/// A file format a client can name; each is a file of that name beside this one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = Format)]
+pub enum FormatName {
+    /// Two columns y and z, separated by blanks, commas, semicolons or tabs.
+    Columns,
+    /// Simpack's `.prr` (rail) and `.prw` (wheel).
+    Simpack,
+    /// MiniProf's `.ban` (rail) and `.whl` (wheel).
+    Miniprof,
 }

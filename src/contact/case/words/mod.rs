@@ -1,5 +1,6 @@
 //! The words of a case: units in the names, no arithmetic.
 
+pub mod canonical;
 pub mod contact;
 pub mod material;
 pub mod motion;

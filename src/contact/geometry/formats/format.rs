@@ -1,14 +1,10 @@
 //! The formats of profile files, and how a text is told to be one of them.
 
-use serde::Serialize;
-use utoipa::ToSchema;
-
 use crate::contact::geometry::formats::profile_file::ProfileFile;
 use crate::contact::geometry::formats::{columns, miniprof, simpack};
 
 /// A file format a client can name; each is a file of that name beside this one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// Two columns y and z, separated by blanks, commas, semicolons or tabs.
     Columns,

@@ -218,22 +218,16 @@ impl WheelTask {
                 return self.lowered(search, lowering, Fineness::fine(wanted), monitor);
             }
         };
-        let near = |force: f64| (force / target - 1.0).abs() <= NEAR;
         let tolerance = wanted.accuracy.tolerance();
         let exact = matches!(wanted.accuracy, Accuracy::For(_));
         let mut bracket = Bracket::default();
-        let mut fineness = Fineness {
-            detail: Detail::Coarse,
-            ..Fineness::fine(wanted)
-        };
-        let mut lowering = match before {
-            Some(before) => {
-                if near(before.found[0]) && exact {
-                    fineness.detail = Detail::Fine;
-                }
-                let [carried, slope] = before.found;
-                bracket.next(before.lowering, carried, target, slope)
-            }
+        let mut fineness = Fineness::fine(wanted);
+        let starts_near = before.is_some_and(|before| near(before.found[0], target));
+        if !(exact && starts_near) {
+            fineness.detail = Detail::Coarse;
+        }
+        let mut lowering = match before.map(|before| (before.lowering, before.found)) {
+            Some((height, [carried, slope])) => bracket.next(height, carried, target, slope),
             None => search.estimated_lowering(target / self.contact_modulus),
         };
         for heights in 1..=HEIGHTS_MAX {
@@ -241,9 +235,8 @@ impl WheelTask {
                 Ok(found) => found,
                 Err(NormalError::NoAnswer(reason)) => {
                     // Too deep, perhaps; the load may be carried higher up.
-                    lowering = bracket
-                        .refuse(lowering, reason)
-                        .map_err(NormalError::NoAnswer)?;
+                    let higher = bracket.refuse(lowering, reason);
+                    lowering = higher.map_err(NormalError::NoAnswer)?;
                     continue;
                 }
                 Err(stopped) => return Err(stopped),
@@ -270,7 +263,7 @@ impl WheelTask {
                 return Ok(found.at_rest(exit, target));
             }
             lowering = if closed { found.lowering } else { next };
-            if closed || !fine && near(carried) {
+            if closed || !fine && near(carried, target) {
                 // What coarse looks said of the forces on either side is not sharp enough to go on from, the slope is.
                 fineness.detail = Detail::Fine;
                 bracket = bracket.opened(found.found[1]);
@@ -428,6 +421,11 @@ impl WheelTask {
         // The power 3/2 of Hertz's contacts is a bound for anything that grows as it is pressed.
         slope.max(carried / found.lowering)
     }
+}
+
+/// May a fine look follow a coarse one that found this force?
+fn near(force: f64, target: f64) -> bool {
+    (force / target - 1.0).abs() <= NEAR
 }
 
 /// Deepest overlap of a gap in mm.

@@ -1,8 +1,8 @@
 //! What a picture shows, and what follows from it: the coloured values, the box around the cells, the zones.
 
 use crate::contact::case::words::solver::Output;
-use crate::contact::post::zone::Zone;
 use crate::contact::solution::words::{PatchCells, PointFields};
+use crate::contact::solution::zone::Zone;
 
 /// What a picture shows.
 #[derive(Debug, Clone)]

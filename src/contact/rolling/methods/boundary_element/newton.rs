@@ -160,15 +160,7 @@ impl<'a> Newton<'a> {
             } else {
                 GROWTH_ALLOWED * recent.iter().copied().fold(0.0, f64::max)
             };
-            let mut halvings = 0;
-            while report.residual > allowed && halvings < HALVINGS_MAX {
-                halvings += 1;
-                let share = 0.5_f64.powi(halvings as i32);
-                for i in 0..t.len() {
-                    t[i] = before[i] + share * (candidate[i] - before[i]);
-                }
-                report.residual = self.evaluate(law, t, &mut report);
-            }
+            self.halve(law, [&before, &candidate], allowed, t, &mut report);
             report.iterations += 1;
         }
         if !report.converged {
@@ -183,6 +175,26 @@ impl<'a> Newton<'a> {
             candidate,
         };
         Ok(report)
+    }
+
+    /// Halves the step between two iterates until the residual is no more than is allowed, but not too often.
+    fn halve(
+        &mut self,
+        law: &NewtonTask,
+        [before, candidate]: [&[f64]; 2],
+        allowed: f64,
+        t: &mut [f64],
+        report: &mut Convergence,
+    ) {
+        let mut halvings = 0;
+        while report.residual > allowed && halvings < HALVINGS_MAX {
+            halvings += 1;
+            let share = 0.5_f64.powi(halvings as i32);
+            for i in 0..t.len() {
+                t[i] = before[i] + share * (candidate[i] - before[i]);
+            }
+            report.residual = self.evaluate(law, t, report);
+        }
     }
 
     /// The slips `q + M T` of the last evaluated iterate, x then y.

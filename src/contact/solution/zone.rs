@@ -1,4 +1,4 @@
-//! Stick or slip per cell: the names, the areas and the outlines of the zones.
+//! Stick or slip: the words for what a cell does.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;

@@ -1,0 +1,31 @@
+//! A case in the form of which its digest is taken.
+
+use serde::Serialize;
+
+use crate::contact::case::words::contact::{Contact, Load};
+use crate::contact::case::words::motion::{MotionWords, Wheelset};
+use crate::contact::case::words::solver::{MeshSizeWords, MethodName, Output, TractionBoundName};
+use crate::contact::rolling::motion::PrescribedForces;
+
+/// Everything that determines the answer, in a fixed order; name and labels do not.
+#[derive(Serialize)]
+pub(crate) struct Canonical<'a> {
+    pub(crate) solver_version: &'static str,
+    pub(crate) solver_revision: u32,
+    pub(crate) elasticity: [f64; 3],
+    pub(crate) friction: f64,
+    pub(crate) contact: &'a Contact,
+    pub(crate) load: Option<&'a Load>,
+    pub(crate) motions: Vec<MotionWords>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) forces: Option<&'a [PrescribedForces]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) wheelset: Option<&'a Wheelset>,
+    pub(crate) method: MethodName,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) traction_bound: Option<TractionBoundName>,
+    pub(crate) target_error: Option<f64>,
+    pub(crate) mesh: Option<MeshSizeWords>,
+    pub(crate) time_limit_s: Option<f64>,
+    pub(crate) outputs: &'a [Output],
+}
