@@ -8,6 +8,7 @@ use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Monitor;
 use railhead::contact::rolling::methods::method::Method;
 use railhead::contact::solve;
+use railhead::jobs::submit_options::SubmitOptions;
 use railhead::jobs::{FailureKind, JobsError, Options, State};
 use serde_json::json;
 use tokio::sync::mpsc::unbounded_channel;
@@ -231,12 +232,27 @@ async fn a_solver_that_hangs_loses_its_job_but_not_the_worker() {
 
 #[tokio::test]
 async fn a_solver_deaf_to_its_cancellation_is_left_behind() {
+    // When its lease is over, and long before that.
+    for lease in [Duration::from_millis(300), Duration::from_secs(600)] {
+        assert_eq!(end_of_deaf(lease, None).await, State::Cancelled);
+    }
+}
+
+#[tokio::test]
+async fn a_solver_deaf_to_its_deadline_is_left_behind() {
+    let deadline = Some(Duration::from_secs(1));
+    let ended = end_of_deaf(Duration::from_secs(600), deadline).await;
+    assert_eq!(ended, State::Failed);
+}
+
+/// How a job ends whose solver does not listen, at its deadline or else by cancellation; the next one is solved.
+async fn end_of_deaf(lease: Duration, deadline: Option<Duration>) -> State {
     let folder = tempfile::tempdir().unwrap();
     let (started, mut has_started) = unbounded_channel();
     let (release, released) = mpsc::channel::<()>();
     let released = Mutex::new(Some(released));
     let options = Options {
-        lease: Duration::from_millis(300),
+        lease,
         ..Options::new(folder.path())
     };
     let jobs = open(options, move |problem: &Problem, monitor: &dyn Monitor| {
@@ -248,22 +264,27 @@ async fn a_solver_deaf_to_its_cancellation_is_left_behind() {
         solve(problem, monitor)
     })
     .await;
-    let deaf = jobs.submit(case("deaf"), None).await.unwrap().id;
+    let asked = SubmitOptions {
+        ends_within: deadline,
+        ..SubmitOptions::default()
+    };
+    let submitted = jobs.submit_with(case("deaf"), None, asked).await;
+    let deaf = submitted.unwrap().0.id;
     jobs.start().unwrap();
     has_started.recv().await.unwrap();
-    jobs.cancel(deaf).await.unwrap();
+    if deadline.is_none() {
+        jobs.cancel(deaf).await.unwrap();
+    }
     let next = jobs.submit(case("next"), None).await.unwrap().id;
     let at_most = Duration::from_secs(60);
-    assert_eq!(
-        jobs.wait(deaf, at_most).await.unwrap().state,
-        State::Cancelled
-    );
+    let ended = jobs.wait(deaf, at_most).await.unwrap().state;
     assert_eq!(
         jobs.wait(next, at_most).await.unwrap().state,
         State::Succeeded
     );
     drop(release);
     jobs.shutdown(Duration::from_secs(10)).await;
+    ended
 }
 
 #[tokio::test]

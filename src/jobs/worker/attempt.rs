@@ -186,6 +186,16 @@ impl Attempt {
         }
     }
 
+    /// The member that the solver is at, if it was cancelled or its deadline has passed.
+    pub(crate) fn unwanted(&self) -> Option<usize> {
+        self.members.iter().position(|member| {
+            let reason = member.control.reason();
+            matches!(member.phase, Phase::Solving)
+                && member.control.is_taken_up()
+                && matches!(reason, Some(StopReason::Cancel | StopReason::Deadline))
+        })
+    }
+
     /// Was it told to stop, or has its solver ended, while it waited?
     pub(crate) fn is_stopped(&self) -> bool {
         let stopped = |member: &Member| {

@@ -155,7 +155,9 @@ impl Worker {
         let slice = shared.options.slice;
         let mut look = interval(YIELD_CHECK_INTERVAL.min(slice.max(Duration::from_millis(1))));
         look.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        let mut told = None;
+        let mut told: Option<Instant> = None;
+        // The member that nobody wants any more, and since when the solver has been at it all the same.
+        let mut unwanted: Option<(usize, Instant)> = None;
         let mut closed = false;
         let gate = attempt.gate.clone();
         let lost = attempt.lease.lost().clone();
@@ -175,7 +177,12 @@ impl Worker {
                 _ = look.tick() => {
                     shared.turns.charge(&attempt.tenant, charged.elapsed(), spent);
                     charged = Instant::now();
-                    if told.is_some_and(|since| since.elapsed() >= STOP_TIMEOUT) {
+                    unwanted = attempt.unwanted().map(|member| {
+                        let same = unwanted.filter(|(before, _)| *before == member);
+                        same.unwrap_or_else(|| (member, Instant::now()))
+                    });
+                    let mut since = told.into_iter().chain(unwanted.map(|(_, since)| since));
+                    if since.any(|since| since.elapsed() >= STOP_TIMEOUT) {
                         tracing::warn!("the solver does not stop; its thread is left behind");
                         self.leave_behind(attempt.abandon());
                         break Turn::Over;
