@@ -38,6 +38,20 @@ struct Record {
     refused: BTreeMap<u16, usize>,
 }
 
+impl Record {
+    /// What another client has done as well.
+    fn add(&mut self, other: Record) {
+        self.accepted.extend(other.accepted);
+        self.done += other.done;
+        self.requests += other.requests;
+        self.looks.extend(other.looks);
+        self.submits.extend(other.submits);
+        for (status, times) in other.refused {
+            *self.refused.entry(status).or_default() += times;
+        }
+    }
+}
+
 /// Runs the load and says what came of it.
 pub async fn run(workers: usize) -> Vec<Row> {
     let (size, seconds) = size_of(SOLVE_SECONDS);
@@ -49,27 +63,15 @@ pub async fn run(workers: usize) -> Vec<Row> {
     let clients: Vec<_> = (0..CLIENTS)
         .map(|number| tokio::spawn(client(service.url.clone(), number, size, end)))
         .collect();
-    let mut samples = Vec::new();
-    while Instant::now() < end {
-        tokio::time::sleep(SAMPLE).await;
-        samples.push(service.usage());
-    }
+    let samples = usage_until(&service, end).await;
     let mut all = Record::default();
     for client in clients {
-        let record = client.await.expect("a client without errors");
-        all.accepted.extend(record.accepted);
-        all.done += record.done;
-        all.requests += record.requests;
-        all.looks.extend(record.looks);
-        all.submits.extend(record.submits);
-        for (status, times) in record.refused {
-            *all.refused.entry(status).or_default() += times;
-        }
+        all.add(client.await.expect("a client without errors"));
     }
     verify(&service, &all.accepted).await;
     let rate = all.done as f64 / TIME.as_secs_f64();
     let p99 = quantile(all.looks.clone(), 0.99);
-    let mut rows = vec![
+    vec![
         Row::plain(
             "mixed: mesh, time of one bare solve",
             format!("{size} × {size}, {:.1} ms", 1e3 * seconds),
@@ -115,12 +117,18 @@ pub async fn run(workers: usize) -> Vec<Row> {
             "mixed: jobs accepted, lost, doubled, failed",
             format!("{}, 0, 0, 0", all.accepted.len()),
         ),
-    ];
-    rows.push(memory(
-        "mixed: memory at 25, 50, 75, 100 % of the time",
-        &samples,
-    ));
-    rows
+        memory("mixed: memory at 25, 50, 75, 100 % of the time", &samples),
+    ]
+}
+
+/// What the service uses, from time to time.
+async fn usage_until(service: &Service, end: Instant) -> Vec<Usage> {
+    let mut samples = Vec::new();
+    while Instant::now() < end {
+        tokio::time::sleep(SAMPLE).await;
+        samples.push(service.usage());
+    }
+    samples
 }
 
 /// Memory over the time; flat if the last quarter uses at most a tenth more than the second.

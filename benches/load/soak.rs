@@ -9,7 +9,7 @@ use crate::Row;
 use crate::cases::meshed;
 use crate::client::Client;
 use crate::mixed::memory;
-use crate::service::Service;
+use crate::service::{Service, Usage};
 
 const CLIENTS: usize = 64;
 /// Jobs before those that are watched: bounded caches have to be full first.
@@ -40,9 +40,7 @@ pub async fn run(workers: usize, jobs: usize) -> Vec<Row> {
             "{ended} of {jobs} jobs have ended"
         );
         tokio::time::sleep(SAMPLE).await;
-        ended = watch
-            .metric("railhead_jobs_ended_total{state=\"succeeded\"}")
-            .await;
+        ended = jobs_ended(&mut watch, "succeeded").await;
         kept_max = kept_max.max(kept(&mut watch).await);
         if ended >= BEFORE as f64 {
             samples.push(service.usage());
@@ -52,26 +50,13 @@ pub async fn run(workers: usize, jobs: usize) -> Vec<Row> {
     for client in clients {
         client.await.expect("a client without errors");
     }
-    let last = Instant::now();
-    while kept(&mut watch).await > 0.0 {
-        assert!(last.elapsed() < ENDS_WITHIN, "expired jobs are removed");
-        tokio::time::sleep(SAMPLE).await;
-    }
-    // What the log of the table and its free pages take goes back in portions.
-    let mut after = service.usage();
-    while after.stored_mb > 90.0 && last.elapsed() < ENDS_WITHIN {
-        tokio::time::sleep(SAMPLE).await;
-        after = service.usage();
-    }
-    let largest =
-        |of: fn(&crate::service::Usage) -> f64| samples.iter().map(of).fold(0.0, f64::max);
-    let failed = watch
-        .metric("railhead_jobs_ended_total{state=\"failed\"}")
-        .await;
-    assert_eq!(
-        (ended, failed),
-        (jobs as f64, 0.0),
-        "each job succeeded once"
+    let after = emptied(&service, &mut watch).await;
+    let largest = |of: fn(&Usage) -> f64| samples.iter().map(of).fold(0.0, f64::max);
+    let failed = jobs_ended(&mut watch, "failed").await;
+    let ended_all = (ended, failed) == (jobs as f64, 0.0);
+    assert!(
+        ended_all,
+        "of {jobs} jobs {ended} succeeded, {failed} failed"
     );
     vec![
         Row::plain(
@@ -105,6 +90,28 @@ pub async fn run(workers: usize, jobs: usize) -> Vec<Row> {
             largest(|usage| usage.files as f64) <= 10.0 && after.descriptors < 2 * CLIENTS,
         ),
     ]
+}
+
+/// Jobs that have ended in this state.
+async fn jobs_ended(watch: &mut Client, state: &str) -> f64 {
+    let metric = format!("railhead_jobs_ended_total{{state=\"{state}\"}}");
+    watch.metric(&metric).await
+}
+
+/// Waits until the last jobs have expired; what the service uses then.
+async fn emptied(service: &Service, watch: &mut Client) -> Usage {
+    let last = Instant::now();
+    while kept(watch).await > 0.0 {
+        assert!(last.elapsed() < ENDS_WITHIN, "expired jobs are removed");
+        tokio::time::sleep(SAMPLE).await;
+    }
+    // What the log of the table and its free pages take goes back in portions.
+    let mut after = service.usage();
+    while after.stored_mb > 90.0 && last.elapsed() < ENDS_WITHIN {
+        tokio::time::sleep(SAMPLE).await;
+        after = service.usage();
+    }
+    after
 }
 
 /// Jobs in the table, whatever their state.

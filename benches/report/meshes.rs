@@ -128,18 +128,7 @@ pub fn section(cases: &[Value], lu: f64, pictures: &Path) -> String {
     series.push(("CONTACT", contact));
     for class in CLASSES {
         let file = format!("{class}.svg");
-        let plot = Plot {
-            title: format!("{class}: median error against median time"),
-            x: "time of a solve, LU".to_owned(),
-            y: "error".to_owned(),
-            series: series
-                .iter()
-                .map(|(name, runs)| Series {
-                    name: (*name).to_owned(),
-                    points: runs.iter().filter_map(|run| run.point(class, lu)).collect(),
-                })
-                .collect(),
-        };
+        let plot = plot(class, &series, lu);
         std::fs::write(pictures.join(&file), plot.svg()).expect("a picture can be written");
         let _ = writeln!(text, "![{class}](accuracy-and-speed/{file})\n");
     }
@@ -150,6 +139,22 @@ pub fn section(cases: &[Value], lu: f64, pictures: &Path) -> String {
          (`tests/data/README.md`), and include its normal problem; here region and pressure of an ellipse are closed forms.\n\n",
     );
     text
+}
+
+/// Errors of a class of cases against their times, a series for each method.
+fn plot(class: &str, series: &[(&str, Vec<Run>)], lu: f64) -> Plot {
+    Plot {
+        title: format!("{class}: median error against median time"),
+        x: "time of a solve, LU".to_owned(),
+        y: "error".to_owned(),
+        series: series
+            .iter()
+            .map(|(name, runs)| Series {
+                name: (*name).to_owned(),
+                points: runs.iter().filter_map(|run| run.point(class, lu)).collect(),
+            })
+            .collect(),
+    }
 }
 
 fn row(table: &mut String, method: &str, mesh: &str, run: &Run, cases: usize, lu: f64) {

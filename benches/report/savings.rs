@@ -28,9 +28,6 @@ pub fn section(lu: f64) -> String {
         "spin_per_mm": { "from": 0.003, "to": 0.003, "points": 1 },
         "combine": "grid",
     } });
-    let alone: Vec<Value> = (0..51)
-        .map(|k| json!({ "creepage_x": 0.0001 * f64::from(k) }))
-        .collect();
     let mut text = "## What skipping saves\n\nWheel on rail (radii 460 and 300 mm, 100 kN, μ 0.3), target 0.005.\n\n\
                     | case | LU | products | allocations |\n|---|---|---|---|\n"
         .to_owned();
@@ -85,16 +82,24 @@ pub fn section(lu: f64) -> String {
             cost.allocations
         );
     }
-    let costs: Vec<Cost> = alone.iter().map(|m| cost(m, &resultants, 0.3)).collect();
-    let _ = writeln!(
-        text,
-        "| the 51 points one by one | {:.3} | {} | {} |\n",
+    text.push_str(&one_by_one(lu));
+    text.push_str(&one_shape(lu));
+    text
+}
+
+/// The points of the creep curve as cases of their own.
+fn one_by_one(lu: f64) -> String {
+    let resultants = json!(["resultants"]);
+    let costs: Vec<Cost> = (0..51)
+        .map(|k| json!({ "creepage_x": 0.0001 * f64::from(k) }))
+        .map(|motion| cost(&motion, &resultants, 0.3))
+        .collect();
+    format!(
+        "| the 51 points one by one | {:.3} | {} | {} |\n\n",
         costs.iter().map(|c| c.seconds).sum::<f64>() / lu,
         costs.iter().map(|c| c.products).sum::<u32>(),
         costs.iter().map(|c| c.allocations).sum::<u64>()
-    );
-    text.push_str(&one_shape(lu));
-    text
+    )
 }
 
 /// Cases of one shape under many loads and motions, each on its own and with the influence kept.

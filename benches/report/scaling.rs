@@ -84,11 +84,18 @@ pub fn section(lu: f64, pictures: &Path) -> String {
         exponent(|s| s.seconds),
         exponent(|s| s.bytes)
     );
+    let picture = plot(&sizes, lu).svg();
+    std::fs::write(pictures.join("growth.svg"), picture).expect("a picture can be written");
+    text
+}
+
+/// Time and memory against the number of cells.
+fn plot(sizes: &[Size], lu: f64) -> Plot {
     let series = |name: &str, value: fn(&Size) -> f64, unit: f64| Series {
         name: name.to_owned(),
         points: sizes.iter().map(|s| (s.cells, value(s) / unit)).collect(),
     };
-    let plot = Plot {
+    Plot {
         title: "growth with the number of cells".to_owned(),
         x: "cells".to_owned(),
         y: "LU, MB".to_owned(),
@@ -96,7 +103,5 @@ pub fn section(lu: f64, pictures: &Path) -> String {
             series("time, LU", |s| s.seconds, lu),
             series("influence, MB", |s| s.bytes, 1e6),
         ],
-    };
-    std::fs::write(pictures.join("growth.svg"), plot.svg()).expect("a picture can be written");
-    text
+    }
 }

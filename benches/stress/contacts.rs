@@ -140,9 +140,9 @@ fn target(random: &mut Random) -> Value {
     json!({ "target_error": target })
 }
 
-fn case(kind: &str, random: &mut Random) -> Value {
-    let setting = Setting::new(random);
-    let solver = match kind {
+/// How a case of this kind is to be solved.
+fn solver(kind: &str, random: &mut Random) -> Value {
+    match kind {
         "ellipse, huge mesh" => mesh(44, 50),
         "ellipse, few cells" => match random.below(4) {
             0 => mesh(1, 1),
@@ -157,7 +157,12 @@ fn case(kind: &str, random: &mut Random) -> Value {
         "two patches nearly touching" => [mesh(8, 10), target(random)][random.below(2)].clone(),
         kind if kind.ends_with("mesh") => mesh(4 + random.below(14), 4 + random.below(20)),
         _ => target(random),
-    };
+    }
+}
+
+fn case(kind: &str, random: &mut Random) -> Value {
+    let setting = Setting::new(random);
+    let solver = solver(kind, random);
     match kind {
         "radii, target" => {
             let radius = random.decades(0.1, 1e4);

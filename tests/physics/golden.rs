@@ -75,6 +75,28 @@ fn pressures() -> Value {
 
 /// Every contact type and method, with creepage, spin, forces and sweeps.
 pub fn cases() -> Vec<(String, Value)> {
+    let mut cases = made();
+    for name in ["wheel-rail", "wheel-rail-flange"] {
+        let file = format!(
+            "{}/api/examples/{name}.case.json",
+            concat!(env!("CARGO_MANIFEST_DIR"), "/../..")
+        );
+        let text = std::fs::read_to_string(file).expect("an example");
+        let case = serde_json::from_str(&text).expect("an example is JSON");
+        cases.push((name, case));
+    }
+    let owned = |(name, case): (&str, Value)| (name.to_owned(), case);
+    cases.into_iter().map(owned).collect()
+}
+
+/// A solver with its method.
+fn with(method: &str, mut solver: Value) -> Value {
+    solver["method"] = json!(method);
+    solver
+}
+
+/// The cases that are no shipped examples.
+fn made() -> Vec<(&'static str, Value)> {
     let radii = || json!({ "type": "radii", "rolling_mm": 460, "lateral_mm": 300 });
     let ellipse = |a: f64, b: f64| json!({ "type": "ellipse", "a_mm": a, "b_mm": b });
     let along = || json!({ "creepage_x": 0.001 });
@@ -82,13 +104,8 @@ pub fn cases() -> Vec<(String, Value)> {
     let spin = || json!({ "creepage_x": 0.004, "spin_per_mm": 0.004 });
     let target = |t: f64| json!({ "target_error": t });
     let mesh = || json!({ "mesh": { "strips": 12, "cells": 16 } });
-    let with = |method: &str, solver: Value| {
-        let mut solver = solver;
-        solver["method"] = json!(method);
-        solver
-    };
     let sweep = || json!([{ "creepage_x": 0.0005, "spin_per_mm": 0.003 }, { "creepage_x": 0.001, "spin_per_mm": 0.003 }, { "creepage_x": 0.002, "spin_per_mm": 0.003 }]);
-    let mut cases = vec![
+    vec![
         ("radii, creepage", case(radii(), along(), target(0.005))),
         ("radii, all", case(radii(), all(), target(0.005))),
         ("radii, all, 0.001", case(radii(), all(), target(0.001))),
@@ -144,20 +161,7 @@ pub fn cases() -> Vec<(String, Value)> {
         ),
         ("pressure grid", case(pressures(), all(), target(0.01))),
         ("pressure grid, mesh", case(pressures(), all(), mesh())),
-    ];
-    for name in ["wheel-rail", "wheel-rail-flange"] {
-        let file = format!(
-            "{}/api/examples/{name}.case.json",
-            concat!(env!("CARGO_MANIFEST_DIR"), "/../..")
-        );
-        let text = std::fs::read_to_string(file).expect("an example");
-        cases.push((
-            name,
-            serde_json::from_str(&text).expect("an example is JSON"),
-        ));
-    }
-    let owned = |(name, case): (&str, Value)| (name.to_owned(), case);
-    cases.into_iter().map(owned).collect()
+    ]
 }
 
 /// Eight digits of a number.

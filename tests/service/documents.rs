@@ -5,43 +5,47 @@ use serde_json::{Value, json};
 
 use crate::server::{Server, example, example_text};
 
+/// The names in a list, sorted.
+fn words(list: &Value) -> Vec<String> {
+    let mut words: Vec<String> = list
+        .as_array()
+        .expect("a list")
+        .iter()
+        .map(|item| item["name"].as_str().expect("a name").to_owned())
+        .collect();
+    words.sort();
+    words
+}
+
+/// The words that a schema allows, sorted.
+fn enumerated(schema: &Value) -> Vec<String> {
+    let variants = schema["oneOf"]
+        .as_array()
+        .cloned()
+        .unwrap_or_else(|| vec![schema.clone()]);
+    let words = variants.iter().flat_map(|variant| {
+        let tag = if variant["properties"]["type"].is_object() {
+            &variant["properties"]["type"]
+        } else {
+            variant
+        };
+        let word = tag["const"].as_str().map(|word| vec![json!(word)]);
+        word.or_else(|| tag["enum"].as_array().cloned())
+            .unwrap_or_else(|| panic!("no words in {variant}"))
+    });
+    let mut words: Vec<String> = words
+        .map(|word| word.as_str().expect("a word").to_owned())
+        .collect();
+    words.sort();
+    words
+}
+
 #[tokio::test]
 async fn methods_name_every_word_of_the_contract() {
     let server = Server::idle().await;
     let abilities = server.get("/v1/methods").await.json;
     let contract: Value = server.get("/openapi.json").await.json;
     let schemas = &contract["components"]["schemas"];
-    let words = |list: &Value| -> Vec<String> {
-        let mut words: Vec<String> = list
-            .as_array()
-            .expect("a list")
-            .iter()
-            .map(|item| item["name"].as_str().expect("a name").to_owned())
-            .collect();
-        words.sort();
-        words
-    };
-    let enumerated = |schema: &Value| -> Vec<String> {
-        let variants = schema["oneOf"]
-            .as_array()
-            .cloned()
-            .unwrap_or_else(|| vec![schema.clone()]);
-        let words = variants.iter().flat_map(|variant| {
-            let tag = if variant["properties"]["type"].is_object() {
-                &variant["properties"]["type"]
-            } else {
-                variant
-            };
-            let word = tag["const"].as_str().map(|word| vec![json!(word)]);
-            word.or_else(|| tag["enum"].as_array().cloned())
-                .unwrap_or_else(|| panic!("no words in {variant}"))
-        });
-        let mut words: Vec<String> = words
-            .map(|word| word.as_str().expect("a word").to_owned())
-            .collect();
-        words.sort();
-        words
-    };
     assert_eq!(words(&abilities["methods"]), enumerated(&schemas["Method"]));
     assert_eq!(
         words(&abilities["contacts"]),
