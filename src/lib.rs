@@ -16,7 +16,7 @@
 //! 1. [`contact::case`]: [`contact::check`] turns the text into a [`Case`](contact::case::words::question::Case), names every fault at once,
 //!    and makes a [`Problem`](contact::case::problem::Problem) of checked numbers.
 //! 2. [`contact::normal`]: patches and pressures, known in closed form or found from a gap or from profiles
-//!    ([`contact::geometry`]): a [`Footprint`](contact::normal::footprint::Footprint).
+//!    ([`contact::geometry`]): a [`NormalTask`](contact::normal::normal_task::NormalTask) becomes a [`Footprint`](contact::normal::footprint::Footprint).
 //! 3. [`contact::rolling`]: for every motion, [`refinement`](contact::rolling::refinement) makes meshes from coarse to fine
 //!    ([`contact::mesh`]) and takes their operators ([`contact::half_space`]); a [method](contact::rolling::methods) solves each under
 //!    the law of [`friction`](contact::friction) until the estimate of the error meets the target.

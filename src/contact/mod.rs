@@ -1,9 +1,11 @@
 //! What is the physics? Plain synchronous arithmetic: no async, files, environment or printing.
 //!
-//! Units everywhere: mm, N, MPa, rad; creepages are dimensionless, spin is in 1/mm.
+//! A case is [`check`]ed and becomes a [`Problem`](case::problem::Problem); [`solve`] takes its motions slice by slice through the
+//! [`stages`]: footprint, motions from coarse to fine levels, answer. Frame, signs, units and words: [`conventions`].
 
 pub mod answer;
 pub mod case;
+pub mod conventions;
 pub mod coupling;
 pub mod error;
 pub mod friction;
