@@ -40,6 +40,7 @@ const CREEP_LARGE: f64 = 20.0;
 const CREEP_OVER_SPIN: f64 = 3.0;
 /// Powers with which the time grows with the length over the width of a patch beyond this ratio, and with the inverse ratio.
 const SLENDER: f64 = 5.0;
+const RATIO_MAX: f64 = 1e4;
 const LONG_POWER: f64 = 0.7;
 const WIDE_POWER: f64 = 0.25;
 /// The time of a motion within a sweep relative to a single one: a start from the motion before saves work, but not where every
@@ -201,7 +202,11 @@ impl PatchGuess {
         let creepage = unit * motion.creepage_x.hypot(motion.creepage_y);
         let spin = unit * c * motion.spin_per_mm.abs();
         let tractions = Tractions::of(creepage, spin);
-        let ratio = self.half[0] / self.half[1];
+        let ratio = match self.half[0] / self.half[1] {
+            // A load too small to tell a patch.
+            ratio if ratio.is_nan() => 1.0,
+            ratio => ratio.clamp(1.0 / RATIO_MAX, RATIO_MAX),
+        };
         let slender =
             (ratio / SLENDER).max(1.0).powf(LONG_POWER) * (1.0 / ratio).max(1.0).powf(WIDE_POWER);
         (
@@ -357,6 +362,32 @@ mod tests {
         assert_eq!(Tractions::of(1.0, 1.0), Tractions::Spin);
         assert_eq!(Tractions::of(0.0, 1.0), Tractions::Spin);
         assert_eq!(Tractions::of(50.0, 1.0), Tractions::Slide);
+    }
+
+    #[test]
+    fn the_time_of_any_patch_is_a_number() {
+        let elasticity = Elasticity {
+            shear_modulus: 82_000.0,
+            poisson_ratio: 0.28,
+            difference: 0.0,
+        };
+        let motion = Motion {
+            creepage_x: 0.001,
+            creepage_y: 0.0,
+            spin_per_mm: 0.001,
+        };
+        let lengths = [0.0, 1e-300, 1.0, 1e300, f64::INFINITY, f64::NAN];
+        for (a, b) in lengths.iter().flat_map(|a| lengths.map(|b| (*a, b))) {
+            for force in [0.0, 1e-300, 1.0, 1e300, f64::NAN] {
+                let patch = PatchGuess {
+                    half: [a, b],
+                    force,
+                    times: 1.0,
+                };
+                let (_, seconds) = patch.seconds(0.005, &elasticity, 0.3, &motion);
+                assert!(seconds.is_finite(), "{patch:?}: {seconds}");
+            }
+        }
     }
 
     #[test]
