@@ -184,7 +184,7 @@ pub enum SideName {
     Right,
 }
 
-/// A file format a client can name; each is a file of that name beside this one.
+/// A file format of cross-sections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = Format)]
