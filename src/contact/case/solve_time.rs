@@ -68,8 +68,9 @@ const GAP_SMOOTH: f64 = 1.7e-3;
 const GAP_TWO: f64 = 5e-3;
 const GAP_UNEQUAL: f64 = 0.022;
 const GAP_ROUGH: f64 = 0.08;
-/// From so many turns across the contact on two summits differ much, and a line with one or with many is rough.
+/// From so many turns across the contact on two summits differ much, and a line whose teeth are not pressed flat is rough.
 const TURNS_ROUGH: f64 = 12.0;
+const TEETH_ROUGH: f64 = 4e-3;
 /// Time in s to bring a wheel to rest on its rail once, with two grids for every height.
 const WHEEL: f64 = 9e-3;
 /// A relative radius of curvature across a rail, in mm.
@@ -247,9 +248,10 @@ fn guesses(task: &NormalTask, target: Option<f64>) -> (Vec<PatchGuess>, f64) {
 }
 
 fn gap_seconds(outlook: &GapOutlook) -> f64 {
-    let rough = outlook.turns > TURNS_ROUGH;
-    match (outlook.summits, rough) {
-        (1, false) => GAP_SMOOTH,
+    let turns = outlook.turns > TURNS_ROUGH;
+    match (outlook.summits, turns) {
+        (1, true) if outlook.teeth > TEETH_ROUGH => GAP_ROUGH,
+        (1, _) => GAP_SMOOTH,
         (2, false) => GAP_TWO,
         (2, true) => GAP_UNEQUAL,
         _ => GAP_ROUGH,

@@ -25,6 +25,8 @@ pub struct GapOutlook {
     pub summits: usize,
     /// How much the gap turns across rolling, over a parabola, its sharpest bend left out.
     pub turns: f64,
+    /// Mean height of its teeth over the depth, of a saw that bends as much.
+    pub teeth: f64,
 }
 
 impl GapTask {
@@ -60,6 +62,7 @@ impl GapTask {
                 .map(|[low, high]| 0.5 * CONTACT_OVER_BOX * (high - low)),
             depth,
             summits: summits.unwrap_or(1).clamp(1, SUMMITS_MAX),
+            teeth: (all - sharpest) / depth / (4.0 * y.len() as f64),
             turns: (all - sharpest) / depth * y.len() as f64 / TURNS_SMOOTH,
         }
     }

@@ -20,9 +20,9 @@ use crate::contact::normal::gap::tiles_influence::TilesInfluence;
 
 /// More grids than this are not coupled: such a gap is rough, not a few patches of different size.
 const TILES_MAX: usize = 6;
-/// Cells of all grids together. Three patches of like size have 89 × 89 cells each; what wants more is rough, and took up to
-/// 10 s with 60 000 cells, to be told at the end that it is not settled.
-const CELLS_MAX: usize = 25_000;
+/// Cells of all grids together. Three patches of like size have 89 × 89 cells each, a small one beside a large one up to 30 000 in all;
+/// what wants more is rough, and took up to 10 s with 60 000 cells, to be told at the end that it is not settled.
+const CELLS_MAX: usize = 36_000;
 /// Cells along either axis of a grid whose patch is hardly known yet, at least and at most.
 const CELLS_FIRST: [f64; 2] = [24.0, 56.0];
 /// Violation of the contact conditions relative to the deepest overlap. Small patches yield less than large ones: a quarter of
