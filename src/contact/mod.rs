@@ -1,6 +1,6 @@
 //! What is the physics? Plain synchronous arithmetic: no async, files, environment or printing.
 //!
-//! A case is [`check`]ed and becomes a [`Problem`](case::problem::Problem); [`solve`] takes its motions slice by slice through the
+//! A case is [`check`]ed and becomes a [`Problem`]; [`solve`] takes its motions slice by slice through the
 //! [`stages`]: footprint, motions from coarse to fine levels, answer. Frame, signs, units and words: [`conventions`].
 
 pub mod answer;
