@@ -104,18 +104,23 @@ async fn serve(args: &ServeArgs) -> anyhow::Result<ExitCode> {
     };
     tracing::info!(signal = name, "stopping");
     let schedule = Schedule::new(args.drain_delay(name), args.shutdown_grace());
-    schedule.enforce();
+    let code = exit_code(&jobs);
+    schedule.enforce(code);
     signals.end_at_next();
     stop_service(&jobs, schedule, stop, server).await?;
     if let Some(traces) = traces {
         traces.stop().await;
     }
     tracing::info!("stopped");
-    Ok(if jobs.broken().is_cancelled() {
-        ExitCode::from(START_AGAIN)
-    } else {
-        ExitCode::SUCCESS
-    })
+    Ok(ExitCode::from(code.max(exit_code(&jobs))))
+}
+
+/// How a service that stops now ends: in good order, or to be started again.
+fn exit_code(jobs: &Jobs) -> u8 {
+    match jobs.broken().is_cancelled() {
+        true => START_AGAIN,
+        false => 0,
+    }
 }
 
 /// Opens the data folder with the settings of the workers.

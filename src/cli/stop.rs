@@ -53,12 +53,12 @@ impl Schedule {
         }
     }
 
-    /// Ends the process at the last moment, from a thread that needs nothing of the async runtime.
-    pub(super) fn enforce(self) {
+    /// Ends the process with this exit code at the last moment, from a thread that needs nothing of the async runtime.
+    pub(super) fn enforce(self, code: u8) {
         let enforced = std::thread::Builder::new().name("railhead-stop".to_owned());
         let enforced = enforced.spawn(move || {
             std::thread::sleep(self.last_moment.saturating_duration_since(Instant::now()));
-            exit(0);
+            exit(code.into());
         });
         if let Err(error) = enforced {
             tracing::warn!(%error, "the time of the stop is not limited");

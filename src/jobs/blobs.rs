@@ -10,9 +10,11 @@ use std::path::{Path as FilePath, PathBuf};
 use std::sync::Arc;
 
 use bytes::Bytes;
+use futures_util::stream::BoxStream;
+use futures_util::{StreamExt, TryStreamExt};
 use object_store::local::LocalFileSystem;
 use object_store::path::Path;
-use object_store::{ObjectStore, ObjectStoreExt, PutPayload};
+use object_store::{GetOptions, ObjectStore, ObjectStoreExt, PutPayload};
 use uuid::Uuid;
 
 use crate::contact::solution::words::PatchFields;
@@ -99,6 +101,30 @@ impl Blobs {
     pub async fn solution(&self, folder: &str) -> Result<Bytes, JobsError> {
         let path = Path::from(folder).join(SOLUTION);
         Ok(self.objects.get(&path).await?.bytes().await?)
+    }
+
+    /// Size of a stored solution, and its text without the closing brace, read while it is taken.
+    ///
+    /// # Errors
+    /// It cannot be read, or is no object.
+    pub async fn open_solution(
+        &self,
+        folder: &str,
+    ) -> Result<(usize, BoxStream<'static, Result<Bytes, JobsError>>), JobsError> {
+        let path = Path::from(folder).join(SOLUTION);
+        let size = self.objects.head(&path).await?.size;
+        let open = size.saturating_sub(1);
+        let last = self.objects.get_range(&path, open..size).await?;
+        if &*last != b"}" || open == 0 {
+            return Err(JobsError::Damaged(format!("{path} is no object")));
+        }
+        let options = GetOptions {
+            range: Some((0..open).into()),
+            ..GetOptions::default()
+        };
+        let pieces = self.objects.get_opts(&path, options).await?.into_stream();
+        let size = usize::try_from(size).unwrap_or(usize::MAX);
+        Ok((size, pieces.map_err(JobsError::from).boxed()))
     }
 
     /// Size of a stored solution.

@@ -1,6 +1,8 @@
 //! What is kept of a job besides its row: the case, the solution, the fields.
 
 use bytes::Bytes;
+use futures_util::StreamExt;
+use futures_util::stream::{self, BoxStream};
 use uuid::Uuid;
 
 use crate::contact::case::words::solver::Output;
@@ -18,6 +20,20 @@ const LARGE_BYTES: usize = 64 << 10;
 pub struct FetchedResult {
     /// What was computed, as JSON text.
     pub solution: Bytes,
+    /// It was computed for an identical case before.
+    pub cached: bool,
+    /// What the case asked for.
+    pub outputs: Vec<Output>,
+}
+
+/// The answer of a succeeded job, read from where it is stored while it is taken.
+pub struct ResultStream {
+    /// What was computed, as JSON text without the closing brace.
+    pub open_solution: BoxStream<'static, Result<Bytes, JobsError>>,
+    /// Size of the whole text.
+    pub bytes: usize,
+    /// How much of it is in memory already.
+    pub held_bytes: usize,
     /// It was computed for an identical case before.
     pub cached: bool,
     /// What the case asked for.
@@ -94,6 +110,38 @@ impl Jobs {
             solution,
             cached: job.cached,
             outputs: outputs_of(id, &stored)?,
+        })
+    }
+
+    /// As [`Jobs::answer`], read piece by piece: a client that does not take it holds no memory for it.
+    ///
+    /// # Errors
+    /// As [`Jobs::solution`].
+    pub async fn open_answer(&self, id: Uuid) -> Result<ResultStream, JobsError> {
+        let (job, stored) = self.stored(id).await?;
+        let outputs = outputs_of(id, &stored)?;
+        let (bytes, held_bytes, open_solution) = match &stored.result {
+            StoredResult::Blob(key, _) => match self.shared.blobs.open_solution(key).await {
+                Ok((bytes, pieces)) => (bytes, 0, pieces),
+                Err(error) => return Err(self.gone_meanwhile(id, error).await),
+            },
+            StoredResult::Inline(result) => {
+                let text = &result.solution;
+                if !text.ends_with(b"}") {
+                    return Err(JobsError::Damaged(format!(
+                        "the solution of job {id} is no object"
+                    )));
+                }
+                let open = text.slice(..text.len() - 1);
+                (text.len(), text.len(), stream::iter([Ok(open)]).boxed())
+            }
+        };
+        Ok(ResultStream {
+            open_solution,
+            bytes,
+            held_bytes,
+            cached: job.cached,
+            outputs,
         })
     }
 

@@ -22,6 +22,8 @@ mod formats;
 mod fuzzed;
 mod guarded;
 mod guides;
+#[cfg(target_os = "linux")]
+mod held_solver;
 mod keys;
 mod leases;
 mod malformed;

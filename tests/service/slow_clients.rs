@@ -184,6 +184,56 @@ async fn clients_that_read_nothing_cost_little_memory() {
     drop(silent);
 }
 
+#[tokio::test]
+async fn a_large_result_that_nobody_reads_is_not_held_in_memory() {
+    const CLIENTS: usize = 60;
+    let folder = tempfile::tempdir().expect("a folder");
+    let service = Service::start(folder.path(), &["--request-memory-mb", "64"]);
+    // The most motions there may be.
+    let mut case = long_case("large", 10_000);
+    case["solver"]["mesh"] = json!({ "strips": 2, "cells": 2 });
+    let submitted = service.request(Method::POST, "/v1/jobs").json(&case);
+    let submitted = submitted.header("prefer", "wait=60");
+    let answer = submitted.send().await.expect("an answer");
+    let job: Value = answer.json().await.expect("JSON, with the result");
+    let motions = &job["result"]["patches"][0]["points"];
+    assert_eq!(motions.as_array().map(Vec::len), Some(10_000), "{job:.300}");
+    let id = job["id"].as_str().expect("an id");
+    for part in ["result", "resultants", "resultants?format=csv"] {
+        let path = format!("/v1/jobs/{id}/{part}");
+        let read = service.request(Method::GET, &path).send();
+        let whole = read.await.expect("an answer").bytes().await;
+        let whole = whole.expect("a body").len();
+        assert!(whole > 1 << 20, "{part}: {whole} bytes fill no buffer");
+        let before = resident_bytes(service.id());
+        let mut silent = Vec::new();
+        for _ in 0..CLIENTS {
+            let stream = TcpStream::connect(service.address()).await;
+            let mut stream = stream.expect("a connection");
+            let request = format!("GET {path} HTTP/1.1\r\nhost: localhost\r\n\r\n");
+            stream.write_all(request.as_bytes()).await.expect("sent");
+            silent.push(stream);
+        }
+        tokio::time::sleep(Duration::from_secs(2)).await;
+        let grown = resident_bytes(service.id()).saturating_sub(before);
+        // A stored text is read as it is taken. What is cut out of it is held as numbers and counted; the allocator keeps
+        // some of what was freed.
+        let allowed = match part {
+            "result" => CLIENTS << 20,
+            _ => (64 + 64) << 20,
+        };
+        assert!(
+            allowed < CLIENTS * whole,
+            "{part}: {whole} bytes show nothing"
+        );
+        assert!(
+            grown < allowed,
+            "{part}: {grown} bytes, {CLIENTS} times {whole}"
+        );
+        service.submit(&example("spin.case.json")).await;
+    }
+}
+
 /// Resident memory of a process.
 fn resident_bytes(process: u32) -> usize {
     let status = std::fs::read_to_string(format!("/proc/{process}/status")).expect("a process");

@@ -2,14 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use bytes::Bytes;
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::contact::remark::entry::RemarkEntry;
 use crate::http::dto::problem::ProblemBody;
 use crate::http::dto::result::JobResult;
-use crate::http::problem::error::ApiError;
 use crate::jobs::model::{Job, QueuePlace, State as JobState};
 use crate::jobs::submit_options::Priority;
 
@@ -96,24 +94,6 @@ impl JobAnswer {
             error,
             result: None,
         }
-    }
-
-    /// Shows a job, with the text of its result.
-    ///
-    /// # Errors
-    /// It cannot be written as JSON.
-    pub fn text(job: Job, result: Option<&[Bytes]>) -> Result<Vec<u8>, ApiError> {
-        let text = serde_json::to_vec(&JobAnswer::new(job));
-        let mut text = text.map_err(|error| ApiError::internal(&error))?;
-        if let Some(result) = result {
-            text.pop();
-            text.extend_from_slice(b",\"result\":");
-            for piece in result {
-                text.extend_from_slice(piece);
-            }
-            text.push(b'}');
-        }
-        Ok(text)
     }
 }
 

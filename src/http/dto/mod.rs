@@ -5,3 +5,4 @@ pub mod cells;
 pub mod job;
 pub mod problem;
 pub mod result;
+pub mod resultants;

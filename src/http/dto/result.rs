@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use bytes::Bytes;
 use serde::Serialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
@@ -10,7 +9,6 @@ use uuid::Uuid;
 use crate::contact::case::words::solver::Output;
 use crate::contact::solution::words::Solution;
 use crate::http::problem::error::ApiError;
-use crate::jobs::results::FetchedResult;
 
 /// The result of a job: the solution without its fields, and where to get those.
 #[derive(Debug, Serialize, ToSchema)]
@@ -24,23 +22,15 @@ pub struct JobResult {
 }
 
 impl JobResult {
-    /// The text of a result, in pieces: the stored solution as it is, without reading it, and what else is told of it.
+    /// What follows the stored solution, whose closing brace makes way for it.
     ///
     /// # Errors
-    /// The stored solution is no object.
-    pub fn text(id: Uuid, answer: &FetchedResult) -> Result<[Bytes; 2], ApiError> {
-        // An object that is continued: the closing brace makes way.
-        if !answer.solution.ends_with(b"}") {
-            return Err(ApiError::internal(&format!(
-                "the solution of job {id} is no object"
-            )));
-        }
-        let open = answer.solution.slice(..answer.solution.len() - 1);
-        let outputs: Vec<&str> = answer.outputs.iter().copied().map(name_of).collect();
+    /// It cannot be written as JSON.
+    pub fn tail(id: Uuid, cached: bool, outputs: &[Output]) -> Result<String, ApiError> {
+        let outputs: Vec<&str> = outputs.iter().copied().map(name_of).collect();
         let links = serde_json::to_string(&JobResult::links(id, &outputs));
         let links = links.map_err(|error| ApiError::internal(&error))?;
-        let tail = format!(",\"cached\":{},\"links\":{links}}}", answer.cached);
-        Ok([open, Bytes::from(tail)])
+        Ok(format!(",\"cached\":{cached},\"links\":{links}}}"))
     }
 
     /// The links of the result of a job whose case asked for these outputs.

@@ -47,7 +47,11 @@ pub fn lines(table: &Table, rows: Range<usize>) -> Result<Vec<u8>, csv::Error> {
     finish(out)
 }
 
-fn finish(out: csv::Writer<Vec<u8>>) -> Result<Vec<u8>, csv::Error> {
+/// What was written.
+///
+/// # Errors
+/// None that memory does not have.
+pub fn finish(out: csv::Writer<Vec<u8>>) -> Result<Vec<u8>, csv::Error> {
     out.into_inner()
         .map_err(|error| csv::Error::from(error.into_error()))
 }

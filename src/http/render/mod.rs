@@ -4,5 +4,6 @@ pub mod csv;
 pub mod npz;
 pub mod picture;
 pub mod pieces;
+pub mod resultants;
 pub mod table;
 pub mod vtk;

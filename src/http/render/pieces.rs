@@ -52,8 +52,8 @@ pub fn json_body(table: Table, patch: usize, point: usize) -> Body {
     body(texts)
 }
 
-/// The texts, gathered into pieces.
-fn body<E>(mut texts: impl Iterator<Item = Result<Vec<u8>, E>> + Send + 'static) -> Body
+/// The texts, gathered into pieces; each is made when the client has taken those before it.
+pub fn body<E>(mut texts: impl Iterator<Item = Result<Vec<u8>, E>> + Send + 'static) -> Body
 where
     E: std::error::Error + Send + Sync + 'static,
 {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use axum::body::Bytes;
+use axum::body::Body;
 use axum::extract::State;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
@@ -22,11 +22,12 @@ use crate::http::extract::submit_options::SubmitQuery;
 use crate::http::limits::concurrency::ConcurrencyLimits;
 use crate::http::limits::holding_body::{HeldShares, hold_while_sent};
 use crate::http::limits::memory::Memory;
+use crate::http::limits::shares::Share;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 use crate::http::routes::results::result_text;
-use crate::jobs::model::State as JobState;
-use crate::jobs::{Filter, PAGE_MAX};
+use crate::jobs::model::{Job, State as JobState};
+use crate::jobs::{Filter, Jobs, PAGE_MAX};
 
 /// Longest time that `Prefer: wait` holds a request, in s.
 pub const WAIT_MAX_SECONDS: u32 = 60;
@@ -107,7 +108,6 @@ pub async fn submit(
     let (mut job, replayed) = jobs.submit_with(value, key, options).await?;
     drop(room);
     let location = format!("/v1/jobs/{}", job.id);
-    let mut result = None;
     if let Some(seconds) = wait {
         // From here on the request only waits, which is counted apart.
         held.release();
@@ -116,13 +116,6 @@ pub async fn submit(
             Ok(later) => job = later,
             Err(reason) => tracing::debug!(%reason, job = %job.id, "the wait ended early"),
         }
-        if job.state == JobState::Succeeded {
-            // The same holds for a result that cannot be read.
-            match result_text(&jobs, &memory, job.id).await {
-                Ok(found) => result = Some(found),
-                Err(error) => tracing::error!(?error, job = %job.id, "a result cannot be read"),
-            }
-        }
     }
     let in_time = wait.is_some() && job.state.ended();
     let status = if in_time {
@@ -130,14 +123,14 @@ pub async fn submit(
     } else {
         StatusCode::ACCEPTED
     };
-    let (pieces, share) = result.unzip();
+    let with_result = wait.is_some() && job.state == JobState::Succeeded;
+    let (body, share) = job_text(&jobs, &memory, job, with_result).await?;
     let head = [
         (header::LOCATION, location.as_str()),
         (header::CONTENT_TYPE, Format::Json.media_type()),
     ];
-    let text = JobAnswer::text(job, pieces.as_ref().map(<[Bytes; 2]>::as_slice))?;
-    let response = (status, head, text).into_response();
-    let mut response = hold_while_sent(response, share.flatten());
+    let response = (status, head, body).into_response();
+    let mut response = hold_while_sent(response, share);
     if !in_time {
         response
             .headers_mut()
@@ -150,6 +143,26 @@ pub async fn submit(
     }
     mark_replay(&mut response, replayed);
     Ok(response)
+}
+
+/// A job as JSON, with its result if that is wanted and can be read, and the memory for what is held of it.
+async fn job_text(
+    jobs: &Jobs,
+    memory: &Memory,
+    job: Job,
+    with_result: bool,
+) -> Result<(Body, Option<Share>), ApiError> {
+    let id = job.id;
+    let text = serde_json::to_string(&JobAnswer::new(job));
+    let text = text.map_err(|error| ApiError::internal(&error))?;
+    if with_result && let Some(open) = text.strip_suffix('}') {
+        // A client that submitted a job must learn its id, whatever became of the result.
+        match result_text(jobs, memory, id, [&format!("{open},\"result\":"), "}"]).await {
+            Ok(answer) => return Ok(answer),
+            Err(error) => tracing::error!(?error, job = %id, "a result cannot be read"),
+        }
+    }
+    Ok((Body::from(text), None))
 }
 
 /// Says that a response is about what an earlier request with the same idempotency key made.

@@ -1,12 +1,10 @@
 //! `/v1/jobs/{id}/result`: everything small about the answer of a job.
 
-use std::convert::Infallible;
-
 use axum::body::{Body, Bytes};
 use axum::extract::State;
 use axum::http::{HeaderMap, Uri, header};
 use axum::response::{IntoResponse, Response};
-use futures_util::stream;
+use futures_util::{StreamExt, TryStreamExt, stream};
 use uuid::Uuid;
 
 use crate::http::dto::result::JobResult;
@@ -46,20 +44,16 @@ pub async fn result(
         Known::Unchanged(answer) => return Ok(answer),
         Known::Tag(tag) => tag,
     };
-    let (pieces, share) = result_text(&jobs, &memory, id).await?;
+    let (body, share) = result_text(&jobs, &memory, id, ["", ""]).await?;
     let head = [(header::CONTENT_TYPE, Format::Json.media_type())];
-    let size: usize = pieces.iter().map(Bytes::len).sum();
-    let body = match size <= SMALL_BYTES {
-        true => Body::from(pieces.concat()),
-        false => Body::from_stream(stream::iter(pieces.map(Ok::<_, Infallible>))),
-    };
     Ok(tagged(
         &tag,
         hold_while_sent((head, body).into_response(), share),
     ))
 }
 
-/// The text of the result of a succeeded job in two pieces, and the memory for it.
+/// The text of the result of a succeeded job between two other texts, and the memory for what is held of it. A large result is
+/// read from where it is stored while the client takes it.
 ///
 /// # Errors
 /// The job is unknown, has not ended or has no result; or there is no memory.
@@ -67,11 +61,22 @@ pub async fn result_text(
     jobs: &Jobs,
     memory: &Memory,
     id: Uuid,
-) -> Result<([Bytes; 2], Option<Share>), ApiError> {
-    let mut share = memory.ready_answer(jobs.tenant(), jobs.answer_bytes(id).await?)?;
-    let pieces = JobResult::text(id, &jobs.answer(id).await?)?;
-    if let Some(share) = &mut share {
-        share.keep(pieces.iter().map(Bytes::len).sum());
-    }
-    Ok((pieces, share))
+    around: [&str; 2],
+) -> Result<(Body, Option<Share>), ApiError> {
+    let answer = jobs.open_answer(id).await?;
+    let share = memory.ready_answer(jobs.tenant(), answer.held_bytes)?;
+    let tail = JobResult::tail(id, answer.cached, &answer.outputs)?;
+    let [before, behind] = around;
+    let before = Bytes::from(before.to_owned());
+    let behind = Bytes::from(tail + behind);
+    let pieces = stream::iter([Ok(before)])
+        .chain(answer.open_solution)
+        .chain(stream::iter([Ok(behind)]));
+    let body = if answer.bytes <= SMALL_BYTES {
+        let pieces: Vec<Bytes> = pieces.try_collect().await?;
+        Body::from(pieces.concat())
+    } else {
+        Body::from_stream(pieces)
+    };
+    Ok((body, share))
 }

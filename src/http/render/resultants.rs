@@ -1,0 +1,248 @@
+//! Forces and moments as JSON and as a table, piece by piece as the client takes them.
+
+use std::ops::Range;
+
+use axum::body::Body;
+use serde::Serialize;
+
+use crate::contact::solution::words::{ErrorEstimate, Total};
+use crate::http::dto::resultants::{PatchResultants, PointResultants, Resultants, Sum};
+use crate::http::render::csv::{finish, number};
+use crate::http::render::pieces::body;
+
+/// Motions written at once.
+const POINTS: usize = 64;
+
+/// A part of the text.
+enum Part {
+    Text(String),
+    /// Motions of the patch at this place.
+    Points(usize, Range<usize>),
+    /// Sums over the patches.
+    Total(Range<usize>),
+}
+
+/// The JSON that [`Resultants`] is as a whole.
+///
+/// # Errors
+/// The origin cannot be written.
+pub fn json_body(resultants: Resultants) -> Result<Body, serde_json::Error> {
+    let mut parts = Vec::new();
+    for (place, patch) in resultants.patches.iter().enumerate() {
+        let before = if place == 0 { "{\"patches\":[" } else { "]}," };
+        let load = serde_json::to_string(&patch.normal_force_n)?;
+        let number = patch.patch;
+        parts.push(Part::Text(format!(
+            "{before}{{\"patch\":{number},\"normal_force_n\":{load},\"points\":["
+        )));
+        parts.extend(ranges(patch.points.len()).map(|range| Part::Points(place, range)));
+    }
+    let open = if resultants.patches.is_empty() {
+        "{\"patches\":["
+    } else {
+        "]}"
+    };
+    parts.push(Part::Text(format!("{open}],\"total\":[")));
+    parts.extend(ranges(resultants.total.len()).map(Part::Total));
+    let origin = serde_json::to_string(&resultants.origin)?;
+    parts.push(Part::Text(format!("],\"origin\":{origin}}}")));
+    Ok(body(parts.into_iter().map(move |part| match part {
+        Part::Text(text) => Ok(text.into_bytes()),
+        Part::Points(patch, range) => values(&resultants.patches[patch].points, range),
+        Part::Total(range) => values(&resultants.total, range),
+    })))
+}
+
+/// One line per patch and motion, then one per motion with the sums over all patches.
+pub fn csv_body(resultants: Resultants, sums: Vec<Sum>) -> Body {
+    let head = line(CSV_COLUMNS);
+    let mut parts = Vec::new();
+    for (place, patch) in resultants.patches.iter().enumerate() {
+        parts.extend(ranges(patch.points.len()).map(|range| Part::Points(place, range)));
+    }
+    parts.extend(ranges(resultants.total.len()).map(Part::Total));
+    let lines = parts.into_iter().map(move |part| match part {
+        Part::Text(text) => Ok(text.into_bytes()),
+        Part::Points(patch, range) => patch_lines(&resultants.patches[patch], range),
+        Part::Total(range) => total_lines(&resultants, &sums, range),
+    });
+    body(std::iter::once(head).chain(lines))
+}
+
+fn ranges(count: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..count)
+        .step_by(POINTS)
+        .map(move |start| start..(start + POINTS).min(count))
+}
+
+/// Some elements of an array, with a comma before them unless they are the first.
+fn values<T: Serialize>(all: &[T], range: Range<usize>) -> Result<Vec<u8>, serde_json::Error> {
+    let first = range.start == 0;
+    let mut text = serde_json::to_vec(&all[range])?;
+    // The bracket before the elements makes way for the comma, that behind them for what follows.
+    text.pop();
+    match first {
+        true => drop(text.drain(..1)),
+        false => text[0] = b',',
+    }
+    Ok(text)
+}
+
+const CSV_COLUMNS: [&str; 15] = [
+    "patch",
+    "point",
+    "creepage_x",
+    "creepage_y",
+    "spin_per_mm",
+    "normal_force_n",
+    "force_x_n",
+    "force_y_n",
+    "moment_z_n_mm",
+    "error_force_x_n",
+    "error_force_y_n",
+    "error_moment_z_n_mm",
+    "friction_power_n",
+    "friction_power_without_spin_n",
+    "saturated",
+];
+
+fn patch_lines(patch: &PatchResultants, range: Range<usize>) -> Result<Vec<u8>, csv::Error> {
+    let mut out = csv::Writer::from_writer(Vec::new());
+    let number = patch.patch.to_string();
+    for point in &patch.points[range] {
+        let (sum, total) = as_total(patch.normal_force_n, point);
+        out.write_record(csv_line(&number, point.point, &sum, &total))?;
+    }
+    finish(out)
+}
+
+/// A patch for one motion in the words of a sum over patches.
+fn as_total(normal_force_n: f64, point: &PointResultants) -> (Sum, Total) {
+    let sum = Sum {
+        motion: point.motion,
+        normal_force_n,
+        friction_power_n: point.friction_power_n,
+        friction_power_without_spin_n: point.friction_power_without_spin_n,
+        saturated: point.saturated,
+    };
+    let total = Total {
+        force_x_n: point.force_x_n,
+        force_y_n: point.force_y_n,
+        force_z_n: None,
+        moment_z_n_mm: point.moment_z_n_mm,
+        error_estimate: point.error_estimate,
+        profile_uncertainty: point.profile_uncertainty.as_deref().copied(),
+    };
+    (sum, total)
+}
+
+fn total_lines(
+    resultants: &Resultants,
+    sums: &[Sum],
+    range: Range<usize>,
+) -> Result<Vec<u8>, csv::Error> {
+    let mut out = csv::Writer::from_writer(Vec::new());
+    // The numbers of the motions are those of any patch.
+    let points = resultants.patches.first().map(|patch| &patch.points[..]);
+    for place in range {
+        let point = points.and_then(|points| points.get(place));
+        if let Some((point, sum)) =
+            point.and_then(|point| Some((point.point, sums.get(point.point)?)))
+        {
+            out.write_record(csv_line("total", point, sum, &resultants.total[place]))?;
+        }
+    }
+    finish(out)
+}
+
+fn line<const N: usize>(fields: [&str; N]) -> Result<Vec<u8>, csv::Error> {
+    let mut out = csv::Writer::from_writer(Vec::new());
+    out.write_record(fields)?;
+    finish(out)
+}
+
+fn csv_line(patch: &str, point: usize, sum: &Sum, total: &Total) -> [String; 15] {
+    let estimate = |value: fn(&ErrorEstimate) -> f64| {
+        total
+            .error_estimate
+            .as_ref()
+            .map_or_else(String::new, |errors| number(value(errors)))
+    };
+    [
+        patch.to_owned(),
+        point.to_string(),
+        number(sum.motion.creepage_x),
+        number(sum.motion.creepage_y),
+        number(sum.motion.spin_per_mm),
+        number(sum.normal_force_n),
+        number(total.force_x_n),
+        number(total.force_y_n),
+        number(total.moment_z_n_mm),
+        estimate(|errors| errors.force_x_n),
+        estimate(|errors| errors.force_y_n),
+        estimate(|errors| errors.moment_z_n_mm),
+        number(sum.friction_power_n),
+        number(sum.friction_power_without_spin_n),
+        sum.saturated.to_string(),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use http_body_util::BodyExt;
+    use serde_json::Value;
+
+    use super::*;
+    use crate::contact::case::words::motion::MotionWords;
+    use crate::contact::solution::words::Origin;
+
+    fn resultants(patches: usize, points: usize) -> Resultants {
+        let point = |point: usize| PointResultants {
+            point,
+            motion: MotionWords::default(),
+            force_x_n: 1.0 / (1 + point) as f64,
+            force_y_n: -0.1,
+            moment_z_n_mm: 1e-300,
+            error_estimate: None,
+            profile_uncertainty: None,
+            friction_power_n: 0.0,
+            friction_power_without_spin_n: 0.0,
+            saturated: false,
+        };
+        let points: Vec<_> = (0..points).map(point).collect();
+        let total = points.iter().map(|point| as_total(1.0, point).1).collect();
+        let patch = |patch: usize| PatchResultants {
+            patch,
+            normal_force_n: 0.1 + patch as f64,
+            points: (0..points.len()).map(point).collect(),
+        };
+        Resultants {
+            patches: (0..patches).map(patch).collect(),
+            total,
+            origin: Origin {
+                x_mm: 0.0,
+                y_mm: 0.1,
+                meaning: "a \"point\"".to_owned(),
+            },
+        }
+    }
+
+    async fn text(body: Body) -> String {
+        let bytes = body.collect().await.unwrap().to_bytes();
+        String::from_utf8(bytes.to_vec()).unwrap()
+    }
+
+    #[tokio::test]
+    async fn the_pieces_together_are_the_whole() {
+        for (patches, points) in [(0, 0), (1, 1), (2, POINTS), (3, 2 * POINTS + 1)] {
+            let whole = serde_json::to_value(resultants(patches, points)).unwrap();
+            let pieces = text(json_body(resultants(patches, points)).unwrap()).await;
+            assert_eq!(serde_json::from_str::<Value>(&pieces).unwrap(), whole);
+            let sum = as_total(1.0, &resultants(1, 1).patches[0].points[0]).0;
+            let table = csv_body(resultants(patches, points), vec![sum; points]);
+            let lines = text(table).await.lines().count();
+            let totals = if patches == 0 { 0 } else { points };
+            assert_eq!(lines, 1 + patches * points + totals);
+        }
+    }
+}

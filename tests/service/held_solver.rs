@@ -1,0 +1,66 @@
+//! The real program when one of its solver threads stops listening: the thread is held from outside, as a debugger does.
+
+use std::path::PathBuf;
+use std::sync::mpsc;
+
+use nix::sys::ptrace::{self, Options};
+use nix::sys::wait::{WaitPidFlag, waitpid};
+use nix::unistd::Pid;
+use reqwest::Method;
+
+use crate::support::{Service, endless_case};
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_process_with_more_deaf_solvers_than_allowed_ends_to_be_started_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let flags = ["--workers", "1", "--abandoned-max", "0"];
+    let service = Service::start(folder.path(), &flags);
+    let id = service.submit(&endless_case("deaf")).await;
+    service.until(&id, "running").await;
+    let holder = hold(service.id(), "solver-0");
+    let cancel = service.request(Method::POST, &format!("/v1/jobs/{id}/cancel"));
+    assert!(cancel.send().await.unwrap().status().is_success());
+    let ended = tokio::task::spawn_blocking(move || service.wait());
+    let ended = ended.await.unwrap();
+    holder.join().unwrap();
+    assert_eq!(ended.code(), Some(75), "{ended}");
+
+    // Nothing is left to be repaired, and the port is served again.
+    let service = Service::start(folder.path(), &flags);
+    service.until(&id, "cancelled").await;
+}
+
+/// Holds one thread of a process until the process ends; returns once the thread stands still.
+fn hold(process: u32, name: &str) -> std::thread::JoinHandle<()> {
+    let thread = thread_named(process, name);
+    let (held, is_held) = mpsc::channel();
+    // A thread is held by the one that took it, and let go when that one ends.
+    let holder = std::thread::spawn(move || {
+        ptrace::seize(thread, Options::empty()).expect("a thread that may be traced");
+        ptrace::interrupt(thread).expect("a thread that is traced");
+        let all = Some(WaitPidFlag::__WALL);
+        waitpid(thread, all).expect("a thread that stands still");
+        held.send(()).expect("a test that waits");
+        // The end of the thread, without which that of its process is not told.
+        while waitpid(thread, all).is_ok_and(|status| status.pid().is_some() && !ended(status)) {}
+    });
+    is_held.recv().expect("a thread that is held");
+    holder
+}
+
+fn ended(status: nix::sys::wait::WaitStatus) -> bool {
+    use nix::sys::wait::WaitStatus::{Exited, Signaled};
+    matches!(status, Exited(..) | Signaled(..))
+}
+
+fn thread_named(process: u32, name: &str) -> Pid {
+    let folder = PathBuf::from(format!("/proc/{process}/task"));
+    let threads = std::fs::read_dir(folder).expect("a process");
+    let mut threads = threads.map(|thread| thread.expect("a thread").path());
+    let found = threads.find(|thread| {
+        std::fs::read_to_string(thread.join("comm")).is_ok_and(|text| text.trim_end() == name)
+    });
+    let found = found.unwrap_or_else(|| panic!("no thread is called {name}"));
+    let id = found.file_name().and_then(|id| id.to_str()).expect("an id");
+    Pid::from_raw(id.parse().expect("a number"))
+}
