@@ -9,11 +9,10 @@ use std::time::Instant;
 use bytes::Bytes;
 use railhead::jobs::State;
 use railhead::jobs::store::Store;
+use railhead::jobs::store::claim::{ClaimKind, ClaimRequest, ReleaseReason};
 use railhead::jobs::store::list::Filter;
 use railhead::jobs::store::sqlite::database::SqliteStore;
-use railhead::jobs::store::types::{
-    ClaimKind, ClaimRequest, NewBatch, NewJob, QueueBounds, ReleaseReason,
-};
+use railhead::jobs::store::submission::{NewBatch, NewJob, QueueBounds};
 use railhead::jobs::submit_options::SubmitOptions;
 use uuid::Uuid;
 

@@ -7,6 +7,7 @@ use std::path::Path;
 
 use crate::jobs::error::JobsError;
 use crate::jobs::maintenance::disk_reserve::make_private_folder;
+use crate::jobs::store::open::table_file;
 use crate::jobs::store::sqlite::database::SqliteStore;
 
 /// Copies the jobs and their results into a new folder, from which a service can be started.
@@ -21,11 +22,11 @@ pub async fn backup(data_dir: &Path, to: &Path) -> Result<(), JobsError> {
         path: path.to_owned(),
         source,
     };
-    let table = data_dir.join("jobs.db");
+    let table = table_file(data_dir);
     let store = SqliteStore::open_existing(&table).await?;
     let made = DirBuilder::new().mode(0o700).create(to);
     made.map_err(|source| failed(to, source))?;
-    let copied = store.copy_into(&to.join("jobs.db")).await;
+    let copied = store.copy_into(&table_file(to)).await;
     store.close().await;
     copied?;
     let (from, to) = (data_dir.join("results"), to.join("results"));

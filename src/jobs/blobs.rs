@@ -21,7 +21,7 @@ use crate::contact::solution::words::PatchFields;
 use crate::jobs::codec::fields::{Header, PREFIX_BYTES, header_length};
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::error::JobsError;
-use crate::jobs::store::types::Claim;
+use crate::jobs::store::claim::Claim;
 
 /// The folder of the data folder in which results lie.
 pub(crate) const ROOT: &str = "results";

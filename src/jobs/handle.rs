@@ -15,7 +15,7 @@ use crate::jobs::options::Options;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::list::{Filter, Page};
-use crate::jobs::store::types::Deleted;
+use crate::jobs::store::retention::Deleted;
 use crate::jobs::worker::attempt_control::StopReason;
 
 /// Longest list page.

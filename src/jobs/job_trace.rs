@@ -12,7 +12,7 @@ use uuid::Uuid;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::created_at;
 use crate::jobs::shared::Shared;
-use crate::jobs::store::types::Claim;
+use crate::jobs::store::claim::Claim;
 use crate::jobs::trace::{SubmitSpan, TRACEPARENT, Tracer};
 use crate::jobs::worker::outcome::Outcome;
 

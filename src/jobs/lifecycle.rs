@@ -29,13 +29,10 @@ use crate::jobs::options::Options;
 use crate::jobs::quota::StagedBytes;
 use crate::jobs::recent_reads::RecentReads;
 use crate::jobs::shared::Shared;
-use crate::jobs::store::sqlite::database::SqliteStore;
+use crate::jobs::store::open::{note_closed, open_for_service};
 use crate::jobs::worker::fair_turns::FairTurns;
 use crate::jobs::worker::pool::Worker;
 use crate::jobs::worker::running::RunningAttempts;
-
-/// The file that says that the job table was closed in good order.
-const CLOSED: &str = "closed";
 
 /// How long a shutdown waits for workers that were told to stop.
 const STOPPED_WITHIN: Duration = Duration::from_secs(10);
@@ -57,23 +54,7 @@ impl Jobs {
     /// As [`Jobs::open`].
     pub async fn open_with(options: Options, engine: Engine) -> Result<Jobs, JobsError> {
         let lock = lock(&options.data_dir)?;
-        let table = options.data_dir.join("jobs.db");
-        // After an end that closed the table there is nothing to be checked.
-        let closed = std::fs::remove_file(options.data_dir.join(CLOSED)).is_ok();
-        let unclean = !closed && table.exists();
-        let store = match SqliteStore::open(&table).await {
-            Err(error)
-                if error.storage_fault().is_some()
-                    && disk_reserve::give_back(&options.data_dir) =>
-            {
-                tracing::warn!(%error, "the job table is opened on the reserve");
-                SqliteStore::open(&table).await?
-            }
-            opened => opened?,
-        };
-        if unclean {
-            store.check().await?;
-        }
+        let store = open_for_service(&options.data_dir).await?;
         let blobs = Blobs::open(&options.data_dir)?;
         let unfinished_batches = UnfinishedBatches {
             abandoned: store.unfinished_batches().await?.into_iter().collect(),
@@ -85,7 +66,7 @@ impl Jobs {
             shared: Arc::new(Shared {
                 options,
                 engine,
-                store: Arc::new(store),
+                store,
                 blobs,
                 wake: Notify::new(),
                 ended,
@@ -187,16 +168,7 @@ impl Jobs {
             }
         }
         self.shared.store.close().await;
-        let closed = self.shared.options.data_dir.join(CLOSED);
-        let marked = File::options()
-            .create(true)
-            .truncate(true)
-            .write(true)
-            .mode(0o600)
-            .open(closed);
-        if let Err(error) = marked {
-            tracing::debug!(%error, "the next start will check the job table");
-        }
+        note_closed(&self.shared.options.data_dir);
         drop(
             self.shared
                 .lock

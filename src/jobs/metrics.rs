@@ -12,7 +12,7 @@ use prometheus_client::registry::Registry;
 use crate::contact::case::words::solver::MethodName;
 use crate::contact::solution::words::Solution;
 use crate::jobs::model::{FailureKind, State};
-use crate::jobs::store::types::Ending;
+use crate::jobs::store::ending::Ending;
 
 /// Upper bounds of solve times in s.
 const SOLVE_SECONDS: [f64; 14] = [

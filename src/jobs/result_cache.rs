@@ -6,7 +6,7 @@ use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::State;
 use crate::jobs::shared::Shared;
-use crate::jobs::store::types::{CacheKey, NewJob};
+use crate::jobs::store::submission::{CacheKey, NewJob};
 
 impl Jobs {
     /// The key of a case with this digest; `None` if results are not to be used again.

@@ -10,7 +10,7 @@ use crate::contact::solution::words::{PatchFields, Solution};
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::Job;
-use crate::jobs::store::types::{ResultRef, StoredResult};
+use crate::jobs::store::ending::{ResultRef, StoredResult};
 
 /// Solutions from this size on are read off the threads that answer requests.
 const LARGE_BYTES: usize = 64 << 10;

@@ -13,7 +13,7 @@ use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::idempotency;
 use crate::jobs::model::{Job, created_at};
-use crate::jobs::store::types::{Enqueued, NewJob, QueueBounds, Refusal};
+use crate::jobs::store::submission::{Enqueued, NewJob, QueueBounds, Refusal};
 use crate::jobs::submit_options::SubmitOptions;
 
 impl Jobs {

@@ -8,11 +8,11 @@ use railhead::jobs::Options;
 use reqwest::Method;
 use serde_json::{Value, json};
 
-use railhead::jobs::store::types::QueueBounds;
+use railhead::jobs::store::submission::QueueBounds;
 
 use crate::errors::assert_problem;
 use crate::server::{Answer, Server, Setup};
-use crate::store::open_sqlite;
+use crate::store::open_beside;
 use crate::support::{Service, case, endless_case, open, pause, tick_forever};
 
 pub fn lines(cases: &[Value]) -> String {
@@ -367,9 +367,9 @@ async fn a_batch_outlives_two_kills_and_every_case_is_answered_once() {
 
 #[tokio::test]
 async fn an_incomplete_batch_is_gone_after_a_restart() {
-    use railhead::jobs::store::types::{BatchBegun, NewBatch};
+    use railhead::jobs::store::submission::{BatchBegun, NewBatch};
     let folder = tempfile::tempdir().unwrap();
-    let store = open_sqlite(&folder.path().join("jobs.db")).await;
+    let store = open_beside(folder.path()).await;
     let new = NewBatch {
         id: uuid::Uuid::now_v7(),
         tenant: "anonymous".into(),

@@ -53,6 +53,7 @@ mod store_lists;
 mod store_model;
 mod store_moves;
 mod store_slices;
+mod store_turns;
 mod support;
 mod sweeps;
 mod traces;

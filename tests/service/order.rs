@@ -7,49 +7,15 @@ use std::time::Duration;
 use railhead::contact;
 use railhead::jobs::State;
 use railhead::jobs::clock::Clock;
-use railhead::jobs::store::types::NewJob;
-use railhead::jobs::submit_options::{Priority, SubmitOptions};
 use reqwest::{Method, RequestBuilder};
 use serde_json::{Value, json};
 
 use crate::batches::small;
 use crate::errors::assert_problem;
 use crate::server::{Server, Setup};
-use crate::store::{StoreKind, Table, new_job};
 use crate::support::{case, pause, tick_forever};
 
 const DAY_MS: i64 = 24 * 3600 * 1000;
-
-fn wishing(tenant: &str, priority: Priority) -> NewJob {
-    NewJob {
-        tenant: tenant.into(),
-        options: SubmitOptions {
-            priority,
-            ..SubmitOptions::default()
-        },
-        ..new_job()
-    }
-}
-
-#[tokio::test]
-async fn jobs_are_claimed_by_priority_and_then_by_age() {
-    let table = Table::new(StoreKind::Sqlite).await;
-    let mut added = Vec::new();
-    for priority in [
-        Priority::Low,
-        Priority::Normal,
-        Priority::High,
-        Priority::Normal,
-        Priority::High,
-    ] {
-        added.push(table.add(wishing("t", priority)).await.id);
-    }
-    let mut claimed = Vec::new();
-    while let Some(claim) = table.claim(0).await {
-        claimed.push(claim.id);
-    }
-    assert_eq!(claimed, [2, 4, 1, 3, 0].map(|place: usize| added[place]));
-}
 
 /// A clock that a test turns.
 fn turned() -> (Clock, Arc<AtomicI64>) {

@@ -7,16 +7,16 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use railhead::jobs::clock::Clock;
-use railhead::jobs::store::types::NewJob;
+use railhead::jobs::store::submission::NewJob;
 use railhead::jobs::{Jobs, JobsError, Options};
 use serde_json::{Value, json};
 
-use railhead::jobs::store::types::QueueBounds;
+use railhead::jobs::store::submission::QueueBounds;
 
 use crate::errors::assert_problem;
 use crate::results::path_of;
 use crate::server::{Server, Setup};
-use crate::store::open_sqlite;
+use crate::store::open_beside;
 use crate::store::{claim_up_to, finish_one, new_job, success};
 use crate::support::{case, endless_case, pause};
 
@@ -198,7 +198,7 @@ async fn the_database_shrinks_when_its_jobs_go() {
     const CASE_BYTES: usize = 400 << 10;
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("jobs.db");
-    let store = open_sqlite(&file).await;
+    let store = open_beside(folder.path()).await;
     for _ in 0..JOBS {
         let body = Bytes::from(vec![b' '; CASE_BYTES]);
         let new = NewJob { body, ..new_job() };

@@ -12,7 +12,7 @@ use sqlx::Connection;
 use tokio::sync::mpsc::unbounded_channel;
 
 use crate::store::claim_up_to;
-use crate::store::open_sqlite;
+use crate::store::open_beside;
 use crate::support::{Service, case, endless_case, jobs_with, long_case, open, pause};
 
 #[tokio::test]
@@ -104,7 +104,7 @@ async fn a_job_that_kills_every_process_fails_in_the_end() {
     jobs.shutdown(Duration::ZERO).await;
     for attempt in 1..=3 {
         // A process that claims the job and dies: nothing after the claim reaches the table.
-        let store = open_sqlite(&folder.path().join("jobs.db")).await;
+        let store = open_beside(folder.path()).await;
         assert_eq!(
             claim_up_to(&*store, 0, i64::MAX / 2, 1)
                 .await

@@ -11,11 +11,9 @@ use bytes::Bytes;
 use railhead::contact::remark::entry::RemarkEntry;
 use railhead::contact::remark::list::Remark;
 use railhead::jobs::store::Store;
-use railhead::jobs::store::sqlite::database::SqliteStore;
-use railhead::jobs::store::types::{
-    Claim, ClaimKind, ClaimRequest, Ending, Enqueued, NewJob, QueueBounds, ReleaseReason, Renewal,
-    StoredResult,
-};
+use railhead::jobs::store::claim::{Claim, ClaimKind, ClaimRequest, ReleaseReason, Renewal};
+use railhead::jobs::store::ending::{Ending, StoredResult};
+use railhead::jobs::store::submission::{Enqueued, NewJob, QueueBounds};
 use railhead::jobs::submit_options::SubmitOptions;
 use railhead::jobs::{Failure, FailureKind, Job, State};
 use tempfile::TempDir;
@@ -117,13 +115,15 @@ impl Table {
 
 async fn open_store(kind: StoreKind, folder: &Path) -> Arc<dyn Store> {
     match kind {
-        StoreKind::Sqlite => open_sqlite(&folder.join("jobs.db")).await,
+        StoreKind::Sqlite => open_beside(folder).await,
     }
 }
 
-/// The embedded store in this file.
-pub async fn open_sqlite(file: &Path) -> Arc<dyn Store> {
-    Arc::new(SqliteStore::open(file).await.unwrap())
+/// The store of a data folder, beside the service that uses it.
+pub async fn open_beside(folder: &Path) -> Arc<dyn Store> {
+    railhead::jobs::store::open::open_beside(folder)
+        .await
+        .unwrap()
 }
 
 /// Claims at most so many small jobs of the first tenant that has any.

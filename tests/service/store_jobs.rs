@@ -2,9 +2,12 @@
 
 use crate::store_keys::keyed;
 use bytes::Bytes;
+use railhead::jobs::store::claim::Reap;
+use railhead::jobs::store::claim::Renewal;
+use railhead::jobs::store::ending::Ending;
 use railhead::jobs::store::list::Filter;
-use railhead::jobs::store::types::Reap;
-use railhead::jobs::store::types::{Deleted, Ending, Enqueued, NewJob, QueueBounds, Renewal};
+use railhead::jobs::store::retention::Deleted;
+use railhead::jobs::store::submission::{Enqueued, NewJob, QueueBounds};
 use railhead::jobs::{FailureKind, State};
 use uuid::Uuid;
 

@@ -2,7 +2,7 @@
 
 use railhead::jobs::State;
 use railhead::jobs::store::list::Filter;
-use railhead::jobs::store::types::NewJob;
+use railhead::jobs::store::submission::NewJob;
 use serde_json::{Value, json};
 use uuid::Uuid;
 

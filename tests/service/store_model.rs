@@ -5,8 +5,9 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use proptest::prelude::*;
 use proptest::sample::Index;
+use railhead::jobs::store::claim::Claim;
 use railhead::jobs::store::list::Filter;
-use railhead::jobs::store::types::{BatchBegun, Claim, NewBatch, QueueBounds};
+use railhead::jobs::store::submission::{BatchBegun, NewBatch, QueueBounds};
 use uuid::Uuid;
 
 use crate::model::{BOUNDS, BatchRow, Model, Row};

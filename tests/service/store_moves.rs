@@ -7,10 +7,10 @@ use std::time::Duration;
 use bytes::Bytes;
 use railhead::jobs::codec::result::EncodedResult;
 use railhead::jobs::store::Store;
-use railhead::jobs::store::types::{
-    Claim, ClaimKind, ClaimRequest, Deleted, Ending, Enqueued, Moment, NewJob, NewSlice,
-    QueueBounds, Reap, ReleaseReason, Renewal, RetentionRule, SliceRecord, StoredResult,
-};
+use railhead::jobs::store::claim::{Claim, ClaimKind, ClaimRequest, Reap, ReleaseReason, Renewal};
+use railhead::jobs::store::ending::{Ending, NewSlice, SliceRecord, StoredResult};
+use railhead::jobs::store::retention::{Deleted, Moment, RetentionRule};
+use railhead::jobs::store::submission::{Enqueued, NewJob, QueueBounds};
 use railhead::jobs::submit_options::{Priority, SubmitOptions};
 use railhead::jobs::{Failure, FailureKind, State};
 use uuid::Uuid;

@@ -6,13 +6,12 @@ use std::time::Duration;
 use bytes::Bytes;
 use railhead::jobs::codec::result::EncodedResult;
 use railhead::jobs::store::Store;
-use railhead::jobs::store::types::Moment;
-use railhead::jobs::store::types::NewJob;
-use railhead::jobs::store::types::Reap;
-use railhead::jobs::store::types::SliceRecord;
-use railhead::jobs::store::types::{
-    Claim, ClaimKind, ClaimRequest, Ending, NewSlice, ReleaseReason, StoredResult,
-};
+use railhead::jobs::store::claim::Reap;
+use railhead::jobs::store::claim::{Claim, ClaimKind, ClaimRequest, ReleaseReason};
+use railhead::jobs::store::ending::SliceRecord;
+use railhead::jobs::store::ending::{Ending, NewSlice, StoredResult};
+use railhead::jobs::store::retention::Moment;
+use railhead::jobs::store::submission::NewJob;
 use railhead::jobs::submit_options::SubmitOptions;
 use railhead::jobs::{Failure, State};
 use uuid::Uuid;

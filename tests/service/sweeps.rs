@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 use uuid::Uuid;
 
 use crate::batches::small;
-use crate::store::open_sqlite;
+use crate::store::open_beside;
 use crate::support::{Service, long_case, pause};
 
 const AT_MOST: Duration = Duration::from_secs(60);
@@ -210,7 +210,7 @@ async fn the_time_limit_counts_every_slice_and_every_process() {
     jobs.start().unwrap();
     let id = jobs.submit(sweep("held", 11), None).await.unwrap().id;
     until_slices(&jobs, id, 4.0 / 11.0).await;
-    let about = open_sqlite(&shop.folder.path().join("jobs.db")).await;
+    let about = open_beside(shop.folder.path()).await;
     let spent = about.slices(id).await.unwrap()[1].spent;
     assert!(
         spent > Duration::ZERO && spent < Duration::from_millis(600),
@@ -314,7 +314,7 @@ async fn a_killed_process_costs_a_sweep_no_more_than_the_slice_it_was_at() {
     service.kill();
 
     // What the dead process did not come to say is in its table.
-    let store = open_sqlite(&folder.path().join("jobs.db")).await;
+    let store = open_beside(folder.path()).await;
     let stored = store.slices(id.parse().unwrap()).await.unwrap().len();
     store.close().await;
     assert!((2..slices).contains(&stored), "{stored} of {slices}");

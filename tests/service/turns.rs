@@ -7,14 +7,13 @@ use std::time::Duration;
 use railhead::contact::case::problem::Problem;
 use railhead::contact::monitor::Monitor;
 use railhead::contact::solve;
-use railhead::jobs::store::types::Reap;
-use railhead::jobs::store::types::{ClaimKind, QueueBounds, ReleaseReason};
+use railhead::jobs::store::claim::Reap;
 use railhead::jobs::{Jobs, Options, State};
 use serde_json::json;
 
 use crate::batches::small;
-use crate::store::open_sqlite;
-use crate::store::{StoreKind, Table, claim_up_to, new_job, success};
+use crate::store::claim_up_to;
+use crate::store::open_beside;
 use crate::support::{case, open};
 
 const AT_MOST: Duration = Duration::from_secs(60);
@@ -162,52 +161,10 @@ async fn a_waiting_solve_can_be_cancelled_and_is_handed_back_at_the_end() {
 }
 
 #[tokio::test]
-async fn a_bystander_of_a_dead_process_counts_no_attempt() {
-    let table = Table::new(StoreKind::Sqlite).await;
-    let store = &*table.store;
-    let ids = [table.add(new_job()).await.id, table.add(new_job()).await.id];
-    for _ in 0..2 {
-        assert_eq!(claim_up_to(store, 0, 1000, 1).await.len(), 1);
-    }
-    // Both were being solved: nobody knows which of them it was.
-    assert_eq!(store.reap(Reap::Dead, 1, 1).await.unwrap().len(), 2);
-    for id in ids {
-        let job = store.job("anonymous", id).await.unwrap().unwrap();
-        assert_eq!((job.state, job.attempt), (State::Queued, 0));
-    }
-    // Now each comes alone, and is marked when it is solved alone.
-    let suspect = claim_up_to(store, 2, 1000, 8).await;
-    assert_eq!((suspect.len(), suspect[0].suspect), (1, true));
-    let waiting = claim_up_to(store, 2, 1000, 8).await;
-    store.set_solving(&suspect, true).await.unwrap();
-    let mut taken = store.reap(Reap::Dead, 3, 1).await.unwrap();
-    taken.sort_unstable();
-    assert_eq!(taken, [(ids[0], State::Failed), (ids[1], State::Queued)]);
-    assert_eq!(waiting[0].id, ids[1]);
-    assert_eq!(
-        store
-            .job("anonymous", ids[1])
-            .await
-            .unwrap()
-            .unwrap()
-            .attempt,
-        0
-    );
-    // One that waited at its gate is no suspect either.
-    let other = claim_up_to(store, 4, 1000, 1).await;
-    store.set_solving(&other, false).await.unwrap();
-    assert_eq!(
-        store.reap(Reap::Dead, 5, 1).await.unwrap(),
-        [(ids[1], State::Queued)]
-    );
-}
-
-#[tokio::test]
 async fn a_suspect_is_solved_while_nothing_else_is() {
     let shop = shop(|options| options.workers = 3).await;
     let jobs = &shop.jobs;
-    let folder = shop._folder.path().join("jobs.db");
-    let store = open_sqlite(&folder).await;
+    let store = open_beside(shop._folder.path()).await;
     let mut ids = Vec::new();
     for number in 0..3 {
         ids.push(
@@ -233,48 +190,6 @@ async fn a_suspect_is_solved_while_nothing_else_is() {
     }
     assert_eq!(shop.working[1].load(Ordering::SeqCst), 1);
     jobs.shutdown(Duration::from_secs(10)).await;
-}
-
-#[tokio::test]
-async fn a_job_that_was_longer_than_thought_is_known_as_long() {
-    let table = Table::new(StoreKind::Sqlite).await;
-    let store = &*table.store;
-    let id = table.add(new_job()).await.id;
-    let claims = claim_up_to(store, 0, 1000, 1).await;
-    let long = ReleaseReason::Long {
-        slice_us: 5_000_000,
-    };
-    assert_eq!(
-        store.release(&claims, long, 1).await.unwrap(),
-        [(id, State::Queued)]
-    );
-    let request = |each_slice_us| railhead::jobs::store::types::ClaimRequest {
-        worker: "w",
-        tenant: "anonymous",
-        jobs: 8,
-        cost_us: 200_000,
-        kind: ClaimKind::New,
-        each_slice_us,
-        workers: 1,
-        lease_until: 1000,
-        now: 2,
-        late_before: 2,
-        skip: Box::leak(Box::default()),
-    };
-    assert!(
-        store
-            .claim(&request(Some(2_000_000)))
-            .await
-            .unwrap()
-            .is_empty()
-    );
-    let claims = store.claim(&request(None)).await.unwrap();
-    assert_eq!((claims.len(), claims[0].attempt), (1, 1));
-    let ends = [(claims[0].clone(), success())];
-    assert_eq!(store.finish(&ends, 3).await.unwrap().len(), 1);
-    assert_eq!(store.stats().await.unwrap().jobs[&State::Queued], 0);
-    store.enqueue(&new_job(), QueueBounds::NONE).await.unwrap();
-    assert_eq!(store.stats().await.unwrap().jobs[&State::Queued], 1);
 }
 
 #[tokio::test]

@@ -199,7 +199,11 @@ mod tests {
     fn resultants(patches: usize, points: usize) -> Resultants {
         let point = |point: usize| PointResultants {
             point,
-            motion: MotionWords::default(),
+            motion: MotionWords {
+                creepage_x: 0.1,
+                creepage_y: 0.0,
+                spin_per_mm: 1e-9,
+            },
             force_x_n: 1.0 / (1 + point) as f64,
             force_y_n: -0.1,
             moment_z_n_mm: 1e-300,

@@ -13,7 +13,7 @@ use crate::jobs::batch::upload::BatchUpload;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::created_at;
-use crate::jobs::store::types::{BatchBegun, NewBatch, NewJob};
+use crate::jobs::store::submission::{BatchBegun, NewBatch, NewJob};
 use crate::jobs::submit_options::SubmitOptions;
 
 /// Jobs queued in one transaction.

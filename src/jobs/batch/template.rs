@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use crate::jobs::error::JobsError;
-use crate::jobs::store::types::StoredCase;
+use crate::jobs::store::submission::StoredCase;
 
 /// A value and the members that lead to its place.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -1,16 +1,18 @@
 //! API keys: which tenant a request belongs to. Of a key only its hash is kept.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use crate::jobs::clock::Clock;
 use crate::jobs::error::JobsError;
 use crate::jobs::keys::key::{Key, MARK, is_tenant};
-use crate::jobs::store::sqlite::database::SqliteStore;
+use crate::jobs::store::Store;
+use crate::jobs::store::open::{open_beside, table_file};
 
 /// The keys of a data folder, also beside a running service.
 #[derive(Debug)]
 pub struct Keyring {
-    store: SqliteStore,
+    store: Arc<dyn Store>,
 }
 
 impl Keyring {
@@ -23,14 +25,14 @@ impl Keyring {
             path: data_dir.to_owned(),
             source,
         })?;
-        let store = SqliteStore::open(&data_dir.join("jobs.db")).await?;
+        let store = open_beside(data_dir).await?;
         Ok(Keyring { store })
     }
 
     /// Is this the data folder of a service?
     #[must_use]
     pub fn is_there(data_dir: &Path) -> bool {
-        data_dir.join("jobs.db").is_file()
+        table_file(data_dir).is_file()
     }
 
     /// Makes a key of a tenant. The secret, returned second, is shown this one time and kept nowhere.

@@ -8,7 +8,7 @@ use uuid::Uuid;
 use crate::jobs::error::JobsError;
 use crate::jobs::model::{FailureKind, too_late};
 use crate::jobs::shared::Shared;
-use crate::jobs::store::types::Moment;
+use crate::jobs::store::retention::Moment;
 use crate::jobs::worker::attempt_control::StopReason;
 
 /// Time between two checks for jobs whose deadline has passed.

@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 
 use crate::jobs::model::{FailureKind, State};
 use crate::jobs::shared::{Shared, heartbeat};
-use crate::jobs::store::types::Reap;
+use crate::jobs::store::claim::Reap;
 
 /// Takes jobs whose lease has run out from their workers, three times per lease, until the service drains.
 pub(crate) async fn reap_expired(shared: Arc<Shared>) {

@@ -7,7 +7,7 @@ use std::time::Duration;
 use crate::jobs::error::JobsError;
 use crate::jobs::maintenance::disk_reserve;
 use crate::jobs::shared::Shared;
-use crate::jobs::store::types::Reap;
+use crate::jobs::store::claim::Reap;
 
 /// Time between two tries to do what a full disk did not allow.
 const RECOVER_EVERY: Duration = Duration::from_secs(1);

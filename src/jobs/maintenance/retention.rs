@@ -10,7 +10,7 @@ use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::Job;
 use crate::jobs::shared::Shared;
-use crate::jobs::store::types::RetentionRule;
+use crate::jobs::store::retention::RetentionRule;
 
 /// How long the ids of expired jobs and batches are remembered.
 pub const REMEMBERED_FOR: Duration = Duration::from_secs(30 * 24 * 3600);

@@ -16,10 +16,14 @@
 //!
 //! `tests/service/store*.rs` hold every store to this.
 
+pub mod claim;
+pub mod ending;
 pub mod error;
 pub mod list;
+pub mod open;
+pub mod retention;
 pub mod sqlite;
-pub mod types;
+pub mod submission;
 
 use std::collections::{HashMap, HashSet};
 use std::fmt::Debug;
@@ -31,12 +35,13 @@ use uuid::Uuid;
 use crate::jobs::batch::model::{Batch, BatchItem};
 use crate::jobs::keys::key::Key;
 use crate::jobs::model::{Failure, Job, State};
+use crate::jobs::store::claim::{Claim, ClaimRequest, QueueAhead, Reap, ReleaseReason, Renewal};
+use crate::jobs::store::ending::{Ending, NewSlice, ResultRef, SliceRecord, StoredResult};
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::list::{Filter, Page};
-use crate::jobs::store::types::{
-    BatchBegun, CacheKey, Claim, ClaimRequest, Deleted, Ending, Enqueued, Moment, NewBatch, NewJob,
-    NewSlice, Overdue, QueueAhead, QueueBounds, Reap, Refusal, ReleaseReason, Renewal, ResultRef,
-    RetentionRule, SliceRecord, Stats, StoredCase, StoredResult,
+use crate::jobs::store::retention::{Deleted, Moment, Overdue, RetentionRule, Stats};
+use crate::jobs::store::submission::{
+    BatchBegun, CacheKey, Enqueued, NewBatch, NewJob, QueueBounds, Refusal, StoredCase,
 };
 
 /// A job table, which also keeps API keys.

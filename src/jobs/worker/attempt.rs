@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 use tokio::sync::mpsc::UnboundedReceiver;
 use uuid::Uuid;
 
-use crate::jobs::store::types::Claim;
+use crate::jobs::store::claim::Claim;
 use crate::jobs::worker::attempt_control::{AttemptControl, StopReason};
 use crate::jobs::worker::gate::Gate;
 use crate::jobs::worker::lease::GroupLease;

@@ -9,7 +9,7 @@ use tokio::sync::mpsc::unbounded_channel;
 use crate::jobs::job_trace::JobTrace;
 use crate::jobs::model::{Failure, FailureKind};
 use crate::jobs::shared::Shared;
-use crate::jobs::store::types::Claim;
+use crate::jobs::store::claim::Claim;
 use crate::jobs::worker::attempt::{Attempt, Member, Phase, Solver, TimeSpentOn};
 use crate::jobs::worker::attempt_control::AttemptControl;
 use crate::jobs::worker::gate::Gate;

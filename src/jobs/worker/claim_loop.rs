@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::jobs::error::JobsError;
-use crate::jobs::store::types::{Claim, ClaimKind, ClaimRequest};
+use crate::jobs::store::claim::{Claim, ClaimKind, ClaimRequest};
 use crate::jobs::worker::attempt::Attempt;
 use crate::jobs::worker::begin;
 use crate::jobs::worker::fair_turns::LongSolve;

@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use tokio::time::{MissedTickBehavior, interval};
 
 use crate::jobs::shared::{Shared, heartbeat};
-use crate::jobs::store::types::{Claim, Renewal};
+use crate::jobs::store::claim::{Claim, Renewal};
 use crate::jobs::worker::attempt_control::{AttemptControl, StopReason};
 use crate::jobs::worker::lease::{GroupLease, HeldLeases};
 

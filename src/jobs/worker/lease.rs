@@ -11,7 +11,7 @@ use tokio::task::AbortHandle;
 use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
-use crate::jobs::store::types::Claim;
+use crate::jobs::store::claim::Claim;
 use crate::jobs::worker::attempt_control::AttemptControl;
 
 /// The heartbeat of some claimed jobs; it ends when this is dropped.

@@ -4,7 +4,8 @@ use crate::contact::error::{CaseError, SolveError};
 use crate::contact::remark::entry::RemarkEntry;
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::model::Failure;
-use crate::jobs::store::types::{SliceRecord, StoredCase};
+use crate::jobs::store::ending::SliceRecord;
+use crate::jobs::store::submission::StoredCase;
 use crate::jobs::worker::slices::SlicedCase;
 
 /// What came out of the solver thread.

@@ -4,7 +4,7 @@ use uuid::Uuid;
 
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::error::JobsError;
-use crate::jobs::store::types::{NewSlice, SliceRecord, StoredResult};
+use crate::jobs::store::ending::{NewSlice, SliceRecord, StoredResult};
 use crate::jobs::submit::microseconds;
 use crate::jobs::worker::attempt::Attempt;
 use crate::jobs::worker::outcome::Work;

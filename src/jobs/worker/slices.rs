@@ -6,7 +6,7 @@ use std::ops::Range;
 use std::time::Duration;
 
 use crate::contact::case::problem::Problem;
-use crate::jobs::store::types::SliceRecord;
+use crate::jobs::store::ending::SliceRecord;
 
 /// A checked case with its slices, of which the first `done` are stored.
 #[derive(Debug)]

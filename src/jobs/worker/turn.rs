@@ -13,7 +13,7 @@ use tokio::time::{MissedTickBehavior, interval};
 
 use crate::jobs::error::JobsError;
 use crate::jobs::shared::Shared;
-use crate::jobs::store::types::ReleaseReason;
+use crate::jobs::store::claim::ReleaseReason;
 use crate::jobs::worker::attempt::{Attempt, Phase};
 use crate::jobs::worker::attempt_control::StopReason;
 use crate::jobs::worker::begin;

@@ -1,6 +1,6 @@
 //! Batches in the embedded job table: filled piece by piece, acknowledged once they are complete.
 //!
-//! No worker claims a job of a batch while it is being filled ([`skip`](crate::jobs::store::types::ClaimRequest::skip)). A batch that a dead process left incomplete was never
+//! No worker claims a job of a batch while it is being filled ([`skip`](crate::jobs::store::claim::ClaimRequest::skip)). A batch that a dead process left incomplete was never
 //! acknowledged and is removed with its jobs.
 
 use crate::jobs::store::sqlite::blob_refs::drop_slices_of_ended;
@@ -19,7 +19,7 @@ use crate::jobs::store::sqlite::quota::Places;
 use crate::jobs::store::sqlite::rows::{
     job_columns, read_blob_ids, read_count, read_id, read_job, read_state,
 };
-use crate::jobs::store::types::{BatchBegun, NewBatch, NewJob, QueueBounds, Refusal};
+use crate::jobs::store::submission::{BatchBegun, NewBatch, NewJob, QueueBounds, Refusal};
 
 const CANCEL: &str = "UPDATE jobs SET state = CASE WHEN state = 'queued' THEN 'cancelled' ELSE state END, \
      ended_at = CASE WHEN state = 'queued' THEN $1 ELSE NULL END, \

@@ -10,8 +10,8 @@ use crate::jobs::store::sqlite::rows::read_state;
 use sqlx::sqlite::SqliteRow;
 use sqlx::{QueryBuilder, Row, Sqlite, SqliteConnection};
 
+use crate::jobs::store::ending::StoredResult;
 use crate::jobs::store::error::StoreError;
-use crate::jobs::store::types::StoredResult;
 
 /// Values bound in one statement; far below the bound of SQLite.
 pub(crate) const VALUES_PER_STATEMENT: usize = 250;

@@ -7,7 +7,7 @@ use uuid::Uuid;
 
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::rows::read_id;
-use crate::jobs::store::types::NewJob;
+use crate::jobs::store::submission::NewJob;
 
 /// One seek in the index, however many jobs have the same key.
 pub(crate) const SOURCE: &str =

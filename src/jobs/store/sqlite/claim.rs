@@ -7,10 +7,10 @@ use sqlx::sqlite::SqliteRow;
 use sqlx::{AssertSqlSafe, QueryBuilder, Row, Sqlite};
 use uuid::Uuid;
 
+use crate::jobs::store::claim::{Claim, ClaimKind, ClaimRequest};
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::{push_list, read_cache_key, read_count, read_id};
-use crate::jobs::store::types::{Claim, ClaimKind, ClaimRequest};
 
 /// Queued jobs read in one claim, whatever the number of workers.
 const PEEK_JOBS: i64 = 256;

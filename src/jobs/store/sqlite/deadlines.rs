@@ -1,15 +1,15 @@
 //! Jobs of the embedded table whose deadline has passed.
 
+use crate::jobs::store::retention::Overdue;
 use crate::jobs::store::sqlite::blob_refs::drop_slices_of_ended;
 use crate::jobs::store::sqlite::rows::read_move;
-use crate::jobs::store::types::Overdue;
 use uuid::Uuid;
 
 use crate::jobs::model::{Failure, State};
 use crate::jobs::store::error::StoreError;
+use crate::jobs::store::retention::Moment;
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::{read_id, read_state, to_json};
-use crate::jobs::store::types::Moment;
 
 /// Late at $1; what was submitted before $2 is late only if it is at $3.
 const LATE: &str = "SELECT id, state FROM jobs WHERE deadline <= $1 AND deadline IS NOT NULL AND ended_at IS NULL \

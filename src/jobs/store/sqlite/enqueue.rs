@@ -5,7 +5,7 @@ use tokio::sync::oneshot;
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::group_commit::{Submission, by_key};
-use crate::jobs::store::types::{Enqueued, NewJob, QueueBounds};
+use crate::jobs::store::submission::{Enqueued, NewJob, QueueBounds};
 
 impl SqliteStore {
     /// Queues a job if the bounds leave it a place, or finds the one its idempotency key already stands for. Durable once it returns. Whoever stops

@@ -5,10 +5,10 @@ use uuid::Uuid;
 
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::list::first_id_at;
+use crate::jobs::store::retention::RetentionRule;
 use crate::jobs::store::sqlite::blob_refs::release_blobs;
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::{push_list, read_blob_ids, read_id};
-use crate::jobs::store::types::RetentionRule;
 
 /// Ids grow with the time of submission, so that only the oldest rows are read.
 const EXPIRED: &str = "SELECT id, blob_id FROM jobs \

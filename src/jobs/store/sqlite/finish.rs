@@ -6,7 +6,7 @@ use crate::jobs::store::sqlite::cached::SOURCE;
 use crate::jobs::store::sqlite::cached::end_pairs;
 use crate::jobs::store::sqlite::rows::read_cache_key;
 use crate::jobs::store::sqlite::rows::read_move;
-use crate::jobs::store::types::CacheKey;
+use crate::jobs::store::submission::CacheKey;
 use sqlx::Row;
 use sqlx::SqliteConnection;
 use std::collections::HashMap;
@@ -16,12 +16,13 @@ use sqlx::{QueryBuilder, Sqlite};
 use uuid::Uuid;
 
 use crate::jobs::model::State;
+use crate::jobs::store::claim::Claim;
+use crate::jobs::store::ending::{Ending, StoredResult};
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::blob_refs::{insert_blobs, release_blobs};
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::fence;
 use crate::jobs::store::sqlite::rows::{read_id, to_json};
-use crate::jobs::store::types::{Claim, Ending, StoredResult};
 
 impl SqliteStore {
     /// Ends jobs, all in one transaction. Returns those that ended; the others' leases were lost and nothing of them

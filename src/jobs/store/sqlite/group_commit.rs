@@ -13,7 +13,7 @@ use crate::jobs::store::sqlite::insert::insert_jobs;
 use crate::jobs::store::sqlite::quota::{Places, with_living_source};
 use crate::jobs::store::sqlite::rows::GET;
 use crate::jobs::store::sqlite::rows::{job_columns, read_job};
-use crate::jobs::store::types::{Enqueued, NewJob, QueueBounds};
+use crate::jobs::store::submission::{Enqueued, NewJob, QueueBounds};
 
 /// Most jobs stored together.
 const TOGETHER: usize = 256;

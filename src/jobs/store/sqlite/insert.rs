@@ -6,7 +6,7 @@ use uuid::Uuid;
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::cached::end_with_sources;
 use crate::jobs::store::sqlite::rows::to_json;
-use crate::jobs::store::types::{CacheKey, NewJob};
+use crate::jobs::store::submission::{CacheKey, NewJob};
 
 /// Jobs in one statement; with 17 values each far below the bound of SQLite.
 const ROWS_PER_STATEMENT: usize = 250;

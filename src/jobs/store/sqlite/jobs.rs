@@ -1,21 +1,22 @@
 //! What clients ask of one job.
 
+use crate::jobs::store::ending::StoredResult;
 use crate::jobs::store::sqlite::blob_refs::drop_slices_of_ended;
 use crate::jobs::store::sqlite::rows::GET;
 use crate::jobs::store::sqlite::rows::read_count;
-use crate::jobs::store::types::StoredCase;
-use crate::jobs::store::types::StoredResult;
+use crate::jobs::store::submission::StoredCase;
 use bytes::Bytes;
 
 use sqlx::Row;
 use uuid::Uuid;
 
 use crate::jobs::model::Job;
+use crate::jobs::store::ending::ResultRef;
 use crate::jobs::store::error::StoreError;
+use crate::jobs::store::retention::Deleted;
 use crate::jobs::store::sqlite::blob_refs::release_blobs;
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::{job_columns, read_blob_id, read_job};
-use crate::jobs::store::types::{Deleted, ResultRef};
 
 impl SqliteStore {
     /// Cancels a queued job at once and asks the worker of a running one to stop; an ended job stays as it is.

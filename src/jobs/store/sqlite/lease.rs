@@ -10,10 +10,11 @@ use sqlx::{QueryBuilder, Row, Sqlite};
 use uuid::Uuid;
 
 use crate::jobs::model::State;
+use crate::jobs::store::claim::{Claim, ReleaseReason, Renewal};
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::{push_list, read_id};
-use crate::jobs::store::types::{Claim, ReleaseReason, Renewal, StoredCase};
+use crate::jobs::store::submission::StoredCase;
 
 impl SqliteStore {
     /// The cases of jobs, and whether their cancellation was asked for. A template is read once, however many rows fill it.

@@ -8,7 +8,7 @@ use uuid::Uuid;
 
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::rows::{push_list, read_count, read_id};
-use crate::jobs::store::types::{NewJob, QueueBounds, Refusal};
+use crate::jobs::store::submission::{NewJob, QueueBounds, Refusal};
 
 /// Queued jobs of a tenant (of all tenants if it is NULL) and the places reserved for batches that are being filled.
 const TAKEN: &str = "SELECT (SELECT COALESCE(SUM(number), 0) FROM job_counts \

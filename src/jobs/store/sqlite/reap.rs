@@ -1,8 +1,8 @@
 //! Takes jobs from workers whose lease has run out, and from a dead process.
 
+use crate::jobs::store::claim::Reap;
 use crate::jobs::store::sqlite::blob_refs::drop_slices_of_ended;
 use crate::jobs::store::sqlite::rows::read_move;
-use crate::jobs::store::types::Reap;
 use uuid::Uuid;
 
 use crate::jobs::model::{Failure, State};

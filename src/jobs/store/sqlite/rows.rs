@@ -1,6 +1,6 @@
 //! Rows of the job table as the words of this room, and back.
 
-use crate::jobs::store::types::Claim;
+use crate::jobs::store::claim::Claim;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use sqlx::sqlite::SqliteRow;
@@ -9,7 +9,7 @@ use uuid::Uuid;
 
 use crate::jobs::model::{Job, State};
 use crate::jobs::store::error::StoreError;
-use crate::jobs::store::types::CacheKey;
+use crate::jobs::store::submission::CacheKey;
 use crate::jobs::submit_options::Priority;
 
 /// The columns a [`Job`] is read from.

@@ -6,12 +6,13 @@ use std::time::Duration;
 use sqlx::Row;
 use uuid::Uuid;
 
+use crate::jobs::store::claim::Claim;
+use crate::jobs::store::ending::{NewSlice, SliceRecord, StoredResult};
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::blob_refs::{insert_blobs, release_blobs};
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::fence;
 use crate::jobs::store::sqlite::rows::read_count;
-use crate::jobs::store::types::{Claim, NewSlice, SliceRecord, StoredResult};
 
 pub(crate) const NOTES: &str =
     "SELECT number, motions, digest, spent_us FROM job_slices WHERE job_id = $1 ORDER BY number";

@@ -1,16 +1,16 @@
 //! Statistics of the embedded job table: how many jobs, how old, how large; and what comes before a queued job.
 
 use crate::jobs::model::Job;
-use crate::jobs::store::types::QueueAhead;
+use crate::jobs::store::claim::QueueAhead;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::Path;
 
 use crate::jobs::model::State;
 use crate::jobs::store::error::StoreError;
+use crate::jobs::store::retention::Stats;
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::{read_count, read_state};
-use crate::jobs::store::types::Stats;
 
 const COUNT: &str = "SELECT state, SUM(number) AS jobs FROM job_counts GROUP BY state";
 

@@ -1,0 +1,63 @@
+//! Which store a data folder has, and how it is opened: the only place, besides its backup, that knows one store from another.
+
+use std::fs::File;
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crate::jobs::error::JobsError;
+use crate::jobs::maintenance::disk_reserve;
+use crate::jobs::store::Store;
+use crate::jobs::store::sqlite::database::SqliteStore;
+
+/// The file that says that the job table was closed in good order.
+const CLOSED: &str = "closed";
+
+/// The file of the embedded job table.
+#[must_use]
+pub fn table_file(data_dir: &Path) -> PathBuf {
+    data_dir.join("jobs.db")
+}
+
+/// Opens the store of a data folder for the one service that runs its jobs. It is checked for damage unless it was closed in good order.
+///
+/// # Errors
+/// It cannot be opened, is of another version, or is damaged.
+pub async fn open_for_service(data_dir: &Path) -> Result<Arc<dyn Store>, JobsError> {
+    let table = table_file(data_dir);
+    // After an end that closed the table there is nothing to be checked.
+    let closed = std::fs::remove_file(data_dir.join(CLOSED)).is_ok();
+    let unclean = !closed && table.exists();
+    let store = match SqliteStore::open(&table).await {
+        Err(error) if error.storage_fault().is_some() && disk_reserve::give_back(data_dir) => {
+            tracing::warn!(%error, "the job table is opened on the reserve");
+            SqliteStore::open(&table).await?
+        }
+        opened => opened?,
+    };
+    if unclean {
+        store.check().await?;
+    }
+    Ok(Arc::new(store))
+}
+
+/// Opens the store of a data folder beside a service that may be running.
+///
+/// # Errors
+/// It cannot be opened, or is of another version.
+pub async fn open_beside(data_dir: &Path) -> Result<Arc<dyn Store>, JobsError> {
+    Ok(Arc::new(SqliteStore::open(&table_file(data_dir)).await?))
+}
+
+/// Notes that the store was closed in good order.
+pub fn note_closed(data_dir: &Path) {
+    let marked = File::options()
+        .create(true)
+        .truncate(true)
+        .write(true)
+        .mode(0o600)
+        .open(data_dir.join(CLOSED));
+    if let Err(error) = marked {
+        tracing::debug!(%error, "the next start will check the job table");
+    }
+}

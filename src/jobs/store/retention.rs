@@ -1,0 +1,64 @@
+//! What passes by itself or is removed, and what is counted.
+
+use std::collections::BTreeMap;
+
+use uuid::Uuid;
+
+use crate::jobs::model::State;
+
+/// The answer to a call that deletes a job.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Deleted {
+    /// The row and all that hung on it are gone.
+    Done,
+    /// It has not ended.
+    NotEnded(State),
+    /// There was none.
+    NotFound,
+}
+
+/// The present, and what became of the clock.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Moment {
+    /// Epoch milliseconds.
+    pub now: i64,
+    /// What was submitted before this time is judged by the next.
+    pub set_at: i64,
+    /// The present of a clock that was not set.
+    pub unset: i64,
+}
+
+/// What is to be removed. Times are epoch milliseconds.
+#[derive(Debug, Clone, Copy)]
+pub struct RetentionRule {
+    /// The present.
+    pub now: i64,
+    /// Jobs that ended at this time or before have expired.
+    pub ended_before: i64,
+    /// Ids of what was removed at this time or before are forgotten.
+    pub forget_before: i64,
+    /// Most jobs to remove.
+    pub jobs: u32,
+}
+
+/// Statistics of a job table.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Stats {
+    /// Number of jobs in each state; every state is there.
+    pub jobs: BTreeMap<State, u64>,
+    /// Time of submission of the oldest queued job, epoch milliseconds.
+    pub oldest_queued_at: Option<i64>,
+    /// Size of the database file and its write-ahead log.
+    pub database_bytes: u64,
+    /// Size of the results outside the table.
+    pub result_bytes: u64,
+}
+
+/// Jobs whose deadline has passed.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Overdue {
+    /// Those that were queued and have been ended.
+    pub ended: Vec<Uuid>,
+    /// Those that are running.
+    pub running: Vec<Uuid>,
+}
