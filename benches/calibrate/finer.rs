@@ -125,7 +125,7 @@ fn one_mesh(
     for cells in [256, cells] {
         let level = levels.get(solved.point.level);
         let spinning = asked.motion.spin_per_mm != 0.0;
-        let found = regime(level, &solved.point.tangential, spinning);
+        let found = regime(&level, &solved.point.tangential, spinning);
         let plan = levels.policy.plan(cells, found);
         solved = solve_level(
             &task,

@@ -1,9 +1,12 @@
-//! Counts what is allocated on the heap.
+//! Counts what a thread allocates on the heap.
 
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::cell::Cell;
 
-static COUNT: AtomicU64 = AtomicU64::new(0);
+thread_local! {
+    // Without a first value to compute and without a destructor, so that the allocator itself may use it at any time.
+    static COUNT: Cell<u64> = const { Cell::new(0) };
+}
 
 /// The system's allocator, with a count of its calls.
 pub struct Counting;
@@ -12,7 +15,7 @@ pub struct Counting;
 #[expect(unsafe_code, reason = "an allocator is unsafe; this one only counts")]
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        COUNT.fetch_add(1, Ordering::Relaxed);
+        COUNT.set(COUNT.get() + 1);
         // SAFETY: as the caller promises.
         unsafe { System.alloc(layout) }
     }
@@ -23,17 +26,17 @@ unsafe impl GlobalAlloc for Counting {
     }
 
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        COUNT.fetch_add(1, Ordering::Relaxed);
+        COUNT.set(COUNT.get() + 1);
         // SAFETY: as the caller promises.
         unsafe { System.realloc(pointer, layout, size) }
     }
 }
 
-/// Allocations during one call of `work`.
+/// Allocations of this thread during one call of `work`.
 pub fn during<T>(work: impl FnOnce() -> T) -> u64 {
-    let before = COUNT.load(Ordering::Relaxed);
+    let before = COUNT.get();
     let answer = work();
-    let count = COUNT.load(Ordering::Relaxed) - before;
+    let count = COUNT.get() - before;
     drop(answer);
     count
 }

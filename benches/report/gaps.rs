@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use std::hint::black_box;
 
 use railhead::contact::case::problem::Problem;
+use railhead::contact::half_space::grid_operator::GridWorkspace;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::normal::normal_task::NormalTask;
 use railhead::contact::normal::wheel_height::search::{Accuracy, NormalPass};
@@ -248,7 +249,13 @@ fn at_rest(problem: &Problem) -> (f64, u32) {
     let rest = || {
         let search = contact.search().expect("a wheel over a rail");
         contact
-            .press(&search, wanted, None, &Unmonitored)
+            .press(
+                &search,
+                wanted,
+                None,
+                &mut GridWorkspace::default(),
+                &Unmonitored,
+            )
             .expect("a rest")
             .heights
     };

@@ -12,6 +12,7 @@ use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::geometry::wheelset::{WheelsetMotion, creepages};
+use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::wheel_height::search::{
@@ -74,10 +75,11 @@ pub(crate) fn solve(
         judge,
         monitor,
     };
+    let workspace = &mut GridWorkspace::default();
     if solve.balanced {
-        return solve.balance();
+        return solve.balance(workspace);
     }
-    let mut at_rest = solve.rest(solve.exactly(0.0), None)?;
+    let mut at_rest = solve.rest(solve.exactly(0.0), None, workspace)?;
     let answers = solve.answers(&at_rest, problem)?;
     if vertical {
         let remark = Remark::NormalForcesAloneBalance {};
@@ -117,10 +119,17 @@ impl WheelSolve<'_> {
         }
     }
 
-    fn rest(&self, wanted: NormalPass, before: Option<&PressedWheel>) -> Result<Rest, SolveError> {
+    fn rest(
+        &self,
+        wanted: NormalPass,
+        before: Option<&PressedWheel>,
+        workspace: &mut GridWorkspace<f32>,
+    ) -> Result<Rest, SolveError> {
         let watch = TimeLimit::new(self.monitor, self.problem.time_limit, 1);
         let began = self.monitor.elapsed();
-        let wheel = self.contact.press(&self.search, wanted, before, &watch);
+        let wheel = self
+            .contact
+            .press(&self.search, wanted, before, workspace, &watch);
         let wheel = wheel.map_err(|failure| watch.explained(failure.into(), self.problem))?;
         if matches!(wanted.accuracy, Accuracy::For(_)) {
             self.judge.before(&wheel)?;
@@ -145,7 +154,7 @@ impl WheelSolve<'_> {
     }
 
     /// Brings normal and tangential forces to balance the vertical force together.
-    fn balance(&self) -> Result<Found, SolveError> {
+    fn balance(&self, workspace: &mut GridWorkspace<f32>) -> Result<Found, SolveError> {
         let WheelSolve {
             problem, contact, ..
         } = *self;
@@ -161,7 +170,7 @@ impl WheelSolve<'_> {
             friction_share: 0.0,
             accuracy: Accuracy::About(TOLERANCE_FIRST),
         };
-        let mut at_rest = self.rest(about, None)?;
+        let mut at_rest = self.rest(about, None, workspace)?;
         let answers = self.answers(&at_rest, &coarse)?;
         let mut share = friction_share(&at_rest.wheel, &answers);
         let mut counted = share;
@@ -174,7 +183,8 @@ impl WheelSolve<'_> {
                 exit = BalanceExit::NothingCarried;
                 break;
             }
-            at_rest = at_rest.again(self.rest(self.exactly(counted), Some(&at_rest.wheel))?);
+            let wanted = self.exactly(counted);
+            at_rest = at_rest.again(self.rest(wanted, Some(&at_rest.wheel), workspace)?);
             let answers = self.answers(&at_rest, problem)?;
             share = friction_share(&at_rest.wheel, &answers);
             let before = previous.replace((counted, share));

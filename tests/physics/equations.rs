@@ -6,6 +6,7 @@ use railhead::contact::mesh::strips::Grading;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::methods::liu_hsu::initial_guess::InitialGuess;
 use railhead::contact::rolling::methods::liu_hsu::solve::solve_with;
+use railhead::contact::rolling::slip_equations::SlipScratch;
 use railhead::contact::rolling::slip_rules::Rule;
 use serde::Deserialize;
 
@@ -151,7 +152,7 @@ fn forces_stick_cells_and_power_have_their_known_digits() {
 fn power(contact: &Contact, rule: Rule, state: [f64; 3], t: &[f64]) -> f64 {
     let equations = contact.equations(rule);
     let mut slip = vec![0.0; t.len()];
-    let mut scratch = vec![0.0; 2 * equations.row_count()];
+    let mut scratch = SlipScratch::default();
     equations.elastic(t, &mut slip, &mut scratch);
     let rigid = equations.rigid(&regions::motion(state));
     let padded = equations.padded();

@@ -6,6 +6,7 @@ use railhead::contact::mesh::size::MeshSize;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::methods::boundary_element::newton::Newton;
 use railhead::contact::rolling::methods::boundary_element::task::NewtonTask;
+use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use railhead::contact::rolling::motion::Motion;
 use railhead::contact::rolling::slip_equations::SlipEquations;
 use railhead::contact::rolling::slip_rules::Rule;
@@ -66,7 +67,8 @@ fn one_rule(contact: &Ellipse, rule: Rule) -> Cells {
     };
     let (bound, area) = (resized(&level.bound), resized(&level.area));
     let rigid = equations.rigid(&motion);
-    let mut newton = Newton::new(&equations);
+    let newton = Newton::new(&equations);
+    let mut workspace = NewtonWorkspace::default();
     let law = NewtonTask {
         rigid: &rigid,
         bound: &bound,
@@ -76,14 +78,16 @@ fn one_rule(contact: &Ellipse, rule: Rule) -> Cells {
         tolerance: 0.01 * TOLERANCE_LEAST,
     };
     let mut t = vec![0.0; 2 * padded];
-    let report = newton.solve(&law, &mut t, &Unmonitored);
+    let report = newton.solve(&law, &mut t, &mut workspace, &Unmonitored);
     assert!(report.expect("never stopped").converged);
     let n = level.mesh.cells();
     let halves = |v: &[f64]| [v[..n].to_vec(), v[padded..padded + n].to_vec()];
     let reach = contact.a_mm.max(contact.b_mm) / contact.c();
     Cells {
-        slips: (0..n).map(|i| newton.slips(&bound, &t, i)).collect(),
-        slip: halves(newton.slip()),
+        slips: (0..n)
+            .map(|i| newton.slips(&bound, &t, workspace.slip(), i))
+            .collect(),
+        slip: halves(workspace.slip()),
         traction: halves(&t),
         largest: [
             motion.creepage_x.hypot(motion.creepage_y) + motion.spin_per_mm.abs() * reach,

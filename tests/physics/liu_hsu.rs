@@ -8,12 +8,14 @@ use railhead::contact::mesh::strips::Grading;
 use railhead::contact::monitor::{Monitor, Stop, Unmonitored};
 use railhead::contact::rolling::methods::boundary_element::newton::Newton;
 use railhead::contact::rolling::methods::boundary_element::task::Convergence;
+use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use railhead::contact::rolling::methods::liu_hsu::active_set::ZonesExit;
 use railhead::contact::rolling::methods::liu_hsu::initial_guess::InitialGuess;
 use railhead::contact::rolling::methods::liu_hsu::solve::{
     ZonesOutcome, coarse_pole, solve, solve_by_upwind, solve_with,
 };
 use railhead::contact::rolling::motion::Motion;
+use railhead::contact::rolling::slip_equations::SlipScratch;
 use railhead::contact::rolling::slip_rules::Rule;
 
 use crate::convergence_domain::{count, motions};
@@ -104,7 +106,8 @@ fn zones(contact: &Contact, rule: Rule, state: [f64; 3], t: &[f64]) -> Vec<bool>
     let equations = contact.equations(rule);
     let rigid = equations.rigid(&regions::motion(state));
     let law = contact.law(&rigid, 1e-10);
-    let mut newton = Newton::new(&equations);
+    let newton = Newton::new(&equations);
+    let mut workspace = NewtonWorkspace::default();
     let mut unused = Convergence {
         converged: false,
         iterations: 0,
@@ -112,9 +115,9 @@ fn zones(contact: &Contact, rule: Rule, state: [f64; 3], t: &[f64]) -> Vec<bool>
         residual: 0.0,
         inexact_steps: 0,
     };
-    newton.evaluate(&law, t, &mut unused);
+    newton.evaluate(&law, t, &mut workspace, &mut unused);
     (0..equations.cells())
-        .map(|i| newton.slips(law.bound, t, i))
+        .map(|i| newton.slips(law.bound, t, workspace.slip(), i))
         .collect()
 }
 
@@ -126,7 +129,7 @@ fn slips_and_residual_of_the_outcome_belong_to_its_tractions() {
     let (t, outcome) = everything(&contact, &contact, Rule::Trapezoid, state);
     assert!(outcome.converged && outcome.residual <= 1e-8, "{outcome:?}");
     let mut slip = vec![0.0; t.len()];
-    let mut scratch = vec![0.0; 2 * equations.row_count()];
+    let mut scratch = SlipScratch::default();
     equations.elastic(&t, &mut slip, &mut scratch);
     let (rigid, padded) = (equations.rigid(&regions::motion(state)), equations.padded());
     for i in 0..equations.cells() {

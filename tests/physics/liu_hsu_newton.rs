@@ -7,6 +7,7 @@ use railhead::contact::rolling::methods::liu_hsu::newton_raphson::newton_step;
 use railhead::contact::rolling::methods::liu_hsu::stick_block::{
     DenseProblem, SlipSystem, both_components,
 };
+use railhead::contact::rolling::slip_equations::SlipScratch;
 use railhead::contact::rolling::slip_rules::Rule;
 
 use crate::regions::{self, Contact, Region};
@@ -49,7 +50,7 @@ fn with_the_eliminated_tractions_stick_cells_do_not_slip_and_slip_cells_slip_as_
             t[place(*k)] = value;
         }
         let mut slip = vec![0.0; 2 * padded];
-        let mut scratch = vec![0.0; 2 * stage.equations.row_count()];
+        let mut scratch = SlipScratch::default();
         stage.equations.elastic(&t, &mut slip, &mut scratch);
         for k in stick_places {
             assert!((slip[place(k)] + stage.law.rigid[place(k)]).abs() < 1e-10);

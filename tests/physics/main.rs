@@ -2,6 +2,8 @@
 
 extern crate railhead_contact as railhead;
 
+#[path = "../../benches/report/allocations.rs"]
+mod allocations;
 mod answers;
 mod carter;
 mod case_faults;
@@ -70,3 +72,7 @@ mod targets;
 #[path = "../../benches/calibrate/truth.rs"]
 mod truth;
 mod watched;
+mod workspaces;
+
+#[global_allocator]
+static ALLOCATOR: allocations::Counting = allocations::Counting;

@@ -9,6 +9,7 @@ use railhead::contact::mesh::strips::{Chord, Grading, Mesh, equal_strips};
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::methods::boundary_element::newton::Newton;
 use railhead::contact::rolling::methods::boundary_element::task::{Convergence, NewtonTask};
+use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use railhead::contact::rolling::methods::liu_hsu::dense_task::DenseTask;
 use railhead::contact::rolling::methods::liu_hsu::solve::ZonesOutcome;
 use railhead::contact::rolling::motion::Motion;
@@ -215,7 +216,12 @@ pub fn boundary_element(
         let equations = contact.equations(rule);
         let rigid = equations.rigid(&motion(state));
         Newton::new(&equations)
-            .solve(&contact.law(&rigid, tolerance), t, &Unmonitored)
+            .solve(
+                &contact.law(&rigid, tolerance),
+                t,
+                &mut NewtonWorkspace::default(),
+                &Unmonitored,
+            )
             .unwrap()
     };
     let mut t = vec![0.0; 2 * contact.bound.len()];

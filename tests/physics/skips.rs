@@ -9,6 +9,7 @@ use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::methods::boundary_element::newton::Newton;
 use railhead::contact::rolling::methods::boundary_element::solve as boundary_element;
 use railhead::contact::rolling::methods::boundary_element::task::NewtonTask;
+use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use railhead::contact::rolling::slip_equations::SlipEquations;
 use railhead::contact::rolling::slip_rules::Rule;
 use railhead::contact::rolling::strip_mesh::StripMesh;
@@ -35,8 +36,10 @@ fn distance_to_plain_newton(contact: &Ellipse) -> f64 {
     let footprint = problem.pressed(&Unmonitored).expect("a contact").footprint;
     let level = StripMesh::new(&problem.rolling_task(&footprint), size).expect("a mesh");
     let motion = level.scale.motion(&problem.motions[0]);
+    let mut workspace = NewtonWorkspace::default();
     let shortened =
-        boundary_element::solve(&level, &motion, None, 1e-9, &Unmonitored).expect("a solution");
+        boundary_element::solve(&level, &motion, None, 1e-9, &mut workspace, &Unmonitored)
+            .expect("a solution");
 
     let nu = problem.elasticity.poisson_ratio;
     let whole = StripOperator::new(
@@ -68,7 +71,7 @@ fn distance_to_plain_newton(contact: &Ellipse) -> f64 {
             tolerance: 1e-9,
         };
         let report = Newton::new(&equations)
-            .solve(&law, &mut t, &Unmonitored)
+            .solve(&law, &mut t, &mut workspace, &Unmonitored)
             .expect("never stopped");
         assert!(report.converged, "{rule:?}: {report:?}");
     }

@@ -4,6 +4,7 @@ use crate::contact::case::problem::Problem;
 use crate::contact::case::size::SizeInput;
 use crate::contact::error::SolveError;
 use crate::contact::friction::law::FrictionLaw;
+use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::answer::{NormalError, NormalWork};
 use crate::contact::normal::footprint::Footprint;
@@ -45,7 +46,7 @@ impl Problem {
             NormalTask::Wheel(_) => unreachable!("a wheel is brought to rest first"),
         };
         let began = monitor.elapsed();
-        let found = task.solve_for(self.target(), monitor)?;
+        let found = task.solve_for(self.target(), &mut GridWorkspace::default(), monitor)?;
         let seconds = (monitor.elapsed() - began).as_secs_f64();
         let pressed = PressedContact {
             footprint: Footprint::computed(found.field, 0.0),

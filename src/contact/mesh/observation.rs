@@ -2,9 +2,16 @@
 
 use crate::contact::mesh::strips::{Mesh, Segment};
 
-/// The observation points of a segment, see the module's text.
+/// The observation points of a segment: its nodes, its leading edge, and the images of its last two nodes behind that edge.
 #[must_use]
 pub fn observation_points(mesh: &Mesh, segment: &Segment) -> Vec<f64> {
+    let mut points = Vec::with_capacity(segment.cells.len() + 3);
+    observe(mesh, segment, &mut points);
+    points
+}
+
+/// The same in place of what `points` held.
+pub fn observe(mesh: &Mesh, segment: &Segment, points: &mut Vec<f64>) {
     let nodes = &mesh.node[segment.cells.clone()];
     let edge = segment.chord.right;
     let n = nodes.len();
@@ -14,7 +21,7 @@ pub fn observation_points(mesh: &Mesh, segment: &Segment) -> Vec<f64> {
     } else {
         segment.chord.left
     };
-    let mut points = nodes.to_vec();
+    points.clear();
+    points.extend_from_slice(nodes);
     points.extend([edge, 2.0 * edge - last, 2.0 * edge - before]);
-    points
 }

@@ -9,33 +9,49 @@ use crate::contact::rolling::slip_rules::Rule;
 /// Own blocks of the operator, fixed for a rule and mesh.
 #[derive(Debug)]
 pub struct OwnBlocks {
-    /// `M_xx` and `M_yy` of every segment, column by column.
-    pub(crate) blocks: Vec<(Vec<f64>, Vec<f64>)>,
+    /// `M_xx` of every segment, column by column, one segment after the other.
+    xx: Vec<f64>,
+    /// `M_yy`, likewise.
+    yy: Vec<f64>,
+    /// Start of each segment's block, and one more.
+    starts: Vec<usize>,
 }
 
 impl OwnBlocks {
     /// Collects the blocks.
     #[must_use]
     pub fn new(equations: &SlipEquations) -> OwnBlocks {
-        OwnBlocks {
-            blocks: (0..equations.segments())
-                .map(|j| equations.own_block(j))
-                .collect(),
+        let mut starts = vec![0];
+        for j in 0..equations.segments() {
+            starts.push(starts[j] + equations.segment(j).len().pow(2));
         }
+        let length = starts[equations.segments()];
+        let (mut xx, mut yy) = (vec![0.0; length], vec![0.0; length]);
+        let mut differences = [Vec::new(), Vec::new()];
+        for (j, range) in starts.windows(2).enumerate() {
+            let (xx, yy) = (&mut xx[range[0]..range[1]], &mut yy[range[0]..range[1]]);
+            equations.own_block(j, [xx, yy], &mut differences);
+        }
+        OwnBlocks { xx, yy, starts }
+    }
+
+    /// `M_xx` and `M_yy` of every segment, column by column.
+    pub(crate) fn blocks(&self) -> impl Iterator<Item = (&[f64], &[f64])> {
+        let ranges = self.starts.windows(2).map(|range| range[0]..range[1]);
+        ranges.map(|range| (&self.xx[range.clone()], &self.yy[range]))
     }
 
     /// Bytes of the blocks.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        let numbers = self.blocks.iter().map(|(xx, yy)| xx.len() + yy.len());
-        8 * numbers.sum::<usize>() as u64
+        8 * (self.xx.len() + self.yy.len()) as u64
     }
 
     /// `−(M_xx + M_yy)/2` on the diagonal, cell by cell.
     #[must_use]
     pub fn diagonal(&self, equations: &SlipEquations) -> Vec<f64> {
         let mut diagonal = vec![0.0; equations.cells()];
-        for (j, (xx, yy)) in self.blocks.iter().enumerate() {
+        for (j, (xx, yy)) in self.blocks().enumerate() {
             let n = equations.segment(j).len();
             for (k, i) in equations.segment(j).enumerate() {
                 diagonal[i] = -0.5 * (xx[k * n + k] + yy[k * n + k]);

@@ -3,15 +3,16 @@
 //! Everything is dimensionless: lengths by the scale of the patch, tractions by a reference traction P, slips by P/G.
 //! Vectors hold all x components, then all y components, each padded with zeros to the operator's length.
 
-use std::cell::RefCell;
 use std::ops::ControlFlow;
 
 use crate::contact::half_space::strip_operator::kind::Parity;
-use crate::contact::half_space::strip_operator::operator::{OperatorScratch, StripOperator};
+use crate::contact::half_space::strip_operator::operator::{
+    OperatorScratch, StripOperator, rows_of,
+};
 use crate::contact::mesh::strips::Mesh;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::motion::Motion;
-use crate::contact::rolling::slip_rules::{Rule, Stencil};
+use crate::contact::rolling::slip_rules::{Rule, Stencils};
 
 /// A rule on a mesh with its influence: the linear map from tractions to slips.
 #[derive(Debug)]
@@ -20,7 +21,7 @@ pub struct SlipEquations<'a> {
     pub rule: Rule,
     differences: &'a StripOperator,
     parity: Option<Parity>,
-    stencils: Vec<Stencil>,
+    stencils: Stencils,
     /// Cells and rows of every segment that has unknowns.
     cells: Vec<std::ops::Range<usize>>,
     rows: Vec<std::ops::Range<usize>>,
@@ -28,8 +29,15 @@ pub struct SlipEquations<'a> {
     row_count: usize,
     /// y of every segment, for the rigid slip.
     y: Vec<f64>,
-    /// Of the products.
-    scratch: RefCell<OperatorScratch>,
+}
+
+/// Buffers of one product. The caller keeps them from product to product, so that a product allocates nothing and the equations
+/// can be shared by threads; they fit equations of any size.
+#[derive(Debug, Clone, Default)]
+pub struct SlipScratch {
+    /// Displacement differences along x, then across.
+    differences: Vec<f64>,
+    operator: OperatorScratch,
 }
 
 impl<'a> SlipEquations<'a> {
@@ -51,25 +59,23 @@ impl<'a> SlipEquations<'a> {
         } else {
             mesh.segments.len()
         };
+        let segments = &mesh.segments[..count];
         let mut row = 0;
         let mut equations = SlipEquations {
             rule,
             differences,
             parity,
-            stencils: Vec::with_capacity(count),
+            stencils: Stencils::new(rule, mesh, segments),
             cells: Vec::with_capacity(count),
             rows: Vec::with_capacity(count),
             padded: differences.padded(parity),
             row_count: 0,
             y: Vec::with_capacity(count),
-            scratch: RefCell::default(),
         };
-        for (segment, y) in mesh.segments[..count].iter().zip(&mesh.arm) {
-            let stencil = Stencil::new(rule, mesh, segment);
-            let rows = stencil.cells() + 2;
+        for (segment, y) in segments.iter().zip(&mesh.arm) {
+            let rows = rows_of(segment.cells.len());
             equations.rows.push(row..row + rows);
             row += rows;
-            equations.stencils.push(stencil);
             equations.cells.push(segment.cells.clone());
             equations.y.push(*y);
         }
@@ -101,23 +107,24 @@ impl<'a> SlipEquations<'a> {
         self.cells[j].clone()
     }
 
-    /// Number of displacement differences, for scratch space.
-    #[must_use]
-    pub fn row_count(&self) -> usize {
-        self.row_count
-    }
-
-    /// Elastic slip `M T` of tractions `t`; `scratch` has twice [`row_count`](Self::row_count) values.
-    pub fn elastic(&self, t: &[f64], slip: &mut [f64], scratch: &mut [f64]) {
+    /// Elastic slip `M T` of tractions `t`; values of `slip` behind the cells of a component stay as they are.
+    pub fn elastic(&self, t: &[f64], slip: &mut [f64], scratch: &mut SlipScratch) {
         let (tx, ty) = t.split_at(self.padded);
         let (sx, sy) = slip.split_at_mut(self.padded);
-        let (dx, dy) = scratch.split_at_mut(self.row_count);
-        let mut of_product = self.scratch.borrow_mut();
+        let SlipScratch {
+            differences,
+            operator,
+        } = scratch;
+        differences.resize(2 * self.row_count, 0.0);
+        let (dx, dy) = differences.split_at_mut(self.row_count);
         self.differences
-            .apply(self.parity, tx, ty, dx, dy, &mut of_product);
-        for ((stencil, cells), rows) in self.stencils.iter().zip(&self.cells).zip(&self.rows) {
-            stencil.elastic(&dx[rows.clone()], &mut sx[cells.clone()]);
-            stencil.elastic(&dy[rows.clone()], &mut sy[cells.clone()]);
+            .apply(self.parity, tx, ty, dx, dy, operator);
+        for (cells, rows) in self.cells.iter().zip(&self.rows) {
+            for (differences, slip) in [(&*dx, &mut *sx), (&*dy, &mut *sy)] {
+                let slip = &mut slip[cells.clone()];
+                self.stencils
+                    .elastic(cells.clone(), &differences[rows.clone()], slip);
+            }
         }
     }
 
@@ -126,23 +133,26 @@ impl<'a> SlipEquations<'a> {
     pub fn rigid(&self, motion: &Motion) -> Vec<f64> {
         let mut slip = vec![0.0; 2 * self.padded];
         let (sx, sy) = slip.split_at_mut(self.padded);
-        for ((stencil, cells), y) in self.stencils.iter().zip(&self.cells).zip(&self.y) {
-            stencil.rigid(
-                |_| motion.creepage_x - motion.spin_per_mm * y,
-                &mut sx[cells.clone()],
-            );
-            stencil.rigid(
-                |x| motion.creepage_y + motion.spin_per_mm * x,
-                &mut sy[cells.clone()],
-            );
+        for (cells, y) in self.cells.iter().zip(&self.y) {
+            let (x_slip, y_slip) = (&mut sx[cells.clone()], &mut sy[cells.clone()]);
+            let along = |_| motion.creepage_x - motion.spin_per_mm * y;
+            let across = |x| motion.creepage_y + motion.spin_per_mm * x;
+            self.stencils.rigid(cells.clone(), along, x_slip);
+            self.stencils.rigid(cells.clone(), across, y_slip);
         }
         slip
     }
 
-    /// The own block of segment `j`: `M_xx` and `M_yy` between its cells, column by column. (`M_xy` is 0 there.)
-    #[must_use]
-    pub fn own_block(&self, j: usize) -> (Vec<f64>, Vec<f64>) {
-        let n = self.stencils[j].cells();
+    /// Fills `blocks` with the own block of segment `j`: `M_xx` and `M_yy` between its cells, column by column. (`M_xy` is 0
+    /// there.) `differences` are buffers.
+    pub(crate) fn own_block(
+        &self,
+        j: usize,
+        blocks: [&mut [f64]; 2],
+        differences: &mut [Vec<f64>; 2],
+    ) {
+        let own = self.cells[j].clone();
+        let n = own.len();
         // A mirrored segment has the same own block as its image.
         let stored = if j < self.differences.segments() {
             j
@@ -153,16 +163,21 @@ impl<'a> SlipEquations<'a> {
             self.differences.rows(stored),
             self.differences.cells(stored),
         );
-        let mut blocks = (vec![0.0; n * n], vec![0.0; n * n]);
-        let (mut dx, mut dy) = (vec![0.0; n + 2], vec![0.0; n + 2]);
+        let [xx, yy] = blocks;
+        let [dx, dy] = differences;
         for (column, cell) in cells.enumerate() {
-            for (k, row) in rows.clone().enumerate() {
-                (dx[k], dy[k]) = self.differences.own(row, cell, self.parity);
+            dx.clear();
+            dy.clear();
+            for row in rows.clone() {
+                let (x, y) = self.differences.own(row, cell, self.parity);
+                dx.push(x);
+                dy.push(y);
             }
-            self.stencils[j].elastic(&dx, &mut blocks.0[column * n..(column + 1) * n]);
-            self.stencils[j].elastic(&dy, &mut blocks.1[column * n..(column + 1) * n]);
+            let column = column * n..(column + 1) * n;
+            let (xx, yy) = (&mut xx[column.clone()], &mut yy[column]);
+            self.stencils.elastic(own.clone(), dx, xx);
+            self.stencils.elastic(own.clone(), dy, yy);
         }
-        blocks
     }
 
     /// The whole map `M` as a matrix over the cells without padding, column by column: the x components of all cells
@@ -185,7 +200,7 @@ impl<'a> SlipEquations<'a> {
                 return Err(stop);
             }
             let ((xx, yx), (xy, yy)) = (from_x.split_at_mut(n), from_y.split_at_mut(n));
-            for ((stencil, cells), rows) in self.stencils.iter().zip(&self.cells).zip(&self.rows) {
+            for (cells, rows) in self.cells.iter().zip(&self.rows) {
                 differences.iter_mut().for_each(Vec::clear);
                 for row in rows.clone() {
                     let entry = self.differences.entry(self.parity, row, cell);
@@ -197,7 +212,8 @@ impl<'a> SlipEquations<'a> {
                     .iter()
                     .zip([&mut *xx, &mut *xy, &mut *yx, &mut *yy])
                 {
-                    stencil.elastic(list, &mut slip[cells.clone()]);
+                    let slip = &mut slip[cells.clone()];
+                    self.stencils.elastic(cells.clone(), list, slip);
                 }
             }
         }
@@ -252,7 +268,7 @@ mod tests {
                     t[place(i)] = (1.0 + 3.7 * i as f64).sin();
                 }
                 let mut slip = vec![0.0; 2 * padded];
-                let mut scratch = vec![0.0; 2 * equations.row_count()];
+                let mut scratch = SlipScratch::default();
                 equations.elastic(&t, &mut slip, &mut scratch);
                 for row in 0..2 * n {
                     let product: f64 = (0..2 * n)

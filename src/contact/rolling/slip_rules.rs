@@ -4,7 +4,9 @@
 //! leading edge: that is what selects the solution that vanishes there and keeps the problem well posed. Slip is in
 //! units of G⁻¹ × traction, lengths in the unit of the mesh.
 
-use crate::contact::mesh::observation::observation_points;
+use std::ops::Range;
+
+use crate::contact::mesh::observation::observe;
 use crate::contact::mesh::strips::{Mesh, Segment};
 
 /// The rules offered.
@@ -33,10 +35,10 @@ impl Rule {
     }
 }
 
-/// A rule made ready for one segment: `t_i = Σ_k band_i[k] (d_{i+k} + W_{i+k})`, then, from the leading cell
-/// backwards, `s_i = t_i − carry_i s_{i+1}`.
+/// A rule made ready for the segments of a mesh, cell by cell: `t_i = Σ_k band_i[k] (d_{i+k} + W_{i+k})`, then, from the
+/// leading cell of a segment backwards, `s_i = t_i − carry_i s_{i+1}`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Stencil {
+pub struct Stencils {
     band: Vec<[f64; 3]>,
     carry: Vec<f64>,
     /// Where the rigid slip of each cell is taken, along x; a carried rule adds the neighbour's as for `s`.
@@ -45,55 +47,58 @@ pub struct Stencil {
     rigid_weight: Vec<f64>,
 }
 
-impl Stencil {
-    /// Prepares a rule for a segment.
+impl Stencils {
+    /// Prepares a rule for the segments of a mesh, or for the first of them.
     #[must_use]
-    pub fn new(rule: Rule, mesh: &Mesh, segment: &Segment) -> Stencil {
-        let points = observation_points(mesh, segment);
-        let n = segment.cells.len();
-        let mut stencil = Stencil {
-            band: vec![[0.0; 3]; n],
-            carry: vec![0.0; n],
-            rigid_at: vec![0.0; n],
-            rigid_weight: vec![1.0; n],
+    pub fn new(rule: Rule, mesh: &Mesh, segments: &[Segment]) -> Stencils {
+        let cells = segments.last().map_or(0, |segment| segment.cells.end);
+        let mut stencils = Stencils {
+            band: vec![[0.0; 3]; cells],
+            carry: vec![0.0; cells],
+            rigid_at: vec![0.0; cells],
+            rigid_weight: vec![1.0; cells],
         };
-        for i in 0..n {
-            let (x, next) = (points[i], points[i + 1]);
+        let mut points = Vec::new();
+        for segment in segments {
+            observe(mesh, segment, &mut points);
+            stencils.prepare(rule, segment.cells.clone(), &points);
+        }
+        stencils
+    }
+
+    /// Prepares the rule for one segment with these observation points.
+    fn prepare(&mut self, rule: Rule, cells: Range<usize>, points: &[f64]) {
+        let n = cells.len();
+        for (k, i) in cells.enumerate() {
+            let (x, next) = (points[k], points[k + 1]);
             match rule {
                 Rule::Upwind => {
-                    stencil.band[i] = [1.0 / (next - x), 0.0, 0.0];
-                    stencil.rigid_at[i] = 0.5 * (x + next);
+                    self.band[i] = [1.0 / (next - x), 0.0, 0.0];
+                    self.rigid_at[i] = 0.5 * (x + next);
                 }
                 Rule::ThreePoint => {
-                    stencil.band[i] = three_point(&points, i, n);
-                    stencil.rigid_at[i] = if n == 1 { 0.5 * (x + next) } else { x };
+                    self.band[i] = three_point(points, k, n);
+                    self.rigid_at[i] = if n == 1 { 0.5 * (x + next) } else { x };
                 }
                 Rule::Trapezoid => {
-                    let share = if i + 1 < n { 0.5 } else { 1.0 };
-                    stencil.band[i] = [1.0 / (share * (next - x)), 0.0, 0.0];
-                    stencil.carry[i] = if i + 1 < n { 1.0 } else { 0.0 };
-                    stencil.rigid_at[i] = 0.5 * (x + next);
-                    stencil.rigid_weight[i] = 1.0 / share;
+                    let share = if k + 1 < n { 0.5 } else { 1.0 };
+                    self.band[i] = [1.0 / (share * (next - x)), 0.0, 0.0];
+                    self.carry[i] = if k + 1 < n { 1.0 } else { 0.0 };
+                    self.rigid_at[i] = 0.5 * (x + next);
+                    self.rigid_weight[i] = 1.0 / share;
                 }
             }
         }
-        stencil
     }
 
-    /// Number of cells.
-    #[must_use]
-    pub fn cells(&self) -> usize {
-        self.band.len()
-    }
-
-    /// Slip from displacement differences: `differences` has `cells + 2` values, `slip` has `cells`.
+    /// Slip of a segment from its displacement differences: `differences` has `cells + 2` values, `slip` has `cells`.
     #[inline]
-    pub fn elastic(&self, differences: &[f64], slip: &mut [f64]) {
-        let n = self.band.len();
+    pub fn elastic(&self, cells: Range<usize>, differences: &[f64], slip: &mut [f64]) {
+        let n = cells.len();
         let (d, band, carry, slip) = (
             &differences[..n + 2],
-            &self.band[..n],
-            &self.carry[..n],
+            &self.band[cells.clone()],
+            &self.carry[cells],
             &mut slip[..n],
         );
         let mut ahead = 0.0;
@@ -104,12 +109,12 @@ impl Stencil {
         }
     }
 
-    /// Rigid slip of every cell for `w(x)`, which must be linear in x.
-    pub fn rigid(&self, w: impl Fn(f64) -> f64, slip: &mut [f64]) {
+    /// Rigid slip of every cell of a segment for `w(x)`, which must be linear in x.
+    pub fn rigid(&self, cells: Range<usize>, w: impl Fn(f64) -> f64, slip: &mut [f64]) {
         let mut ahead = 0.0;
-        for i in (0..self.band.len()).rev() {
+        for (i, slip) in cells.zip(slip).rev() {
             ahead = self.rigid_weight[i] * w(self.rigid_at[i]) - self.carry[i] * ahead;
-            slip[i] = ahead;
+            *slip = ahead;
         }
     }
 }
@@ -135,6 +140,7 @@ fn three_point(points: &[f64], i: usize, n: usize) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::mesh::observation::observation_points;
     use crate::contact::mesh::strips::{Chord, Grading};
 
     fn mesh(n: usize) -> Mesh {
@@ -155,7 +161,7 @@ mod tests {
         let points = observation_points(&mesh, segment);
         let differences: Vec<f64> = points.windows(2).map(|p| u(p[1]) - u(p[0])).collect();
         let mut slip = vec![0.0; n];
-        Stencil::new(rule, &mesh, segment).elastic(&differences, &mut slip);
+        Stencils::new(rule, &mesh, &mesh.segments).elastic(0..n, &differences, &mut slip);
         mesh.node.iter().copied().zip(slip).collect()
     }
 
@@ -200,10 +206,10 @@ mod tests {
                     .windows(2)
                     .map(|p| displaced(p[1]) - displaced(p[0]))
                     .collect();
-                let stencil = Stencil::new(rule, &mesh, segment);
+                let stencils = Stencils::new(rule, &mesh, &mesh.segments);
                 let (mut elastic, mut rigid) = (vec![0.0; n], vec![0.0; n]);
-                stencil.elastic(&differences, &mut elastic);
-                stencil.rigid(|x| 0.3 + 0.4 * x, &mut rigid);
+                stencils.elastic(0..n, &differences, &mut elastic);
+                stencils.rigid(0..n, |x| 0.3 + 0.4 * x, &mut rigid);
                 for i in 0..n {
                     assert!(
                         (elastic[i] - rigid[i]).abs() < 1e-12,

@@ -66,11 +66,11 @@ impl<'a> Assembly<'a> {
             self.remarks = merged(std::mem::take(&mut self.remarks));
         }
         for (index, patch) in self.patches.iter().enumerate() {
-            self.points[index].push(point_solution(problem, level, patch, index, point));
+            self.points[index].push(point_solution(problem, &level, patch, index, point));
         }
         self.total.push(total(problem, &self.patches, point));
         if wants_fields(problem) {
-            self.add_fields(level, point);
+            self.add_fields(&level, point);
         }
     }
 

@@ -3,7 +3,6 @@
 //! On a half-space a wave of amplitude c and length L is pressed flat by the pressure `π E* c / L` (Johnson, Contact Mechanics, 1985, §13.2),
 //! in wavenumbers k: `q = E* |k| r / 2`. So every difference r(s) becomes a pressure and compares with that of the contact.
 
-use std::cell::RefCell;
 use std::f64::consts::{PI, TAU};
 
 use realfft::RealFftPlanner;
@@ -13,13 +12,14 @@ const TAPER: f64 = 2.0;
 /// Zeros beside the heights, so that the ends do not see each other.
 const PADDING: usize = 4;
 
-thread_local! {
-    static PLANNER: RefCell<RealFftPlanner<f64>> = RefCell::new(RealFftPlanner::new());
-}
-
 /// Pressure in MPa that flattens `heights` in mm, `step` mm apart, with the contact modulus in MPa; one value per height.
 #[must_use]
-pub fn flattening(heights: &[f64], step: f64, modulus: f64) -> Vec<f64> {
+pub fn flattening(
+    heights: &[f64],
+    step: f64,
+    modulus: f64,
+    planner: &mut RealFftPlanner<f64>,
+) -> Vec<f64> {
     let count = heights.len();
     let padded = (PADDING * count).max(2).next_power_of_two();
     let mut values = vec![0.0; padded];
@@ -27,12 +27,8 @@ pub fn flattening(heights: &[f64], step: f64, modulus: f64) -> Vec<f64> {
         let from_end = step * k.min(count - 1 - k) as f64;
         values[k] = height * 0.5 * (1.0 - (PI * (from_end / TAPER).min(1.0)).cos());
     }
-    let (forward, backward) = PLANNER.with_borrow_mut(|planner| {
-        (
-            planner.plan_fft_forward(padded),
-            planner.plan_fft_inverse(padded),
-        )
-    });
+    let forward = planner.plan_fft_forward(padded);
+    let backward = planner.plan_fft_inverse(padded);
     let mut spectrum = forward.make_output_vec();
     // The lengths are those of the plans, so that neither transform can fail.
     let done = forward.process(&mut values, &mut spectrum);

@@ -1,5 +1,7 @@
 //! Two readings of the same points: the spline in use against a smoother one, and against Akima's curve.
 
+use realfft::RealFftPlanner;
+
 use crate::contact::geometry::profile_quality::flattening::flattening;
 use crate::contact::geometry::profile_quality::noise::{MEDIAN_OF_NORMAL, median};
 use crate::contact::geometry::profile_quality::samples::Points;
@@ -46,9 +48,10 @@ pub fn roughness(points: Points, smoothing: f64, contact: [f64; 2], modulus: f64
     let count = ((window[1] - window[0]) / step).floor() as usize + 1;
     let places: Vec<f64> = (0..count).map(|k| window[0] + step * k as f64).collect();
     let used = HeightCurve::smoothed(part, smoothing);
-    let pressures = |other: &HeightCurve| {
+    let mut planner = RealFftPlanner::new();
+    let mut pressures = |other: &HeightCurve| {
         let heights: Vec<f64> = places.iter().map(|s| used.above(other, *s)).collect();
-        flattening(&heights, step, modulus)
+        flattening(&heights, step, modulus, &mut planner)
     };
     let over_contact = |pressures: &[f64]| {
         let (mut sum, mut count) = (0.0, 0.0_f64);

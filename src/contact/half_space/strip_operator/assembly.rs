@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use pulp::{Arch, NullaryFnOnce};
 
-use crate::contact::mesh::observation::observation_points;
+use crate::contact::mesh::observation::observe;
 use crate::contact::mesh::strips::Mesh;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::simd_ln::Number;
@@ -153,13 +153,13 @@ impl OperatorAssembly<'_> {
         let rows = self.first_row[self.first_row.len() - 1];
         let mut matrix = vec![T::ZERO; rows * self.row_length];
         let mut edges = CellEdges::new(self.mesh);
-        let arch = Arch::new();
+        let (arch, mut points) = (Arch::new(), Vec::new());
         let places = self.first_row.windows(2);
         for (place, segment) in places.zip(&self.mesh.segments) {
             if let ControlFlow::Break(stop) = monitor.tick(0.0) {
                 return Err(stop);
             }
-            let points = observation_points(self.mesh, segment);
+            observe(self.mesh, segment, &mut points);
             edges.look_from(self.mesh, segment.chord.y);
             arch.dispatch(SegmentRows {
                 edges: &mut edges,

@@ -4,7 +4,7 @@
 //! δ prescribed (Polonsky and Keer 1999). Cells may differ in size: scalar products are weighted with their areas, and
 //! distances are scaled by what a cell's own pressure displaces, so that small cells take no more iterations than large ones.
 
-use crate::contact::half_space::grid_operator::GridOperator;
+use crate::contact::half_space::grid_operator::{GridOperator, GridWorkspace};
 use crate::contact::half_space::transforms::Width;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::hertz::Pressing;
@@ -13,8 +13,10 @@ use crate::contact::normal::hertz::Pressing;
 pub(crate) trait PressureInfluence {
     /// Up to so many changed pressures are added to the displacement one by one, for less than a whole product costs.
     const CHANGES_MAX: usize;
+    /// Buffers of a product.
+    type Workspace;
     /// Displacement in mm at every centre for pressures in MPa.
-    fn apply(&mut self, pressure: &[f64], displacement: &mut [f64]);
+    fn apply(&self, pressure: &[f64], displacement: &mut [f64], workspace: &mut Self::Workspace);
     /// Adds the displacement in mm for changed pressures in MPa, cell by cell; never more than `CHANGES_MAX`.
     fn add(&self, changes: &[(usize, f64)], displacement: &mut [f64]);
     /// Displacement in mm/MPa of the first cell by its own pressure.
@@ -28,9 +30,10 @@ pub(crate) trait PressureInfluence {
 
 impl<T: Width> PressureInfluence for GridOperator<T> {
     const CHANGES_MAX: usize = 12;
+    type Workspace = GridWorkspace<T>;
 
-    fn apply(&mut self, pressure: &[f64], displacement: &mut [f64]) {
-        GridOperator::apply(self, pressure, displacement);
+    fn apply(&self, pressure: &[f64], displacement: &mut [f64], workspace: &mut GridWorkspace<T>) {
+        GridOperator::apply(self, pressure, displacement, workspace);
     }
 
     fn add(&self, changes: &[(usize, f64)], displacement: &mut [f64]) {
@@ -89,18 +92,33 @@ pub(crate) enum PressureFailure {
     Stopped(Stop),
 }
 
-/// Solves for the pressure under which surfaces with the gap `gap` touch; `cell` is the area of the first cell in mm².
+/// What is asked of the pressure on a grid.
+pub(crate) struct PressureTask<'a> {
+    /// Gap of the undeformed surfaces at every cell in mm.
+    pub(crate) gap: &'a [f64],
+    /// Area of the first cell in mm².
+    pub(crate) cell: f64,
+    pub(crate) pressing: Pressing,
+    /// Violation of the contact conditions to reach, see [`Pressed::residual`].
+    pub(crate) tolerance: f64,
+}
+
+/// Solves for the pressure under which the surfaces touch.
 ///
 /// `start` is any pressure that is not 0 everywhere; it decides the number of iterations only.
 pub(crate) fn press<I: PressureInfluence>(
-    influence: &mut I,
-    gap: &[f64],
-    cell: f64,
-    pressing: Pressing,
+    task: &PressureTask,
+    influence: &I,
     start: Vec<f64>,
-    tolerance: f64,
+    workspace: &mut I::Workspace,
     monitor: &dyn Monitor,
 ) -> Result<Pressed, PressureFailure> {
+    let PressureTask {
+        gap,
+        cell,
+        pressing,
+        tolerance,
+    } = *task;
     let least = gap.iter().copied().fold(f64::INFINITY, f64::min);
     let n = gap.len();
     let mut work = PressureIterate {
@@ -112,7 +130,7 @@ pub(crate) fn press<I: PressureInfluence>(
         changes: Vec::new(),
     };
     work.scale_to(influence, pressing, cell);
-    influence.apply(&work.p, &mut work.u);
+    influence.apply(&work.p, &mut work.u, workspace);
     let (mut follow, mut last) = (false, 1.0);
     let mut residual = f64::INFINITY;
     for iterations in 0..ITERATIONS_MAX {
@@ -134,7 +152,7 @@ pub(crate) fn press<I: PressureInfluence>(
         let factor = if follow { square / last } else { 0.0 };
         last = square;
         work.direction(influence, factor);
-        influence.apply(&work.t, &mut work.r);
+        influence.apply(&work.t, &mut work.r, workspace);
         let step = work.step(influence, pressing);
         follow = work.advance(influence, step);
         if work.changes.len() <= I::CHANGES_MAX {
@@ -143,7 +161,7 @@ pub(crate) fn press<I: PressureInfluence>(
             work.u.iter_mut().for_each(|u| *u *= scale);
         } else {
             work.scale_to(influence, pressing, cell);
-            influence.apply(&work.p, &mut work.u);
+            influence.apply(&work.p, &mut work.u, workspace);
         }
     }
     Err(PressureFailure::NotConverged(residual))
@@ -323,18 +341,15 @@ mod tests {
     }
 
     fn solved(pressing: Pressing, start: Vec<f64>) -> Pressed {
-        let mut influence = GridOperator::<f64>::new(CELLS, CELLS, STEP, STEP, MODULUS);
-        let gap = paraboloid();
-        press(
-            &mut influence,
-            &gap,
-            STEP * STEP,
+        let mut workspace = GridWorkspace::<f64>::default();
+        let influence = GridOperator::new([CELLS; 2], [STEP; 2], MODULUS, &mut workspace);
+        let task = PressureTask {
+            gap: &paraboloid(),
+            cell: STEP * STEP,
             pressing,
-            start,
-            1e-9,
-            &Unmonitored,
-        )
-        .unwrap()
+            tolerance: 1e-9,
+        };
+        press(&task, &influence, start, &mut workspace, &Unmonitored).unwrap()
     }
 
     #[test]

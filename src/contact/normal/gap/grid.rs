@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use crate::contact::half_space::grid_operator::GridOperator;
+use crate::contact::half_space::grid_operator::{GridOperator, GridWorkspace};
 use crate::contact::normal::gap::conjugate_gradients::Pressed;
 use crate::contact::normal::gap::edges;
 use crate::contact::normal::gap::search_box::Reach;
@@ -97,9 +97,12 @@ impl PressureGrid {
     }
 
     /// Single precision does for the violations of the contact conditions that are asked for.
-    pub(crate) fn influence(&self, contact_modulus: f64) -> GridOperator<f32> {
-        let ([nx, ny], [dx, dy]) = (self.cells, self.step);
-        GridOperator::new(nx, ny, dx, dy, contact_modulus)
+    pub(crate) fn influence(
+        &self,
+        contact_modulus: f64,
+        workspace: &mut GridWorkspace<f32>,
+    ) -> GridOperator<f32> {
+        GridOperator::new(self.cells, self.step, contact_modulus, workspace)
     }
 
     /// The gap at the centres.

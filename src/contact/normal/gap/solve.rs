@@ -4,9 +4,10 @@
 //! conjugate gradients, each grid started from the one before and shrunk to the contact. Where one grid cannot resolve all
 //! patches, each gets a grid of its own (see `tiles.rs`). At the end the edges are placed between the cells.
 
+use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::answer::{NormalAnswer, NormalError, edge_reached, no_touch};
-use crate::contact::normal::gap::conjugate_gradients::{Pressed, press};
+use crate::contact::normal::gap::conjugate_gradients::{Pressed, PressureTask, press};
 use crate::contact::normal::gap::constants::{
     APPROACH_CHANGE, CELLS_FIRST, COARSER_MAX, GRIDS_MAX, NEAR, PRESSURE_CHANGE, REFINEMENT,
     RESOLUTION, RESOLUTION_COARSE, TARGET_POWER, TARGET_USUAL, TOLERANCE, TOLERANCE_FIRST,
@@ -44,41 +45,39 @@ impl GapTask {
         }
     }
 
-    /// Finds region and pressure.
+    /// Finds region and pressure for a target of the resultants' error, relative to μN: finer below 0.002.
     ///
-    /// Measured on Hertz's contact and on crowns of arcs: approach within 0.02 %, area within 0.3 %, largest pressure
-    /// within 0.3 %.
+    /// Measured on Hertz's contact and on crowns of arcs, from that target on: approach within 0.02 %, area within 0.3 %, largest
+    /// pressure within 0.3 %.
     ///
     /// # Errors
     /// A reason why there is no answer; or the monitor stopped the work.
-    pub fn solve(&self, monitor: &dyn Monitor) -> Result<NormalAnswer, NormalError> {
-        self.solve_on(RESOLUTION, monitor)
+    pub fn solve_for(
+        &self,
+        target: f64,
+        workspace: &mut GridWorkspace<f32>,
+        monitor: &dyn Monitor,
+    ) -> Result<NormalAnswer, NormalError> {
+        self.solve_on(RESOLUTION.for_target(target), workspace, monitor)
     }
 
     /// The same at a third of the cost for whoever looks for a height: forces within some tenths of a per cent, edges
     /// within a cell of a twentieth of the contact. Roughness is not followed.
     ///
     /// # Errors
-    /// As [`GapTask::solve`].
-    pub fn estimate(&self, monitor: &dyn Monitor) -> Result<NormalAnswer, NormalError> {
-        self.solve_on(RESOLUTION_COARSE, monitor)
-    }
-
-    /// The same for a target of the resultants' error, relative to μN: finer below 0.002.
-    ///
-    /// # Errors
-    /// As [`GapTask::solve`].
-    pub fn solve_for(
+    /// As [`GapTask::solve_for`].
+    pub fn estimate(
         &self,
-        target: f64,
+        workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<NormalAnswer, NormalError> {
-        self.solve_on(RESOLUTION.for_target(target), monitor)
+        self.solve_on(RESOLUTION_COARSE, workspace, monitor)
     }
 
     fn solve_on(
         &self,
         resolution: GridFineness,
+        workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<NormalAnswer, NormalError> {
         let mut reach = reach(&self.gap, self.pressing, self.contact_modulus);
@@ -95,7 +94,7 @@ impl GapTask {
         let (mut iterations, mut pressure_change) = (0, 0.0);
         let mut end = NextStep::Rough { capped: false };
         for _ in 0..GRIDS_MAX {
-            let pressed = self.press(&grid, solved.as_ref(), &reach, monitor)?;
+            let pressed = self.press(&grid, solved.as_ref(), &reach, workspace, monitor)?;
             iterations += pressed.iterations;
             if let Some((_, before)) = &solved {
                 pressure_change = before.largest() / pressed.largest() - 1.0;
@@ -124,7 +123,7 @@ impl GapTask {
         let whole = Tile { grid, pressed };
         if end.capped()
             && let Some(found) =
-                self.solve_on_tiles(whole.clone(), reach.least, resolution, monitor)?
+                self.solve_on_tiles(whole.clone(), reach.least, resolution, workspace, monitor)?
         {
             return self.found(GapOutcome {
                 iterations: iterations + found.iterations,
@@ -146,6 +145,7 @@ impl GapTask {
         grid: &PressureGrid,
         before: Option<&(PressureGrid, Pressed)>,
         reach: &Reach,
+        workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<Pressed, NormalError> {
         let gap = grid.gap(&self.gap);
@@ -158,17 +158,14 @@ impl GapTask {
                 TOLERANCE_FIRST,
             ),
         };
-        let mut influence = grid.influence(self.contact_modulus);
-        let cell = grid.step[0] * grid.step[1];
-        let mut pressed = press(
-            &mut influence,
-            &gap,
-            cell,
-            self.pressing,
-            start,
+        let influence = grid.influence(self.contact_modulus, workspace);
+        let task = PressureTask {
+            gap: &gap,
+            cell: grid.step[0] * grid.step[1],
+            pressing: self.pressing,
             tolerance,
-            monitor,
-        )?;
+        };
+        let mut pressed = press(&task, &influence, start, workspace, monitor)?;
         grid.symmetrise(&mut pressed.pressure);
         Ok(pressed)
     }

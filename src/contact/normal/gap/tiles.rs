@@ -7,9 +7,10 @@
 
 use std::ops::Range;
 
+use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::answer::{NormalError, edge_reached};
-use crate::contact::normal::gap::conjugate_gradients::{Pressed, press};
+use crate::contact::normal::gap::conjugate_gradients::{Pressed, PressureTask, press};
 use crate::contact::normal::gap::constants::{
     APPROACH_CHANGE, COARSER_MAX, GRIDS_MAX, NEAR, PRESSURE_CHANGE, REFINEMENT,
 };
@@ -48,6 +49,7 @@ impl GapTask {
         whole: Tile,
         least: f64,
         resolution: GridFineness,
+        workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<Option<GapOutcome>, NormalError> {
         let limits = self.gap.window();
@@ -63,7 +65,7 @@ impl GapTask {
             least,
         };
         for _ in 0..GRIDS_MAX {
-            let tiles = self.press_tiles(grids, &found.tiles, monitor)?;
+            let tiles = self.press_tiles(grids, &found.tiles, workspace, monitor)?;
             let before = std::mem::replace(&mut found.tiles, tiles);
             found.iterations += found.tiles[0].pressed.iterations;
             let peak = |tiles: &[Tile]| tiles.iter().map(Tile::largest).fold(0.0, f64::max);
@@ -105,25 +107,23 @@ impl GapTask {
         &self,
         grids: Vec<PressureGrid>,
         before: &[Tile],
+        workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<Vec<Tile>, NormalError> {
-        let mut influence = TilesInfluence::new(&grids, self.contact_modulus);
+        let influence = TilesInfluence::new(&grids, self.contact_modulus, workspace);
         let (mut gap, mut start) = (Vec::new(), Vec::new());
         for grid in &grids {
             let own = grid.gap(&self.gap);
             start.extend(start_on(grid, before, &own));
             gap.extend(own);
         }
-        let cell = grids[0].step[0] * grids[0].step[1];
-        let pressed = press(
-            &mut influence,
-            &gap,
-            cell,
-            self.pressing,
-            start,
-            TOLERANCE,
-            monitor,
-        )?;
+        let task = PressureTask {
+            gap: &gap,
+            cell: grids[0].step[0] * grids[0].step[1],
+            pressing: self.pressing,
+            tolerance: TOLERANCE,
+        };
+        let pressed = press(&task, &influence, start, workspace, monitor)?;
         let parts = grids.into_iter().zip(influence.ranges);
         let tile = |(grid, range): (PressureGrid, Range<usize>)| {
             let mut pressure = pressed.pressure[range.clone()].to_vec();

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::contact::half_space::grid_operator::GridOperator;
+use crate::contact::half_space::grid_operator::{GridOperator, GridWorkspace};
 use crate::contact::normal::gap::conjugate_gradients::PressureInfluence;
 use crate::contact::normal::gap::coupling::Coupling;
 use crate::contact::normal::gap::grid::PressureGrid;
@@ -20,18 +20,22 @@ pub(crate) struct TilesInfluence {
 }
 
 impl TilesInfluence {
-    pub(crate) fn new(grids: &[PressureGrid], contact_modulus: f64) -> TilesInfluence {
+    pub(crate) fn new(
+        grids: &[PressureGrid],
+        contact_modulus: f64,
+        workspace: &mut GridWorkspace<f32>,
+    ) -> TilesInfluence {
         let own: Vec<GridOperator<f32>> = grids
             .iter()
-            .map(|grid| grid.influence(contact_modulus))
+            .map(|grid| grid.influence(contact_modulus, workspace))
             .collect();
         let (mut ranges, mut area, mut yielding) = (Vec::new(), Vec::new(), Vec::new());
         let first = grids[0].step[0] * grids[0].step[1];
-        for (grid, convolution) in grids.iter().zip(&own) {
+        for (grid, operator) in grids.iter().zip(&own) {
             let count = grid.cells[0] * grid.cells[1];
             ranges.push(area.len()..area.len() + count);
             area.resize(area.len() + count, grid.step[0] * grid.step[1] / first);
-            yielding.resize(yielding.len() + count, own[0].own() / convolution.own());
+            yielding.resize(yielding.len() + count, own[0].own() / operator.own());
         }
         let pairs = (0..grids.len()).flat_map(|to| (0..grids.len()).map(move |from| (to, from)));
         let couplings = pairs
@@ -54,10 +58,17 @@ impl TilesInfluence {
 impl PressureInfluence for TilesInfluence {
     // A change acts on every other grid: a whole product costs less than adding one by one.
     const CHANGES_MAX: usize = 0;
+    type Workspace = GridWorkspace<f32>;
 
-    fn apply(&mut self, pressure: &[f64], displacement: &mut [f64]) {
-        for (range, own) in self.ranges.iter().zip(&mut self.own) {
-            own.apply(&pressure[range.clone()], &mut displacement[range.clone()]);
+    fn apply(
+        &self,
+        pressure: &[f64],
+        displacement: &mut [f64],
+        workspace: &mut GridWorkspace<f32>,
+    ) {
+        for (range, own) in self.ranges.iter().zip(&self.own) {
+            let displacement = &mut displacement[range.clone()];
+            own.apply(&pressure[range.clone()], displacement, workspace);
         }
         for (to, from, coupling) in &self.couplings {
             let [to, from] = [to, from].map(|k| self.ranges[*k].clone());

@@ -10,6 +10,7 @@ use std::f64::consts::PI;
 use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::local_gap::{Detail, LocalGap};
+use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::answer::{NormalError, NormalWork};
 use crate::contact::normal::gap::surface::GapSurface;
@@ -209,19 +210,20 @@ impl WheelTask {
         search: &ContactLocus,
         wanted: NormalPass,
         before: Option<&PressedWheel>,
+        workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<PressedWheel, NormalError> {
         let target = match self.loading {
             WheelLoad::Vertical(force) => force / (1.0 + wanted.friction_share),
             WheelLoad::Normal(force) => force,
             WheelLoad::Lowering(lowering) => {
-                return self.lowered(search, lowering, Fineness::fine(wanted), monitor);
+                let fineness = Fineness::fine(wanted);
+                return self.lowered(search, lowering, fineness, workspace, monitor);
             }
         };
         let tolerance = wanted.accuracy.tolerance();
         let exact = matches!(wanted.accuracy, Accuracy::For(_));
-        let mut bracket = Bracket::default();
-        let mut fineness = Fineness::fine(wanted);
+        let (mut bracket, mut fineness) = (Bracket::default(), Fineness::fine(wanted));
         let starts_near = before.is_some_and(|before| near(before.found[0], target));
         if !(exact && starts_near) {
             fineness.detail = Detail::Coarse;
@@ -231,7 +233,7 @@ impl WheelTask {
             None => search.estimated_lowering(target / self.contact_modulus),
         };
         for heights in 1..=HEIGHTS_MAX {
-            let mut found = match self.looked_at(search, lowering, fineness, monitor) {
+            let mut found = match self.looked_at(search, lowering, fineness, workspace, monitor) {
                 Ok(found) => found,
                 Err(NormalError::NoAnswer(reason)) => {
                     // Too deep, perhaps; the load may be carried higher up.
@@ -247,10 +249,10 @@ impl WheelTask {
             found.found[1] = bracket.slope.or(known).unwrap_or(slope);
             found.heights = heights;
             let missed = (carried / target - 1.0).abs();
+            let fine = fineness.detail == Detail::Fine;
             if missed <= tolerance && !exact {
                 return Ok(found);
             }
-            let fine = fineness.detail == Detail::Fine;
             if missed <= tolerance && fine {
                 return Ok(found.at_rest(HeightExit::Met { missed }, target));
             }
@@ -280,15 +282,16 @@ impl WheelTask {
         search: &ContactLocus,
         lowering: f64,
         fineness: Fineness,
+        workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<PressedWheel, NormalError> {
-        match self.lowered(search, lowering, fineness, monitor) {
+        match self.lowered(search, lowering, fineness, workspace, monitor) {
             Err(NormalError::NoAnswer(_)) if fineness.detail == Detail::Coarse => {
                 let fine = Fineness {
                     detail: Detail::Fine,
                     ..fineness
                 };
-                self.lowered(search, lowering, fine, monitor)
+                self.lowered(search, lowering, fine, workspace, monitor)
             }
             found => found,
         }
@@ -300,6 +303,7 @@ impl WheelTask {
         search: &ContactLocus,
         lowering: f64,
         fineness: Fineness,
+        workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<PressedWheel, NormalError> {
         let centre = search.touch - lowering;
@@ -310,7 +314,7 @@ impl WheelTask {
         let least = DEPTH_SHARE_MIN * depths.iter().copied().fold(0.0, f64::max);
         let touching = gaps.iter().zip(&depths).filter(|(_, d)| **d > least);
         let patches = touching
-            .map(|(gap, depth)| self.pressed(gap, *depth, centre, fineness, monitor))
+            .map(|(gap, depth)| self.pressed(gap, *depth, centre, fineness, workspace, monitor))
             .collect::<Result<Vec<_>, _>>()?;
         if patches.is_empty() {
             return Err(NormalError::NoAnswer(
@@ -339,6 +343,7 @@ impl WheelTask {
         depth: f64,
         centre: f64,
         fineness: Fineness,
+        workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<PressedGap, NormalError> {
         if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.0) {
@@ -355,8 +360,8 @@ impl WheelTask {
             contact_modulus: self.contact_modulus,
         };
         let found = match fineness.detail {
-            Detail::Coarse => contact.estimate(monitor)?,
-            Detail::Fine => contact.solve_for(fineness.target, monitor)?,
+            Detail::Coarse => contact.estimate(workspace, monitor)?,
+            Detail::Fine => contact.solve_for(fineness.target, workspace, monitor)?,
         };
         let mut remarks = found.remarks;
         remarks.extend(missed_beside(gap, &found.field));

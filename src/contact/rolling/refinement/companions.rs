@@ -74,14 +74,15 @@ impl Companion {
             Err(error) => return Err(error),
         };
         let (fine, level) = (levels.get(number), levels.get(companion));
-        let start = nested_tractions(fine, &answer.traction, level);
+        let start = nested_tractions(&fine, &answer.traction, &level);
         let motion = level.scale.motion(motion);
         let tolerance = task.tolerance();
-        match boundary_element::trapezoid(level, &motion, &start, tolerance, monitor) {
+        let workspace = &mut levels.workspace;
+        match boundary_element::trapezoid(&level, &motion, &start, tolerance, workspace, monitor) {
             Ok((traction, work)) => {
                 let patches = task.footprint.patches().len();
                 let found = (0..patches)
-                    .map(|p| Resultants::of_patch(level, &traction, p))
+                    .map(|p| Resultants::of_patch(&level, &traction, p))
                     .collect();
                 let reach = self.reach(fine.plan.size, plan.size);
                 Ok((CompanionAnswer::Found(found, reach), work))

@@ -6,6 +6,7 @@ use crate::contact::monitor::Monitor;
 use crate::contact::rolling::answer::{LevelAnswer, LevelFailure, Work};
 use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::methods::boundary_element::solve as boundary_element;
+use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use crate::contact::rolling::methods::liu_hsu::on_level;
 use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::methods::{fastsim, full_slip};
@@ -99,18 +100,20 @@ pub fn solve_level(
         .as_ref()
         .map(|point| (levels.get(point.level), &point.tangential));
     let motion = level.scale.motion(&asked.motion);
-    let warm = levels.sweep.start(number, level, &motion);
-    let start = warm.or_else(|| below.map(|(coarse, answer)| nested_start(coarse, answer, level)));
-    let tangential = run_method(task, level, &asked.motion, start, monitor)
+    let warm = levels.sweep.start(number, &level, &motion);
+    let start =
+        warm.or_else(|| below.map(|(coarse, answer)| nested_start(&coarse, answer, &level)));
+    let workspace = &mut levels.workspace;
+    let tangential = run_method(task, &level, &asked.motion, start, workspace, monitor)
         .map_err(|f| named(f, task, task.first_motion + asked.index))?;
     let patches = task.footprint.patches().len();
     let summed: Vec<Resultants> = (0..patches)
-        .map(|p| Resultants::of_patch(level, &tangential.traction, p))
+        .map(|p| Resultants::of_patch(&level, &tangential.traction, p))
         .collect();
     let before = coarser
         .as_ref()
-        .and_then(|point| before(levels, level, point));
-    let finer = finer_for_sums(task, level, asked, &tangential);
+        .and_then(|point| before(levels, &level, point));
+    let finer = finer_for_sums(task, &level, asked, &tangential);
     let circumstances = EstimateContext {
         motion: &asked.motion,
         before,
@@ -118,7 +121,7 @@ pub fn solve_level(
         slenderness: levels.policy.slenderness(),
         tolerance: task.tolerance(),
     };
-    let indicators = Indicators::of_level(task, level, &tangential, &summed, circumstances);
+    let indicators = Indicators::of_level(task, &level, &tangential, &summed, circumstances);
     levels.sweep.remember(number, motion, &tangential);
     levels.path.push(number);
     let mut work = coarser.as_ref().map_or(Work::default(), |point| point.work);
@@ -204,6 +207,7 @@ fn run_method(
     level: &StripMesh,
     motion: &Motion,
     start: Option<Start>,
+    workspace: &mut NewtonWorkspace,
     monitor: &dyn Monitor,
 ) -> Result<LevelAnswer, LevelFailure> {
     if task.friction.is_frictionless() {
@@ -217,5 +221,6 @@ fn run_method(
     if task.method == Method::Fastsim {
         return Ok(fastsim::solve(task, level, &motion));
     }
-    boundary_element::solve(level, &motion, start.as_ref(), task.tolerance(), monitor)
+    let (start, tolerance) = (start.as_ref(), task.tolerance());
+    boundary_element::solve(level, &motion, start, tolerance, workspace, monitor)
 }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::contact::error::SolveError;
 use crate::contact::rolling::mesh_plan::MeshPlan;
+use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use crate::contact::rolling::operator_store::{CaseOperators, OperatorStore};
 use crate::contact::rolling::refinement::mesh_policy::MeshPolicy;
 use crate::contact::rolling::refinement::warm_start::SweepState;
@@ -20,7 +21,7 @@ pub struct Levels<'a> {
     task: &'a RollingTask<'a>,
     operators: Arc<CaseOperators>,
     /// With their numbers, which are never given twice, in the order of their last use.
-    kept: Vec<(usize, StripMesh)>,
+    kept: Vec<(usize, Arc<StripMesh>)>,
     made: usize,
     /// What the motions solved so far left on the levels.
     pub sweep: SweepState,
@@ -30,6 +31,8 @@ pub struct Levels<'a> {
     pub begin: Option<MeshPlan>,
     /// Which meshes suit the patches.
     pub policy: MeshPolicy,
+    /// Buffers of the iterations, of all motions and levels.
+    pub workspace: NewtonWorkspace,
 }
 
 impl<'a> Levels<'a> {
@@ -45,6 +48,7 @@ impl<'a> Levels<'a> {
             path: Vec::new(),
             begin: None,
             policy: MeshPolicy::new(task.footprint),
+            workspace: NewtonWorkspace::default(),
         }
     }
 
@@ -60,19 +64,19 @@ impl<'a> Levels<'a> {
         }
         let operators = Arc::clone(&self.operators);
         let level = StripMesh::with_operators(self.task, plan, operators)?;
-        self.kept.push((self.made, level));
+        self.kept.push((self.made, Arc::new(level)));
         self.made += 1;
         Ok(self.made - 1)
     }
 
     /// A level by its number; it must have been used since the last [`Levels::trim`], or lie on the path.
     #[must_use]
-    pub fn get(&self, level: usize) -> &StripMesh {
+    pub fn get(&self, level: usize) -> Arc<StripMesh> {
         let found = self.kept.iter().rev().find(|(number, _)| *number == level);
         let Some((_, level)) = found else {
             unreachable!("level {level} was dropped while it was in use")
         };
-        level
+        Arc::clone(level)
     }
 
     /// Drops the least recently used levels beyond [`LEVELS_KEPT`], and what motions left on them. Called between motions: no answer

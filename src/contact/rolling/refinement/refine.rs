@@ -66,7 +66,7 @@ fn on_mesh(
     let number = levels.level(size.into())?;
     let level = levels.get(number);
     let motion = level.scale.motion(&asked.motion);
-    let started = levels.sweep.start(number, level, &motion).is_some();
+    let started = levels.sweep.start(number, &level, &motion).is_some();
     if !started && cells(size) >= CELLS_NESTED && 2 * cells(half) <= cells(size) {
         coarser = match on_mesh(task, levels, asked, half, monitor) {
             Ok(point) => Some(point),
@@ -231,7 +231,7 @@ fn begin_on(
     let number = levels.level(plan)?;
     let level = levels.get(number);
     let motion = level.scale.motion(&asked.motion);
-    if levels.sweep.start(number, level, &motion).is_none() {
+    if levels.sweep.start(number, &level, &motion).is_none() {
         return Ok(None);
     }
     let solved = solve_level(task, levels, asked, plan, None, monitor)?;
@@ -249,5 +249,5 @@ fn begin_on(
 /// What the tractions of a solved level look like.
 fn regime_of(levels: &Levels, asked: MotionTask, point: &MotionAnswer) -> Regime {
     let spinning = asked.motion.spin_per_mm != 0.0;
-    regime(levels.get(point.level), &point.tangential, spinning)
+    regime(&levels.get(point.level), &point.tangential, spinning)
 }

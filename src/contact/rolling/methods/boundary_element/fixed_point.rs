@@ -3,6 +3,7 @@
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
 use crate::contact::rolling::methods::boundary_element::task::{Convergence, NewtonTask};
+use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 
 /// Rigid slip above this, in the same units, makes the fixed point worth trying.
 const FIXED_POINT_FROM: f64 = 30.0;
@@ -17,9 +18,10 @@ const SWEEPS_MAX: u32 = 12;
 /// # Errors
 /// Only if the monitor stops the work.
 pub fn fixed_point(
-    newton: &mut Newton,
+    newton: &Newton,
     law: &NewtonTask,
     t: &mut [f64],
+    workspace: &mut NewtonWorkspace,
     monitor: &dyn Monitor,
 ) -> Result<Option<Convergence>, Stop> {
     let padded = t.len() / 2;
@@ -49,13 +51,13 @@ pub fn fixed_point(
         if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.0) {
             return Err(stop);
         }
-        report.residual = newton.evaluate(law, t, &mut report);
+        report.residual = newton.evaluate(law, t, workspace, &mut report);
         report.iterations += 1;
         if report.residual <= law.tolerance {
-            report.converged = (0..cells).all(|i| newton.slips(law.bound, t, i));
+            report.converged = (0..cells).all(|i| newton.slips(law.bound, t, workspace.slip(), i));
             return Ok(report.converged.then_some(report));
         }
-        follow(t, newton.slip());
+        follow(t, workspace.slip());
     }
     Ok(None)
 }

@@ -6,3 +6,4 @@ pub mod newton;
 pub mod preconditioner;
 pub mod solve;
 pub mod task;
+pub mod workspace;

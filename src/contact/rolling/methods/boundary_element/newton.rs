@@ -9,12 +9,15 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::numerics::gmres::{Gmres, LinearSystem};
+use crate::contact::numerics::gmres::LinearSystem;
 use crate::contact::rolling::methods::boundary_element::linearisation::Linearisation;
 use crate::contact::rolling::methods::boundary_element::preconditioner::StripFactors;
 use crate::contact::rolling::methods::boundary_element::task::{Convergence, NewtonTask};
+use crate::contact::rolling::methods::boundary_element::workspace::{
+    NewtonWorkspace, StepVectors, zeroed,
+};
 use crate::contact::rolling::own_blocks::OwnBlocks;
-use crate::contact::rolling::slip_equations::SlipEquations;
+use crate::contact::rolling::slip_equations::{SlipEquations, SlipScratch};
 
 /// Projection parameter times `M_ii`.
 const PROJECTION: f64 = 0.3;
@@ -31,57 +34,30 @@ const INNER_TOLERANCE: (f64, f64) = (1e-4, 1e-1);
 /// The residual may grow by this factor against the largest of the last steps before a step is halved.
 const GROWTH_ALLOWED: f64 = 1.5;
 
-/// Solver for one rule on one mesh; keeps its factors and buffers between solves.
+/// Solver for one rule on one mesh. It is not changed by a solve, and threads may share it.
+#[derive(Debug)]
 pub struct Newton<'a> {
     equations: &'a SlipEquations<'a>,
     own: Arc<OwnBlocks>,
     /// Projection parameter r of every cell.
     parameter: Vec<f64>,
-    blocks: StripFactors,
-    gmres: Gmres,
-    linear: Linearisation,
-    /// What brings each slipping cell from its traction to the tangent of its disc.
-    lift: Vec<(f64, f64)>,
-    slip: Vec<f64>,
-    scratch: Vec<f64>,
-    expanded: Vec<f64>,
-    steps: NewtonScratch,
-}
-
-/// Vectors that one Newton step after the other uses.
-#[derive(Debug, Default)]
-pub(crate) struct NewtonScratch {
-    step: Vec<f64>,
-    rhs: Vec<f64>,
-    best: Vec<f64>,
-    before: Vec<f64>,
-    candidate: Vec<f64>,
 }
 
 impl<'a> Newton<'a> {
-    /// Prepares the own blocks and the buffers.
+    /// Collects the own blocks.
     #[must_use]
     pub fn new(equations: &'a SlipEquations<'a>) -> Newton<'a> {
         Newton::with_blocks(equations, Arc::new(OwnBlocks::new(equations)))
     }
 
-    /// Prepares the buffers; the own blocks are those of the equations.
+    /// A solver with own blocks that exist already; they are those of the equations.
     #[must_use]
     pub fn with_blocks(equations: &'a SlipEquations<'a>, own: Arc<OwnBlocks>) -> Newton<'a> {
         let diagonal = own.diagonal(equations);
-        let length = 2 * equations.padded();
         Newton {
             equations,
             parameter: diagonal.iter().map(|m| PROJECTION / m.abs()).collect(),
             own,
-            blocks: StripFactors::default(),
-            gmres: Gmres::default(),
-            linear: Linearisation::default(),
-            lift: vec![(0.0, 0.0); equations.cells()],
-            slip: vec![0.0; length],
-            scratch: vec![0.0; 2 * equations.row_count()],
-            expanded: vec![0.0; length],
-            steps: NewtonScratch::default(),
         }
     }
 
@@ -109,9 +85,10 @@ impl<'a> Newton<'a> {
     /// # Errors
     /// Only if the monitor stops the work.
     pub fn solve(
-        &mut self,
+        &self,
         law: &NewtonTask,
         t: &mut [f64],
+        workspace: &mut NewtonWorkspace,
         monitor: &dyn Monitor,
     ) -> Result<Convergence, Stop> {
         let mut report = Convergence {
@@ -121,21 +98,19 @@ impl<'a> Newton<'a> {
             residual: f64::INFINITY,
             inexact_steps: 0,
         };
-        let NewtonScratch {
-            mut step,
-            mut rhs,
-            mut best,
-            mut before,
-            mut candidate,
-        } = std::mem::take(&mut self.steps);
-        for values in [&mut step, &mut rhs, &mut best, &mut before, &mut candidate] {
-            values.clear();
-            values.extend_from_slice(t);
-        }
+        let mut vectors = std::mem::take(&mut workspace.vectors);
+        vectors.copy(t);
+        let StepVectors {
+            step,
+            rhs,
+            best,
+            before,
+            candidate,
+        } = &mut vectors;
         let mut least = f64::INFINITY;
         let mut recent = [0.0_f64; 3];
         let mut last = f64::INFINITY;
-        report.residual = self.evaluate(law, t, &mut report);
+        report.residual = self.evaluate(law, t, workspace, &mut report);
         while report.iterations < ITERATIONS_MAX {
             if report.residual < least {
                 least = report.residual;
@@ -147,43 +122,39 @@ impl<'a> Newton<'a> {
             }
             recent[report.iterations as usize % 3] = report.residual;
             before.copy_from_slice(t);
-            self.linearise(law, t, &mut rhs, &mut report);
-            self.blocks.factor(&self.own, self.equations, &self.linear);
+            self.linearise(law, t, rhs, workspace, &mut report);
+            let NewtonWorkspace { blocks, linear, .. } = &mut *workspace;
+            blocks.factor(&self.own, self.equations, linear);
             let inner = inner_tolerance(report.residual, last, law.tolerance);
-            self.linear_step(&rhs, inner, &mut step, monitor, &mut report)?;
+            self.linear_step(rhs, inner, step, workspace, monitor, &mut report)?;
             last = report.residual;
-            self.candidate(law, t, &step, &mut candidate);
-            t.copy_from_slice(&candidate);
-            report.residual = self.evaluate(law, t, &mut report);
+            self.candidate(law, t, step, &workspace.linear, candidate);
+            t.copy_from_slice(candidate);
+            report.residual = self.evaluate(law, t, workspace, &mut report);
             let allowed = if report.iterations < FREE_STEPS {
                 f64::INFINITY
             } else {
                 GROWTH_ALLOWED * recent.iter().copied().fold(0.0, f64::max)
             };
-            self.halve(law, [&before, &candidate], allowed, t, &mut report);
+            self.halve(law, [before, candidate], allowed, t, workspace, &mut report);
             report.iterations += 1;
         }
         if !report.converged {
             report.residual = least;
-            t.copy_from_slice(&best);
+            t.copy_from_slice(best);
         }
-        self.steps = NewtonScratch {
-            step,
-            rhs,
-            best,
-            before,
-            candidate,
-        };
+        workspace.vectors = vectors;
         Ok(report)
     }
 
     /// Halves the step between two iterates until the residual is no more than is allowed, but not too often.
     fn halve(
-        &mut self,
+        &self,
         law: &NewtonTask,
         [before, candidate]: [&[f64]; 2],
         allowed: f64,
         t: &mut [f64],
+        workspace: &mut NewtonWorkspace,
         report: &mut Convergence,
     ) {
         let mut halvings = 0;
@@ -193,40 +164,37 @@ impl<'a> Newton<'a> {
             for i in 0..t.len() {
                 t[i] = before[i] + share * (candidate[i] - before[i]);
             }
-            report.residual = self.evaluate(law, t, report);
+            report.residual = self.evaluate(law, t, workspace, report);
         }
     }
 
-    /// The slips `q + M T` of the last evaluated iterate, x then y.
+    /// Does a cell slip under tractions `t` with the slips that they cause?
     #[must_use]
-    pub fn slip(&self) -> &[f64] {
-        &self.slip
-    }
-
-    /// Does a cell of the last evaluated iterate slip?
-    #[must_use]
-    pub fn slips(&self, bound: &[f64], t: &[f64], cell: usize) -> bool {
+    pub fn slips(&self, bound: &[f64], t: &[f64], slip: &[f64], cell: usize) -> bool {
         let padded = self.equations.padded();
         let r = self.parameter[cell];
         let (zx, zy) = (
-            t[cell] + r * self.slip[cell],
-            t[padded + cell] + r * self.slip[padded + cell],
+            t[cell] + r * slip[cell],
+            t[padded + cell] + r * slip[padded + cell],
         );
         (zx * zx + zy * zy).sqrt() > bound[cell]
     }
 
-    /// Computes the slips of `t` and the residual of the projected law.
-    pub fn evaluate(&mut self, law: &NewtonTask, t: &[f64], report: &mut Convergence) -> f64 {
+    /// Computes the slips of `t` and the residual of the projected law; the slips are left in the workspace.
+    pub fn evaluate(
+        &self,
+        law: &NewtonTask,
+        t: &[f64],
+        workspace: &mut NewtonWorkspace,
+        report: &mut Convergence,
+    ) -> f64 {
         let padded = self.equations.padded();
-        self.equations.elastic(t, &mut self.slip, &mut self.scratch);
-        report.products += 1;
-        for (s, q) in self.slip.iter_mut().zip(law.rigid) {
-            *s += q;
-        }
+        self.slip(law, t, workspace, report);
+        let slip = &workspace.slip;
         let (mut sum, mut weight) = (0.0, 0.0);
         for i in 0..self.equations.cells() {
             let (tx, ty, r) = (t[i], t[padded + i], self.parameter[i]);
-            let (zx, zy) = (tx + r * self.slip[i], ty + r * self.slip[padded + i]);
+            let (zx, zy) = (tx + r * slip[i], ty + r * slip[padded + i]);
             let length = (zx * zx + zy * zy).sqrt();
             let shrink = if length > law.bound[i] {
                 law.bound[i] / length
@@ -239,66 +207,85 @@ impl<'a> Newton<'a> {
         (sum / weight).sqrt() / law.scale
     }
 
+    /// Computes the slips `q + M T`.
+    fn slip(
+        &self,
+        law: &NewtonTask,
+        t: &[f64],
+        workspace: &mut NewtonWorkspace,
+        report: &mut Convergence,
+    ) {
+        let NewtonWorkspace { slip, product, .. } = workspace;
+        zeroed(slip, 2 * self.equations.padded());
+        self.equations.elastic(t, slip, product);
+        report.products += 1;
+        for (s, q) in slip.iter_mut().zip(law.rigid) {
+            *s += q;
+        }
+    }
+
     /// Sorts the cells into stick and slip by the last slips, moves `t` of slipping cells to the tangent of the disc,
     /// and sets up the right-hand side there.
     fn linearise(
-        &mut self,
+        &self,
         law: &NewtonTask,
         t: &mut [f64],
         rhs: &mut [f64],
+        workspace: &mut NewtonWorkspace,
         report: &mut Convergence,
     ) {
         let residual = report.residual;
         let (padded, cells) = (self.equations.padded(), self.equations.cells());
-        self.linear.direction.clear();
-        self.linear.stiffness.clear();
+        let NewtonWorkspace {
+            linear,
+            to_tangent,
+            slip,
+            ..
+        } = &mut *workspace;
+        linear.direction.clear();
+        linear.stiffness.clear();
+        to_tangent.clear();
         let (mut lifted, mut weight) = (0.0, 0.0);
         for i in 0..cells {
             let r = self.parameter[i];
-            let (zx, zy) = (
-                t[i] + r * self.slip[i],
-                t[padded + i] + r * self.slip[padded + i],
-            );
+            let (zx, zy) = (t[i] + r * slip[i], t[padded + i] + r * slip[padded + i]);
             let (length, bound) = ((zx * zx + zy * zy).sqrt(), law.bound[i]);
             weight += law.area[i];
             if length <= bound {
-                self.linear.direction.push((1.0, 0.0));
-                self.linear.stiffness.push(-1.0);
-                self.lift[i] = (0.0, 0.0);
+                linear.direction.push((1.0, 0.0));
+                linear.stiffness.push(-1.0);
+                to_tangent.push((0.0, 0.0));
                 continue;
             }
             let (dx, dy) = (zx / length, zy / length);
-            self.linear.direction.push((-dy, dx));
+            linear.direction.push((-dy, dx));
             // A cell without pressure has no freedom: an infinite stiffness would spoil the factors, a large one serves.
             let stiffness = if bound > 0.0 {
                 (length - bound) / (bound * r)
             } else {
                 1e12 / r
             };
-            self.linear.stiffness.push(stiffness.min(1e12 / r));
+            linear.stiffness.push(stiffness.min(1e12 / r));
             let lift = bound - (dx * t[i] + dy * t[padded + i]);
-            self.lift[i] = (lift * dx, lift * dy);
+            to_tangent.push((lift * dx, lift * dy));
             lifted += law.area[i] * lift * lift;
         }
         // Near the solution the tangent differs from the circle by less than the step will leave over.
         if (lifted / weight).sqrt() > LIFT_NEGLIGIBLE * residual * law.scale {
-            for (i, (x, y)) in self.lift[..cells].iter().enumerate() {
+            for (i, (x, y)) in to_tangent.iter().enumerate() {
                 t[i] += x;
                 t[padded + i] += y;
             }
-            self.equations.elastic(t, &mut self.slip, &mut self.scratch);
-            report.products += 1;
-            for (s, q) in self.slip.iter_mut().zip(law.rigid) {
-                *s += q;
-            }
+            self.slip(law, t, workspace, report);
         }
+        let NewtonWorkspace { linear, slip, .. } = workspace;
         rhs.fill(0.0);
         for i in 0..cells {
-            let (sx, sy) = (self.slip[i], self.slip[padded + i]);
-            if self.linear.slips(i) {
-                let (ux, uy) = self.linear.direction[i];
+            let (sx, sy) = (slip[i], slip[padded + i]);
+            if linear.slips(i) {
+                let (ux, uy) = linear.direction[i];
                 let along = ux * t[i] + uy * t[padded + i];
-                rhs[i] = self.linear.stiffness[i] * along - (ux * sx + uy * sy);
+                rhs[i] = linear.stiffness[i] * along - (ux * sx + uy * sy);
             } else {
                 rhs[i] = -sx;
                 rhs[padded + i] = -sy;
@@ -308,35 +295,53 @@ impl<'a> Newton<'a> {
 
     /// Solves the linear system to a relative tolerance.
     fn linear_step(
-        &mut self,
+        &self,
         rhs: &[f64],
         tolerance: f64,
         step: &mut [f64],
+        workspace: &mut NewtonWorkspace,
         monitor: &dyn Monitor,
         report: &mut Convergence,
     ) -> Result<(), Stop> {
+        let NewtonWorkspace {
+            blocks,
+            gmres,
+            linear,
+            slip,
+            product,
+            expanded,
+            ..
+        } = workspace;
+        zeroed(expanded, step.len());
         let mut system = NewtonSystem {
             equations: self.equations,
-            linear: &self.linear,
-            blocks: &mut self.blocks,
-            scratch: &mut self.scratch,
-            expanded: &mut self.expanded,
-            slip: &mut self.slip,
+            linear,
+            blocks,
+            product,
+            expanded,
+            slip,
             monitor,
         };
-        let linear = self.gmres.solve(&mut system, rhs, tolerance, step)?;
-        report.products += linear.products;
-        report.inexact_steps += u32::from(!linear.exit.converged());
+        let report_of_step = gmres.solve(&mut system, rhs, tolerance, step)?;
+        report.products += report_of_step.products;
+        report.inexact_steps += u32::from(!report_of_step.exit.converged());
         Ok(())
     }
 
     /// `next` is `t` plus the step, slipping cells brought back to the circle.
-    fn candidate(&self, law: &NewtonTask, t: &[f64], step: &[f64], next: &mut [f64]) {
+    fn candidate(
+        &self,
+        law: &NewtonTask,
+        t: &[f64],
+        step: &[f64],
+        linear: &Linearisation,
+        next: &mut [f64],
+    ) {
         let padded = self.equations.padded();
         next.copy_from_slice(t);
         for i in 0..self.equations.cells() {
-            if self.linear.slips(i) {
-                let (ux, uy) = self.linear.direction[i];
+            if linear.slips(i) {
+                let (ux, uy) = linear.direction[i];
                 let (x, y) = (t[i] + ux * step[i], t[padded + i] + uy * step[i]);
                 let length = x.hypot(y);
                 let factor = if length > 0.0 {
@@ -372,7 +377,7 @@ struct NewtonSystem<'a> {
     equations: &'a SlipEquations<'a>,
     linear: &'a Linearisation,
     blocks: &'a mut StripFactors,
-    scratch: &'a mut [f64],
+    product: &'a mut SlipScratch,
     expanded: &'a mut [f64],
     slip: &'a mut [f64],
     monitor: &'a dyn Monitor,
@@ -392,7 +397,7 @@ impl LinearSystem for NewtonSystem<'_> {
             }
         }
         self.equations
-            .elastic(self.expanded, self.slip, self.scratch);
+            .elastic(self.expanded, self.slip, self.product);
         out.fill(0.0);
         for i in 0..cells {
             let (sx, sy) = (self.slip[i], self.slip[padded + i]);

@@ -51,7 +51,7 @@ impl StripFactors {
         self.offsets.clear();
         self.factors.clear();
         let padded = equations.padded();
-        for (j, (xx, yy)) in own.blocks.iter().enumerate() {
+        for (j, (xx, yy)) in own.blocks().enumerate() {
             let cells = equations.segment(j);
             if cells.clone().any(|i| linear.slips(i)) {
                 let start = self.open_block();

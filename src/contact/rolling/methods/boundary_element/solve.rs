@@ -13,6 +13,7 @@ use crate::contact::rolling::answer::{LevelAnswer, LevelFailure, Work, project_o
 use crate::contact::rolling::methods::boundary_element::fixed_point::fixed_point;
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
 use crate::contact::rolling::methods::boundary_element::task::{Convergence, NewtonTask};
+use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use crate::contact::rolling::methods::full_slip;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::LevelOperator;
@@ -32,6 +33,7 @@ pub fn solve(
     motion: &Motion,
     start: Option<&Start>,
     tolerance: f64,
+    workspace: &mut NewtonWorkspace,
     monitor: &dyn Monitor,
 ) -> Result<LevelAnswer, LevelFailure> {
     if let Some(answer) = full_slip::rigid_answer(level, motion) {
@@ -39,7 +41,12 @@ pub fn solve(
     }
     let operator = level.operator(monitor)?;
     let parity = level.parity(motion);
-    let mut solve = RuleSequence::new(level, motion, &operator, parity, tolerance, monitor);
+    let control = Control {
+        tolerance,
+        workspace,
+        monitor,
+    };
+    let mut solve = RuleSequence::new(level, motion, &operator, parity, control);
     let mut skipped = Vec::new();
     if parity.is_some() {
         skipped.push("mirror symmetry of patch and motion: half the cells".to_owned());
@@ -85,6 +92,7 @@ pub fn trapezoid(
     motion: &Motion,
     start: &[Vec<f64>; 2],
     tolerance: f64,
+    workspace: &mut NewtonWorkspace,
     monitor: &dyn Monitor,
 ) -> Result<([Vec<f64>; 2], Work), LevelFailure> {
     if let Some(answer) = full_slip::rigid_answer(level, motion) {
@@ -92,7 +100,12 @@ pub fn trapezoid(
     }
     let operator = level.operator(monitor)?;
     let parity = level.parity(motion);
-    let mut solve = RuleSequence::new(level, motion, &operator, parity, tolerance, monitor);
+    let control = Control {
+        tolerance,
+        workspace,
+        monitor,
+    };
+    let mut solve = RuleSequence::new(level, motion, &operator, parity, control);
     let mut t = solve.start(Some(start));
     let Some(slips) = solve.trapezoid(&mut t, None)? else {
         return Err(LevelFailure::NotConverged {
@@ -126,6 +139,13 @@ struct ThreePointAnswer {
     by_fixed_point: bool,
 }
 
+/// How exactly to solve, with which buffers, and who may stop it.
+struct Control<'a> {
+    tolerance: f64,
+    workspace: &'a mut NewtonWorkspace,
+    monitor: &'a dyn Monitor,
+}
+
 /// One motion on one level.
 struct RuleSequence<'a> {
     level: &'a StripMesh,
@@ -134,9 +154,8 @@ struct RuleSequence<'a> {
     parity: Option<Parity>,
     bound: Vec<f64>,
     area: Vec<f64>,
-    tolerance: f64,
+    control: Control<'a>,
     work: Work,
-    monitor: &'a dyn Monitor,
 }
 
 impl<'a> RuleSequence<'a> {
@@ -145,8 +164,7 @@ impl<'a> RuleSequence<'a> {
         motion: &'a Motion,
         operator: &'a LevelOperator,
         parity: Option<Parity>,
-        tolerance: f64,
-        monitor: &'a dyn Monitor,
+        control: Control<'a>,
     ) -> RuleSequence<'a> {
         let padded = operator.influence.padded(parity);
         let resized = |values: &[f64]| {
@@ -161,9 +179,8 @@ impl<'a> RuleSequence<'a> {
             parity,
             bound: resized(&level.bound),
             area: resized(&level.normalised.areas()),
-            tolerance,
+            control,
             work: Work::default(),
-            monitor,
         }
     }
 
@@ -190,7 +207,12 @@ impl<'a> RuleSequence<'a> {
         let padded = self.operator.influence.padded(self.parity);
         let mut t = vec![0.0; 2 * padded];
         if let Some([x, y]) = start {
-            let unknowns = self.equations(Rule::Upwind).cells();
+            let cells = self.level.mesh.cells();
+            let unknowns = if self.parity.is_some() {
+                cells / 2
+            } else {
+                cells
+            };
             t[..unknowns].copy_from_slice(&x[..unknowns]);
             t[padded..padded + unknowns].copy_from_slice(&y[..unknowns]);
         }
@@ -200,7 +222,7 @@ impl<'a> RuleSequence<'a> {
     /// Solves one rule from `t`; `shortcut` allows the fixed point.
     fn rule(
         &mut self,
-        newton: &mut Newton,
+        newton: &Newton,
         rigid: &[f64],
         t: &mut [f64],
         shortcut: bool,
@@ -211,17 +233,20 @@ impl<'a> RuleSequence<'a> {
             bound: &self.bound,
             area: &self.area,
             scale: (largest * newton.compliance()).min(1.0),
-            tolerance: self.tolerance,
+            tolerance: self.control.tolerance,
         };
+        let Control {
+            workspace, monitor, ..
+        } = &mut self.control;
         let settled = if shortcut {
-            fixed_point(newton, &law, t, self.monitor)?
+            fixed_point(newton, &law, t, workspace, *monitor)?
         } else {
             None
         };
         let by_fixed_point = settled.is_some();
         let report = match settled {
             Some(report) => report,
-            None => newton.solve(&law, t, self.monitor)?,
+            None => newton.solve(&law, t, workspace, *monitor)?,
         };
         self.work.add(Work {
             iterations: report.iterations,
@@ -236,35 +261,36 @@ impl<'a> RuleSequence<'a> {
     fn mirror(&mut self, t: &mut [f64], started: bool) -> Result<ThreePointAnswer, LevelFailure> {
         let equations = self.equations(Rule::ThreePoint);
         let rigid = equations.rigid(self.motion);
-        let mut newton = self.newton(&equations);
-        let (mut report, by_fixed_point) = self.rule(&mut newton, &rigid, t, true)?;
+        let newton = self.newton(&equations);
+        let (mut report, by_fixed_point) = self.rule(&newton, &rigid, t, true)?;
         if !report.converged && started {
             t.fill(0.0);
-            report = self.rule(&mut newton, &rigid, t, false)?.0;
+            report = self.rule(&newton, &rigid, t, false)?.0;
         }
         if !report.converged {
             t.fill(0.0);
             self.upwind(t)?;
-            report = self.rule(&mut newton, &rigid, t, false)?.0;
+            report = self.rule(&newton, &rigid, t, false)?.0;
         }
         if !report.converged {
             return Err(LevelFailure::NotConverged {
                 work: self.work,
-                tolerance: self.tolerance,
+                tolerance: self.control.tolerance,
                 advice: advice(&report),
             });
         }
         Ok(ThreePointAnswer {
-            slip: self.expand(newton.slip()),
+            slip: self.expand(self.control.workspace.slip()),
             slips: self.zones(&newton, t),
             by_fixed_point,
         })
     }
 
-    /// Which cells of the whole mesh slip, by the last iterate of `newton`.
+    /// Which cells of the whole mesh slip; `newton` has evaluated `t` last.
     fn zones(&self, newton: &Newton, t: &[f64]) -> Vec<bool> {
+        let slip = self.control.workspace.slip();
         let slips: Vec<f64> = (0..newton.cells())
-            .map(|i| f64::from(u8::from(newton.slips(&self.bound, t, i))))
+            .map(|i| f64::from(u8::from(newton.slips(&self.bound, t, slip, i))))
             .collect();
         let slips = if self.parity.is_some() {
             self.level.unfold(&slips, 1.0)
@@ -277,8 +303,8 @@ impl<'a> RuleSequence<'a> {
     fn upwind(&mut self, t: &mut [f64]) -> Result<bool, Stop> {
         let equations = self.equations(Rule::Upwind);
         let rigid = equations.rigid(self.motion);
-        let mut newton = self.newton(&equations);
-        Ok(self.rule(&mut newton, &rigid, t, false)?.0.converged)
+        let newton = self.newton(&equations);
+        Ok(self.rule(&newton, &rigid, t, false)?.0.converged)
     }
 
     /// The trapezoid rule from a start of its own if there is one, else from the three-point solution in `t`, else from the
@@ -290,33 +316,21 @@ impl<'a> RuleSequence<'a> {
     ) -> Result<Option<Vec<bool>>, Stop> {
         let equations = self.equations(Rule::Trapezoid);
         let rigid = equations.rigid(self.motion);
-        let mut newton = self.newton(&equations);
+        let newton = self.newton(&equations);
         let residual = self.work.residual;
         let mut converged = false;
         let mut found = t.to_vec();
         if let Some(warm) = warm {
             found.copy_from_slice(&warm);
-            converged = self
-                .rule(&mut newton, &rigid, &mut found, true)?
-                .0
-                .converged;
+            converged = self.rule(&newton, &rigid, &mut found, true)?.0.converged;
             if !converged {
                 found.copy_from_slice(t);
             }
         }
-        if !converged
-            && !self
-                .rule(&mut newton, &rigid, &mut found, true)?
-                .0
-                .converged
-        {
+        if !converged && !self.rule(&newton, &rigid, &mut found, true)?.0.converged {
             found.fill(0.0);
             self.upwind(&mut found)?;
-            if !self
-                .rule(&mut newton, &rigid, &mut found, false)?
-                .0
-                .converged
-            {
+            if !self.rule(&newton, &rigid, &mut found, false)?.0.converged {
                 self.work.residual = residual;
                 return Ok(None);
             }

@@ -3,6 +3,7 @@
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
 use crate::contact::rolling::methods::boundary_element::task::Convergence;
+use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use crate::contact::rolling::methods::liu_hsu::active_set;
 use crate::contact::rolling::methods::liu_hsu::active_set::{ZonesExit, ZonesRun, Zoning};
 use crate::contact::rolling::methods::liu_hsu::dense_task::DenseTask;
@@ -143,6 +144,7 @@ struct ZonesSearch<'a> {
     /// Tractions given by the caller, over the cells without padding.
     start: Vec<f64>,
     newton: Newton<'a>,
+    workspace: NewtonWorkspace,
     attempts: Vec<ZonesRun>,
     best: Option<(f64, Zoning)>,
 }
@@ -160,6 +162,7 @@ impl<'a> ZonesSearch<'a> {
             start: task.compact(t),
             task,
             newton: Newton::new(stage.equations),
+            workspace: NewtonWorkspace::default(),
             attempts: Vec::new(),
             best: None,
         })
@@ -211,7 +214,9 @@ impl<'a> ZonesSearch<'a> {
             residual: 0.0,
             inexact_steps: 0,
         };
-        self.newton.evaluate(&self.stage.law, &padded, &mut unused)
+        let workspace = &mut self.workspace;
+        self.newton
+            .evaluate(&self.stage.law, &padded, workspace, &mut unused)
     }
 
     fn finish(mut self, t: &mut [f64]) -> ZonesOutcome {
@@ -230,7 +235,7 @@ impl<'a> ZonesSearch<'a> {
                 .is_some_and(|a| a.exit == ZonesExit::Converged),
             residual,
             attempts: self.attempts,
-            slip: self.newton.slip().to_vec(),
+            slip: self.workspace.slip().to_vec(),
             slips: division.slips,
         }
     }

@@ -1,0 +1,63 @@
+//! Buffers of the Newton iteration, kept by the caller.
+
+use crate::contact::numerics::gmres::Gmres;
+use crate::contact::rolling::methods::boundary_element::linearisation::Linearisation;
+use crate::contact::rolling::methods::boundary_element::preconditioner::StripFactors;
+use crate::contact::rolling::slip_equations::SlipScratch;
+
+/// What the iteration writes to. It fits equations of any size and grows to the largest; a second solve of the same size
+/// allocates nothing. Nothing in it but [`slip`](Self::slip) means anything between two calls.
+#[derive(Debug, Default)]
+pub struct NewtonWorkspace {
+    pub(crate) blocks: StripFactors,
+    pub(crate) gmres: Gmres,
+    pub(crate) linear: Linearisation,
+    /// What brings each slipping cell from its traction to the tangent of its disc.
+    pub(crate) to_tangent: Vec<(f64, f64)>,
+    pub(crate) slip: Vec<f64>,
+    pub(crate) product: SlipScratch,
+    /// Unknowns of the linear system as tractions.
+    pub(crate) expanded: Vec<f64>,
+    pub(crate) vectors: StepVectors,
+}
+
+/// Vectors of one Newton step.
+#[derive(Debug, Default)]
+pub(crate) struct StepVectors {
+    pub(crate) step: Vec<f64>,
+    pub(crate) rhs: Vec<f64>,
+    pub(crate) best: Vec<f64>,
+    pub(crate) before: Vec<f64>,
+    pub(crate) candidate: Vec<f64>,
+}
+
+impl NewtonWorkspace {
+    /// The slips `q + M T` of the iterate that was evaluated last, x then y.
+    #[must_use]
+    pub fn slip(&self) -> &[f64] {
+        &self.slip
+    }
+}
+
+impl StepVectors {
+    /// Makes all of them copies of an iterate.
+    pub(crate) fn copy(&mut self, t: &[f64]) {
+        let StepVectors {
+            step,
+            rhs,
+            best,
+            before,
+            candidate,
+        } = self;
+        for values in [step, rhs, best, before, candidate] {
+            values.clear();
+            values.extend_from_slice(t);
+        }
+    }
+}
+
+/// Makes a buffer a vector of zeros.
+pub(crate) fn zeroed(buffer: &mut Vec<f64>, length: usize) {
+    buffer.clear();
+    buffer.resize(length, 0.0);
+}
