@@ -56,7 +56,8 @@ use crate::http::problem::kinds::ProblemKind;
 use crate::http::routes::service::metrics as service_metrics;
 use crate::http::routes::service::{health, methods, problems, remarks};
 use crate::http::routes::{
-    batch_results, batches, cases, events, fields, jobs, plots, resultants, results, zones,
+    batch_results, batches, cases, events, fields, jobs, plots, point_fields, resultants, results,
+    zones,
 };
 use crate::http::server::drain_body;
 use crate::http::state::AppState;
@@ -179,6 +180,7 @@ fn resources() -> OpenApiRouter<AppState> {
     let parts = OpenApiRouter::new()
         .routes(routes!(resultants::resultants))
         .routes(routes!(zones::zones))
+        .routes(routes!(point_fields::fields))
         .routes(routes!(fields::tractions))
         .routes(routes!(fields::pressure))
         .routes(routes!(fields::slip))

@@ -31,7 +31,7 @@ fn coded(value: &Value) -> f64 {
     }
 }
 
-fn column(values: &Value) -> Vec<f64> {
+pub fn column(values: &Value) -> Vec<f64> {
     values
         .as_array()
         .expect("an array")
@@ -49,7 +49,7 @@ pub fn flat(rows: &Value) -> Vec<f64> {
         .collect()
 }
 
-fn bits(values: &[f64]) -> Vec<u64> {
+pub fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|value| value.to_bits()).collect()
 }
 
@@ -74,7 +74,7 @@ fn read_csv(answer: &Answer) -> BTreeMap<String, Vec<f64>> {
 }
 
 /// The arrays of an NPZ with their shapes as written.
-fn read_npz(answer: &Answer) -> BTreeMap<String, (String, Vec<f64>)> {
+pub fn read_npz(answer: &Answer) -> BTreeMap<String, (String, Vec<f64>)> {
     let mut archive = zip::ZipArchive::new(Cursor::new(&answer.bytes)).expect("an archive");
     let mut arrays = BTreeMap::new();
     for index in 0..archive.len() {
@@ -101,6 +101,10 @@ fn read_npz(answer: &Answer) -> BTreeMap<String, (String, Vec<f64>)> {
                 .iter()
                 .map(|b| f64::from_le_bytes(*b))
                 .collect(),
+            "<f4" => {
+                let numbers = data.as_chunks().0.iter();
+                numbers.map(|b| f32::from_le_bytes(*b).into()).collect()
+            }
             "<u4" => data
                 .as_chunks()
                 .0
@@ -138,7 +142,8 @@ async fn every_form_of_the_cells_says_the_same_numbers() {
                 .header("content-disposition")
                 .is_some_and(|value| value.contains(&format!("\"{part}-0-0.npz\"")))
         );
-        let archive = read_npz(&archive);
+        let mut archive = read_npz(&archive);
+        archive.retain(|name, _| !name.starts_with("outline_"));
         assert_eq!((table.len(), archive.len()), (header.len(), header.len()));
         for name in header {
             let expected = column(&cells[name]);

@@ -35,6 +35,7 @@ mod model;
 mod order;
 mod ownership;
 mod pictures;
+mod point_fields;
 mod profiles;
 mod requests;
 mod results;

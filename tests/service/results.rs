@@ -128,7 +128,7 @@ async fn fields_add_up_to_the_resultants() {
 }
 
 /// Area inside closed polygons; holes count negative.
-fn area(polygons: &Value) -> f64 {
+pub fn area(polygons: &Value) -> f64 {
     let polygons = polygons
         .as_array()
         .expect("polygons")

@@ -4,9 +4,38 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::contact::case::words::solver::Output;
+use crate::contact::post::outlines::outline::{outlines, patch_outline};
 use crate::contact::post::resample::{resample, resample_zone};
 use crate::contact::solution::words::{PatchCells, PointFields};
 use crate::contact::solution::zone::Zone;
+
+/// Closed polygons as lists of `[x, y]` in mm; the last point is joined to the first. Outer borders run
+/// counter-clockwise, holes clockwise.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
+pub struct Outlines {
+    /// The border of the patch.
+    pub patch: Vec<Vec<[f64; 2]>>,
+    /// Around the cells that stick; only with zones.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stick: Option<Vec<Vec<[f64; 2]>>>,
+    /// Around the cells that slip; only with zones.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slip: Option<Vec<Vec<[f64; 2]>>>,
+}
+
+impl Outlines {
+    /// The border of a patch, and those of its zones if they are wanted and known.
+    #[must_use]
+    pub fn of(cells: &PatchCells, point: &PointFields, with_zones: bool) -> Outlines {
+        let zones = point.zone.as_deref().filter(|_| with_zones);
+        let around = |zone| zones.map(|zones| outlines(cells, Some(zones), Some(zone)));
+        Outlines {
+            patch: patch_outline(cells),
+            stick: around(Zone::Stick),
+            slip: around(Zone::Slip),
+        }
+    }
+}
 
 /// Values per cell, strip by strip from smaller to larger y, in each strip from smaller to larger x. All arrays have
 /// the same length; those of other fields are absent.
@@ -50,6 +79,8 @@ pub struct GriddedField {
     pub patch: usize,
     /// Number of the motion, counted from 0.
     pub point: usize,
+    /// The border of the patch, and of its zones where they are part of the answer.
+    pub outlines: Outlines,
     /// Samples along x in mm, ascending.
     pub x_mm: Vec<f64>,
     /// Samples across in mm, ascending.
@@ -74,8 +105,8 @@ pub struct GriddedField {
     pub slip_y: Option<Vec<Vec<Option<f64>>>>,
 }
 
-/// The cells with the values of one output.
-pub fn per_cell(fields: PatchCells, point: PointFields, output: Output) -> Cells {
+/// The cells with the values of these outputs.
+pub fn per_cell(fields: PatchCells, point: PointFields, outputs: &[Output]) -> Cells {
     let mut cells = Cells {
         x_mm: fields.x_mm,
         y_mm: fields.y_mm,
@@ -84,51 +115,65 @@ pub fn per_cell(fields: PatchCells, point: PointFields, output: Output) -> Cells
         strip: fields.strip,
         ..Cells::default()
     };
-    match output {
-        Output::Tractions => {
-            (cells.traction_x_mpa, cells.traction_y_mpa) =
-                (point.traction_x_mpa, point.traction_y_mpa)
-        }
-        Output::Pressure => cells.pressure_mpa = fields.pressure_mpa,
-        Output::Slip => (cells.slip_x, cells.slip_y) = (point.slip_x, point.slip_y),
-        Output::Zones => cells.zone = point.zone,
-        Output::Resultants => {}
+    let wanted = |output| outputs.contains(&output);
+    if wanted(Output::Tractions) {
+        cells.traction_x_mpa = point.traction_x_mpa;
+        cells.traction_y_mpa = point.traction_y_mpa;
+    }
+    if wanted(Output::Pressure) {
+        cells.pressure_mpa = fields.pressure_mpa;
+    }
+    if wanted(Output::Slip) {
+        (cells.slip_x, cells.slip_y) = (point.slip_x, point.slip_y);
+    }
+    if wanted(Output::Zones) {
+        cells.zone = point.zone;
     }
     cells
 }
 
-/// The values of one output on a grid of `nx × ny` samples; neither patch nor point are filled in.
+/// The values of these outputs on a grid of `nx × ny` samples; neither patch, point nor outlines are filled in.
 pub fn gridded(
     fields: &PatchCells,
     point: &PointFields,
-    output: Output,
+    outputs: &[Output],
     nx: usize,
     ny: usize,
 ) -> GriddedField {
     let mut answer = GriddedField::default();
-    let mut sample = |values: &Option<Vec<f64>>| {
+    let mut sample = |output, values: &Option<Vec<f64>>| {
+        if !outputs.contains(&output) {
+            return None;
+        }
         let grid = resample(fields, values.as_deref()?, nx, ny);
         (answer.x_mm, answer.y_mm) = (grid.x_mm, grid.y_mm);
         Some(grid.values)
     };
-    match output {
-        Output::Tractions => {
-            let (x, y) = (sample(&point.traction_x_mpa), sample(&point.traction_y_mpa));
-            (answer.traction_x_mpa, answer.traction_y_mpa) = (x, y);
-        }
-        Output::Pressure => answer.pressure_mpa = sample(&fields.pressure_mpa),
-        Output::Slip => {
-            let (x, y) = (sample(&point.slip_x), sample(&point.slip_y));
-            (answer.slip_x, answer.slip_y) = (x, y);
-        }
-        Output::Zones => {
-            if let Some(zone) = &point.zone {
-                let grid = resample_zone(fields, zone, nx, ny);
-                (answer.x_mm, answer.y_mm) = (grid.x_mm, grid.y_mm);
-                answer.zone = Some(grid.values);
-            }
-        }
-        Output::Resultants => {}
+    let tractions = Output::Tractions;
+    let (traction_x_mpa, traction_y_mpa) = (
+        sample(tractions, &point.traction_x_mpa),
+        sample(tractions, &point.traction_y_mpa),
+    );
+    let pressure_mpa = sample(Output::Pressure, &fields.pressure_mpa);
+    let (slip_x, slip_y) = (
+        sample(Output::Slip, &point.slip_x),
+        sample(Output::Slip, &point.slip_y),
+    );
+    if let Some(zone) = point
+        .zone
+        .as_ref()
+        .filter(|_| outputs.contains(&Output::Zones))
+    {
+        let grid = resample_zone(fields, zone, nx, ny);
+        (answer.x_mm, answer.y_mm) = (grid.x_mm, grid.y_mm);
+        answer.zone = Some(grid.values);
     }
-    answer
+    GriddedField {
+        traction_x_mpa,
+        traction_y_mpa,
+        pressure_mpa,
+        slip_x,
+        slip_y,
+        ..answer
+    }
 }

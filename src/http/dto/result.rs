@@ -40,6 +40,9 @@ impl JobResult {
         let mut links = BTreeMap::from([("resultants".to_owned(), format!("{own}/resultants"))]);
         for name in outputs.iter().map(AsRef::as_ref) {
             links.insert(name.to_owned(), format!("{own}/{name}"));
+            if name != name_of(Output::Resultants) {
+                links.insert("fields".to_owned(), format!("{own}/fields"));
+            }
         }
         links.insert("job".to_owned(), own);
         links

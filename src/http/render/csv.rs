@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::http::render::table::{ArrayData, PLACES, Rows, Table, TableColumn};
+use crate::http::render::table::{ArrayData, PLACES, Precision, Rows, Table};
 
 /// The line with the names.
 ///
@@ -29,20 +29,21 @@ pub fn head(table: &Table) -> Result<Vec<u8>, csv::Error> {
 /// None that memory does not have.
 pub fn lines(table: &Table, rows: Range<usize>) -> Result<Vec<u8>, csv::Error> {
     let mut out = csv::Writer::from_writer(Vec::new());
+    let written = |value: f64| number_as(value, table.precision);
     for row in rows {
         match &table.rows {
             Rows::Cells { places, strip } => {
                 for place in places {
-                    out.write_field(number(place[row]))?;
+                    out.write_field(written(place[row]))?;
                 }
                 out.write_field(strip[row].to_string())?;
             }
             Rows::Grid { x_mm, y_mm } => {
-                out.write_field(number(x_mm[row % x_mm.len()]))?;
-                out.write_field(number(y_mm[row / x_mm.len()]))?;
+                out.write_field(written(x_mm[row % x_mm.len()]))?;
+                out.write_field(written(y_mm[row / x_mm.len()]))?;
             }
         }
-        end_row(&mut out, &table.values, row)?;
+        end_row(&mut out, table, row)?;
     }
     finish(out)
 }
@@ -56,14 +57,12 @@ pub fn finish(out: csv::Writer<Vec<u8>>) -> Result<Vec<u8>, csv::Error> {
         .map_err(|error| csv::Error::from(error.into_error()))
 }
 
-fn end_row(
-    out: &mut csv::Writer<Vec<u8>>,
-    columns: &[TableColumn],
-    row: usize,
-) -> Result<(), csv::Error> {
-    for column in columns {
+fn end_row(out: &mut csv::Writer<Vec<u8>>, table: &Table, row: usize) -> Result<(), csv::Error> {
+    for column in &table.values {
         match &column.data {
-            ArrayData::Numbers(values) => out.write_field(number(values[row]))?,
+            ArrayData::Numbers(values) => {
+                out.write_field(number_as(values[row], table.precision))?;
+            }
             ArrayData::Zones(zones) => {
                 out.write_field(zones[row].map_or("", |zone| zone.name()))?;
             }
@@ -80,6 +79,22 @@ pub fn number(value: f64) -> String {
     } else {
         format!("{value:?}")
     }
+}
+
+/// The same in this precision.
+#[must_use]
+pub fn number_as(value: f64, precision: Precision) -> String {
+    match precision {
+        Precision::Single if !value.is_nan() => format!("{:?}", single(value)),
+        _ => number(value),
+    }
+}
+
+/// The nearest number of 32 bits; NaN stays NaN.
+#[must_use]
+#[expect(clippy::cast_possible_truncation, reason = "that is what is asked for")]
+pub fn single(value: f64) -> f32 {
+    value as f32
 }
 
 #[cfg(test)]

@@ -10,38 +10,44 @@ use zip::result::ZipResult;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
-use crate::http::render::table::{ArrayData, PLACES, Rows, Table, zone_code};
+use crate::http::dto::cells::Outlines;
+use crate::http::render::csv::single;
+use crate::http::render::table::{ArrayData, PLACES, Precision, Rows, Table, zone_code};
 
 /// What an NPY header has to be a multiple of, the parts before it included.
 const ALIGNMENT: usize = 64;
 /// Bytes before the header: mark, version, length.
 const BEFORE_HEADER: usize = 10;
 
-/// Writes a table. Zones are `int8`: 0 stick, 1 slip, -1 outside the patch; other values outside are NaN.
+/// Writes a table and its outlines: `outline_patch_mm` has the corners of all polygons around the patch, `outline_patch_start` the place of
+/// the first corner of each, and so for `stick` and `slip`. Zones are `int8`: 0 stick, 1 slip, -1 outside the patch; other values outside are NaN.
 ///
 /// # Errors
 /// The archive would be larger than the format allows.
-pub fn write(table: &Table) -> ZipResult<Vec<u8>> {
-    let mut archive = Archive(ZipWriter::new(Cursor::new(Vec::new())));
+pub fn write(table: &Table, outlines: &Outlines) -> ZipResult<Vec<u8>> {
+    let mut archive = Archive {
+        zip: ZipWriter::new(Cursor::new(Vec::new())),
+        precision: table.precision,
+    };
     let shape = match &table.rows {
         Rows::Cells { places, strip } => {
             for (name, place) in PLACES.iter().zip(places) {
-                archive.add(name, "<f8", &[place.len()], &f64_bytes(place))?;
+                archive.numbers(name, &[place.len()], place)?;
             }
             let bytes: Vec<u8> = strip.iter().flat_map(|value| value.to_le_bytes()).collect();
             archive.add("strip", "<u4", &[strip.len()], &bytes)?;
             vec![strip.len()]
         }
         Rows::Grid { x_mm, y_mm } => {
-            archive.add("x_mm", "<f8", &[x_mm.len()], &f64_bytes(x_mm))?;
-            archive.add("y_mm", "<f8", &[y_mm.len()], &f64_bytes(y_mm))?;
+            archive.numbers("x_mm", &[x_mm.len()], x_mm)?;
+            archive.numbers("y_mm", &[y_mm.len()], y_mm)?;
             vec![y_mm.len(), x_mm.len()]
         }
     };
     for column in &table.values {
         match &column.data {
             ArrayData::Numbers(values) => {
-                archive.add(column.name, "<f8", &shape, &f64_bytes(values))?;
+                archive.numbers(column.name, &shape, values)?;
             }
             ArrayData::Zones(zones) => {
                 let codes = zones.iter().flat_map(|zone| zone_code(*zone).to_le_bytes());
@@ -50,25 +56,61 @@ pub fn write(table: &Table) -> ZipResult<Vec<u8>> {
             }
         }
     }
-    Ok(archive.0.finish()?.into_inner())
+    archive.outline("patch", &outlines.patch)?;
+    let zones = [("stick", &outlines.stick), ("slip", &outlines.slip)];
+    for (name, polygons) in zones {
+        if let Some(polygons) = polygons {
+            archive.outline(name, polygons)?;
+        }
+    }
+    Ok(archive.zip.finish()?.into_inner())
 }
 
-fn f64_bytes(values: &[f64]) -> Vec<u8> {
-    values
-        .iter()
-        .flat_map(|value| value.to_le_bytes())
-        .collect()
+struct Archive {
+    zip: ZipWriter<Cursor<Vec<u8>>>,
+    precision: Precision,
 }
-
-struct Archive(ZipWriter<Cursor<Vec<u8>>>);
 
 impl Archive {
+    fn numbers(&mut self, name: &str, shape: &[usize], values: &[f64]) -> ZipResult<()> {
+        let values = values.iter();
+        match self.precision {
+            Precision::Double => {
+                let bytes: Vec<u8> = values.flat_map(|value| value.to_le_bytes()).collect();
+                self.add(name, "<f8", shape, &bytes)
+            }
+            Precision::Single => {
+                let bytes = values.flat_map(|value| single(*value).to_le_bytes());
+                self.add(name, "<f4", shape, &bytes.collect::<Vec<u8>>())
+            }
+        }
+    }
+
+    /// The corners of all polygons, and the place of the first corner of each.
+    fn outline(&mut self, name: &str, polygons: &[Vec<[f64; 2]>]) -> ZipResult<()> {
+        let corners: Vec<f64> = polygons.iter().flatten().flatten().copied().collect();
+        let shape = [corners.len() / 2, 2];
+        self.numbers(&format!("outline_{name}_mm"), &shape, &corners)?;
+        let mut starts = Vec::new();
+        let mut start = 0_usize;
+        for polygon in polygons {
+            starts.extend(u32::try_from(start).unwrap_or(u32::MAX).to_le_bytes());
+            start += polygon.len();
+        }
+        self.add(
+            &format!("outline_{name}_start"),
+            "<u4",
+            &[polygons.len()],
+            &starts,
+        )
+    }
+
     fn add(&mut self, name: &str, kind: &str, shape: &[usize], values: &[u8]) -> ZipResult<()> {
         // The time of an entry stays that of the format's epoch: equal fields are equal files.
         let options = SimpleFileOptions::default().compression_method(CompressionMethod::Deflated);
-        self.0.start_file(format!("{name}.npy"), options)?;
-        self.0.write_all(&header(kind, shape))?;
-        self.0.write_all(values)?;
+        self.zip.start_file(format!("{name}.npy"), options)?;
+        self.zip.write_all(&header(kind, shape))?;
+        self.zip.write_all(values)?;
         Ok(())
     }
 }

@@ -8,7 +8,7 @@ use futures_util::stream;
 
 use crate::contact::solution::zone::Zone;
 use crate::http::render::csv;
-use crate::http::render::table::{ArrayData, PLACES, Rows, Table};
+use crate::http::render::table::{ArrayData, PLACES, Precision, Rows, Table};
 
 /// Pieces are at least this large, but for the last one.
 const PIECE_BYTES: usize = 32 << 10;
@@ -42,9 +42,9 @@ pub fn csv_body(table: Table) -> Body {
     body(std::iter::once(head).chain(lines))
 }
 
-/// The table as the JSON of a field: per cell inside `cells`, or on a grid.
-pub fn json_body(table: Table, patch: usize, point: usize) -> Body {
-    let parts = parts(&table, patch, point);
+/// The table as the JSON of a field: members written before (`"patch":0,…`), then per cell inside `cells`, or on a grid.
+pub fn json_body(table: Table, members: &str) -> Body {
+    let parts = parts(&table, members);
     let texts = parts.into_iter().map(move |part| match part {
         Part::Text(text) => Ok::<_, std::convert::Infallible>(text.into_bytes()),
         Part::Values(column, rows) => Ok(values(&table, column, rows).into_bytes()),
@@ -71,15 +71,13 @@ where
     Body::from_stream(stream::iter(pieces))
 }
 
-fn parts(table: &Table, patch: usize, point: usize) -> Vec<Part> {
+fn parts(table: &Table, members: &str) -> Vec<Part> {
     let mut parts = Vec::new();
     let open = match table.rows {
         Rows::Cells { .. } => ",\"cells\":{",
         Rows::Grid { .. } => ",",
     };
-    parts.push(Part::Text(format!(
-        "{{\"patch\":{patch},\"point\":{point}{open}"
-    )));
+    parts.push(Part::Text(format!("{{{members}{open}")));
     let close = match &table.rows {
         Rows::Cells { .. } => {
             for (number, name) in PLACES.iter().enumerate() {
@@ -139,16 +137,16 @@ fn values(table: &Table, column: ColumnName, rows: Range<usize>) -> String {
         }
         match (column, &table.rows) {
             (ColumnName::Place(number), Rows::Cells { places, .. }) => {
-                push(&mut out, places[number][row])
+                push(&mut out, places[number][row], table.precision)
             }
             (ColumnName::Strip, Rows::Cells { strip, .. }) => {
                 // Writing to a string cannot fail.
                 let _ = write!(out, "{}", strip[row]);
             }
-            (ColumnName::X, Rows::Grid { x_mm, .. }) => push(&mut out, x_mm[row]),
-            (ColumnName::Y, Rows::Grid { y_mm, .. }) => push(&mut out, y_mm[row]),
+            (ColumnName::X, Rows::Grid { x_mm, .. }) => push(&mut out, x_mm[row], table.precision),
+            (ColumnName::Y, Rows::Grid { y_mm, .. }) => push(&mut out, y_mm[row], table.precision),
             (ColumnName::Value(number), _) => match &table.values[number].data {
-                ArrayData::Numbers(numbers) => push(&mut out, numbers[row]),
+                ArrayData::Numbers(numbers) => push(&mut out, numbers[row], table.precision),
                 ArrayData::Zones(zones) => push_zone(&mut out, zones[row]),
             },
             _ => unreachable!("the parts were made from this table"),
@@ -158,13 +156,12 @@ fn values(table: &Table, column: ColumnName, rows: Range<usize>) -> String {
 }
 
 /// The number as JSON; null where there is none.
-fn push(out: &mut String, value: f64) {
-    match serde_json::Number::from_f64(value) {
-        Some(number) => {
-            let _ = write!(out, "{number}");
-        }
-        None => out.push_str("null"),
-    }
+fn push(out: &mut String, value: f64, precision: Precision) {
+    let _ = match (serde_json::Number::from_f64(value), precision) {
+        (None, _) => write!(out, "null"),
+        (Some(number), Precision::Double) => write!(out, "{number}"),
+        (Some(_), Precision::Single) => write!(out, "{:?}", csv::single(value)),
+    };
 }
 
 fn push_zone(out: &mut String, zone: Option<Zone>) {
@@ -182,7 +179,7 @@ mod tests {
     use serde_json::Value;
 
     use super::*;
-    use crate::http::dto::cells::{Cells, GriddedField};
+    use crate::http::dto::cells::{Cells, GriddedField, Outlines};
     use crate::http::routes::fields::Field;
 
     async fn text(body: Body) -> String {
@@ -197,7 +194,10 @@ mod tests {
 
     async fn reads_back(make: impl Fn() -> Field) {
         let whole: Value = serde_json::from_str(&serde_json::to_string(&make()).unwrap()).unwrap();
-        let pieces = text(json_body(make().into(), 1, 2)).await;
+        let (table, outlines): (Table, Outlines) = make().into();
+        let outlines = serde_json::to_string(&outlines).unwrap();
+        let members = format!("\"patch\":1,\"point\":2,\"outlines\":{outlines}");
+        let pieces = text(json_body(table, &members)).await;
         assert_eq!(serde_json::from_str::<Value>(&pieces).unwrap(), whole);
     }
 
@@ -207,6 +207,7 @@ mod tests {
             reads_back(|| Field::PerCell {
                 patch: 1,
                 point: 2,
+                outlines: Outlines::default(),
                 cells: Cells {
                     x_mm: numbers(count),
                     y_mm: numbers(count),
@@ -236,6 +237,24 @@ mod tests {
     }
 
     #[tokio::test]
+    async fn single_precision_is_the_nearest_number_of_32_bits() {
+        let field = Field::Gridded(GriddedField {
+            x_mm: vec![1.0 / 3.0],
+            y_mm: vec![1e-300],
+            pressure_mpa: Some(vec![vec![Some(1e9 + 1.0)]]),
+            ..GriddedField::default()
+        });
+        let (mut table, _): (Table, Outlines) = field.into();
+        table.precision = Precision::Single;
+        let csv = text(csv_body(table.clone())).await;
+        assert_eq!(csv.lines().nth(1), Some("0.33333334,0.0,1000000000.0"));
+        let json: Value =
+            serde_json::from_str(&text(json_body(table, "\"patch\":0")).await).unwrap();
+        assert_eq!(json["x_mm"][0].as_f64().map(csv::single), Some(1.0 / 3.0));
+        assert_eq!(json["pressure_mpa"][0][0], 1e9);
+    }
+
+    #[tokio::test]
     async fn a_table_has_one_line_per_row_after_its_head() {
         let field = Field::Gridded(GriddedField {
             x_mm: numbers(2),
@@ -243,7 +262,8 @@ mod tests {
             pressure_mpa: Some(vec![vec![Some(1.5), None]; 400]),
             ..GriddedField::default()
         });
-        let text = text(csv_body(field.into())).await;
+        let (table, _): (Table, Outlines) = field.into();
+        let text = text(csv_body(table)).await;
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), 801);
         assert_eq!(

@@ -1,5 +1,6 @@
 //! Fields as tables, and the formats that a table can be written in; one format is one file here.
 
+use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::contact::solution::zone::Zone;
@@ -18,6 +19,19 @@ pub struct Table {
     pub rows: Rows,
     /// The values of the field.
     pub values: Vec<TableColumn>,
+    /// How exactly its numbers are written.
+    pub precision: Precision,
+}
+
+/// How exactly numbers are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Precision {
+    /// As they were computed: 64 bits.
+    #[default]
+    Double,
+    /// 32 bits, some seven digits: enough for pictures, and half as large.
+    Single,
 }
 
 impl Table {
@@ -110,6 +124,7 @@ impl From<Cells> for Table {
                 strip: cells.strip,
             },
             values: zone.into_iter().chain(columns(numbers)).collect(),
+            precision: Precision::Double,
         }
     }
 }
@@ -137,6 +152,7 @@ impl From<GriddedField> for Table {
                 y_mm: field.y_mm,
             },
             values: zone.into_iter().chain(columns(numbers)).collect(),
+            precision: Precision::Double,
         }
     }
 }

@@ -9,7 +9,8 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use crate::contact::case::words::solver::Output;
-use crate::http::dto::cells::{Cells, GriddedField, gridded, per_cell};
+use crate::contact::solution::words::{PatchCells, PointFields};
+use crate::http::dto::cells::{Cells, GriddedField, Outlines, gridded, per_cell};
 use crate::http::dto::result::name_of;
 use crate::http::extract::accept::{Format, choose, one_of};
 use crate::http::extract::caller::Caller;
@@ -20,7 +21,7 @@ use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::limits::memory::{Memory, Rendering};
 use crate::http::problem::error::ApiError;
 use crate::http::render::pieces::{csv_body, json_body};
-use crate::http::render::table::{File, Table};
+use crate::http::render::table::{File, Precision, Table};
 use crate::http::render::{npz, vtk};
 use crate::http::routes::plots::{PlotOptions, WIDTH_DEFAULT, picture};
 use crate::http::routes::stored_fields::{FieldProblems, stored};
@@ -53,6 +54,8 @@ pub enum Field {
         patch: usize,
         /// Number of the motion, counted from 0.
         point: usize,
+        /// The border of the patch, and of its zones where they are part of the answer.
+        outlines: Outlines,
         /// Geometry and values of the cells.
         cells: Cells,
     },
@@ -60,11 +63,44 @@ pub enum Field {
     Gridded(GriddedField),
 }
 
-impl From<Field> for Table {
+impl Field {
+    /// The values of these outputs, as the selection asks for them.
+    #[must_use]
+    pub fn of(
+        selection: Selection,
+        outputs: &[Output],
+        cells: PatchCells,
+        values: PointFields,
+    ) -> Field {
+        let (patch, point) = (selection.patch, selection.point);
+        let outlines = Outlines::of(&cells, &values, outputs.contains(&Output::Zones));
+        match selection.grid {
+            None => Field::PerCell {
+                patch,
+                point,
+                outlines,
+                cells: per_cell(cells, values, outputs),
+            },
+            Some((nx, ny)) => Field::Gridded(GriddedField {
+                patch,
+                point,
+                outlines,
+                ..gridded(&cells, &values, outputs, nx, ny)
+            }),
+        }
+    }
+}
+
+impl From<Field> for (Table, Outlines) {
     fn from(field: Field) -> Self {
         match field {
-            Field::PerCell { cells, .. } => cells.into(),
-            Field::Gridded(field) => field.into(),
+            Field::PerCell {
+                cells, outlines, ..
+            } => (cells.into(), outlines),
+            Field::Gridded(mut field) => {
+                let outlines = std::mem::take(&mut field.outlines);
+                (field.into(), outlines)
+            }
         }
     }
 }
@@ -80,6 +116,9 @@ query! {
         /// 250 000 in all where the operator says nothing else
         #[param(example = "60x40")]
         grid: (usize, usize) as String = grid(*samples_max);
+        /// `single`: numbers of 32 bits, which is enough for a picture; `double` when left out. VTK is always `double`
+        #[param(pattern = "^(single|double)$", example = "single")]
+        precision: Precision as String = precision();
         /// `json`, `csv`, `npz`, `vtk`, or `svg` and `png` for a picture; overrides `Accept`
         #[param(example = "csv")]
         format: Format as String = one_of(FORMATS);
@@ -97,6 +136,8 @@ pub struct Selection {
     pub grid: Option<(usize, usize)>,
     /// The form of the answer.
     pub format: Format,
+    /// How exactly its numbers are written.
+    pub precision: Precision,
 }
 
 impl Selection {
@@ -111,6 +152,7 @@ impl Selection {
             point: query.point.unwrap_or(0),
             grid: query.grid,
             format: choose(headers, query.format, FORMATS)?,
+            precision: query.precision.unwrap_or_default(),
         })
     }
 
@@ -154,8 +196,17 @@ impl Selection {
     }
 }
 
+/// How exactly numbers are written.
+pub fn precision() -> Reader<Precision> {
+    reader("`single`, `double`", |text| match text {
+        "single" => Some(Precision::Single),
+        "double" => Some(Precision::Double),
+        _ => None,
+    })
+}
+
 /// A regular grid of at most so many samples.
-fn grid(samples_max: usize) -> Reader<(usize, usize)> {
+pub fn grid(samples_max: usize) -> Reader<(usize, usize)> {
     let allowed = format!(
         "`NXxNY` such as `60x40`, each from 2 to 1000, and at most {samples_max} samples in all"
     );
@@ -271,31 +322,17 @@ async fn answer(
     let (patch, point) = (selection.patch, selection.point);
     let rendering = shared.memory.rendering(jobs.tenant(), selection.bytes());
     let rendering = rendering.await?;
-    let (fields, values) = stored(jobs, id, patch, point, output).await?;
-    let written = write_as(
-        rendering,
-        selection,
-        name_of(output),
-        move || match selection.grid {
-            None => Field::PerCell {
-                patch,
-                point,
-                cells: per_cell(fields, values, output),
-            },
-            Some((nx, ny)) => Field::Gridded(GriddedField {
-                patch,
-                point,
-                ..gridded(&fields, &values, output, nx, ny)
-            }),
-        },
-    );
+    let (cells, values) = stored(jobs, id, patch, point, output).await?;
+    let written = write_as(rendering, selection, name_of(output), move || {
+        Field::of(selection, &[output], cells, values)
+    });
     Ok(tagged(&tag, written.await?))
 }
 
 /// What an answer is written from.
 pub enum Written {
-    /// A table, whose text is made when the client takes it.
-    Table(Table),
+    /// A table and its outlines, whose text is made when the client takes it.
+    Table(Table, Outlines),
     /// The whole answer.
     Whole(Vec<u8>),
 }
@@ -311,10 +348,11 @@ pub async fn write_as(
     make: impl FnOnce() -> Field + Send + 'static,
 ) -> Result<Response, ApiError> {
     write(rendering, selection, name, move |format| {
-        let table = make().into();
+        let (mut table, outlines): (Table, Outlines) = make().into();
+        table.precision = selection.precision;
         match format {
-            Format::Json | Format::Csv => Ok(Written::Table(table)),
-            _ => write_file(&table, selection, name),
+            Format::Json | Format::Csv => Ok(Written::Table(table, outlines)),
+            _ => write_file(&table, &outlines, selection, name),
         }
     })
     .await
@@ -326,12 +364,13 @@ pub async fn write_as(
 /// `internal` if that fails.
 pub fn write_file(
     table: &Table,
+    outlines: &Outlines,
     selection: Selection,
     name: &'static str,
 ) -> Result<Written, ApiError> {
     let Selection { patch, point, .. } = selection;
     let bytes = match selection.format {
-        Format::Npz => npz::write(table).map_err(|error| ApiError::internal(&error))?,
+        Format::Npz => npz::write(table, outlines).map_err(|error| ApiError::internal(&error))?,
         _ => vtk::write(
             table,
             &format!("{name}, patch {patch}, motion {point}; mm, N, MPa"),
@@ -357,13 +396,18 @@ pub async fn write(
         ..
     } = selection;
     let size = |written: &Written| match written {
-        Written::Table(table) => table.bytes(),
+        Written::Table(table, _) => table.bytes(),
         Written::Whole(bytes) => bytes.len(),
     };
     let (written, share) = rendering.run(move || make(format), size).await?;
     let body = match written {
-        Written::Table(table) if format == Format::Csv => csv_body(table),
-        Written::Table(table) => json_body(table, patch, point),
+        Written::Table(table, _) if format == Format::Csv => csv_body(table),
+        Written::Table(table, outlines) => {
+            let outlines = serde_json::to_string(&outlines);
+            let outlines = outlines.map_err(|error| ApiError::internal(&error))?;
+            let members = format!("\"patch\":{patch},\"point\":{point},\"outlines\":{outlines}");
+            json_body(table, &members)
+        }
         Written::Whole(bytes) => Body::from(bytes),
     };
     let headers = [

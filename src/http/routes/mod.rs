@@ -7,6 +7,7 @@ pub mod events;
 pub mod fields;
 pub mod jobs;
 pub mod plots;
+pub mod point_fields;
 pub mod resultants;
 pub mod results;
 pub mod service;

@@ -35,17 +35,22 @@ pub async fn stored(
     // One motion was asked for, so there is one entry, and one mesh.
     let values = fields.points.pop().unwrap_or_default();
     let cells = fields.meshes.pop().unwrap_or_default();
-    let has = match output {
+    if !has(&cells, &values, output) {
+        return not_asked(jobs, id, output).await;
+    }
+    Ok((cells, values))
+}
+
+/// Is the output among what was stored?
+#[must_use]
+pub fn has(cells: &PatchCells, values: &PointFields, output: Output) -> bool {
+    match output {
         Output::Tractions => values.traction_x_mpa.is_some() && values.traction_y_mpa.is_some(),
         Output::Pressure => cells.pressure_mpa.is_some(),
         Output::Slip => values.slip_x.is_some() && values.slip_y.is_some(),
         Output::Zones => values.zone.is_some(),
         Output::Resultants => true,
-    };
-    if !has {
-        return not_asked(jobs, id, output).await;
     }
-    Ok((cells, values))
 }
 
 /// The failure of a client that fetches what its case did not ask for.

@@ -8,9 +8,7 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use crate::contact::case::words::solver::Output;
-use crate::contact::post::outlines::outline::{outlines, patch_outline};
-use crate::contact::solution::zone::Zone;
-use crate::http::dto::cells::{Cells, GriddedField, gridded, per_cell};
+use crate::http::dto::cells::{Cells, GriddedField, Outlines, per_cell};
 use crate::http::extract::accept::Format;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::JobId;
@@ -18,7 +16,7 @@ use crate::http::extract::query::require_index;
 use crate::http::layers::etag::{Known, tagged};
 use crate::http::problem::error::ApiError;
 use crate::http::render::table::File;
-use crate::http::routes::fields::{FieldQuery, Selection, Written, write, write_file};
+use crate::http::routes::fields::{Field, FieldQuery, Selection, Written, write, write_file};
 use crate::http::routes::stored_fields::{FieldProblems, not_asked, stored};
 use crate::http::state::AppState;
 use crate::jobs::Jobs;
@@ -56,18 +54,6 @@ pub struct ZoneCells {
     outlines: Outlines,
     /// Geometry and zone of the cells.
     cells: Cells,
-}
-
-/// Closed polygons as lists of `[x, y]` in mm; the last point is joined to the first. Outer borders run
-/// counter-clockwise, holes clockwise.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct Outlines {
-    /// The whole patch.
-    patch: Vec<Vec<[f64; 2]>>,
-    /// The cells that stick.
-    stick: Vec<Vec<[f64; 2]>>,
-    /// The cells that slip.
-    slip: Vec<Vec<[f64; 2]>>,
 }
 
 /// Stick and slip zones of a succeeded job.
@@ -113,38 +99,28 @@ pub async fn zones(
     let (patch, point) = (selection.patch, selection.point);
     let (fields, values) = stored(&jobs, id, patch, point, shown).await?;
     let written = write(rendering, selection, "zones", move |format| {
-        if let Some((nx, ny)) = selection.grid {
-            let table = gridded(&fields, &values, shown, nx, ny).into();
+        if selection.grid.is_some() || format != Format::Json {
+            let (mut table, outlines) = Field::of(selection, &[shown], fields, values).into();
+            table.precision = selection.precision;
             return match format {
-                Format::Json | Format::Csv => Ok(Written::Table(table)),
-                _ => write_file(&table, selection, "zones"),
+                Format::Json | Format::Csv => Ok(Written::Table(table, outlines)),
+                _ => write_file(&table, &outlines, selection, "zones"),
             };
         }
-        let outlines = Outlines {
-            patch: patch_outline(&fields),
-            stick: outlines(&fields, values.zone.as_deref(), Some(Zone::Stick)),
-            slip: outlines(&fields, values.zone.as_deref(), Some(Zone::Slip)),
-        };
-        let cells = per_cell(fields, values, shown);
-        match format {
-            Format::Json => {
-                let zones = Zones::PerCell(ZoneCells {
-                    patch,
-                    point,
-                    stick_area_mm2: sizes.stick_area_mm2,
-                    slip_area_mm2: sizes.slip_area_mm2,
-                    stick_cells: sizes.stick_cells,
-                    slip_cells: sizes.slip_cells,
-                    outlines,
-                    cells,
-                });
-                let text = serde_json::to_vec(&zones);
-                let text = text.map_err(|error| ApiError::internal(&error))?;
-                Ok(Written::Whole(text))
-            }
-            Format::Csv => Ok(Written::Table(cells.into())),
-            _ => write_file(&cells.into(), selection, "zones"),
-        }
+        let zones = Zones::PerCell(ZoneCells {
+            patch,
+            point,
+            stick_area_mm2: sizes.stick_area_mm2,
+            slip_area_mm2: sizes.slip_area_mm2,
+            stick_cells: sizes.stick_cells,
+            slip_cells: sizes.slip_cells,
+            outlines: Outlines::of(&fields, &values, true),
+            cells: per_cell(fields, values, &[shown]),
+        });
+        let text = serde_json::to_vec(&zones);
+        Ok(Written::Whole(
+            text.map_err(|error| ApiError::internal(&error))?,
+        ))
     });
     Ok(tagged(&tag, written.await?))
 }
