@@ -7,7 +7,7 @@ use std::path::Path;
 
 use crate::jobs::error::JobsError;
 use crate::jobs::maintenance::disk_reserve::make_private_folder;
-use crate::jobs::store::open::table_file;
+use crate::jobs::open_store::table_file;
 use crate::jobs::store::sqlite::database::SqliteStore;
 
 /// Copies the jobs and their results into a new folder, from which a service can be started.

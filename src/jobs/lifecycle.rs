@@ -25,11 +25,11 @@ use crate::jobs::maintenance::{
     blob_collector, deadlines, disk_reserve, reaper, recovery, retention,
 };
 use crate::jobs::metrics::Metrics;
+use crate::jobs::open_store::{note_closed, open_for_service};
 use crate::jobs::options::Options;
 use crate::jobs::quota::StagedBytes;
 use crate::jobs::recent_reads::RecentReads;
 use crate::jobs::shared::Shared;
-use crate::jobs::store::open::{note_closed, open_for_service};
 use crate::jobs::worker::fair_turns::FairTurns;
 use crate::jobs::worker::pool::Worker;
 use crate::jobs::worker::running::RunningAttempts;

@@ -49,6 +49,7 @@ pub mod metrics;
 pub mod metrics_refresh;
 pub mod model;
 pub mod notify;
+pub mod open_store;
 pub mod options;
 pub mod quota;
 pub mod recent_reads;

@@ -121,7 +121,7 @@ async fn open_store(kind: StoreKind, folder: &Path) -> Arc<dyn Store> {
 
 /// The store of a data folder, beside the service that uses it.
 pub async fn open_beside(folder: &Path) -> Arc<dyn Store> {
-    railhead::jobs::store::open::open_beside(folder)
+    railhead::jobs::open_store::open_beside(folder)
         .await
         .unwrap()
 }

@@ -56,7 +56,7 @@ const ORDER: &[&str] = &[
     "jobs::store",
     "jobs::store::sqlite",
     "jobs::maintenance::disk_reserve",
-    "jobs::store::open",
+    "jobs::open_store",
     "jobs::blobs",
     "jobs::metrics",
     "jobs::trace",

@@ -14,7 +14,7 @@ use crate::http::render::pieces::body;
 const POINTS: usize = 64;
 
 /// A part of the text.
-enum Part {
+enum Section {
     Text(String),
     /// Motions of the patch at this place.
     Points(usize, Range<usize>),
@@ -32,24 +32,24 @@ pub fn json_body(resultants: Resultants) -> Result<Body, serde_json::Error> {
         let before = if place == 0 { "{\"patches\":[" } else { "]}," };
         let load = serde_json::to_string(&patch.normal_force_n)?;
         let number = patch.patch;
-        parts.push(Part::Text(format!(
+        parts.push(Section::Text(format!(
             "{before}{{\"patch\":{number},\"normal_force_n\":{load},\"points\":["
         )));
-        parts.extend(ranges(patch.points.len()).map(|range| Part::Points(place, range)));
+        parts.extend(ranges(patch.points.len()).map(|range| Section::Points(place, range)));
     }
     let open = if resultants.patches.is_empty() {
         "{\"patches\":["
     } else {
         "]}"
     };
-    parts.push(Part::Text(format!("{open}],\"total\":[")));
-    parts.extend(ranges(resultants.total.len()).map(Part::Total));
+    parts.push(Section::Text(format!("{open}],\"total\":[")));
+    parts.extend(ranges(resultants.total.len()).map(Section::Total));
     let origin = serde_json::to_string(&resultants.origin)?;
-    parts.push(Part::Text(format!("],\"origin\":{origin}}}")));
+    parts.push(Section::Text(format!("],\"origin\":{origin}}}")));
     Ok(body(parts.into_iter().map(move |part| match part {
-        Part::Text(text) => Ok(text.into_bytes()),
-        Part::Points(patch, range) => values(&resultants.patches[patch].points, range),
-        Part::Total(range) => values(&resultants.total, range),
+        Section::Text(text) => Ok(text.into_bytes()),
+        Section::Points(patch, range) => values(&resultants.patches[patch].points, range),
+        Section::Total(range) => values(&resultants.total, range),
     })))
 }
 
@@ -58,13 +58,13 @@ pub fn csv_body(resultants: Resultants, sums: Vec<Sum>) -> Body {
     let head = line(CSV_COLUMNS);
     let mut parts = Vec::new();
     for (place, patch) in resultants.patches.iter().enumerate() {
-        parts.extend(ranges(patch.points.len()).map(|range| Part::Points(place, range)));
+        parts.extend(ranges(patch.points.len()).map(|range| Section::Points(place, range)));
     }
-    parts.extend(ranges(resultants.total.len()).map(Part::Total));
+    parts.extend(ranges(resultants.total.len()).map(Section::Total));
     let lines = parts.into_iter().map(move |part| match part {
-        Part::Text(text) => Ok(text.into_bytes()),
-        Part::Points(patch, range) => patch_lines(&resultants.patches[patch], range),
-        Part::Total(range) => total_lines(&resultants, &sums, range),
+        Section::Text(text) => Ok(text.into_bytes()),
+        Section::Points(patch, range) => patch_lines(&resultants.patches[patch], range),
+        Section::Total(range) => total_lines(&resultants, &sums, range),
     });
     body(std::iter::once(head).chain(lines))
 }

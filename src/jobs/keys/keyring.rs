@@ -6,8 +6,8 @@ use std::sync::Arc;
 use crate::jobs::clock::Clock;
 use crate::jobs::error::JobsError;
 use crate::jobs::keys::key::{Key, MARK, is_tenant};
+use crate::jobs::open_store::{open_beside, table_file};
 use crate::jobs::store::Store;
-use crate::jobs::store::open::{open_beside, table_file};
 
 /// The keys of a data folder, also beside a running service.
 #[derive(Debug)]

@@ -20,7 +20,6 @@ pub mod claim;
 pub mod ending;
 pub mod error;
 pub mod list;
-pub mod open;
 pub mod retention;
 pub mod sqlite;
 pub mod submission;
