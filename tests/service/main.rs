@@ -8,6 +8,7 @@ mod batch_tables;
 mod batches;
 mod cache;
 mod caching;
+mod check_case;
 mod cli;
 mod contract;
 mod cost;

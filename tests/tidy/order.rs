@@ -21,6 +21,7 @@ const ORDER: &[&str] = &[
     "contact::solution::zone",
     "contact::solution::profile_quality",
     "contact::solution::words",
+    "contact::solution::understanding",
     "contact::post",
     "contact::case",
     "contact::solution",

@@ -18,4 +18,5 @@ pub mod read;
 pub mod resolution;
 pub mod size;
 pub mod solve_time;
+pub mod understood;
 pub mod words;

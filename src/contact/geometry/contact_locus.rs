@@ -102,6 +102,14 @@ impl<'g> ContactLocus<'g> {
         })
     }
 
+    /// Parameters of rail and wheel where they touch first; of several such places, the one at the smallest y.
+    #[must_use]
+    pub fn first_touch(&self) -> [f64; 2] {
+        let mut lines = self.lines.iter();
+        let first = lines.find(|line| line.clearance <= 0.0);
+        first.map_or([0.0; 2], |line| [line.rail, line.wheel])
+    }
+
     /// The frames of the patches when the wheel is lowered by `lowering` mm below first touch, from smaller to larger y.
     ///
     /// # Errors

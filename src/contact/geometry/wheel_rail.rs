@@ -217,6 +217,14 @@ impl WheelRail {
         Some(point)
     }
 
+    /// The wheel's cross-section below its axle in track axes `[y, z]`, z from the height of the wheelset's centre.
+    #[must_use]
+    pub fn wheel_section(&self, s: f64) -> [f64; 2] {
+        let circle = self.meridian(s);
+        let at = |k: usize| circle.along * self.axle[k] + circle.radius * self.down[k];
+        [at(1) + self.placement.lateral_shift, at(2)]
+    }
+
     /// Position on the rail's profile as it was given (before cant): y to the field side, z down.
     #[must_use]
     pub fn on_rail(&self, s: f64) -> [f64; 2] {

@@ -5,5 +5,6 @@ pub mod finish;
 pub mod finite;
 pub mod profile_quality;
 pub mod track_axes;
+pub mod understanding;
 pub mod words;
 pub mod zone;

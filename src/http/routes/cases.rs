@@ -9,6 +9,7 @@ use crate::contact::case::words::question::Case;
 use crate::contact::case::words::solver::{MethodName, Output};
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::solution::profile_quality::PairQuality;
+use crate::contact::solution::understanding::Understanding;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::json::JsonBody;
 use crate::http::limits::memory::Memory;
@@ -29,6 +30,10 @@ pub struct CheckReport {
     motions: usize,
     /// Expected cost.
     estimate: Estimate,
+    /// What the case was understood as; absent where no part of the wheel lies above the rail.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    understood: Option<Understanding>,
     /// How far the points of the profiles can be trusted, as far as that is known without the contact; only for `profiles`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
@@ -72,20 +77,22 @@ pub async fn check(
     let checked = tokio::task::spawn_blocking(move || {
         // Memory and turn are held until the work ends, even if the client has gone away.
         let _room = room;
-        jobs.check(&value).map(|problem| {
-            let cost = problem.cost();
-            CheckReport {
-                digest: problem.digest.clone(),
-                method: problem.method_asked,
-                outputs: problem.outputs.clone(),
-                motions: problem.motions.len(),
-                estimate: Estimate {
-                    bytes: cost.bytes,
-                    seconds: cost.seconds,
-                },
-                quality: problem.quality(),
-                remarks: problem.remarks,
-            }
+        let problem = jobs.check(&value)?;
+        let cost = problem.cost();
+        // What a wheel that lies nowhere above its rail is told when it is solved.
+        let understood = problem.understood().ok();
+        Ok::<_, ApiError>(CheckReport {
+            digest: problem.digest.clone(),
+            method: problem.method_asked,
+            outputs: problem.outputs.clone(),
+            motions: problem.motions.len(),
+            estimate: Estimate {
+                bytes: cost.bytes,
+                seconds: cost.seconds,
+            },
+            understood,
+            quality: problem.quality(),
+            remarks: problem.remarks,
         })
     });
     let checked = checked.await.map_err(|error| ApiError::internal(&error))?;

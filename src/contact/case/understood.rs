@@ -1,0 +1,91 @@
+//! What a case is understood as: patches that are known without a solve, and wheel and rail in place.
+
+use crate::contact::case::problem::Problem;
+use crate::contact::geometry::contact_locus::ContactLocus;
+use crate::contact::geometry::wheel_rail::WheelRail;
+use crate::contact::normal::normal_task::NormalTask;
+use crate::contact::normal::patch::Patch;
+use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
+use crate::contact::solution::understanding::{
+    FirstTouch, KnownPatch, PlacedProfiles, Understanding,
+};
+
+/// Spacing of the points of a drawn cross-section in mm.
+const STEP: f64 = 0.25;
+/// Digits of a coordinate in mm that are kept.
+const ROUNDED: f64 = 1e4;
+
+impl Problem {
+    /// What can be said of the contact without solving it.
+    ///
+    /// # Errors
+    /// A sentence, if no part of the wheel lies above the rail.
+    pub fn understood(&self) -> Result<Understanding, String> {
+        let patches = self.task.patches();
+        let normal: f64 = patches.iter().map(|patch| patch.normal_force).sum();
+        let placement = match &self.task {
+            NormalTask::Wheel(task) => Some(placed(task)?),
+            _ => None,
+        };
+        Ok(Understanding {
+            friction_limit_n: (!patches.is_empty()).then_some(self.friction * normal),
+            patches: patches.iter().map(known).collect(),
+            placement,
+        })
+    }
+}
+
+fn known(patch: &Patch) -> KnownPatch {
+    KnownPatch {
+        normal_force_n: patch.normal_force,
+        approach_mm: patch.approach,
+        area_mm2: patch.area,
+        pressure_max_mpa: patch.pressure_max,
+        semi_axes_mm: patch.semi_axes,
+        extent_mm: patch.extent,
+    }
+}
+
+fn placed(task: &WheelTask) -> Result<PlacedProfiles, String> {
+    let geometry = &task.geometry;
+    let locus = ContactLocus::new(geometry)?;
+    let [rail, wheel] = geometry.parameters(STEP);
+    let rail_mm = rail.into_iter().map(|s| rounded(geometry.rail_at(s).at));
+    let wheel_mm = wheel.into_iter().map(|s| {
+        let [y, z] = match geometry.lowest(s) {
+            Some([_, y, z]) => [y, z],
+            None => geometry.wheel_section(s),
+        };
+        rounded([y, z + locus.touch])
+    });
+    let lowering_estimate_mm = match task.loading {
+        WheelLoad::Vertical(force) | WheelLoad::Normal(force) => {
+            locus.estimated_lowering(force / task.contact_modulus)
+        }
+        WheelLoad::Lowering(lowering) => lowering,
+    };
+    Ok(PlacedProfiles {
+        rail_mm: rail_mm.collect(),
+        wheel_mm: wheel_mm.collect(),
+        first_touch: first_touch(&locus, geometry),
+        lowering_estimate_mm,
+    })
+}
+
+fn first_touch(locus: &ContactLocus<'_>, geometry: &WheelRail) -> FirstTouch {
+    let [rail, wheel] = locus.first_touch();
+    let on_rail = geometry.rail_at(rail);
+    // The tangent toward the left, whichever way the curve runs.
+    let [dy, dz] = on_rail.slope;
+    let x = geometry.lowest(wheel).map_or(0.0, |[x, ..]| x);
+    FirstTouch {
+        track_mm: [x, on_rail.at[0], on_rail.at[1]],
+        rail_mm: geometry.on_rail(rail),
+        wheel_mm: geometry.on_wheel(wheel),
+        contact_angle_rad: (dz * dy.signum()).atan2(dy.abs()),
+    }
+}
+
+fn rounded(at: [f64; 2]) -> [f64; 2] {
+    at.map(|value| (value * ROUNDED).round() / ROUNDED)
+}
