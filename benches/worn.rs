@@ -61,8 +61,8 @@ fn main() -> ExitCode {
 }
 
 fn solved(case: &Value) -> Result<Solution, String> {
-    let problem = check(case, &Limits::default()).map_err(|error| error.to_string())?;
-    let answer = solve(&problem, &Unmonitored).map_err(|error| error.to_string())?;
+    let checked = check(case, &Limits::default()).map_err(|error| error.to_string())?;
+    let answer = solve(&checked, &Unmonitored).map_err(|error| error.to_string())?;
     Ok(answer.0)
 }
 

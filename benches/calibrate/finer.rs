@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
-use railhead::contact::case::problem::Problem;
+use railhead::contact::case::problem::CheckedCase;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::normal::footprint::Footprint;
@@ -40,20 +40,20 @@ pub fn find(class: Class, case: &Value) -> Result<Truth, String> {
     }
     let mut fine = case.clone();
     fine["solver"] = json!({ "target_error": TARGET_GAP });
-    let problem = contact::check(&fine, &Limits::default()).map_err(|e| e.to_string())?;
-    let pressed = problem.pressed(&Unmonitored).map_err(|e| e.to_string())?;
-    let (value, change) = two_meshes(&problem, &pressed.footprint).map_err(|e| e.to_string())?;
-    let frame = frame_of(&problem, &pressed.footprint);
+    let checked = contact::check(&fine, &Limits::default()).map_err(|e| e.to_string())?;
+    let pressed = checked.pressed(&Unmonitored).map_err(|e| e.to_string())?;
+    let (value, change) = two_meshes(&checked, &pressed.footprint).map_err(|e| e.to_string())?;
+    let frame = frame_of(&checked, &pressed.footprint);
     let mut uncertainty = change + LEAST;
     let value = frame.relative(value);
-    if matches!(problem.task, NormalTask::Gap(_)) {
+    if matches!(checked.problem.task, NormalTask::Gap(_)) {
         // The change from a coarser normal problem, which errs about three times as much.
         let mut coarse = case.clone();
         coarse["solver"] = json!({ "target_error": 0.001 });
-        let problem = contact::check(&coarse, &Limits::default()).map_err(|e| e.to_string())?;
-        let coarse = problem.pressed(&Unmonitored).map_err(|e| e.to_string())?;
+        let checked = contact::check(&coarse, &Limits::default()).map_err(|e| e.to_string())?;
+        let coarse = checked.pressed(&Unmonitored).map_err(|e| e.to_string())?;
         let other = [&pressed, &coarse].map(|pressed| {
-            one_mesh(&problem, &pressed.footprint, 256)
+            one_mesh(&checked, &pressed.footprint, 256)
                 .map(|(sum, _)| frame.relative(sum))
                 .map_err(|e| e.to_string())
         });
@@ -71,7 +71,7 @@ pub fn find(class: Class, case: &Value) -> Result<Truth, String> {
 }
 
 /// Units and centre of a problem's resultants.
-fn frame_of(problem: &Problem, footprint: &Footprint) -> Frame {
+fn frame_of(checked: &CheckedCase, footprint: &Footprint) -> Frame {
     let patches = footprint.patches();
     let load: f64 = patches.iter().map(|p| p.normal_force).sum();
     let area: f64 = patches.iter().map(|p| p.area).sum();
@@ -82,15 +82,18 @@ fn frame_of(problem: &Problem, footprint: &Footprint) -> Frame {
     Frame {
         centre: [middle(0), middle(1)],
         length: (area / std::f64::consts::PI).sqrt(),
-        limit: problem.friction * load,
+        limit: checked.problem.friction.largest() * load,
     }
 }
 
 /// The sum of the resultants from two fine meshes, and half of what they say is left, relative to μN.
-fn two_meshes(problem: &Problem, footprint: &Footprint) -> Result<(Resultants, f64), SolveError> {
-    let frame = frame_of(problem, footprint);
-    let (coarse, coarse_cells) = one_mesh(problem, footprint, CELLS[0])?;
-    let (fine, fine_cells) = one_mesh(problem, footprint, CELLS[1])?;
+fn two_meshes(
+    checked: &CheckedCase,
+    footprint: &Footprint,
+) -> Result<(Resultants, f64), SolveError> {
+    let frame = frame_of(checked, footprint);
+    let (coarse, coarse_cells) = one_mesh(checked, footprint, CELLS[0])?;
+    let (fine, fine_cells) = one_mesh(checked, footprint, CELLS[1])?;
     let share = 1.0 / (fine_cells as f64 / coarse_cells as f64 - 1.0);
     let beyond = fine.beyond(coarse, share, frame.limit);
     let half = |a: f64, b: f64| 0.5 * (a + b);
@@ -105,18 +108,18 @@ fn two_meshes(problem: &Problem, footprint: &Footprint) -> Result<(Resultants, f
 
 /// The sum of the resultants on a mesh of so many cells, in double precision, and how many there are.
 fn one_mesh(
-    problem: &Problem,
+    checked: &CheckedCase,
     footprint: &Footprint,
     cells: u32,
 ) -> Result<(Resultants, usize), SolveError> {
-    let mut exact = problem.clone();
-    exact.resolution = Resolution::Mesh(contact::mesh::size::MeshSize {
+    let mut exact = checked.clone();
+    exact.run.resolution = Resolution::Mesh(contact::mesh::size::MeshSize {
         strips: 8,
         cells: 8,
     });
     let asked = MotionTask {
         index: 0,
-        motion: problem.motions[0],
+        motion: checked.problem.motions[0],
     };
     let task = exact.rolling_task(footprint);
     let mut levels = Levels::new(&task, &Arc::default());
@@ -145,9 +148,9 @@ fn one_mesh(
 fn of_profiles(case: &Value) -> Result<Truth, String> {
     let mut fine = case.clone();
     fine["solver"] = json!({ "target_error": TARGET_PROFILES });
-    let problem = contact::check(&fine, &Limits::default()).map_err(|e| e.to_string())?;
-    let (solution, _) = contact::solve(&problem, &Unmonitored).map_err(|e| e.to_string())?;
-    let limit = problem.friction * normal_force(&solution);
+    let checked = contact::check(&fine, &Limits::default()).map_err(|e| e.to_string())?;
+    let (solution, _) = contact::solve(&checked, &Unmonitored).map_err(|e| e.to_string())?;
+    let limit = checked.problem.friction.largest() * normal_force(&solution);
     let value = tangential(&solution).map(|force| force / limit);
     let estimate = estimate(&solution).ok_or("no estimate")? / limit;
     Ok(Truth {

@@ -117,9 +117,9 @@ fn tables(class: Class, truths: &Truths, each: bool) {
             let mut question = case(class, *number);
             assert_eq!(truth.print, truth::print(&question), "another population");
             question["solver"] = json!({ "target_error": target });
-            let problem = contact::check(&question, &Limits::default()).expect("a sound case");
+            let checked = contact::check(&question, &Limits::default()).expect("a sound case");
             let began = ThreadTime::now();
-            let (solution, _) = match contact::solve(&problem, &Unmonitored) {
+            let (solution, _) = match contact::solve(&checked, &Unmonitored) {
                 Ok(found) => found,
                 Err(error) => {
                     println!("{} {number} at {target}: {error}", class.name());

@@ -67,15 +67,15 @@ impl Figure {
             memory_bytes: 8 << 30,
             ..Limits::default()
         };
-        let problem = check(&case, &limits).expect("a valid case");
-        let (solution, fields) = solve(&problem, &Unmonitored).expect("an answer");
+        let checked = check(&case, &limits).expect("a valid case");
+        let (solution, fields) = solve(&checked, &Unmonitored).expect("an answer");
         let lengths = solution.patches.iter().map(|patch| patch.extent_mm);
         let half_length = lengths.map(|e| 0.5 * (e[1] - e[0])).fold(0.0, f64::max);
         let forces = solution.patches.iter().map(|patch| patch.normal_force_n);
-        let bound = problem.friction * forces.sum::<f64>();
+        let bound = checked.problem.friction.largest() * forces.sum::<f64>();
         // E/(1 − σ²) = 2 G/(1 − σ)
-        let stiffness =
-            2.0 * problem.elasticity.shear_modulus / (1.0 - problem.elasticity.poisson_ratio);
+        let stiffness = 2.0 * checked.problem.elasticity.shear_modulus
+            / (1.0 - checked.problem.elasticity.poisson_ratio);
         Figure {
             creepage: bound / (stiffness * half_length.powi(2)),
             solution,

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::fmt::Write as _;
 use std::hint::black_box;
 
-use railhead::contact::case::problem::Problem;
+use railhead::contact::case::problem::CheckedCase;
 use railhead::contact::half_space::grid_operator::GridWorkspace;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::normal::normal_task::NormalTask;
@@ -59,10 +59,10 @@ fn table<'a>(cases: impl Iterator<Item = &'a Value>, lu: f64) -> String {
         .to_owned();
     let (mut whole, mut normal, mut errors) = (Vec::new(), Vec::new(), Vec::new());
     for case in cases {
-        let problem = problem(&question(case));
-        let (solution, seconds) = timed(&problem, REPEATS);
+        let checked = problem(&question(case));
+        let (solution, seconds) = timed(&checked, REPEATS);
         let press = || {
-            let _ = black_box(problem.pressed(&Unmonitored));
+            let _ = black_box(checked.pressed(&Unmonitored));
         };
         let pressing = median((0..REPEATS).map(|_| seconds_of(press).0).collect());
         let solution = solution.expect("an answer");
@@ -217,13 +217,14 @@ fn wheels(lu: f64) -> String {
     cases.push(("flange".to_owned(), example("wheel-rail-flange.case.json")));
     for (name, mut case) in cases {
         case["outputs"] = json!(["resultants"]);
-        let problem = problem(&case);
-        let (solution, seconds) = timed(&problem, REPEATS);
+        let checked = problem(&case);
+        let (solution, seconds) = timed(&checked, REPEATS);
         let solution = solution.expect("an answer");
-        let (rest, heights) = at_rest(&problem);
+        let (rest, heights) = at_rest(&checked);
         let estimate = solution.patches.iter().map(|patch| {
             let estimate = patch.points[0].error_estimate.unwrap_or_default();
-            estimate.force_x_n.max(estimate.force_y_n) / (problem.friction * patch.normal_force_n)
+            estimate.force_x_n.max(estimate.force_y_n)
+                / (checked.problem.friction.largest() * patch.normal_force_n)
         });
         let _ = writeln!(
             text,
@@ -238,8 +239,8 @@ fn wheels(lu: f64) -> String {
 }
 
 /// Seconds to bring the wheel of a problem to rest, and the heights looked at.
-fn at_rest(problem: &Problem) -> (f64, u32) {
-    let NormalTask::Wheel(contact) = &problem.task else {
+fn at_rest(checked: &CheckedCase) -> (f64, u32) {
+    let NormalTask::Wheel(contact) = &checked.problem.task else {
         unreachable!("the examples give profiles")
     };
     let wanted = NormalPass {

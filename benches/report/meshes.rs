@@ -25,8 +25,8 @@ impl Run {
     fn of(cases: &[Value], solver: &Value) -> Run {
         let mut run = Run::default();
         for case in cases {
-            let problem = hertz(case, solver, &json!(["resultants"]));
-            let (solution, seconds) = timed(&problem, REPEATS);
+            let checked = hertz(case, solver, &json!(["resultants"]));
+            let (solution, seconds) = timed(&checked, REPEATS);
             if let Some(solution) = solution {
                 run.add(case, hertz_error(&solution.total[0], case).0, seconds);
             }

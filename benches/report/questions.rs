@@ -1,7 +1,7 @@
 //! The reference cases as questions, and the errors of their answers.
 
 use railhead::contact::case::limits::Limits;
-use railhead::contact::case::problem::Problem;
+use railhead::contact::case::problem::CheckedCase;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::solution::words::{Solution, Total};
 use railhead::contact::{check, solve};
@@ -38,7 +38,7 @@ pub fn number(case: &Value, name: &str) -> f64 {
 }
 
 /// A stored Hertz case as a problem.
-pub fn hertz(case: &Value, solver: &Value, outputs: &Value) -> Problem {
+pub fn hertz(case: &Value, solver: &Value, outputs: &Value) -> CheckedCase {
     let question = json!({
         "material": { "shear_modulus_mpa": case["shear_modulus_mpa"], "poisson_ratio": case["poisson_ratio"] },
         "friction": { "coefficient": case["friction"] },
@@ -52,7 +52,7 @@ pub fn hertz(case: &Value, solver: &Value, outputs: &Value) -> Problem {
 }
 
 /// A question as a problem; meshes beyond the usual limit of memory are allowed.
-pub fn problem(question: &Value) -> Problem {
+pub fn problem(question: &Value) -> CheckedCase {
     let limits = Limits {
         memory_bytes: 8 << 30,
         ..Limits::default()
@@ -61,13 +61,13 @@ pub fn problem(question: &Value) -> Problem {
 }
 
 /// The answer if there is one, and the median time of a solve over `repeats`, fewer where one takes long.
-pub fn timed(problem: &Problem, repeats: usize) -> (Option<Solution>, f64) {
-    let (first, answer) = seconds_of(|| solve(problem, &Unmonitored));
+pub fn timed(checked: &CheckedCase, repeats: usize) -> (Option<Solution>, f64) {
+    let (first, answer) = seconds_of(|| solve(checked, &Unmonitored));
     let Ok((solution, _)) = answer else {
         return (None, first);
     };
     let repeats = if first > 0.1 { 1 } else { repeats };
-    let seconds = (0..repeats).map(|_| seconds_of(|| solve(problem, &Unmonitored)).0);
+    let seconds = (0..repeats).map(|_| seconds_of(|| solve(checked, &Unmonitored)).0);
     (Some(solution), median(seconds.collect()))
 }
 

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::hint::black_box;
 use std::sync::Arc;
 
-use railhead::contact::case::problem::Problem;
+use railhead::contact::case::problem::CheckedCase;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::operator_store::OperatorStore;
 use railhead::contact::{solve, solve_with};
@@ -104,7 +104,7 @@ fn one_by_one(lu: f64) -> String {
 
 /// Cases of one shape under many loads and motions, each on its own and with the influence kept.
 fn one_shape(lu: f64) -> String {
-    let problems: Vec<Problem> = (0..CASES_OF_A_SHAPE)
+    let problems: Vec<CheckedCase> = (0..CASES_OF_A_SHAPE)
         .map(|k| {
             let part = f64::from(k) / f64::from(CASES_OF_A_SHAPE);
             let motion =
@@ -115,13 +115,13 @@ fn one_shape(lu: f64) -> String {
         .collect();
     let store = Arc::new(OperatorStore::default());
     let (alone, _) = seconds_of(|| {
-        for problem in &problems {
-            let _ = black_box(solve(problem, &Unmonitored));
+        for checked in &problems {
+            let _ = black_box(solve(checked, &Unmonitored));
         }
     });
     let (kept, _) = seconds_of(|| {
-        for problem in &problems {
-            let _ = black_box(solve_with(&store, problem, &Unmonitored));
+        for checked in &problems {
+            let _ = black_box(solve_with(&store, checked, &Unmonitored));
         }
     });
     let each = |seconds: f64| seconds / lu / f64::from(CASES_OF_A_SHAPE);
@@ -142,13 +142,13 @@ struct Cost {
 }
 
 fn cost(motion: &Value, outputs: &Value, friction: f64) -> Cost {
-    let problem = problem(&question(motion, outputs, friction, 100_000.0));
-    let (solution, seconds) = timed(&problem, REPEATS);
+    let checked = problem(&question(motion, outputs, friction, 100_000.0));
+    let (solution, seconds) = timed(&checked, REPEATS);
     let points = &solution.expect("an answer").patches[0].points;
     Cost {
         seconds,
         products: points.iter().map(|p| p.solver.products).sum(),
-        allocations: during(|| solve(&problem, &Unmonitored)),
+        allocations: during(|| solve(&checked, &Unmonitored)),
     }
 }
 

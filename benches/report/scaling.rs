@@ -30,7 +30,7 @@ pub fn section(lu: f64, pictures: &Path) -> String {
         .to_owned();
     let mut sizes = Vec::new();
     for side in [16, 24, 32, 44, 64, 90, 100] {
-        let problem = problem(&json!({
+        let checked = problem(&json!({
             "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
             "friction": { "coefficient": 0.3 },
             "contact": { "type": "radii", "rolling_mm": 460, "lateral_mm": 300 },
@@ -39,13 +39,13 @@ pub fn section(lu: f64, pictures: &Path) -> String {
             "solver": { "mesh": { "strips": side, "cells": side } },
             "outputs": ["resultants"],
         }));
-        let seconds = timed(&problem, 3).1;
+        let seconds = timed(&checked, 3).1;
         let asked = MotionTask {
             index: 0,
-            motion: problem.motions[0],
+            motion: checked.problem.motions[0],
         };
-        let footprint = problem.pressed(&Unmonitored).expect("a contact").footprint;
-        let task = problem.rolling_task(&footprint);
+        let footprint = checked.pressed(&Unmonitored).expect("a contact").footprint;
+        let task = checked.rolling_task(&footprint);
         let mut levels = Levels::new(&task, &Arc::default());
         let point = refine::solve(&task, &mut levels, asked, &Unmonitored).expect("an answer");
         let cells = (side * side) as usize;

@@ -58,12 +58,12 @@ pub fn section(cases: &[Value], lu: f64) -> String {
 }
 
 fn outcome(case: &Value, target: f64) -> Outcome {
-    let problem = hertz(
+    let checked = hertz(
         case,
         &json!({ "target_error": target }),
         &json!(["resultants"]),
     );
-    let (solution, seconds) = timed(&problem, REPEATS);
+    let (solution, seconds) = timed(&checked, REPEATS);
     let solution = solution.expect("an answer");
     let (error, uncertainty) = hertz_error(&solution.total[0], case);
     let bound = number(case, "friction") * number(case, "normal_force_n");

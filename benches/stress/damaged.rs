@@ -337,8 +337,8 @@ pub fn with(
 
 /// The answer, if there is one.
 pub fn answer(case: &Value) -> Option<Solution> {
-    let problem = check(case, &Limits::default()).ok()?;
-    solve(&problem, &Unmonitored)
+    let checked = check(case, &Limits::default()).ok()?;
+    solve(&checked, &Unmonitored)
         .ok()
         .map(|(solution, _)| solution)
 }

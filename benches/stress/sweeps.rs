@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use railhead::contact::case::limits::Limits;
-use railhead::contact::case::problem::Problem;
+use railhead::contact::case::problem::CheckedCase;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::operator_store::OperatorStore;
 use railhead::contact::{check, solve, solve_with};
@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 const SIDES: [u32; 2] = [30, 100];
 const SPIN: f64 = 0.003;
 
-fn case(motion: Value, target: f64, outputs: &Value) -> Problem {
+fn case(motion: Value, target: f64, outputs: &Value) -> CheckedCase {
     let case = json!({
         "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
         "friction": { "coefficient": 0.3 },
@@ -28,7 +28,7 @@ fn case(motion: Value, target: f64, outputs: &Value) -> Problem {
     check(&case, &Limits::default()).expect("a valid case")
 }
 
-fn creep_map(side: u32) -> Problem {
+fn creep_map(side: u32) -> CheckedCase {
     let range = |reach: f64| json!({ "from": -reach * SPIN, "to": reach * SPIN, "points": side });
     let sweep = json!({
         "creepage_x": range(4.0),
@@ -63,9 +63,9 @@ pub fn creep_maps() -> String {
         let idle = status("VmRSS:").unwrap_or(f64::NAN);
         forget_peak();
         let store = Arc::new(OperatorStore::default());
-        let problem = creep_map(side);
+        let checked = creep_map(side);
         let began = Instant::now();
-        let (solution, _) = solve_with(&store, &problem, &Unmonitored).expect("an answer");
+        let (solution, _) = solve_with(&store, &checked, &Unmonitored).expect("an answer");
         let seconds = began.elapsed().as_secs_f64();
         let peak = status("VmHWM:").unwrap_or(f64::NAN) - idle;
         let points = &solution.patches[0].points;
@@ -73,7 +73,7 @@ pub fn creep_maps() -> String {
         let motions = points.len();
         drop(solution);
         let after = status("VmRSS:").unwrap_or(f64::NAN) - idle;
-        let cost = problem.cost();
+        let cost = checked.cost();
         let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
         let _ = writeln!(
             text,
@@ -97,8 +97,8 @@ pub fn with_zones() -> String {
         .collect();
     for target in [0.02, 0.005, 0.002, 0.001] {
         let ask = |outputs: Value| {
-            let problem = case(json!(motions), target, &outputs);
-            solve(&problem, &Unmonitored).expect("an answer")
+            let checked = case(json!(motions), target, &outputs);
+            solve(&checked, &Unmonitored).expect("an answer")
         };
         let (plain, _) = ask(json!(["resultants"]));
         let (full, fields) = ask(json!([

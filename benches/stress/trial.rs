@@ -99,9 +99,9 @@ pub fn attempt_timed(case: &Value) -> Result<((Solution, Fields), [f64; 2]), End
         ..Limits::default()
     };
     let work = || -> Result<((Solution, Fields), [f64; 2]), End> {
-        let problem = check(case, &limits).map_err(|error| End::Refused(error.to_string()))?;
+        let checked = check(case, &limits).map_err(|error| End::Refused(error.to_string()))?;
         let began = ThreadTime::now();
-        let answer = solve(&problem, &Clock(Instant::now())).map_err(|error| match error {
+        let answer = solve(&checked, &Clock(Instant::now())).map_err(|error| match error {
             SolveError::NormalProblem { reason } => End::Refused(reason),
             SolveError::Unmeshable { .. } => End::Refused(error.to_string()),
             SolveError::NotConverged { .. } => End::NotConverged(error.to_string()),
@@ -109,7 +109,7 @@ pub fn attempt_timed(case: &Value) -> Result<((Solution, Fields), [f64; 2]), End
         })?;
         Ok((
             answer,
-            [began.elapsed().as_secs_f64(), problem.cost().seconds],
+            [began.elapsed().as_secs_f64(), checked.cost().seconds],
         ))
     };
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| Err(End::Failed("crashes".to_owned())))

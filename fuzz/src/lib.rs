@@ -29,9 +29,9 @@ fn template() -> Value {
 fn check(case: &Value) {
     let limits = Limits::default();
     match contact::check(case, &limits) {
-        Ok(problem) => {
+        Ok(checked) => {
             let again = contact::check(case, &limits).expect("what was taken once is taken again");
-            assert_eq!(problem.digest, again.digest);
+            assert_eq!(checked.label.digest, again.label.digest);
         }
         Err(faults) => {
             assert!(!faults.0.is_empty());

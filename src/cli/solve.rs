@@ -53,8 +53,8 @@ pub(super) fn run(args: &SolveArgs) -> anyhow::Result<ExitCode> {
             return Ok(ExitCode::from(FAULTY_CASE));
         }
     };
-    let problem = match check(&case, &args.case.limits()) {
-        Ok(problem) => problem,
+    let checked = match check(&case, &args.case.limits()) {
+        Ok(checked) => checked,
         Err(faults) => {
             for fault in &faults.0 {
                 let place = if fault.pointer.is_empty() {
@@ -68,7 +68,7 @@ pub(super) fn run(args: &SolveArgs) -> anyhow::Result<ExitCode> {
         }
     };
     let operators = Arc::new(args.case.operators());
-    let (solution, fields) = solve_with(&operators, &problem, &Clock(Instant::now()))?;
+    let (solution, fields) = solve_with(&operators, &checked, &Clock(Instant::now()))?;
     let result = Printed {
         solution: &solution,
         fields: (!fields.patches.is_empty()).then(|| fields_json(&fields)),

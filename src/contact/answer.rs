@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::contact::case::press::PressedContact;
-use crate::contact::case::problem::Problem;
+use crate::contact::case::problem::CheckedCase;
 use crate::contact::error::SolveError;
 use crate::contact::rolling::force_control;
 use crate::contact::rolling::operator_store::OperatorStore;
@@ -20,27 +20,27 @@ use crate::contact::time_limit::TimeLimit;
 /// Why a motion has no answer; or the monitor stopped the work.
 pub(crate) fn answer(
     operators: &Arc<OperatorStore>,
-    problem: &Problem,
+    case: &CheckedCase,
     pressed: &PressedContact,
     watch: &TimeLimit,
 ) -> Result<(Solution, Fields), SolveError> {
-    let answer = motions(operators, problem, pressed, watch);
-    let (mut solution, fields) = answer.map_err(|error| watch.explained(error, problem))?;
+    let answer = motions(operators, case, pressed, watch);
+    let (mut solution, fields) = answer.map_err(|error| watch.explained(error, case))?;
     share_seconds(&mut solution);
     Ok((solution, fields))
 }
 
 fn motions(
     operators: &Arc<OperatorStore>,
-    problem: &Problem,
+    case: &CheckedCase,
     pressed: &PressedContact,
     watch: &TimeLimit,
 ) -> Result<(Solution, Fields), SolveError> {
-    let task = problem.rolling_task(&pressed.footprint);
+    let task = case.rolling_task(&pressed.footprint);
     let mut levels = Levels::new(&task, operators);
-    let mut assembly = Assembly::new(problem, pressed);
+    let mut assembly = Assembly::new(case, pressed);
     let mut before: Option<MotionAnswer> = None;
-    for index in 0..problem.motions.len() {
+    for index in 0..case.problem.motions.len() {
         let mut point = force_control::solve(&task, &mut levels, index, before.as_ref(), watch)?;
         if index == 0 {
             // What all motions share is charged to the first.

@@ -5,8 +5,7 @@ use std::sync::Arc;
 
 use crate::contact::answer::answer;
 use crate::contact::case::press::PressedContact;
-use crate::contact::case::problem::Problem;
-use crate::contact::case::words::solver::Output;
+use crate::contact::case::problem::{CheckedCase, Run};
 use crate::contact::error::SolveError;
 use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::surface_exit::SurfaceMissed;
@@ -57,7 +56,7 @@ const TOLERANCE_FIRST: f64 = 0.1;
 /// A named reason why there is no answer, with what `judge` says of it.
 pub(crate) fn solve(
     operators: &Arc<OperatorStore>,
-    problem: &Problem,
+    case: &CheckedCase,
     contact: &WheelTask,
     judge: &dyn Judge,
     monitor: &dyn Monitor,
@@ -65,13 +64,14 @@ pub(crate) fn solve(
     let search = contact
         .search()
         .map_err(|reason| SolveError::NormalProblem { reason })?;
-    let vertical = matches!(contact.loading, WheelLoad::Vertical(_)) && problem.friction > 0.0;
+    let vertical = matches!(contact.loading, WheelLoad::Vertical(_))
+        && !case.problem.friction.is_frictionless();
     let solve = WheelSolve {
         operators,
-        problem,
+        case,
         contact,
         search,
-        balanced: vertical && problem.part.all == 1,
+        balanced: vertical && case.problem.part.all == 1,
         judge,
         monitor,
     };
@@ -80,12 +80,12 @@ pub(crate) fn solve(
         return solve.balance(workspace);
     }
     let mut at_rest = solve.rest(solve.exactly(0.0), None, workspace)?;
-    let answers = solve.answers(&at_rest, problem)?;
+    let answers = solve.answers(&at_rest, &case.run)?;
     if vertical {
         let remark = Remark::NormalForcesAloneBalance {};
         at_rest.wheel.remarks.push(remark.into());
     }
-    at_rest.found(problem, contact, answers)
+    at_rest.found(case, contact, answers)
 }
 
 /// Who judges a wheel at rest before and after its motions are solved.
@@ -103,7 +103,7 @@ pub(crate) trait Judge {
 /// One wheel on its rail.
 struct WheelSolve<'a> {
     operators: &'a Arc<OperatorStore>,
-    problem: &'a Problem,
+    case: &'a CheckedCase,
     contact: &'a WheelTask,
     search: ContactLocus<'a>,
     balanced: bool,
@@ -115,7 +115,7 @@ impl WheelSolve<'_> {
     fn exactly(&self, friction_share: f64) -> NormalPass {
         NormalPass {
             friction_share,
-            accuracy: Accuracy::For(self.problem.target()),
+            accuracy: Accuracy::For(self.case.run.target()),
         }
     }
 
@@ -125,12 +125,12 @@ impl WheelSolve<'_> {
         before: Option<&PressedWheel>,
         workspace: &mut GridWorkspace<f32>,
     ) -> Result<Rest, SolveError> {
-        let watch = TimeLimit::new(self.monitor, self.problem.time_limit, 1);
+        let watch = TimeLimit::new(self.monitor, self.case.run.time_limit, 1);
         let began = self.monitor.elapsed();
         let wheel = self
             .contact
             .press(&self.search, wanted, before, workspace, &watch);
-        let wheel = wheel.map_err(|failure| watch.explained(failure.into(), self.problem))?;
+        let wheel = wheel.map_err(|failure| watch.explained(failure.into(), self.case))?;
         if matches!(wanted.accuracy, Accuracy::For(_)) {
             self.judge.before(&wheel)?;
         }
@@ -143,29 +143,57 @@ impl WheelSolve<'_> {
         })
     }
 
-    fn answers(
+    fn answers(&self, at_rest: &Rest, run: &Run) -> Result<Vec<(Solution, Fields)>, SolveError> {
+        self.answers_of_gaps(at_rest, run)
+            .map_err(|error| self.judge.explain(&at_rest.wheel, error))
+    }
+
+    /// Solves every motion in every gap.
+    fn answers_of_gaps(
         &self,
         at_rest: &Rest,
-        problem: &Problem,
+        run: &Run,
     ) -> Result<Vec<(Solution, Fields)>, SolveError> {
-        at_rest
-            .answers(self.operators, problem, self.contact, self.monitor)
-            .map_err(|error| self.judge.explain(&at_rest.wheel, error))
+        let CheckedCase { problem, label, .. } = self.case;
+        let (wheel, geometry) = (&at_rest.wheel, &self.contact.geometry);
+        let count = wheel.patches.len();
+        let watch = TimeLimit::new(self.monitor, run.time_limit, count * problem.motions.len());
+        let mut answers = Vec::with_capacity(count);
+        for (k, gap) in wheel.patches.iter().enumerate() {
+            // What all gaps share is charged to the first.
+            let seconds = if k == 0 { at_rest.seconds } else { 0.0 };
+            let normal = NormalReport {
+                force_residual: wheel.force_residual,
+                ..gap.report.with_time(seconds)
+            };
+            let motions = match &problem.wheelset {
+                None => problem.motions.clone(),
+                Some(wheelset) => vec![at_rest.motion(gap, geometry, wheelset)?],
+            };
+            let load_error = wheel.load_error.hypot(at_rest.unbalanced);
+            let pressed = PressedContact {
+                footprint: Footprint::computed(gap.field.clone(), load_error),
+                report: Some(normal),
+                remarks: Vec::new(),
+            };
+            let part = CheckedCase {
+                problem: problem.of_gap(motions),
+                run: run.clone(),
+                label: label.clone(),
+                // They are told of the whole contact.
+                remarks: Vec::new(),
+            };
+            part.fits(&pressed.footprint)?;
+            let answered = answer(self.operators, &part, &pressed, &watch);
+            answers.push(answered.map_err(|error| of_gap(error, gap, geometry))?);
+        }
+        Ok(answers)
     }
 
     /// Brings normal and tangential forces to balance the vertical force together.
     fn balance(&self, workspace: &mut GridWorkspace<f32>) -> Result<Found, SolveError> {
-        let WheelSolve {
-            problem, contact, ..
-        } = *self;
-        let coarse = Problem {
-            resolution: match problem.resolution {
-                Resolution::Target(target) => Resolution::Target(target.max(TARGET_FIRST)),
-                mesh @ Resolution::Mesh(_) => mesh,
-            },
-            outputs: vec![Output::Resultants],
-            ..problem.clone()
-        };
+        let WheelSolve { case, contact, .. } = *self;
+        let coarse = case.run.for_resultants(TARGET_FIRST);
         let about = NormalPass {
             friction_share: 0.0,
             accuracy: Accuracy::About(TOLERANCE_FIRST),
@@ -175,7 +203,7 @@ impl WheelSolve<'_> {
         let mut share = friction_share(&at_rest.wheel, &answers);
         let mut counted = share;
         let mut previous = None;
-        let tolerance = tolerance(problem.resolution);
+        let tolerance = tolerance(case.run.resolution);
         let mut exit = BalanceExit::NothingCarried;
         let mut last = None;
         for _ in 0..ROUNDS_MAX {
@@ -185,7 +213,7 @@ impl WheelSolve<'_> {
             }
             let wanted = self.exactly(counted);
             at_rest = at_rest.again(self.rest(wanted, Some(&at_rest.wheel), workspace)?);
-            let answers = self.answers(&at_rest, problem)?;
+            let answers = self.answers(&at_rest, &case.run)?;
             share = friction_share(&at_rest.wheel, &answers);
             let before = previous.replace((counted, share));
             last = Some(answers);
@@ -198,7 +226,7 @@ impl WheelSolve<'_> {
             counted = next_share((counted, share), before);
         }
         let answers = exit.judged(last, tolerance, share, &mut at_rest.wheel)?;
-        at_rest.found(problem, contact, answers)
+        at_rest.found(case, contact, answers)
     }
 }
 
@@ -317,17 +345,17 @@ struct Rest {
 impl Rest {
     fn found(
         mut self,
-        problem: &Problem,
+        case: &CheckedCase,
         contact: &WheelTask,
         answers: Vec<(Solution, Fields)>,
     ) -> Result<Found, SolveError> {
-        let part = match problem.resolution {
+        let part = match case.run.resolution {
             Resolution::Target(target) => target,
             Resolution::Mesh(_) => UNCOUPLED,
         };
         let remark = contact.uncoupled(&self.wheel, part);
         self.wheel.remarks.extend(remark.map(RemarkEntry::from));
-        let (solution, fields) = merge(problem, &contact.geometry, &self.wheel, answers)?;
+        let (solution, fields) = merge(case, &contact.geometry, &self.wheel, answers)?;
         Ok(Found {
             wheel: self.wheel,
             solution,
@@ -344,43 +372,6 @@ impl Rest {
             seconds: self.seconds + later.seconds,
             unbalanced: later.unbalanced,
         }
-    }
-
-    /// Solves every motion on every part.
-    fn answers(
-        &self,
-        operators: &Arc<OperatorStore>,
-        problem: &Problem,
-        contact: &WheelTask,
-        monitor: &dyn Monitor,
-    ) -> Result<Vec<(Solution, Fields)>, SolveError> {
-        let parts = self.wheel.patches.len();
-        let watch = TimeLimit::new(monitor, problem.time_limit, parts * problem.motions.len());
-        let mut answers = Vec::with_capacity(parts);
-        for (k, gap) in self.wheel.patches.iter().enumerate() {
-            // What all parts share is charged to the first.
-            let normal = NormalReport {
-                force_residual: self.wheel.force_residual,
-                ..gap
-                    .report
-                    .with_time(if k == 0 { self.seconds } else { 0.0 })
-            };
-            let motions = match &problem.wheelset {
-                None => problem.motions.clone(),
-                Some(wheelset) => vec![self.motion(gap, &contact.geometry, wheelset)?],
-            };
-            let load_error = self.wheel.load_error.hypot(self.unbalanced);
-            let pressed = PressedContact {
-                footprint: Footprint::computed(gap.field.clone(), load_error),
-                report: Some(normal),
-                remarks: Vec::new(),
-            };
-            problem.fits(&pressed.footprint)?;
-            let part = problem.of_part(motions);
-            let answered = answer(operators, &part, &pressed, &watch);
-            answers.push(answered.map_err(|error| of_gap(error, gap, &contact.geometry))?);
-        }
-        Ok(answers)
     }
 
     /// Creepages and spin about the origin of a gap: those at its patches, weighted with their forces. Between patches

@@ -1,6 +1,6 @@
 //! What is the physics? Plain synchronous arithmetic: no async, files, environment or printing.
 //!
-//! A case is [`check`]ed and becomes a [`Problem`]; [`solve`] takes its motions slice by slice through the
+//! A case is [`check`]ed and becomes a [`CheckedCase`]; [`solve`] takes its motions slice by slice through the
 //! [`stages`]: footprint, motions from coarse to fine levels, answer. Frame, signs, units and words: [`conventions`].
 
 pub mod answer;
@@ -29,7 +29,7 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use crate::contact::case::limits::Limits;
-use crate::contact::case::problem::Problem;
+use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::read::draft;
 use crate::contact::error::{CaseError, SolveError};
 use crate::contact::monitor::Monitor;
@@ -41,13 +41,13 @@ use crate::contact::solution::words::{Fields, Solution};
 ///
 /// # Errors
 /// Every fault of the case at once: those of the text, and those of its sound parts against physics and limits.
-pub fn check(case: &Value, limits: &Limits) -> Result<Problem, CaseError> {
+pub fn check(case: &Value, limits: &Limits) -> Result<CheckedCase, CaseError> {
     let (draft, mut faults) = draft::draft(case);
     if !faults.is_empty() {
         faults.extend(draft.faults_beside(limits));
         return Err(CaseError(faults));
     }
-    Problem::new(&draft.complete().ok_or(CaseError(faults))?, limits)
+    CheckedCase::new(&draft.complete().ok_or(CaseError(faults))?, limits)
 }
 
 /// Solves a checked case: region and pressure where they are not known yet, then every motion from a coarse mesh level
@@ -55,8 +55,8 @@ pub fn check(case: &Value, limits: &Limits) -> Result<Problem, CaseError> {
 ///
 /// # Errors
 /// A named reason why there is no answer.
-pub fn solve(problem: &Problem, monitor: &dyn Monitor) -> Result<(Solution, Fields), SolveError> {
-    solve_with(&Arc::default(), problem, monitor)
+pub fn solve(case: &CheckedCase, monitor: &dyn Monitor) -> Result<(Solution, Fields), SolveError> {
+    solve_with(&Arc::default(), case, monitor)
 }
 
 /// The same for one of many problems: operators of patches of the same shape are kept in the store for the next.
@@ -65,12 +65,12 @@ pub fn solve(problem: &Problem, monitor: &dyn Monitor) -> Result<(Solution, Fiel
 /// The same.
 pub fn solve_with(
     operators: &Arc<OperatorStore>,
-    problem: &Problem,
+    case: &CheckedCase,
     monitor: &dyn Monitor,
 ) -> Result<(Solution, Fields), SolveError> {
     let mut answer: Option<(Solution, Fields)> = None;
-    for range in slices(problem) {
-        let (more, more_fields) = solve_slice(operators, problem, range, monitor)?;
+    for range in slices(case) {
+        let (more, more_fields) = solve_slice(operators, case, range, monitor)?;
         match &mut answer {
             None => answer = Some((more, more_fields)),
             Some((solution, fields)) => {

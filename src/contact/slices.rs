@@ -7,7 +7,7 @@ use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::contact::case::problem::Problem;
+use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::solve_time::SolveTime;
 use crate::contact::error::SolveError;
 use crate::contact::monitor::{Monitor, Stop};
@@ -25,9 +25,9 @@ const NORMAL_TIMES: f64 = 10.0;
 /// Where a case is cut: ranges of motions in order, one after the other, at least one. The same case gives the same slices, whatever the
 /// load, limits and machine.
 #[must_use]
-pub fn slices(problem: &Problem) -> Vec<Range<usize>> {
-    let motions = problem.motions.len();
-    let SolveTime { whole, normal } = problem.solve_time();
+pub fn slices(case: &CheckedCase) -> Vec<Range<usize>> {
+    let motions = case.problem.motions.len();
+    let SolveTime { whole, normal } = case.solve_time();
     let each = (whole - normal).max(0.0) / motions as f64;
     let wanted = SLICE_SECONDS.max(NORMAL_TIMES * normal) / each.max(f64::MIN_POSITIVE);
     // Nearly equal parts, so that no short one is left over.
@@ -44,20 +44,20 @@ pub fn slices(problem: &Problem) -> Vec<Range<usize>> {
 /// A named reason why there is no answer.
 pub fn solve_slice(
     operators: &Arc<OperatorStore>,
-    problem: &Problem,
+    case: &CheckedCase,
     range: Range<usize>,
     monitor: &dyn Monitor,
 ) -> Result<(Solution, Fields), SolveError> {
-    let all = problem.motions.len();
+    let all = case.problem.motions.len();
     if range == (0..all) {
-        return solve_whole(operators, problem, monitor);
+        return solve_whole(operators, case, monitor);
     }
     let share = Share {
         inner: monitor,
         before: range.start as f64 / all as f64,
         own: range.len() as f64 / all as f64,
     };
-    solve_whole(operators, &problem.slice(range), &share)
+    solve_whole(operators, &case.slice(range), &share)
 }
 
 /// The monitor of a part of the work.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::contact::answer::answer;
-use crate::contact::case::problem::Problem;
+use crate::contact::case::problem::CheckedCase;
 use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::normal_task::NormalTask;
@@ -19,17 +19,17 @@ use crate::contact::time_limit::TimeLimit;
 /// A named reason why there is no answer; or the monitor stopped the work.
 pub(crate) fn solve_whole(
     operators: &Arc<OperatorStore>,
-    problem: &Problem,
+    case: &CheckedCase,
     monitor: &dyn Monitor,
 ) -> Result<(Solution, Fields), SolveError> {
     let began = monitor.elapsed();
-    let answer = if let NormalTask::Wheel(contact) = &problem.task {
-        trust::solve(operators, problem, contact, monitor)?
+    let answer = if let NormalTask::Wheel(contact) = &case.problem.task {
+        trust::solve(operators, case, contact, monitor)?
     } else {
-        let watch = TimeLimit::new(monitor, problem.time_limit, problem.motions.len());
-        let pressed = problem.pressed(&watch);
-        let pressed = pressed.map_err(|error| watch.explained(error, problem))?;
-        answer(operators, problem, &pressed, &watch)?
+        let watch = TimeLimit::new(monitor, case.run.time_limit, case.problem.motions.len());
+        let pressed = case.pressed(&watch);
+        let pressed = pressed.map_err(|error| watch.explained(error, case))?;
+        answer(operators, case, &pressed, &watch)?
     };
-    finish(problem, answer, monitor.elapsed().saturating_sub(began))
+    finish(case, answer, monitor.elapsed().saturating_sub(began))
 }

@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use crate::contact::case::problem::Problem;
+use crate::contact::case::problem::CheckedCase;
 use crate::contact::error::SolveError;
 use crate::contact::monitor::{Monitor, Stop};
 
@@ -32,15 +32,15 @@ impl<'a> TimeLimit<'a> {
     }
 
     /// An error of this case; one of time with the limit and how far the solve came.
-    pub(crate) fn explained(&self, error: SolveError, problem: &Problem) -> SolveError {
+    pub(crate) fn explained(&self, error: SolveError, case: &CheckedCase) -> SolveError {
         let SolveError::OutOfTime { limit_s: None, .. } = error else {
             return error;
         };
         // Of a wheel on a rail every motion is solved patch by patch.
-        let done = self.done.get() * problem.motions.len() / self.motions.max(1);
+        let done = self.done.get() * case.problem.motions.len() / self.motions.max(1);
         SolveError::OutOfTime {
             limit_s: self.time_limit.map(|limit| limit.as_secs_f64()),
-            motions: Some([problem.part.before + done, problem.part.all]),
+            motions: Some([case.problem.part.before + done, case.problem.part.all]),
         }
     }
 

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::contact;
 use crate::contact::case::limits::Limits;
-use crate::contact::case::problem::Problem;
+use crate::contact::case::problem::CheckedCase;
 use crate::contact::error::{CaseError, SolveError};
 use crate::contact::monitor::Monitor;
 use crate::contact::rolling::operator_store::OperatorStore;
@@ -16,13 +16,13 @@ use crate::contact::slices::{slices, solve_slice};
 use crate::contact::solution::words::{Fields, Solution};
 
 /// Checks a case against limits.
-pub type Check = dyn Fn(&Value, &Limits) -> Result<Problem, CaseError> + Send + Sync;
+pub type Check = dyn Fn(&Value, &Limits) -> Result<CheckedCase, CaseError> + Send + Sync;
 
 /// Where a checked case is cut: ranges of motions, one after the other.
-pub type Slices = dyn Fn(&Problem) -> Vec<Range<usize>> + Send + Sync;
+pub type Slices = dyn Fn(&CheckedCase) -> Vec<Range<usize>> + Send + Sync;
 
 /// Solves one of these ranges of a checked case under a monitor.
-pub type Solve = dyn Fn(&Problem, Range<usize>, &dyn Monitor) -> Result<(Solution, Fields), SolveError>
+pub type Solve = dyn Fn(&CheckedCase, Range<usize>, &dyn Monitor) -> Result<(Solution, Fields), SolveError>
     + Send
     + Sync;
 
@@ -54,8 +54,8 @@ impl Engine {
         Engine {
             check: Arc::new(contact::check),
             slices: Arc::new(slices),
-            solve: Arc::new(move |problem, slice, monitor| {
-                solve_slice(&store, problem, slice, monitor)
+            solve: Arc::new(move |checked, slice, monitor| {
+                solve_slice(&store, checked, slice, monitor)
             }),
             operators,
         }
@@ -65,14 +65,14 @@ impl Engine {
     #[must_use]
     pub fn solving<F>(self, solve: F) -> Engine
     where
-        F: Fn(&Problem, &dyn Monitor) -> Result<(Solution, Fields), SolveError>
+        F: Fn(&CheckedCase, &dyn Monitor) -> Result<(Solution, Fields), SolveError>
             + Send
             + Sync
             + 'static,
     {
         Engine {
-            slices: Arc::new(|problem| std::iter::once(0..problem.motions.len()).collect()),
-            solve: Arc::new(move |problem, _, monitor| solve(problem, monitor)),
+            slices: Arc::new(|checked| std::iter::once(0..checked.problem.motions.len()).collect()),
+            solve: Arc::new(move |checked, _, monitor| solve(checked, monitor)),
             ..self
         }
     }

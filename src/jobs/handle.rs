@@ -7,7 +7,7 @@ use serde_json::Value;
 use tokio::time::timeout;
 use uuid::Uuid;
 
-use crate::contact::case::problem::Problem;
+use crate::contact::case::problem::CheckedCase;
 use crate::contact::error::CaseError;
 use crate::jobs::error::JobsError;
 use crate::jobs::model::{Job, QueuePlace, State};
@@ -61,7 +61,7 @@ impl Jobs {
     ///
     /// # Errors
     /// Every fault of the case.
-    pub fn check(&self, case: &Value) -> Result<Problem, CaseError> {
+    pub fn check(&self, case: &Value) -> Result<CheckedCase, CaseError> {
         (self.shared.engine.check)(case, &self.shared.options.limits)
     }
 

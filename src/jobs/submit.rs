@@ -7,7 +7,7 @@ use opentelemetry::KeyValue;
 use serde_json::Value;
 use uuid::Uuid;
 
-use crate::contact::case::problem::Problem;
+use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::words::solver::Output;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
@@ -76,7 +76,7 @@ impl Jobs {
             let idempotency = idempotency_key.map(|key| (key, digest()));
             (jobs.check(&case), serde_json::to_vec(&case), idempotency)
         });
-        let (problem, body, idempotency) = read
+        let (checked, body, idempotency) = read
             .await
             .map_err(|error| JobsError::Damaged(error.to_string()))?;
         drop(turn);
@@ -93,13 +93,13 @@ impl Jobs {
                 answer => return answer,
             }
         }
-        let problem = problem?;
+        let checked = checked?;
         let body = Bytes::from(body.map_err(|error| JobsError::Damaged(error.to_string()))?);
         let mut new = NewJob {
             idempotency,
             traceparent,
             options,
-            ..self.new_job(problem, body)
+            ..self.new_job(checked, body)
         };
         let id = new.id;
         if !options.bypass_cache {
@@ -118,34 +118,34 @@ impl Jobs {
     }
 
     /// A checked case as a job about to be queued.
-    fn new_job(&self, problem: Problem, body: Bytes) -> NewJob {
+    fn new_job(&self, checked: CheckedCase, body: Bytes) -> NewJob {
         let id = Uuid::now_v7();
         NewJob {
             id,
             tenant: self.tenant.clone(),
             created_at: created_at(id),
-            method: problem.method.name().to_owned(),
-            outputs: outputs_text(&problem.outputs),
-            cost_us: cost_us(&problem),
-            slice_us: self.slice_us(&problem),
-            cache_key: self.cache_key(&problem.digest),
+            method: checked.run.method.name().to_owned(),
+            outputs: outputs_text(&checked.run.outputs),
+            cost_us: cost_us(&checked),
+            slice_us: self.slice_us(&checked),
+            cache_key: self.cache_key(&checked.label.digest),
             source: None,
             body,
             row: false,
             idempotency: None,
             traceparent: None,
             options: SubmitOptions::default(),
-            name: problem.name,
-            labels: problem.labels,
+            name: checked.label.name,
+            labels: checked.label.labels,
         }
     }
 
     /// Expected solve time of the longest slice of a case in µs.
-    pub(crate) fn slice_us(&self, problem: &Problem) -> u32 {
-        let slices = (self.shared.engine.slices)(problem);
+    pub(crate) fn slice_us(&self, checked: &CheckedCase) -> u32 {
+        let slices = (self.shared.engine.slices)(checked);
         let longest = slices.iter().map(ExactSizeIterator::len).max().unwrap_or(1);
-        let part = longest as f64 / problem.motions.len().max(1) as f64;
-        microseconds(problem.cost().seconds * part)
+        let part = longest as f64 / checked.problem.motions.len().max(1) as f64;
+        microseconds(checked.cost().seconds * part)
     }
 
     /// The bounds of the queue.
@@ -186,8 +186,8 @@ pub(crate) fn outputs_text(outputs: &[Output]) -> String {
 }
 
 /// Expected solve time in µs.
-pub(crate) fn cost_us(problem: &Problem) -> u32 {
-    microseconds(problem.cost().seconds)
+pub(crate) fn cost_us(checked: &CheckedCase) -> u32 {
+    microseconds(checked.cost().seconds)
 }
 
 /// A time in s as µs, at least 1.

@@ -15,8 +15,8 @@ use crate::cases::{assert_fault, good, good_with, with};
 use crate::gap_samples::{profile, spread};
 
 fn answer(case: &Value) -> Solution {
-    let problem = check(case, &Limits::default()).unwrap_or_else(|error| panic!("{error}"));
-    solve(&problem, &Unmonitored)
+    let checked = check(case, &Limits::default()).unwrap_or_else(|error| panic!("{error}"));
+    solve(&checked, &Unmonitored)
         .unwrap_or_else(|error| panic!("{error}"))
         .0
 }
@@ -173,9 +173,9 @@ impl Monitor for Clock {
 #[test]
 fn seconds_are_shares_that_add_up_over_patches_and_motions() {
     for name in ["two-patches", "wheel-rail", "wheel-rail-flange", "sweep"] {
-        let problem = check(&example(name), &Limits::default()).unwrap();
+        let checked = check(&example(name), &Limits::default()).unwrap();
         let clock = Clock(Instant::now());
-        let solution = solve(&problem, &clock).unwrap().0;
+        let solution = solve(&checked, &clock).unwrap().0;
         let took = clock.elapsed().as_secs_f64();
         let points = solution.patches.iter().flat_map(|patch| &patch.points);
         let seconds: Vec<f64> = points.map(|point| point.solver.seconds).collect();

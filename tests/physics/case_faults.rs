@@ -9,10 +9,10 @@ use crate::cases::{assert_fault, faults, good, good_with, problem, with};
 
 #[test]
 fn the_good_case_is_good() {
-    let problem = problem(&good());
-    assert_eq!(problem.motions.len(), 1);
-    assert!(problem.remarks.is_empty(), "{:?}", problem.remarks);
-    assert!(problem.wants(Output::Tractions) && !problem.wants(Output::Slip));
+    let checked = problem(&good());
+    assert_eq!(checked.problem.motions.len(), 1);
+    assert!(checked.remarks.is_empty(), "{:?}", checked.remarks);
+    assert!(checked.run.wants(Output::Tractions) && !checked.run.wants(Output::Slip));
 }
 
 #[test]
@@ -21,10 +21,10 @@ fn what_is_left_out_has_the_documented_default() {
     for name in ["name", "labels", "solver", "outputs"] {
         case.as_object_mut().unwrap().remove(name);
     }
-    let problem = problem(&case);
-    assert_eq!(problem.resolution, Resolution::Target(0.005));
-    assert_eq!(problem.outputs, [Output::Resultants, Output::Zones]);
-    assert_eq!(problem.name, None);
+    let checked = problem(&case);
+    assert_eq!(checked.run.resolution, Resolution::Target(0.005));
+    assert_eq!(checked.run.outputs, [Output::Resultants, Output::Zones]);
+    assert_eq!(checked.label.name, None);
 }
 
 #[test]
@@ -276,6 +276,7 @@ fn motions_are_refused_with_the_place_in_the_list() {
     );
     assert_eq!(
         problem(&good_with("/motion", grid["motion"].clone()))
+            .problem
             .motions
             .len(),
         12

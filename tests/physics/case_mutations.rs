@@ -158,11 +158,11 @@ proptest! {
 
     #[test]
     fn no_mutation_of_a_case_panics(case in mutated()) {
-        if let Ok(problem) = check(&case, &Limits::default()) {
-            prop_assert!(!problem.motions.is_empty() && !problem.outputs.is_empty());
-            prop_assert!(problem.cost().bytes <= Limits::default().memory_bytes);
-            prop_assert!(problem.cost().seconds.is_finite());
-            for patch in problem.task.patches() {
+        if let Ok(checked) = check(&case, &Limits::default()) {
+            prop_assert!(!checked.problem.motions.is_empty() && !checked.run.outputs.is_empty());
+            prop_assert!(checked.cost().bytes <= Limits::default().memory_bytes);
+            prop_assert!(checked.cost().seconds.is_finite());
+            for patch in checked.problem.task.patches() {
                 prop_assert!(patch.normal_force.is_finite() && patch.normal_force > 0.0, "{patch:?}");
                 prop_assert!(patch.area.is_finite() && patch.area > 0.0, "{patch:?}");
             }

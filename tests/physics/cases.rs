@@ -1,7 +1,7 @@
 //! Valid cases to start from, and ways to change them.
 
 use railhead::contact::case::limits::Limits;
-use railhead::contact::case::problem::Problem;
+use railhead::contact::case::problem::CheckedCase;
 use railhead::contact::check;
 use railhead::contact::error::Fault;
 use serde_json::{Value, json};
@@ -53,7 +53,7 @@ pub fn faults(case: &Value) -> Vec<Fault> {
 }
 
 /// The problem of a good case.
-pub fn problem(case: &Value) -> Problem {
+pub fn problem(case: &Value) -> CheckedCase {
     check(case, &Limits::default()).unwrap_or_else(|error| panic!("{error}"))
 }
 

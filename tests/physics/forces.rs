@@ -343,7 +343,11 @@ fn several_patches_carry_a_prescribed_force_together() {
 
 #[test]
 fn a_force_changes_the_digest() {
-    let digest = |motion: Value| crate::cases::problem(&good_with("/motion", motion)).digest;
+    let digest = |motion: Value| {
+        crate::cases::problem(&good_with("/motion", motion))
+            .label
+            .digest
+    };
     let motions = [
         json!({ "creepage_x": 0 }),
         json!({ "force_x_n": 0 }),

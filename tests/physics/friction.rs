@@ -49,14 +49,14 @@ fn violations(cells: &Cells) -> [f64; 4] {
 
 /// A rule's own tractions and slips, dimensionless.
 fn one_rule(contact: &Ellipse, rule: Rule) -> Cells {
-    let problem = contact::check(&contact.case(12, 12), &Limits::default()).expect("a valid case");
+    let checked = contact::check(&contact.case(12, 12), &Limits::default()).expect("a valid case");
     let size = MeshSize {
         strips: 12,
         cells: 12,
     };
-    let footprint = problem.pressed(&Unmonitored).expect("a contact").footprint;
-    let level = StripMesh::new(&problem.rolling_task(&footprint), size).expect("a mesh");
-    let motion: Motion = level.scale.motion(&problem.motions[0]);
+    let footprint = checked.pressed(&Unmonitored).expect("a contact").footprint;
+    let level = StripMesh::new(&checked.rolling_task(&footprint), size).expect("a mesh");
+    let motion: Motion = level.scale.motion(&checked.problem.motions[0]);
     let operator = level.operator(&Unmonitored).expect("never stopped");
     let equations = SlipEquations::new(rule, &level.normalised, &operator.influence, None);
     let padded = equations.padded();

@@ -26,8 +26,8 @@ fn bowl() -> Value {
 }
 
 fn reason(case: &Value) -> String {
-    let problem = check(case, &Limits::default()).unwrap_or_else(|e| panic!("{e}"));
-    match contact::solve(&problem, &Unmonitored) {
+    let checked = check(case, &Limits::default()).unwrap_or_else(|e| panic!("{e}"));
+    match contact::solve(&checked, &Unmonitored) {
         Err(SolveError::NormalProblem { reason }) => reason,
         other => panic!("{other:?}"),
     }
@@ -37,8 +37,8 @@ fn reason(case: &Value) -> String {
 fn sound_gaps_are_accepted_without_being_solved() {
     for case in [crown(), bowl()] {
         assert_eq!(faults(&case), []);
-        let problem = check(&case, &Limits::default()).unwrap();
-        assert!(problem.task.patches().is_empty() && problem.cost().seconds < 1.0);
+        let checked = check(&case, &Limits::default()).unwrap();
+        assert!(checked.problem.task.patches().is_empty() && checked.cost().seconds < 1.0);
     }
 }
 
@@ -189,8 +189,8 @@ fn a_contact_that_reaches_the_edge_of_the_data_is_an_error_that_says_where() {
 fn a_contact_just_inside_the_data_is_solved() {
     let y = spread(-5.9, 5.9, 31);
     let contact = profile(460.0, &y, |y| y * y / 600.0);
-    let problem = check(&good_with("/contact", contact), &Limits::default()).unwrap();
-    let (solution, _) = contact::solve(&problem, &Unmonitored).unwrap();
+    let checked = check(&good_with("/contact", contact), &Limits::default()).unwrap();
+    let (solution, _) = contact::solve(&checked, &Unmonitored).unwrap();
     assert!(
         (solution.patches[0].area_mm2 / 122.27 - 1.0).abs() < 0.01,
         "{:?}",
@@ -208,8 +208,8 @@ fn nearly_conformal_and_overloaded_contacts_carry_a_remark() {
             "/load",
             Some(json!({ "normal_force_n": force })),
         );
-        let problem = check(&case, &Limits::default()).unwrap();
-        contact::solve(&problem, &Unmonitored).unwrap().0.remarks
+        let checked = check(&case, &Limits::default()).unwrap();
+        contact::solve(&checked, &Unmonitored).unwrap().0.remarks
     };
     assert!(
         warned(20.0, 20.0, 2e6)

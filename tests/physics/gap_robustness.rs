@@ -181,11 +181,11 @@ fn solve(sample: &Sample) -> Result<Outcome, String> {
     let mut case = steel(sample.contact.clone(), load, [0.001, 0.0, 0.0]);
     case["solver"] = json!({ "mesh": { "strips": 12, "cells": 14 } });
     case["outputs"] = json!(["pressure"]);
-    let problem = match check(&case, &Limits::default()) {
-        Ok(problem) => problem,
+    let checked = match check(&case, &Limits::default()) {
+        Ok(checked) => checked,
         Err(error) => return Ok(Outcome::Refused(error.to_string())),
     };
-    match contact::solve(&problem, &Unmonitored) {
+    match contact::solve(&checked, &Unmonitored) {
         Ok((solution, fields)) => {
             let distance = distance_inside(sample, &solution, &fields);
             Ok(Outcome::Solved(Box::new(solution), distance))

@@ -189,8 +189,8 @@ fn a_case_of_radii_becomes_the_worked_ellipse() {
         "load": { "normal_force_n": 80_000 },
         "motion": { "creepage_x": 0.001 },
     });
-    let problem = check(&case, &Limits::default()).unwrap();
-    let patch = problem.task.patches()[0];
+    let checked = check(&case, &Limits::default()).unwrap();
+    let patch = checked.problem.task.patches()[0];
     assert!(close(patch.normal_force, 80_000.0, 1e-13));
     assert!(close(patch.pressure_max, 1148.85, 1e-5));
     assert!(close(patch.approach.unwrap(), 0.089727, 1e-5));

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use railhead::contact::case::limits::Limits;
-use railhead::contact::case::problem::Problem;
+use railhead::contact::case::problem::CheckedCase;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::operator_store::OperatorStore;
 use railhead::contact::solution::words::Solution;
@@ -36,13 +36,13 @@ pub fn creep_map(side: u32, target: f64) -> Value {
     })
 }
 
-fn problem(case: &Value) -> Problem {
+fn problem(case: &Value) -> CheckedCase {
     check(case, &Limits::default()).expect("a valid case")
 }
 
 /// The answer without its times.
-fn answer(store: &Arc<OperatorStore>, problem: &Problem) -> Solution {
-    let (mut solution, _) = solve_with(store, problem, &Unmonitored).expect("an answer");
+fn answer(store: &Arc<OperatorStore>, checked: &CheckedCase) -> Solution {
+    let (mut solution, _) = solve_with(store, checked, &Unmonitored).expect("an answer");
     for point in solution.patches.iter_mut().flat_map(|p| &mut p.points) {
         point.solver.seconds = 0.0;
     }
@@ -65,18 +65,18 @@ fn answers_do_not_depend_on_what_the_operator_store_keeps() {
                    { "creepage_x": 0.0012, "spin_per_mm": 0.0005 }],
     });
     for case in [creep_map(4, 0.005), gap] {
-        let problem = problem(&case);
+        let checked = problem(&case);
         let roomy = Arc::new(OperatorStore::new(1 << 30));
-        let first = answer(&roomy, &problem);
+        let first = answer(&roomy, &checked);
         assert!(roomy.bytes() > 0);
         assert_eq!(
             first,
-            answer(&roomy, &problem),
+            answer(&roomy, &checked),
             "all operators from the store"
         );
         for bytes in [0, 1 << 20] {
             let store = Arc::new(OperatorStore::new(bytes));
-            assert_eq!(first, answer(&store, &problem), "a store of {bytes} bytes");
+            assert_eq!(first, answer(&store, &checked), "a store of {bytes} bytes");
             assert!(store.bytes() <= bytes);
         }
     }

@@ -12,7 +12,7 @@ fn bad_grids_are_refused_with_their_place() {
         json!({ "type": "pressure_grid", "x_mm": [0, 1, 2], "y_mm": [0, 1],
         "pressure_mpa": [[0, 1, 0], [0, 2, 0]] }),
     );
-    assert_eq!(problem(&case).task.patches().len(), 1);
+    assert_eq!(problem(&case).problem.task.patches().len(), 1);
     let put = |pointer: &str, value: Value| with(&case, pointer, Some(value));
     let pressure = "/contact/pressure_mpa";
     let order = "pressure_mpa[j][i] belongs to (x_mm[i], y_mm[j])";
@@ -105,7 +105,15 @@ fn patches_are_limited_in_number() {
         memory_bytes: u64::MAX,
         ..Default::default()
     };
-    assert_eq!(check(&dots(8), &limits).unwrap().task.patches().len(), 64);
+    assert_eq!(
+        check(&dots(8), &limits)
+            .unwrap()
+            .problem
+            .task
+            .patches()
+            .len(),
+        64
+    );
     assert_fault(
         &dots(9),
         "/contact/pressure_mpa",

@@ -130,7 +130,7 @@ fn absurd_contacts_are_refused_by_what_comes_out() {
 
 #[test]
 fn the_digest_names_the_answer_and_nothing_else() {
-    let digest = |case: &Value| problem(case).digest;
+    let digest = |case: &Value| problem(case).label.digest;
     let base = digest(&good());
     assert_eq!(base.len(), 64);
     assert_eq!(digest(&good_with("/name", json!("other"))), base);

@@ -31,8 +31,8 @@ fn columns(points: &[[f64; 2]]) -> String {
 }
 
 fn reason(case: &Value) -> String {
-    let problem = check(case, &Limits::default()).unwrap_or_else(|e| panic!("{e}"));
-    match solve(&problem, &Unmonitored) {
+    let checked = check(case, &Limits::default()).unwrap_or_else(|e| panic!("{e}"));
+    match solve(&checked, &Unmonitored) {
         Err(SolveError::NormalProblem { reason }) => reason,
         other => panic!("{other:?}"),
     }
@@ -42,9 +42,9 @@ fn reason(case: &Value) -> String {
 fn a_sound_wheel_on_a_rail_is_accepted_without_being_solved() {
     let case = generated();
     assert_eq!(faults(&case), []);
-    let problem = check(&case, &Limits::default()).unwrap();
-    assert!(problem.task.patches().is_empty() && problem.cost().seconds < 1.0);
-    assert_eq!(problem.motions.len(), 1);
+    let checked = check(&case, &Limits::default()).unwrap();
+    assert!(checked.problem.task.patches().is_empty() && checked.cost().seconds < 1.0);
+    assert_eq!(checked.problem.motions.len(), 1);
 }
 
 #[test]
@@ -210,7 +210,7 @@ fn what_is_left_out_is_the_standard_track() {
     }
     let limits = Limits::default();
     let [full, short] = [generated(), short].map(|case| check(&case, &limits).unwrap());
-    assert_eq!(full.digest, short.digest);
+    assert_eq!(full.label.digest, short.label.digest);
 }
 
 #[test]
@@ -302,8 +302,8 @@ fn remarks_on_profiles_are_in_the_answer() {
     let mut points = rail_60e1();
     points.swap(100, 101);
     let case = changed(RAIL, json!(points));
-    let problem = check(&case, &Limits::default()).unwrap();
-    let (solution, _) = solve(&problem, &Unmonitored).unwrap();
+    let checked = check(&case, &Limits::default()).unwrap();
+    let (solution, _) = solve(&checked, &Unmonitored).unwrap();
     assert!(
         solution
             .remarks
@@ -321,12 +321,15 @@ fn the_digest_knows_the_motion_of_the_wheelset() {
         let mut case = generated();
         case["motion"] =
             json!({ "wheelset": { "speed_mm_per_s": 2e4, "free_rolling_radius_mm": free } });
-        check(&case, &Limits::default()).unwrap().digest
+        check(&case, &Limits::default()).unwrap().label.digest
     };
     assert_ne!(digest(460.0), digest(461.0));
     assert_eq!(digest(460.0), digest(460.0));
     assert_ne!(
         digest(460.0),
-        check(&generated(), &Limits::default()).unwrap().digest
+        check(&generated(), &Limits::default())
+            .unwrap()
+            .label
+            .digest
     );
 }

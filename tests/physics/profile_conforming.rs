@@ -40,8 +40,8 @@ fn clearance(y: f64) -> f64 {
 
 /// Wheel and rail of a case in place.
 fn geometry(case: &Value) -> WheelRail {
-    let problem = check(case, &Limits::default()).expect("a case");
-    let NormalTask::Wheel(contact) = &problem.task else {
+    let checked = check(case, &Limits::default()).expect("a case");
+    let NormalTask::Wheel(contact) = &checked.problem.task else {
         unreachable!("profiles were given")
     };
     contact.geometry.clone()

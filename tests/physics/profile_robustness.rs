@@ -30,8 +30,8 @@ fn random_wheelsets_are_balanced_or_refused_with_a_reason() {
         case["friction"] = json!({ "coefficient": random.between(0.0, 0.6) });
         case["motion"] =
             json!({ "wheelset": { "speed_mm_per_s": 20000, "free_rolling_radius_mm": 460 } });
-        let problem = check(&case, &Limits::default()).unwrap_or_else(|e| panic!("{k}: {e}"));
-        let solution = match solve(&problem, &Unmonitored) {
+        let checked = check(&case, &Limits::default()).unwrap_or_else(|e| panic!("{k}: {e}"));
+        let solution = match solve(&checked, &Unmonitored) {
             Ok((solution, _)) => solution,
             Err(SolveError::NormalProblem { reason }) => {
                 let known = ["end of a profile", "come to balance"];

@@ -32,15 +32,15 @@ fn on_rail(rail: &[[f64; 2]]) -> Value {
 }
 
 fn solved(case: &Value) -> Solution {
-    let problem = check(case, &Limits::default()).expect("a case");
-    solve(&problem, &Unmonitored)
+    let checked = check(case, &Limits::default()).expect("a case");
+    solve(&checked, &Unmonitored)
         .unwrap_or_else(|reason| panic!("{reason}"))
         .0
 }
 
 fn refusal(case: &Value) -> (String, String) {
-    let problem = check(case, &Limits::default()).expect("a case");
-    match solve(&problem, &Unmonitored) {
+    let checked = check(case, &Limits::default()).expect("a case");
+    match solve(&checked, &Unmonitored) {
         Err(SolveError::RoughProfile { pointer, reason }) => (pointer, reason),
         other => panic!("{other:?}"),
     }
@@ -190,8 +190,8 @@ fn a_solve_that_fails_on_the_ridge_of_an_outlier_names_the_outlier() {
         for method in ["auto", "boundary_element"] {
             let mut case = put(&case, "contact", json!({ "accept_rough_profiles": accept }));
             case["solver"]["method"] = json!(method);
-            let problem = check(&case, &Limits::default()).expect("a case");
-            let told = match solve(&problem, &Unmonitored) {
+            let checked = check(&case, &Limits::default()).expect("a case");
+            let told = match solve(&checked, &Unmonitored) {
                 Ok((found, _)) => {
                     let told = found.remarks.iter().find(|r| r.code == "profile-outlier");
                     told.expect("a remark").detail.clone()
@@ -252,8 +252,8 @@ fn exchanged_profiles_are_refused_and_a_single_one_is_told() {
     assert_eq!(pointers, ["/contact/rail", "/contact/wheel"]);
     assert!(error.0[0].detail.contains("looks like a wheel"), "{error}");
     let twice = with(&tread(), &s1002(), &s1002(), 0.0);
-    let problem = check(&twice, &Limits::default()).expect("a case");
-    let told = problem
+    let checked = check(&twice, &Limits::default()).expect("a case");
+    let told = checked
         .remarks
         .iter()
         .find(|r| r.code == "profile-of-other-body");
@@ -304,8 +304,8 @@ fn a_contact_near_the_end_of_a_profile_is_told_with_what_is_left() {
         .into_iter()
         .filter(|at| at[0] <= under.y_mm[1] - 1.0)
         .collect();
-    let problem = check(&on_rail(&cut), &Limits::default()).expect("a case");
-    let error = solve(&problem, &Unmonitored)
+    let checked = check(&on_rail(&cut), &Limits::default()).expect("a case");
+    let error = solve(&checked, &Unmonitored)
         .map(|_| ())
         .expect_err("cut off")
         .to_string();
@@ -317,8 +317,8 @@ fn what_is_known_before_the_solve_is_in_the_check() {
     let mut random = Random(5);
     let rail = Damage::Noise(0.005).done_to(&rail_60e1(), CROWN, &mut random);
     let rail = without(&rail, 10.0, 22.0);
-    let problem = check(&on_rail(&rail), &Limits::default()).expect("a case");
-    let quality = problem.quality().expect("a quality");
+    let checked = check(&on_rail(&rail), &Limits::default()).expect("a case");
+    let quality = checked.quality().expect("a quality");
     let noise = quality.rail.noise_um.expect("noise");
     assert!((4.0..6.0).contains(&noise), "{noise}");
     assert!((12.0..14.0).contains(&quality.rail.hole_mm), "{quality:?}");
@@ -328,7 +328,7 @@ fn what_is_known_before_the_solve_is_in_the_check() {
     );
     assert!(quality.wheel.noise_um.expect("noise") < 0.1, "{quality:?}");
     let plain = check(&on_rail(&rail_60e1()), &Limits::default()).expect("a case");
-    assert!(problem.cost().seconds > plain.cost().seconds);
+    assert!(checked.cost().seconds > plain.cost().seconds);
 }
 
 /// Points of both profiles this far apart in mm, with white noise of a deviation in mm.

@@ -32,8 +32,8 @@ pub fn worn(shift: f64, force: f64, yaw: f64) -> Option<Value> {
 }
 
 pub fn solved(case: &Value) -> Result<Solution, String> {
-    let problem = check(case, &Limits::default()).map_err(|e| e.to_string())?;
-    solve(&problem, &Unmonitored)
+    let checked = check(case, &Limits::default()).map_err(|e| e.to_string())?;
+    solve(&checked, &Unmonitored)
         .map(|(solution, _)| solution)
         .map_err(|e| e.to_string())
 }

@@ -62,8 +62,8 @@ fn filled(shown: &Value, found: &Value, path: &str, differing: &mut Vec<String>)
 #[test]
 fn the_answer_in_the_readme_is_the_one_of_its_example() {
     let case: Value = serde_json::from_str(&read("api/examples/hertz-steel.case.json")).unwrap();
-    let problem = check(&case, &Limits::default()).unwrap();
-    let (solution, _) = solve(&problem, &Unmonitored).unwrap();
+    let checked = check(&case, &Limits::default()).unwrap();
+    let (solution, _) = solve(&checked, &Unmonitored).unwrap();
     let found = json!({ "state": "succeeded", "result": serde_json::to_value(solution).unwrap() });
     let mut differing = Vec::new();
     let wanted = filled(&block(&read("README.md")), &found, "", &mut differing);

@@ -183,9 +183,9 @@ impl Ellipse {
 
 /// Checks and solves a case that has an answer.
 pub fn solve(case: &Value) -> (Solution, Fields) {
-    let problem =
+    let checked =
         contact::check(case, &Limits::default()).unwrap_or_else(|e| panic!("{e}\n{case}"));
-    contact::solve(&problem, &Unmonitored).unwrap_or_else(|e| panic!("{e}\n{case}"))
+    contact::solve(&checked, &Unmonitored).unwrap_or_else(|e| panic!("{e}\n{case}"))
 }
 
 /// Middle value; the lower one of two.

@@ -61,9 +61,9 @@ fn five_hundred_random_motions_are_solved_in_few_iterations() {
     let (mut failures, mut iterations, mut fallbacks) = (Vec::new(), Vec::new(), 0);
     for (k, contact) in contacts.iter().enumerate() {
         let (strips, cells) = [(8, 16), (12, 12), (6, 12)][k % 3];
-        let problem =
+        let checked =
             contact::check(&contact.case(strips, cells), &Limits::default()).expect("a valid case");
-        let (solution, fields) = match contact::solve(&problem, &Unmonitored) {
+        let (solution, fields) = match contact::solve(&checked, &Unmonitored) {
             Ok(answer) => answer,
             Err(error) => {
                 failures.push(format!("{}: {error}", describe(contact)));
@@ -120,8 +120,8 @@ fn liu_hsu_solves_or_says_what_to_use_instead() {
     for contact in contacts(500) {
         let mut case = contact.case(8, 8);
         case["solver"]["method"] = json!("liu_hsu");
-        let problem = contact::check(&case, &Limits::default()).expect("a valid case");
-        match contact::solve(&problem, &Unmonitored) {
+        let checked = contact::check(&case, &Limits::default()).expect("a valid case");
+        match contact::solve(&checked, &Unmonitored) {
             Ok((solution, _)) => {
                 solved += 1;
                 let forces = contact.relative(&solution.patches[0].points[0]);

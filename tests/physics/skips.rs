@@ -2,7 +2,6 @@
 
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
-use railhead::contact::case::problem::Problem;
 use railhead::contact::half_space::strip_operator::kind::Precision;
 use railhead::contact::half_space::strip_operator::operator::StripOperator;
 use railhead::contact::monitor::Unmonitored;
@@ -28,20 +27,20 @@ fn answered(contact: &Ellipse) -> PointSolution {
 /// whole mesh in double precision, relative to the friction bound.
 fn distance_to_plain_newton(contact: &Ellipse) -> f64 {
     let case = contact.case(STRIPS, CELLS);
-    let problem: Problem = contact::check(&case, &Limits::default()).expect("a valid case");
+    let checked = contact::check(&case, &Limits::default()).expect("a valid case");
     let size = railhead::contact::mesh::size::MeshSize {
         strips: STRIPS,
         cells: CELLS,
     };
-    let footprint = problem.pressed(&Unmonitored).expect("a contact").footprint;
-    let level = StripMesh::new(&problem.rolling_task(&footprint), size).expect("a mesh");
-    let motion = level.scale.motion(&problem.motions[0]);
+    let footprint = checked.pressed(&Unmonitored).expect("a contact").footprint;
+    let level = StripMesh::new(&checked.rolling_task(&footprint), size).expect("a mesh");
+    let motion = level.scale.motion(&checked.problem.motions[0]);
     let mut workspace = NewtonWorkspace::default();
     let shortened =
         boundary_element::solve(&level, &motion, None, 1e-9, &mut workspace, &Unmonitored)
             .expect("a solution");
 
-    let nu = problem.elasticity.poisson_ratio;
+    let nu = checked.problem.elasticity.poisson_ratio;
     let whole = StripOperator::new(
         &level.normalised,
         nu,

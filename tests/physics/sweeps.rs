@@ -205,19 +205,19 @@ fn a_sweep_solved_by_slices_in_any_order_is_the_sweep_solved_at_once() {
     );
     question["outputs"] = json!(["resultants", "zones"]);
     question["friction"]["coefficient"] = json!(1.2);
-    let problem = check(&question, &Limits::default()).expect("a valid case");
-    let ranges = slices(&problem);
+    let checked = check(&question, &Limits::default()).expect("a valid case");
+    let ranges = slices(&checked);
     assert!(ranges.len() > 2, "{ranges:?}");
     assert_eq!((ranges[0].start, ranges[ranges.len() - 1].end), (0, 2000));
     assert!(ranges.windows(2).all(|pair| pair[0].end == pair[1].start));
-    assert_eq!(ranges, slices(&problem));
+    assert_eq!(ranges, slices(&checked));
     let mut parts: Vec<(Solution, Fields)> = ranges
         .iter()
         .rev()
         .map(|range| {
             // Each in a process of its own, so to speak.
             let store = Arc::new(OperatorStore::new(0));
-            solve_slice(&store, &problem, range.clone(), &Unmonitored).expect("an answer")
+            solve_slice(&store, &checked, range.clone(), &Unmonitored).expect("an answer")
         })
         .collect();
     let (mut solution, mut fields) = parts.pop().expect("a slice");
@@ -225,7 +225,7 @@ fn a_sweep_solved_by_slices_in_any_order_is_the_sweep_solved_at_once() {
         solution.append(more);
         fields.append(more_fields);
     }
-    let whole = timeless(contact::solve(&problem, &Unmonitored).expect("an answer"));
+    let whole = timeless(contact::solve(&checked, &Unmonitored).expect("an answer"));
     let joined = timeless((solution, fields));
     assert_eq!(joined.0, whole.0);
     assert!(joined.1 == whole.1, "fields differ");
@@ -235,8 +235,8 @@ fn a_sweep_solved_by_slices_in_any_order_is_the_sweep_solved_at_once() {
 
 #[test]
 fn a_short_sweep_is_one_slice() {
-    let problem = check(&case(&json!(lines()[2]), 0.005), &Limits::default()).expect("a case");
-    assert_eq!(slices(&problem), vec![0..25]);
+    let checked = check(&case(&json!(lines()[2]), 0.005), &Limits::default()).expect("a case");
+    assert_eq!(slices(&checked), vec![0..25]);
 }
 
 #[test]

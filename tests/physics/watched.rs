@@ -88,9 +88,9 @@ fn large_gap() -> Value {
 #[test]
 fn no_stage_leaves_the_caller_unasked_on_the_largest_inputs() {
     for (name, case) in [("profiles", long_profiles()), ("gap", large_gap())] {
-        let problem = check(&case, &Limits::default()).expect("a case");
+        let checked = check(&case, &Limits::default()).expect("a case");
         let monitor = Counting::new(None);
-        solve(&problem, &monitor).expect("an answer");
+        solve(&checked, &monitor).expect("an answer");
         assert!(monitor.tick(1.0).is_continue());
         let silence = monitor.silence.get();
         assert!(silence < SILENCE_MAX, "{name}: {silence:?}");
@@ -100,7 +100,7 @@ fn no_stage_leaves_the_caller_unasked_on_the_largest_inputs() {
         for part in 1..8 {
             let stop_at = 1 + part * ticks / 9;
             let monitor = Counting::new(Some(stop_at));
-            let found = solve(&problem, &monitor).map(|_| ());
+            let found = solve(&checked, &monitor).map(|_| ());
             assert_eq!(found, Err(SolveError::Cancelled), "{name} at {stop_at}");
             assert_eq!(monitor.ticks.get(), stop_at, "{name}");
         }

@@ -1,7 +1,7 @@
 //! Do iterations and products use the buffers of their workspaces alone, and can threads share what they only read?
 
 use railhead::contact::case::limits::Limits;
-use railhead::contact::case::problem::Problem;
+use railhead::contact::case::problem::CheckedCase;
 use railhead::contact::half_space::grid_operator::{GridOperator, GridWorkspace};
 use railhead::contact::mesh::size::MeshSize;
 use railhead::contact::monitor::Unmonitored;
@@ -29,10 +29,10 @@ fn operators_equations_meshes_and_stores_are_shared_by_threads() {
     shared::<SlipEquations>();
     shared::<Newton>();
     shared::<StripMesh>();
-    shared::<Problem>();
+    shared::<CheckedCase>();
 }
 
-fn case(solver: &Value, motion: &Value) -> Problem {
+fn case(solver: &Value, motion: &Value) -> CheckedCase {
     let case = json!({
         "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
         "friction": { "coefficient": 0.3 },
@@ -48,12 +48,12 @@ fn case(solver: &Value, motion: &Value) -> Problem {
 /// Calls `work` with the equations of every rule on a mesh of 12 strips and 14 cells, whole and by parity, and with the padded bound
 /// and areas.
 fn with_equations(precision_target: f64, work: impl Fn(&SlipEquations, [&[f64]; 2])) {
-    let problem = case(
+    let checked = case(
         &json!({ "target_error": precision_target }),
         &json!({ "creepage_x": 0.001 }),
     );
-    let footprint = problem.pressed(&Unmonitored).expect("a contact").footprint;
-    let task = problem.rolling_task(&footprint);
+    let footprint = checked.pressed(&Unmonitored).expect("a contact").footprint;
+    let task = checked.rolling_task(&footprint);
     let size = MeshSize {
         strips: 12,
         cells: 14,
@@ -135,8 +135,8 @@ fn newton_and_gmres_allocate_nothing_in_a_workspace_that_has_served_before() {
 fn a_small_solve_allocates_a_bounded_number_of_times() {
     let motion = json!({ "creepage_x": 0.001, "creepage_y": 0.0005, "spin_per_mm": 0.0003 });
     let count = |solver: &Value| {
-        let problem = case(solver, &motion);
-        during(|| solve(&problem, &Unmonitored))
+        let checked = case(solver, &motion);
+        during(|| solve(&checked, &Unmonitored))
     };
     let on_mesh = count(&json!({ "mesh": { "strips": 8, "cells": 8 } }));
     let to_target = count(&json!({ "target_error": 0.005 }));

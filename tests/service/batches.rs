@@ -269,9 +269,9 @@ async fn results_as_csv_have_a_header_and_a_line_per_motion() {
 
 #[tokio::test]
 async fn a_panic_in_a_group_fails_that_job_only() {
-    let setup = Setup::new().solving(|problem, monitor| {
-        assert!(problem.name.as_deref() != Some("bad"), "boom");
-        solve(problem, monitor)
+    let setup = Setup::new().solving(|checked, monitor| {
+        assert!(checked.label.name.as_deref() != Some("bad"), "boom");
+        solve(checked, monitor)
     });
     let server = setup.start().await;
     let mut cases = ["a", "bad", "c"].map(small);

@@ -223,7 +223,7 @@ async fn draining_service_is_not_ready_and_takes_no_jobs() {
 
 #[tokio::test]
 async fn failed_job_is_answered_with_its_reason_in_time() {
-    let setup = Setup::new().solving(|problem, _| match problem.name.as_deref() {
+    let setup = Setup::new().solving(|checked, _| match checked.label.name.as_deref() {
         Some("no convergence") => Err(SolveError::NotConverged {
             method: SolverMethod::LiuHsu,
             point: 0,

@@ -5,8 +5,6 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
-use railhead::contact::case::problem::Problem;
-use railhead::contact::monitor::Monitor;
 use railhead::contact::solve;
 use railhead::jobs::{Jobs, Options, State};
 use sqlx::Connection;
@@ -35,7 +33,7 @@ impl Shop {
             ..Options::new(folder.path())
         };
         let (go, count): (_, Arc<AtomicUsize>) = (let_go.clone(), Arc::clone(&begun));
-        let jobs = open(options, move |problem: &Problem, monitor: &dyn Monitor| {
+        let jobs = open(options, move |case, monitor| {
             count.fetch_add(1, Ordering::SeqCst);
             while !go.load(Ordering::SeqCst) {
                 if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.5) {
@@ -43,7 +41,7 @@ impl Shop {
                 }
                 std::thread::sleep(Duration::from_millis(1));
             }
-            solve(problem, monitor)
+            solve(case, monitor)
         })
         .await;
         jobs.start().unwrap();
@@ -144,13 +142,13 @@ async fn more_deaf_solvers_than_allowed_break_the_service_and_no_fewer() {
     let (release, released) = mpsc::channel::<()>();
     let released = std::sync::Mutex::new(released);
     let (begun, began) = mpsc::channel();
-    let jobs = open(options, move |problem: &Problem, monitor: &dyn Monitor| {
-        if problem.name.as_deref() == Some("deaf") {
+    let jobs = open(options, move |case, monitor| {
+        if case.label.name.as_deref() == Some("deaf") {
             begun.send(()).unwrap();
             // Until the test is over.
             let _ = released.lock().unwrap().recv();
         }
-        solve(problem, monitor)
+        solve(case, monitor)
     })
     .await;
     jobs.start().unwrap();

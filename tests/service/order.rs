@@ -45,9 +45,9 @@ async fn until(server: &Server, job: &Value, state: &str) -> Value {
 
 #[tokio::test]
 async fn late_jobs_fail_whether_queued_or_running_and_others_do_not() {
-    let mut setup = Setup::new().solving(|problem, monitor| match problem.name.as_deref() {
+    let mut setup = Setup::new().solving(|checked, monitor| match checked.label.name.as_deref() {
         Some("endless") => Err(tick_forever(monitor)),
-        _ => contact::solve(problem, monitor),
+        _ => contact::solve(checked, monitor),
     });
     let (clock, ahead) = turned();
     setup.options.clock = clock;

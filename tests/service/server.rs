@@ -4,7 +4,7 @@ use std::io::Read;
 use std::net::SocketAddr;
 use std::path::Path;
 
-use railhead::contact::case::problem::Problem;
+use railhead::contact::case::problem::CheckedCase;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Monitor;
 use railhead::contact::solution::words::{Fields, Solution};
@@ -64,7 +64,7 @@ impl Setup {
     /// Replaces the solver, for failures that the real one cannot be made to have.
     pub fn solving(
         mut self,
-        solve: impl Fn(&Problem, &dyn Monitor) -> Result<(Solution, Fields), SolveError>
+        solve: impl Fn(&CheckedCase, &dyn Monitor) -> Result<(Solution, Fields), SolveError>
         + Send
         + Sync
         + 'static,

@@ -3,8 +3,6 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use railhead::contact::case::problem::Problem;
-use railhead::contact::monitor::Monitor;
 use railhead::contact::solve;
 use railhead::jobs::{FailureKind, Jobs, JobsError, Options, State};
 use reqwest::Method;
@@ -19,7 +17,7 @@ use crate::support::{Service, case, endless_case, jobs_with, long_case, open, pa
 async fn a_running_job_goes_back_to_the_queue_uncounted() {
     let folder = tempfile::tempdir().unwrap();
     let (started, mut has_started) = unbounded_channel();
-    let jobs = jobs_with(folder.path(), move |_: &Problem, monitor: &dyn Monitor| {
+    let jobs = jobs_with(folder.path(), move |_, monitor| {
         started.send(()).unwrap();
         loop {
             if let ControlFlow::Break(stop) = monitor.tick(0.1) {
@@ -57,10 +55,10 @@ async fn a_job_that_ends_within_the_grace_period_is_not_run_again() {
         group_max: 1,
         ..Options::new(folder.path())
     };
-    let jobs = open(options, move |problem: &Problem, monitor: &dyn Monitor| {
+    let jobs = open(options, move |case, monitor| {
         started.send(()).unwrap();
         may_finish.lock().unwrap().recv().unwrap();
-        solve(problem, monitor)
+        solve(case, monitor)
     })
     .await;
     jobs.start().unwrap();

@@ -8,7 +8,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::Duration;
 
-use railhead::contact::case::problem::Problem;
+use railhead::contact::case::problem::CheckedCase;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Monitor;
 use railhead::contact::solution::words::{Fields, Solution};
@@ -35,7 +35,10 @@ pub fn case(name: &str) -> Value {
 /// Jobs on a data folder, solved by the given function.
 pub async fn jobs_with<F>(data_dir: &Path, solve: F) -> Jobs
 where
-    F: Fn(&Problem, &dyn Monitor) -> Result<(Solution, Fields), SolveError> + Send + Sync + 'static,
+    F: Fn(&CheckedCase, &dyn Monitor) -> Result<(Solution, Fields), SolveError>
+        + Send
+        + Sync
+        + 'static,
 {
     open(Options::new(data_dir), solve).await
 }
@@ -43,7 +46,10 @@ where
 /// Jobs with options of one's own, solved by the given function, each anew.
 pub async fn open<F>(options: Options, solve: F) -> Jobs
 where
-    F: Fn(&Problem, &dyn Monitor) -> Result<(Solution, Fields), SolveError> + Send + Sync + 'static,
+    F: Fn(&CheckedCase, &dyn Monitor) -> Result<(Solution, Fields), SolveError>
+        + Send
+        + Sync
+        + 'static,
 {
     let recipe = Engine::contact().solving(solve);
     let options = Options {

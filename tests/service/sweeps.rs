@@ -52,20 +52,20 @@ impl Shop {
         let real = Engine::contact();
         let (solved, go) = (self.solved.clone(), self.let_go.clone());
         let recipe = Engine {
-            slices: Arc::new(|problem| {
-                let motions = problem.motions.len();
+            slices: Arc::new(|checked| {
+                let motions = checked.problem.motions.len();
                 let cuts = (0..motions).step_by(2);
                 cuts.map(|from| from..(from + 2).min(motions)).collect()
             }),
-            solve: Arc::new(move |problem, slice, monitor: &dyn Monitor| {
-                let held = problem.name.as_deref() == Some("held") && slice.start >= 4;
+            solve: Arc::new(move |checked, slice, monitor: &dyn Monitor| {
+                let held = checked.label.name.as_deref() == Some("held") && slice.start >= 4;
                 while held && !go.load(Ordering::SeqCst) {
                     if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.3) {
                         return Err(stop.into());
                     }
                     std::thread::sleep(Duration::from_millis(1));
                 }
-                let answer = (real.solve)(problem, slice, monitor)?;
+                let answer = (real.solve)(checked, slice, monitor)?;
                 solved.fetch_add(1, Ordering::SeqCst);
                 Ok(answer)
             }),

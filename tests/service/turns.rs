@@ -4,8 +4,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
-use railhead::contact::case::problem::Problem;
-use railhead::contact::monitor::Monitor;
 use railhead::contact::solve;
 use railhead::jobs::store::claim::Reap;
 use railhead::jobs::{Jobs, Options, State};
@@ -37,8 +35,9 @@ async fn shop(change: impl FnOnce(&mut Options)) -> Shop {
     };
     change(&mut options);
     let (go, count) = (let_go.clone(), working.clone());
-    let jobs = open(options, move |problem: &Problem, monitor: &dyn Monitor| {
-        while problem
+    let jobs = open(options, move |case, monitor| {
+        while case
+            .label
             .name
             .as_deref()
             .is_some_and(|name| name.starts_with("long"))
@@ -54,7 +53,7 @@ async fn shop(change: impl FnOnce(&mut Options)) -> Shop {
                 break;
             }
         }
-        solve(problem, monitor)
+        solve(case, monitor)
     })
     .await;
     Shop {
@@ -223,15 +222,15 @@ async fn a_clock_that_is_set_forward_makes_nothing_late_or_old() {
         lease: Duration::from_secs(2),
         ..Options::new(folder.path())
     };
-    let jobs = open(options, move |problem: &Problem, monitor: &dyn Monitor| {
-        while problem.name.as_deref() == Some("long") && !go.load(Ordering::SeqCst) {
+    let jobs = open(options, move |case, monitor| {
+        while case.label.name.as_deref() == Some("long") && !go.load(Ordering::SeqCst) {
             assert!(
                 monitor.tick(0.5).is_continue(),
                 "it is neither late nor lost"
             );
             std::thread::sleep(Duration::from_millis(1));
         }
-        solve(problem, monitor)
+        solve(case, monitor)
     })
     .await;
     jobs.start().unwrap();

@@ -3,9 +3,7 @@
 use std::sync::{Mutex, mpsc};
 use std::time::Duration;
 
-use railhead::contact::case::problem::Problem;
 use railhead::contact::error::SolveError;
-use railhead::contact::monitor::Monitor;
 use railhead::contact::rolling::methods::method::Method;
 use railhead::contact::solve;
 use railhead::jobs::submit_options::SubmitOptions;
@@ -31,8 +29,8 @@ async fn keeps_its_answer(small_result_max_bytes: usize) {
             small_result_max_bytes,
             ..Options::new(folder.path())
         },
-        move |problem: &Problem, monitor: &dyn Monitor| {
-            let solved = solve(problem, monitor)?;
+        move |case, monitor| {
+            let solved = solve(case, monitor)?;
             answer.send(solved.clone()).unwrap();
             Ok(solved)
         },
@@ -84,9 +82,13 @@ async fn keeps_its_answer(small_result_max_bytes: usize) {
 #[tokio::test]
 async fn a_panic_fails_that_job_only() {
     let folder = tempfile::tempdir().unwrap();
-    let jobs = jobs_with(folder.path(), |problem: &Problem, monitor: &dyn Monitor| {
-        assert_ne!(problem.name.as_deref(), Some("bad"), "a cell without area");
-        solve(problem, monitor)
+    let jobs = jobs_with(folder.path(), |case, monitor| {
+        assert_ne!(
+            case.label.name.as_deref(),
+            Some("bad"),
+            "a cell without area"
+        );
+        solve(case, monitor)
     })
     .await;
     let bad = jobs.submit(case("bad"), None).await.unwrap().id;
@@ -115,7 +117,7 @@ async fn a_panic_fails_that_job_only() {
 #[tokio::test]
 async fn a_solve_without_convergence_fails_with_its_residual() {
     let folder = tempfile::tempdir().unwrap();
-    let jobs = jobs_with(folder.path(), |_: &Problem, _: &dyn Monitor| {
+    let jobs = jobs_with(folder.path(), |_, _| {
         Err(SolveError::NotConverged {
             method: Method::LiuHsu,
             point: 0,
@@ -145,7 +147,7 @@ async fn a_solve_without_convergence_fails_with_its_residual() {
 async fn a_running_job_stops_when_it_is_cancelled() {
     let folder = tempfile::tempdir().unwrap();
     let (started, mut has_started) = unbounded_channel();
-    let jobs = jobs_with(folder.path(), move |_: &Problem, monitor: &dyn Monitor| {
+    let jobs = jobs_with(folder.path(), move |_, monitor| {
         started.send(()).unwrap();
         Err(tick_forever(monitor))
     })
@@ -181,13 +183,13 @@ async fn a_ticking_solver_keeps_its_lease_and_shows_its_progress() {
         lease: Duration::from_millis(1_500),
         ..Options::new(folder.path())
     };
-    let jobs = open(options, move |problem: &Problem, monitor: &dyn Monitor| {
+    let jobs = open(options, move |case, monitor| {
         let may_finish = may_finish.lock().unwrap();
         while may_finish.try_recv().is_err() {
             assert!(monitor.tick(0.5).is_continue());
             std::thread::sleep(Duration::from_millis(1));
         }
-        solve(problem, monitor)
+        solve(case, monitor)
     })
     .await;
     let id = jobs.submit(case("long"), None).await.unwrap().id;
@@ -211,13 +213,13 @@ async fn a_solver_that_hangs_loses_its_job_but_not_the_worker() {
         lease: Duration::from_millis(300),
         ..Options::new(folder.path())
     };
-    let jobs = open(options, move |problem: &Problem, monitor: &dyn Monitor| {
+    let jobs = open(options, move |case, monitor| {
         let first_time = released.lock().unwrap().take();
         if let Some(released) = first_time {
             // The first attempt hangs, without a tick, until the test is over.
             let _ = released.recv();
         }
-        solve(problem, monitor)
+        solve(case, monitor)
     })
     .await;
     let id = jobs.submit(case("hangs once"), None).await.unwrap().id;
@@ -255,13 +257,13 @@ async fn end_of_deaf(lease: Duration, deadline: Option<Duration>) -> State {
         lease,
         ..Options::new(folder.path())
     };
-    let jobs = open(options, move |problem: &Problem, monitor: &dyn Monitor| {
+    let jobs = open(options, move |case, monitor| {
         let first_time = released.lock().unwrap().take();
         if let Some(released) = first_time {
             started.send(()).unwrap();
             let _ = released.recv();
         }
-        solve(problem, monitor)
+        solve(case, monitor)
     })
     .await;
     let asked = SubmitOptions {

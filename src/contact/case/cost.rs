@@ -1,10 +1,10 @@
 //! What a case will cost, estimated before it is queued: memory from its finest mesh (`size.rs`), time from its motions (`solve_time.rs`).
 
-use crate::contact::case::problem::Problem;
+use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::size::{SizeInput, length_over_width, segments};
 use crate::contact::case::words::solver::Output;
 
-impl Problem {
+impl CheckedCase {
     /// Estimated cost of solving this: the operator of the finest mesh and what stands beside it, the matrices of the dense method,
     /// the answer. What the process keeps for all cases, the operator store, comes on top. Seconds are rough.
     #[must_use]
@@ -19,12 +19,12 @@ impl Problem {
     pub(crate) fn size_input(&self) -> SizeInput {
         let fields = |output: &Output| *output != Output::Resultants;
         SizeInput {
-            method: self.method,
-            resolution: self.resolution,
-            segments: segments(&self.task),
-            motions: self.motions.len(),
-            fields: self.outputs.iter().any(fields),
-            ellipse: length_over_width(&self.task),
+            method: self.run.method,
+            resolution: self.run.resolution,
+            segments: segments(&self.problem.task),
+            motions: self.problem.motions.len(),
+            fields: self.run.outputs.iter().any(fields),
+            ellipse: length_over_width(&self.problem.task),
         }
     }
 }

@@ -1,15 +1,15 @@
 //! How good the points of both profiles of a case are, before anything is solved.
 
-use crate::contact::case::problem::Problem;
+use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::profile_points;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::solution::profile_quality::PairQuality;
 
-impl Problem {
+impl CheckedCase {
     /// How far the points of the profiles can be trusted, as far as that is known without the contact; only of a wheel on a rail.
     #[must_use]
     pub fn quality(&self) -> Option<PairQuality> {
-        let NormalTask::Wheel(contact) = &self.task else {
+        let NormalTask::Wheel(contact) = &self.problem.task else {
             return None;
         };
         Some(profile_points::quality(

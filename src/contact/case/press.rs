@@ -1,16 +1,14 @@
 //! From question to footprint: finds patches and pressures where a case gives a gap.
 
-use crate::contact::case::problem::Problem;
+use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::size::SizeInput;
 use crate::contact::error::SolveError;
-use crate::contact::friction::law::FrictionLaw;
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::answer::{NormalError, NormalWork};
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::rolling::task::RollingTask;
 use crate::contact::solution::words::NormalReport;
 
@@ -25,7 +23,7 @@ pub struct PressedContact {
     pub remarks: Vec<RemarkEntry>,
 }
 
-impl Problem {
+impl CheckedCase {
     /// Patches and pressures; of a gap they are found.
     ///
     /// # Errors
@@ -39,14 +37,14 @@ impl Problem {
             report: None,
             remarks: Vec::new(),
         };
-        let task = match &self.task {
+        let task = match &self.problem.task {
             NormalTask::Hertz(ellipse) => return Ok(known(Footprint::hertz(*ellipse))),
             NormalTask::Given(field) => return Ok(known(Footprint::given(field.clone()))),
             NormalTask::Gap(task) => task,
             NormalTask::Wheel(_) => unreachable!("a wheel is brought to rest first"),
         };
         let began = monitor.elapsed();
-        let found = task.solve_for(self.target(), &mut GridWorkspace::default(), monitor)?;
+        let found = task.solve_for(self.run.target(), &mut GridWorkspace::default(), monitor)?;
         let seconds = (monitor.elapsed() - began).as_secs_f64();
         let pressed = PressedContact {
             footprint: Footprint::computed(found.field, 0.0),
@@ -60,26 +58,18 @@ impl Problem {
     /// What is asked of the tangential problem on a footprint.
     #[must_use]
     pub fn rolling_task<'a>(&'a self, footprint: &'a Footprint) -> RollingTask<'a> {
+        let CheckedCase { problem, run, .. } = self;
         RollingTask {
             footprint,
-            elasticity: &self.elasticity,
-            friction: FrictionLaw::Constant(self.friction),
-            motions: &self.motions,
-            forces: &self.forces,
-            first_motion: self.part.before,
-            single_motion: self.part.all == 1,
-            method: self.method,
-            traction_bound: self.traction_bound,
-            resolution: self.resolution,
-        }
-    }
-
-    /// Target of the resultants' error relative to μN; infinite where a mesh is given.
-    #[must_use]
-    pub fn target(&self) -> f64 {
-        match self.resolution {
-            Resolution::Target(target) => target,
-            Resolution::Mesh(_) => f64::INFINITY,
+            elasticity: &problem.elasticity,
+            friction: problem.friction,
+            motions: &problem.motions,
+            forces: &problem.forces,
+            first_motion: problem.part.before,
+            single_motion: problem.part.all == 1,
+            method: run.method,
+            traction_bound: run.traction_bound,
+            resolution: run.resolution,
         }
     }
 
@@ -97,13 +87,13 @@ impl Problem {
             ..self.size_input()
         }
         .bytes() as u64;
-        if bytes > self.memory_bytes {
+        if bytes > self.run.memory_bytes {
             return Err(SolveError::NormalProblem {
                 reason: format!(
                     "the contact falls apart into {patches} patches with {sum:.1} segments per strip, which need about {} MiB; at \
                      most {} MiB are allowed for one case",
                     bytes >> 20,
-                    self.memory_bytes >> 20
+                    self.run.memory_bytes >> 20
                 ),
             });
         }

@@ -1,6 +1,7 @@
-//! The question as checked numbers: materials combined, limits enforced.
+//! A checked case in three parts: what is asked ([`Problem`]), how it is to be solved ([`Run`]) and what it is called ([`Label`]).
 //!
-//! A [`Problem`] cannot exist unchecked: [`Problem::new`] is the only way to make one.
+//! A [`Problem`] comes from [`CheckedCase::new`] or from a checked one that asked for more: nothing outside this folder can put one
+//! together. It holds no results, no options and no names, so that whoever changes accuracy or outputs leaves the question alone.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -15,6 +16,7 @@ use crate::contact::case::words::question::Case;
 use crate::contact::case::words::solver::{MethodName, Output};
 use crate::contact::case::{plausibility, profiles};
 use crate::contact::error::CaseError;
+use crate::contact::friction::law::FrictionLaw;
 use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::normal::normal_task::NormalTask;
@@ -32,17 +34,26 @@ pub struct MotionPart {
     pub all: usize,
 }
 
-/// A checked case, ready to solve.
+/// A case that can be solved.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CheckedCase {
+    /// What is asked.
+    pub problem: Problem,
+    /// How to solve it.
+    pub run: Run,
+    /// What it is called.
+    pub label: Label,
+    /// Remarks of the checks; they go into the answer.
+    pub remarks: Vec<RemarkEntry>,
+}
+
+/// What is asked: the physics.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Problem {
-    /// Free text of the client.
-    pub name: Option<String>,
-    /// Labels of the client.
-    pub labels: BTreeMap<String, String>,
     /// Combined elastic constants.
     pub elasticity: Elasticity,
-    /// Coulomb's friction coefficient μ.
-    pub friction: f64,
+    /// Bound of the tractions.
+    pub friction: FrictionLaw,
     /// Where patches and pressures come from.
     pub task: NormalTask,
     /// The motions, in the order of the case; never empty.
@@ -54,6 +65,16 @@ pub struct Problem {
     pub wheelset: Option<WheelsetMotion>,
     /// Forces prescribed instead of creepages, motion by motion.
     pub forces: Vec<PrescribedForces>,
+    checked: Checked,
+}
+
+/// Proof that a problem went through the checks: without it no literal and no `..problem` compiles outside this file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Checked;
+
+/// How a case is to be solved: nothing of it changes what is asked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
     /// The method to solve with.
     pub method: Method,
     /// The word it was asked for with.
@@ -64,22 +85,29 @@ pub struct Problem {
     pub resolution: Resolution,
     /// Time allowed for the whole case.
     pub time_limit: Option<Duration>,
-    /// What to compute, sorted, without repetition.
-    pub outputs: Vec<Output>,
-    /// Remarks that go into the answer.
-    pub remarks: Vec<RemarkEntry>,
     /// Memory the solve may use, in bytes.
     pub memory_bytes: u64,
+    /// What to compute, sorted, without repetition.
+    pub outputs: Vec<Output>,
+}
+
+/// What a case is called; the answer does not depend on it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Label {
+    /// Free text of the client.
+    pub name: Option<String>,
+    /// Labels of the client.
+    pub labels: BTreeMap<String, String>,
     /// Hexadecimal digest of everything that determines the answer, the solver version included.
     pub digest: String,
 }
 
-impl Problem {
+impl CheckedCase {
     /// Checks a case against the limits and prepares its numbers.
     ///
     /// # Errors
     /// Every fault found, each with its JSON pointer.
-    pub fn new(case: &Case, limits: &Limits) -> Result<Problem, CaseError> {
+    pub fn new(case: &Case, limits: &Limits) -> Result<CheckedCase, CaseError> {
         let given = PartialCase {
             material: Some(&case.material),
             friction: Some(case.friction.coefficient),
@@ -113,11 +141,9 @@ impl Problem {
         let implausible = plausibility::of_case(&case.contact, &task.patches(), given);
         let remarks = merged(of_case.chain(remarks).chain(implausible));
         let digest = digest(case, &elasticity, &motions, &forces);
-        Ok(Problem {
-            name: case.name.clone(),
-            labels: case.labels.clone(),
+        let problem = Problem {
             elasticity,
-            friction: case.friction.coefficient,
+            friction: FrictionLaw::Constant(case.friction.coefficient),
             task,
             part: MotionPart {
                 before: 0,
@@ -126,40 +152,94 @@ impl Problem {
             motions,
             forces,
             wheelset: profiles::wheelset(&case.motion),
-            method: case.solver.method.into(),
-            method_asked: case.solver.method,
-            traction_bound: case.solver.traction_bound.unwrap_or_default().into(),
-            resolution: resolution(&case.solver),
-            time_limit: case.solver.time_limit_s.map(Duration::from_secs_f64),
-            outputs: case.outputs.clone(),
+            checked: Checked,
+        };
+        Ok(CheckedCase {
+            problem,
+            run: run(case, limits),
+            label: Label {
+                name: case.name.clone(),
+                labels: case.labels.clone(),
+                digest,
+            },
             remarks,
-            memory_bytes: limits.memory_bytes,
-            digest,
         })
     }
 
-    /// The same question about some of its motions.
+    /// The same case with some of its motions.
     #[must_use]
-    pub fn slice(&self, range: Range<usize>) -> Problem {
+    pub fn slice(&self, range: Range<usize>) -> CheckedCase {
+        let chosen: Vec<usize> = range.clone().collect();
+        let part = MotionPart {
+            before: self.problem.part.before + range.start,
+            ..self.problem.part
+        };
+        let problem = Problem {
+            part,
+            ..self.problem.with_motions(&chosen)
+        };
+        CheckedCase {
+            problem,
+            ..self.clone()
+        }
+    }
+}
+
+/// How a case is to be solved, by its words.
+fn run(case: &Case, limits: &Limits) -> Run {
+    Run {
+        method: case.solver.method.into(),
+        method_asked: case.solver.method,
+        traction_bound: case.solver.traction_bound.unwrap_or_default().into(),
+        resolution: resolution(&case.solver),
+        time_limit: case.solver.time_limit_s.map(Duration::from_secs_f64),
+        memory_bytes: limits.memory_bytes,
+        outputs: case.outputs.clone(),
+    }
+}
+
+impl Problem {
+    /// The same question about some of the motions, by their places.
+    #[must_use]
+    pub fn with_motions(&self, chosen: &[usize]) -> Problem {
         Problem {
-            part: MotionPart {
-                before: self.part.before + range.start,
-                ..self.part
-            },
-            motions: self.motions[range.clone()].to_vec(),
-            forces: self.forces[range].to_vec(),
+            motions: chosen.iter().map(|k| self.motions[*k]).collect(),
+            forces: chosen.iter().map(|k| self.forces[*k]).collect(),
             ..self.clone()
         }
     }
 
-    /// The same question about a part of the contact with motions of its own; without remarks.
+    /// The same question about one gap of a wheel, with motions about its origin.
     #[must_use]
-    pub(crate) fn of_part(&self, motions: Vec<Motion>) -> Problem {
+    pub(crate) fn of_gap(&self, motions: Vec<Motion>) -> Problem {
         Problem {
             motions,
             wheelset: None,
-            remarks: Vec::new(),
             ..self.clone()
+        }
+    }
+}
+
+impl Run {
+    /// The same for resultants alone, with this target or a larger one.
+    #[must_use]
+    pub fn for_resultants(&self, target: f64) -> Run {
+        Run {
+            resolution: match self.resolution {
+                Resolution::Target(asked) => Resolution::Target(asked.max(target)),
+                mesh @ Resolution::Mesh(_) => mesh,
+            },
+            outputs: vec![Output::Resultants],
+            ..self.clone()
+        }
+    }
+
+    /// Target of the resultants' error relative to μN; infinite where a mesh is given.
+    #[must_use]
+    pub fn target(&self) -> f64 {
+        match self.resolution {
+            Resolution::Target(target) => target,
+            Resolution::Mesh(_) => f64::INFINITY,
         }
     }
 

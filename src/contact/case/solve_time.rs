@@ -9,7 +9,7 @@
 //! `benches/calibrate` at three targets; the bench shows another seed. How far the share within a factor of 3 depends on each of them was
 //! not measured.
 
-use crate::contact::case::problem::Problem;
+use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::profile_points;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::half_space::strip_operator::kind::Precision;
@@ -271,12 +271,12 @@ pub struct SolveTime {
     pub whole: f64,
 }
 
-impl Problem {
+impl CheckedCase {
     /// Estimated time of this case.
     #[must_use]
     pub fn solve_time(&self) -> SolveTime {
-        let (patches, normal) = guesses(&self.task, self.resolution.target());
-        let tangential = match (self.method, self.resolution) {
+        let (patches, normal) = guesses(&self.problem.task, self.run.resolution.target());
+        let tangential = match (self.run.method, self.run.resolution) {
             (Method::BoundaryElement, Resolution::Target(target)) => {
                 self.to_target(&patches, target)
             }
@@ -290,27 +290,29 @@ impl Problem {
 
     /// Solves that motion `k` stands for.
     fn solves(&self, k: usize) -> f64 {
-        match self.forces.get(k) {
+        match self.problem.forces.get(k) {
             Some(forces) if *forces != [None; 2] => 1.0 + TRIALS,
             _ => 1.0,
         }
     }
 
     fn to_target(&self, patches: &[PatchGuess], target: f64) -> f64 {
-        let precise = match precision_of(self.resolution) {
+        let precise = match precision_of(self.run.resolution) {
             Precision::Single => 1.0,
             Precision::Double => DOUBLE_TIMES,
         };
+        let problem = &self.problem;
+        let friction = problem.friction.largest();
         let one = |motion: &Motion| {
             let each = patches
                 .iter()
-                .map(|patch| patch.seconds(target, &self.elasticity, self.friction, motion));
+                .map(|patch| patch.seconds(target, &problem.elasticity, friction, motion));
             each.fold((Tractions::Stick, 0.0), |(_, sum), (tractions, seconds)| {
                 (tractions, sum + seconds)
             })
         };
         let crowd = crowd_seconds(patches.len());
-        let motions = self.motions.iter().enumerate().map(|(k, motion)| {
+        let motions = self.problem.motions.iter().enumerate().map(|(k, motion)| {
             let (tractions, seconds) = one(motion);
             let share = match tractions {
                 _ if k == 0 => 1.0,
@@ -341,8 +343,13 @@ impl Problem {
             Method::LiuHsu => (4e-8 * cells * cells, 1.5e-9 * (2.0 * cells).powi(3)),
             Method::Fastsim => (1e-7 * cells, 1e-5 + 5e-9 * cells),
         };
-        let solves: f64 = (0..self.motions.len()).map(|k| self.solves(k)).sum();
-        SECONDS_MIN * patches as f64 + first + each * solves + fields * self.motions.len() as f64
+        let solves: f64 = (0..self.problem.motions.len())
+            .map(|k| self.solves(k))
+            .sum();
+        SECONDS_MIN * patches as f64
+            + first
+            + each * solves
+            + fields * self.problem.motions.len() as f64
     }
 }
 

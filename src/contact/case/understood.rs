@@ -1,6 +1,6 @@
 //! What a case is understood as: patches that are known without a solve, and wheel and rail in place.
 
-use crate::contact::case::problem::Problem;
+use crate::contact::case::problem::CheckedCase;
 use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::normal_task::NormalTask;
@@ -15,20 +15,20 @@ const STEP: f64 = 0.25;
 /// Digits of a coordinate in mm that are kept.
 const ROUNDED: f64 = 1e4;
 
-impl Problem {
+impl CheckedCase {
     /// What can be said of the contact without solving it.
     ///
     /// # Errors
     /// A sentence, if no part of the wheel lies above the rail.
     pub fn understood(&self) -> Result<Understanding, String> {
-        let patches = self.task.patches();
-        let normal: f64 = patches.iter().map(|patch| patch.normal_force).sum();
-        let placement = match &self.task {
+        let patches = self.problem.task.patches();
+        let friction = self.problem.friction;
+        let placement = match &self.problem.task {
             NormalTask::Wheel(task) => Some(placed(task)?),
             _ => None,
         };
         Ok(Understanding {
-            friction_limit_n: (!patches.is_empty()).then_some(self.friction * normal),
+            friction_limit_n: (!patches.is_empty()).then(|| friction.limit_of_all(&patches)),
             patches: patches.iter().map(known).collect(),
             placement,
         })

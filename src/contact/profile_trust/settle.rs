@@ -1,6 +1,6 @@
 //! `smoothing_mm: "auto"`: the smoothing that suits the noise of the profiles and the pressure between them.
 
-use crate::contact::case::problem::Problem;
+use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::profile_points;
 use crate::contact::case::profile_points::PRESSURE_USUAL;
 use crate::contact::error::SolveError;
@@ -57,7 +57,7 @@ pub(crate) fn undecided(contact: &WheelTask) -> bool {
 /// # Errors
 /// There is no rest of the wheel, or the monitor stopped the work.
 pub(crate) fn settled(
-    problem: &Problem,
+    case: &CheckedCase,
     contact: &WheelTask,
     monitor: &dyn Monitor,
 ) -> Result<Option<WheelTask>, SolveError> {
@@ -86,7 +86,7 @@ pub(crate) fn settled(
         friction_share: 0.0,
         accuracy: Accuracy::About(TOLERANCE),
     };
-    let watch = TimeLimit::new(monitor, problem.time_limit, 1);
+    let watch = TimeLimit::new(monitor, case.run.time_limit, 1);
     let wheel = trial.press(&search, wanted, None, &mut GridWorkspace::default(), &watch)?;
     let pressures = wheel.patches.iter().flat_map(|gap| gap.field.patches());
     let main = pressures

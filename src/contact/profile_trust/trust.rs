@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::contact::case::problem::Problem;
+use crate::contact::case::problem::CheckedCase;
 use crate::contact::coupling;
 use crate::contact::coupling::{Found, Judge};
 use crate::contact::error::SolveError;
@@ -26,14 +26,14 @@ use crate::contact::solution::words::{Fields, Solution};
 /// accepted.
 pub(crate) fn solve(
     operators: &Arc<OperatorStore>,
-    problem: &Problem,
+    case: &CheckedCase,
     contact: &WheelTask,
     monitor: &dyn Monitor,
 ) -> Result<(Solution, Fields), SolveError> {
-    let settled = settle::settled(problem, contact, monitor)?;
+    let settled = settle::settled(case, contact, monitor)?;
     let contact = settled.as_ref().unwrap_or(contact);
     let judgement = Judgement { contact };
-    let found = coupling::solve(operators, problem, contact, &judgement, monitor)?;
+    let found = coupling::solve(operators, case, contact, &judgement, monitor)?;
     let (qualities, findings) = judgement.of(&found.wheel)?;
     let Found {
         mut solution,
@@ -47,14 +47,7 @@ pub(crate) fn solve(
         finding.of_roughness() && finding.has_evidence() && finding.share > uncertainty::HARMLESS
     });
     let suspicious = rough || settle::undecided(contact);
-    let changes = uncertainty::add(
-        operators,
-        problem,
-        contact,
-        suspicious,
-        &mut solution,
-        monitor,
-    )?;
+    let changes = uncertainty::add(operators, case, contact, suspicious, &mut solution, monitor)?;
     let told = findings
         .into_iter()
         .filter(|finding| finding.is_told(changes[finding.patch]));
@@ -63,7 +56,7 @@ pub(crate) fn solve(
     solution.remarks.extend(told.iter().map(Finding::remark));
     solution
         .remarks
-        .extend(uncertainty::target_below(problem, &solution));
+        .extend(uncertainty::target_below(case, &solution));
     Ok((solution, fields))
 }
 

@@ -8,8 +8,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::contact::case::problem::Problem;
-use crate::contact::case::words::solver::Output;
+use crate::contact::case::problem::CheckedCase;
 use crate::contact::coupling;
 use crate::contact::coupling::Judge;
 use crate::contact::error::SolveError;
@@ -80,13 +79,13 @@ impl Judge for NoJudge {
 /// The monitor stopped the work.
 pub(crate) fn add(
     operators: &Arc<OperatorStore>,
-    problem: &Problem,
+    case: &CheckedCase,
     contact: &WheelTask,
     suspicious: bool,
     solution: &mut Solution,
     monitor: &dyn Monitor,
 ) -> Result<Vec<bool>, SolveError> {
-    let motions = problem.motions.len();
+    let motions = case.problem.motions.len();
     let chosen: Vec<usize> = if motions <= MOTIONS_MAX {
         (0..motions).collect()
     } else {
@@ -101,7 +100,7 @@ pub(crate) fn add(
             let other = contact.smoothed(smoothing);
             match coupling::solve(
                 operators,
-                &companion(problem, &chosen),
+                &companion(case, &chosen),
                 &other,
                 &NoJudge,
                 &Afterwards(monitor),
@@ -115,18 +114,23 @@ pub(crate) fn add(
             }
         }
     }
-    Ok(write(problem.friction, &chosen, &companions, solution))
+    Ok(write(
+        case.problem.friction.largest(),
+        &chosen,
+        &companions,
+        solution,
+    ))
 }
 
 /// The remark on a target that is smaller than what the profiles leave open, where that was looked into.
-pub(crate) fn target_below(problem: &Problem, solution: &Solution) -> Option<RemarkEntry> {
-    let Resolution::Target(target) = problem.resolution else {
+pub(crate) fn target_below(case: &CheckedCase, solution: &Solution) -> Option<RemarkEntry> {
+    let Resolution::Target(target) = case.run.resolution else {
         return None;
     };
     let limit: f64 = solution
         .patches
         .iter()
-        .map(|patch| problem.friction * patch.normal_force_n)
+        .map(|patch| case.problem.friction.largest() * patch.normal_force_n)
         .sum();
     let open = solution
         .total
@@ -208,17 +212,12 @@ fn readings(contact: &WheelTask, solution: &Solution) -> Vec<[f64; 2]> {
     COMPANIONS.map(with).to_vec()
 }
 
-fn companion(problem: &Problem, chosen: &[usize]) -> Problem {
-    Problem {
-        resolution: match problem.resolution {
-            Resolution::Target(target) => Resolution::Target(target.max(TARGET)),
-            mesh @ Resolution::Mesh(_) => mesh,
-        },
-        outputs: vec![Output::Resultants],
-        motions: chosen.iter().map(|k| problem.motions[*k]).collect(),
-        forces: chosen.iter().map(|k| problem.forces[*k]).collect(),
+fn companion(case: &CheckedCase, chosen: &[usize]) -> CheckedCase {
+    CheckedCase {
+        problem: case.problem.with_motions(chosen),
+        run: case.run.for_resultants(TARGET),
+        label: case.label.clone(),
         remarks: Vec::new(),
-        ..problem.clone()
     }
 }
 

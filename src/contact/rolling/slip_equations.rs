@@ -31,6 +31,16 @@ pub struct SlipEquations<'a> {
     y: Vec<f64>,
 }
 
+/// Slip of every cell beside rigid and elastic slip, in the units of the motion, at [`SlipEquations::sampled_at`]. In steady rolling of
+/// like bodies there is none; unlike bodies have one from their pressure, transient rolling one from the step before.
+#[derive(Debug, Clone, Copy)]
+pub struct SlipSource<'a> {
+    /// Along x.
+    pub x: &'a [f64],
+    /// Across.
+    pub y: &'a [f64],
+}
+
 /// Buffers of one product. The caller keeps them from product to product, so that a product allocates nothing and the equations
 /// can be shared by threads; they fit equations of any size.
 #[derive(Debug, Clone, Default)]
@@ -131,16 +141,37 @@ impl<'a> SlipEquations<'a> {
     /// Rigid slip `q` of a motion, in the units of the motion: `(ν_x − φ y, ν_y + φ x)` as the rule samples it.
     #[must_use]
     pub fn rigid(&self, motion: &Motion) -> Vec<f64> {
+        self.given(motion, None)
+    }
+
+    /// Rigid slip of a motion and a source: slip of every cell that has another cause than motion and tractions.
+    #[must_use]
+    pub fn given(&self, motion: &Motion, source: Option<SlipSource>) -> Vec<f64> {
         let mut slip = vec![0.0; 2 * self.padded];
         let (sx, sy) = slip.split_at_mut(self.padded);
         for (cells, y) in self.cells.iter().zip(&self.y) {
             let (x_slip, y_slip) = (&mut sx[cells.clone()], &mut sy[cells.clone()]);
             let along = |_| motion.creepage_x - motion.spin_per_mm * y;
             let across = |x| motion.creepage_y + motion.spin_per_mm * x;
-            self.stencils.rigid(cells.clone(), along, x_slip);
-            self.stencils.rigid(cells.clone(), across, y_slip);
+            let (stencils, cells) = (&self.stencils, cells.clone());
+            match source {
+                None => {
+                    stencils.given(cells.clone(), |_, x| along(x), x_slip);
+                    stencils.given(cells, |_, x| across(x), y_slip);
+                }
+                Some(source) => {
+                    stencils.given(cells.clone(), |i, x| along(x) + source.x[i], x_slip);
+                    stencils.given(cells, |i, x| across(x) + source.y[i], y_slip);
+                }
+            }
         }
         slip
+    }
+
+    /// Where the slip of a source is sampled: x of every cell with unknowns. y is that of its segment's mid-line.
+    #[must_use]
+    pub fn sampled_at(&self) -> &[f64] {
+        self.stencils.samples()
     }
 
     /// Fills `blocks` with the own block of segment `j`: `M_xx` and `M_yy` between its cells, column by column. (`M_xy` is 0
@@ -234,8 +265,7 @@ mod tests {
     use crate::contact::mesh::strips::{Chord, Grading, equal_strips};
     use crate::contact::monitor::Unmonitored;
 
-    #[test]
-    fn the_dense_matrix_acts_like_the_map_in_every_storage() {
+    fn parabolic_mesh() -> Mesh {
         let chords: Vec<Chord> = equal_strips(-0.6, 0.6, 4)
             .into_iter()
             .enumerate()
@@ -248,7 +278,51 @@ mod tests {
                 right: 0.8 - y * y,
             })
             .collect();
-        let mesh = Mesh::new(&chords, &Grading::cosine(5));
+        Mesh::new(&chords, &Grading::cosine(5))
+    }
+
+    #[test]
+    fn a_source_that_slips_as_a_motion_does_is_that_motion() {
+        let mesh = parabolic_mesh();
+        let influence =
+            StripOperator::new(&mesh, 0.3, false, Precision::Double, &Unmonitored).unwrap();
+        let motion = Motion {
+            creepage_x: 0.3,
+            creepage_y: -0.2,
+            spin_per_mm: 0.7,
+        };
+        let more = Motion {
+            creepage_x: 0.1,
+            creepage_y: 0.5,
+            spin_per_mm: -0.4,
+        };
+        let sum = Motion {
+            creepage_x: 0.4,
+            creepage_y: 0.3,
+            spin_per_mm: 0.3,
+        };
+        for rule in [Rule::Upwind, Rule::ThreePoint, Rule::Trapezoid] {
+            let equations = SlipEquations::new(rule, &mesh, &influence, None);
+            let places = equations.sampled_at().iter().zip(mesh.rows());
+            let [x, y]: [Vec<f64>; 2] = places
+                .map(|(x, y)| {
+                    (
+                        more.creepage_x - more.spin_per_mm * y,
+                        more.creepage_y + more.spin_per_mm * x,
+                    )
+                })
+                .unzip()
+                .into();
+            let with_source = equations.given(&motion, Some(SlipSource { x: &x, y: &y }));
+            for (a, b) in with_source.iter().zip(equations.rigid(&sum)) {
+                assert!((a - b).abs() < 1e-12, "{rule:?}: {a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_dense_matrix_acts_like_the_map_in_every_storage() {
+        let mesh = parabolic_mesh();
         for folded in [false, true] {
             let differences =
                 StripOperator::new(&mesh, 0.3, folded, Precision::Double, &Unmonitored).unwrap();

@@ -109,13 +109,20 @@ impl Stencils {
         }
     }
 
-    /// Rigid slip of every cell of a segment for `w(x)`, which must be linear in x.
-    pub fn rigid(&self, cells: Range<usize>, w: impl Fn(f64) -> f64, slip: &mut [f64]) {
+    /// Given slip of every cell of a segment: `w(i, x)` is what is given for cell i at x, where the rule samples it. For rigid slip
+    /// w is linear in x.
+    pub fn given(&self, cells: Range<usize>, w: impl Fn(usize, f64) -> f64, slip: &mut [f64]) {
         let mut ahead = 0.0;
         for (i, slip) in cells.zip(slip).rev() {
-            ahead = self.rigid_weight[i] * w(self.rigid_at[i]) - self.carry[i] * ahead;
+            ahead = self.rigid_weight[i] * w(i, self.rigid_at[i]) - self.carry[i] * ahead;
             *slip = ahead;
         }
+    }
+
+    /// Where the rule samples the given slip of every cell, along x.
+    #[must_use]
+    pub fn samples(&self) -> &[f64] {
+        &self.rigid_at
     }
 }
 
@@ -209,7 +216,7 @@ mod tests {
                 let stencils = Stencils::new(rule, &mesh, &mesh.segments);
                 let (mut elastic, mut rigid) = (vec![0.0; n], vec![0.0; n]);
                 stencils.elastic(0..n, &differences, &mut elastic);
-                stencils.rigid(0..n, |x| 0.3 + 0.4 * x, &mut rigid);
+                stencils.given(0..n, |_, x| 0.3 + 0.4 * x, &mut rigid);
                 for i in 0..n {
                     assert!(
                         (elastic[i] - rigid[i]).abs() < 1e-12,

@@ -121,11 +121,12 @@ impl StripMesh {
         }
         let area = mesh.areas();
         let pressure = cell_pressures(footprint, &fitted, &mesh, &area);
-        let mirror = mesh
-            .mirror_line()
-            .filter(|_| pressures_mirror(&mesh, &pressure));
-        let [x, y] = middle(&patches.iter().map(|p| p.extent).collect::<Vec<_>>());
         let largest = patches.iter().map(|p| p.pressure_max).fold(0.0, f64::max);
+        let middles = mesh.node.iter().zip(mesh.rows()).map(|(x, y)| [*x, y]);
+        let bound = task.friction.bounds(middles, &pressure, largest);
+        // The equations know pressures by their bounds alone.
+        let mirror = mesh.mirror_line().filter(|_| bounds_mirror(&mesh, &bound));
+        let [x, y] = middle(&patches.iter().map(|p| p.extent).collect::<Vec<_>>());
         let scale = Scale {
             length: (patches.iter().map(|p| p.area).sum::<f64>() / PI).sqrt(),
             traction: task.friction.largest() * largest,
@@ -137,10 +138,6 @@ impl StripMesh {
         if precision == Precision::Single {
             normalised.round(COORDINATE_STEP);
         }
-        let pairs = pressure.iter().zip(mesh.rows());
-        let bound = pairs
-            .map(|(p, y)| task.friction.relative(y) * p / largest)
-            .collect();
         Ok(StripMesh {
             plan,
             mesh,
@@ -281,17 +278,17 @@ fn scale(values: &mut [f64], factor: f64) {
     values.iter_mut().for_each(|value| *value *= factor);
 }
 
-/// Are the pressures mirror images to 1e-9 of the largest?
-fn pressures_mirror(mesh: &Mesh, pressure: &[f64]) -> bool {
-    let tolerance = 1e-9 * pressure.iter().copied().fold(0.0, f64::max);
+/// Are the bounds of the cells mirror images to 1e-9 of the largest?
+fn bounds_mirror(mesh: &Mesh, bound: &[f64]) -> bool {
+    let tolerance = 1e-9 * bound.iter().copied().fold(0.0, f64::max);
     let m = mesh.segments.len();
     mesh.segments[..m / 2]
         .iter()
         .zip(mesh.segments.iter().rev())
         .all(|(here, there)| {
-            let pairs = pressure[here.cells.clone()]
+            let pairs = bound[here.cells.clone()]
                 .iter()
-                .zip(&pressure[there.cells.clone()]);
+                .zip(&bound[there.cells.clone()]);
             pairs.into_iter().all(|(a, b)| (a - b).abs() <= tolerance)
         })
 }

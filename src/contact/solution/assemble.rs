@@ -1,7 +1,7 @@
 //! From stage results to the answer a client reads: units put back, only what was asked for.
 
 use crate::contact::case::press::PressedContact;
-use crate::contact::case::problem::Problem;
+use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::words::solver::Output;
 use crate::contact::normal::patch::Patch;
 use crate::contact::remark::entry::{RemarkEntry, merged};
@@ -27,7 +27,7 @@ const FRAME: &str = "x along rolling (leading edge at larger x), y to the left, 
 /// The answer of a problem, motion by motion; of each only what the answer holds is kept.
 #[derive(Debug)]
 pub struct Assembly<'a> {
-    problem: &'a Problem,
+    case: &'a CheckedCase,
     pressed: &'a PressedContact,
     patches: Vec<Patch>,
     /// Motion by motion, for every patch.
@@ -42,11 +42,11 @@ pub struct Assembly<'a> {
 impl<'a> Assembly<'a> {
     /// No motion yet.
     #[must_use]
-    pub fn new(problem: &'a Problem, pressed: &'a PressedContact) -> Assembly<'a> {
+    pub fn new(case: &'a CheckedCase, pressed: &'a PressedContact) -> Assembly<'a> {
         let patches = pressed.footprint.patches().to_vec();
-        let remarks = problem.remarks.iter().chain(&pressed.remarks);
+        let remarks = case.remarks.iter().chain(&pressed.remarks);
         Assembly {
-            problem,
+            case,
             pressed,
             points: vec![Vec::new(); patches.len()],
             patches,
@@ -59,24 +59,23 @@ impl<'a> Assembly<'a> {
 
     /// Adds the next motion.
     pub fn add(&mut self, levels: &Levels, point: &MotionAnswer) {
-        let (problem, level) = (self.problem, levels.get(point.level));
-        self.remarks
-            .extend(remarks(problem, self.total.len(), point));
+        let (case, level) = (self.case, levels.get(point.level));
+        self.remarks.extend(remarks(case, self.total.len(), point));
         if self.remarks.len() > REMARKS_AT_ONCE {
             self.remarks = merged(std::mem::take(&mut self.remarks));
         }
         for (index, patch) in self.patches.iter().enumerate() {
-            self.points[index].push(point_solution(problem, &level, patch, index, point));
+            self.points[index].push(point_solution(case, &level, patch, index, point));
         }
-        self.total.push(total(problem, &self.patches, point));
-        if wants_fields(problem) {
+        self.total.push(total(case, &self.patches, point));
+        if wants_fields(case) {
             self.add_fields(&level, point);
         }
     }
 
     /// Values per cell of the next motion; motions that were solved on one level share its cells.
     fn add_fields(&mut self, level: &StripMesh, point: &MotionAnswer) {
-        let problem = self.problem;
+        let case = self.case;
         let patches = self.patches.len();
         self.fields
             .patches
@@ -88,9 +87,9 @@ impl<'a> Assembly<'a> {
         }
         for (index, fields) in self.fields.patches.iter_mut().enumerate() {
             if known.is_none() {
-                fields.meshes.push(patch_cells(problem, level, index));
+                fields.meshes.push(patch_cells(case, level, index));
             }
-            let values = point_fields(problem, level, level.patch_cells(index), point);
+            let values = point_fields(case, level, level.patch_cells(index), point);
             fields.points.push(PointFields { mesh, ..values });
         }
     }
@@ -98,7 +97,7 @@ impl<'a> Assembly<'a> {
     /// The answer.
     #[must_use]
     pub fn finish(self) -> (Solution, Fields) {
-        let problem = self.problem;
+        let case = self.case;
         let patches = self.patches.iter().zip(self.points);
         let solution = Solution {
             patches: patches.map(patch_solution).collect(),
@@ -118,12 +117,12 @@ impl<'a> Assembly<'a> {
             },
             frame: FRAME.to_owned(),
             material: CombinedMaterial {
-                shear_modulus_mpa: problem.elasticity.shear_modulus,
-                poisson_ratio: problem.elasticity.poisson_ratio,
-                difference_parameter: problem.elasticity.difference,
+                shear_modulus_mpa: case.problem.elasticity.shear_modulus,
+                poisson_ratio: case.problem.elasticity.poisson_ratio,
+                difference_parameter: case.problem.elasticity.difference,
             },
             solver_version: env!("CARGO_PKG_VERSION").to_owned(),
-            case_digest: problem.digest.clone(),
+            case_digest: case.label.digest.clone(),
         };
         (solution, self.fields)
     }
@@ -131,8 +130,8 @@ impl<'a> Assembly<'a> {
 
 /// Is anything asked for that has a value per cell?
 #[must_use]
-pub fn wants_fields(problem: &Problem) -> bool {
-    problem.outputs.iter().any(|o| *o != Output::Resultants)
+pub fn wants_fields(case: &CheckedCase) -> bool {
+    case.run.outputs.iter().any(|o| *o != Output::Resultants)
 }
 
 fn patch_solution((patch, points): (&Patch, Vec<PointSolution>)) -> PatchSolution {
@@ -150,7 +149,7 @@ fn patch_solution((patch, points): (&Patch, Vec<PointSolution>)) -> PatchSolutio
 }
 
 fn point_solution(
-    problem: &Problem,
+    case: &CheckedCase,
     level: &StripMesh,
     patch: &Patch,
     index: usize,
@@ -164,20 +163,20 @@ fn point_solution(
         .clone()
         .map(|i| traction[0][i].hypot(traction[1][i]))
         .fold(0.0, f64::max);
-    let areas = problem
+    let areas = case
+        .run
         .wants(Output::Zones)
         .then(|| zone_areas(level, patch, cells, &point.tangential.slips));
     let power_x = motion.creepage_x * found.force_x;
     let power_y = motion.creepage_y * found.force_y;
     PointSolution {
         motion: (*motion).into(),
-        normalised: normalised(problem, patch, motion),
+        normalised: normalised(case, patch, motion),
         force_x_n: found.force_x,
         force_y_n: found.force_y,
         moment_z_n_mm: found.moment_z,
         profile_uncertainty: None,
-        error_estimate: point.errors[index]
-            .map(|e| absolute(problem, std::slice::from_ref(patch), e)),
+        error_estimate: point.errors[index].map(|e| absolute(case, std::slice::from_ref(patch), e)),
         stick_area_mm2: areas.map(|a| a.stick_area),
         slip_area_mm2: areas.map(|a| a.slip_area),
         stick_cells: areas.map(|a| a.stick_cells),
@@ -197,14 +196,14 @@ fn point_solution(
             skipped: point.tangential.skipped.clone(),
             seconds: point.seconds,
         },
-        target_met: target_met(problem, point),
+        target_met: target_met(case, point),
         saturated: point.saturated,
     }
 }
 
 /// Does the estimate of the sum over the patches stay within the target?
-fn target_met(problem: &Problem, point: &MotionAnswer) -> Option<bool> {
-    let Resolution::Target(target) = problem.resolution else {
+fn target_met(case: &CheckedCase, point: &MotionAnswer) -> Option<bool> {
+    let Resolution::Target(target) = case.run.resolution else {
         return None;
     };
     Some(
@@ -254,12 +253,14 @@ fn zone_areas(
 }
 
 /// Creepages made dimensionless with E = 2G(1+ν) and c = √(A/π) (Kalker 1990; the seed uses half the longest strip).
-fn normalised(problem: &Problem, patch: &Patch, motion: &Motion) -> NormalisedMotion {
+fn normalised(case: &CheckedCase, patch: &Patch, motion: &Motion) -> NormalisedMotion {
     let c = (patch.area / std::f64::consts::PI).sqrt();
-    let bound = problem.friction * patch.normal_force;
-    let unit =
-        2.0 * problem.elasticity.shear_modulus / (1.0 - problem.elasticity.poisson_ratio) * c * c
-            / bound;
+    let bound = case.problem.friction.limit(patch);
+    let unit = 2.0 * case.problem.elasticity.shear_modulus
+        / (1.0 - case.problem.elasticity.poisson_ratio)
+        * c
+        * c
+        / bound;
     let scaled = |value: f64| (bound > 0.0).then_some(value * unit);
     NormalisedMotion {
         creepage_x: scaled(motion.creepage_x),
@@ -270,10 +271,10 @@ fn normalised(problem: &Problem, patch: &Patch, motion: &Motion) -> NormalisedMo
 }
 
 /// A relative error as absolute ones. The moment's grows with the distance of the patches from the origin.
-fn absolute(problem: &Problem, patches: &[Patch], relative: f64) -> ErrorEstimate {
+fn absolute(case: &CheckedCase, patches: &[Patch], relative: f64) -> ErrorEstimate {
     let (mut force, mut area, mut reach) = (0.0, 0.0, 0.0_f64);
     for patch in patches {
-        force += problem.friction * patch.normal_force;
+        force += case.problem.friction.limit(patch);
         area += patch.area;
         let middle = (0.5 * (patch.extent[0] + patch.extent[1]))
             .hypot(0.5 * (patch.extent[2] + patch.extent[3]));
@@ -287,7 +288,7 @@ fn absolute(problem: &Problem, patches: &[Patch], relative: f64) -> ErrorEstimat
     }
 }
 
-fn total(problem: &Problem, patches: &[Patch], point: &MotionAnswer) -> Total {
+fn total(case: &CheckedCase, patches: &[Patch], point: &MotionAnswer) -> Total {
     let sum = point
         .resultants
         .iter()
@@ -303,26 +304,26 @@ fn total(problem: &Problem, patches: &[Patch], point: &MotionAnswer) -> Total {
             .last()
             .copied()
             .flatten()
-            .map(|e| absolute(problem, patches, e)),
+            .map(|e| absolute(case, patches, e)),
     }
 }
 
 /// Remarks on motion `index` of the problem, with its number in the case.
 fn remarks(
-    problem: &Problem,
+    case: &CheckedCase,
     index: usize,
     point: &MotionAnswer,
 ) -> impl Iterator<Item = RemarkEntry> {
     let own = point.tangential.remarks.iter().cloned();
-    let missed = target_missed(problem, point);
-    let number = problem.part.before + index;
-    own.chain(unreachable(problem, index, point))
+    let missed = target_missed(case, point);
+    let number = case.problem.part.before + index;
+    own.chain(unreachable(case, index, point))
         .chain(missed)
         .map(move |remark| remark.at_point(number))
 }
 
-fn unreachable(problem: &Problem, index: usize, point: &MotionAnswer) -> Option<Remark> {
-    let [wanted_x_n, wanted_y_n] = problem.forces[index];
+fn unreachable(case: &CheckedCase, index: usize, point: &MotionAnswer) -> Option<Remark> {
+    let [wanted_x_n, wanted_y_n] = case.problem.forces[index];
     let sum = Resultants::default();
     let found = point.resultants.iter().fold(sum, |sum, r| sum.plus(*r));
     point.saturated.then_some(Remark::ForceUnreachable {
@@ -333,15 +334,15 @@ fn unreachable(problem: &Problem, index: usize, point: &MotionAnswer) -> Option<
     })
 }
 
-fn target_missed(problem: &Problem, point: &MotionAnswer) -> Option<Remark> {
-    let Resolution::Target(target) = problem.resolution else {
+fn target_missed(case: &CheckedCase, point: &MotionAnswer) -> Option<Remark> {
+    let Resolution::Target(target) = case.run.resolution else {
         return None;
     };
     let estimate = point.error();
-    (target_met(problem, point) == Some(false)).then_some(Remark::TargetMissed { estimate, target })
+    (target_met(case, point) == Some(false)).then_some(Remark::TargetMissed { estimate, target })
 }
 
-fn patch_cells(problem: &Problem, level: &StripMesh, patch: usize) -> PatchCells {
+fn patch_cells(case: &CheckedCase, level: &StripMesh, patch: usize) -> PatchCells {
     let cells = level.patch_cells(patch);
     let mesh = &level.mesh;
     let mut fields = PatchCells::default();
@@ -356,14 +357,15 @@ fn patch_cells(problem: &Problem, level: &StripMesh, patch: usize) -> PatchCells
                 .push(u32::try_from(segment.chord.strip).unwrap_or(u32::MAX));
         }
     }
-    fields.pressure_mpa = problem
+    fields.pressure_mpa = case
+        .run
         .wants(Output::Pressure)
         .then(|| level.pressure[cells].to_vec());
     fields
 }
 
 fn point_fields(
-    problem: &Problem,
+    case: &CheckedCase,
     level: &StripMesh,
     cells: std::ops::Range<usize>,
     point: &MotionAnswer,
@@ -376,19 +378,20 @@ fn point_fields(
             .collect::<Vec<_>>()
     };
     let traction = |k: usize| {
-        problem
+        case.run
             .wants(Output::Tractions)
             .then(|| scaled(&answer.traction[k], level.scale.traction))
     };
     let slip = |k: usize| {
-        problem
+        case.run
             .wants(Output::Slip)
             .then(|| scaled(&answer.slip[k], level.scale.slip()))
     };
     let zone = |slips: &bool| if *slips { Zone::Slip } else { Zone::Stick };
     PointFields {
         mesh: 0,
-        zone: problem
+        zone: case
+            .run
             .wants(Output::Zones)
             .then(|| answer.slips[cells.clone()].iter().map(zone).collect()),
         traction_x_mpa: traction(0),

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use std::time::Duration;
 
 use crate::contact::case::plausibility;
-use crate::contact::case::problem::Problem;
+use crate::contact::case::problem::CheckedCase;
 use crate::contact::error::SolveError;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
@@ -20,14 +20,14 @@ const DUST: f64 = 1e-14;
 /// # Errors
 /// [`SolveError::NotFinite`] if the answer holds something that is no number.
 pub fn finish(
-    problem: &Problem,
+    case: &CheckedCase,
     (mut solution, fields): (Solution, Fields),
     took: Duration,
 ) -> Result<(Solution, Fields), SolveError> {
     finite::require(&solution, &fields)?;
-    clear_dust(problem, &mut solution);
+    clear_dust(case, &mut solution);
     scale_seconds(&mut solution, took.as_secs_f64());
-    let said = implausible(&solution, problem.part.before);
+    let said = implausible(&solution, case.problem.part.before);
     solution.remarks = merged(solution.remarks.into_iter().chain(said));
     Ok((solution, fields))
 }
@@ -63,12 +63,12 @@ fn scale_seconds(solution: &mut Solution, took: f64) {
 }
 
 /// Sets what is rounding of larger numbers to 0.
-fn clear_dust(problem: &Problem, solution: &mut Solution) {
+fn clear_dust(case: &CheckedCase, solution: &mut Solution) {
     let (mut limit_all, mut moment_all) = (0.0, 0.0);
     let mut length_all = 0.0_f64;
     for patch in &mut solution.patches {
         let length = (patch.area_mm2 / PI).sqrt();
-        let limit = problem.friction * patch.normal_force_n;
+        let limit = case.problem.friction.largest() * patch.normal_force_n;
         for point in &mut patch.points {
             clear(&mut point.force_x_n, limit);
             clear(&mut point.force_y_n, limit);

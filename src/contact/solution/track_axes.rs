@@ -1,6 +1,6 @@
 //! The answers for the parts of a wheel–rail contact put together, with their places and the sums in track axes.
 
-use crate::contact::case::problem::Problem;
+use crate::contact::case::problem::CheckedCase;
 use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
@@ -19,7 +19,7 @@ const FRAME: &str = "every patch in its own axes: x along rolling (leading edge 
                      z up; forces, moments and tractions act on the lower body, slip is that of the upper body relative to the \
                      lower one";
 
-/// Puts the answers for the parts together, in the order of the wheel's patches; `problem` is the whole, `answers` has at
+/// Puts the answers for the parts together, in the order of the wheel's patches; `case` is the whole, `answers` has at
 /// least one entry.
 ///
 /// `total` holds the sums in track axes: `F_x`, `F_y cos α + N sin α` across, `F_y sin α − N cos α` upward, with the contact angle α and
@@ -29,7 +29,7 @@ const FRAME: &str = "every patch in its own axes: x along rolling (leading edge 
 /// # Errors
 /// Rail or wheel were not found over the load centre of a patch, or the rail over its ends.
 pub fn merge(
-    problem: &Problem,
+    case: &CheckedCase,
     geometry: &WheelRail,
     wheel: &PressedWheel,
     answers: Vec<(Solution, Fields)>,
@@ -46,7 +46,7 @@ pub fn merge(
         })
         .collect::<Option<Vec<Total>>>()
         .unwrap_or_default();
-    let mut remarks = problem.remarks.clone();
+    let mut remarks = case.remarks.clone();
     remarks.extend_from_slice(&wheel.remarks);
     let alone = answers.len() == 1;
     let mut whole: Option<(Solution, Fields)> = None;

@@ -77,22 +77,22 @@ pub async fn check(
     let checked = tokio::task::spawn_blocking(move || {
         // Memory and turn are held until the work ends, even if the client has gone away.
         let _room = room;
-        let problem = jobs.check(&value)?;
-        let cost = problem.cost();
+        let checked = jobs.check(&value)?;
+        let cost = checked.cost();
         // What a wheel that lies nowhere above its rail is told when it is solved.
-        let understood = problem.understood().ok();
+        let understood = checked.understood().ok();
         Ok::<_, ApiError>(CheckReport {
-            digest: problem.digest.clone(),
-            method: problem.method_asked,
-            outputs: problem.outputs.clone(),
-            motions: problem.motions.len(),
+            digest: checked.label.digest.clone(),
+            method: checked.run.method_asked,
+            outputs: checked.run.outputs.clone(),
+            motions: checked.problem.motions.len(),
             estimate: Estimate {
                 bytes: cost.bytes,
                 seconds: cost.seconds,
             },
             understood,
-            quality: problem.quality(),
-            remarks: problem.remarks,
+            quality: checked.quality(),
+            remarks: checked.remarks,
         })
     });
     let checked = checked.await.map_err(|error| ApiError::internal(&error))?;

@@ -121,8 +121,8 @@ impl BatchUpload {
                 }])
             }
         };
-        let problem = match checked {
-            Ok(problem) => problem,
+        let checked = match checked {
+            Ok(checked) => checked,
             Err(faults) => {
                 self.rejected += 1;
                 if self.faulty.len() < FAULTY_KEPT {
@@ -139,13 +139,13 @@ impl BatchUpload {
         let staged = StagedCase {
             index,
             row: row.is_some(),
-            method: problem.method.name().to_owned(),
-            outputs: outputs_text(&problem.outputs),
-            cost_us: cost_us(&problem),
-            slice_us: self.jobs.slice_us(&problem),
-            digest: problem.digest,
-            name: problem.name,
-            labels: problem.labels,
+            method: checked.run.method.name().to_owned(),
+            outputs: outputs_text(&checked.run.outputs),
+            cost_us: cost_us(&checked),
+            slice_us: self.jobs.slice_us(&checked),
+            digest: checked.label.digest,
+            name: checked.label.name,
+            labels: checked.label.labels,
         };
         let Some(staging) = &mut self.staging else {
             return Ok(());

@@ -96,7 +96,7 @@ mod tests {
     use super::*;
     use crate::contact::error::CaseError;
 
-    fn problem() -> crate::contact::case::problem::Problem {
+    fn checked() -> crate::contact::case::problem::CheckedCase {
         let case = serde_json::json!({
             "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
             "friction": { "coefficient": 0.3 },
@@ -139,7 +139,7 @@ mod tests {
             field_patches: 0,
         };
         let slice = || Outcome::Slice {
-            sliced: Box::new(SlicedCase::new(problem(), vec![0..1, 1..2], &[])),
+            sliced: Box::new(SlicedCase::new(checked(), vec![0..1, 1..2], &[])),
             part: None,
         };
         let broken = || Outcome::Broken(Failure::new(FailureKind::Panic, "boom"));

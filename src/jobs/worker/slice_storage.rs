@@ -42,7 +42,7 @@ impl Worker {
                 }
             };
             let slice = NewSlice {
-                rest_us: u64::from(microseconds(sliced.problem.cost().seconds * (1.0 - done))),
+                rest_us: u64::from(microseconds(sliced.checked.cost().seconds * (1.0 - done))),
                 note,
                 result,
                 done,

@@ -5,13 +5,13 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use crate::contact::case::problem::Problem;
+use crate::contact::case::problem::CheckedCase;
 use crate::jobs::store::ending::SliceRecord;
 
 /// A checked case with its slices, of which the first `done` are stored.
 #[derive(Debug)]
 pub(crate) struct SlicedCase {
-    pub(crate) problem: Problem,
+    pub(crate) checked: CheckedCase,
     slices: Vec<Range<usize>>,
     done: usize,
     /// Solver time up to the end of what is stored.
@@ -21,21 +21,21 @@ pub(crate) struct SlicedCase {
 impl SlicedCase {
     /// A case cut here, of which this is stored. What was cut elsewhere, or solved by another solver, is left aside.
     pub(crate) fn new(
-        problem: Problem,
+        checked: CheckedCase,
         slices: Vec<Range<usize>>,
         stored: &[SliceRecord],
     ) -> SlicedCase {
         let fits = |(place, (note, slice)): (usize, (&SliceRecord, &Range<usize>))| {
             note.number as usize == place
                 && note.motions as usize == slice.end
-                && note.digest == problem.digest
+                && note.digest == checked.label.digest
         };
         let pairs = stored.iter().zip(&slices).enumerate();
         let done = pairs.take_while(|pair| fits(*pair)).count();
         let last = done.checked_sub(1).and_then(|last| stored.get(last));
         SlicedCase {
             spent: last.map_or(Duration::ZERO, |note| note.spent),
-            problem,
+            checked,
             slices,
             done,
         }
@@ -57,7 +57,7 @@ impl SlicedCase {
         SliceRecord {
             number: u32::try_from(self.done).unwrap_or(u32::MAX),
             motions: u32::try_from(motions).unwrap_or(u32::MAX),
-            digest: self.problem.digest.clone(),
+            digest: self.checked.label.digest.clone(),
             spent,
         }
     }
@@ -65,7 +65,7 @@ impl SlicedCase {
     /// Part of the motions that is done once the next slice is, 0 to 1.
     pub(crate) fn done_after_next(&self) -> f64 {
         let motions = self.next().map_or(0, |slice| slice.end);
-        motions as f64 / self.problem.motions.len().max(1) as f64
+        motions as f64 / self.checked.problem.motions.len().max(1) as f64
     }
 
     /// The next slice is stored.
@@ -93,7 +93,7 @@ mod tests {
     use crate::contact;
     use crate::contact::case::limits::Limits;
 
-    fn problem() -> Problem {
+    fn checked_case() -> CheckedCase {
         let case = json!({
             "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
             "friction": { "coefficient": 0.3 },
@@ -106,21 +106,21 @@ mod tests {
         contact::check(&case, &Limits::default()).unwrap()
     }
 
-    fn note(number: u32, motions: u32, problem: &Problem) -> SliceRecord {
+    fn note(number: u32, motions: u32, checked: &CheckedCase) -> SliceRecord {
         SliceRecord {
             number,
             motions,
-            digest: problem.digest.clone(),
+            digest: checked.label.digest.clone(),
             spent: Duration::from_secs(u64::from(motions)),
         }
     }
 
     #[test]
     fn only_what_was_cut_here_and_solved_by_this_solver_counts_as_done() {
-        let problem = problem();
+        let checked = checked_case();
         let cuts = || vec![0..3, 3..5, 5..7];
-        let sliced = |stored: &[SliceRecord]| SlicedCase::new(problem.clone(), cuts(), stored);
-        let good = [note(0, 3, &problem), note(1, 5, &problem)];
+        let sliced = |stored: &[SliceRecord]| SlicedCase::new(checked.clone(), cuts(), stored);
+        let good = [note(0, 3, &checked), note(1, 5, &checked)];
         let going = sliced(&good);
         assert_eq!(
             (going.next(), going.spent),
@@ -130,7 +130,7 @@ mod tests {
         assert!((going.done_after_next() - 1.0).abs() < f64::EPSILON);
         assert_eq!(sliced(&[]).next(), Some(0..3));
         // Cut elsewhere, a hole, another solver.
-        assert_eq!(sliced(&[note(0, 2, &problem)]).next(), Some(0..3));
+        assert_eq!(sliced(&[note(0, 2, &checked)]).next(), Some(0..3));
         assert_eq!(sliced(&good[1..]).next(), Some(0..3));
         let other = SliceRecord {
             digest: "of another revision".to_owned(),

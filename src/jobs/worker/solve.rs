@@ -50,18 +50,18 @@ fn check_and_solve(
         Ok(case) => case,
         Err(error) => return internal(&error.to_string()),
     };
-    let mut problem = match (shared.engine.check)(&case, &shared.options.limits) {
-        Ok(problem) => problem,
+    let mut checked = match (shared.engine.check)(&case, &shared.options.limits) {
+        Ok(checked) => checked,
         Err(error) => return Outcome::Refused(error),
     };
     let limit = shared.options.time_limit;
-    problem.time_limit = Some(problem.time_limit.map_or(limit, |time| time.min(limit)));
-    control.set_memory_bytes(problem.cost().bytes);
-    let slices = (shared.engine.slices)(&problem);
+    checked.run.time_limit = Some(checked.run.time_limit.map_or(limit, |time| time.min(limit)));
+    control.set_memory_bytes(checked.cost().bytes);
+    let slices = (shared.engine.slices)(&checked);
     solve_next(
         shared,
         control,
-        Box::new(SlicedCase::new(problem, slices, notes)),
+        Box::new(SlicedCase::new(checked, slices, notes)),
     )
 }
 
@@ -70,7 +70,7 @@ fn solve_next(shared: &Shared, control: &AttemptControl, sliced: Box<SlicedCase>
         return Outcome::Slice { sliced, part: None };
     };
     control.begin(sliced.spent);
-    let solved = (shared.engine.solve)(&sliced.problem, slice, control);
+    let solved = (shared.engine.solve)(&sliced.checked, slice, control);
     let spent = control.pause();
     let (solution, fields) = match solved {
         Ok(answer) => answer,
@@ -120,7 +120,7 @@ pub(crate) fn whole(
     fields: &Fields,
 ) -> Outcome {
     let seconds = spent.as_secs_f64();
-    let method = sliced.problem.method_asked;
+    let method = sliced.checked.run.method_asked;
     shared.metrics.solved(method, &solution, seconds);
     match encoded(&solution, fields) {
         Ok(result) => Outcome::Solved {
@@ -219,12 +219,12 @@ mod tests {
             "solver": { "mesh": { "strips": 6, "cells": 6 } },
             "outputs": ["resultants", "zones", "tractions", "slip", "pressure"]
         });
-        let problem = contact::check(&case, &Limits::default()).unwrap();
+        let checked = contact::check(&case, &Limits::default()).unwrap();
         let engine = Engine::contact();
         let mut parts = Vec::new();
         let mut whole: Option<(Solution, Fields)> = None;
         for cut in [0..3, 3..5, 5..7] {
-            let (solution, fields) = (engine.solve)(&problem, cut, &Unmonitored).unwrap();
+            let (solution, fields) = (engine.solve)(&checked, cut, &Unmonitored).unwrap();
             parts.push(EncodedResult {
                 solution: Bytes::from(serde_json::to_vec(&solution).unwrap()),
                 fields: Some(Bytes::from(encode(&fields).unwrap())),

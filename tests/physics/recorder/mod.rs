@@ -42,12 +42,12 @@ fn path() -> PathBuf {
 
 /// The answer to one case, or why there is none.
 fn solved(operators: &Arc<OperatorStore>, case: &Value) -> Record {
-    let problem = match contact::check(case, &Limits::default()) {
-        Ok(problem) => problem,
+    let checked = match contact::check(case, &Limits::default()) {
+        Ok(checked) => checked,
         Err(error) => return Record::refused(&error.to_string()),
     };
     let friction = case["friction"]["coefficient"].as_f64().unwrap_or(0.0);
-    match contact::solve_with(operators, &problem, &Unmonitored) {
+    match contact::solve_with(operators, &checked, &Unmonitored) {
         Ok((solution, fields)) => Record::of(friction, &solution, &fields),
         Err(error) => Record::refused(&error.to_string()),
     }
