@@ -1,0 +1,158 @@
+// The public API and nothing else: requests, refusals, and one function for each call that the page makes.
+// The types are those of the contract, `/openapi.json`.
+
+/** @typedef {import('contract').components['schemas']} Schemas */
+/** @typedef {Schemas['Job']} Job */
+/** @typedef {Schemas['JobResult']} JobResult */
+/** @typedef {Schemas['Problem']} Problem */
+/** @typedef {Schemas['Fault']} Fault */
+/** @typedef {Schemas['RemarkEntry']} Remark */
+/** @typedef {Schemas['CheckedCase']} CheckedCase */
+/** @typedef {Schemas['Batch']} Batch */
+/** @typedef {Schemas['State']} State */
+/** @typedef {JobResult['patches'][number]} Patch */
+/** @typedef {Patch['points'][number]} Point */
+/** @typedef {import('./document.js').JsonObject} JsonObject */
+
+/** @typedef {{ method?: string, body?: string, headers?: Record<string, string>, signal?: AbortSignal }} Asked */
+
+const KEY = 'railhead.key';
+let key = sessionStorage.getItem(KEY) ?? '';
+
+export const apiKey = () => key;
+
+/** @param {string} secret Kept until the tab is closed; empty for none. */
+export function useKey(secret) {
+  key = secret.trim();
+  sessionStorage.setItem(KEY, key);
+}
+
+/** The service refused a request, or did not answer: then `status` is 0. */
+export class Refused extends Error {
+  /** @param {Problem} problem */
+  constructor(problem) {
+    super(problem.detail || problem.title);
+    this.problem = problem;
+  }
+
+  get status() {
+    return this.problem.status;
+  }
+
+  /** @returns {readonly Fault[]} */
+  get faults() {
+    return this.problem.errors ?? [];
+  }
+}
+
+/**
+ * @param {string} title
+ * @param {number} status
+ * @param {string} detail
+ * @returns {Problem}
+ */
+const problem = (title, status, detail) => ({ type: 'about:blank', title, status, detail, instance: '' });
+
+/**
+ * @param {string} path
+ * @param {Asked} [asked]
+ * @returns {Promise<Response>} An answer that is no refusal.
+ * @throws {Refused}
+ */
+export async function request(path, asked = {}) {
+  const headers = new Headers(asked.headers);
+  if (key) headers.set('Authorization', `Bearer ${key}`);
+  if (asked.body !== undefined && !headers.has('Content-Type')) headers.set('Content-Type', 'application/json');
+  /** @type {Response} */
+  let answer;
+  try {
+    answer = await fetch(path, { ...asked, headers });
+  } catch (error) {
+    if (asked.signal?.aborted) throw error;
+    throw new Refused(problem('No answer', 0, 'The service does not answer.'));
+  }
+  if (answer.ok) return answer;
+  const told = (answer.headers.get('Content-Type') ?? '').includes('problem+json');
+  throw new Refused(told ? await answer.json() : problem(answer.statusText, answer.status, `status ${answer.status}`));
+}
+
+/**
+ * @param {string} path
+ * @param {Asked} [asked]
+ */
+const json = async (path, asked) => (await request(path, asked)).json();
+
+/** @param {Record<string, string | number | undefined>} members Those that are undefined or empty are left out. */
+function search(members) {
+  const pairs = Object.entries(members).filter(([, value]) => value !== undefined && value !== '');
+  return new URLSearchParams(pairs.map(([name, value]) => [name, String(value)])).toString();
+}
+
+/** @returns {Promise<Schemas['Health']>} */
+export const health = () => json('/readyz');
+
+/**
+ * @param {string} text The case.
+ * @param {AbortSignal} signal
+ * @returns {Promise<CheckedCase>}
+ */
+export const checkCase = (text, signal) => json('/v1/cases/check', { method: 'POST', body: text, signal });
+
+/**
+ * Submits a case. Within `wait` seconds the answer holds the result.
+ * @param {string} text
+ * @param {{ wait?: number, signal?: AbortSignal }} [how]
+ * @returns {Promise<Job>}
+ */
+export function submit(text, { wait = 0, signal } = {}) {
+  /** @type {Record<string, string>} */
+  const headers = wait ? { Prefer: `wait=${wait}` } : {};
+  return json('/v1/jobs', { method: 'POST', body: text, headers, signal });
+}
+
+/** @type {(id: string) => Promise<Job>} */
+export const job = (id) => json(`/v1/jobs/${id}`);
+
+/** @type {(id: string) => Promise<JobResult>} */
+export const result = (id) => json(`/v1/jobs/${id}/result`);
+
+/** @type {(id: string) => Promise<JsonObject>} */
+export const caseOf = (id) => json(`/v1/jobs/${id}/case`);
+
+/** @typedef {{ state?: string, batch?: string, label?: string, name?: string, cursor?: string, limit?: number }} Filter */
+
+/**
+ * @param {Filter} filter
+ * @returns {Promise<Schemas['JobPage']>}
+ */
+export const jobs = (filter) => json(`/v1/jobs?${search({ limit: 200, ...filter })}`);
+
+/** @type {(id: string) => Promise<Batch>} */
+export const batch = (id) => json(`/v1/batches/${id}`);
+
+/** @param {'jobs' | 'batches'} kind @param {string} id */
+export const cancel = (kind, id) => request(`/v1/${kind}/${id}/cancel`, { method: 'POST' });
+
+/** @param {'jobs' | 'batches'} kind @param {string} id */
+export const remove = (kind, id) => request(`/v1/${kind}/${id}`, { method: 'DELETE' });
+
+/**
+ * Saves what a path answers as a file.
+ * @param {string} path
+ * @param {string} name
+ */
+export async function download(path, name) {
+  save(await (await request(path)).blob(), name);
+}
+
+/**
+ * @param {Blob} blob
+ * @param {string} name
+ */
+export function save(blob, name) {
+  const link = document.createElement('a');
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}

@@ -1,0 +1,141 @@
+// Fields of the kinds of contact, and the files that are dropped on them.
+
+import { html, nothing } from '../vendor/lit-html.js';
+import { at, isObject, numberAt, put } from './document.js';
+import { change, editDocument } from './editing.js';
+import { withContact } from './examples.js';
+import { faultAt, field, fieldId } from './field.js';
+import { number } from './format.js';
+import { parseGapCurve, parseGrid, profileKind } from './tables.js';
+
+/** @typedef {import('./state.js').App} App */
+/** @typedef {import('./document.js').JsonObject} JsonObject */
+
+const FILES = '.ban,.whl,.prr,.prw,.txt,.csv,.dat';
+
+/** @param {App} app @param {string} type */
+export function contactFields(app, type) {
+  switch (type) {
+    case 'radii':
+      return html`<div class="pair">${field(app, '/contact/rolling_mm', 'Relative radius along', 'mm')}${field(app, '/contact/lateral_mm', 'across', 'mm')}</div>`;
+    case 'ellipse':
+      return html`<div class="pair">${field(app, '/contact/a_mm', 'Semi-axis along', 'mm')}${field(app, '/contact/b_mm', 'across', 'mm')}</div>`;
+    case 'profiles':
+      return profileFields(app);
+    case 'gap_profile':
+      return html`<div class="pair">${field(app, '/contact/rolling_mm', 'Relative radius along', 'mm')}
+        ${dropZone('Gap', pointsOf(app, '/contact/gap_mm'), '/contact/gap_mm', app, (file) => takeGap(app, file))}</div>`;
+    case 'gap_grid':
+    case 'pressure_grid': {
+      const member = type === 'gap_grid' ? 'gap_mm' : 'pressure_mpa';
+      return dropZone(type === 'gap_grid' ? 'Gap on a grid' : 'Pressure on a grid', pointsOf(app, `/contact/${member}`), `/contact/${member}`, app, (file) => takeGrid(app, file, member));
+    }
+    default:
+      return html`<p class="hint">Choose a kind of contact, or drop the files of a rail and a wheel anywhere here.</p>`;
+  }
+}
+
+/** @param {App} app */
+function profileFields(app) {
+  const document = app.store.get().compose.document ?? {};
+  const cant = numberAt(document, '/contact/cant_rad');
+  const shift = numberAt(document, '/contact/lateral_shift_mm') || 0;
+  const slide = (/** @type {Event} */ event) =>
+    change(app, '/contact/lateral_shift_mm', Number(/** @type {HTMLInputElement} */ (event.target).value));
+  const side = at(document, '/contact/side') ?? 'right';
+  return html`
+    <div class="pair">${sectionZone(app, 'rail')}${sectionZone(app, 'wheel')}</div>
+    <div class="segs" role="group" aria-label="Side of the track">${['left', 'right'].map((name) => html`<label class="seg">
+      <input type="radio" name="side" .checked=${side === name} @change=${() => change(app, '/contact/side', name)}><span>${name} rail</span></label>`)}</div>
+    <div class="pair">${field(app, '/contact/rolling_radius_mm', 'Rolling radius', 'mm')}
+      ${field(app, '/contact/cant_rad', 'Rail inclination', 'rad', { hint: cant ? `1 : ${number(1 / cant, 3)}` : '1 : 40 is 0.025' })}</div>
+    <label class="slide"><span>Wheelset shift to the left <output>${number(shift, 3)} mm</output></span>
+      <input type="range" min="-8" max="8" step="0.05" .value=${String(shift)} @input=${slide}></label>`;
+}
+
+/** @param {App} app @param {'rail' | 'wheel'} body */
+function sectionZone(app, body) {
+  const section = at(app.store.get().compose.document ?? {}, `/contact/${body}`);
+  const what = !isObject(section) ? ''
+    : Array.isArray(section.points_mm) ? `${section.points_mm.length} points`
+    : typeof section.text === 'string' ? `${section.format}, ${section.text.split('\n').filter((line) => line.trim()).length} lines` : '';
+  return dropZone(body === 'rail' ? 'Rail' : 'Wheel', what, `/contact/${body}`, app, (file) => takeProfiles(app, [file], body));
+}
+
+/** @param {App} app @param {string} pointer */
+function pointsOf(app, pointer) {
+  const list = at(app.store.get().compose.document ?? {}, pointer);
+  if (!Array.isArray(list) || !list.length) return '';
+  return Array.isArray(list[0]) ? `${list[0].length} × ${list.length} values` : `${list.length} points`;
+}
+
+/**
+ * A place for a file: dropped on it, or chosen.
+ * @param {string} title
+ * @param {string} what What is there already.
+ * @param {string} pointer
+ * @param {App} app
+ * @param {(file: File) => void} take
+ */
+function dropZone(title, what, pointer, app, take) {
+  const fault = faultAt(app, pointer);
+  const over = (/** @type {DragEvent} */ event, /** @type {boolean} */ on) => {
+    event.preventDefault();
+    /** @type {HTMLElement} */ (event.currentTarget).classList.toggle('over', on);
+  };
+  const drop = (/** @type {DragEvent} */ event) => {
+    over(event, false);
+    event.stopPropagation();
+    const file = event.dataTransfer?.files[0];
+    if (file) take(file);
+  };
+  const chosen = (/** @type {Event} */ event) => {
+    const input = /** @type {HTMLInputElement} */ (event.target);
+    if (input.files?.[0]) take(input.files[0]);
+    input.value = '';
+  };
+  return html`<div class=${fault ? 'field bad' : 'field'}>
+    <label class="drop" @dragover=${(/** @type {DragEvent} */ event) => over(event, true)}
+      @dragleave=${(/** @type {DragEvent} */ event) => over(event, false)} @drop=${drop}>
+      <span>${title}</span><span class="quiet">${what || 'drop or choose a file'}</span>
+      <input type="file" class="visually-hidden" id=${fieldId(pointer)} accept=${FILES} @change=${chosen}></label>
+    ${fault ? html`<p class="fault">${fault.detail}</p>` : nothing}</div>`;
+}
+
+/** @param {App} app @param {File} file */
+async function takeGap(app, file) {
+  const curve = parseGapCurve(await file.text());
+  if (!curve) return app.say(`${file.name} has no two columns of numbers, y and gap in mm.`);
+  const document = app.store.get().compose.document ?? {};
+  editDocument(app, put(put(document, '/contact/y_mm', curve.y_mm), '/contact/gap_mm', curve.gap_mm));
+}
+
+/** @param {App} app @param {File} file @param {string} member */
+async function takeGrid(app, file, member) {
+  const grid = parseGrid(await file.text());
+  if (!grid) return app.say(`${file.name} is no grid with x in its first row and y in its first column.`);
+  const document = app.store.get().compose.document ?? {};
+  const { type } = /** @type {JsonObject} */ (document.contact);
+  editDocument(app, put(document, '/contact', { type, x_mm: grid.x_mm, y_mm: grid.y_mm, [member]: grid.values }));
+}
+
+/**
+ * Takes files of cross-sections. The end of the name says which body it is; else it is the one dropped on, or the one that is missing.
+ * @param {App} app
+ * @param {readonly File[]} files
+ * @param {'rail' | 'wheel'} [onto]
+ */
+export async function takeProfiles(app, files, onto) {
+  const before = app.store.get().compose.document;
+  let document = at(before ?? undefined, '/contact/type') === 'profiles' && before ? before : withContact(before, 'profiles');
+  for (const file of files) {
+    const { format, body } = profileKind(file.name);
+    const missing = isObject(at(document, '/contact/rail')) && Object.keys(at(document, '/contact/rail') ?? {}).length ? 'wheel' : 'rail';
+    const target = (format === 'columns' ? onto : undefined) ?? body ?? onto ?? missing;
+    document = put(document, `/contact/${target}`, { format, text: await file.text() });
+    if (onto && target !== onto) app.say(`${file.name} is a ${target}, by its name.`);
+  }
+  const name = files.map((file) => file.name.replace(/\.[^.]*$/, '')).join(' on ');
+  if (before && at(before, '/contact/type') !== 'profiles') document = put(document, '/name', name);
+  editDocument(app, document);
+}

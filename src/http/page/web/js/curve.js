@@ -1,0 +1,229 @@
+// <creep-curve>: forces or the moment against the motion that varies, with the errors that the solver estimates. A click chooses.
+
+import uPlot from '../vendor/uPlot.esm.js';
+import { number, tickLabel } from './format.js';
+
+/** @typedef {import('./api.js').Patch} Patch */
+
+/** @typedef {{ label: string, unit: string, colour: string, dash?: number[], y: number[], error: (number | null)[] }} Line */
+
+/**
+ * @typedef {object} Curve
+ * @property {string} xLabel
+ * @property {string} yLabel
+ * @property {number[]} x Increasing.
+ * @property {number[]} order The motion of each place.
+ * @property {Line[]} lines
+ * @property {number} bound Friction's bound μN; NaN for none.
+ */
+
+const MOTIONS = /** @type {const} */ ([
+  { key: 'creepage_x', label: 'creepage along / %', factor: 0.01 },
+  { key: 'creepage_y', label: 'creepage across / %', factor: 0.01 },
+  { key: 'spin_per_mm', label: 'spin / (1/m)', factor: 0.001 },
+]);
+const CAP = 4;
+
+/**
+ * The curve of a patch against the component of motion that varies most.
+ * @param {Patch} patch
+ * @param {'forces' | 'moment'} kind
+ * @param {number} friction
+ * @returns {Curve | null} Null for fewer than three motions.
+ */
+export function curveOf(patch, kind, friction) {
+  const { points } = patch;
+  if (points.length < 3) return null;
+  const values = MOTIONS.map(({ key, factor }) => points.map(({ motion }) => (motion[key] ?? 0) / factor));
+  const spreads = values.map((of) => Math.max(...of) - Math.min(...of));
+  const most = spreads.indexOf(Math.max(...spreads));
+  const order = [...points.keys()].sort((one, two) => values[most][one] - values[most][two]);
+  /** @type {(name: 'force_x_n' | 'force_y_n' | 'moment_z_n_mm', look: Pick<Line, 'label' | 'unit' | 'colour' | 'dash'>) => Line} */
+  const line = (name, look) => ({
+    ...look,
+    y: order.map((at) => points[at][name] / 1000),
+    error: order.map((at) => {
+      const error = points[at].error_estimate?.[name];
+      return typeof error === 'number' ? error / 1000 : null;
+    }),
+  });
+  const moment = kind === 'moment';
+  return {
+    xLabel: MOTIONS[most].label,
+    yLabel: moment ? 'moment on the rail / N·m' : 'force on the rail / kN',
+    x: order.map((at) => values[most][at]),
+    order,
+    lines: moment
+      ? [line('moment_z_n_mm', { label: 'M z', unit: 'N·m', colour: '--c3' })]
+      : [line('force_x_n', { label: 'F x', unit: 'kN', colour: '--c1' }), line('force_y_n', { label: 'F y', unit: 'kN', colour: '--c2', dash: [7, 4] })],
+    bound: moment ? NaN : (friction * patch.normal_force_n) / 1000,
+  };
+}
+
+/** @typedef {{ curve: Curve, chosen: number, pick: (motion: number) => void }} Shown */
+
+export class CreepCurve extends HTMLElement {
+  /** @type {uPlot | null} */ #plot = null;
+  /** @type {Shown | null} */ #shown = null;
+  #resized = new ResizeObserver(() => this.#resize());
+  #themed = new MutationObserver(() => this.#build());
+
+  connectedCallback() {
+    this.#resized.observe(this);
+    this.#themed.observe(document.documentElement, { attributes: true, attributeFilter: ['data-theme'] });
+    this.#build();
+  }
+
+  disconnectedCallback() {
+    this.#resized.disconnect();
+    this.#themed.disconnect();
+    this.#plot?.destroy();
+    this.#plot = null;
+  }
+
+  /** @param {Shown} shown */
+  set shown(shown) {
+    const same = this.#shown?.curve === shown.curve;
+    this.#shown = shown;
+    if (same) this.#plot?.redraw();
+    else this.#build();
+  }
+
+  get plot() {
+    return this.#plot;
+  }
+
+  #resize() {
+    if (!this.#plot) this.#build();
+    else if (Math.abs(this.clientWidth - this.#plot.width) > 1) this.#plot.setSize(this.#size());
+  }
+
+  #size() {
+    return { width: this.clientWidth, height: Math.max(220, Math.min(330, this.clientWidth * 0.5)) };
+  }
+
+  #build() {
+    const shown = this.#shown;
+    this.#plot?.destroy();
+    this.#plot = null;
+    if (!shown || !this.isConnected || !this.clientWidth) return;
+    const { curve } = shown;
+    const style = getComputedStyle(this);
+    const token = (/** @type {string} */ name) => style.getPropertyValue(name).trim();
+    const font = `12px ${style.fontFamily}`;
+    const labels = (/** @type {uPlot} */ _, /** @type {number[]} */ marks) => marks.map((mark) => tickLabel(mark, marks));
+    const axis = { stroke: token('--ink-2'), grid: { stroke: token('--line'), width: 1 }, ticks: { show: false }, font, labelFont: font, labelSize: 22, labelGap: 0, values: labels };
+    /** @type {uPlot.Options} */
+    const options = {
+      ...this.#size(),
+      scales: { x: { time: false }, y: { range: withZero } },
+      axes: [{ ...axis, size: 30, gap: 4, label: curve.xLabel }, { ...axis, size: 58, label: curve.yLabel }],
+      series: [
+        { label: curve.xLabel, value: (_, value) => number(value) },
+        ...curve.lines.map((line) => seriesOf(line, token)),
+      ],
+      legend: { live: true },
+      cursor: { points: { size: 9 }, drag: { x: false, y: false } },
+      hooks: { draw: [(plot) => this.#annotate(plot, token, font)] },
+    };
+    this.#plot = new uPlot(options, [curve.x, ...curve.lines.map((line) => line.y)], this);
+    this.#plot.over.addEventListener('click', () => {
+      const at = this.#plot?.cursor.idx;
+      if (typeof at === 'number') this.#shown?.pick(curve.order[at]);
+    });
+  }
+
+  /**
+   * Error bars, friction's bound and the chosen motion.
+   * @param {uPlot} plot
+   * @param {(name: string) => string} token
+   * @param {string} font
+   */
+  #annotate(plot, token, font) {
+    const shown = this.#shown;
+    if (!shown) return;
+    const { curve, chosen } = shown;
+    const pen = plot.ctx;
+    const density = devicePixelRatio || 1;
+    const { left, top, width, height } = plot.bbox;
+    pen.save();
+    for (const bound of [curve.bound, -curve.bound]) {
+      const y = plot.valToPos(bound, 'y', true);
+      if (!(y >= top && y <= top + height)) continue;
+      pen.strokeStyle = pen.fillStyle = token('--ink-2');
+      pen.lineWidth = density;
+      pen.setLineDash([5 * density, 4 * density]);
+      pen.beginPath();
+      pen.moveTo(left, y);
+      pen.lineTo(left + width, y);
+      pen.stroke();
+      pen.font = font.replace('12px', `${12 * density}px`);
+      pen.fillText(bound > 0 ? 'μN' : '−μN', left + 6 * density, y - 5 * density);
+    }
+    pen.setLineDash([]);
+    for (const line of curve.lines) drawErrors(plot, curve, line, token(line.colour), density);
+    const x = plot.valToPos(curve.x[curve.order.indexOf(chosen)], 'x', true);
+    pen.strokeStyle = token('--accent');
+    pen.globalAlpha = 0.3;
+    pen.lineWidth = 8 * density;
+    pen.beginPath();
+    pen.moveTo(x, top);
+    pen.lineTo(x, top + height);
+    pen.stroke();
+    pen.restore();
+  }
+}
+
+/**
+ * @param {Line} line
+ * @param {(name: string) => string} token
+ * @returns {uPlot.Series}
+ */
+const seriesOf = (line, token) => ({
+  label: line.label,
+  stroke: token(line.colour),
+  width: 2,
+  dash: line.dash,
+  points: { show: true, size: 6, fill: token('--surface'), width: 1.5 },
+  value: (_plot, value, _series, at) => {
+    const error = at === null ? null : line.error[at];
+    return `${number(value)}${error ? ` ± ${number(error, 2)}` : ''} ${line.unit}`;
+  },
+});
+
+/** @type {uPlot.Range.Function} */
+function withZero(_plot, low, high) {
+  const [least, most] = [Math.min(0, low), Math.max(0, high)];
+  const margin = (most - least || 1) * 0.06;
+  return [least < 0 ? least - margin : least, most > 0 ? most + margin : most];
+}
+
+/**
+ * @param {uPlot} plot
+ * @param {Curve} curve
+ * @param {Line} line
+ * @param {string} colour
+ * @param {number} density
+ */
+function drawErrors(plot, curve, line, colour, density) {
+  const pen = plot.ctx;
+  const cap = CAP * density;
+  pen.strokeStyle = colour;
+  pen.lineWidth = 1.25 * density;
+  pen.beginPath();
+  curve.x.forEach((value, at) => {
+    const error = line.error[at];
+    if (!error) return;
+    const x = plot.valToPos(value, 'x', true);
+    const ends = [plot.valToPos(line.y[at] - error, 'y', true), plot.valToPos(line.y[at] + error, 'y', true)];
+    pen.moveTo(x, ends[0]);
+    pen.lineTo(x, ends[1]);
+    for (const y of ends) {
+      pen.moveTo(x - cap, y);
+      pen.lineTo(x + cap, y);
+    }
+  });
+  pen.stroke();
+}
+
+customElements.define('creep-curve', CreepCurve);

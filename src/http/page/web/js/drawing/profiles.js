@@ -1,0 +1,148 @@
+// Wheel on rail, seen along rolling with the left on the left, and the gap between the two below it.
+
+import { html, nothing, svg } from '../../vendor/lit-html.js';
+import { degrees, number, tickLabel, ticks } from '../format.js';
+import { grid, path, scaleOf } from './axes.js';
+
+/** @typedef {import('../placing.js').Placed} Placed */
+/** @typedef {import('../api.js').Patch} Patch */
+/** @typedef {import('./axes.js').Point} Point */
+
+/** @typedef {{ y: number[], pressure: number[] }} Comb The largest pressure of every strip, across the patch. */
+
+/**
+ * @typedef {object} Standing
+ * @property {readonly Patch[]} patches
+ * @property {readonly (Comb | null)[]} combs
+ * @property {number} chosen
+ * @property {(patch: number) => void} choose
+ */
+
+const WIDTH = 560;
+const TOP_MM = 27;
+const COMB_MM = 15;
+const TAG_MM = 21;
+
+/**
+ * @param {Placed | null} placed
+ * @param {Standing} [standing] Patches with their pressure.
+ */
+export function drawProfiles(placed, standing) {
+  if (!placed) return html`<p class="quiet pad">The drawing appears when both cross-sections can be read.</p>`;
+  const { rail, touch } = placed;
+  const patches = standing?.patches ?? [];
+  const tips = patches.flatMap(({ position }) => (position ? [position.track_mm[1] - 1.2 * TAG_MM * Math.sin(position.contact_angle_rad)] : []));
+  const y0 = Math.min(...rail.map(([y]) => y - 12), ...tips);
+  const y1 = Math.max(...rail.map(([y]) => y + 12), ...tips);
+  const low = -Math.min(44, 4 - Math.min(...rail.map(([, z]) => z)));
+  const scale = WIDTH / (y1 - y0);
+  const height = (TOP_MM - low) * scale;
+  /** @type {(point: Point) => Point} */
+  const T = ([y, z]) => [(y1 - y) * scale, (TOP_MM - z) * scale];
+  const wheel = placed.wheel.filter(([y]) => y > y0 - 40 && y < y1 + 40).map(T);
+  const seen = patches.length
+    ? patches.map((patch, at) => `patch ${at} at ${degrees(patch.position?.contact_angle_rad ?? 0)}`).join(', ')
+    : touch ? `first touch at y ${number(touch[0])} mm` : 'no touch';
+  return html`<svg class="drawing" viewBox=${`0 0 ${WIDTH} ${height.toFixed(0)}`} role="img" aria-label=${`Wheel on rail, seen along rolling: ${seen}`}>
+    ${lattice([y0, y1], [low, TOP_MM], T, height)}
+    <path class="rail" d=${closed(rail.map(T), height + 20)}/>
+    ${wheel.length > 1 ? svg`<path class="wheel" d=${closed(wheel, -20)}/>` : nothing}
+    ${latticeNumbers([y0, y1], [low, TOP_MM], T, height)}
+    <g class="bodies">
+      <text x=${WIDTH / 2} y="22" text-anchor="middle">wheel</text>
+      <text x=${T([mean(rail), 0])[0]} y=${height - 34} text-anchor="middle">rail</text>
+    </g>
+    ${standing && patches.length ? standPatches(standing, T) : touch ? drawTouch(T(touch)) : nothing}
+  </svg>`;
+}
+
+/** @param {readonly Point[]} line */
+const mean = (line) => (Math.min(...line.map(([y]) => y)) + Math.max(...line.map(([y]) => y))) / 2;
+
+/** A line closed beyond the picture. @param {readonly Point[]} line @param {number} edge */
+const closed = (line, edge) => `${path(line)}L${line[line.length - 1][0]} ${edge}L${line[0][0]} ${edge}Z`;
+
+/** @param {Point} touch */
+const drawTouch = ([x, y]) => svg`<g class="touch"><circle cx=${x} cy=${y} r="5"/><text x=${x + 10} y=${y - 16}>first touch</text></g>`;
+
+/**
+ * @param {Point} across
+ * @param {Point} up
+ * @param {(point: Point) => Point} T
+ * @param {number} height
+ */
+function lattice([y0, y1], [low, high], T, height) {
+  const ys = ticks(y0, y1, 7);
+  const zs = ticks(low, high, 5);
+  return svg`
+    <g class="gridlines">
+      ${ys.map((y) => svg`<line x1=${T([y, 0])[0]} x2=${T([y, 0])[0]} y1="0" y2=${height}/>`)}
+      ${zs.map((z) => svg`<line x1="0" x2=${WIDTH} y1=${T([0, z])[1]} y2=${T([0, z])[1]}/>`)}
+    </g>
+`;
+}
+
+/**
+ * The numbers of the lattice, in front of the bodies.
+ * @param {Point} across
+ * @param {Point} up
+ * @param {(point: Point) => Point} T
+ * @param {number} height
+ */
+function latticeNumbers([y0, y1], [low, high], T, height) {
+  const ys = ticks(y0, y1, 7);
+  const zs = ticks(low, high, 5);
+  return svg`
+    <g>
+      ${ys.slice(1, -1).map((y) => svg`<text x=${T([y, 0])[0]} y=${height - 6} text-anchor="middle">${tickLabel(y, ys)}</text>`)}
+      ${zs.slice(1).map((z) => svg`<text x="6" y=${T([0, z])[1] + 4}>${tickLabel(z, zs)}</text>`)}
+      <text x="6" y="14" class="strong">z up / mm</text>
+      <text x=${WIDTH - 6} y=${height - 6} text-anchor="end" class="strong">y to the left / mm</text>
+    </g>`;
+}
+
+/**
+ * Pressure stands on the rail at every patch; a click chooses one.
+ * @param {Standing} standing
+ * @param {(point: Point) => Point} T
+ */
+function standPatches({ patches, combs, chosen, choose }, T) {
+  const scale = COMB_MM / Math.max(...patches.map((patch) => patch.pressure_max_mpa));
+  return patches.map((patch, at) => {
+    const { position } = patch;
+    if (!position) return nothing;
+    const [cos, sin] = [Math.cos(position.contact_angle_rad), Math.sin(position.contact_angle_rad)];
+    const [, y0, z0] = position.origin_track_mm;
+    const [, y, z] = position.track_mm;
+    /** @type {(across: number, height: number) => Point} */
+    const on = (across, height) => T([y0 + across * cos - height * sin, z0 + across * sin + height * cos]);
+    const comb = combs[at];
+    const shape = comb && [...comb.y.map((across) => on(across, 0)), ...comb.y.map((across, i) => on(across, comb.pressure[i] * scale)).reverse()];
+    const [x, top] = T([y - TAG_MM * sin, z + TAG_MM * cos]);
+    const [cx, cy] = T([y, z]);
+    return svg`<g class=${`patch ${at === chosen ? 'chosen' : ''}`} data-patch=${at} @click=${() => choose(at)}>
+      ${shape ? svg`<path class="comb" d=${`${path(shape)}Z`}/>` : nothing}
+      <line x1=${cx} y1=${cy} x2=${x} y2=${top}/>
+      <circle class="dot" cx=${cx} cy=${cy} r="4"/>
+      <circle class="tag" cx=${x} cy=${top} r="12"/>
+      <text class="tag" x=${x} y=${top + 4.5} text-anchor="middle">${at}</text>
+    </g>`;
+  });
+}
+
+/** The gap from 0 to 1 mm near the first touch: whether a second contact is near. @param {Placed | null} placed */
+export function drawGap(placed) {
+  const touch = placed?.touch;
+  if (!touch) return nothing;
+  const near = placed.gap.filter(([y]) => Math.abs(y - touch[0]) <= 26);
+  if (near.length < 3) return nothing;
+  const axes = { left: 46, right: WIDTH - 12, top: 24, bottom: 116, x: /** @type {const} */ ([touch[0] + 26, touch[0] - 26]), y: /** @type {const} */ ([0, 1]) };
+  const T = scaleOf(axes);
+  const line = near.map(([y, gap]) => T([y, Math.min(gap, 1.25)]));
+  return html`<svg class="drawing strip" viewBox=${`0 0 ${WIDTH} 154`} role="img" aria-label=${`Gap between wheel and rail within 26 mm of the first touch`}>
+    ${grid(axes, { x: 'y to the left / mm', y: 'gap before loading / mm', rows: 2 })}
+    <svg x=${axes.left} y=${axes.top} width=${axes.right - axes.left} height=${axes.bottom - axes.top + 2} viewBox=${`${axes.left} ${axes.top} ${axes.right - axes.left} ${axes.bottom - axes.top + 2}`}>
+      <path class="gap" d=${path(line)}/>
+    </svg>
+  </svg>`;
+}

@@ -1,0 +1,81 @@
+// The examples of the API, as the page offers them, and the beginning of a case of each kind of contact.
+
+/** @typedef {import('./document.js').JsonObject} JsonObject */
+
+export const EXAMPLES = [
+  { file: 'hertz-steel', title: 'Hertz contact' },
+  { file: 'wheel-rail', title: 'Wheel on rail: tread' },
+  { file: 'wheel-rail-flange', title: 'Wheel on rail: gauge corner and flange' },
+  { file: 'spin', title: 'Ellipse with spin' },
+  { file: 'sweep', title: 'Creep curve' },
+  { file: 'two-patches', title: 'Two patches' },
+  { file: 'uic60-crown', title: 'Crown of 60E1: three radii' },
+  { file: 'area-132re-crown', title: 'Crown of 132RE' },
+  { file: 'pressure-grid', title: 'A pressure of any shape' },
+  { file: 'paper-figure-3', title: 'Zones under growing creepage' },
+  { file: 'paper-figure-4', title: 'Zones under growing spin' },
+  { file: 'paper-figure-5', title: 'Force and moment curves' },
+  { file: 'faulty', title: 'A case with five faults' },
+];
+
+/** Parts of an answer that are fields; the page draws all of them. */
+export const ALL_OUTPUTS = ['resultants', 'zones', 'tractions', 'pressure', 'slip'];
+
+const STEEL = { shear_modulus_mpa: 82000, poisson_ratio: 0.28 };
+const GAP_YS = [-12, -9, -6, -3, 0, 3, 6, 9, 12];
+
+/** @type {Record<string, { contact: JsonObject, load?: JsonObject, motion: JsonObject }>} */
+const STARTS = {
+  radii: {
+    contact: { type: 'radii', rolling_mm: 460, lateral_mm: 300 },
+    load: { normal_force_n: 100000 },
+    motion: { creepage_x: 0.001, creepage_y: 0, spin_per_mm: 0 },
+  },
+  ellipse: {
+    contact: { type: 'ellipse', a_mm: 7, b_mm: 5 },
+    load: { normal_force_n: 100000 },
+    motion: { creepage_x: 0.001, creepage_y: 0, spin_per_mm: 0 },
+  },
+  profiles: {
+    contact: { type: 'profiles', rail: {}, wheel: {}, side: 'right', rolling_radius_mm: 460, cant_rad: 0.025, lateral_shift_mm: 0 },
+    load: { vertical_force_n: 75000 },
+    motion: { wheelset: { speed_mm_per_s: 20000, free_rolling_radius_mm: 460 } },
+  },
+  gap_profile: {
+    contact: { type: 'gap_profile', rolling_mm: 460, y_mm: GAP_YS, gap_mm: GAP_YS.map((y) => Math.round((y * y * 1e6) / 600) / 1e6) },
+    load: { normal_force_n: 100000 },
+    motion: { creepage_x: 0.001, creepage_y: 0, spin_per_mm: 0 },
+  },
+  gap_grid: {
+    contact: { type: 'gap_grid', x_mm: [], y_mm: [], gap_mm: [] },
+    load: { normal_force_n: 100000 },
+    motion: { creepage_x: 0.001, creepage_y: 0, spin_per_mm: 0 },
+  },
+  pressure_grid: {
+    contact: { type: 'pressure_grid', x_mm: [], y_mm: [], pressure_mpa: [] },
+    motion: { creepage_x: 0.001, creepage_y: 0, spin_per_mm: 0 },
+  },
+};
+
+/**
+ * A case with another kind of contact: material, friction, name and labels stay, and what else still fits.
+ * @param {JsonObject | null} document
+ * @param {string} type
+ * @returns {JsonObject}
+ */
+export function withContact(document, type) {
+  const start = STARTS[type];
+  const before = document ?? {};
+  const contact = /** @type {JsonObject} */ (before.contact ?? {});
+  const alike = start.load && (type === 'profiles') === (contact.type === 'profiles');
+  const { load, ...kept } = before;
+  return {
+    ...kept,
+    material: before.material ?? STEEL,
+    friction: before.friction ?? { coefficient: 0.3 },
+    contact: start.contact,
+    ...(start.load ? { load: alike && load ? load : start.load } : {}),
+    motion: (type === 'profiles') === (contact.type === 'profiles') && before.motion ? before.motion : start.motion,
+    outputs: ALL_OUTPUTS,
+  };
+}

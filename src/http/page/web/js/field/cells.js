@@ -1,0 +1,206 @@
+// The cells of a field by strip: which cell is at a place, how far the patch reaches, and its border.
+
+/** @typedef {import('../fields.js').Cells} Cells */
+/** @typedef {import('../fields.js').Field} Field */
+/** @typedef {import('../fields.js').Loop} Loop */
+
+/**
+ * @typedef {object} Strip
+ * @property {number} y Its middle.
+ * @property {number} low
+ * @property {number} high
+ * @property {number} first Its first cell.
+ * @property {number} end The cell after its last.
+ * @property {number} left Where its first cell begins.
+ * @property {number} right Where its last cell ends.
+ * @property {boolean} whole Its cells touch each other.
+ */
+
+export class CellIndex {
+  /** @param {Field} field */
+  constructor(field) {
+    this.cells = field.cells;
+    this.strips = stripsOf(field.cells);
+    this.border = (field.border?.length ? field.border : [outline(this.strips)]).map(smoothLoop);
+    const across = this.border.flat();
+    this.x0 = Math.min(...across.map(([x]) => x), ...this.strips.map((strip) => strip.left));
+    this.x1 = Math.max(...across.map(([x]) => x), ...this.strips.map((strip) => strip.right));
+    this.y0 = Math.min(...across.map(([, y]) => y), ...this.strips.map((strip) => strip.low));
+    this.y1 = Math.max(...across.map(([, y]) => y), ...this.strips.map((strip) => strip.high));
+  }
+
+  /** Can values be interpolated from strip to strip? Not over holes. */
+  get whole() {
+    return this.border.length === 1 && this.strips.length > 2 && this.strips.every((strip) => strip.whole);
+  }
+
+  /**
+   * The strip at a height; -1 outside.
+   * @param {number} y
+   */
+  stripAt(y) {
+    let low = 0;
+    let high = this.strips.length - 1;
+    while (low <= high) {
+      const middle = (low + high) >> 1;
+      const strip = this.strips[middle];
+      if (y < strip.low) high = middle - 1;
+      else if (y > strip.high) low = middle + 1;
+      else return middle;
+    }
+    return -1;
+  }
+
+  /**
+   * The cell of a strip at a place along rolling; -1 outside.
+   * @param {number} at The strip.
+   * @param {number} x
+   */
+  cellIn(at, x) {
+    const strip = this.strips[at];
+    if (!strip) return -1;
+    const { x_mm, dx_mm } = this.cells;
+    let low = strip.first;
+    let high = strip.end - 1;
+    while (low <= high) {
+      const middle = (low + high) >> 1;
+      const half = dx_mm[middle] / 2 + 1e-9;
+      if (x < x_mm[middle] - half) high = middle - 1;
+      else if (x > x_mm[middle] + half) low = middle + 1;
+      else return middle;
+    }
+    return -1;
+  }
+
+  /**
+   * @param {number} x
+   * @param {number} y
+   */
+  cellAt(x, y) {
+    return this.cellIn(this.stripAt(y), x);
+  }
+
+  /**
+   * The cell at a place or close beside it: the outermost cells of two meshes of one patch do not quite meet.
+   * @param {number} x
+   * @param {number} y
+   */
+  nearest(x, y) {
+    const last = this.strips.length - 1;
+    if (last < 0) return -1;
+    const inside = this.stripAt(y);
+    const at = inside >= 0 ? inside : y < this.strips[0].low ? 0 : last;
+    const strip = this.strips[at];
+    const cell = this.cellIn(at, x);
+    if (cell >= 0) return cell;
+    const beside = x < strip.left ? strip.first : strip.end - 1;
+    const reach = 2 * (strip.high - strip.low) + this.cells.dx_mm[beside];
+    return Math.hypot(x - this.cells.x_mm[beside], y - strip.y) <= reach ? beside : -1;
+  }
+
+  /** Cells across rolling at a place along it, one of every strip that reaches there. @param {number} x */
+  column(x) {
+    return this.strips.map((_, at) => this.cellIn(at, x)).filter((cell) => cell >= 0);
+  }
+
+  /** The cells of a strip. @param {number} at */
+  row(at) {
+    const strip = this.strips[at];
+    return strip ? Array.from({ length: strip.end - strip.first }, (_, place) => strip.first + place) : [];
+  }
+}
+
+/** @type {WeakMap<Field, CellIndex>} */
+const known = new WeakMap();
+
+/** The index of a field, made once. @param {Field} field */
+export function indexOf(field) {
+  const index = known.get(field) ?? new CellIndex(field);
+  known.set(field, index);
+  return index;
+}
+
+/**
+ * @param {Cells} cells
+ * @returns {Strip[]}
+ */
+function stripsOf({ x_mm, y_mm, dx_mm, dy_mm, strip }) {
+  /** @type {Strip[]} */
+  const strips = [];
+  for (let cell = 0; cell < strip.length; cell += 1) {
+    const left = x_mm[cell] - dx_mm[cell] / 2;
+    const right = x_mm[cell] + dx_mm[cell] / 2;
+    const open = strips.at(-1);
+    if (open && strip[cell] === strip[cell - 1]) {
+      open.whole &&= left - open.right < 1e-6 + 1e-3 * dx_mm[cell];
+      open.end = cell + 1;
+      open.right = right;
+      continue;
+    }
+    const half = dy_mm[cell] / 2;
+    strips.push({ y: y_mm[cell], low: y_mm[cell] - half, high: y_mm[cell] + half, first: cell, end: cell + 1, left, right, whole: true });
+  }
+  return strips;
+}
+
+/**
+ * The border of a patch of which only the strips are known: around their ends.
+ * @param {Strip[]} strips
+ * @returns {Loop}
+ */
+function outline(strips) {
+  if (!strips.length) return [];
+  const first = strips[0];
+  const last = strips[strips.length - 1];
+  const middle = (/** @type {Strip} */ strip) => (strip.left + strip.right) / 2;
+  return [
+    [middle(first), first.low],
+    ...strips.map((strip) => /** @type {[number, number]} */ ([strip.right, strip.y])),
+    [middle(last), last.high],
+    ...strips.map((strip) => /** @type {[number, number]} */ ([strip.left, strip.y])).reverse(),
+  ];
+}
+
+/** Points that a segment of a border is divided by. */
+const FINER = 6;
+
+/**
+ * A closed smooth curve through the corners of a border (centripetal Catmull-Rom; Yuksel, Schaefer and Keyser, 2011): a contact patch has
+ * no corners, but few strips give it some.
+ * @param {Loop} loop
+ * @returns {Loop}
+ */
+export function smoothLoop(loop) {
+  const corners = loop.filter(([x, y], at) => {
+    const [xb, yb] = loop[(at || loop.length) - 1];
+    return x !== xb || y !== yb;
+  });
+  if (corners.length < 4 || corners.length > 400) return loop;
+  return corners.flatMap((one, at) => {
+    const before = corners[(at + corners.length - 1) % corners.length];
+    const two = corners[(at + 1) % corners.length];
+    const after = corners[(at + 2) % corners.length];
+    return Array.from({ length: FINER }, (_, part) => between(before, one, two, after, part / FINER));
+  });
+}
+
+/**
+ * @param {[number, number]} before
+ * @param {[number, number]} one
+ * @param {[number, number]} two
+ * @param {[number, number]} after
+ * @param {number} share Of the way from `one` to `two`.
+ * @returns {[number, number]}
+ */
+function between(before, one, two, after, share) {
+  const knot = (/** @type {[number, number]} */ from, /** @type {[number, number]} */ to) => Math.sqrt(Math.hypot(to[0] - from[0], to[1] - from[1]));
+  const [a, b, c] = [knot(before, one), knot(one, two), knot(two, after)];
+  const along = (/** @type {0 | 1} */ axis) => {
+    const [p0, p1, p2, p3] = [before[axis], one[axis], two[axis], after[axis]];
+    const start = b * ((p1 - p0) / a - (p2 - p0) / (a + b) + (p2 - p1) / b);
+    const end = b * ((p2 - p1) / b - (p3 - p1) / (b + c) + (p3 - p2) / c);
+    const [s, s2, s3] = [share, share ** 2, share ** 3];
+    return (2 * s3 - 3 * s2 + 1) * p1 + (s3 - 2 * s2 + s) * start + (3 * s2 - 2 * s3) * p2 + (s3 - s2) * end;
+  };
+  return [along(0), along(1)];
+}

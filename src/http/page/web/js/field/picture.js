@@ -1,0 +1,426 @@
+// The picture of a field: colours inside the border, the border of the stick zone, arrows, axes and the colour bar.
+
+import { number, tickLabel, ticks } from '../format.js';
+import { colourise, hex, mapOf } from './palette.js';
+import { rasterCells, rasterSmooth } from './raster.js';
+import { stickBorder } from './stick.js';
+
+/** @typedef {import('./cells.js').CellIndex} CellIndex */
+/** @typedef {import('./layout.js').Layout} Layout */
+/** @typedef {import('./quantities.js').Quantity} Quantity */
+/** @typedef {CanvasRenderingContext2D} Pen */
+
+/** @typedef {{ ink: string, quiet: string, line: string, sunken: string, surface: string, accent: string, stick: string, slip: string, font: string }} Ink */
+
+/**
+ * @typedef {object} Scene
+ * @property {CellIndex} index
+ * @property {Quantity} quantity
+ * @property {ArrayLike<number>} values
+ * @property {readonly [number, number]} range
+ * @property {number} friction The coefficient; NaN if it is not known.
+ * @property {boolean} border Draw the border of the stick zone.
+ * @property {boolean} arrows
+ * @property {boolean} mesh Show the cells as they were computed.
+ * @property {boolean} compact
+ */
+
+const ARROW_STEP = 30;
+const HATCH_STEP = 9;
+
+/**
+ * @param {Pen} pen
+ * @param {Scene} scene
+ * @param {Layout} layout
+ * @param {number} density Device pixels per CSS pixel.
+ * @param {Ink} ink
+ */
+export function drawPicture(pen, scene, layout, density, ink) {
+  const { map } = layout;
+  pen.setTransform(density, 0, 0, density, 0, 0);
+  pen.clearRect(0, 0, layout.width, layout.height);
+  if (!scene.compact) drawGround(pen, layout, ink);
+  pen.save();
+  pen.beginPath();
+  pen.rect(map.left, map.top, map.width, map.height);
+  pen.clip();
+  drawValues(pen, scene, layout, density, ink);
+  drawBorders(pen, scene, layout, ink);
+  if (scene.arrows) drawArrows(pen, scene, layout);
+  pen.restore();
+  if (scene.compact) return;
+  drawAxes(pen, layout, ink);
+  drawBar(pen, scene, layout, ink);
+}
+
+/** @param {Layout} layout */
+const ticksOf = ({ map, scale, x0, y1 }) => ({
+  x: ticks(x0, x0 + map.width / scale, Math.max(3.4, map.width / 80)),
+  y: ticks(y1 - map.height / scale, y1, Math.max(3.4, map.height / 56)),
+});
+
+/**
+ * @param {Pen} pen
+ * @param {Layout} layout
+ * @param {Ink} ink
+ */
+function drawGround(pen, layout, ink) {
+  const { map, X, Y } = layout;
+  pen.fillStyle = ink.sunken;
+  pen.fillRect(map.left, map.top, map.width, map.height);
+  const marks = ticksOf(layout);
+  pen.strokeStyle = ink.line;
+  pen.lineWidth = 1;
+  pen.beginPath();
+  for (const x of marks.x) {
+    const at = Math.round(X(x)) + 0.5;
+    pen.moveTo(at, map.top);
+    pen.lineTo(at, map.top + map.height);
+  }
+  for (const y of marks.y) {
+    const at = Math.round(Y(y)) + 0.5;
+    pen.moveTo(map.left, at);
+    pen.lineTo(map.left + map.width, at);
+  }
+  pen.stroke();
+}
+
+/**
+ * @param {Pen} pen
+ * @param {Scene} scene
+ * @param {Layout} layout
+ * @param {number} density
+ * @param {Ink} ink
+ */
+function drawValues(pen, scene, layout, density, ink) {
+  const { index, quantity, values, mesh } = scene;
+  const { map } = layout;
+  const smooth = !mesh && quantity.scale !== 'zones' && index.whole;
+  const frame = {
+    width: Math.ceil(map.width * density),
+    height: Math.ceil(map.height * density),
+    x0: layout.x0,
+    y1: layout.y1,
+    step: 1 / (layout.scale * density),
+  };
+  if (!frame.width || !frame.height) return;
+  const raster = smooth ? rasterSmooth(index, values, frame, quantity.vanishes) : rasterCells(index, values, frame);
+  pen.save();
+  if (smooth) {
+    pen.beginPath();
+    trace(pen, index.border, layout);
+    pen.clip();
+  }
+  if (quantity.scale === 'zones') drawZones(pen, scene, layout, ink);
+  else {
+    const sheet = document.createElement('canvas');
+    sheet.width = frame.width;
+    sheet.height = frame.height;
+    const sheetPen = /** @type {Pen} */ (sheet.getContext('2d'));
+    const image = sheetPen.createImageData(frame.width, frame.height);
+    colourise(raster, new Uint32Array(image.data.buffer), mapOf(quantity.scale), scene.range);
+    sheetPen.putImageData(image, 0, 0);
+    pen.drawImage(sheet, map.left, map.top, frame.width / density, frame.height / density);
+  }
+  pen.restore();
+  if (mesh && index.cells.x_mm.length < 20_000) drawMesh(pen, scene, layout, density);
+}
+
+/**
+ * Zones are never interpolated; slip is hatched too, since colour must not be the only sign.
+ * @param {Pen} pen
+ * @param {Scene} scene
+ * @param {Layout} layout
+ * @param {Ink} ink
+ */
+function drawZones(pen, { index, values }, layout, ink) {
+  const { x_mm, y_mm, dx_mm, dy_mm } = index.cells;
+  const { X, Y, scale, map } = layout;
+  /** @type {[Path2D, Path2D]} */
+  const areas = [new Path2D(), new Path2D()];
+  for (let cell = 0; cell < x_mm.length; cell += 1) {
+    const left = X(x_mm[cell] - dx_mm[cell] / 2);
+    const top = Y(y_mm[cell] + dy_mm[cell] / 2);
+    // Half a pixel more hides the seams between neighbours.
+    areas[values[cell] ? 1 : 0].rect(left, top, dx_mm[cell] * scale + 0.5, dy_mm[cell] * scale + 0.5);
+  }
+  pen.fillStyle = ink.stick;
+  pen.fill(areas[0]);
+  pen.fillStyle = ink.slip;
+  pen.fill(areas[1]);
+  pen.save();
+  pen.clip(areas[1]);
+  pen.beginPath();
+  for (let at = -map.height; at < map.width; at += HATCH_STEP) {
+    pen.moveTo(map.left + at, map.top + map.height);
+    pen.lineTo(map.left + at + map.height, map.top);
+  }
+  pen.strokeStyle = '#00000066';
+  pen.lineWidth = 1;
+  pen.stroke();
+  pen.restore();
+}
+
+/**
+ * @param {Pen} pen
+ * @param {Scene} scene
+ * @param {Layout} layout
+ * @param {number} density
+ */
+function drawMesh(pen, { index }, layout, density) {
+  const { x_mm, y_mm, dx_mm, dy_mm } = index.cells;
+  pen.beginPath();
+  for (let cell = 0; cell < x_mm.length; cell += 1) {
+    const left = layout.X(x_mm[cell] - dx_mm[cell] / 2);
+    const top = layout.Y(y_mm[cell] + dy_mm[cell] / 2);
+    pen.rect(left, top, dx_mm[cell] * layout.scale, dy_mm[cell] * layout.scale);
+  }
+  pen.strokeStyle = '#ffffff66';
+  pen.lineWidth = 1 / density;
+  pen.stroke();
+}
+
+/**
+ * @param {Pen | Path2D} pen
+ * @param {readonly (readonly (readonly [number, number])[])[]} loops
+ * @param {Layout} layout
+ * @param {boolean} [closed]
+ */
+function trace(pen, loops, { X, Y }, closed = true) {
+  for (const loop of loops) {
+    loop.forEach(([x, y], place) => (place ? pen.lineTo(X(x), Y(y)) : pen.moveTo(X(x), Y(y))));
+    if (closed) pen.closePath();
+  }
+}
+
+/**
+ * @param {Pen} pen
+ * @param {Scene} scene
+ * @param {Layout} layout
+ * @param {Ink} ink
+ */
+function drawBorders(pen, scene, layout, ink) {
+  const { index, quantity } = scene;
+  pen.lineJoin = 'round';
+  pen.lineCap = 'round';
+  pen.beginPath();
+  trace(pen, index.border, layout);
+  pen.strokeStyle = ink.ink;
+  pen.lineWidth = scene.compact ? 1 : 1.25;
+  pen.stroke();
+  if (!scene.border || quantity.scale === 'zones') return;
+  const border = new Path2D();
+  trace(border, stickBorder(index, scene.friction), layout, false);
+  pen.save();
+  pen.beginPath();
+  trace(pen, index.border, layout);
+  pen.clip();
+  twoTone(pen, border, scene.compact ? [2, 1] : [4, 1.75]);
+  pen.restore();
+}
+
+/** White on a dark edge: seen on every colour. @param {Pen} pen @param {Path2D} path @param {[number, number]} widths */
+function twoTone(pen, path, [outer, inner]) {
+  pen.strokeStyle = '#000000b0';
+  pen.lineWidth = outer;
+  pen.stroke(path);
+  pen.strokeStyle = '#ffffff';
+  pen.lineWidth = inner;
+  pen.stroke(path);
+}
+
+/**
+ * Arrows on a lattice, a quarter to all of its spacing long.
+ * @param {Pen} pen
+ * @param {Scene} scene
+ * @param {Layout} layout
+ */
+function drawArrows(pen, { index, quantity, range }, layout) {
+  const vector = quantity.vector(index.cells);
+  if (!vector) return;
+  const { map } = layout;
+  const step = layout.narrow ? 24 : ARROW_STEP;
+  const arrows = new Path2D();
+  for (let py = map.top + (map.height % step) / 2; py < map.top + map.height; py += step) {
+    for (let px = map.left + (map.width % step) / 2; px < map.left + map.width; px += step) {
+      const x = layout.x0 + (px - map.left) / layout.scale;
+      const cell = index.cellAt(x, layout.y1 - (py - map.top) / layout.scale);
+      if (cell < 0) continue;
+      const along = vector[0][cell];
+      const across = vector[1][cell];
+      const size = Math.hypot(along, across);
+      if (size < 0.02 * range[1]) continue;
+      const length = (0.25 + 0.75 * Math.min(1, size / range[1])) * step * 0.82;
+      addArrow(arrows, px, py, (along / size) * length, (-across / size) * length);
+    }
+  }
+  twoTone(pen, arrows, [3.2, 1.4]);
+}
+
+/**
+ * @param {Path2D} path
+ * @param {number} x Its middle.
+ * @param {number} y
+ * @param {number} dx Its whole length.
+ * @param {number} dy
+ */
+function addArrow(path, x, y, dx, dy) {
+  const tipX = x + dx / 2;
+  const tipY = y + dy / 2;
+  const barb = Math.min(6, Math.hypot(dx, dy) * 0.42) / Math.hypot(dx, dy);
+  path.moveTo(x - dx / 2, y - dy / 2);
+  path.lineTo(tipX, tipY);
+  for (const side of [-1, 1]) {
+    path.moveTo(tipX, tipY);
+    path.lineTo(tipX - barb * (0.86 * dx - side * 0.5 * dy), tipY - barb * (0.86 * dy + side * 0.5 * dx));
+  }
+}
+
+/**
+ * @param {Pen} pen
+ * @param {Layout} layout
+ * @param {Ink} ink
+ */
+function drawAxes(pen, layout, ink) {
+  const { map, X, Y } = layout;
+  const marks = ticksOf(layout);
+  pen.font = `12px ${ink.font}`;
+  pen.fillStyle = ink.quiet;
+  pen.textBaseline = 'top';
+  pen.textAlign = 'center';
+  for (const x of marks.x) pen.fillText(tickLabel(x, marks.x), X(x), map.top + map.height + 6);
+  pen.textAlign = 'right';
+  pen.textBaseline = 'middle';
+  for (const y of marks.y) pen.fillText(tickLabel(y, marks.y), map.left - 7, Y(y));
+  pen.globalAlpha = 0.5;
+  pen.strokeStyle = ink.quiet;
+  pen.lineWidth = 1;
+  pen.strokeRect(map.left + 0.5, map.top + 0.5, map.width, map.height);
+  pen.globalAlpha = 1;
+  pen.fillStyle = ink.ink;
+  pen.textBaseline = 'top';
+  pen.fillText('x along rolling / mm  →', map.left + map.width, map.top + map.height + 23);
+  pen.save();
+  pen.translate(11, map.top + map.height / 2);
+  pen.rotate(-Math.PI / 2);
+  pen.textAlign = 'center';
+  pen.textBaseline = 'middle';
+  pen.fillText('y to the left / mm', 0, 0);
+  pen.restore();
+}
+
+/**
+ * Where the colour bar is.
+ * @param {Layout} layout
+ */
+export function barBox({ map, narrow }) {
+  const width = Math.min(260, map.width * (narrow ? 0.46 : 0.55));
+  return { left: map.left + map.width - width, top: 12, width, height: 10 };
+}
+
+/**
+ * @param {Pen} pen
+ * @param {Scene} scene
+ * @param {Layout} layout
+ * @param {Ink} ink
+ */
+function drawBar(pen, { quantity, range }, layout, ink) {
+  const bar = barBox(layout);
+  pen.font = `600 13px ${ink.font}`;
+  pen.fillStyle = ink.ink;
+  pen.textAlign = 'left';
+  pen.textBaseline = 'middle';
+  pen.fillText(quantity.unit ? `${quantity.heading} / ${quantity.unit}` : quantity.heading, layout.map.left, bar.top + 5);
+  pen.font = `12px ${ink.font}`;
+  if (quantity.scale === 'zones') {
+    drawLegend(pen, bar.left + bar.width, bar.top, ink);
+    return;
+  }
+  const map = mapOf(quantity.scale);
+  for (let column = 0; column < bar.width; column += 1) {
+    pen.fillStyle = hex(map, column / (bar.width - 1));
+    pen.fillRect(bar.left + column, bar.top, 1.5, bar.height);
+  }
+  const marks = ticks(range[0], range[1], bar.width / 64);
+  pen.fillStyle = ink.quiet;
+  pen.textBaseline = 'top';
+  for (const value of marks) {
+    const at = bar.left + ((value - range[0]) / (range[1] - range[0])) * bar.width;
+    pen.fillRect(at, bar.top + bar.height, 1, 3);
+    pen.textAlign = at - bar.left < 12 ? 'left' : bar.left + bar.width - at < 14 ? 'right' : 'center';
+    pen.fillText(tickLabel(value, marks), at, bar.top + bar.height + 5);
+  }
+}
+
+/**
+ * @param {Pen} pen
+ * @param {number} right
+ * @param {number} top
+ * @param {Ink} ink
+ */
+function drawLegend(pen, right, top, ink) {
+  let at = right;
+  pen.textAlign = 'right';
+  for (const [name, colour] of [['slip (hatched)', ink.slip], ['stick', ink.stick]]) {
+    pen.fillStyle = ink.ink;
+    pen.fillText(name, at, top + 5);
+    at -= pen.measureText(name).width + 8;
+    pen.fillStyle = colour;
+    pen.fillRect(at - 14, top - 1, 14, 12);
+    at -= 30;
+  }
+}
+
+/**
+ * The mark of a value on the colour bar.
+ * @param {Pen} pen
+ * @param {Scene} scene
+ * @param {Layout} layout
+ * @param {number} value
+ * @param {Ink} ink
+ */
+export function drawBarMark(pen, { range, quantity }, layout, value, ink) {
+  if (quantity.scale === 'zones' || !Number.isFinite(value)) return;
+  const bar = barBox(layout);
+  const at = bar.left + ((value - range[0]) / (range[1] - range[0])) * bar.width;
+  pen.fillStyle = ink.ink;
+  pen.beginPath();
+  pen.moveTo(at - 4, bar.top - 7);
+  pen.lineTo(at + 4, bar.top - 7);
+  pen.lineTo(at, bar.top - 1);
+  pen.fill();
+}
+
+/** All colours and the font that a picture needs, from the styles of an element. @param {Element} element @returns {Ink} */
+export function inkOf(element) {
+  const style = getComputedStyle(element);
+  const token = (/** @type {string} */ name) => style.getPropertyValue(name).trim();
+  return {
+    ink: token('--ink'), quiet: token('--ink-2'), line: token('--line'), sunken: token('--sunken'), surface: token('--surface'),
+    accent: token('--accent'), stick: token('--stick'), slip: token('--slip'), font: style.fontFamily,
+  };
+}
+
+/**
+ * What a field says at a cell: names and values with units, for the readout.
+ * @param {Scene} scene
+ * @param {{ x: number, y: number }} place
+ * @param {number} cell -1 outside.
+ * @returns {[string, string][]}
+ */
+export function tell({ index, friction, quantity, values }, place, cell) {
+  /** @type {[string, string][]} */
+  const told = [['x', `${number(place.x)} mm`], ['y', `${number(place.y)} mm`]];
+  if (cell < 0) return [...told, ['', 'outside the patch']];
+  const { pressure_mpa, traction_x_mpa, traction_y_mpa, slip_x, slip_y, zone } = index.cells;
+  if (quantity.key === 'difference') return [...told, [quantity.heading, `${number(values[cell])} ${quantity.unit}`]];
+  if (pressure_mpa) told.push(['p', `${number(pressure_mpa[cell])} MPa`]);
+  if (traction_x_mpa && traction_y_mpa) {
+    const size = Math.hypot(traction_x_mpa[cell], traction_y_mpa[cell]);
+    told.push(['|t|', `${number(size)} MPa`], ['t', `(${number(traction_x_mpa[cell], 3)}, ${number(traction_y_mpa[cell], 3)})`]);
+    if (pressure_mpa && friction > 0) told.push(['|t|/μp', number(size / (friction * pressure_mpa[cell]), 3)]);
+  }
+  if (slip_x && slip_y) told.push(['slip', number(Math.hypot(slip_x[cell], slip_y[cell]), 3)]);
+  if (zone) told.push(['zone', zone[cell]]);
+  return told;
+}

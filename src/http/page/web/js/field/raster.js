@@ -1,0 +1,131 @@
+// Values of cells at the pixels of a picture: as they were computed, or interpolated inside the border of the patch.
+
+/** @typedef {import('./cells.js').CellIndex} CellIndex */
+
+/**
+ * @typedef {object} Frame
+ * Pixels of a picture: the middle of pixel (column, row) is at x0 + (column + ½)·step, y1 − (row + ½)·step.
+ * @property {number} width
+ * @property {number} height
+ * @property {number} x0 Left edge in mm.
+ * @property {number} y1 Upper edge in mm.
+ * @property {number} step Side of a pixel in mm.
+ */
+
+/** Samples along a strip; those of neighbouring strips are interpolated at equal shares of their lengths. */
+const SAMPLES = 512;
+
+/**
+ * Every cell in its own value.
+ * @param {CellIndex} index
+ * @param {ArrayLike<number>} values
+ * @param {Frame} frame
+ * @returns {Float32Array} Row by row from the top; NaN outside.
+ */
+export function rasterCells(index, values, frame) {
+  const raster = new Float32Array(frame.width * frame.height).fill(NaN);
+  const { x_mm, dx_mm } = index.cells;
+  for (let row = 0; row < frame.height; row += 1) {
+    const strip = index.strips[index.stripAt(frame.y1 - (row + 0.5) * frame.step)];
+    if (!strip) continue;
+    for (let cell = strip.first; cell < strip.end; cell += 1) {
+      const from = Math.round((x_mm[cell] - dx_mm[cell] / 2 - frame.x0) / frame.step);
+      const to = Math.round((x_mm[cell] + dx_mm[cell] / 2 - frame.x0) / frame.step);
+      raster.fill(values[cell], row * frame.width + Math.max(0, from), row * frame.width + Math.min(frame.width, Math.max(0, to)));
+    }
+  }
+  return raster;
+}
+
+/**
+ * Values between the middles of cells, along the strips and from strip to strip, inside the border.
+ * @param {CellIndex} index One that is `whole`.
+ * @param {ArrayLike<number>} values
+ * @param {Frame} frame
+ * @param {boolean} vanishes The value is 0 at the border.
+ * @returns {Float32Array} Row by row from the top; NaN outside.
+ */
+export function rasterSmooth(index, values, frame, vanishes) {
+  const raster = new Float32Array(frame.width * frame.height).fill(NaN);
+  const samples = sampleStrips(index, values, vanishes);
+  const { strips, border } = index;
+  const last = strips.length - 1;
+  for (let row = 0, upper = last; row < frame.height; row += 1) {
+    const y = frame.y1 - (row + 0.5) * frame.step;
+    const span = spanAt(border[0], y);
+    if (!span) continue;
+    while (upper > 0 && strips[upper].y > y) upper -= 1;
+    const below = y < strips[0].y ? 0 : upper;
+    const above = y < strips[0].y ? 0 : Math.min(last, upper + 1);
+    const share = below === above ? 0 : (y - strips[below].y) / (strips[above].y - strips[below].y);
+    const fade = below === above && vanishes ? edgeFade(index, strips[below], y) : 1;
+    const [left, right] = span;
+    // Two pixels more on either side: the border is cut by the path of the picture, not here.
+    const from = Math.max(0, Math.floor((left - frame.x0) / frame.step) - 2);
+    const to = Math.min(frame.width, Math.ceil((right - frame.x0) / frame.step) + 2);
+    const perMm = SAMPLES / (right - left || 1);
+    const one = below * SAMPLES;
+    const two = above * SAMPLES;
+    for (let column = from; column < to; column += 1) {
+      let at = ((frame.x0 + (column + 0.5) * frame.step - left) * perMm) | 0;
+      at = at < 0 ? 0 : at >= SAMPLES ? SAMPLES - 1 : at;
+      raster[row * frame.width + column] = fade * (samples[one + at] * (1 - share) + samples[two + at] * share);
+    }
+  }
+  return raster;
+}
+
+/**
+ * Beyond the middle of the outermost strip values that vanish at the border go there.
+ * @param {CellIndex} index
+ * @param {import('./cells.js').Strip} strip
+ * @param {number} y
+ */
+function edgeFade(index, strip, y) {
+  const edge = y > strip.y ? index.y1 : index.y0;
+  return Math.sqrt(Math.max(0, (edge - y) / (edge - strip.y || 1)));
+}
+
+/**
+ * @param {CellIndex} index
+ * @param {ArrayLike<number>} values
+ * @param {boolean} vanishes
+ */
+function sampleStrips({ strips, cells: { x_mm } }, values, vanishes) {
+  const samples = new Float32Array(strips.length * SAMPLES);
+  strips.forEach(({ first, end, left, right }, at) => {
+    let cell = first;
+    for (let sample = 0; sample < SAMPLES; sample += 1) {
+      const x = left + ((sample + 0.5) / SAMPLES) * (right - left);
+      while (cell < end - 1 && x_mm[cell + 1] < x) cell += 1;
+      const before = x < x_mm[cell];
+      const x0 = before ? left : x_mm[cell];
+      const v0 = before ? (vanishes ? 0 : values[cell]) : values[cell];
+      const beyond = !before && cell === end - 1;
+      const x1 = before ? x_mm[cell] : beyond ? right : x_mm[cell + 1];
+      const v1 = before ? values[cell] : beyond ? (vanishes ? 0 : values[cell]) : values[cell + 1];
+      samples[at * SAMPLES + sample] = v0 + ((x - x0) / (x1 - x0 || 1)) * (v1 - v0);
+    }
+  });
+  return samples;
+}
+
+/**
+ * Where a loop begins and ends at a height.
+ * @param {readonly (readonly [number, number])[]} loop
+ * @param {number} y
+ * @returns {[number, number] | null}
+ */
+export function spanAt(loop, y) {
+  let left = Infinity;
+  let right = -Infinity;
+  for (let i = 0, before = loop.length - 1; i < loop.length; before = i, i += 1) {
+    const [xa, ya] = loop[before];
+    const [xb, yb] = loop[i];
+    if (ya > y === yb > y) continue;
+    const x = xa + ((y - ya) / (yb - ya)) * (xb - xa);
+    if (x < left) left = x;
+    if (x > right) right = x;
+  }
+  return right > left ? [left, right] : null;
+}

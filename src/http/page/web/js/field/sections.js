@@ -1,0 +1,190 @@
+// The two sections of a field at the crosshair: along rolling below the map, across on its right. They share its axes.
+
+import { number, tickLabel, ticks } from '../format.js';
+
+/** @typedef {import('./layout.js').Layout} Layout */
+/** @typedef {import('./layout.js').Box} Box */
+/** @typedef {import('./picture.js').Scene} Scene */
+/** @typedef {import('./picture.js').Ink} Ink */
+/** @typedef {import('./picture.js').Pen} Pen */
+
+/**
+ * @typedef {object} Section
+ * @property {boolean} along
+ * @property {Box} box
+ * @property {number[]} cells
+ * @property {readonly [number, number]} range
+ * @property {boolean} bounded
+ * @property {(cell: number) => number} from The begin of a cell on the section's axis, in pixels.
+ * @property {(cell: number) => number} middle
+ * @property {(cell: number) => number} to
+ * @property {(value: number) => number} value To pixels.
+ */
+
+/**
+ * @param {Pen} pen
+ * @param {Scene} scene
+ * @param {Layout} layout
+ * @param {{ x: number, y: number }} place
+ * @param {Ink} ink
+ */
+export function drawSections(pen, scene, layout, place, ink) {
+  const at = scene.index.stripAt(place.y);
+  const here = scene.index.cellIn(at, place.x);
+  if (layout.along) drawSection(pen, scene, sectionOf(scene, layout, layout.along, true, scene.index.row(at)), layout, place, here, ink);
+  if (layout.across) {
+    drawSection(pen, scene, sectionOf(scene, layout, layout.across, false, scene.index.column(place.x)), layout, place, here, ink);
+  }
+}
+
+/**
+ * @param {Scene} scene
+ * @param {Layout} layout
+ * @param {Box} box
+ * @param {boolean} along
+ * @param {number[]} cells
+ * @returns {Section}
+ */
+function sectionOf({ index, quantity, range, friction }, layout, box, along, cells) {
+  const { x_mm, y_mm, dx_mm, dy_mm, pressure_mpa } = index.cells;
+  const [middle, size] = along ? [x_mm, dx_mm] : [y_mm, dy_mm];
+  const toPixels = along ? layout.X : layout.Y;
+  const [low, high] = range;
+  const length = along ? box.height - 6 : box.width - 8;
+  const start = along ? box.top + box.height : box.left;
+  const sign = along ? -1 : 1;
+  return {
+    along, box, cells, range,
+    bounded: quantity.bounded && friction > 0 && pressure_mpa !== undefined,
+    from: (cell) => toPixels(middle[cell] - size[cell] / 2),
+    middle: (cell) => toPixels(middle[cell]),
+    to: (cell) => toPixels(middle[cell] + size[cell] / 2),
+    value: (value) => start + sign * ((value - low) / (high - low)) * length,
+  };
+}
+
+/**
+ * @param {Pen} pen
+ * @param {Scene} scene
+ * @param {Section} section
+ * @param {Layout} layout
+ * @param {{ x: number, y: number }} place
+ * @param {number} here The cell at the crosshair.
+ * @param {Ink} ink
+ */
+function drawSection(pen, scene, section, layout, place, here, ink) {
+  const { values, quantity, friction, index } = scene;
+  drawScale(pen, section, quantity.scale === 'signed' ? 5 : 3, ink);
+  shadeStick(pen, section, index.cells.zone, ink);
+  if (section.bounded) {
+    const pressure = index.cells.pressure_mpa ?? [];
+    const signs = quantity.scale === 'signed' ? [1, -1] : [1];
+    for (const sign of signs) drawLine(pen, section, (cell) => sign * friction * pressure[cell], ink.quiet, 1.25, [4, 3]);
+  }
+  drawLine(pen, section, (cell) => values[cell], ink.accent, 2, []);
+  drawCursor(pen, section, layout, place, here, values, ink);
+  pen.fillStyle = ink.ink;
+  pen.font = `12px ${ink.font}`;
+  pen.textBaseline = 'alphabetic';
+  pen.textAlign = 'left';
+  const { box } = section;
+  const legend = section.bounded && !layout.narrow ? '   (dashed: μp, shaded: stick)' : '';
+  const title = section.along ? `along rolling at y = ${number(place.y, 3)} mm${legend}` : `across at x = ${number(place.x, 3)} mm`;
+  pen.fillText(title, box.left, box.top - 7);
+}
+
+/**
+ * @param {Pen} pen
+ * @param {Section} section
+ * @param {number} wanted
+ * @param {Ink} ink
+ */
+function drawScale(pen, { along, box, range, value }, wanted, ink) {
+  const marks = ticks(range[0], range[1], wanted);
+  pen.strokeStyle = ink.line;
+  pen.lineWidth = 1;
+  pen.fillStyle = ink.quiet;
+  pen.font = `11px ${ink.font}`;
+  pen.textBaseline = along ? 'middle' : 'top';
+  for (const mark of marks) {
+    const at = Math.round(value(mark)) + 0.5;
+    pen.beginPath();
+    pen.moveTo(along ? box.left : at, along ? at : box.top);
+    pen.lineTo(along ? box.left + box.width : at, along ? at : box.top + box.height);
+    pen.stroke();
+    pen.textAlign = along ? 'right' : mark === marks[0] ? 'left' : 'center';
+    pen.fillText(tickLabel(mark, marks), along ? box.left - 7 : at, along ? at : box.top + box.height + 6);
+  }
+}
+
+/**
+ * @param {Pen} pen
+ * @param {Section} section
+ * @param {string[] | undefined} zone
+ * @param {Ink} ink
+ */
+function shadeStick(pen, { along, box, cells, from, to }, zone, ink) {
+  if (!zone) return;
+  pen.fillStyle = ink.stick;
+  pen.globalAlpha = 0.2;
+  for (const cell of cells) {
+    if (zone[cell] === 'slip') continue;
+    if (along) pen.fillRect(from(cell), box.top, to(cell) - from(cell), box.height);
+    else pen.fillRect(box.left, to(cell), box.width, from(cell) - to(cell));
+  }
+  pen.globalAlpha = 1;
+}
+
+/**
+ * @param {Pen} pen
+ * @param {Section} section
+ * @param {(cell: number) => number} of
+ * @param {string} colour
+ * @param {number} width
+ * @param {number[]} dash
+ */
+function drawLine(pen, { along, cells, middle, value }, of, colour, width, dash) {
+  pen.beginPath();
+  cells.forEach((cell, place) => {
+    const x = along ? middle(cell) : value(of(cell));
+    const y = along ? value(of(cell)) : middle(cell);
+    if (place) pen.lineTo(x, y);
+    else pen.moveTo(x, y);
+  });
+  pen.strokeStyle = colour;
+  pen.lineWidth = width;
+  pen.setLineDash(dash);
+  pen.stroke();
+  pen.setLineDash([]);
+}
+
+/**
+ * @param {Pen} pen
+ * @param {Section} section
+ * @param {Layout} layout
+ * @param {{ x: number, y: number }} place
+ * @param {number} here
+ * @param {ArrayLike<number>} values
+ * @param {Ink} ink
+ */
+function drawCursor(pen, section, layout, place, here, values, ink) {
+  const { along, box, middle, value } = section;
+  const at = along ? layout.X(place.x) : layout.Y(place.y);
+  pen.strokeStyle = ink.quiet;
+  pen.lineWidth = 1;
+  pen.setLineDash([3, 3]);
+  pen.beginPath();
+  pen.moveTo(along ? at : box.left, along ? box.top : at);
+  pen.lineTo(along ? at : box.left + box.width, along ? box.top + box.height : at);
+  pen.stroke();
+  pen.setLineDash([]);
+  if (here < 0) return;
+  const height = value(values[here]);
+  pen.fillStyle = ink.surface;
+  pen.strokeStyle = ink.accent;
+  pen.lineWidth = 2;
+  pen.beginPath();
+  pen.arc(along ? middle(here) : height, along ? height : middle(here), 4, 0, 2 * Math.PI);
+  pen.fill();
+  pen.stroke();
+}

@@ -1,0 +1,122 @@
+// The border between stick and slip: along every strip where the traction reaches friction's bound, joined from strip to strip.
+
+/** @typedef {import('./cells.js').CellIndex} CellIndex */
+/** @typedef {[number, number][]} Line */
+
+/**
+ * Lines between stick and slip.
+ * @param {CellIndex} index
+ * @param {number} friction Its coefficient; NaN if it is not known, then the border lies between the cells.
+ * @returns {Line[]}
+ */
+export function stickBorder(index, friction) {
+  const { zone } = index.cells;
+  if (!zone) return [];
+  const crossings = index.strips.map((strip) => {
+    /** @type {number[]} */
+    const places = [];
+    for (let cell = strip.first + 1; cell < strip.end; cell += 1) {
+      if ((zone[cell] === 'slip') === (zone[cell - 1] === 'slip')) continue;
+      places.push(crossing(index, cell, friction));
+    }
+    return places;
+  });
+  /** @type {Line[]} */
+  const lines = [];
+  /** @type {Line[]} */
+  let open = [];
+  index.strips.forEach((strip, at) => {
+    const places = crossings[at];
+    const middle = at ? (index.strips[at - 1].y + strip.y) / 2 : strip.low;
+    const joined = join(open, places);
+    meet(open.filter((_, place) => !joined.includes(place)), middle);
+    open = places.map((x, place) => {
+      const known = open[joined[place]];
+      if (known) known.push([x, strip.y]);
+      return known ?? [[x, strip.y]];
+    });
+    const started = open.filter((_, place) => joined[place] < 0);
+    meet(started.map((line) => line.reverse()), middle);
+    started.forEach((line) => line.reverse());
+    lines.push(...started);
+  });
+  return lines.filter((line) => line.length > 1).map((line) => reachOut(line, index));
+}
+
+/**
+ * A line that ends in the middle of the outermost strip is continued over its other half; the picture is cut at the border.
+ * @param {Line} line
+ * @param {CellIndex} index
+ */
+function reachOut(line, { strips }) {
+  const first = strips[0];
+  const last = strips[strips.length - 1];
+  const beyond = (/** @type {[number, number]} */ end, /** @type {[number, number]} */ before) =>
+    /** @type {[number, number]} */ ([end[0] + (end[0] - before[0]) / 2, end[1] + (end[1] - before[1]) / 2]);
+  const start = line[0][1] === first.y ? [beyond(line[0], line[1])] : [];
+  const end = line[line.length - 1][1] === last.y ? [beyond(line[line.length - 1], line[line.length - 2])] : [];
+  return [...start, ...line, ...end];
+}
+
+/**
+ * Which line goes on at which place of the next strip: in order where there are as many, else the nearest.
+ * @param {readonly Line[]} open
+ * @param {readonly number[]} places
+ * @returns {number[]} The line of every place; -1 where one begins.
+ */
+function join(open, places) {
+  if (open.length === places.length) return places.map((_, place) => place);
+  const ends = open.map((line) => line[line.length - 1][0]);
+  const pairs = places.flatMap((x, place) => ends.map((end, line) => ({ place, line, far: Math.abs(end - x) })));
+  const joined = places.map(() => -1);
+  for (const { place, line } of pairs.sort((one, two) => one.far - two.far)) {
+    if (joined[place] < 0 && !joined.includes(line)) joined[place] = line;
+  }
+  return joined;
+}
+
+/**
+ * A zone that ends between two strips is closed: its two sides meet half-way.
+ * @param {readonly Line[]} ending
+ * @param {number} y
+ */
+function meet(ending, y) {
+  if (ending.length !== 2) return;
+  const [one, two] = ending.map((line) => line[line.length - 1][0]);
+  ending.forEach((line) => line.push([(one + two) / 2, y]));
+}
+
+/**
+ * Where between the middles of a cell and the one before it the traction reaches μp: the margin μp − |t| of the last two cells
+ * that stick, continued; half-way where that is not known.
+ * @param {CellIndex} index
+ * @param {number} cell
+ * @param {number} friction
+ */
+function crossing(index, cell, friction) {
+  const { x_mm, dx_mm, zone = [] } = index.cells;
+  const shared = x_mm[cell] - dx_mm[cell] / 2;
+  const step = zone[cell] === 'slip' ? -1 : 1;
+  const near = step < 0 ? cell - 1 : cell;
+  const far = near + step;
+  const slipping = near - step;
+  const one = margin(index, near, friction);
+  const two = zone[far] === 'slip' || index.cells.strip[far] !== index.cells.strip[cell] ? NaN : margin(index, far, friction);
+  const slope = (one - two) / (x_mm[near] - x_mm[far]);
+  const place = x_mm[near] - one / slope;
+  if (!Number.isFinite(place)) return shared;
+  const low = Math.min(x_mm[near], x_mm[slipping]);
+  const high = Math.max(x_mm[near], x_mm[slipping]);
+  return Math.max(low, Math.min(high, place));
+}
+
+/**
+ * @param {CellIndex} index
+ * @param {number} cell
+ * @param {number} friction
+ */
+function margin({ cells }, cell, friction) {
+  const { pressure_mpa, traction_x_mpa, traction_y_mpa } = cells;
+  if (!pressure_mpa || !traction_x_mpa || !traction_y_mpa) return NaN;
+  return friction * pressure_mpa[cell] - Math.hypot(traction_x_mpa[cell], traction_y_mpa[cell]);
+}

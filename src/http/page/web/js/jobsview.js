@@ -1,0 +1,126 @@
+// Jobs: batches with their progress, and a list of which only the rows in view exist.
+
+import { html, nothing, svg } from '../vendor/lit-html.js';
+import { cancel, download, remove } from './api.js';
+import { ago, count, seconds } from './format.js';
+import { marked, toggleMark } from './marks.js';
+import { filterQueue, forgetBatch, loadMore, queueSeen, refreshSoon } from './queue.js';
+import { formatRoute } from './routes.js';
+
+/** @typedef {import('./state.js').App} App */
+/** @typedef {import('./api.js').Job} Job */
+/** @typedef {import('./api.js').Batch} Batch */
+/** @typedef {import('./api.js').State} State */
+
+const ROW = 44;
+const SPARE_ROWS = 8;
+const STATES = /** @type {const} */ (['queued', 'running', 'succeeded', 'failed', 'cancelled']);
+/** @type {Record<State, string>} */
+const GLYPHS = { queued: '○', running: '◔', succeeded: '●', failed: '✕', cancelled: '⊘' };
+
+/** @param {App} app */
+export function jobsView(app) {
+  const queue = queueSeen();
+  return html`<h1 class="visually-hidden">Jobs</h1>
+    ${[...queue.batches.values()].sort((one, two) => (one.id < two.id ? 1 : -1)).map((batch) => batchPanel(app, batch))}
+    <section class="panel jobs" aria-labelledby="h-jobs">
+      <header class="bar"><h2 id="h-jobs">Jobs</h2>${filters(app)}${compareLink()}</header>
+      <div class="rows head" aria-hidden="true"><span></span><span>State</span><span>Name</span><span>Labels</span><span>Submitted</span><span>Took</span><span></span></div>
+      ${list(app)}
+    </section>`;
+}
+
+/** @param {App} app */
+function filters(app) {
+  const queue = queueSeen();
+  const labelled = (/** @type {Event} */ event) => filterQueue(app, { label: /** @type {HTMLInputElement} */ (event.target).value.trim() });
+  return html`<div class="segs" role="group" aria-label="State">${['', ...STATES].map((state) => html`<label class="seg">
+      <input type="radio" name="state" .checked=${queue.state === state} @change=${() => filterQueue(app, { state })}><span>${state || 'all'}</span></label>`)}</div>
+    <label class="inline">Label <input class="search" placeholder="line:A12" .value=${queue.label} @change=${labelled}></label>`;
+}
+
+function compareLink() {
+  const ids = marked();
+  if (ids.length < 2) return html`<span class="hint">tick two to four to compare</span>`;
+  return html`<a class="button primary small" href=${formatRoute('compare', ids)}>Compare ${ids.length}</a>`;
+}
+
+/** @param {App} app */
+function list(app) {
+  const queue = queueSeen();
+  const height = Math.max(320, innerHeight - 190);
+  const first = Math.max(0, Math.min(queue.jobs.length, Math.floor(queue.top / ROW)) - SPARE_ROWS);
+  const rows = queue.jobs.slice(first, first + Math.ceil(height / ROW) + 2 * SPARE_ROWS);
+  const scrolled = (/** @type {Event} */ event) => {
+    const { scrollTop, clientHeight, scrollHeight } = /** @type {HTMLElement} */ (event.target);
+    if (scrollTop + clientHeight > scrollHeight - 40 * ROW) loadMore(app);
+    if (Math.abs(scrollTop - queue.top) < 3 * ROW && scrollTop > 0) return;
+    queue.top = scrollTop;
+    app.redraw();
+  };
+  const after = queue.jobs.length - first - rows.length;
+  return html`<div class="list" tabindex="0" role="group" aria-label="Jobs, newest first" .scrollTop=${queue.top} @scroll=${scrolled}>
+    ${spacer(first)}${rows.map((job) => row(app, job))}${spacer(after)}
+    ${queue.loaded && !queue.jobs.length ? html`<p class="quiet pad">No jobs${queue.state ? ` that are ${queue.state}` : ''}${queue.label ? ` with the label ${queue.label}` : ''}.
+      <a href="#/compose">Compose one.</a></p>` : nothing}
+    ${queue.loaded ? nothing : html`<p class="quiet pad">Loading …</p>`}
+  </div>`;
+}
+
+/** The height of rows that are not in view. @param {number} rows */
+const spacer = (rows) => svg`<svg class="spacer" width="1" height=${rows * ROW} aria-hidden="true"></svg>`;
+
+/** @param {App} app @param {Job} job */
+function row(app, job) {
+  const name = job.name || job.id;
+  const open = job.state === 'queued' || job.state === 'running';
+  const act = () => (open ? cancel('jobs', job.id) : remove('jobs', job.id)).then(() => refreshSoon(app), app.refused);
+  return html`<div class="rows job">
+    <span><input type="checkbox" aria-label=${`Compare ${name}`} .checked=${marked().includes(job.id)} ?disabled=${job.state !== 'succeeded'}
+      @change=${() => toggleMark(app, job.id)}></span>
+    <span class=${`state ${job.state}`}><i aria-hidden="true">${GLYPHS[job.state]}</i> ${job.state}${job.state === 'running'
+      ? html` <progress max="1" .value=${job.progress} aria-label="Progress"></progress>` : nothing}</span>
+    <a class="name" href=${formatRoute('result', [job.id])}>${name}</a>
+    <span class="labels">${Object.entries(job.labels).slice(0, 3).map(([key, value]) => html`<span class="chip">${key}: ${value}</span>`)}</span>
+    <time datetime=${job.created_at} title=${job.created_at}>${ago(job.created_at)}</time>
+    <span class="n">${took(job)}</span>
+    <span class="do"><button class=${open ? 'small' : 'small ghost'} aria-label=${`${open ? 'Cancel' : 'Delete'} ${name}`} @click=${act}>${open ? 'Cancel' : 'Delete'}</button></span>
+  </div>`;
+}
+
+/** @param {Job} job */
+function took(job) {
+  if (job.cached) return 'solved before';
+  if (!job.started_at || !job.ended_at) return '';
+  const time = (Date.parse(job.ended_at) - Date.parse(job.started_at)) / 1000;
+  return time > 0 ? seconds(time) : '< 1 ms';
+}
+
+/** @param {App} app @param {Batch} batch */
+function batchPanel(app, batch) {
+  const states = STATES.filter((state) => batch.states[state]).map((state) => `${count(batch.states[state])} ${state}`);
+  const table = () => download(`/v1/batches/${batch.id}/results?format=csv`, `batch-${batch.id.slice(0, 8)}.csv`).catch(app.refused);
+  const drop = () => remove('batches', batch.id).then(() => {
+    forgetBatch(batch.id);
+    refreshSoon(app);
+  }, app.refused);
+  return html`<section class="panel batch" aria-label=${`Batch of ${batch.count}`}>
+    <strong>Batch of ${count(batch.count)}</strong>
+    <svg class="shares" viewBox="0 0 1000 10" preserveAspectRatio="none" role="img" aria-label=${`${Math.round(100 * batch.progress)} percent ended`}>${shares(batch)}</svg>
+    <span class="n">${Math.floor(100 * batch.progress)} %</span><span class="quiet">${states.join(' · ')}</span>
+    <span class="do">${batch.ended ? html`
+      <a class="button small" href=${formatRoute('line', [batch.id])}>Along the line</a><button class="small" @click=${table}>CSV</button>
+      <button class="small ghost" aria-label=${`Delete the batch of ${batch.count}`} @click=${drop}>Delete</button>`
+      : html`<button class="small" @click=${() => cancel('batches', batch.id).catch(app.refused)}>Cancel all</button>`}</span>
+  </section>`;
+}
+
+/** @param {Batch} batch */
+function shares({ states, count: all }) {
+  let at = 0;
+  return /** @type {const} */ (['succeeded', 'failed', 'cancelled', 'running']).map((state) => {
+    const from = at;
+    at += (1000 * states[state]) / Math.max(1, all);
+    return svg`<rect class=${state} x=${from} width=${at - from} height="10"/>`;
+  });
+}

@@ -1,0 +1,72 @@
+// Line: strips along a label that is a number, limits, the worst places, and the way from there to the contact.
+
+import { html, nothing } from '../vendor/lit-html.js';
+import { chooseLine, lineSeen, placeOf, STRIPS, worstRows } from './line.js';
+import { count, number } from './format.js';
+import { queueSeen } from './queue.js';
+import { formatRoute } from './routes.js';
+
+/** @typedef {import('./state.js').App} App */
+/** @typedef {import('./line.js').Line} Line */
+/** @typedef {import('./line.js').StripKey} StripKey */
+
+const WORST = 8;
+
+/** @param {App} app */
+export function lineView(app) {
+  const line = lineSeen();
+  if (!line) return choice();
+  if (!line.rows.length && line.done) return html`<section class="panel wait"><h1>Along the line</h1><p>This batch has no results.</p></section>`;
+  const shown = {
+    rows: line.rows, by: line.by, limits: line.limits, zoom: line.zoom,
+    open: (/** @type {import('./line.js').Row} */ row) => app.go(formatRoute('result', [row.id])),
+    zoomed: (/** @type {Line['zoom']} */ zoom) => chooseLine(app, { zoom }),
+  };
+  const by = (/** @type {Event} */ event) => chooseLine(app, { by: /** @type {HTMLSelectElement} */ (event.target).value, zoom: null });
+  return html`<div class="result"><header class="jobhead"><div><h1>Along the line</h1>
+      <p class="quiet">${count(line.rows.length)} of ${count(line.count)} cases · drag to zoom, double click or Enter opens the contact, Escape shows all</p></div>
+      <label class="inline">Along <select @change=${by}>${['', ...line.labels].map((label) => html`<option value=${label} ?selected=${label === line.by}>${label || 'order of the batch'}</option>`)}</select></label></header>
+    ${line.done ? html`<div class="cols">
+      <section class="panel" aria-label="Strips"><line-strips tabindex="0" role="group" aria-label="Strips along the line; arrow keys move the cursor" .shown=${shown}></line-strips>${limits(app, line)}</section>
+      ${worstPanel(app, line)}</div>`
+    : html`<progress max=${line.count || 1} .value=${line.rows.length} aria-label="Loading"></progress>`}</div>`;
+}
+
+/** No batch is chosen yet. */
+function choice() {
+  const batches = [...queueSeen().batches.values()].filter((batch) => batch.ended);
+  return html`<section class="panel wait"><h1>Along the line</h1>
+    ${batches.length ? html`<p>Choose a batch:</p>${batches.map((batch) => html`<a class="button" href=${formatRoute('line', [batch.id])}>
+      ${count(batch.count)} cases of ${batch.created_at.slice(0, 16).replace('T', ' ')}</a>`)}`
+    : html`<p>There is no batch that has ended. Send many cases with a label that is a number, such as <code>"km": "37.2"</code>, to <code>/v1/batches</code>.</p>`}
+    <a class="button" href="#/jobs">To the jobs</a></section>`;
+}
+
+/** Limits are drawn into the strips. @param {App} app @param {Line} line */
+function limits(app, line) {
+  const set = (/** @type {StripKey} */ key) => (/** @type {Event} */ event) => {
+    const text = /** @type {HTMLInputElement} */ (event.target).value.trim();
+    const value = Number(text);
+    const rest = { ...line.limits };
+    delete rest[key];
+    chooseLine(app, { limits: text && Number.isFinite(value) ? { ...rest, [key]: value } : rest });
+  };
+  return html`<div class="limits" role="group" aria-label="Limits">${STRIPS.map(({ key, label, unit }) => html`<label>Limit of ${label}
+    <span class="input"><input inputmode="decimal" .value=${String(line.limits[key] ?? '')} @change=${set(key)}><span class="unit">${unit}</span></span></label>`)}</div>`;
+}
+
+/** @param {App} app @param {Line} line */
+function worstPanel(app, line) {
+  const strip = STRIPS.find(({ key }) => key === line.worst) ?? STRIPS[0];
+  const rows = worstRows(line, WORST);
+  const limit = line.limits[strip.key];
+  const over = limit === undefined ? 0 : line.rows.filter((row) => row[strip.key] > limit).length;
+  const pick = (/** @type {Event} */ event) => chooseLine(app, { worst: /** @type {HTMLSelectElement} */ (event.target).value });
+  return html`<section class="panel" aria-labelledby="h-worst"><header class="bar"><h2 id="h-worst">Worst places</h2>
+      <label class="inline">by <select @change=${pick}>${STRIPS.map(({ key, label }) => html`<option value=${key} ?selected=${key === line.worst}>${label}</option>`)}</select></label></header>
+    ${limit === undefined ? nothing : html`<p class="pad">${count(over)} of ${count(line.rows.length)} over the limit of ${number(limit)} ${strip.unit}</p>`}
+    <div class="scroll" tabindex="0" role="region" aria-labelledby="h-worst"><table>
+      <thead><tr><th scope="col">${line.by || 'case'}</th>${STRIPS.map(({ label, unit }) => html`<th scope="col">${label} / ${unit}</th>`)}<th></th></tr></thead>
+      <tbody>${rows.map((row) => html`<tr><th scope="row">${number(placeOf(row, line.by), 6)}</th>${STRIPS.map(({ key }) => html`<td class=${over && key === strip.key && row[key] > (limit ?? Infinity) ? 'warn' : ''}>${number(row[key])}</td>`)}
+        <td><a href=${formatRoute('result', [row.id])}>open<span class="visually-hidden"> ${row.name}</span></a></td></tr>`)}</tbody></table></div></section>`;
+}

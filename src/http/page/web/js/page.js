@@ -1,0 +1,94 @@
+// The start of the page: its state, the way from addresses to views, and what every view may ask for.
+
+import { health, Refused } from './api.js';
+import { openComparison } from './compare.js';
+import { openKept, solve } from './editing.js';
+import './curve.js';
+import './fieldmap.js';
+import './strips.js';
+import { openLine } from './line.js';
+import { isGone, openJob } from './result.js';
+import { startQueue, stopQueue } from './queue.js';
+import { formatRoute, parseRoute } from './routes.js';
+import { renderShell } from './shell.js';
+import { initialState } from './state.js';
+import { createStore } from './store.js';
+
+/** @typedef {import('./state.js').App} App */
+
+const HEALTH_MS = 10_000;
+const TOAST_MS = 4000;
+
+const store = createStore(initialState());
+let toastTimer = 0;
+
+/** @type {App} */
+const app = {
+  store,
+  compose: (change) => store.set({ compose: { ...store.get().compose, ...change } }),
+  redraw: () => store.set({ turn: store.get().turn + 1 }),
+  say(text) {
+    clearTimeout(toastTimer);
+    store.set({ toast: text });
+    toastTimer = window.setTimeout(() => store.set({ toast: '' }), TOAST_MS);
+  },
+  refused(error) {
+    if (error instanceof DOMException && error.name === 'AbortError') return;
+    if (!(error instanceof Refused)) throw error;
+    if (error.status === 401) store.set({ keyLine: true });
+    if (error.status === 0) store.set({ health: { ready: false, version: store.get().health?.version ?? '' } });
+    app.say(isGone(error) ? `${error.message} It may have been deleted or have expired.` : error.message);
+  },
+  go(address) {
+    if (location.hash === address) follow();
+    else location.hash = address;
+  },
+  remember(address) {
+    history.replaceState(null, '', address);
+    store.set({ route: parseRoute(address) });
+  },
+};
+
+/** Shows what the address says. */
+function follow() {
+  const before = store.get().route;
+  const route = parseRoute(location.hash);
+  store.set({ route });
+  if (route.view !== 'jobs') stopQueue();
+  if (route.view === 'jobs') startQueue(app);
+  if (route.view === 'result') openJob(app, route.ids[0], route.query);
+  if (route.view === 'compare') openComparison(app, route.ids, route.query);
+  if (route.view === 'line') openLine(app, route.ids[0], route.query);
+  if (before.view !== route.view) document.getElementById('main')?.focus({ preventScroll: true });
+}
+
+async function lookAtHealth() {
+  if (document.hidden) return;
+  try {
+    const { status, version } = await health();
+    store.set({ health: { ready: status === 'ready', version } });
+  } catch {
+    store.set({ health: { ready: false, version: store.get().health?.version ?? '' } });
+  }
+}
+
+const root = /** @type {HTMLElement} */ (document.getElementById('page'));
+root.replaceChildren();
+store.on(() => renderShell(app, root));
+addEventListener('hashchange', follow);
+addEventListener('keydown', (event) => {
+  if (event.key !== 'Enter' || !(event.ctrlKey || event.metaKey) || store.get().route.view !== 'compose') return;
+  event.preventDefault();
+  solve(app);
+});
+// The first picture after "Solve" ends the time that the reader waited.
+root.addEventListener('drawn', () => {
+  if (store.get().route.view !== 'result' || !performance.getEntriesByName('solve').length) return;
+  performance.measure('solve to picture', 'solve');
+  performance.clearMarks('solve');
+});
+setInterval(lookAtHealth, HEALTH_MS);
+lookAtHealth();
+openKept(app);
+if (!location.hash) history.replaceState(null, '', formatRoute('compose'));
+follow();

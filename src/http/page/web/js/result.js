@@ -1,0 +1,206 @@
+// The result that is being looked at: what is loaded of it, and which part is chosen.
+
+import { caseOf, job as jobOf, Refused, result as resultOf } from './api.js';
+import { follow } from './events.js';
+import { numberAt } from './document.js';
+import { loadField } from './fields.js';
+import { offered, quantityOf, rangeOf } from './field/quantities.js';
+import { place } from './placing.js';
+import { formatRoute } from './routes.js';
+
+/** @typedef {import('./state.js').App} App */
+/** @typedef {import('./api.js').Job} Job */
+/** @typedef {import('./api.js').JobResult} JobResult */
+/** @typedef {import('./api.js').Point} Point */
+/** @typedef {import('./document.js').JsonObject} JsonObject */
+/** @typedef {import('./fields.js').Field} Field */
+/** @typedef {import('./field/quantities.js').Quantity} Quantity */
+
+/**
+ * @typedef {object} Looked
+ * A job with its result, and what is chosen of it.
+ * @property {Job} job
+ * @property {JobResult | null} result
+ * @property {JsonObject | null} document The case.
+ * @property {import('./placing.js').Placed | null} placed Its cross-sections.
+ * @property {string[]} outputs What the case asked for.
+ * @property {Map<string, Promise<Field>>} asked Fields by patch and motion.
+ * @property {(Field | undefined)[]} fields Those of the chosen motion, by patch.
+ * @property {number} patch
+ * @property {number} point
+ * @property {string} quantity Its key; empty if there is no field.
+ * @property {{ x: number, y: number } | null} held Where the crosshair is held.
+ * @property {boolean} border
+ * @property {boolean} arrows
+ * @property {boolean} mesh
+ * @property {'forces' | 'moment'} curve
+ */
+
+/** @type {Looked | null} */
+let looked = null;
+let following = new AbortController();
+
+export const lookedAt = () => looked;
+
+/** The motion that tells most: the force nearest to 65 % of the largest. @param {readonly Point[]} points */
+export function tellingPoint(points) {
+  const forces = points.map((point) => Math.hypot(point.force_x_n, point.force_y_n));
+  const wanted = 0.65 * Math.max(...forces);
+  return forces.reduce((best, force, at) => (Math.abs(force - wanted) < Math.abs(forces[best] - wanted) ? at : best), 0);
+}
+
+/** @param {Job} job @returns {Looked} */
+const fresh = (job) => ({
+  job, result: null, document: null, placed: null, outputs: [], asked: new Map(), fields: [], patch: 0, point: -1, quantity: '',
+  held: null, border: true, arrows: true, mesh: false, curve: 'forces',
+});
+
+/**
+ * A job that has just been submitted, with its case: it need not be asked for again.
+ * @param {App} app
+ * @param {Job} job
+ * @param {JsonObject} document
+ */
+export function adoptJob(app, job, document) {
+  following.abort();
+  looked = { ...fresh(job), document };
+  if (job.result) show(app, job.result);
+  else if (job.state === 'queued' || job.state === 'running') followJob(app);
+}
+
+/**
+ * Opens what an address names.
+ * @param {App} app
+ * @param {string} id
+ * @param {Record<string, string>} query
+ */
+export async function openJob(app, id, query) {
+  try {
+    if (looked?.job.id !== id) {
+      following.abort();
+      looked = null;
+      const job = await jobOf(id);
+      looked = fresh(job);
+      apply(query);
+      await load(app);
+    } else {
+      apply(query);
+      if (looked.result) await loadFields(app);
+    }
+    app.redraw();
+  } catch (error) {
+    app.refused(error);
+  }
+}
+
+/** @param {Record<string, string>} query */
+function apply({ patch, point, field, x, y, cells }) {
+  if (!looked) return;
+  if (patch !== undefined) looked.patch = Math.max(0, Math.trunc(Number(patch)) || 0);
+  if (point !== undefined) looked.point = Math.max(0, Math.trunc(Number(point)) || 0);
+  if (field && quantityOf(field)) looked.quantity = field;
+  if (x !== undefined && y !== undefined && Number.isFinite(Number(x) + Number(y))) looked.held = { x: Number(x), y: Number(y) };
+  if (cells) looked.mesh = true;
+}
+
+/** @param {App} app */
+async function load(app) {
+  const mine = looked;
+  if (!mine) return;
+  if (mine.job.state === 'succeeded') {
+    const [result, document] = await Promise.all([resultOf(mine.job.id), mine.document ?? caseOf(mine.job.id)]);
+    if (looked !== mine) return;
+    mine.document = document;
+    show(app, result);
+  } else if (mine.job.state === 'queued' || mine.job.state === 'running') followJob(app);
+  else mine.document ??= await caseOf(mine.job.id);
+  app.redraw();
+}
+
+/** @param {App} app */
+async function followJob(app) {
+  const mine = looked;
+  if (!mine) return;
+  const { signal } = (following = new AbortController());
+  try {
+    await follow(`/v1/jobs/${mine.job.id}/events`, ({ data }) => {
+      mine.job = { ...mine.job, ...JSON.parse(data) };
+      app.redraw();
+      return !['queued', 'running'].includes(mine.job.state);
+    }, signal);
+    if (signal.aborted) return;
+    mine.job = await jobOf(mine.job.id);
+    await load(app);
+  } catch (error) {
+    app.refused(error);
+  }
+}
+
+/** @param {App} app @param {JobResult} result */
+function show(app, result) {
+  if (!looked) return;
+  looked.result = result;
+  looked.outputs = Object.keys(result.links);
+  looked.placed = looked.document ? place(looked.document.contact) : null;
+  looked.patch = Math.min(looked.patch, result.patches.length - 1);
+  const { points } = result.patches[looked.patch];
+  if (looked.point < 0 || looked.point >= points.length) looked.point = tellingPoint(points);
+  loadFields(app).catch(app.refused);
+}
+
+/** Loads the fields of all patches of the chosen motion. @param {App} app */
+async function loadFields(app) {
+  const mine = looked;
+  if (!mine?.result) return;
+  const parts = mine.outputs.filter((output) => ['zones', 'tractions', 'pressure', 'slip'].includes(output));
+  if (!parts.length) return;
+  const { point, result } = mine;
+  const fields = await Promise.all(result.patches.map((_, patch) => {
+    const name = `${patch}/${point}`;
+    const known = mine.asked.get(name) ?? loadField(mine.job.id, mine.outputs, patch, point);
+    mine.asked.set(name, known);
+    return known;
+  }));
+  if (looked !== mine || mine.point !== point) return;
+  mine.fields = fields;
+  const all = offered(fields[0].cells);
+  if (!all.some(({ key }) => key === mine.quantity)) mine.quantity = (all.find(({ key }) => key === 'traction') ?? all[0])?.key ?? '';
+  app.redraw();
+}
+
+/**
+ * Chooses another part of the result, and writes it into the address.
+ * @param {App} app
+ * @param {Partial<Looked>} choice
+ */
+export function choose(app, choice) {
+  if (!looked) return;
+  const moved = choice.point !== undefined && choice.point !== looked.point;
+  Object.assign(looked, choice);
+  if (choice.patch !== undefined) looked.held = null;
+  rememberView(app);
+  if (moved) loadFields(app).catch(app.refused);
+  app.redraw();
+}
+
+/** @param {App} app */
+export function rememberView(app) {
+  if (!looked) return;
+  const { job, patch, point, quantity, held, mesh } = looked;
+  const place = held ? { x: held.x.toFixed(3), y: held.y.toFixed(3) } : {};
+  app.remember(formatRoute('result', [job.id], { patch, point, field: quantity, ...place, cells: mesh ? 1 : undefined }));
+}
+
+/** What friction bounds: its coefficient, NaN where the case has another law. @param {Looked} of */
+export const frictionOf = ({ document }) => numberAt(document ?? undefined, '/friction/coefficient');
+
+/** One range of colours for all patches and motions. @param {Looked} of @param {Quantity} quantity */
+export function sharedRange(of, quantity) {
+  const pressure = Math.max(...(of.result?.patches ?? []).map((patch) => patch.pressure_max_mpa));
+  const bound = quantity.bounded ? frictionOf(of) * pressure : NaN;
+  const cells = of.fields.flatMap((field) => (field ? [field.cells] : []));
+  return rangeOf(quantity, cells, bound);
+}
+
+/** Was the job removed since? @param {unknown} error */
+export const isGone = (error) => error instanceof Refused && (error.status === 404 || error.status === 410);

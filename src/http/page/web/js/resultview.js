@@ -1,0 +1,284 @@
+// Result: the numbers with their errors, the field, the patches on the profiles, the creep curve, and how it was computed.
+
+import { html, nothing } from '../vendor/lit-html.js';
+import { cancel } from './api.js';
+import { curveOf } from './curve.js';
+import { put } from './document.js';
+import { downloads } from './downloads.js';
+import { drawProfiles } from './drawing/profiles.js';
+import { editDocument, solve } from './editing.js';
+import { ALL_OUTPUTS } from './examples.js';
+import { indexOf } from './field/cells.js';
+import { offered, quantityOf } from './field/quantities.js';
+import { count, degrees, number, seconds, withError } from './format.js';
+import { choose, frictionOf, lookedAt, rememberView, sharedRange } from './result.js';
+import { formatRoute } from './routes.js';
+
+/** @typedef {import('./state.js').App} App */
+/** @typedef {import('./result.js').Looked} Looked */
+/** @typedef {import('./api.js').Patch} Patch */
+/** @typedef {import('./api.js').Point} Point */
+/** @typedef {import('./api.js').JobResult} JobResult */
+/** @typedef {import('./fieldmap.js').CrosshairEvent} CrosshairEvent */
+
+const TABLE_ROWS = 400;
+
+/** @param {App} app */
+export function result(app) {
+  const looked = lookedAt();
+  if (!looked) return html`<p class="pad quiet">Loading …</p>`;
+  const { job } = looked;
+  const head = html`<header class="jobhead">
+    <div><h1>${job.name || `Job ${job.id.slice(0, 8)}`}</h1>
+      <p class="quiet">${Object.entries(job.labels ?? {}).map(([key, value]) => html`<span class="chip">${key}: ${value}</span>`)} <code>${job.id}</code></p></div>
+    ${looked.result ? html`<div class="downloads" role="group" aria-label="Download">${downloads(app, looked)}
+      <button class="small primary" @click=${() => edit(app, looked)}>Edit case</button></div>` : nothing}
+  </header>`;
+  if (!looked.result) return html`<div class="result">${head}${waiting(app, looked)}</div>`;
+  return html`<div class="result">${head}${loaded(app, looked, looked.result)}</div>`;
+}
+
+/** @param {App} app @param {Looked} looked */
+function edit(app, looked) {
+  if (looked.document) editDocument(app, looked.document);
+  app.compose({ example: '' });
+  app.go(formatRoute('compose'));
+}
+
+/** A job without a result. @param {App} app @param {Looked} looked */
+function waiting(app, looked) {
+  const { job } = looked;
+  switch (job.state) {
+    case 'queued':
+    case 'running': {
+      const place = job.queue ? ` ${count(job.queue.position)} before it, starts in about ${seconds(job.queue.starts_in_s)}.` : '';
+      return html`<section class="panel wait"><p role="status">${job.state === 'queued' ? `Waiting in the queue …${place}` : 'Solving …'}</p>
+        <progress max="1" .value=${job.progress} aria-label="Progress"></progress>
+        <button @click=${() => cancel('jobs', job.id).catch(app.refused)}>Cancel</button></section>`;
+    }
+    case 'failed':
+    case 'cancelled':
+      return html`<section class="panel wait"><p class="fault big">${job.state === 'failed' ? (job.error?.title ?? 'Failed') : 'Cancelled'}</p>
+        <p>${job.error?.detail ?? ''}</p>
+        ${(job.error?.errors ?? []).map((fault) => html`<p><code>${fault.pointer}</code> ${fault.detail}</p>`)}
+        <button @click=${() => edit(app, looked)}>Open the case</button></section>`;
+    default:
+      return html`<p class="pad quiet">Loading …</p>`;
+  }
+}
+
+/** @param {App} app @param {Looked} looked @param {JobResult} answer */
+function loaded(app, looked, answer) {
+  const patch = answer.patches[looked.patch];
+  const point = patch.points[looked.point];
+  const hasFields = looked.outputs.some((output) => ALL_OUTPUTS.slice(1).includes(output));
+  return html`
+    ${remarks(app, answer)}
+    ${figures(looked, patch, point)}
+    <div class=${hasFields ? 'cols' : 'cols nofield'}>
+      ${hasFields ? fieldPanel(app, looked, answer) : html`<section class="panel wait"><p>The case asked for no fields, so there is no map.</p>
+        <button class="primary" @click=${() => again(app, looked)}>Solve again with fields</button></section>`}
+      <div class="aside">
+        ${looked.placed && patch.position ? profilePanel(app, looked, answer) : nothing}
+        ${patch.points.length > 2 ? curvePanel(app, looked, patch) : nothing}
+        ${answer.patches.length > 1 ? totalPanel(answer, looked.point) : nothing}
+        ${factsPanel(answer, patch, point)}
+      </div>
+    </div>`;
+}
+
+/** @param {App} app @param {Looked} looked */
+function again(app, looked) {
+  if (!looked.document) return;
+  editDocument(app, put(looked.document, '/outputs', ALL_OUTPUTS));
+  solve(app);
+}
+
+/** Remarks of the whole, of the chosen patch and of the chosen motion; others lead to where they belong.
+ * @param {App} app @param {JobResult} answer */
+function remarks(app, answer) {
+  return (answer.remarks ?? []).map((remark) => {
+    const place = [];
+    if (typeof remark.patch === 'number') place.push({ patch: remark.patch, label: `patch ${remark.patch}` });
+    if (typeof remark.point === 'number') place.push({ point: remark.point, label: `motion ${remark.point + 1}` });
+    return html`<p class=${`remark ${remark.severity}`} data-code=${remark.code}>
+      ${place.map(({ label, ...choice }) => html`<button class="small" @click=${() => choose(app, choice)}>${label}</button>`)}
+      ${remark.pointer ? html`<code>${remark.pointer}</code>` : nothing} ${remark.detail}</p>`;
+  });
+}
+
+/** @param {Looked} looked @param {Patch} patch @param {Point} point */
+function figures(looked, patch, point) {
+  const errors = point.error_estimate;
+  const friction = frictionOf(looked);
+  const figure = (/** @type {unknown} */ label, /** @type {number} */ value, /** @type {string} */ unit, /** @type {number | null | undefined} */ error) => {
+    const text = withError(value, error);
+    return html`<div class="figure-of"><dt>${label}</dt><dd><b>${text.value}</b>${text.error
+      ? html`<span class="err" title="estimated error"> ± ${text.error}</span>` : nothing}<span class="unit"> ${unit}</span></dd></div>`;
+  };
+  const share = typeof point.stick_area_mm2 === 'number' ? point.stick_area_mm2 / patch.area_mm2 : NaN;
+  const used = (100 * Math.hypot(point.force_x_n, point.force_y_n)) / (friction * patch.normal_force_n);
+  return html`<dl class="figures" tabindex="0" aria-label="Numbers of the chosen patch and motion; forces on the rail">
+    ${figure(html`F<sub>x</sub> along`, point.force_x_n / 1000, 'kN', errors && errors.force_x_n / 1000)}
+    ${figure(html`F<sub>y</sub> across`, point.force_y_n / 1000, 'kN', errors && errors.force_y_n / 1000)}
+    ${figure(html`M<sub>z</sub> moment`, point.moment_z_n_mm / 1000, 'N·m', errors && errors.moment_z_n_mm / 1000)}
+    ${figure(html`N normal`, patch.normal_force_n / 1000, 'kN', undefined)}
+    ${figure(html`p<sub>max</sub> pressure`, patch.pressure_max_mpa, 'MPa', point.profile_uncertainty?.pressure_max_mpa ?? undefined)}
+    ${figure('area', patch.area_mm2, 'mm²', undefined)}
+    ${Number.isFinite(used) ? html`<div class="figure-of"><dt>friction used</dt><dd><b>${number(used, 3)}</b><span class="unit"> % of μN</span></dd></div>` : nothing}
+    ${Number.isFinite(share) ? html`<div class="figure-of"><dt>stick</dt><dd><b>${number(100 * share, 3)}</b><span class="unit"> % of the area</span></dd>
+      <svg class="share" viewBox="0 0 100 5" preserveAspectRatio="none" aria-hidden="true"><rect class="slip" width="100" height="5"/><rect class="stick" width=${100 * share} height="5"/></svg></div>` : nothing}
+    ${figure('Tγ friction power', point.friction_power_n, 'J/m', undefined)}
+  </dl>`;
+}
+
+/** @param {App} app @param {Looked} looked @param {JobResult} answer */
+function fieldPanel(app, looked, answer) {
+  const field = looked.fields[looked.patch];
+  const all = field ? offered(field.cells) : [];
+  const quantity = quantityOf(looked.quantity);
+  const toggles = /** @type {const} */ ([['border', 'stick border'], ['arrows', 'arrows'], ['mesh', 'cells']]);
+  const shown = field && quantity && all.includes(quantity) ? {
+    field, quantity, range: sharedRange(looked, quantity), friction: frictionOf(looked), border: looked.border, arrows: looked.arrows,
+    mesh: looked.mesh, held: looked.held, name: `${quantity.heading} of patch ${looked.patch}`,
+  } : null;
+  const moved = (/** @type {CrosshairEvent} */ { detail: { x, y, held } }) => {
+    looked.held = held ? { x, y } : null;
+    rememberView(app);
+  };
+  return html`<section class="panel map" aria-labelledby="h-field">
+    <header class="bar"><h2 id="h-field" class="visually-hidden">Field</h2>
+      <div class="segs" role="group" aria-label="Quantity">${all.map(({ key, label }) => html`<label class=${key.includes('_') ? 'seg minor' : 'seg'}>
+        <input type="radio" name="quantity" .checked=${looked.quantity === key} @change=${() => choose(app, { quantity: key })}><span>${label}</span></label>`)}</div>
+      <div class="toggles">${toggles.map(([key, label]) => html`<label><input type="checkbox" .checked=${looked[key]}
+        @change=${(/** @type {Event} */ event) => choose(app, { [key]: /** @type {HTMLInputElement} */ (event.target).checked })}> ${label}</label>`)}</div>
+    </header>
+    ${answer.patches.length > 1 ? thumbnails(app, looked, answer) : nothing}
+    ${shown ? html`<field-map class="main" .shown=${shown} @crosshair=${moved}></field-map>` : html`<p class="pad quiet">Loading the field …</p>`}
+    ${field ? cellTable(field) : nothing}
+  </section>`;
+}
+
+/** Small maps of all patches, at one scale of length and one of colour. @param {App} app @param {Looked} looked @param {JobResult} answer */
+function thumbnails(app, looked, answer) {
+  const quantity = quantityOf(looked.quantity);
+  const indices = looked.fields.map((field) => field && indexOf(field));
+  const widest = Math.max(...indices.map((index) => (index ? Math.max(index.x1 - index.x0, 1.6 * (index.y1 - index.y0)) : 1)));
+  return html`<div class="segs thumbs" role="group" aria-label="Patch">${answer.patches.map((patch, at) => {
+    const field = looked.fields[at];
+    const shown = field && quantity ? { field, quantity, range: sharedRange(looked, quantity), friction: frictionOf(looked), border: true, scale: 124 / widest } : null;
+    const angle = patch.position ? ` · ${degrees(patch.position.contact_angle_rad)}` : '';
+    const warned = (answer.remarks ?? []).some((remark) => remark.patch === at && remark.severity === 'warning');
+    return html`<label class="seg thumb"><input type="radio" name="patch" .checked=${looked.patch === at} @change=${() => choose(app, { patch: at })}>
+      <span>${shown ? html`<field-map class="small" .shown=${shown}></field-map>` : nothing}
+        Patch ${at}${warned ? html` <abbr class="warn" title="There is a remark on this patch">▲</abbr>` : nothing}
+        <small>${number(patch.normal_force_n / 1000, 3)} kN${angle}</small></span></label>`;
+  })}</div>`;
+}
+
+/** The field as a table, for those who read rather than look. @param {import('./fields.js').Field} field */
+function cellTable({ cells }) {
+  const columns = /** @type {(keyof typeof cells)[]} */ (Object.keys(cells)).filter((name) => !['dx_mm', 'dy_mm', 'strip'].includes(name));
+  const rows = Math.min(cells.x_mm.length, TABLE_ROWS);
+  const fill = (/** @type {Event} */ event) => {
+    const details = /** @type {HTMLDetailsElement} */ (event.target);
+    const body = details.querySelector('tbody');
+    if (!details.open || !body) return;
+    const lines = Array.from({ length: rows }, (_, row) => {
+      const line = document.createElement('tr');
+      for (const name of columns) {
+        const value = cells[name]?.[row];
+        line.insertCell().textContent = typeof value === 'number' ? number(value) : String(value);
+      }
+      return line;
+    });
+    body.replaceChildren(...lines);
+  };
+  return html`<details class="as-table" @toggle=${fill}><summary>As a table${rows < cells.x_mm.length ? `, the first ${rows} of ${count(cells.x_mm.length)} cells` : ''}</summary>
+    <div class="scroll" tabindex="0" role="region" aria-label="Cells of the field"><table><thead><tr>${columns.map((name) => html`<th scope="col">${name}</th>`)}</tr></thead><tbody></tbody></table></div></details>`;
+}
+
+/** The largest pressure of every strip. @param {import('./fields.js').Field | undefined} field */
+function combOf(field) {
+  if (!field?.cells.pressure_mpa) return null;
+  const { strips } = indexOf(field);
+  const pressure = field.cells.pressure_mpa;
+  const largest = strips.map(({ first, end }) => pressure.slice(first, end).reduce((most, value) => Math.max(most, value), 0));
+  return { y: [strips[0].low, ...strips.map(({ y }) => y), strips[strips.length - 1].high], pressure: [0, ...largest, 0] };
+}
+
+/** @param {App} app @param {Looked} looked @param {JobResult} answer */
+function profilePanel(app, looked, answer) {
+  const standing = {
+    patches: answer.patches, combs: answer.patches.map((_, at) => combOf(looked.fields[at])), chosen: looked.patch,
+    choose: (/** @type {number} */ patch) => choose(app, { patch }),
+  };
+  return html`<section class="panel" aria-labelledby="h-profiles"><header class="bar"><h2 id="h-profiles">On the profiles</h2>
+    <span class="hint">${standing.combs[0] ? 'pressure stands on the rail' : ''}</span></header>
+    <div class="figure">${drawProfiles(looked.placed, standing)}</div></section>`;
+}
+
+/** @type {{ patch: Patch, kind: string, friction: number, curve: ReturnType<typeof curveOf> } | null} */
+let curveBefore = null;
+
+/** @param {App} app @param {Looked} looked @param {Patch} patch */
+function curvePanel(app, looked, patch) {
+  const friction = frictionOf(looked);
+  if (curveBefore?.patch !== patch || curveBefore.kind !== looked.curve) {
+    curveBefore = { patch, kind: looked.curve, friction, curve: curveOf(patch, looked.curve, friction) };
+  }
+  const { curve } = curveBefore;
+  if (!curve) return nothing;
+  const pick = (/** @type {number} */ point) => choose(app, { point });
+  const at = curve.order.indexOf(looked.point);
+  const slide = (/** @type {Event} */ event) => pick(curve.order[Number(/** @type {HTMLInputElement} */ (event.target).value)]);
+  const kinds = /** @type {const} */ ([['forces', 'Forces'], ['moment', 'Moment']]);
+  return html`<section class="panel" aria-labelledby="h-curve"><header class="bar"><h2 id="h-curve">Creep curve</h2>
+    <div class="segs" role="group" aria-label="Curve">${kinds.map(([kind, label]) => html`<label class="seg">
+      <input type="radio" name="curve" .checked=${looked.curve === kind} @change=${() => choose(app, { curve: kind })}><span>${label}</span></label>`)}</div></header>
+    <creep-curve .shown=${{ curve, chosen: looked.point, pick }}></creep-curve>
+    <label class="slide"><span>Motion <output>${at + 1} of ${curve.order.length}: ${curve.xLabel.split(' /')[0]} ${number(curve.x[at])}</output></span>
+      <input type="range" min="0" max=${curve.order.length - 1} .value=${String(at)} @input=${slide}></label>
+    <details class="as-table"><summary>As a table</summary><div class="scroll" tabindex="0" role="region" aria-label="Values of the curve"><table>
+      <thead><tr><th scope="col">${curve.xLabel}</th>${curve.lines.map((line) => html`<th scope="col">${line.label} / ${line.unit}</th><th scope="col">±</th>`)}</tr></thead>
+      <tbody>${curve.x.map((x, place) => html`<tr><td>${number(x)}</td>${curve.lines.map((line) => html`<td>${number(line.y[place])}</td><td>${number(line.error[place], 2)}</td>`)}</tr>`)}</tbody></table></div></details>
+  </section>`;
+}
+
+/** @param {unknown} label @param {unknown} value */
+const row = (label, value) => html`<div><dt>${label}</dt><dd>${value}</dd></div>`;
+
+/** The sum of all patches. @param {JobResult} answer @param {number} point */
+function totalPanel(answer, point) {
+  const total = answer.total[point];
+  if (!total) return nothing;
+  const errors = total.error_estimate;
+  const force = (/** @type {number} */ value, /** @type {number | undefined} */ error) => {
+    const text = withError(value / 1000, error && error / 1000);
+    return text.error ? `${text.value} ± ${text.error}` : text.value;
+  };
+  return html`<section class="panel" aria-labelledby="h-total"><header class="bar"><h2 id="h-total">All patches together</h2>
+    <span class="hint">${answer.patches[0].position ? 'track axes, with the normal forces' : ''}</span></header><dl class="table">
+    ${row('along', `${force(total.force_x_n, errors?.force_x_n)} kN`)}${row('to the left', `${force(total.force_y_n, errors?.force_y_n)} kN`)}
+    ${typeof total.force_z_n === 'number' ? row('up', `${number(total.force_z_n / 1000)} kN`) : nothing}
+    ${row('moment', `${force(total.moment_z_n_mm, errors?.moment_z_n_mm)} N·m`)}</dl></section>`;
+}
+
+/** @param {JobResult} answer @param {Patch} patch @param {Point} point */
+function factsPanel(answer, patch, point) {
+  const { motion, solver } = point;
+  const { position } = patch;
+  return html`<section class="panel facts" aria-labelledby="h-facts"><header class="bar"><h2 id="h-facts">How it was computed</h2></header><dl class="table">
+    ${row('creepage along, across', `${number(100 * (motion.creepage_x ?? 0))} %, ${number(100 * (motion.creepage_y ?? 0))} %`)}
+    ${row('spin', `${number(1000 * (motion.spin_per_mm ?? 0))} 1/m`)}
+    ${patch.semi_axes_mm ? row('semi-axes', `${patch.semi_axes_mm.map((axis) => number(axis)).join(' × ')} mm`) : nothing}
+    ${typeof patch.approach_mm === 'number' ? row('approach', `${number(1000 * patch.approach_mm)} μm`) : nothing}
+    ${position ? row('contact angle, rolling radius', `${degrees(position.contact_angle_rad)}, ${number(position.rolling_radius_mm)} mm`) : nothing}
+    ${row('largest traction', `${number(point.traction_max_mpa)} MPa`)}
+    ${row('method', `${solver.method.replaceAll('_', ' ')}, ${solver.mesh.strips} × ${solver.mesh.cells} cells`)}
+    ${typeof solver.iterations === 'number' ? row('iterations', `${solver.iterations}, residual ${number(solver.residual, 2)}`) : nothing}
+    ${row('time', `${seconds(solver.seconds)}${answer.cached ? ' (solved before)' : ''}`)}
+    ${row('target', point.target_met === true ? 'met' : point.target_met === false ? 'not met' : 'explicit mesh')}
+    ${row('version', answer.solver_version)}</dl></section>`;
+}
+

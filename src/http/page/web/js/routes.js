@@ -1,0 +1,35 @@
+// The address of the page: which view, and all that is needed to see the same again.
+
+/**
+ * @typedef {object} Route
+ * @property {'compose' | 'jobs' | 'result' | 'compare' | 'line' | 'licences'} view
+ * @property {string[]} ids Jobs, or the batch, that the view is about.
+ * @property {Record<string, string>} query What the view shows of them.
+ */
+
+const VIEWS = /** @type {const} */ (['compose', 'jobs', 'compare', 'line', 'licences']);
+
+/**
+ * @param {string} hash
+ * @returns {Route}
+ */
+export function parseRoute(hash) {
+  const [path, search = ''] = hash.replace(/^#\/?/, '').split('?');
+  const [name, ...ids] = path.split('/').filter(Boolean).map(decodeURIComponent);
+  const query = Object.fromEntries(new URLSearchParams(search));
+  const view = VIEWS.find((known) => known === name) ?? 'compose';
+  if (view === 'jobs' && ids.length) return { view: 'result', ids: ids.slice(0, 1), query };
+  return { view, ids, query };
+}
+
+/**
+ * @param {Route['view']} view
+ * @param {readonly string[]} [ids]
+ * @param {Record<string, string | number | undefined>} [query] Members that are undefined or empty are left out.
+ */
+export function formatRoute(view, ids = [], query = {}) {
+  const path = ['#', view === 'result' ? 'jobs' : view, ...ids.map(encodeURIComponent)].join('/');
+  const pairs = Object.entries(query).filter(([, value]) => value !== undefined && value !== '');
+  const search = new URLSearchParams(pairs.map(([key, value]) => [key, String(value)])).toString();
+  return search ? `${path}?${search}` : path;
+}

@@ -1,0 +1,66 @@
+// What the page knows, and what every view may ask of the shell.
+
+/** @typedef {import('./api.js').Job} Job */
+/** @typedef {import('./api.js').JobResult} JobResult */
+/** @typedef {import('./api.js').Fault} Fault */
+/** @typedef {import('./api.js').CheckedCase} CheckedCase */
+/** @typedef {import('./document.js').JsonObject} JsonObject */
+/** @typedef {import('./fields.js').Field} Field */
+/** @typedef {import('./routes.js').Route} Route */
+
+/**
+ * @typedef {object} Preview
+ * A result while typing.
+ * @property {string} digest Of the case that it belongs to.
+ * @property {JobResult} result
+ * @property {Field | null} field Of the first patch and motion, where the case asks for one.
+ */
+
+/**
+ * @typedef {object} Compose
+ * @property {JsonObject | null} document The case; null as long as the text is no JSON.
+ * @property {string} text The same as text.
+ * @property {string} unreadable Why the text is no JSON.
+ * @property {{ pointer: string, text: string } | null} typing The field that is being written in, as it is written.
+ * @property {CheckedCase | null} checked What the service says of a sound case.
+ * @property {readonly Fault[]} faults
+ * @property {string} refusal Why it could not be checked, where that is no fault of the case.
+ * @property {string} example
+ * @property {boolean} solving
+ * @property {boolean} live Solve while typing, where it costs milliseconds.
+ * @property {Preview | null} preview
+ */
+
+/**
+ * @typedef {object} PageState
+ * @property {Route} route
+ * @property {{ ready: boolean, version: string } | null} health
+ * @property {boolean} keyLine Is the line for the API key open?
+ * @property {string} toast
+ * @property {Compose} compose
+ * @property {number} turn Counts changes of what the views keep themselves.
+ */
+
+/**
+ * @typedef {object} App
+ * @property {import('./store.js').Store<PageState>} store
+ * @property {(change: Partial<Compose>) => void} compose Changes the state of Compose.
+ * @property {() => void} redraw
+ * @property {(text: string) => void} say Shows a short message.
+ * @property {(error: unknown) => void} refused Shows why something failed; a missing key opens its line.
+ * @property {(address: string) => void} go To an address of the page.
+ * @property {(address: string) => void} remember Writes what is shown into the address, without a step in the history.
+ */
+
+/** @returns {PageState} */
+export const initialState = () => ({
+  route: { view: 'compose', ids: [], query: {} },
+  health: null,
+  keyLine: false,
+  toast: '',
+  turn: 0,
+  compose: {
+    document: null, text: '', unreadable: '', typing: null, checked: null, faults: [], refusal: '', example: '', solving: false,
+    live: true, preview: null,
+  },
+});

@@ -1,0 +1,61 @@
+// Tables in files that people drop: columns of numbers, and grids with their axes in the first row and column.
+
+/** @typedef {'simpack' | 'miniprof' | 'columns'} ProfileFormat */
+
+/**
+ * The rows of numbers of a text; remarks after `#`, `!` and `%` and lines without numbers are left out.
+ * @param {string} text
+ * @returns {number[][]}
+ */
+export function rowsOf(text) {
+  return text
+    .split(/\r?\n/)
+    .map((line) => line.replace(/[#!%].*/, '').trim())
+    .filter(Boolean)
+    .map((line) => line.split(/[\s,;]+/).filter(Boolean).map(Number))
+    .filter((row) => row.length && row.some(Number.isFinite));
+}
+
+/**
+ * Two columns y and gap, sorted by y.
+ * @param {string} text
+ * @returns {{ y_mm: number[], gap_mm: number[] } | null} Null if there are no two columns.
+ */
+export function parseGapCurve(text) {
+  const rows = rowsOf(text).filter((row) => row.length >= 2 && row.slice(0, 2).every(Number.isFinite));
+  if (rows.length < 3) return null;
+  rows.sort((one, two) => one[0] - two[0]);
+  return { y_mm: rows.map(([y]) => y), gap_mm: rows.map(([, gap]) => gap) };
+}
+
+/**
+ * A grid: the first row holds x, behind a corner cell that may be empty; every further row y and its values.
+ * @param {string} text
+ * @returns {{ x_mm: number[], y_mm: number[], values: number[][] } | null} Null if that is not its shape.
+ */
+export function parseGrid(text) {
+  const rows = rowsOf(text);
+  if (rows.length < 3) return null;
+  const width = rows[1].length - 1;
+  const x_mm = rows[0].slice(-width);
+  const body = rows.slice(1);
+  if (width < 2 || x_mm.length !== width || body.some((row) => row.length !== width + 1)) return null;
+  if (![...x_mm, ...body.flat()].every(Number.isFinite)) return null;
+  if (body[0][0] > body[body.length - 1][0]) body.reverse();
+  return { x_mm, y_mm: body.map(([y]) => y), values: body.map((row) => row.slice(1)) };
+}
+
+/**
+ * What a file of a cross-section is, by the end of its name; null where the name does not say which body.
+ * @param {string} name
+ * @returns {{ format: ProfileFormat, body: 'rail' | 'wheel' | null }}
+ */
+export function profileKind(name) {
+  const end = name.toLowerCase().split('.').pop() ?? '';
+  const worded = /rail/i.test(name) ? 'rail' : /wheel/i.test(name) ? 'wheel' : null;
+  if (end === 'ban') return { format: 'miniprof', body: 'rail' };
+  if (end === 'whl') return { format: 'miniprof', body: 'wheel' };
+  if (end === 'prr') return { format: 'simpack', body: 'rail' };
+  if (end === 'prw') return { format: 'simpack', body: 'wheel' };
+  return { format: 'columns', body: worded };
+}
