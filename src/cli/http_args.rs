@@ -1,6 +1,7 @@
 //! The flags that limit what requests and connections may cost.
 
 use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
@@ -108,6 +109,9 @@ pub struct HttpArgs {
         value_name = "NAME"
     )]
     pub allowed_host: Vec<String>,
+    /// Folder that the files of the page at `/` are read from for each request, for those who change it.
+    #[arg(long, env = "RAILHEAD_PAGE_DIR", value_name = "FOLDER", hide = true)]
+    pub page_dir: Option<PathBuf>,
 }
 
 impl HttpArgs {
@@ -136,6 +140,7 @@ impl HttpArgs {
             renderings_waiting_max: count(self.renderings_waiting_max),
             grid_max_samples: count(self.grid_max_samples),
             allowed_hosts: self.allowed_host.as_slice().into(),
+            page_dir: self.page_dir.as_deref().map(Into::into),
             ..default
         }
     }

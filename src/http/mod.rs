@@ -23,6 +23,7 @@ pub mod extract;
 mod layers;
 mod limits;
 mod options;
+mod page;
 mod problem;
 mod render;
 mod routes;
@@ -35,8 +36,6 @@ use axum::Router;
 use axum::extract::DefaultBodyLimit;
 use axum::http::Uri;
 use axum::middleware::{from_fn, from_fn_with_state};
-use axum::response::Redirect;
-use axum::routing::get;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::decompression::RequestDecompressionLayer;
 use utoipa_axum::router::OpenApiRouter;
@@ -51,6 +50,7 @@ use crate::http::layers::{
     request_id, request_log, security_headers,
 };
 use crate::http::limits::holding_body;
+use crate::http::page::answers;
 use crate::http::problem::error::{self, ApiError};
 use crate::http::problem::kinds::ProblemKind;
 use crate::http::routes::service::metrics as service_metrics;
@@ -125,7 +125,7 @@ fn api(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> Router {
     );
     let router = resources
         .merge(contract)
-        .route("/", get(|| async { Redirect::temporary("/docs/") }))
+        .merge(answers::routes(options.page_dir.clone()))
         .fallback(|uri: Uri| async move { error::unknown_route(uri.path()) })
         .method_not_allowed_fallback(method_not_allowed)
         .layer(DefaultBodyLimit::max(options.body_max_bytes))

@@ -1,5 +1,6 @@
 //! What requests and connections may cost, and who may send them.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -56,6 +57,8 @@ pub struct HttpOptions {
     pub origins: Arc<[String]>,
     /// Requests per second of one key, or of one address without a key; 0 for any number.
     pub requests_per_second: u32,
+    /// Folder that the files of the page are read from, while it is worked on; none: those in the program.
+    pub page_dir: Option<Arc<Path>>,
 }
 
 impl Default for HttpOptions {
@@ -88,6 +91,7 @@ impl Default for HttpOptions {
             allowed_hosts: Arc::default(),
             origins: Arc::default(),
             requests_per_second: 0,
+            page_dir: None,
         }
     }
 }

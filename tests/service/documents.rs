@@ -99,11 +99,6 @@ async fn methods_name_every_word_of_the_contract() {
 #[tokio::test]
 async fn readable_contract_needs_no_other_server() {
     let server = Server::idle().await;
-    let root = server.get("/").await;
-    assert_eq!(
-        (root.status, root.header("location")),
-        (307, Some("/docs/"))
-    );
     let page = server.get("/docs/").await;
     assert_eq!(page.status, 200);
     let mut assets = 0;

@@ -35,6 +35,7 @@ mod metrics;
 mod model;
 mod order;
 mod ownership;
+mod page;
 mod pictures;
 mod point_fields;
 mod profiles;

@@ -104,6 +104,8 @@ const ORDER: &[&str] = &[
     "http::layers",
     "http::extract",
     "http::contract",
+    "http::page::files",
+    "http::page::answers",
     "http::state",
     "http::routes",
     "http",

@@ -143,7 +143,7 @@ export function differenceOf(one, two, quantity) {
     return other < 0 ? NaN : others[other] - values[cell];
   });
   return {
-    key: 'difference', label: 'Difference', heading: `difference of ${quantity.heading}`, unit: quantity.unit, scale: 'signed',
+    key: 'difference', label: 'Difference', heading: `Δ ${quantity.heading}`, unit: quantity.unit, scale: 'signed',
     vanishes: false, bounded: false, values: () => differences, vector: () => null,
   };
 }

@@ -171,7 +171,7 @@ function thumbnails(app, looked, answer) {
     const warned = (answer.remarks ?? []).some((remark) => remark.patch === at && remark.severity === 'warning');
     return html`<label class="seg thumb"><input type="radio" name="patch" .checked=${looked.patch === at} @change=${() => choose(app, { patch: at })}>
       <span>${shown ? html`<field-map class="small" .shown=${shown}></field-map>` : nothing}
-        Patch ${at}${warned ? html` <abbr class="warn" title="There is a remark on this patch">▲</abbr>` : nothing}
+        <b>Patch ${at}${warned ? html` <abbr class="warn" title="There is a remark on this patch">▲</abbr>` : nothing}</b>
         <small>${number(patch.normal_force_n / 1000, 3)} kN${angle}</small></span></label>`;
   })}</div>`;
 }

@@ -97,7 +97,7 @@ function latticeNumbers([y0, y1], [low, high], T, height) {
       ${ys.slice(1, -1).map((y) => svg`<text x=${T([y, 0])[0]} y=${height - 6} text-anchor="middle">${tickLabel(y, ys)}</text>`)}
       ${zs.slice(1).map((z) => svg`<text x="6" y=${T([0, z])[1] + 4}>${tickLabel(z, zs)}</text>`)}
       <text x="6" y="14" class="strong">z up / mm</text>
-      <text x=${WIDTH - 6} y=${height - 6} text-anchor="end" class="strong">y to the left / mm</text>
+      <text x=${WIDTH - 6} y=${height - 22} text-anchor="end" class="strong">y to the left / mm</text>
     </g>`;
 }
 

@@ -163,10 +163,12 @@ function outline(strips) {
 
 /** Points that a segment of a border is divided by. */
 const FINER = 6;
+/** Cosine of the turn from which on a corner is one: 75°. Few strips give an ellipse turns of 60° at its ends. */
+const CORNER = 0.26;
 
 /**
- * A closed smooth curve through the corners of a border (centripetal Catmull-Rom; Yuksel, Schaefer and Keyser, 2011): a contact patch has
- * no corners, but few strips give it some.
+ * A closed smooth curve through the corners of a border (centripetal Catmull-Rom; Yuksel, Schaefer and Keyser, 2011): the border of most
+ * patches has no corners, but few strips give it some. Sharp corners stay.
  * @param {Loop} loop
  * @returns {Loop}
  */
@@ -195,12 +197,20 @@ export function smoothLoop(loop) {
 function between(before, one, two, after, share) {
   const knot = (/** @type {[number, number]} */ from, /** @type {[number, number]} */ to) => Math.sqrt(Math.hypot(to[0] - from[0], to[1] - from[1]));
   const [a, b, c] = [knot(before, one), knot(one, two), knot(two, after)];
+  const sharpStart = turn(before, one, two) < CORNER;
+  const sharpEnd = turn(one, two, after) < CORNER;
   const along = (/** @type {0 | 1} */ axis) => {
     const [p0, p1, p2, p3] = [before[axis], one[axis], two[axis], after[axis]];
-    const start = b * ((p1 - p0) / a - (p2 - p0) / (a + b) + (p2 - p1) / b);
-    const end = b * ((p2 - p1) / b - (p3 - p1) / (b + c) + (p3 - p2) / c);
+    const start = sharpStart ? p2 - p1 : b * ((p1 - p0) / a - (p2 - p0) / (a + b) + (p2 - p1) / b);
+    const end = sharpEnd ? p2 - p1 : b * ((p2 - p1) / b - (p3 - p1) / (b + c) + (p3 - p2) / c);
     const [s, s2, s3] = [share, share ** 2, share ** 3];
     return (2 * s3 - 3 * s2 + 1) * p1 + (s3 - 2 * s2 + s) * start + (3 * s2 - 2 * s3) * p2 + (s3 - s2) * end;
   };
   return [along(0), along(1)];
+}
+
+/** The cosine of the turn at a corner. @param {[number, number]} before @param {[number, number]} at @param {[number, number]} after */
+function turn(before, at, after) {
+  const [x1, y1, x2, y2] = [at[0] - before[0], at[1] - before[1], after[0] - at[0], after[1] - at[1]];
+  return (x1 * x2 + y1 * y2) / (Math.hypot(x1, y1) * Math.hypot(x2, y2));
 }

@@ -76,14 +76,21 @@ function join(open, places) {
 }
 
 /**
- * A zone that ends between two strips is closed: its two sides meet half-way.
+ * A zone that ends between two strips is closed: its two sides meet half-way. A single line goes on in its direction.
  * @param {readonly Line[]} ending
  * @param {number} y
  */
 function meet(ending, y) {
-  if (ending.length !== 2) return;
-  const [one, two] = ending.map((line) => line[line.length - 1][0]);
-  ending.forEach((line) => line.push([(one + two) / 2, y]));
+  if (ending.length === 2) {
+    const [one, two] = ending.map((line) => line[line.length - 1][0]);
+    ending.forEach((line) => line.push([(one + two) / 2, y]));
+    return;
+  }
+  for (const line of ending) {
+    const last = line[line.length - 1];
+    const before = line[line.length - 2];
+    if (before) line.push([last[0] + ((y - last[1]) * (last[0] - before[0])) / (last[1] - before[1]), y]);
+  }
 }
 
 /**

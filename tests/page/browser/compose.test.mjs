@@ -1,0 +1,132 @@
+// Compose: every example, the form and the JSON as faces of one document, faults, files, the result while typing.
+import assert from 'node:assert/strict';
+import { readdirSync } from 'node:fs';
+import { test } from 'node:test';
+import { drawn, example, setUp } from './harness.mjs';
+
+const { service, onPage } = setUp();
+const EXAMPLES = readdirSync(new URL('../../../api/examples/', import.meta.url)).filter((name) => name.endsWith('.case.json'));
+
+/** @param {import('playwright-core').Page} page */
+const json = async (page) => JSON.parse(await page.locator('.code textarea').inputValue());
+/** @param {import('playwright-core').Page} page */
+const sound = (page) => page.locator('.verdict .good').waitFor();
+/** @param {import('playwright-core').Page} page @param {string} file */
+const choose = (page, file) => page.locator('select').first().selectOption(file);
+
+test('every example can be chosen, is drawn, and is solved to a picture or a curve', () => onPage('', async (page) => {
+  const offered = await page.locator('select').first().locator('option').evaluateAll((all) => all.map((option) => /** @type {HTMLOptionElement} */ (option).value));
+  assert.deepEqual(offered.filter(Boolean).sort(), EXAMPLES.map((name) => name.replace('.case.json', '')).sort());
+  for (const file of offered.filter((name) => name && name !== 'faulty')) {
+    await page.goto(`${service.base}/#/compose`);
+    await choose(page, file);
+    await page.waitForFunction((name) => document.querySelector('#h-drawing')?.textContent === name, example(file).name);
+    assert.deepEqual(await json(page), example(file), file);
+    await sound(page);
+    assert.ok(await page.locator('.figure svg.drawing, .figure value-grid canvas').count(), `${file} has a drawing`);
+    await page.getByRole('button', { name: /^Solve/ }).click();
+    if (example(file).outputs.length > 1) await drawn(page);
+    else await page.locator('creep-curve canvas').waitFor();
+    assert.equal(await page.locator('h1').textContent(), example(file).name);
+  }
+}));
+
+test('faults stand at their fields and in a list that leads to them', () => onPage('', async (page) => {
+  await choose(page, 'faulty');
+  await page.locator('.verdict .faults li').nth(4).waitFor();
+  assert.match(await page.locator('.verdict').innerText(), /5 faults/);
+  for (const id of ['material-shear_modulus_mpa', 'material-poisson_ratio', 'friction-coefficient', 'load-normal_force_n']) {
+    assert.equal(await page.locator(`#field-${id}`).getAttribute('aria-invalid'), 'true', id);
+    assert.ok((await page.locator(`#field-${id}-fault`).innerText()).length > 10, id);
+  }
+  const link = page.getByRole('button', { name: '/friction/coefficient' });
+  await link.focus();
+  await page.keyboard.press('Enter');
+  assert.equal(await page.evaluate(() => document.activeElement?.id), 'field-friction-coefficient');
+  // A member without a field: its place in the JSON.
+  await page.getByRole('button', { name: '/motion/creepage_z' }).click();
+  const chosen = await page.locator('.code textarea').evaluate((area) => {
+    const { value, selectionStart, selectionEnd } = /** @type {HTMLTextAreaElement} */ (area);
+    return value.slice(selectionStart, selectionEnd);
+  });
+  assert.equal(chosen, '"creepage_z"');
+}));
+
+test('form and JSON are faces of one document, and broken JSON loses nothing', () => onPage('', async (page) => {
+  await sound(page);
+  await page.getByLabel('Normal force').fill('123.5');
+  assert.equal((await json(page)).load.normal_force_n, 123_500);
+  assert.deepEqual((await json(page)).labels, example('hertz-steel').labels, 'what the form does not show stays');
+  const area = page.locator('.code textarea');
+  const text = await area.inputValue();
+  await area.fill(text.replace('123500', '90000'));
+  assert.equal(await page.getByLabel('Normal force').inputValue(), '90');
+  await area.fill(text.slice(0, -3));
+  await page.getByText('Not JSON').waitFor();
+  assert.equal(await page.getByLabel('Normal force').inputValue(), '90');
+  assert.ok(await page.getByRole('button', { name: /^Solve/ }).isDisabled());
+  await page.reload();
+  await page.getByText('Not JSON').waitFor();
+  await area.fill(text);
+  await sound(page);
+  // A field may be written character by character, and may hold what is no number.
+  const friction = page.getByLabel('Friction coefficient');
+  await friction.fill('');
+  await friction.pressSequentially('0.05');
+  assert.equal(await friction.inputValue(), '0.05');
+  assert.equal((await json(page)).friction.coefficient, 0.05);
+  await friction.fill('much');
+  await page.locator('#field-friction-coefficient-fault').waitFor();
+}));
+
+test('files of profiles go where they belong, also when they are dropped anywhere', () => onPage('', async (page) => {
+  await sound(page);
+  const files = { 'worn.ban': example('wheel-rail-flange').contact.rail.text, 'worn.whl': example('wheel-rail-flange').contact.wheel.text };
+  const transfer = await page.evaluateHandle((given) => {
+    const data = new DataTransfer();
+    for (const [name, text] of Object.entries(given)) data.items.add(new File([text], name));
+    return data;
+  }, files);
+  await page.dispatchEvent('.stage', 'drop', { dataTransfer: transfer });
+  await page.locator('svg[aria-label^="Wheel on rail"] .rail').waitFor();
+  const { contact } = await json(page);
+  assert.equal(contact.type, 'profiles');
+  assert.deepEqual([contact.rail.format, contact.rail.text], ['miniprof', files['worn.ban']]);
+  assert.deepEqual([contact.wheel.format, contact.wheel.text], ['miniprof', files['worn.whl']]);
+  await sound(page);
+  await page.locator('#field-contact-rail').setInputFiles({ name: 'other.csv', mimeType: 'text/csv', buffer: Buffer.from('1 2\n3 4') });
+  await page.locator('.field.bad .drop').waitFor();
+  assert.equal((await json(page)).contact.rail.text, '1 2\n3 4');
+}));
+
+test('gaps and pressures are taken from tables', () => onPage('', async (page) => {
+  await sound(page);
+  await page.getByRole('radio', { name: 'Gap curve' }).check();
+  await sound(page);
+  const rows = Array.from({ length: 25 }, (_, i) => `${i - 12};${((i - 12) ** 2 / 500).toFixed(6)}`).join('\n');
+  await page.locator('#field-contact-gap_mm').setInputFiles({ name: 'gap.csv', mimeType: 'text/csv', buffer: Buffer.from(`y;gap\n${rows}`) });
+  await page.waitForFunction(() => JSON.parse(document.querySelector('textarea')?.value ?? '{}').contact?.y_mm?.length === 25);
+  await sound(page);
+  await page.getByRole('radio', { name: 'Pressure grid' }).check();
+  const axis = [-4, -3, -2, -1, 0, 1, 2, 3, 4];
+  const grid = [['', ...axis], ...axis.map((y) => [y, ...axis.map((x) => Math.max(0, Math.round(900 * (1 - (x * x + y * y) / 12))))])];
+  await page.locator('#field-contact-pressure_mpa').setInputFiles({ name: 'p.csv', mimeType: 'text/csv', buffer: Buffer.from(grid.map((row) => row.join(',')).join('\n')) });
+  await page.locator('value-grid canvas').waitFor();
+  await sound(page);
+}));
+
+test('a cheap case is solved while it is written, and leaves no job behind', () => onPage('', async (page) => {
+  const before = (await service.ask('/v1/jobs?limit=1000')).jobs.length;
+  await page.locator('.preview dd').first().waitFor();
+  const first = await page.locator('.preview').innerText();
+  await page.getByLabel('Normal force').fill('60');
+  await page.waitForFunction((text) => {
+    const shown = /** @type {HTMLElement | null} */ (document.querySelector('.preview'));
+    return shown && shown.innerText !== text;
+  }, first);
+  await drawn(page, '.preview field-map');
+  await page.getByLabel('result while typing').uncheck();
+  await page.locator('.preview').waitFor({ state: 'detached' });
+  const after = (await service.ask('/v1/jobs?limit=1000')).jobs.length;
+  assert.equal(after, before);
+}));

@@ -1,0 +1,149 @@
+// A service of its own for each file of tests, and pages that fail the test for errors, violations of the policy and other origins.
+import assert from 'node:assert/strict';
+import { spawn } from 'node:child_process';
+import { mkdirSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { after, before } from 'node:test';
+import { chromium } from 'playwright-core';
+
+export const OUTPUT = join(import.meta.dirname, '../output');
+/** Times are measured with others at work: in continuous integration they may be three times as long. */
+export const SLACK = process.env.CI ? 3 : 1;
+
+const BROWSER_ARGUMENTS = [
+  '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update',
+  '--disable-sync',
+];
+
+/** @param {string} name An example of the API. */
+export const example = (name) => JSON.parse(readFileSync(new URL(`../../../api/examples/${name}.case.json`, import.meta.url), 'utf8'));
+
+export const ALL = ['resultants', 'zones', 'tractions', 'pressure', 'slip'];
+
+/** An example that asks for every field. @param {string} name */
+export const withFields = (name) => ({ ...example(name), outputs: ALL });
+
+export class Service {
+  folder = mkdtempSync(join(tmpdir(), 'railhead-page-'));
+  base = '';
+  /** @type {import('node:child_process').ChildProcess | null} */
+  process = null;
+
+  /** @param {string[]} more Further arguments. */
+  async start(more = []) {
+    const program = process.env.RAILHEAD_BINARY;
+    assert.ok(program, 'RAILHEAD_BINARY names the program');
+    const listen = this.base ? new URL(this.base).host : '127.0.0.1:0';
+    const child = spawn(program, ['serve', '--listen', listen, '--data-dir', this.folder, '--workers', '1', ...more]);
+    this.process = child;
+    this.base = await new Promise((resolve, reject) => {
+      let printed = '';
+      const read = (/** @type {Buffer} */ piece) => {
+        printed += piece;
+        const address = /listening.*?(127\.0\.0\.1:\d+)/.exec(printed)?.[1];
+        if (address) resolve(`http://${address}`);
+      };
+      child.stdout?.on('data', read);
+      child.stderr?.on('data', read);
+      child.on('exit', () => reject(new Error(`the service ended: ${printed}`)));
+    });
+  }
+
+  /** Ends the process at once, as a crash would. */
+  async kill() {
+    const ended = new Promise((resolve) => this.process?.once('exit', resolve));
+    this.process?.kill('SIGKILL');
+    await ended;
+  }
+
+  async stop() {
+    await this.kill();
+    rmSync(this.folder, { recursive: true, force: true });
+  }
+
+  /**
+   * @param {string} path
+   * @param {RequestInit & { json?: unknown }} [asked]
+   */
+  async ask(path, { json, ...asked } = {}) {
+    const headers = { ...(json === undefined ? {} : { 'Content-Type': 'application/json' }), ...asked.headers };
+    const body = json === undefined ? asked.body : JSON.stringify(json);
+    const answer = await fetch(this.base + path, { ...asked, method: asked.method ?? (body ? 'POST' : 'GET'), headers, body });
+    const text = await answer.text();
+    assert.ok(answer.ok, `${path}: ${answer.status} ${text}`);
+    return JSON.parse(text);
+  }
+
+  /** A job that has ended. @param {unknown} document */
+  solved(document) {
+    return this.ask('/v1/jobs', { json: document, headers: { Prefer: 'wait=60' } });
+  }
+}
+
+/**
+ * A service and a browser for the tests of a file.
+ * @param {string[]} [more]
+ */
+export function setUp(more = []) {
+  const service = new Service();
+  /** @type {{ browser: import('playwright-core').Browser | null }} */
+  const held = { browser: null };
+  before(async () => {
+    mkdirSync(OUTPUT, { recursive: true });
+    [held.browser] = await Promise.all([
+      chromium.launch({ executablePath: process.env.RAILHEAD_TEST_BROWSER, args: BROWSER_ARGUMENTS }),
+      service.start(more),
+    ]);
+  });
+  after(async () => {
+    await held.browser?.close();
+    await service.stop();
+  });
+  /**
+   * Opens the page and runs a test on it. Afterwards nothing may have gone wrong.
+   * @param {string} hash
+   * @param {(page: import('playwright-core').Page) => Promise<void>} test
+   * @param {import('playwright-core').BrowserContextOptions & { quiet?: boolean }} [look] `quiet`: the service is away for a while.
+   */
+  const onPage = async (hash, test, look = {}) => {
+    assert.ok(held.browser);
+    const context = await held.browser.newContext({ viewport: { width: 1440, height: 900 }, acceptDownloads: true, ...look });
+    const page = await context.newPage();
+    /** @type {string[]} */
+    const complaints = [];
+    page.on('pageerror', (error) => complaints.push(error.stack ?? error.message));
+    page.on('console', (message) => {
+      // A refusal is logged by the browser though the page deals with it.
+      if (message.type() === 'error' && !message.text().startsWith('Failed to load resource')) complaints.push(message.text());
+    });
+    page.on('request', (request) => {
+      const { protocol, origin } = new URL(request.url());
+      if (protocol.startsWith('http') && origin !== service.base) complaints.push(`asked ${request.url()}`);
+    });
+    page.setDefaultTimeout(15_000);
+    try {
+      await page.goto(`${service.base}/${hash}`);
+      await test(page);
+      assert.deepEqual(complaints, []);
+    } finally {
+      await context.close();
+    }
+  };
+  return { service, onPage };
+}
+
+/** Waits until the map of the result is drawn. @param {import('playwright-core').Page} page @param {string} [selector] */
+export async function drawn(page, selector = 'field-map.main') {
+  await page.waitForFunction((which) => {
+    const map = /** @type {(HTMLElement & { took: { picture: number } }) | null} */ (document.querySelector(which));
+    return map !== null && map.took.picture > 0;
+  }, selector);
+}
+
+/** What the readout of a map says, by name. @param {import('playwright-core').Page} page */
+export const readout = (page, selector = 'field-map.main') => page.locator(`${selector} .readout div`).evaluateAll((entries) =>
+  Object.fromEntries(entries.map((entry) => [entry.querySelector('dt')?.textContent, entry.querySelector('dd')?.textContent])));
+
+/** A number as the page writes it. @param {string | undefined} text */
+export const parsed = (text) => Number((text ?? '').replace(/\u2212/g, '-').replace(/\u2009/g, '').replace(/ .*/, ''));

@@ -1,0 +1,226 @@
+// Result: the crosshair by mouse, touch and keys against the API, links, creep curves, several patches, downloads.
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { readFileSync } from 'node:fs';
+import { test } from 'node:test';
+import { drawn, example, parsed, readout, setUp, withFields } from './harness.mjs';
+
+const { service, onPage } = setUp();
+
+/** The cell of a field at a place. @param {Record<string, number[]>} cells @param {number} x @param {number} y */
+const cellAt = (cells, x, y) => cells.x_mm.findIndex((_, cell) =>
+  Math.abs(cells.x_mm[cell] - x) <= cells.dx_mm[cell] / 2 && Math.abs(cells.y_mm[cell] - y) <= cells.dy_mm[cell] / 2);
+
+/** The readout says of its place what the API says. @param {import('playwright-core').Page} page @param {string} id */
+async function agrees(page, id, query = 'patch=0&point=0') {
+  const told = await readout(page);
+  const { cells } = await service.ask(`/v1/jobs/${id}/tractions?${query}`);
+  const cell = cellAt(cells, parsed(told.x), parsed(told.y));
+  assert.ok(cell >= 0, JSON.stringify(told));
+  const size = Math.hypot(cells.traction_x_mpa[cell], cells.traction_y_mpa[cell]);
+  assert.ok(Math.abs(parsed(told['|t|']) - size) <= 2e-3 * size, `${told['|t|']} is ${size}`);
+  return told;
+}
+
+test('the crosshair says what the API says, by mouse and by keys', () => onPage('', async (page) => {
+  const { id } = await service.solved(withFields('hertz-steel'));
+  await page.goto(`${service.base}/#/jobs/${id}`);
+  await drawn(page);
+  const over = page.locator('field-map.main .over');
+  const box = await over.boundingBox();
+  assert.ok(box);
+  await page.mouse.move(box.x + 250, box.y + 220);
+  await page.waitForTimeout(60);
+  const one = await agrees(page, id);
+  await page.mouse.click(box.x + 330, box.y + 260);
+  await page.waitForTimeout(60);
+  const held = await agrees(page, id);
+  assert.notEqual(one.x, held.x);
+  await page.mouse.move(box.x + 200, box.y + 200);
+  await page.waitForTimeout(60);
+  assert.deepEqual(await readout(page), held, 'a click holds the crosshair');
+  await over.focus();
+  await page.keyboard.press('ArrowRight');
+  await page.waitForTimeout(60);
+  const right = await agrees(page, id);
+  await page.keyboard.press('ArrowUp');
+  await page.waitForTimeout(60);
+  const up = await agrees(page, id);
+  assert.ok(parsed(right.x) > parsed(held.x) - 1 && parsed(up.y) > parsed(right.y));
+  assert.match((await page.locator('field-map.main output').textContent()) ?? '', /^x .* mm, y .* mm, p .* MPa, \|t\| .* zone (stick|slip)/);
+  await page.keyboard.press('End');
+  await page.waitForTimeout(60);
+  assert.ok(parsed((await agrees(page, id)).x) > parsed(up.x));
+  await page.keyboard.press('Escape');
+}));
+
+test('touch moves the crosshair', () => onPage('', async (page) => {
+  const { id } = await service.solved(withFields('spin'));
+  await page.goto(`${service.base}/#/jobs/${id}`);
+  await drawn(page);
+  const box = await page.locator('field-map.main .over').boundingBox();
+  assert.ok(box);
+  await page.locator('field-map.main').scrollIntoViewIfNeeded();
+  const seen = await page.locator('field-map.main .over').boundingBox();
+  assert.ok(seen);
+  await page.touchscreen.tap(seen.x + 190, seen.y + 120);
+  await page.waitForTimeout(60);
+  await agrees(page, id);
+}, { hasTouch: true, viewport: { width: 390, height: 844 }, isMobile: true }));
+
+test('a link restores patch, motion, quantity and crosshair, and a motion keeps the crosshair', () => onPage('', async (page) => {
+  const { id } = await service.solved(withFields('sweep'));
+  await page.goto(`${service.base}/#/jobs/${id}?patch=0&point=7&field=pressure&x=1.2&y=-0.8`);
+  await drawn(page);
+  await page.waitForTimeout(60);
+  const told = await readout(page);
+  assert.deepEqual([parsed(told.x), parsed(told.y)], [1.2, -0.8]);
+  assert.ok(await page.getByRole('radio', { name: 'Pressure' }).isChecked());
+  await page.getByRole('radio', { name: 'Traction' }).check();
+  await page.waitForTimeout(60);
+  await agrees(page, id, 'patch=0&point=7');
+  await page.locator('.panel > .slide input').fill('3');
+  await page.waitForFunction(() => location.hash.includes('point=3'));
+  await page.waitForTimeout(300);
+  assert.deepEqual([parsed((await readout(page)).x), parsed((await readout(page)).y)], [1.2, -0.8]);
+  await agrees(page, id, 'patch=0&point=3');
+  const copied = page.url();
+  await page.goto('about:blank');
+  await page.goto(copied);
+  await drawn(page);
+  await page.waitForTimeout(60);
+  await agrees(page, id, 'patch=0&point=3');
+  assert.equal(parsed((await readout(page)).x), 1.2);
+}));
+
+test('a click on the creep curve chooses the motion, and error bars reach as far as the errors', () => onPage('', async (page) => {
+  const { id } = await service.solved({ ...withFields('sweep'), solver: { mesh: { strips: 4, cells: 4 } } });
+  await page.goto(`${service.base}/#/jobs/${id}`);
+  await page.locator('creep-curve canvas').waitFor();
+  await drawn(page);
+  const curve = page.locator('creep-curve');
+  const place = await curve.evaluate((element) => {
+    const { plot } = /** @type {HTMLElement & { plot: { data: number[][], valToPos: (value: number, scale: string) => number } }} */ (element);
+    return { x: plot.valToPos(plot.data[0][8], 'x'), y: plot.valToPos(plot.data[1][8], 'y') };
+  });
+  const area = await curve.locator('.u-over').boundingBox();
+  assert.ok(area);
+  await page.mouse.click(area.x + place.x, area.y + place.y);
+  await page.waitForFunction(() => location.hash.includes('point=8'));
+  const { points } = (await service.ask(`/v1/jobs/${id}/result`)).patches[0];
+  const error = points[8].error_estimate.force_x_n / 1000;
+  assert.ok(error > 0.05, 'the coarse mesh has errors that can be seen');
+  // Half-way between the point and the end of its bar there is the colour of the line; a little beyond the end there is not.
+  const inked = await curve.evaluate((element, bar) => {
+    const { plot } = /** @type {HTMLElement & { plot: { data: number[][], ctx: CanvasRenderingContext2D, valToPos: (value: number, scale: string, canvas: boolean) => number } }} */ (element);
+    const colour = getComputedStyle(element).getPropertyValue('--c1').trim();
+    const wanted = [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16));
+    const x = Math.round(plot.valToPos(plot.data[0][bar.at], 'x', true));
+    const seen = (/** @type {number} */ share) => {
+      const y = Math.round(plot.valToPos(plot.data[1][bar.at] + share * bar.error, 'y', true));
+      const { data } = plot.ctx.getImageData(x - 1, y, 3, 1);
+      return [0, 4, 8].some((at) => wanted.every((value, channel) => Math.abs(data[at + channel] - value) < 60));
+    };
+    const pixels = Math.abs(plot.valToPos(bar.error, 'y', true) - plot.valToPos(0, 'y', true));
+    return { end: seen(1), beyond: seen(1 + 5 / pixels), pixels };
+  }, { at: 5, error: points[5].error_estimate.force_x_n / 1000 });
+  assert.ok(inked.pixels > 2, `${inked.pixels}`);
+  assert.deepEqual([inked.end, inked.beyond], [true, false], JSON.stringify(inked));
+}));
+
+test('two patches have one scale of colours, and stand on the profiles', () => onPage('', async (page) => {
+  const { id, result } = await service.solved(withFields('wheel-rail-flange'));
+  await page.goto(`${service.base}/#/jobs/${id}`);
+  await drawn(page);
+  await drawn(page, '.thumbs label:last-child field-map');
+  const ranges = await page.locator('field-map').evaluateAll((maps) => maps.map((map) => /** @type {HTMLElement & { shown: { range: number[] } }} */ (map).shown.range));
+  assert.equal(ranges.length, 3);
+  for (const range of ranges) assert.deepEqual(range, ranges[0]);
+  const bound = example('wheel-rail-flange').friction.coefficient * Math.max(...result.patches.map((/** @type {{ pressure_max_mpa: number }} */ patch) => patch.pressure_max_mpa));
+  assert.ok(Math.abs(ranges[0][1] - bound) < 1e-6 * bound);
+  assert.equal(await page.locator('svg .patch .comb').count(), 2);
+  const remarks = await page.locator('.remark').allInnerTexts();
+  assert.equal(remarks.length, result.remarks.length);
+  assert.ok(remarks.some((text) => text.startsWith('patch 0')));
+  await page.locator('svg .patch[data-patch="1"] circle.tag').click();
+  await page.waitForFunction(() => location.hash.includes('patch=1'));
+  await page.waitForTimeout(60);
+  await agrees(page, id, 'patch=1&point=0');
+  // The contact points lie on the drawn rail.
+  const far = await page.evaluate((positions) => {
+    const rail = /** @type {SVGPathElement} */ (document.querySelector('svg .rail'));
+    const svg = /** @type {SVGSVGElement} */ (rail.ownerSVGElement);
+    const length = rail.getTotalLength();
+    const dots = [...svg.querySelectorAll('.patch .dot')].map((dot) => [Number(dot.getAttribute('cx')), Number(dot.getAttribute('cy'))]);
+    void positions;
+    return dots.map(([x, y]) => {
+      let least = Infinity;
+      for (let at = 0; at < length; at += 0.25) {
+        const point = rail.getPointAtLength(at);
+        least = Math.min(least, Math.hypot(point.x - x, point.y - y));
+      }
+      return least;
+    });
+  }, null);
+  assert.ok(far.every((distance) => distance < 1), `${far}`);
+}));
+
+test('a job without fields shows its numbers and offers to solve again with fields', () => onPage('', async (page) => {
+  const { id } = await service.solved({ ...example('spin'), outputs: ['resultants'] });
+  await page.goto(`${service.base}/#/jobs/${id}`);
+  await page.getByRole('button', { name: 'Solve again with fields' }).click();
+  await drawn(page);
+  assert.ok(!page.url().includes(id));
+}));
+
+/** @param {import('playwright-core').Page} page @param {string} name */
+async function downloaded(page, name) {
+  const [file] = await Promise.all([page.waitForEvent('download'), page.getByRole('group', { name: 'Download' }).getByRole('button', { name, exact: true }).click()]);
+  const path = await file.path();
+  return { path, name: file.suggestedFilename(), body: readFileSync(path) };
+}
+
+test('every download opens', () => onPage('', async (page) => {
+  const { id } = await service.solved(withFields('hertz-steel'));
+  await page.goto(`${service.base}/#/jobs/${id}`);
+  await drawn(page);
+  const svg = await downloaded(page, 'SVG');
+  assert.match(svg.name, /traction\.svg$/);
+  const fault = await page.evaluate((text) => new DOMParser().parseFromString(text, 'image/svg+xml').querySelector('parsererror')?.textContent ?? '', svg.body.toString()).catch(() => '');
+  assert.equal(fault, '');
+  execFileSync('python3', ['-c', 'import sys, xml.dom.minidom; assert xml.dom.minidom.parse(sys.argv[1]).documentElement.tagName == "svg"', svg.path]);
+  const png = await downloaded(page, 'PNG');
+  assert.equal(png.body.toString('latin1', 1, 4), 'PNG');
+  const width = await page.locator('field-map.main canvas').first().evaluate((canvas) => canvas.clientWidth);
+  assert.equal(png.body.readUInt32BE(16), 2 * Math.round(width));
+  const csv = await downloaded(page, 'CSV');
+  const [head, ...lines] = csv.body.toString().trim().split(/\r?\n/);
+  assert.ok(head.includes('traction_x_mpa') && head.includes('traction_y_mpa'), head);
+  const { cells } = await service.ask(`/v1/jobs/${id}/tractions`);
+  assert.equal(lines.length, cells.x_mm.length);
+  const vtk = await downloaded(page, 'VTK');
+  assert.match(vtk.body.toString('latin1', 0, 400), /^(# vtk DataFile|<\?xml|<VTKFile)/);
+  const npz = await downloaded(page, 'NPZ');
+  const read = await page.evaluate(async ({ base, bytes }) => {
+    const { readNpz } = await import(`${base}js/npz.js`);
+    const arrays = await readNpz(new Uint8Array(bytes).buffer);
+    return Array.from(arrays.traction_x_mpa.values);
+  }, { base: new URL(await page.locator('.brand img').getAttribute('src') ?? '', service.base).href.replace('icon.svg', ''), bytes: [...npz.body] });
+  assert.deepEqual(read, cells.traction_x_mpa);
+  const numbers = await downloaded(page, 'Numbers');
+  assert.match(numbers.body.toString(), /force_x_n/);
+  numpyReads(npz.path, cells.traction_x_mpa.length);
+}));
+
+/** NumPy opens the archive, where it is installed. @param {string} path @param {number} length */
+function numpyReads(path, length) {
+  const python = process.env.RAILHEAD_TEST_PYTHON ?? 'python3';
+  try {
+    execFileSync(python, ['-c', 'import numpy'], { stdio: 'ignore' });
+  } catch {
+    // The tests of the service read the same archives with NumPy, and insist on it in continuous integration.
+    return;
+  }
+  const sum = execFileSync(python, ['-c', 'import numpy, sys; print(len(numpy.load(sys.argv[1])["traction_x_mpa"]))', path]);
+  assert.equal(Number(sum.toString()), length);
+}

@@ -1,0 +1,58 @@
+// The case as a document: pointers, text, differences; and the addresses of the page.
+import assert from 'node:assert/strict';
+import { readdirSync, readFileSync } from 'node:fs';
+import { test } from 'node:test';
+import { at, differences, placeInText, pretty, put } from '../../../src/http/page/web/js/document.js';
+import { formatRoute, parseRoute } from '../../../src/http/page/web/js/routes.js';
+
+const EXAMPLES = new URL('../../../api/examples/', import.meta.url);
+
+test('pointers reach members with slashes and tildes in their names', () => {
+  const document = { 'a/b': { 'c~d': [10, { e: 11 }] } };
+  assert.equal(at(document, '/a~1b/c~0d/1/e'), 11);
+  assert.equal(at(document, '/a~1b/none/1'), undefined);
+  assert.equal(at(document, ''), document);
+  const changed = put(document, '/a~1b/c~0d/1/e', 12);
+  assert.equal(at(changed, '/a~1b/c~0d/1/e'), 12);
+  assert.equal(at(document, '/a~1b/c~0d/1/e'), 11, 'the document before stays as it was');
+});
+
+test('putting makes the objects on the way and nothing takes a member away', () => {
+  assert.deepEqual(put({}, '/solver/mesh/strips', 4), { solver: { mesh: { strips: 4 } } });
+  assert.deepEqual(put({ a: 1, b: 2 }, '/a', undefined), { b: 2 });
+});
+
+test('every example reads back from its pretty text', () => {
+  const files = readdirSync(EXAMPLES).filter((name) => name.endsWith('.case.json'));
+  assert.ok(files.length > 10);
+  for (const file of files) {
+    const document = JSON.parse(readFileSync(new URL(file, EXAMPLES), 'utf8'));
+    assert.deepEqual(JSON.parse(pretty(document)), document, file);
+  }
+  for (const value of [[], {}, [[1, 2], [3, 4]], { a: [] }, { a: { b: [{ c: null }] } }, 'x', [Array(300).fill(1.25)]]) {
+    assert.deepEqual(JSON.parse(pretty(value)), value);
+  }
+});
+
+test('differences are the pointers at which two documents differ', () => {
+  const one = { a: 1, b: { c: [1, 2, 3] }, d: 'x' };
+  const two = { a: 1, b: { c: [1, 5, 3] }, e: true };
+  assert.deepEqual(differences(one, two).sort(), ['/b/c/1', '/d', '/e']);
+  assert.deepEqual(differences(one, structuredClone(one)), []);
+  assert.deepEqual(differences({ points: Array(50).fill(0) }, { points: Array(50).fill(1) }), ['/points']);
+});
+
+test('the place of a pointer in the text is that of its member', () => {
+  const text = pretty({ motion: { creepage_x: 1 }, other: { creepage_x: 2 } });
+  const [start, end] = placeInText(text, '/other/creepage_x') ?? [0, 0];
+  assert.equal(text.slice(start, end), '"creepage_x"');
+  assert.ok(start > text.indexOf('"other"'));
+});
+
+test('addresses lead back to what they were made of', () => {
+  const route = parseRoute(formatRoute('result', ['a1'], { patch: 1, point: 9, field: 'traction', x: undefined }));
+  assert.deepEqual(route, { view: 'result', ids: ['a1'], query: { patch: '1', point: '9', field: 'traction' } });
+  assert.deepEqual(parseRoute('#/compare/a/b/c'), { view: 'compare', ids: ['a', 'b', 'c'], query: {} });
+  assert.equal(parseRoute('#/nothing').view, 'compose');
+  assert.equal(parseRoute('').view, 'compose');
+});
