@@ -16,6 +16,8 @@ const BROWSER_ARGUMENTS = [
   '--disable-sync',
 ];
 
+export const launch = () => chromium.launch({ executablePath: process.env.RAILHEAD_TEST_BROWSER, args: BROWSER_ARGUMENTS });
+
 /** @param {string} name An example of the API. */
 export const example = (name) => JSON.parse(readFileSync(new URL(`../../../api/examples/${name}.case.json`, import.meta.url), 'utf8'));
 
@@ -92,7 +94,7 @@ export function setUp(more = []) {
   before(async () => {
     mkdirSync(OUTPUT, { recursive: true });
     [held.browser] = await Promise.all([
-      chromium.launch({ executablePath: process.env.RAILHEAD_TEST_BROWSER, args: BROWSER_ARGUMENTS }),
+      launch(),
       service.start(more),
     ]);
   });

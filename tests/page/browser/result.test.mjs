@@ -142,17 +142,16 @@ test('two patches have one scale of colours, and stand on the profiles', () => o
   const remarks = await page.locator('.remark').allInnerTexts();
   assert.equal(remarks.length, result.remarks.length);
   assert.ok(remarks.some((text) => text.startsWith('patch 0')));
-  await page.locator('svg .patch[data-patch="1"] circle.tag').click();
+  await page.locator('svg .patch[data-patch="1"] text.tag').click();
   await page.waitForFunction(() => location.hash.includes('patch=1'));
   await page.waitForTimeout(60);
   await agrees(page, id, 'patch=1&point=0');
   // The contact points lie on the drawn rail.
-  const far = await page.evaluate((positions) => {
+  const far = await page.evaluate(() => {
     const rail = /** @type {SVGPathElement} */ (document.querySelector('svg .rail'));
     const svg = /** @type {SVGSVGElement} */ (rail.ownerSVGElement);
     const length = rail.getTotalLength();
     const dots = [...svg.querySelectorAll('.patch .dot')].map((dot) => [Number(dot.getAttribute('cx')), Number(dot.getAttribute('cy'))]);
-    void positions;
     return dots.map(([x, y]) => {
       let least = Infinity;
       for (let at = 0; at < length; at += 0.25) {
@@ -161,7 +160,7 @@ test('two patches have one scale of colours, and stand on the profiles', () => o
       }
       return least;
     });
-  }, null);
+  });
   assert.ok(far.every((distance) => distance < 1), `${far}`);
 }));
 
@@ -186,8 +185,6 @@ test('every download opens', () => onPage('', async (page) => {
   await drawn(page);
   const svg = await downloaded(page, 'SVG');
   assert.match(svg.name, /traction\.svg$/);
-  const fault = await page.evaluate((text) => new DOMParser().parseFromString(text, 'image/svg+xml').querySelector('parsererror')?.textContent ?? '', svg.body.toString()).catch(() => '');
-  assert.equal(fault, '');
   execFileSync('python3', ['-c', 'import sys, xml.dom.minidom; assert xml.dom.minidom.parse(sys.argv[1]).documentElement.tagName == "svg"', svg.path]);
   const png = await downloaded(page, 'PNG');
   assert.equal(png.body.toString('latin1', 1, 4), 'PNG');
@@ -218,7 +215,7 @@ function numpyReads(path, length) {
   try {
     execFileSync(python, ['-c', 'import numpy'], { stdio: 'ignore' });
   } catch {
-    // The tests of the service read the same archives with NumPy, and insist on it in continuous integration.
+    assert.ok(!process.env.CI, 'not run: RAILHEAD_TEST_PYTHON names a Python with NumPy');
     return;
   }
   const sum = execFileSync(python, ['-c', 'import numpy, sys; print(len(numpy.load(sys.argv[1])["traction_x_mpa"]))', path]);

@@ -59,7 +59,7 @@ function list(app) {
     app.redraw();
   };
   const after = queue.jobs.length - first - rows.length;
-  return html`<div class="list" tabindex="0" role="group" aria-label="Jobs, newest first" .scrollTop=${queue.top} @scroll=${scrolled}>
+  return html`<div class="list" tabindex="0" role="group" aria-label="Jobs, newest first" @scroll=${scrolled}>
     ${spacer(first)}${rows.map((job) => row(app, job))}${spacer(after)}
     ${queue.loaded && !queue.jobs.length ? html`<p class="quiet pad">No jobs${queue.state ? ` that are ${queue.state}` : ''}${queue.label ? ` with the label ${queue.label}` : ''}.
       <a href="#/compose">Compose one.</a></p>` : nothing}

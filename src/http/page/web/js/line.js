@@ -8,12 +8,12 @@ import { formatRoute } from './routes.js';
 
 /** @typedef {'wear' | 'used' | 'pressure' | 'stick'} StripKey */
 
-/** @type {readonly { key: StripKey, label: string, unit: string, colour: string }[]} */
+/** @type {readonly { key: StripKey, label: string, short: string, unit: string, colour: string }[]} */
 export const STRIPS = [
-  { key: 'wear', label: 'wear number Tγ', unit: 'J/m', colour: '--c1' },
-  { key: 'used', label: 'traction coefficient T/N', unit: '%', colour: '--c2' },
-  { key: 'pressure', label: 'largest pressure', unit: 'MPa', colour: '--c3' },
-  { key: 'stick', label: 'stick', unit: '% of the area', colour: '--stick' },
+  { key: 'wear', label: 'wear number Tγ', short: 'Tγ', unit: 'J/m', colour: '--c1' },
+  { key: 'used', label: 'traction coefficient T/N', short: 'T/N', unit: '%', colour: '--c2' },
+  { key: 'pressure', label: 'largest pressure', short: 'p max', unit: 'MPa', colour: '--c3' },
+  { key: 'stick', label: 'stick', short: 'stick', unit: '% of the area', colour: '--stick' },
 ];
 
 /** @typedef {{ id: string, name: string, index: number, labels: Record<string, string> } & Record<StripKey, number>} Row */

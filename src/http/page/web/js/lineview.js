@@ -66,7 +66,7 @@ function worstPanel(app, line) {
       <label class="inline">by <select @change=${pick}>${STRIPS.map(({ key, label }) => html`<option value=${key} ?selected=${key === line.worst}>${label}</option>`)}</select></label></header>
     ${limit === undefined ? nothing : html`<p class="pad">${count(over)} of ${count(line.rows.length)} over the limit of ${number(limit)} ${strip.unit}</p>`}
     <div class="scroll" tabindex="0" role="region" aria-labelledby="h-worst"><table>
-      <thead><tr><th scope="col">${line.by || 'case'}</th>${STRIPS.map(({ label, unit }) => html`<th scope="col">${label} / ${unit}</th>`)}<th></th></tr></thead>
+      <thead><tr><th scope="col">${line.by || 'case'}</th>${STRIPS.map(({ short, unit }) => html`<th scope="col">${short} / ${unit.split(' ')[0]}</th>`)}<th></th></tr></thead>
       <tbody>${rows.map((row) => html`<tr><th scope="row">${number(placeOf(row, line.by), 6)}</th>${STRIPS.map(({ key }) => html`<td class=${over && key === strip.key && row[key] > (limit ?? Infinity) ? 'warn' : ''}>${number(row[key])}</td>`)}
         <td><a href=${formatRoute('result', [row.id])}>open<span class="visually-hidden"> ${row.name}</span></a></td></tr>`)}</tbody></table></div></section>`;
 }

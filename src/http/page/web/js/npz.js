@@ -1,6 +1,6 @@
 // NumPy archives as typed arrays, unpacked by the browser itself.
 
-/** @typedef {Float64Array | Float32Array | Int32Array | Int8Array | Uint8Array} Values */
+/** @typedef {Float64Array | Float32Array | Int32Array | Uint32Array | Int8Array | Uint8Array} Values */
 /** @typedef {{ shape: number[], values: Values | string[] }} NamedArray */
 
 const END_OF_DIRECTORY = 0x06054b50;
@@ -63,6 +63,7 @@ function valuesOf(kind, raw) {
   if (kind === '<f8') return new Float64Array(raw);
   if (kind === '<f4') return new Float32Array(raw);
   if (kind === '<i4') return new Int32Array(raw);
+  if (kind === '<u4') return new Uint32Array(raw);
   if (kind === '|i1') return new Int8Array(raw);
   if (kind === '|u1') return new Uint8Array(raw);
   const text = /^\|S(\d+)$|^<U(\d+)$/.exec(kind);

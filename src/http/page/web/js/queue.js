@@ -38,6 +38,11 @@ export const queueSeen = () => queue;
 /** @param {App} app */
 export function startQueue(app) {
   stopQueue();
+  // The list is where it was left, as soon as its rows are there.
+  requestAnimationFrame(() => {
+    const list = document.querySelector('.list');
+    if (list) list.scrollTop = queue.top;
+  });
   stopping = new AbortController();
   refresh(app);
 }

@@ -1,0 +1,86 @@
+// Compare and Line: several jobs side by side, and the cases of a batch along a label.
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { drawn, example, parsed, readout, setUp, withFields } from './harness.mjs';
+
+const { service, onPage } = setUp();
+
+test('compared jobs share range and crosshair, and say how many errors they are apart', () => onPage('#/compose', async (page) => {
+  const base = withFields('hertz-steel');
+  const coarse = await service.solved({ ...base, name: 'one', solver: { mesh: { strips: 12, cells: 12 } } });
+  const fine = await service.solved({ ...base, name: 'two', solver: { mesh: { strips: 14, cells: 14 } } });
+  const other = await service.solved({ ...base, name: 'three', friction: { coefficient: 0.15 } });
+  await page.goto(`${service.base}/#/jobs`);
+  for (const name of ['one', 'two', 'three']) await page.getByLabel(`Compare ${name}`, { exact: true }).check();
+  await page.getByRole('link', { name: 'Compare 3' }).first().click();
+  await drawn(page, '[aria-label="Job C"] field-map');
+  const ranges = await page.locator('[aria-label^="Job "] field-map').evaluateAll((maps) => maps.map((map) => /** @type {HTMLElement & { shown: { range: number[] } }} */ (map).shown.range));
+  assert.equal(ranges.length, 3);
+  for (const range of ranges) assert.deepEqual(range, ranges[0]);
+  await page.locator('[aria-label="Job A"] field-map .over').hover({ position: { x: 150, y: 130 } });
+  await page.waitForTimeout(120);
+  const [a, c] = [await readout(page, '[aria-label="Job A"] field-map'), await readout(page, '[aria-label="Job C"] field-map')];
+  assert.deepEqual([c.x, c.y], [a.x, a.y]);
+  const force = page.locator('tr', { hasText: 'F x along' });
+  const numbers = async () => (await force.locator('td').allInnerTexts());
+  assert.equal((await numbers())[4], 'within the errors');
+  assert.ok(Math.abs(parsed((await numbers())[0]) - coarse.result.patches[0].points[0].force_x_n) < 1);
+  await page.getByRole('radio', { name: 'C', exact: true }).check();
+  const difference = other.result.patches[0].points[0].force_x_n - coarse.result.patches[0].points[0].force_x_n;
+  await page.waitForFunction(() => /× the error/.test(document.querySelector('tbody')?.textContent ?? ''));
+  assert.ok(Math.abs(parsed((await numbers())[3]) / difference - 1) < 0.01);
+  const pointers = await page.locator('section[aria-labelledby="h-cases"] code').allInnerTexts();
+  assert.deepEqual(pointers.sort(), ['/friction/coefficient', '/name', '/solver/mesh', '/solver/mesh/cells', '/solver/mesh/strips', '/solver/method', '/solver/target_error']
+    .filter((pointer) => pointers.includes(pointer)));
+  assert.ok(pointers.includes('/friction/coefficient') && pointers.includes('/solver/mesh/strips'));
+  void fine;
+}));
+
+test('the difference of a job with itself is nothing', () => onPage('#/compose', async (page) => {
+  const { id } = await service.solved(withFields('spin'));
+  await page.goto(`${service.base}/#/compare/${id}/${id}`);
+  await drawn(page, '[aria-label="Difference"] field-map');
+  const told = await readout(page, '[aria-label="Difference"] field-map');
+  assert.equal(Object.values(told)[2], '0 MPa', JSON.stringify(told));
+  assert.match(await page.locator('section[aria-labelledby="h-cases"]').innerText(), /Nothing/);
+}));
+
+test('a batch stands along its label, with limits, the worst places and the way to the contact', () => onPage('#/compose', async (page) => {
+  const cases = Array.from({ length: 40 }, (_, i) => ({
+    ...example('hertz-steel'), name: `at ${i}`, labels: { km: String(10 + i / 10), line: 'A12' }, load: { normal_force_n: 60_000 + 2000 * ((i * 7) % 40) },
+    solver: { mesh: { strips: 8, cells: 8 } }, outputs: ['resultants', 'zones'],
+  }));
+  const { id } = await service.ask('/v1/batches', { json: cases });
+  await fetch(`${service.base}/v1/batches/${id}/results?wait=30`).then((answer) => answer.text());
+  await page.goto(`${service.base}/#/line/${id}`);
+  await page.locator('line-strips canvas').nth(3).waitFor();
+  assert.equal(await page.getByRole('combobox', { name: 'Along' }).inputValue(), 'km');
+  const results = (await fetch(`${service.base}/v1/batches/${id}/results`).then((answer) => answer.text())).trim().split('\n').map((line) => JSON.parse(line));
+  const worst = results.sort((one, two) => two.result.patches[0].points[0].friction_power_n - one.result.patches[0].points[0].friction_power_n)[0];
+  const table = page.locator('section[aria-labelledby="h-worst"] tbody tr');
+  assert.equal(await table.count(), 8);
+  assert.ok((await table.first().innerText()).startsWith(Number(worst.labels.km).toPrecision(6)));
+  await page.getByLabel(/Limit of largest pressure/).fill('1200');
+  await page.getByLabel(/Limit of largest pressure/).blur();
+  await page.locator('section[aria-labelledby="h-worst"] select').selectOption('pressure');
+  const over = results.filter((entry) => entry.result.patches[0].pressure_max_mpa > 1200).length;
+  await page.getByText(`${over} of 40 over the limit`).waitFor();
+  // Drag to zoom: all strips follow, and the address keeps it.
+  const area = await page.locator('line-strips .u-over').first().boundingBox();
+  assert.ok(area);
+  await page.mouse.move(area.x + 100, area.y + 40);
+  await page.mouse.down();
+  await page.mouse.move(area.x + 260, area.y + 40, { steps: 6 });
+  await page.mouse.up();
+  await page.waitForFunction(() => location.hash.includes('from='));
+  const scales = await page.locator('line-strips').evaluate((strips) => /** @type {HTMLElement & { plots: { scales: { x: { min: number } } }[] }} */ (strips).plots.map((plot) => plot.scales.x.min));
+  assert.equal(new Set(scales).size, 1);
+  await page.reload();
+  await page.locator('line-strips canvas').nth(3).waitFor();
+  assert.ok(page.url().includes('pressure=1200'));
+  const kept = await page.locator('line-strips').evaluate((strips) => /** @type {HTMLElement & { plots: { scales: { x: { min: number } } }[] }} */ (strips).plots[0].scales.x.min);
+  assert.ok(Math.abs(kept - scales[0]) < 1e-6);
+  await page.locator('section[aria-labelledby="h-worst"] a').first().click();
+  await page.locator('.figures').waitFor();
+  await drawn(page);
+}));

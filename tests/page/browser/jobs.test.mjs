@@ -1,0 +1,131 @@
+// Jobs: from the queue to the end by events, cancelling, a service that dies meanwhile, 10 000 jobs, keys.
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { test } from 'node:test';
+import { drawn, example, launch, Service, setUp, SLACK } from './harness.mjs';
+
+const { service, onPage } = setUp();
+
+/** A case that takes some seconds. @param {string} name @param {number} points */
+const slow = (name, points) => ({
+  ...example('sweep'), name, solver: { mesh: { strips: 40, cells: 40 } }, motion: { sweep: { creepage_x: { from: 0, to: 0.004, points }, creepage_y: { from: 0, to: 0.003, points } } },
+});
+/** @param {import('playwright-core').Page} page @param {string} name */
+const row = (page, name) => page.locator('.rows.job', { hasText: name });
+
+test('a job is followed from the queue to its end, and another is cancelled', () => onPage('#/compose', async (page) => {
+  const first = await service.ask('/v1/jobs', { json: slow('slow one', 400) });
+  const second = await service.ask('/v1/jobs', { json: slow('slow two', 400) });
+  await page.goto(`${service.base}/#/jobs`);
+  await row(page, 'slow one').locator('.state.running').waitFor();
+  await row(page, 'slow two').locator('.state.queued').waitFor();
+  await page.getByRole('button', { name: 'Cancel slow two' }).click();
+  await row(page, 'slow two').locator('.state.cancelled').waitFor();
+  await page.getByRole('radio', { name: 'cancelled', exact: true }).check();
+  await row(page, 'slow one').waitFor({ state: 'detached' });
+  assert.equal(await page.locator('.rows.job').count(), 1);
+  await page.getByRole('button', { name: 'Delete slow two' }).click();
+  await page.getByText('No jobs that are cancelled').waitFor();
+  assert.equal((await fetch(`${service.base}/v1/jobs/${second.id}`)).status, 404);
+  await page.goto(`${service.base}/#/jobs/${first.id}`);
+  await page.getByText('Solving …').waitFor();
+  await page.getByRole('button', { name: 'Cancel' }).click();
+  await page.getByText('Cancelled').waitFor();
+}));
+
+test('the result appears by itself though the service died meanwhile', () => onPage('#/compose', async (page) => {
+  const { id } = await service.ask('/v1/jobs', { json: { ...slow('survivor', 60), solver: { mesh: { strips: 24, cells: 24 } } } });
+  await page.goto(`${service.base}/#/jobs/${id}`);
+  await page.locator('progress').waitFor();
+  await service.kill();
+  await service.start();
+  await page.locator('creep-curve canvas').waitFor({ timeout: 40_000 });
+  await drawn(page);
+}));
+
+test('a batch shows its progress and is cancelled as a whole', () => onPage('#/compose', async (page) => {
+  const cases = Array.from({ length: 12 }, (_, i) => slow(`part ${i}`, 200 + i));
+  await service.ask('/v1/batches', { json: cases });
+  await page.goto(`${service.base}/#/jobs`);
+  const batch = page.locator('.batch').first();
+  await batch.getByText('Batch of 12').waitFor();
+  await batch.getByRole('button', { name: 'Cancel all' }).click();
+  await batch.getByText('100 %').waitFor();
+  await batch.getByRole('button', { name: 'Delete the batch of 12' }).click();
+  await batch.waitFor({ state: 'detached' });
+}));
+
+test('10 000 jobs scroll without a stutter, in few rows', () => onPage('#/compose', async (page) => {
+  const line = JSON.stringify({ ...example('hertz-steel'), outputs: ['resultants'] });
+  const body = Array.from({ length: 10_000 }, (_, i) => line.replace('UIC60 crown, 100 kN', `case ${i}`)).join('\n');
+  const { id } = await service.ask('/v1/batches', { body, headers: { 'Content-Type': 'application/x-ndjson' } });
+  await service.ask(`/v1/batches/${id}/cancel`, { method: 'POST' });
+  await page.goto(`${service.base}/#/jobs`);
+  await row(page, 'case 9999').waitFor();
+  // To the end, page after page.
+  await page.waitForFunction(() => {
+    const list = document.querySelector('.list');
+    if (list) list.scrollTop = list.scrollHeight;
+    return [...document.querySelectorAll('.rows.job .name')].some((name) => name.textContent === 'case 0');
+  }, null, { polling: 100, timeout: 30_000 });
+  const measured = await page.evaluate(async () => {
+    const list = /** @type {HTMLElement} */ (document.querySelector('.list'));
+    list.scrollTop = 0;
+    let most = 0;
+    const frames = [];
+    let before = await new Promise(requestAnimationFrame);
+    for (let step = 0; step < 90; step += 1) {
+      list.scrollTop += 1400;
+      const now = await new Promise(requestAnimationFrame);
+      frames.push(now - before);
+      before = now;
+      most = Math.max(most, document.querySelectorAll('.rows.job').length);
+    }
+    frames.sort((one, two) => one - two);
+    return { rows: most, median: frames[45], late: frames[85], height: list.scrollHeight };
+  });
+  console.log(`10 000 jobs: ${JSON.stringify(measured)}`);
+  assert.ok(measured.rows <= 60, `${measured.rows} rows`);
+  assert.ok(measured.height >= 10_000 * 44, `${measured.height}`);
+  assert.ok(measured.median < 25 * SLACK, `${measured.median} ms a frame`);
+  // Back from a job the list is where it was.
+  const name = await page.locator('.rows.job .name').nth(12).textContent();
+  const place = await page.locator('.list').evaluate((list) => list.scrollTop);
+  await page.locator('.rows.job .name').nth(12).click();
+  await page.getByRole('heading', { level: 1, name: name ?? '' }).waitFor();
+  await page.goBack();
+  await row(page, name ?? '').waitFor();
+  assert.ok(Math.abs((await page.locator('.list').evaluate((list) => list.scrollTop)) - place) < 200);
+  await page.getByRole('radio', { name: 'failed' }).check();
+  await page.getByText('No jobs that are failed').waitFor();
+}));
+
+test('without a key the line for it opens; a key works, and a revoked one says so', async () => {
+  const guarded = new Service();
+  const keys = (/** @type {string[]} */ ...words) => execFileSync(/** @type {string} */ (process.env.RAILHEAD_BINARY), ['keys', ...words, '--data-dir', guarded.folder]).toString();
+  const secret = keys('create', '--tenant', 'north', '--name', 'page').trim().split('\n').pop()?.trim() ?? '';
+  await guarded.start(['--anonymous', 'never']);
+  try {
+    const browser = await launch();
+    const page = await browser.newPage();
+    await page.goto(guarded.base);
+    const line = page.getByLabel('API key', { exact: true }).and(page.locator('input'));
+    await line.waitFor();
+    await line.fill(secret);
+    await page.getByRole('button', { name: 'Use' }).click();
+    await page.getByLabel('Friction coefficient').fill('0.31');
+    await page.locator('.verdict .good').waitFor();
+    await page.getByRole('button', { name: /^Solve/ }).click();
+    await drawn(page);
+    assert.match(await page.evaluate(() => JSON.stringify({ ...localStorage })), /^\{.*\}$/);
+    assert.ok(!(await page.evaluate(() => JSON.stringify({ ...localStorage }))).includes(secret), 'the key is not kept beyond the tab');
+    keys('revoke', secret.split('_')[1]);
+    await page.waitForTimeout(2500);
+    await page.goto(`${guarded.base}/#/jobs`);
+    await line.waitFor();
+    await page.locator('.toast.on').waitFor();
+    await browser.close();
+  } finally {
+    await guarded.stop();
+  }
+});

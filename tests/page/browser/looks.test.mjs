@@ -1,0 +1,128 @@
+// How the page looks and how long it takes: no serious findings of axe, no sideways scrolling, pictures to look at, times.
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import { join } from 'node:path';
+import { test } from 'node:test';
+import { drawn, example, OUTPUT, setUp, SLACK, withFields } from './harness.mjs';
+
+const { service, onPage } = setUp();
+const AXE = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
+const RULES = ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'];
+const PHONE = { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true };
+
+/** Addresses of every view with something in it, and what is there when it is drawn. @returns {Promise<[string, string, string][]>} */
+async function views() {
+  const [flange, curve, other] = [await service.solved(withFields('wheel-rail-flange')), await service.solved(withFields('sweep')), await service.solved(withFields('hertz-steel'))];
+  const cases = Array.from({ length: 24 }, (_, i) => ({
+    ...example('hertz-steel'), labels: { km: String(10 + i / 10) }, load: { normal_force_n: 60_000 + 3000 * ((i * 7) % 24) }, solver: { mesh: { strips: 8, cells: 8 } },
+  }));
+  const batch = await service.ask('/v1/batches', { json: cases });
+  await fetch(`${service.base}/v1/batches/${batch.id}/results?wait=30`).then((answer) => answer.text());
+  return [
+    ['compose', '#/compose', '.verdict .good'],
+    ['result-flange', `#/jobs/${flange.id}`, 'svg .comb'],
+    ['result-curve', `#/jobs/${curve.id}`, 'creep-curve canvas'],
+    ['jobs', '#/jobs', '.rows.job'],
+    ['compare', `#/compare/${curve.id}/${other.id}`, '[aria-label="Difference"] field-map canvas'],
+    ['line', `#/line/${batch.id}`, 'line-strips canvas'],
+  ];
+}
+
+/** @param {import('playwright-core').Page} page @param {string[]} [rules] */
+async function findings(page, rules = RULES) {
+  const { violations } = await page.evaluate(async ({ source, rules }) => {
+    // Axe is brought by the test: in a function of its own it needs no permission of the page's policy.
+    if (!('axe' in window)) throw new Error(`axe is missing (${source.length})`);
+    return /** @type {{ axe: { run: (of: Document, how: object) => Promise<{ violations: { id: string, impact: string, nodes: { html: string, failureSummary: string }[] }[] }> } }} */ (/** @type {unknown} */ (window)).axe.run(document, { runOnly: rules, resultTypes: ['violations'] });
+  }, { source: AXE, rules });
+  return violations.filter(({ impact }) => impact === 'serious' || impact === 'critical')
+    .map(({ id, nodes }) => `${id}: ${nodes.slice(0, 3).map((node) => `${node.html.slice(0, 160)} (${node.failureSummary})`).join(' | ')}`);
+}
+
+test('every view is sound for axe and is kept as a picture, in light, dark and on a phone', async () => {
+  const all = await views();
+  /** @type {[string, import('playwright-core').BrowserContextOptions][]} */
+  const looks = [['light', {}], ['dark', { colorScheme: 'dark' }], ['phone', PHONE]];
+  for (const [look, options] of looks) {
+    await onPage('#/compose', async (page) => {
+      await page.addInitScript(AXE);
+      await page.reload();
+      for (const [name, hash, sign] of all) {
+        await page.goto(`${service.base}/${hash}`);
+        await page.locator(sign).first().waitFor();
+        await page.waitForTimeout(150);
+        // Dark differs from light in its colours alone.
+        assert.deepEqual(await findings(page, look === 'dark' ? ['color-contrast'] : RULES), [], `${name}, ${look}`);
+        await page.screenshot({ path: join(OUTPUT, `${look}-${name}.png`) });
+      }
+    }, options);
+  }
+});
+
+test('nothing scrolls sideways, from a small phone to a desk, nor with text twice as large', async () => {
+  const all = await views();
+  for (const [width, text] of [[320, 1], [390, 1], [768, 1], [1440, 1], [1440, 2]]) {
+    await onPage('#/compose', async (page) => {
+      for (const [name, hash, sign] of all) {
+        await page.goto(`${service.base}/${hash}`);
+        await page.locator(sign).first().waitFor();
+        if (text > 1) await page.evaluate((by) => document.documentElement.style.setProperty('font-size', `${15 * by}px`), text);
+        await page.waitForTimeout(60);
+        const [needed, given] = await page.evaluate(() => [document.documentElement.scrollWidth, document.documentElement.clientWidth]);
+        assert.ok(needed <= given, `${name} at ${width} px, text × ${text}: ${needed} > ${given}`);
+      }
+    }, { viewport: { width, height: 800 } });
+  }
+});
+
+test('the page is quick: first load, solving, drawing', () => onPage('#/compose', async (page) => {
+  await page.locator('.verdict .good').waitFor();
+  const loaded = await page.evaluate(() => performance.now());
+  const sizes = await page.evaluate(() => performance.getEntriesByType('resource').filter((entry) => entry.name.includes('/page/'))
+    .reduce((sum, entry) => sum + /** @type {PerformanceResourceTiming} */ (entry).transferSize, 0));
+  const waits = [];
+  for (let round = 0; round < 7; round += 1) {
+    await page.goto(`${service.base}/#/compose`);
+    await page.getByLabel('Normal force').fill(String(80 + round));
+    await page.locator('.verdict .good').waitFor();
+    await page.waitForTimeout(400);
+    await page.getByRole('button', { name: /^Solve/ }).click();
+    await drawn(page);
+    waits.push(await page.evaluate(() => performance.getEntriesByName('solve to picture').at(-1)?.duration ?? NaN));
+  }
+  waits.sort((one, two) => one - two);
+  // A field of 400 × 400 cells, drawn anew with other values each time.
+  const redraw = await page.evaluate(async () => {
+    const map = /** @type {HTMLElement & { shown: unknown, took: { picture: number } }} */ (document.querySelector('field-map.main'));
+    const side = 400;
+    const cells = { x_mm: [], y_mm: [], dx_mm: [], dy_mm: [], strip: [], pressure_mpa: [] };
+    for (let j = 0; j < side; j += 1) for (let i = 0; i < side; i += 1) {
+      const [x, y] = [(i + 0.5) / side - 0.5, (j + 0.5) / side - 0.5];
+      /** @type {Record<string, number[]>} */ (cells).x_mm.push(20 * x);
+      /** @type {Record<string, number[]>} */ (cells).y_mm.push(14 * y);
+      /** @type {Record<string, number[]>} */ (cells).dx_mm.push(20 / side);
+      /** @type {Record<string, number[]>} */ (cells).dy_mm.push(14 / side);
+      /** @type {Record<string, number[]>} */ (cells).strip.push(j);
+      /** @type {Record<string, number[]>} */ (cells).pressure_mpa.push(1000 * Math.max(0, 1 - 4 * (x * x + y * y)));
+    }
+    const { quantity } = /** @type {{ quantity: { values: unknown } }} */ (map.shown);
+    const field = { cells, border: null };
+    const frames = [];
+    const took = [];
+    let before = await new Promise(requestAnimationFrame);
+    for (let round = 0; round < 40; round += 1) {
+      map.shown = { field, quantity: { ...quantity, key: 'pressure', vector: () => null, values: () => cells.pressure_mpa }, range: [0, 1000 + round], friction: 0.3 };
+      took.push(map.took.picture);
+      const now = await new Promise(requestAnimationFrame);
+      frames.push(now - before);
+      before = now;
+    }
+    return { took: took.sort((one, two) => one - two)[20], frame: frames.sort((one, two) => one - two)[20] };
+  });
+  const crosshair = await page.evaluate(() => /** @type {HTMLElement & { took: { crosshair: number } }} */ (document.querySelector('field-map.main')).took.crosshair);
+  console.log(JSON.stringify({ loaded, kilobytes: sizes / 1000, solveToPicture: waits, redraw, crosshair }));
+  assert.ok(loaded < 1000 * SLACK, `first load to a checked case: ${loaded} ms`);
+  assert.ok(waits[3] < 150 * SLACK, `click to picture: ${waits}`);
+  assert.ok(redraw.frame < 34 * SLACK, `400 × 400: ${JSON.stringify(redraw)}`);
+}));
