@@ -52,7 +52,6 @@ const WEB: &[PageFile] = files!("web/", "":
     "js/fields.js",
     "js/form.js",
     "js/format.js",
-    "js/hertz.js",
     "js/jobsview.js",
     "js/licences.js",
     "js/line.js",

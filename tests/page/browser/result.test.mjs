@@ -138,7 +138,7 @@ test('two patches have one scale of colours, and stand on the profiles', () => o
   for (const range of ranges) assert.deepEqual(range, ranges[0]);
   const bound = example('wheel-rail-flange').friction.coefficient * Math.max(...result.patches.map((/** @type {{ pressure_max_mpa: number }} */ patch) => patch.pressure_max_mpa));
   assert.ok(Math.abs(ranges[0][1] - bound) < 1e-6 * bound);
-  assert.equal(await page.locator('svg .patch .comb').count(), 2);
+  await page.locator('svg .patch .comb').nth(1).waitFor();
   const remarks = await page.locator('.remark').allInnerTexts();
   assert.equal(remarks.length, result.remarks.length);
   assert.ok(remarks.some((text) => text.startsWith('patch 0')));
@@ -162,6 +162,17 @@ test('two patches have one scale of colours, and stand on the profiles', () => o
     });
   });
   assert.ok(far.every((distance) => distance < 1), `${far}`);
+}));
+
+test('a field of many cells comes as arrays, and is the same', () => onPage('#/compose', async (page) => {
+  const { id } = await service.solved({ ...withFields('spin'), solver: { mesh: { strips: 64, cells: 64 } }, outputs: ['zones', 'tractions'] });
+  const [asked] = await Promise.all([page.waitForRequest(/fields.*format=npz/), page.goto(`${service.base}/#/jobs/${id}`)]);
+  assert.ok(asked);
+  await drawn(page);
+  await page.waitForTimeout(60);
+  const told = await agrees(page, id);
+  const { cells } = await service.ask(`/v1/jobs/${id}/zones`);
+  assert.equal(told.zone, cells.zone[cellAt(cells, parsed(told.x), parsed(told.y))]);
 }));
 
 test('a job without fields shows its numbers and offers to solve again with fields', () => onPage('', async (page) => {

@@ -1,27 +1,19 @@
-// What drawings compute: placed cross-sections, the ellipse of Hertz, tables of files.
+// What drawings compute: the gap between wheel and rail, tables of files.
 import assert from 'node:assert/strict';
-import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
-import { ellipseOf, hertz } from '../../../src/http/page/web/js/hertz.js';
+import { gapOf } from '../../../src/http/page/web/js/placing.js';
 import { parseGapCurve, parseGrid, profileKind } from '../../../src/http/page/web/js/tables.js';
 
-/** @param {string} name */
-const example = (name) => JSON.parse(readFileSync(new URL(`../../../api/examples/${name}.case.json`, import.meta.url), 'utf8'));
-
-test('the ellipse is that of Hertz', () => {
-  // Semi-axes and pressure of the service for this example.
-  const { a, b, pressure } = /** @type {{ a: number, b: number, pressure: number }} */ (ellipseOf(example('hertz-steel')));
-  assert.ok(Math.abs(a - 7.192892) < 2e-4, `${a}`);
-  assert.ok(Math.abs(b - 5.410653) < 2e-4, `${b}`);
-  assert.ok(Math.abs(pressure - 1226.84) < 0.1, `${pressure}`);
-  assert.equal(ellipseOf({ contact: { type: 'radii', rolling_mm: 460 } }), null);
-});
-
-test('equal radii give a circle, and the force changes the axes by its cube root', () => {
-  const one = hertz(300, 299.999999, 1000, 1e5);
-  assert.ok(Math.abs(one.long / one.short - 1) < 1e-3);
-  const eight = hertz(900, 300, 8000, 1e5);
-  assert.ok(Math.abs(eight.long / hertz(900, 300, 1000, 1e5).long - 2) < 1e-9);
+test('the gap is the vertical distance of the lower side of the wheel from the upper side of the rail', () => {
+  /** @type {[number, number][]} */
+  const rail = [[-5, -10], [-5, 0], [5, 0], [5, -10]];
+  // The wheel's flange hangs beside the rail; its tread rises to the left.
+  /** @type {[number, number][]} */
+  const wheel = [[-8, 2], [-7, -6], [-6, 1], [6, 4]];
+  const gap = gapOf(rail, wheel);
+  assert.ok(gap.every(([y]) => y >= -5 && y <= 5));
+  for (const [y, distance] of gap) assert.ok(Math.abs(distance - (1 + (y + 6) / 4)) < 1e-9, `${y}: ${distance}`);
+  assert.equal(gap.length, 51);
 });
 
 test('files of gaps and grids are read whatever separates their numbers', () => {

@@ -2,7 +2,7 @@
 
 import { caseOf, job as jobOf, result as resultOf } from './api.js';
 import { numberAt } from './document.js';
-import { loadField } from './fields.js';
+import { hasFields, loadField } from './fields.js';
 import { indexOf } from './field/cells.js';
 import { offered, quantityOf, rangeOf, valuesOf } from './field/quantities.js';
 import { MARKED_MAX } from './marks.js';
@@ -68,11 +68,7 @@ async function loadSide(id, patch, point) {
 }
 
 /** @param {Pick<Side, 'id' | 'result' | 'patch' | 'point'>} side */
-async function fieldOf({ id, result, patch, point }) {
-  const outputs = Object.keys(result.links);
-  const has = outputs.some((output) => ['zones', 'tractions', 'pressure', 'slip'].includes(output));
-  return has ? loadField(id, outputs, patch, point) : null;
-}
+const fieldOf = async ({ id, result, patch, point }) => (hasFields(result) ? loadField(id, result, patch, point) : null);
 
 /** A quantity that all sides have. @param {Comparison} of */
 function settle(of) {

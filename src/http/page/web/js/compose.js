@@ -13,7 +13,7 @@ import { offered, rangeOf } from './field/quantities.js';
 import { fieldId } from './field.js';
 import { caseForm } from './form.js';
 import { bytes, count, number, seconds, withError } from './format.js';
-import { place } from './placing.js';
+import { placed } from './placing.js';
 
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./state.js').Compose} Compose */
@@ -37,7 +37,7 @@ export function compose(app) {
       </section>
       <section class="panel stage" aria-labelledby="h-drawing">
         <header class="bar"><h2 id="h-drawing">${String(state.document?.name ?? 'Drawing')}</h2></header>
-        <div class="figure">${state.document ? drawing(state.document) : nothing}</div>
+        <div class="figure">${state.document ? drawing(state, state.document) : nothing}</div>
         <div class="verdict" role="status">${verdict(state)}</div>
         ${previewOf(state)}
         <div class="actions">
@@ -60,19 +60,21 @@ function examplePicker(app) {
     ${EXAMPLES.map(({ file, title }) => html`<option value=${file} ?selected=${example === file}>${title}</option>`)}</select></label>`;
 }
 
-/** @type {{ contact: unknown, drawn: ReturnType<typeof place> } | null} */
+/** @type {{ of: unknown, drawn: ReturnType<typeof placed> } | null} */
 let placedBefore = null;
 
-/** @param {JsonObject} document */
-function drawing(document) {
-  switch (at(document, '/contact/type')) {
+/** What the case is about: what the service understood of it, or the numbers that it brings. @param {Compose} state @param {JsonObject} document */
+function drawing({ understood }, document) {
+  const type = at(document, '/contact/type');
+  const known = understood && understood.type === type ? understood.of : null;
+  switch (type) {
     case 'radii':
     case 'ellipse':
-      return drawEllipse(document);
+      return drawEllipse(document, known?.patches[0]);
     case 'profiles': {
-      const known = placedBefore?.contact === document.contact ? placedBefore : { contact: document.contact, drawn: place(document.contact) };
-      placedBefore = known;
-      return html`<div class="stack">${drawProfiles(known.drawn)}${drawGap(known.drawn)}</div>`;
+      const before = placedBefore?.of === known ? placedBefore : { of: known, drawn: placed(known?.placement) };
+      placedBefore = before;
+      return html`<div class="stack">${drawProfiles(before.drawn)}${drawGap(before.drawn)}</div>`;
     }
     case 'gap_profile':
       return drawGapCurve(document);

@@ -1,9 +1,9 @@
 // What happens to the case that is being written: changes, checks while writing, the result while typing, solving.
 
 import { checkCase, Refused, remove, result as resultOf, submit } from './api.js';
-import { pretty, put } from './document.js';
+import { at, pretty, put } from './document.js';
 import { EXAMPLES } from './examples.js';
-import { loadField } from './fields.js';
+import { hasFields, loadField } from './fields.js';
 import { formatRoute } from './routes.js';
 import { adoptJob } from './result.js';
 
@@ -12,7 +12,7 @@ import { adoptJob } from './result.js';
 /** @typedef {import('./document.js').JsonValue} JsonValue */
 
 const KEPT = 'railhead.case';
-const PAUSE_MS = 180;
+const PAUSE_MS = 120;
 const WAIT_S = 10;
 /** Estimated seconds up to which a case is solved while it is written. */
 const LIVE_SECONDS_MAX = 0.05;
@@ -84,7 +84,9 @@ async function check(app, text) {
   try {
     const checked = await checkCase(text, mine.signal);
     if (mine.signal.aborted) return;
-    app.compose({ checked, faults: [], refusal: '' });
+    const type = at(app.store.get().compose.document ?? undefined, '/contact/type');
+    const understood = checked.understood ? { type, of: checked.understood } : null;
+    app.compose({ checked, understood, faults: [], refusal: '' });
     await preview(app, checked.digest, mine.signal);
   } catch (error) {
     if (!mine.signal.aborted) showRefusal(app, error);
@@ -118,8 +120,8 @@ async function preview(app, digest, signal) {
   try {
     if (job.state !== 'succeeded') return;
     const result = job.result ?? (await resultOf(job.id));
-    const field = checked.outputs.length > 1 ? await loadField(job.id, checked.outputs, 0, 0) : null;
-    if (!signal.aborted) app.compose({ preview: { digest, result, field: field?.cells.x_mm ? field : null } });
+    const field = hasFields(result) ? await loadField(job.id, result, 0, 0) : null;
+    if (!signal.aborted) app.compose({ preview: { digest, result, field } });
   } finally {
     if (job.state === 'succeeded' || job.state === 'failed') await remove('jobs', job.id).catch(() => {});
   }

@@ -1,7 +1,9 @@
 // The fields of one patch and one motion: cells in strips along rolling, and the border of the patch.
 
 import { request } from './api.js';
+import { readNpz } from './npz.js';
 
+/** @typedef {import('./api.js').JobResult} JobResult */
 /** @typedef {[number, number][]} Loop A closed line, its first point not repeated. */
 
 /**
@@ -23,22 +25,47 @@ import { request } from './api.js';
 /** @typedef {{ cells: Cells, border: Loop[] | null }} Field */
 
 /** Parts of a result that are fields, by the name of the output that a case asks for. */
-export const PARTS = /** @type {const} */ (['pressure', 'tractions', 'slip', 'zones']);
+const PARTS = ['pressure', 'tractions', 'slip', 'zones'];
+/** Cells beyond which arrays are loaded instead of text. */
+const TEXT_CELLS_MAX = 4000;
+
+/** Did the case ask for any field? @param {JobResult} result */
+export const hasFields = ({ links }) => PARTS.some((part) => part in links);
 
 /**
- * Loads all fields that a result has of a patch and a motion.
+ * Loads all fields that a result has of a patch and a motion, as exactly as a picture needs them.
  * @param {string} id The job.
- * @param {readonly string[]} outputs What the case asked for.
+ * @param {JobResult} result
  * @param {number} patch
  * @param {number} point
  * @returns {Promise<Field>}
  */
-export async function loadField(id, outputs, patch, point) {
-  const parts = PARTS.filter((part) => outputs.includes(part));
-  const answers = await Promise.all(
-    parts.map(async (part) => (await request(`/v1/jobs/${id}/${part}?patch=${patch}&point=${point}`)).json()),
-  );
-  const cells = Object.assign({}, ...answers.map((answer) => answer.cells));
-  const outlines = answers.find((answer) => answer.outlines)?.outlines;
-  return { cells, border: outlines?.patch ?? null };
+export async function loadField(id, result, patch, point) {
+  const { mesh } = result.patches[patch].points[point].solver;
+  const large = mesh.strips * mesh.cells > TEXT_CELLS_MAX;
+  const answer = await request(`/v1/jobs/${id}/fields?patch=${patch}&point=${point}&precision=single&format=${large ? 'npz' : 'json'}`);
+  if (large) return fromArrays(await readNpz(await answer.arrayBuffer()));
+  const { cells, outlines } = await answer.json();
+  return { cells, border: outlines.patch };
+}
+
+/**
+ * @param {Record<string, import('./npz.js').NamedArray>} arrays
+ * @returns {Field}
+ */
+export function fromArrays(arrays) {
+  /** @type {Record<string, number[] | string[]>} */
+  const cells = {};
+  for (const [name, { values }] of Object.entries(arrays)) {
+    if (name.startsWith('outline_')) continue;
+    const numbers = Array.from(/** @type {Iterable<number>} */ (values));
+    cells[name] = name === 'zone' ? numbers.map((zone) => (zone === 0 ? 'stick' : 'slip')) : numbers;
+  }
+  const corners = Array.from(/** @type {Iterable<number>} */ (arrays.outline_patch_mm.values));
+  const starts = Array.from(/** @type {Iterable<number>} */ (arrays.outline_patch_start.values));
+  const border = starts.map((start, at) => {
+    const end = starts[at + 1] ?? corners.length / 2;
+    return Array.from({ length: end - start }, (_, corner) => /** @type {[number, number]} */ ([corners[2 * (start + corner)], corners[2 * (start + corner) + 1]]));
+  });
+  return { cells: /** @type {Cells} */ (/** @type {unknown} */ (cells)), border };
 }

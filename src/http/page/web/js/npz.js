@@ -1,7 +1,7 @@
 // NumPy archives as typed arrays, unpacked by the browser itself.
 
 /** @typedef {Float64Array | Float32Array | Int32Array | Uint32Array | Int8Array | Uint8Array} Values */
-/** @typedef {{ shape: number[], values: Values | string[] }} NamedArray */
+/** @typedef {{ shape: number[], values: Values }} NamedArray */
 
 const END_OF_DIRECTORY = 0x06054b50;
 const STORED = 0;
@@ -57,7 +57,7 @@ function readNpy(file) {
 /**
  * @param {string} kind
  * @param {ArrayBuffer} raw
- * @returns {Values | string[]}
+ * @returns {Values}
  */
 function valuesOf(kind, raw) {
   if (kind === '<f8') return new Float64Array(raw);
@@ -66,11 +66,5 @@ function valuesOf(kind, raw) {
   if (kind === '<u4') return new Uint32Array(raw);
   if (kind === '|i1') return new Int8Array(raw);
   if (kind === '|u1') return new Uint8Array(raw);
-  const text = /^\|S(\d+)$|^<U(\d+)$/.exec(kind);
-  if (!text) throw new Error(`numbers of the kind ${kind} cannot be read`);
-  const codes = text[1] ? new Uint8Array(raw) : new Uint32Array(raw);
-  const width = Number(text[1] ?? text[2]);
-  return [...Array(codes.length / width).keys()].map((place) =>
-    String.fromCodePoint(...codes.slice(place * width, (place + 1) * width)).replace(/\0+$/, ''),
-  );
+  throw new Error(`numbers of the kind ${kind} cannot be read`);
 }

@@ -1,11 +1,11 @@
 // The result that is being looked at: what is loaded of it, and which part is chosen.
 
-import { caseOf, job as jobOf, Refused, result as resultOf } from './api.js';
+import { caseOf, checkCase, job as jobOf, Refused, result as resultOf } from './api.js';
 import { follow } from './events.js';
-import { numberAt } from './document.js';
-import { loadField } from './fields.js';
+import { at, numberAt } from './document.js';
+import { hasFields, loadField } from './fields.js';
 import { offered, quantityOf, rangeOf } from './field/quantities.js';
-import { place } from './placing.js';
+import { placed } from './placing.js';
 import { formatRoute } from './routes.js';
 
 /** @typedef {import('./state.js').App} App */
@@ -23,7 +23,6 @@ import { formatRoute } from './routes.js';
  * @property {JobResult | null} result
  * @property {JsonObject | null} document The case.
  * @property {import('./placing.js').Placed | null} placed Its cross-sections.
- * @property {string[]} outputs What the case asked for.
  * @property {Map<string, Promise<Field>>} asked Fields by patch and motion.
  * @property {(Field | undefined)[]} fields Those of the chosen motion, by patch.
  * @property {number} patch
@@ -51,7 +50,7 @@ export function tellingPoint(points) {
 
 /** @param {Job} job @returns {Looked} */
 const fresh = (job) => ({
-  job, result: null, document: null, placed: null, outputs: [], asked: new Map(), fields: [], patch: 0, point: -1, quantity: '',
+  job, result: null, document: null, placed: null, asked: new Map(), fields: [], patch: 0, point: -1, quantity: '',
   held: null, border: true, arrows: true, mesh: false, curve: 'forces',
 });
 
@@ -140,24 +139,31 @@ async function followJob(app) {
 function show(app, result) {
   if (!looked) return;
   looked.result = result;
-  looked.outputs = Object.keys(result.links);
-  looked.placed = looked.document ? place(looked.document.contact) : null;
+  placeProfiles(app).catch(app.refused);
   looked.patch = Math.min(looked.patch, result.patches.length - 1);
   const { points } = result.patches[looked.patch];
   if (looked.point < 0 || looked.point >= points.length) looked.point = tellingPoint(points);
   loadFields(app).catch(app.refused);
 }
 
+/** Asks where the cross-sections of the case lie. @param {App} app */
+async function placeProfiles(app) {
+  const mine = looked;
+  if (!mine?.document || at(mine.document, '/contact/type') !== 'profiles') return;
+  const checked = await checkCase(JSON.stringify(mine.document), new AbortController().signal);
+  mine.placed = placed(checked.understood?.placement);
+  if (looked === mine) app.redraw();
+}
+
 /** Loads the fields of all patches of the chosen motion. @param {App} app */
 async function loadFields(app) {
   const mine = looked;
   if (!mine?.result) return;
-  const parts = mine.outputs.filter((output) => ['zones', 'tractions', 'pressure', 'slip'].includes(output));
-  if (!parts.length) return;
   const { point, result } = mine;
+  if (!hasFields(result)) return;
   const fields = await Promise.all(result.patches.map((_, patch) => {
     const name = `${patch}/${point}`;
-    const known = mine.asked.get(name) ?? loadField(mine.job.id, mine.outputs, patch, point);
+    const known = mine.asked.get(name) ?? loadField(mine.job.id, result, patch, point);
     mine.asked.set(name, known);
     return known;
   }));

@@ -9,6 +9,7 @@ import { drawProfiles } from './drawing/profiles.js';
 import { editDocument, solve } from './editing.js';
 import { ALL_OUTPUTS } from './examples.js';
 import { indexOf } from './field/cells.js';
+import { hasFields } from './fields.js';
 import { offered, quantityOf } from './field/quantities.js';
 import { count, degrees, number, seconds, withError } from './format.js';
 import { choose, frictionOf, lookedAt, rememberView, sharedRange } from './result.js';
@@ -71,12 +72,12 @@ function waiting(app, looked) {
 function loaded(app, looked, answer) {
   const patch = answer.patches[looked.patch];
   const point = patch.points[looked.point];
-  const hasFields = looked.outputs.some((output) => ALL_OUTPUTS.slice(1).includes(output));
+  const mapped = hasFields(answer);
   return html`
     ${remarks(app, answer)}
     ${figures(looked, patch, point)}
-    <div class=${hasFields ? 'cols' : 'cols nofield'}>
-      ${hasFields ? fieldPanel(app, looked, answer) : html`<section class="panel wait"><p>The case asked for no fields, so there is no map.</p>
+    <div class=${mapped ? 'cols' : 'cols nofield'}>
+      ${mapped ? fieldPanel(app, looked, answer) : html`<section class="panel wait"><p>The case asked for no fields, so there is no map.</p>
         <button class="primary" @click=${() => again(app, looked)}>Solve again with fields</button></section>`}
       <div class="aside">
         ${looked.placed && patch.position ? profilePanel(app, looked, answer) : nothing}

@@ -23,6 +23,8 @@
  * @property {string} unreadable Why the text is no JSON.
  * @property {{ pointer: string, text: string } | null} typing The field that is being written in, as it is written.
  * @property {CheckedCase | null} checked What the service says of a sound case.
+ * @property {{ type: unknown, of: NonNullable<CheckedCase['understood']> } | null} understood What the last sound case was understood as, by its
+ *   kind of contact: the drawing stays while faults are being corrected.
  * @property {readonly Fault[]} faults
  * @property {string} refusal Why it could not be checked, where that is no fault of the case.
  * @property {string} example
@@ -60,7 +62,7 @@ export const initialState = () => ({
   toast: '',
   turn: 0,
   compose: {
-    document: null, text: '', unreadable: '', typing: null, checked: null, faults: [], refusal: '', example: '', solving: false,
+    document: null, text: '', unreadable: '', typing: null, checked: null, understood: null, faults: [], refusal: '', example: '', solving: false,
     live: true, preview: null,
   },
 });

@@ -2,7 +2,6 @@
 
 import { html, nothing, svg } from '../../vendor/lit-html.js';
 import { at, isObject, numberAt } from '../document.js';
-import { ellipseOf } from '../hertz.js';
 import { number } from '../format.js';
 
 /** @typedef {import('../document.js').JsonObject} JsonObject */
@@ -13,11 +12,16 @@ const HEIGHT = 400;
 const STEP = 40;
 const ARROW = 70;
 
-/** @param {JsonObject} document A case of the types `ellipse` or `radii`. */
-export function drawEllipse(document) {
-  const ellipse = ellipseOf(document);
-  if (!ellipse) return html`<p class="quiet pad">The drawing appears when the contact is complete.</p>`;
-  const { a, b, pressure } = ellipse;
+/** @typedef {NonNullable<import('../api.js').CheckedCase['understood']>['patches'][number]} KnownPatch */
+
+/**
+ * @param {JsonObject} document A case of the types `ellipse` or `radii`.
+ * @param {KnownPatch | undefined} known Its patch, as the service understood it.
+ */
+export function drawEllipse(document, known) {
+  if (!known?.semi_axes_mm) return html`<p class="quiet pad">The drawing appears when the contact is complete.</p>`;
+  const [a, b] = known.semi_axes_mm;
+  const pressure = known.pressure_max_mpa;
   const scale = Math.min(330 / (2 * a), 260 / (2 * b));
   const [x, y] = [WIDTH / 2, HEIGHT / 2];
   const label = `Contact ellipse with semi-axes ${number(a, 3)} mm along and ${number(b, 3)} mm across rolling`;
@@ -36,7 +40,7 @@ export function drawEllipse(document) {
     ${drawMotion(firstMotion(document), x, y)}
     <text x=${WIDTH - 10} y=${HEIGHT - 10} text-anchor="end" class="strong">x along rolling →</text>
     <text x="10" y="20" class="strong">y to the left ↑</text>
-    ${pressure > 0 ? svg`<text x="10" y=${HEIGHT - 10}>p max ${number(pressure)} MPa (Hertz)</text>` : nothing}
+    <text x="10" y=${HEIGHT - 10}>p max ${number(pressure)} MPa (Hertz)</text>
   </svg>`;
 }
 

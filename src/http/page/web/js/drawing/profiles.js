@@ -28,7 +28,7 @@ const TAG_MM = 21;
  * @param {Standing} [standing] Patches with their pressure.
  */
 export function drawProfiles(placed, standing) {
-  if (!placed) return html`<p class="quiet pad">The drawing appears when both cross-sections can be read.</p>`;
+  if (!placed) return html`<p class="quiet pad">The drawing appears when both cross-sections can be read. Drop the files of a rail and a wheel.</p>`;
   const { rail, touch } = placed;
   const patches = standing?.patches ?? [];
   const tips = patches.flatMap(({ position }) => (position ? [position.track_mm[1] - 1.2 * TAG_MM * Math.sin(position.contact_angle_rad)] : []));
@@ -42,7 +42,7 @@ export function drawProfiles(placed, standing) {
   const wheel = placed.wheel.filter(([y]) => y > y0 - 40 && y < y1 + 40).map(T);
   const seen = patches.length
     ? patches.map((patch, at) => `patch ${at} at ${degrees(patch.position?.contact_angle_rad ?? 0)}`).join(', ')
-    : touch ? `first touch at y ${number(touch[0])} mm` : 'no touch';
+    : `first touch at y ${number(touch[0])} mm`;
   return html`<svg class="drawing" viewBox=${`0 0 ${WIDTH} ${height.toFixed(0)}`} role="img" aria-label=${`Wheel on rail, seen along rolling: ${seen}`}>
     ${lattice([y0, y1], [low, TOP_MM], T, height)}
     <path class="rail" d=${closed(rail.map(T), height + 20)}/>
@@ -52,7 +52,7 @@ export function drawProfiles(placed, standing) {
       <text x=${WIDTH / 2} y="22" text-anchor="middle">wheel</text>
       <text x=${T([mean(rail), 0])[0]} y=${height - 34} text-anchor="middle">rail</text>
     </g>
-    ${standing && patches.length ? standPatches(standing, T) : touch ? drawTouch(T(touch)) : nothing}
+    ${standing && patches.length ? standPatches(standing, T) : drawTouch(T(touch))}
   </svg>`;
 }
 
@@ -132,8 +132,8 @@ function standPatches({ patches, combs, chosen, choose }, T) {
 
 /** The gap from 0 to 1 mm near the first touch: whether a second contact is near. @param {Placed | null} placed */
 export function drawGap(placed) {
-  const touch = placed?.touch;
-  if (!touch) return nothing;
+  if (!placed) return nothing;
+  const { touch } = placed;
   const near = placed.gap.filter(([y]) => Math.abs(y - touch[0]) <= 26);
   if (near.length < 3) return nothing;
   const axes = { left: 46, right: WIDTH - 12, top: 24, bottom: 116, x: /** @type {const} */ ([touch[0] + 26, touch[0] - 26]), y: /** @type {const} */ ([0, 1]) };
