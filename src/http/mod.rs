@@ -15,7 +15,8 @@
 //!    [`limits`].
 //! 5. The handler in [`routes`](mod@routes) asks [`Jobs`]. Parts of a result get their tag before any work is done ([`etag::Known`]).
 //! 6. The answer: a type of [`dto`] as JSON, or a form of [`render`].
-//! 7. Whatever fails becomes a [`problem`] with a kind, a status and what to do.
+//! 7. [`page`] answers `/` and the files of the page, which needs no key and asks the same API.
+//! 8. Whatever fails becomes a [`problem`] with a kind, a status and what to do.
 
 mod contract;
 mod dto;

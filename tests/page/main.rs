@@ -25,7 +25,7 @@ fn folder() -> PathBuf {
 /// Says why tests are not run; in continuous integration they have to be.
 fn skip(reason: &str) {
     assert!(env::var_os("CI").is_none(), "not run: {reason}");
-    eprintln!("not run: {reason}");
+    eprintln!("SKIPPED: {reason}");
 }
 
 fn node_is_there() -> bool {

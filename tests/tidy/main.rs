@@ -158,7 +158,14 @@ fn links_of_the_documents_lead_somewhere() {
     let mut dead = dead_links(&root().join("x.md"), "[a](src) [b](none.rs) [c](https://x)");
     assert_eq!(dead.len(), 1, "{dead:?}");
     dead.clear();
-    for folder in ["", "docs", "api", "tests/data", "docs/paper-figures"] {
+    for folder in [
+        "",
+        "docs",
+        "api",
+        "tests/data",
+        "docs/paper-figures",
+        "docs/page",
+    ] {
         for entry in fs::read_dir(root().join(folder)).expect("a folder") {
             let path = entry.expect("an entry").path();
             if path.extension().is_some_and(|e| e == "md") {
@@ -168,6 +175,58 @@ fn links_of_the_documents_lead_somewhere() {
         }
     }
     assert_eq!(dead, Vec::<String>::new());
+}
+
+/// The longest function of a script, from the line with its name to the brace that closes it at the same indentation.
+fn longest_function(text: &str) -> usize {
+    let lines: Vec<&str> = text.lines().collect();
+    let indent = |line: &str| line.len() - line.trim_start().len();
+    let begins = |line: &str| {
+        let line = line.trim_start().trim_start_matches("export ");
+        let line = line.trim_start_matches("async ");
+        line.ends_with('{') && (line.starts_with("function ") || line.contains(") {"))
+    };
+    let length = |(first, line): (usize, &&str)| {
+        let closes =
+            |other: &&str| other.trim_start().starts_with('}') && indent(other) == indent(line);
+        let length = lines[first + 1..].iter().position(closes);
+        length.map_or(0, |length| length + 2)
+    };
+    let functions = lines.iter().enumerate().filter(|(_, line)| begins(line));
+    functions.map(length).max().unwrap_or(0)
+}
+
+#[test]
+fn scripts_of_the_page_are_short_and_say_what_they_are_for() {
+    assert_eq!(longest_function("function a() {\n  if (b) {\n  }\n}\n"), 4);
+    let mut folders = vec![
+        root().join("src/http/page/web/js"),
+        root().join("tests/page"),
+    ];
+    let mut wrong = Vec::new();
+    let mut seen = 0;
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(&folder).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            let name = path.display().to_string();
+            if path.is_dir() {
+                let made = ["node_modules", "types", "output"];
+                if !made.iter().any(|made| path.ends_with(made)) {
+                    folders.push(path);
+                }
+            } else if name.ends_with(".js") || name.ends_with(".mjs") {
+                seen += 1;
+                let text = fs::read_to_string(&path).expect("a script");
+                let sizes = [text.lines().count(), longest_function(&text)];
+                let most = [rules::FILE_LINES_MAX, rules::FUNCTION_LINES_MAX];
+                if sizes[0] > most[0] || sizes[1] > most[1] || !text.starts_with("// ") {
+                    wrong.push(format!("{name}: {sizes:?}"));
+                }
+            }
+        }
+    }
+    assert!(seen > 30, "{seen}");
+    assert_eq!(wrong, Vec::<String>::new());
 }
 
 #[test]

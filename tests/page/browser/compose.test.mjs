@@ -99,6 +99,31 @@ test('files of profiles go where they belong, also when they are dropped anywher
   assert.equal((await json(page)).contact.rail.text, '1 2\n3 4');
 }));
 
+/** A file of MiniProf: a header, and x toward the track's centre. @param {string} text Two columns, y to the field side. */
+function miniprof(text) {
+  const points = text.trim().split('\n').map((line) => line.trim().split(/\s+/).map(Number));
+  const head = ['Filename=own', 'MPTypeNo=299', `XYPoints=${points.length}`, 'XOffset=0.0000', 'ColumnDef=X,Y,A,C,N', ''];
+  return [...head, ...points.map(([y, z]) => `${-y}\t${z}\t0.0\t0.0\t0`)].join('\r\n');
+}
+
+test('two files dropped and one click lead from an empty service to the patch', () => onPage('', async (page) => {
+  const { contact } = example('wheel-rail-flange');
+  const files = { 'mine.ban': miniprof(contact.rail.text), 'mine.whl': miniprof(contact.wheel.text) };
+  await sound(page);
+  const transfer = await page.evaluateHandle((given) => {
+    const data = new DataTransfer();
+    for (const [name, text] of Object.entries(given)) data.items.add(new File([text], name));
+    return data;
+  }, files);
+  await page.dispatchEvent('.form', 'drop', { dataTransfer: transfer });
+  await page.locator('svg[aria-label*="first touch"] .rail').waitFor();
+  await sound(page);
+  await page.getByRole('button', { name: /^Solve/ }).click();
+  await drawn(page);
+  await page.locator('svg .patch .comb').first().waitFor();
+  assert.equal(await page.locator('h1').textContent(), 'mine on mine');
+}));
+
 test('gaps and pressures are taken from tables', () => onPage('', async (page) => {
   await sound(page);
   await page.getByRole('radio', { name: 'Gap curve' }).check();

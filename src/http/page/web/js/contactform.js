@@ -127,15 +127,19 @@ async function takeGrid(app, file, member) {
  */
 export async function takeProfiles(app, files, onto) {
   const before = app.store.get().compose.document;
-  let document = at(before ?? undefined, '/contact/type') === 'profiles' && before ? before : withContact(before, 'profiles');
+  const fresh = !before || at(before, '/contact/type') !== 'profiles';
+  let document = fresh ? put(put(withContact(before, 'profiles'), '/labels', undefined), '/name', undefined) : before;
+  /** @type {Record<string, string>} */
+  const names = {};
   for (const file of files) {
     const { format, body } = profileKind(file.name);
     const missing = isObject(at(document, '/contact/rail')) && Object.keys(at(document, '/contact/rail') ?? {}).length ? 'wheel' : 'rail';
     const target = (format === 'columns' ? onto : undefined) ?? body ?? onto ?? missing;
     document = put(document, `/contact/${target}`, { format, text: await file.text() });
+    names[target] = file.name.replace(/\.[^.]*$/, '');
     if (onto && target !== onto) app.say(`${file.name} is a ${target}, by its name.`);
   }
-  const name = files.map((file) => file.name.replace(/\.[^.]*$/, '')).join(' on ');
-  if (before && at(before, '/contact/type') !== 'profiles') document = put(document, '/name', name);
+  if (fresh) document = put(document, '/name', [names.wheel, names.rail].filter(Boolean).join(' on '));
+  app.compose({ example: '' });
   editDocument(app, document);
 }

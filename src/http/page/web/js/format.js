@@ -3,6 +3,8 @@
 const THIN_SPACE = '\u2009';
 const MINUS = '\u2212';
 const NONE = '–';
+/** Less than this is rounding of what should be 0. */
+const ROUNDING = 1e-15;
 const SUPERSCRIPT = '⁰¹²³⁴⁵⁶⁷⁸⁹';
 
 /**
@@ -25,7 +27,7 @@ export function fixed(value, decimals) {
  */
 export function number(value, digits = 4) {
   if (value === null || value === undefined || !Number.isFinite(value)) return NONE;
-  if (value === 0) return '0';
+  if (Math.abs(value) < ROUNDING) return '0';
   const exponent = Math.floor(Math.log10(Math.abs(value)));
   if (exponent >= -4 && exponent <= 8) return fixed(value, Math.max(0, digits - 1 - exponent));
   const mantissa = fixed(value / 10 ** exponent, Math.max(0, digits - 2)).replace(/\.0+$/, '');
