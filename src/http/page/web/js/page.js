@@ -3,9 +3,8 @@
 import { health, Refused } from './api.js';
 import { openComparison } from './compare.js';
 import { openKept, solve } from './editing.js';
-import './curve.js';
 import './fieldmap.js';
-import './strips.js';
+import { loadCurves } from './late.js';
 import { openLine } from './line.js';
 import { isGone, openJob } from './result.js';
 import { startQueue, stopQueue } from './queue.js';
@@ -18,6 +17,7 @@ import { createStore } from './store.js';
 
 const HEALTH_MS = 10_000;
 const TOAST_MS = 4000;
+const CURVES_MS = 2000;
 
 const store = createStore(initialState());
 let toastTimer = 0;
@@ -56,6 +56,7 @@ function follow() {
   store.set({ route });
   if (route.view !== 'jobs') stopQueue();
   if (route.view === 'jobs') startQueue(app);
+  if (route.view === 'result' || route.view === 'line') loadCurves();
   if (route.view === 'result') openJob(app, route.ids[0], route.query);
   if (route.view === 'compare') openComparison(app, route.ids, route.query);
   if (route.view === 'line') openLine(app, route.ids[0], route.query);
@@ -88,6 +89,8 @@ root.addEventListener('drawn', () => {
   performance.clearMarks('solve');
 });
 setInterval(lookAtHealth, HEALTH_MS);
+// Ready before they are needed, but not before the page is.
+setTimeout(loadCurves, CURVES_MS);
 lookAtHealth();
 openKept(app);
 if (!location.hash) history.replaceState(null, '', formatRoute('compose'));

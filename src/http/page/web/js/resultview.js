@@ -2,7 +2,7 @@
 
 import { html, nothing } from '../vendor/lit-html.js';
 import { cancel } from './api.js';
-import { curveOf } from './curve.js';
+import { curveOf } from './curvedata.js';
 import { put } from './document.js';
 import { downloads } from './downloads.js';
 import { drawProfiles } from './drawing/profiles.js';

@@ -2,6 +2,7 @@
 
 import uPlot from '../vendor/uPlot.esm.js';
 import { number, tickLabel } from './format.js';
+import { adoptShown } from './late.js';
 import { placeOf, STRIPS } from './line.js';
 
 /** @typedef {import('./line.js').Row} Row */
@@ -28,6 +29,7 @@ export class LineStrips extends HTMLElement {
   #themed = new MutationObserver(() => this.#build());
 
   connectedCallback() {
+    adoptShown(this);
     this.#resized.observe(this);
     this.#themed.observe(document.documentElement, { attributes: true, attributeFilter: ['data-theme'] });
     this.addEventListener('keydown', (event) => this.#key(event));
