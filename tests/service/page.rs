@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-use crate::support::Server;
+use crate::server::Server;
 
 const WEB: &str = "src/http/page/web";
 
