@@ -77,7 +77,7 @@ pub async fn lists() -> Vec<Row> {
             let start = Instant::now();
             let page = store.list(TENANT, &filter, None, 50).await.expect("a page");
             seconds.push(start.elapsed().as_secs_f64());
-            assert_eq!(page.jobs.len(), expected, "{name}");
+            assert_eq!(page.entries.len(), expected, "{name}");
         }
         rows.push(Row::judged(
             &format!("lists: median, p99 among 200 000 jobs: {name}"),
@@ -91,15 +91,15 @@ pub async fn lists() -> Vec<Row> {
 
 /// Filters with the number of jobs that they find on a page of 50.
 fn filters(batch: Uuid) -> [(&'static str, Filter, usize); 7] {
-    let label = Some(("run".to_owned(), "big".to_owned()));
-    let (failed, none) = (Some(State::Failed), Some(Uuid::now_v7()));
+    let label = vec![("run".to_owned(), "big".to_owned())];
+    let (failed, none) = (vec![State::Failed], Some(Uuid::now_v7()));
     let all = Filter::default();
     [
         ("nothing asked, a full page", all.clone(), 50),
         (
             "state",
             Filter {
-                state: failed,
+                states: failed.clone(),
                 ..all.clone()
             },
             0,
@@ -107,8 +107,8 @@ fn filters(batch: Uuid) -> [(&'static str, Filter, usize); 7] {
         (
             "label and state",
             Filter {
-                label: label.clone(),
-                state: failed,
+                labels: label.clone(),
+                states: failed.clone(),
                 ..all.clone()
             },
             0,
@@ -117,7 +117,7 @@ fn filters(batch: Uuid) -> [(&'static str, Filter, usize); 7] {
             "batch and state",
             Filter {
                 batch: Some(batch),
-                state: failed,
+                states: failed.clone(),
                 ..all.clone()
             },
             0,
@@ -125,7 +125,7 @@ fn filters(batch: Uuid) -> [(&'static str, Filter, usize); 7] {
         (
             "label and another batch",
             Filter {
-                label: label.clone(),
+                labels: label.clone(),
                 batch: none,
                 ..all.clone()
             },
@@ -134,9 +134,9 @@ fn filters(batch: Uuid) -> [(&'static str, Filter, usize); 7] {
         (
             "label, batch and state",
             Filter {
-                label,
+                labels: label,
                 batch: Some(batch),
-                state: failed,
+                states: failed.clone(),
                 ..all.clone()
             },
             0,
@@ -170,6 +170,8 @@ async fn fill(store: &dyn Store, jobs: usize) -> Uuid {
         created_at: 0,
         count: u32::try_from(jobs).expect("a count"),
         rejected: 0,
+        name: None,
+        labels: Default::default(),
         template: None,
         idempotency: None,
     };

@@ -20,6 +20,7 @@
 
 mod contract;
 mod dto;
+mod examples;
 pub mod extract;
 mod layers;
 mod limits;
@@ -55,10 +56,12 @@ use crate::http::page::answers;
 use crate::http::problem::error::{self, ApiError};
 use crate::http::problem::kinds::ProblemKind;
 use crate::http::routes::service::metrics as service_metrics;
-use crate::http::routes::service::{health, methods, problems, remarks};
+use crate::http::routes::service::{
+    examples as service_examples, health, methods, problems, remarks,
+};
 use crate::http::routes::{
-    batch_results, batches, cases, events, fields, jobs, plots, point_fields, resultants, results,
-    zones,
+    batch_list, batch_results, batches, cases, events, fields, job_list, jobs, me, plots,
+    point_fields, resultants, results, tenant_events, zones,
 };
 use crate::http::server::drain_body;
 use crate::http::state::AppState;
@@ -155,6 +158,7 @@ fn resources() -> OpenApiRouter<AppState> {
         .routes(routes!(batches::get, batches::delete))
         .routes(routes!(methods::methods))
         .routes(routes!(remarks::remarks))
+        .routes(routes!(service_examples::examples))
         .route_layer(from_fn(query::refuse_parameters))
         .route_layer(from_fn(etag::revalidate));
     let changing = contract::conditional(changing);
@@ -164,6 +168,12 @@ fn resources() -> OpenApiRouter<AppState> {
         .route_layer(from_fn(query::refuse_parameters))
         .route_layer(from_fn(etag::immutable));
     let finished = contract::conditional(finished);
+    // They check their parameters themselves.
+    let lists = OpenApiRouter::new()
+        .routes(routes!(jobs::submit, job_list::list))
+        .routes(routes!(batches::submit, batch_list::list))
+        .route_layer(from_fn(etag::revalidate));
+    let lists = contract::conditional(lists);
     let plain = OpenApiRouter::new()
         .routes(routes!(jobs::cancel))
         .routes(routes!(batches::cancel))
@@ -174,8 +184,8 @@ fn resources() -> OpenApiRouter<AppState> {
     let v1 = changing
         .merge(finished)
         .merge(plain)
-        .routes(routes!(jobs::submit, jobs::list))
-        .routes(routes!(batches::submit))
+        .routes(routes!(me::me))
+        .merge(lists)
         .route_layer(from_fn(accept::require_json));
     // These choose among several forms themselves.
     let parts = OpenApiRouter::new()
@@ -196,6 +206,7 @@ fn resources() -> OpenApiRouter<AppState> {
     let events = OpenApiRouter::new()
         .routes(routes!(events::job))
         .routes(routes!(events::batch))
+        .routes(routes!(tenant_events::follow))
         .route_layer(from_fn(query::refuse_parameters));
     v1.merge(parts)
         .routes(routes!(batch_results::results))

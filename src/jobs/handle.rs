@@ -9,17 +9,20 @@ use uuid::Uuid;
 
 use crate::contact::case::problem::CheckedCase;
 use crate::contact::error::CaseError;
+use crate::jobs::batch::model::Batch;
 use crate::jobs::error::JobsError;
 use crate::jobs::model::{Job, QueuePlace, State};
 use crate::jobs::options::Options;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::error::StoreError;
-use crate::jobs::store::list::{Filter, Page};
-use crate::jobs::store::retention::Deleted;
+use crate::jobs::store::list::{BatchFilter, Filter, Page};
+use crate::jobs::store::retention::{Deleted, Usage};
 use crate::jobs::worker::attempt_control::StopReason;
 
 /// Longest list page.
 pub const PAGE_MAX: u32 = 1000;
+/// Longest list page of batches, whose jobs are counted.
+pub const BATCH_PAGE_MAX: u32 = 100;
 
 /// Beyond this place in the queue the place of a job is not given.
 const PLACES_COUNTED: u32 = 10_000;
@@ -113,7 +116,7 @@ impl Jobs {
         filter: &Filter,
         cursor: Option<&str>,
         limit: u32,
-    ) -> Result<Page, JobsError> {
+    ) -> Result<Page<Job>, JobsError> {
         let after = match cursor {
             Some(cursor) => Some(filter.read_cursor(cursor).ok_or(JobsError::BadCursor)?),
             None => None,
@@ -122,9 +125,40 @@ impl Jobs {
         let mut page = store
             .list(&self.tenant, filter, after, limit.clamp(1, PAGE_MAX))
             .await?;
-        let jobs = page.jobs.into_iter();
-        page.jobs = jobs.filter_map(|job| self.unexpired(job).ok()).collect();
+        let jobs = page.entries.into_iter();
+        page.entries = jobs.filter_map(|job| self.unexpired(job).ok()).collect();
         Ok(page)
+    }
+
+    /// What the tenant has here.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn usage(&self) -> Result<Usage, JobsError> {
+        let usage = self.shared.store.usage(&self.tenant).await?;
+        Ok(Usage {
+            staged_bytes: self.shared.staged.of(&self.tenant),
+            ..usage
+        })
+    }
+
+    /// One page of the batches, newest first; `limit` is brought into 1 to [`BATCH_PAGE_MAX`].
+    ///
+    /// # Errors
+    /// [`JobsError::BadCursor`], or a failed database.
+    pub async fn batches(
+        &self,
+        filter: &BatchFilter,
+        cursor: Option<&str>,
+        limit: u32,
+    ) -> Result<Page<Batch>, JobsError> {
+        let after = match cursor {
+            Some(cursor) => Some(filter.read_cursor(cursor).ok_or(JobsError::BadCursor)?),
+            None => None,
+        };
+        let limit = limit.clamp(1, BATCH_PAGE_MAX);
+        let store = &self.shared.store;
+        Ok(store.batches(&self.tenant, filter, after, limit).await?)
     }
 
     /// Cancels a job: a queued one ends at once, a running one at the next tick of its solver, an ended one stays as

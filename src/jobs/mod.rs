@@ -33,6 +33,7 @@
 pub mod backup;
 pub mod batch;
 pub mod blobs;
+pub mod changes;
 pub mod clock;
 pub mod clock_steps;
 pub mod codec;
@@ -65,8 +66,8 @@ pub mod trace;
 pub mod worker;
 
 pub use crate::jobs::error::JobsError;
-pub use crate::jobs::handle::{Jobs, PAGE_MAX};
+pub use crate::jobs::handle::{BATCH_PAGE_MAX, Jobs, PAGE_MAX};
 pub use crate::jobs::model::{Failure, FailureKind, Job, QueuePlace, State};
 pub use crate::jobs::options::Options;
 pub use crate::jobs::store::error::StorageFault;
-pub use crate::jobs::store::list::{Filter, Page};
+pub use crate::jobs::store::list::{BatchFilter, Filter, Page, Total};

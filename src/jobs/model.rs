@@ -29,6 +29,8 @@ pub struct Job {
     pub priority: Priority,
     /// Time of submission.
     pub created_at: i64,
+    /// Time of the last change, progress aside.
+    pub updated_at: i64,
     /// Start of the current or last attempt; absent while queued.
     pub started_at: Option<i64>,
     /// End of the job; absent before it.

@@ -110,7 +110,7 @@ impl Jobs {
     }
 
     /// The same of a batch.
-    async fn recent_batch(&self, id: Uuid, age: Duration) -> Result<Batch, JobsError> {
+    pub(crate) async fn recent_batch(&self, id: Uuid, age: Duration) -> Result<Batch, JobsError> {
         let look = self.shared.store.batch(&self.tenant, id);
         let batch = self
             .shared

@@ -43,6 +43,12 @@ impl StagedBytes {
         Ok(())
     }
 
+    /// The bytes of a tenant.
+    pub(crate) fn of(&self, tenant: &Arc<str>) -> u64 {
+        let staged = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        staged.get(tenant).copied().unwrap_or(0)
+    }
+
     /// Gives bytes of a tenant back.
     pub(crate) fn give_back(&self, tenant: &Arc<str>, bytes: u64) {
         let mut staged = self.0.lock().unwrap_or_else(PoisonError::into_inner);

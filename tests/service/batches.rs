@@ -12,7 +12,7 @@ use railhead::jobs::store::submission::QueueBounds;
 
 use crate::errors::assert_problem;
 use crate::server::{Answer, Server, Setup};
-use crate::store::open_beside;
+use crate::store::{new_batch, open_beside};
 use crate::support::{Service, case, endless_case, open, pause, tick_forever};
 
 pub fn lines(cases: &[Value]) -> String {
@@ -371,13 +371,8 @@ async fn an_incomplete_batch_is_gone_after_a_restart() {
     let folder = tempfile::tempdir().unwrap();
     let store = open_beside(folder.path()).await;
     let new = NewBatch {
-        id: uuid::Uuid::now_v7(),
-        tenant: "anonymous".into(),
-        created_at: 0,
-        count: 2,
-        rejected: 0,
-        template: None,
         idempotency: Some(("k".to_owned(), [1; 32])),
+        ..new_batch("anonymous", 2)
     };
     let living = HashSet::new();
     let begun = store.begin_batch(&new, &living, QueueBounds::NONE).await;

@@ -13,7 +13,7 @@ use railhead::contact::remark::list::Remark;
 use railhead::jobs::store::Store;
 use railhead::jobs::store::claim::{Claim, ClaimKind, ClaimRequest, ReleaseReason, Renewal};
 use railhead::jobs::store::ending::{Ending, StoredResult};
-use railhead::jobs::store::submission::{Enqueued, NewJob, QueueBounds};
+use railhead::jobs::store::submission::{Enqueued, NewBatch, NewJob, QueueBounds};
 use railhead::jobs::submit_options::SubmitOptions;
 use railhead::jobs::{Failure, FailureKind, Job, State};
 use tempfile::TempDir;
@@ -185,6 +185,20 @@ pub fn new_job() -> NewJob {
         idempotency: None,
         traceparent: None,
         options: SubmitOptions::default(),
+    }
+}
+
+pub fn new_batch(tenant: &str, count: u32) -> NewBatch {
+    NewBatch {
+        id: Uuid::now_v7(),
+        tenant: tenant.into(),
+        created_at: 0,
+        count,
+        rejected: 0,
+        name: None,
+        labels: BTreeMap::new(),
+        template: None,
+        idempotency: None,
     }
 }
 

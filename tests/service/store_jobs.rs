@@ -328,7 +328,7 @@ async fn only_an_ended_job_can_be_deleted_and_all_that_hung_on_it_goes(kind: Sto
         None
     );
     let filter = Filter {
-        label: Some(("line".to_owned(), "A12".to_owned())),
+        labels: vec![("line".to_owned(), "A12".to_owned())],
         ..Filter::default()
     };
     assert_eq!(
@@ -337,7 +337,7 @@ async fn only_an_ended_job_can_be_deleted_and_all_that_hung_on_it_goes(kind: Sto
             .list("anonymous", &filter, None, 10)
             .await
             .unwrap()
-            .jobs,
+            .entries,
         []
     );
     let released = table.store.released_blobs(&[], 10).await.unwrap();

@@ -26,7 +26,7 @@ async fn pages_neither_repeat_nor_skip_while_jobs_arrive(kind: StoreKind) {
             .list("anonymous", &filter, after, 10)
             .await
             .unwrap();
-        seen.extend(page.jobs.iter().map(|job| job.id));
+        seen.extend(page.entries.iter().map(|job| job.id));
         // A newcomer belongs before the first page; a job that ends stays where it is.
         table.add(new_job()).await;
         let claim = table.claim(0).await.unwrap();
@@ -73,25 +73,25 @@ async fn filters_combine_and_windows_are_half_open(kind: StoreKind) {
             .list("anonymous", filter, None, 100)
             .await
             .unwrap();
-        page.jobs
+        page.entries
             .iter()
             .map(|job| jobs.iter().position(|id| *id == job.id).unwrap())
             .collect::<Vec<_>>()
     };
-    let label = |value: &str| Some(("line".to_owned(), value.to_owned()));
+    let label = |value: &str| vec![("line".to_owned(), value.to_owned())];
     let mut filter = Filter::default();
     assert_eq!(ids(&filter).await, [5, 4, 3, 2, 1, 0]);
-    filter.label = label("a");
+    filter.labels = label("a");
     assert_eq!(ids(&filter).await, [4, 2, 0]);
-    filter.state = Some(State::Queued);
+    filter.states = vec![State::Queued];
     assert_eq!(ids(&filter).await, [4, 2]);
-    filter.label = None;
+    filter.labels = Vec::new();
     filter.created_after = Some(1_002);
     filter.created_before = Some(1_005);
     assert_eq!(ids(&filter).await, [4, 3, 2]);
-    filter.label = label("b");
+    filter.labels = label("b");
     assert_eq!(ids(&filter).await, [3]);
-    filter.label = label("c");
+    filter.labels = label("c");
     assert_eq!(ids(&filter).await, [0; 0]);
 }
 
@@ -108,7 +108,7 @@ async fn a_cursor_of_another_filter_is_refused(kind: StoreKind) {
         .next_cursor
         .unwrap();
     let other = Filter {
-        state: Some(State::Queued),
+        states: vec![State::Queued],
         ..Filter::default()
     };
     for (filter, cursor) in [(&other, cursor.as_str()), (&Filter::default(), "nonsense")] {

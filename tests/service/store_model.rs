@@ -11,7 +11,7 @@ use railhead::jobs::store::submission::{BatchBegun, NewBatch, QueueBounds};
 use uuid::Uuid;
 
 use crate::model::{BOUNDS, BatchRow, Model, Row};
-use crate::store::{StoreKind, Table};
+use crate::store::{StoreKind, Table, new_batch};
 use crate::store_moves::{Pair, TENANTS};
 
 #[derive(Debug, Clone)]
@@ -140,7 +140,7 @@ impl Pair {
                 .store
                 .list(tenant, &Filter::default(), None, 1000)
                 .await;
-            let jobs = page.unwrap().jobs.into_iter().rev();
+            let jobs = page.unwrap().entries.into_iter().rev();
             let seen: Vec<_> = jobs
                 .map(|job| (job.id, job.state, job.attempt, job.cached))
                 .collect();
@@ -191,13 +191,8 @@ impl Pair {
 impl Pair {
     async fn begin_batch(&mut self, tenant: &'static str, count: u32) {
         let new = NewBatch {
-            id: Uuid::now_v7(),
-            tenant: tenant.into(),
             created_at: self.now,
-            count,
-            rejected: 0,
-            template: None,
-            idempotency: None,
+            ..new_batch(tenant, count)
         };
         let bounds = QueueBounds {
             all: BOUNDS.0,

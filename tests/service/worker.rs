@@ -298,7 +298,10 @@ async fn a_refused_case_is_not_stored() {
         other => panic!("{other:?}"),
     }
     assert_eq!(
-        jobs.list(&Default::default(), None, 10).await.unwrap().jobs,
+        jobs.list(&Default::default(), None, 10)
+            .await
+            .unwrap()
+            .entries,
         []
     );
     jobs.submit(case("repaired"), Some("k".to_owned()))

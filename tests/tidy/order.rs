@@ -99,6 +99,7 @@ const ORDER: &[&str] = &[
     "http::limits",
     "http::render",
     "http::server",
+    "http::examples",
     "http::extract::query",
     "http::extract::accept",
     "http::layers",

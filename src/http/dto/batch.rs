@@ -43,9 +43,18 @@ pub struct BatchAnswer {
     /// Identifier of the batch.
     #[schema(value_type = String, format = "uuid")]
     id: String,
+    /// Where the batch stands.
+    state: BatchState,
+    /// Free text of the client.
+    name: Option<String>,
+    /// Labels of the client; those of its cases are with the jobs.
+    labels: BTreeMap<String, String>,
     /// Time of submission.
     #[schema(format = "date-time", example = "2026-01-31T09:30:00.000Z")]
     created_at: String,
+    /// End of the last job; null until every job has ended.
+    #[schema(format = "date-time")]
+    ended_at: Option<String>,
     /// Number of jobs made.
     count: u32,
     /// Number of faulty cases that were left out.
@@ -59,6 +68,18 @@ pub struct BatchAnswer {
     pub ended: bool,
     /// Where to go from here.
     links: BTreeMap<String, String>,
+}
+
+/// Where a batch stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum BatchState {
+    /// No job has begun.
+    Queued,
+    /// Some jobs have begun, and not all have ended.
+    Running,
+    /// Every job has ended.
+    Ended,
 }
 
 /// Number of jobs in each state.
@@ -80,9 +101,17 @@ impl From<Batch> for BatchAnswer {
         } else {
             ended as f64 / all as f64
         };
+        let state = match (ended, batch.in_state(JobState::Running)) {
+            (ended, _) if ended == all => BatchState::Ended,
+            (0, 0) => BatchState::Queued,
+            _ => BatchState::Running,
+        };
+        let ended_at = batch.last_ended_at.filter(|_| ended == all);
         BatchAnswer {
             id: batch.id.to_string(),
+            state,
             created_at: rfc3339(batch.created_at),
+            ended_at: ended_at.map(rfc3339),
             count: batch.count,
             rejected: batch.rejected,
             states: BatchStates {
@@ -95,6 +124,8 @@ impl From<Batch> for BatchAnswer {
             progress,
             ended: ended == all,
             links: links(&batch),
+            name: batch.name,
+            labels: batch.labels,
         }
     }
 }

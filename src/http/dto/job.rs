@@ -32,6 +32,9 @@ pub struct JobAnswer {
     /// Time of submission.
     #[schema(format = "date-time", example = "2026-01-31T09:30:00.000Z")]
     created_at: String,
+    /// Time of the last change, progress aside.
+    #[schema(format = "date-time")]
+    updated_at: String,
     /// Start of the current or last attempt; null while queued.
     #[schema(format = "date-time")]
     started_at: Option<String>,
@@ -82,6 +85,7 @@ impl JobAnswer {
             batch_id: job.batch_id.map(|id| id.to_string()),
             priority: job.priority,
             created_at: rfc3339(job.created_at),
+            updated_at: rfc3339(job.updated_at),
             started_at: job.started_at.map(rfc3339),
             ended_at: job.ended_at.map(rfc3339),
             deadline_at: job.deadline.map(rfc3339),

@@ -6,5 +6,6 @@ pub mod caller;
 pub mod ids;
 pub mod json;
 pub mod json_weight;
+pub mod labels;
 pub mod query;
 pub mod submit_options;

@@ -65,6 +65,45 @@ pub struct Reader<T> {
 /// The value of a text; nothing if it cannot be read.
 type Read<T> = Box<dyn Fn(&str) -> Option<T>>;
 
+/// How the texts of a parameter are read.
+pub trait ReadTexts {
+    /// What they say.
+    type Value;
+    /// May the parameter be given more than once?
+    const REPEATED: bool;
+
+    /// The value of these texts, of which there is at least one.
+    ///
+    /// # Errors
+    /// The text that cannot be read, and what is allowed.
+    fn read<'t>(&self, texts: &[&'t str]) -> Result<Self::Value, (&'t str, &str)>;
+}
+
+impl<T> ReadTexts for Reader<T> {
+    type Value = T;
+    const REPEATED: bool = false;
+
+    fn read<'t>(&self, texts: &[&'t str]) -> Result<T, (&'t str, &str)> {
+        (self.read)(texts[0]).ok_or((texts[0], &*self.allowed))
+    }
+}
+
+/// Reads a parameter that may be given more than once.
+pub struct Repeated<T>(pub Reader<T>);
+
+impl<T> ReadTexts for Repeated<T> {
+    type Value = Vec<T>;
+    const REPEATED: bool = true;
+
+    fn read<'t>(&self, texts: &[&'t str]) -> Result<Vec<T>, (&'t str, &str)> {
+        let Reader { allowed, read } = &self.0;
+        let values = texts
+            .iter()
+            .map(|text| read(text).ok_or((*text, &**allowed)));
+        values.collect()
+    }
+}
+
 /// Reads by a function; `allowed` says in words what it accepts.
 pub fn reader<T>(
     allowed: impl Into<Cow<'static, str>>,
@@ -161,6 +200,7 @@ pub(crate) use query;
 pub struct Query {
     pairs: Vec<(String, String)>,
     faults: Vec<Fault>,
+    repeatable: Vec<String>,
 }
 
 impl Query {
@@ -170,6 +210,7 @@ impl Query {
         let mut query = Query {
             pairs: Vec::new(),
             faults: Vec::new(),
+            repeatable: Vec::new(),
         };
         let pairs = match Pairs::<Vec<(String, String)>>::try_from_uri(uri) {
             Ok(Pairs(pairs)) => pairs,
@@ -191,11 +232,6 @@ impl Query {
                     &name,
                     format!("`{name}` is not a parameter here; allowed: {allowed}"),
                 ));
-            } else if query.pairs.iter().any(|(other, _)| *other == name) {
-                query.faults.push(Fault::parameter(
-                    &name,
-                    format!("`{name}` is given more than once; give it once"),
-                ));
             } else {
                 query.pairs.push((name, value));
             }
@@ -204,23 +240,44 @@ impl Query {
     }
 
     /// The value of a parameter, if it is given and can be read; otherwise notes what would be allowed.
-    pub fn take<T>(&mut self, name: &str, reader: &Reader<T>) -> Option<T> {
-        let (_, text) = self.pairs.iter().find(|(other, _)| other == name)?;
-        let value = (reader.read)(text);
-        if value.is_none() {
-            self.faults.push(Fault::parameter(
-                name,
-                format!("`{name}` is `{text}`; allowed: {}", reader.allowed),
-            ));
+    pub fn take<R: ReadTexts>(&mut self, name: &str, reader: &R) -> Option<R::Value> {
+        let pairs = self.pairs.iter();
+        let texts: Vec<&str> = pairs
+            .filter(|(other, _)| other == name)
+            .map(|(_, text)| text.as_str())
+            .collect();
+        if texts.is_empty() {
+            return None;
         }
-        value
+        if R::REPEATED {
+            self.repeatable.push(name.to_owned());
+        }
+        match reader.read(&texts) {
+            Ok(value) => Some(value),
+            Err((text, allowed)) => {
+                self.faults.push(Fault::parameter(
+                    name,
+                    format!("`{name}` is `{text}`; allowed: {allowed}"),
+                ));
+                None
+            }
+        }
     }
 
     /// Ends the reading.
     ///
     /// # Errors
     /// `bad-query` with every fault found.
-    pub fn finish(self) -> Result<(), ApiError> {
+    pub fn finish(mut self) -> Result<(), ApiError> {
+        for (place, (name, _)) in self.pairs.iter().enumerate() {
+            let before = self.pairs[..place]
+                .iter()
+                .filter(|(other, _)| other == name);
+            if before.count() == 1 && !self.repeatable.contains(name) {
+                let detail = format!("`{name}` is given more than once; give it once");
+                self.faults.push(Fault::parameter(name, detail));
+            }
+        }
         if self.faults.is_empty() {
             Ok(())
         } else {

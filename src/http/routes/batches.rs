@@ -1,5 +1,7 @@
 //! `/v1/batches`: many cases in one request, followed and cancelled as one.
 
+use std::collections::BTreeMap;
+
 use axum::Json;
 use axum::extract::{Request, State};
 use axum::http::{StatusCode, header};
@@ -11,7 +13,8 @@ use crate::http::dto::problem::Fault;
 use crate::http::extract::batch::body::{form, read_draft};
 use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::BatchId;
-use crate::http::extract::query::{Parameters, id, query, reader};
+use crate::http::extract::labels::{LABELS_MAX, name, new_label};
+use crate::http::extract::query::{Parameters, Repeated, id, query, reader};
 use crate::http::extract::submit_options::SubmitQuery;
 use crate::http::limits::memory::Memory;
 use crate::http::options::HttpOptions;
@@ -37,6 +40,12 @@ query! {
             "valid" => Some(true),
             _ => None,
         });
+        /// Name of the batch
+        #[param(min_length = 1, max_length = 200, example = "timetable 2026")]
+        name: String as String = name();
+        /// A label of the batch, written `key:value`; may be repeated, for at most 32 labels with different keys
+        #[param(max_items = 32, example = json!(["line:A12"]))]
+        label: Vec<(String, String)> as Vec<String> = Repeated(new_label());
         /// With `text/csv`, and needed there: the job whose case is the template
         #[param(format = "uuid")]
         template: Uuid as String = id("job");
@@ -83,9 +92,12 @@ pub async fn submit(
     let key = idempotency_key(request.headers())?;
     let (batch, submit) = <(BatchQuery, SubmitQuery)>::read(request.uri(), &())?;
     let submit_options = submit.options(request.headers());
+    let labels = labels_of(batch.label.unwrap_or_default())?;
     let form = form(&jobs, request.headers(), batch.template).await?;
     let mut draft = read_draft(&jobs, &memory, &options, form, request).await?;
     draft.options = submit_options;
+    draft.name = batch.name;
+    draft.labels = labels;
     if draft.cases == draft.rejected || (draft.rejected > 0 && !batch.accept.unwrap_or(false)) {
         return Err(refusal(&draft));
     }
@@ -102,6 +114,18 @@ pub async fn submit(
     let mut response = (StatusCode::ACCEPTED, location, Json(receipt)).into_response();
     mark_replay(&mut response, replayed);
     Ok(response)
+}
+
+fn labels_of(given: Vec<(String, String)>) -> Result<BTreeMap<String, String>, ApiError> {
+    let number = given.len();
+    let labels: BTreeMap<String, String> = given.into_iter().collect();
+    if labels.len() < number || number > LABELS_MAX {
+        let detail = format!(
+            "{number} labels are given; at most {LABELS_MAX} with different keys are allowed"
+        );
+        return Err(ApiError::bad_parameter("label", detail));
+    }
+    Ok(labels)
 }
 
 /// Why a batch is not taken.

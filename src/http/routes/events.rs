@@ -36,7 +36,7 @@ use crate::jobs::model::{Job, State as JobState};
 /// A comment is sent when nothing has happened for this long, so that no one in between closes the connection.
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 /// When a client should connect again after the connection was lost.
-const RETRY: Duration = Duration::from_secs(1);
+pub const RETRY: Duration = Duration::from_secs(1);
 
 const LAST_EVENT_ID: HeaderName = HeaderName::from_static("last-event-id");
 
@@ -60,7 +60,7 @@ pub struct BatchEventSent;
 
 impl PartialSchema for JobEventSent {
     fn schema() -> RefOr<Schema> {
-        event_schema::<JobEvent>()
+        event_schema::<JobEvent>("`state`")
     }
 }
 
@@ -74,14 +74,14 @@ impl ToSchema for JobEventSent {
 
 impl PartialSchema for BatchEventSent {
     fn schema() -> RefOr<Schema> {
-        event_schema::<BatchAnswer>()
+        event_schema::<BatchAnswer>("`state`")
     }
 }
 
 impl ToSchema for BatchEventSent {}
 
-/// An event line by line; its data is `T` as JSON text.
-fn event_schema<T: ToSchema>() -> RefOr<Schema> {
+/// An event line by line, called so; its data is `T` as JSON text.
+pub fn event_schema<T: ToSchema>(names: &str) -> RefOr<Schema> {
     let text = |what: &str| {
         let text = ObjectBuilder::new().schema_type(Type::String);
         text.description(Some(what))
@@ -95,7 +95,7 @@ fn event_schema<T: ToSchema>() -> RefOr<Schema> {
         .description(Some("Milliseconds after which to connect again"));
     let event = ObjectBuilder::new()
         .description(Some("One event of the stream, line by line"))
-        .property("event", text("`state`"))
+        .property("event", text(names))
         .required("event")
         .property("id", text("What was seen, for `Last-Event-ID`"))
         .required("id")
@@ -229,14 +229,15 @@ async fn next_of_batch(
     Some((Ok(event), (ended < all).then_some(Some(mark))))
 }
 
-fn answer(events: impl Stream<Item = Result<Event, Infallible>> + Send + 'static) -> Response {
+/// The stream as an answer.
+pub fn answer(events: impl Stream<Item = Result<Event, Infallible>> + Send + 'static) -> Response {
     Sse::new(events)
         .keep_alive(KeepAlive::new().interval(KEEP_ALIVE))
         .into_response()
 }
 
 /// The change, if there is one; a failure ends the stream, and the client connects again.
-fn changed<T>(change: Result<Option<T>, impl std::fmt::Display>) -> Option<T> {
+pub fn changed<T>(change: Result<Option<T>, impl std::fmt::Display>) -> Option<T> {
     change
         .inspect_err(|reason| tracing::debug!(%reason, "a stream of events ended early"))
         .ok()
@@ -248,7 +249,8 @@ fn event<T: Serialize>(id: &str, data: &T) -> Option<Event> {
     event.json_data(data).ok()
 }
 
-fn last_event_id(headers: &HeaderMap) -> Option<String> {
+/// What the client says that it saw last.
+pub fn last_event_id(headers: &HeaderMap) -> Option<String> {
     let value = headers.get(LAST_EVENT_ID)?;
     value.to_str().ok().map(str::to_owned)
 }

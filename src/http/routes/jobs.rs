@@ -1,4 +1,4 @@
-//! `/v1/jobs`: submit, list, get, cancel, delete, and the case as it was submitted.
+//! `/v1/jobs`: submit, get, cancel, delete, and the case as it was submitted.
 
 use std::time::Duration;
 
@@ -7,9 +7,6 @@ use axum::extract::State;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
-use serde::Serialize;
-use utoipa::ToSchema;
-use uuid::Uuid;
 
 use crate::contact::case::words::question::Case;
 use crate::http::dto::job::JobAnswer;
@@ -17,7 +14,7 @@ use crate::http::extract::accept::Format;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::JobId;
 use crate::http::extract::json::JsonBody;
-use crate::http::extract::query::{Parameters, Reader, count, id, query, reader};
+use crate::http::extract::query::Parameters;
 use crate::http::extract::submit_options::SubmitQuery;
 use crate::http::limits::concurrency::ConcurrencyLimits;
 use crate::http::limits::holding_body::{HeldShares, hold_while_sent};
@@ -25,32 +22,16 @@ use crate::http::limits::memory::Memory;
 use crate::http::limits::shares::Share;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
+use crate::http::routes::prefer_wait::{preferred_wait, say_applied, wait_for_end};
 use crate::http::routes::results::result_text;
+use crate::jobs::Jobs;
 use crate::jobs::model::{Job, State as JobState};
-use crate::jobs::{Filter, Jobs, PAGE_MAX};
-
-/// Longest time that `Prefer: wait` holds a request, in s.
-pub const WAIT_MAX_SECONDS: u32 = 60;
-
-/// Jobs in one page of a list when nothing is said.
-const LIST_LIMIT_DEFAULT: u32 = 50;
 
 /// Longest idempotency key in characters.
 const IDEMPOTENCY_KEY_MAX_CHARS: usize = 255;
 
-const PREFER: HeaderName = HeaderName::from_static("prefer");
-const PREFERENCE_APPLIED: HeaderName = HeaderName::from_static("preference-applied");
 const IDEMPOTENCY_REPLAYED: HeaderName = HeaderName::from_static("idempotency-replayed");
 const IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");
-
-/// A page of jobs, newest first.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct JobPage {
-    /// The jobs of this page.
-    jobs: Vec<JobAnswer>,
-    /// Give this as `cursor` for the next page; null on the last one.
-    next_cursor: Option<String>,
-}
 
 problems! {
     /// What `POST /v1/jobs` can fail with.
@@ -136,11 +117,7 @@ pub async fn submit(
             .headers_mut()
             .insert(header::RETRY_AFTER, HeaderValue::from(1));
     }
-    if let Some(applied) =
-        wait.and_then(|seconds| HeaderValue::from_str(&format!("wait={seconds}")).ok())
-    {
-        response.headers_mut().insert(PREFERENCE_APPLIED, applied);
-    }
+    let mut response = say_applied(response, wait);
     mark_replay(&mut response, replayed);
     Ok(response)
 }
@@ -174,24 +151,6 @@ pub fn mark_replay(response: &mut Response, replayed: bool) {
     }
 }
 
-/// The wait that the client prefers, in s, capped. Preferences that are not understood are ignored (RFC 7240,
-/// section 2); the first `wait` counts.
-fn preferred_wait(headers: &HeaderMap) -> Option<u32> {
-    let values = headers
-        .get_all(&PREFER)
-        .iter()
-        .filter_map(|value| value.to_str().ok());
-    let preferences = values.flat_map(|value| value.split([',', ';']));
-    let mut waits = preferences.filter_map(|preference| {
-        let (name, value) = preference.split_once('=')?;
-        let digits = value.trim().trim_matches('"');
-        let whole = !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit());
-        (name.trim().eq_ignore_ascii_case("wait") && whole)
-            .then(|| digits.parse().unwrap_or(WAIT_MAX_SECONDS))
-    });
-    waits.next().map(|seconds| seconds.min(WAIT_MAX_SECONDS))
-}
-
 /// The idempotency key of a request, if it has one.
 ///
 /// # Errors
@@ -218,80 +177,6 @@ pub fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, ApiError> 
 }
 
 problems! {
-    /// What `GET /v1/jobs` can fail with.
-    ListProblems: BadQuery
-}
-
-query! {
-    /// Filters and page of a list of jobs.
-    ListQuery(() => ()) {
-        /// Only jobs in this state
-        state: JobState as JobState = reader(JobState::ALL.map(JobState::name).join(", "), JobState::from_name);
-        /// Only jobs of this batch
-        #[param(format = "uuid")]
-        batch: Uuid as String = id("batch");
-        /// Only jobs with this label, written `key:value`
-        #[param(example = "line:A12")]
-        label: (String, String) as String = reader("`key:value`", |text| {
-            let (key, value) = text.split_once(':')?;
-            Some((key.to_owned(), value.to_owned()))
-        });
-        /// Only jobs submitted at or after this time (RFC 3339)
-        #[param(format = "date-time", example = "2026-01-31T09:30:00Z")]
-        created_after: i64 as String = time();
-        /// Only jobs submitted before this time (RFC 3339)
-        #[param(format = "date-time")]
-        created_before: i64 as String = time();
-        /// Jobs in one page; 50 when left out
-        #[param(minimum = 1, maximum = 1000)]
-        limit: u32 as u32 = count(1, PAGE_MAX);
-        /// `next_cursor` of the page before, with the same filters
-        #[param(pattern = "^[0-9a-f]{40}$")]
-        cursor: String as String = reader("a cursor of this service", |text| Some(text.to_owned()));
-    }
-}
-
-/// A time, as milliseconds since 1970.
-fn time() -> Reader<i64> {
-    let allowed = "a time in RFC 3339 such as `2026-01-31T09:30:00Z` (write `+` as `%2B`)";
-    reader(allowed, |text| {
-        let time = text.parse::<jiff::Timestamp>();
-        time.ok().map(jiff::Timestamp::as_millisecond)
-    })
-}
-
-/// Lists jobs, newest first.
-#[utoipa::path(
-    get,
-    path = "/v1/jobs",
-    tag = "jobs",
-    operation_id = "list_jobs",
-    params(ListQuery),
-    responses((status = 200, description = "A page of jobs", body = JobPage), ListProblems)
-)]
-pub async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Json<JobPage>, ApiError> {
-    let query = ListQuery::read(&uri, &())?;
-    let filter = Filter {
-        state: query.state,
-        batch: query.batch,
-        label: query.label,
-        created_after: query.created_after,
-        created_before: query.created_before,
-    };
-    let page = jobs
-        .list(
-            &filter,
-            query.cursor.as_deref(),
-            query.limit.unwrap_or(LIST_LIMIT_DEFAULT),
-        )
-        .await?;
-    Ok(Json(JobPage {
-        jobs: page.jobs.into_iter().map(JobAnswer::new).collect(),
-        next_cursor: page.next_cursor,
-    }))
-}
-
-problems! {
     /// What asking for one job can fail with.
     GetProblems: BadQuery, JobNotFound
 }
@@ -302,11 +187,24 @@ problems! {
     path = "/v1/jobs/{id}",
     tag = "jobs",
     operation_id = "get_job",
-    params(("id" = String, Path, description = "Id of the job", format = "uuid")),
-    responses((status = 200, description = "The job", body = JobAnswer), GetProblems)
+    params(
+        ("id" = String, Path, description = "Id of the job", format = "uuid"),
+        ("Prefer" = Option<String>, Header, description = "`wait=N`: answer when the job has ended, at most N seconds (60 at most) later (RFC 7240)", example = "wait=10")
+    ),
+    responses((status = 200, description = "The job", body = JobAnswer, headers(
+        ("Preference-Applied" = String, description = "The wait that was applied, if one was asked for")
+    )), GetProblems)
 )]
-pub async fn get(Caller(jobs): Caller, JobId(id): JobId) -> Result<Json<JobAnswer>, ApiError> {
-    Ok(Json(JobAnswer::new(jobs.get_with_queue_place(id).await?)))
+pub async fn get(
+    Caller(jobs): Caller,
+    JobId(id): JobId,
+    State(crowds): State<ConcurrencyLimits>,
+    Extension(held): Extension<HeldShares>,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    let applied = wait_for_end(&jobs, &crowds, &held, id, &headers).await?;
+    let job = Json(JobAnswer::new(jobs.get_with_queue_place(id).await?));
+    Ok(say_applied(job.into_response(), applied))
 }
 
 /// The case of a job, as it was submitted.
@@ -363,36 +261,4 @@ problems! {
 pub async fn delete(Caller(jobs): Caller, JobId(id): JobId) -> Result<StatusCode, ApiError> {
     jobs.delete(id).await?;
     Ok(StatusCode::NO_CONTENT)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn wait_of(prefer: &[&'static str]) -> Option<u32> {
-        let mut headers = HeaderMap::new();
-        for value in prefer {
-            headers.append(PREFER, HeaderValue::from_static(value));
-        }
-        preferred_wait(&headers)
-    }
-
-    #[test]
-    fn the_preferred_wait_is_read_and_capped() {
-        assert_eq!(wait_of(&["wait=10"]), Some(10));
-        assert_eq!(wait_of(&["respond-async, WAIT = \"7\""]), Some(7));
-        assert_eq!(wait_of(&["handling=lenient", "wait=60"]), Some(60));
-        assert_eq!(wait_of(&["wait=61"]), Some(60));
-        assert_eq!(wait_of(&["wait=99999999999999999999"]), Some(60));
-        for ignored in [
-            "wait",
-            "wait=",
-            "wait=-1",
-            "wait=1.5",
-            "wait=soon",
-            "await=3",
-        ] {
-            assert_eq!(wait_of(&[ignored]), None, "{ignored}");
-        }
-    }
 }

@@ -1,15 +1,20 @@
 //! The resources of the API, one file each. Handlers read a request, call `jobs` and answer.
 
+pub mod batch_list;
 pub mod batch_results;
 pub mod batches;
 pub mod cases;
 pub mod events;
 pub mod fields;
+pub mod job_list;
 pub mod jobs;
+pub mod me;
 pub mod plots;
 pub mod point_fields;
+pub mod prefer_wait;
 pub mod resultants;
 pub mod results;
 pub mod service;
 pub mod stored_fields;
+pub mod tenant_events;
 pub mod zones;

@@ -1,5 +1,6 @@
 //! `/v1/jobs/{id}/result`: everything small about the answer of a job.
 
+use axum::Extension;
 use axum::body::{Body, Bytes};
 use axum::extract::State;
 use axum::http::{HeaderMap, Uri, header};
@@ -12,11 +13,13 @@ use crate::http::extract::accept::Format;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::JobId;
 use crate::http::layers::etag::{Known, tagged};
-use crate::http::limits::holding_body::hold_while_sent;
+use crate::http::limits::concurrency::ConcurrencyLimits;
+use crate::http::limits::holding_body::{HeldShares, hold_while_sent};
 use crate::http::limits::memory::{Memory, SMALL_BYTES};
 use crate::http::limits::shares::Share;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
+use crate::http::routes::prefer_wait::{say_applied, wait_for_end};
 use crate::jobs::Jobs;
 
 problems! {
@@ -30,26 +33,32 @@ problems! {
     path = "/v1/jobs/{id}/result",
     tag = "results",
     operation_id = "get_result",
-    params(("id" = String, Path, description = "Id of the job", format = "uuid")),
-    responses((status = 200, description = "The result", body = JobResult), ResultProblems)
+    params(
+        ("id" = String, Path, description = "Id of the job", format = "uuid"),
+        ("Prefer" = Option<String>, Header, description = "`wait=N`: wait for the end of the job, at most N seconds (60 at most) (RFC 7240)", example = "wait=10")
+    ),
+    responses((status = 200, description = "The result", body = JobResult, headers(
+        ("Preference-Applied" = String, description = "The wait that was applied, if one was asked for")
+    )), ResultProblems)
 )]
 pub async fn result(
     Caller(jobs): Caller,
     JobId(id): JobId,
     State(memory): State<Memory>,
+    State(crowds): State<ConcurrencyLimits>,
+    Extension(held): Extension<HeldShares>,
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
+    let applied = wait_for_end(&jobs, &crowds, &held, id, &headers).await?;
     let tag = match Known::of(&jobs, id, &uri, &headers, Format::Json).await? {
         Known::Unchanged(answer) => return Ok(answer),
         Known::Tag(tag) => tag,
     };
     let (body, share) = result_text(&jobs, &memory, id, ["", ""]).await?;
     let head = [(header::CONTENT_TYPE, Format::Json.media_type())];
-    Ok(tagged(
-        &tag,
-        hold_while_sent((head, body).into_response(), share),
-    ))
+    let response = say_applied((head, body).into_response(), applied);
+    Ok(tagged(&tag, hold_while_sent(response, share)))
 }
 
 /// The text of the result of a succeeded job between two other texts, and the memory for what is held of it. A large result is

@@ -56,6 +56,11 @@ impl Jobs {
         traceparent: Option<Arc<str>>,
     ) -> Result<(Batch, bool), JobsError> {
         let id = draft.id;
+        if draft.name.is_some() || !draft.labels.is_empty() {
+            // The text of a pair ends where its quotes say.
+            let words = format!("{:?} {:?}", draft.name, draft.labels);
+            draft.digest.update(words.as_bytes());
+        }
         let digest = draft.options.digest(draft.digest.finalize().as_bytes());
         let new = NewBatch {
             id,
@@ -63,6 +68,8 @@ impl Jobs {
             created_at: created_at(id),
             count: draft.cases - draft.rejected,
             rejected: draft.rejected,
+            name: draft.name.clone(),
+            labels: draft.labels.clone(),
             template: draft.template.clone(),
             idempotency: idempotency_key.map(|key| (key, digest)),
         };

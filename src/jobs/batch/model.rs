@@ -20,6 +20,12 @@ pub struct Batch {
     pub count: u32,
     /// Number of faulty cases that were left out.
     pub rejected: u32,
+    /// Free text of the client.
+    pub name: Option<String>,
+    /// Labels of the client.
+    pub labels: BTreeMap<String, String>,
+    /// When the last of its jobs that have ended did so, epoch milliseconds.
+    pub last_ended_at: Option<i64>,
     /// Number of jobs in each state; every state is there.
     pub states: BTreeMap<State, u64>,
 }

@@ -1,5 +1,7 @@
 //! Batches that are being received: cases are checked and staged while they arrive, on places reserved in the queue.
 
+use std::collections::BTreeMap;
+
 use bytes::Bytes;
 use serde_json::Value;
 use tokio::runtime::Handle;
@@ -48,6 +50,10 @@ pub struct BatchUpload {
     pub faulty: Vec<FaultyCase>,
     /// Options of all its jobs.
     pub options: SubmitOptions,
+    /// Free text of the client.
+    pub name: Option<String>,
+    /// Labels of the client, of the batch as a whole.
+    pub labels: BTreeMap<String, String>,
     /// Places in the queue reserved so far.
     reserved: u32,
     /// Bytes counted so far.
@@ -231,6 +237,8 @@ impl Jobs {
             rejected: 0,
             faulty: Vec::new(),
             options: SubmitOptions::default(),
+            name: None,
+            labels: BTreeMap::new(),
             reserved: 0,
             staged: 0,
             in_table: false,

@@ -1,50 +1,89 @@
-//! Lists of jobs, newest first, page by page: the filter, the page and the cursor between pages.
+//! Lists of jobs and batches, newest first, page by page: the filter, the page and the cursor between pages.
 
 use uuid::Uuid;
 
-use crate::jobs::model::{Job, State};
+use crate::jobs::model::State;
 
 /// Which jobs to list; everything left out does not restrict.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Filter {
-    /// Only jobs in this state.
-    pub state: Option<State>,
+    /// Only jobs in one of these states; any if there is none.
+    pub states: Vec<State>,
     /// Only jobs of this batch.
     pub batch: Option<Uuid>,
-    /// Only jobs that carry this label with this value.
-    pub label: Option<(String, String)>,
+    /// Only jobs that carry each of these labels with its value.
+    pub labels: Vec<(String, String)>,
+    /// Only jobs whose name contains this text; ASCII letters match in either case.
+    pub name: Option<String>,
     /// Only jobs submitted at or after this time (epoch milliseconds).
     pub created_after: Option<i64>,
     /// Only jobs submitted before this time (epoch milliseconds). Together with `created_after`: a half-open window.
     pub created_before: Option<i64>,
+    /// Only jobs that changed at or after this time (epoch milliseconds), progress aside.
+    pub updated_after: Option<i64>,
 }
 
-/// One page of a list.
+/// Which batches to list; everything left out does not restrict.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct BatchFilter {
+    /// Only batches that carry each of these labels with its value.
+    pub labels: Vec<(String, String)>,
+    /// Only batches whose name contains this text; ASCII letters match in either case.
+    pub name: Option<String>,
+    /// Only batches submitted at or after this time (epoch milliseconds).
+    pub created_after: Option<i64>,
+    /// Only batches submitted before this time (epoch milliseconds).
+    pub created_before: Option<i64>,
+}
+
+/// One page of a list. It may have fewer entries than asked for although more follow: where many have to be looked at to find
+/// some, a page ends after a bounded number of them.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Page {
-    /// The jobs, newest first.
-    pub jobs: Vec<Job>,
+pub struct Page<T> {
+    /// The entries, newest first.
+    pub entries: Vec<T>,
     /// Where the next page begins; absent on the last page.
     pub next_cursor: Option<String>,
+    /// Number of entries of the whole list.
+    pub total: Total,
+}
+
+/// Number of entries of a list.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Total {
+    /// So many.
+    Exactly(u64),
+    /// So many were counted, there may be more.
+    AtLeast(u64),
+}
+
+/// A job that changed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Change {
+    /// The job.
+    pub id: Uuid,
+    /// Its batch.
+    pub batch: Option<Uuid>,
+    /// When, epoch milliseconds.
+    pub at: i64,
 }
 
 impl Filter {
     /// The cursor that continues this list after the job `last`: 40 characters of `[0-9a-f]`.
     #[must_use]
     pub fn cursor_after(&self, last: Uuid) -> String {
-        format!("{}{}", last.simple(), self.change_tag())
+        cursor(last, &self.change_tag())
     }
 
-    /// The job after which `cursor` continues; `None` if it is not a cursor of this very filter.
+    /// The job after which `text` continues; `None` if it is not a cursor of this very filter.
     #[must_use]
-    pub fn read_cursor(&self, cursor: &str) -> Option<Uuid> {
-        let (id, mark) = cursor.split_at_checked(32)?;
-        if mark != self.change_tag() {
-            return None;
-        }
-        let id = Uuid::try_parse(id).ok()?;
-        // Only our own spelling is a cursor: the parser would also take capital letters.
-        (id.simple().to_string() == cursor[..32]).then_some(id)
+    pub fn read_cursor(&self, text: &str) -> Option<Uuid> {
+        read_cursor(text, &self.change_tag())
+    }
+
+    /// Is more asked of a job than an index finds?
+    pub(crate) fn looks_at_jobs(&self) -> bool {
+        self.labels.len() > 1 || self.name.is_some() || self.updated_after.is_some()
     }
 
     /// Smallest id a job of the filter can have: UUIDv7 begins with 48 bits of milliseconds.
@@ -59,23 +98,74 @@ impl Filter {
 
     /// Eight hexadecimal digits that tell one filter from another.
     fn change_tag(&self) -> String {
-        let mut hasher = blake3::Hasher::new();
-        let parts = [
-            self.state.map(|state| state.name().to_owned()),
-            self.label.as_ref().map(|(key, _)| key.clone()),
-            self.label.as_ref().map(|(_, value)| value.clone()),
+        let mut parts = vec![
             self.created_after.map(|time| time.to_string()),
             self.created_before.map(|time| time.to_string()),
+            self.updated_after.map(|time| time.to_string()),
             self.batch.map(|batch| batch.to_string()),
+            self.name.clone(),
+            Some(self.states.len().to_string()),
         ];
-        for part in parts {
-            // Length first, so that neighbouring parts cannot run into each other.
-            let part = part.map_or_else(|| "-".to_owned(), |text| format!("+{text}"));
-            hasher.update(&(part.len() as u64).to_le_bytes());
-            hasher.update(part.as_bytes());
-        }
-        hasher.finalize().to_hex()[..8].to_owned()
+        let states = self.states.iter();
+        parts.extend(states.map(|state| Some(state.name().to_owned())));
+        parts.extend(words(&self.labels));
+        digits_of(parts)
     }
+}
+
+impl BatchFilter {
+    /// The cursor that continues this list after the batch `last`.
+    #[must_use]
+    pub fn cursor_after(&self, last: Uuid) -> String {
+        cursor(last, &self.change_tag())
+    }
+
+    /// The batch after which `text` continues; `None` if it is not a cursor of this very filter.
+    #[must_use]
+    pub fn read_cursor(&self, text: &str) -> Option<Uuid> {
+        read_cursor(text, &self.change_tag())
+    }
+
+    fn change_tag(&self) -> String {
+        let mut parts = vec![
+            Some("batches".to_owned()),
+            self.created_after.map(|time| time.to_string()),
+            self.created_before.map(|time| time.to_string()),
+            self.name.clone(),
+        ];
+        parts.extend(words(&self.labels));
+        digits_of(parts)
+    }
+}
+
+fn words(labels: &[(String, String)]) -> impl Iterator<Item = Option<String>> {
+    let words = labels.iter().flat_map(|(key, value)| [key, value]);
+    words.map(|word| Some(word.clone()))
+}
+
+fn cursor(last: Uuid, tag: &str) -> String {
+    format!("{}{tag}", last.simple())
+}
+
+fn read_cursor(text: &str, tag: &str) -> Option<Uuid> {
+    let (id, mark) = text.split_at_checked(32)?;
+    if mark != tag {
+        return None;
+    }
+    let read = Uuid::try_parse(id).ok()?;
+    // Only our own spelling is a cursor: the parser would also take capital letters.
+    (read.simple().to_string() == id).then_some(read)
+}
+
+fn digits_of(parts: impl IntoIterator<Item = Option<String>>) -> String {
+    let mut hasher = blake3::Hasher::new();
+    for part in parts {
+        // Length first, so that neighbouring parts cannot run into each other.
+        let part = part.map_or_else(|| "-".to_owned(), |text| format!("+{text}"));
+        hasher.update(&(part.len() as u64).to_le_bytes());
+        hasher.update(part.as_bytes());
+    }
+    hasher.finalize().to_hex()[..8].to_owned()
 }
 
 /// The smallest UUID whose leading 48 bits are the given time; times outside 48 bits are clamped.
@@ -91,7 +181,7 @@ mod tests {
     #[test]
     fn a_cursor_leads_back_to_its_job_and_to_no_other_filter() {
         let filter = Filter {
-            state: Some(State::Queued),
+            states: vec![State::Queued],
             ..Filter::default()
         };
         let id = Uuid::now_v7();
@@ -113,7 +203,7 @@ mod tests {
     #[test]
     fn parts_of_a_filter_do_not_run_into_each_other() {
         let with = |key: &str, value: &str| Filter {
-            label: Some((key.to_owned(), value.to_owned())),
+            labels: vec![(key.to_owned(), value.to_owned())],
             ..Filter::default()
         };
         assert_ne!(with("ab", "c").change_tag(), with("a", "bc").change_tag());

@@ -37,8 +37,8 @@ use crate::jobs::model::{Failure, Job, State};
 use crate::jobs::store::claim::{Claim, ClaimRequest, QueueAhead, Reap, ReleaseReason, Renewal};
 use crate::jobs::store::ending::{Ending, NewSlice, ResultRef, SliceRecord, StoredResult};
 use crate::jobs::store::error::StoreError;
-use crate::jobs::store::list::{Filter, Page};
-use crate::jobs::store::retention::{Deleted, Moment, Overdue, RetentionRule, Stats};
+use crate::jobs::store::list::{BatchFilter, Change, Filter, Page};
+use crate::jobs::store::retention::{Deleted, Moment, Overdue, RetentionRule, Stats, Usage};
 use crate::jobs::store::submission::{
     BatchBegun, CacheKey, Enqueued, NewBatch, NewJob, QueueBounds, Refusal, StoredCase,
 };
@@ -53,6 +53,9 @@ pub trait Store: KeyStore + Send + Sync + Debug {
 
     /// Counts and sizes, read from indices alone.
     async fn stats(&self) -> Result<Stats, StoreError>;
+
+    /// What a tenant has; the bytes that its unfinished batches stand for are not known here.
+    async fn usage(&self, tenant: &str) -> Result<Usage, StoreError>;
 
     /// Closes every connection. Later calls fail.
     async fn close(&self);
@@ -131,7 +134,26 @@ pub trait Store: KeyStore + Send + Sync + Debug {
         filter: &Filter,
         after: Option<Uuid>,
         limit: u32,
-    ) -> Result<Page, StoreError>;
+    ) -> Result<Page<Job>, StoreError>;
+
+    /// One page of the acknowledged batches of a tenant with their counts, newest first, from the first one older than `after`.
+    async fn batches(
+        &self,
+        tenant: &str,
+        filter: &BatchFilter,
+        after: Option<Uuid>,
+        limit: u32,
+    ) -> Result<Page<Batch>, StoreError>;
+
+    /// Jobs of a tenant that changed, progress aside, in the order of the time of their last change and of their ids: those
+    /// that changed later than `since`, and of those that changed at that time the ones after the job `after`, or all of them.
+    async fn changes(
+        &self,
+        tenant: &str,
+        since: i64,
+        after: Option<Uuid>,
+        limit: u32,
+    ) -> Result<Vec<Change>, StoreError>;
 
     /// An acknowledged batch with its counts.
     async fn batch(&self, tenant: &str, id: Uuid) -> Result<Option<Batch>, StoreError>;

@@ -54,6 +54,17 @@ pub struct Stats {
     pub result_bytes: u64,
 }
 
+/// What a tenant has in a job table.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Usage {
+    /// Number of jobs in each state; a state may be missing.
+    pub jobs: BTreeMap<State, u64>,
+    /// Places in the queue that are reserved for batches that are being received.
+    pub reserved: u64,
+    /// Bytes that these stand for.
+    pub staged_bytes: u64,
+}
+
 /// Jobs whose deadline has passed.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Overdue {

@@ -97,6 +97,10 @@ pub struct NewBatch {
     pub count: u32,
     /// Number of cases that were refused.
     pub rejected: u32,
+    /// Free text of the client.
+    pub name: Option<String>,
+    /// Labels of the client.
+    pub labels: BTreeMap<String, String>,
     /// The case that its rows fill, if it is a table.
     pub template: Option<Bytes>,
     /// The client's idempotency key with the digest of all cases and options.

@@ -9,7 +9,7 @@ use crate::contact::case::words::solver::{MethodName, Output};
 use crate::http::extract::caller::AnyTenant;
 use crate::http::options::HttpOptions;
 use crate::http::problem::catalogue::PlainProblems;
-use crate::http::routes::jobs::WAIT_MAX_SECONDS;
+use crate::http::routes::prefer_wait::WAIT_MAX_SECONDS;
 use crate::jobs::PAGE_MAX;
 
 /// What the service can do.

@@ -1,5 +1,6 @@
 //! Resources that describe the service itself.
 
+pub mod examples;
 pub mod health;
 pub mod methods;
 pub mod metrics;

@@ -4,12 +4,12 @@
 //! acknowledged and is removed with its jobs.
 
 use crate::jobs::store::sqlite::blob_refs::drop_slices_of_ended;
-use std::collections::{BTreeMap, HashSet};
+use std::collections::HashSet;
 
 use sqlx::{Row, SqliteConnection};
 use uuid::Uuid;
 
-use crate::jobs::batch::model::{Batch, BatchItem, ItemResult};
+use crate::jobs::batch::model::{BatchItem, ItemResult};
 use crate::jobs::model::{State, created_at};
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::blob_refs::release_blobs;
@@ -17,13 +17,13 @@ use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::insert::insert_jobs;
 use crate::jobs::store::sqlite::quota::Places;
 use crate::jobs::store::sqlite::rows::{
-    job_columns, read_blob_ids, read_count, read_id, read_job, read_state,
+    job_columns, read_blob_ids, read_count, read_id, read_job, read_state, to_json,
 };
 use crate::jobs::store::submission::{BatchBegun, NewBatch, NewJob, QueueBounds, Refusal};
 
 const CANCEL: &str = "UPDATE jobs SET state = CASE WHEN state = 'queued' THEN 'cancelled' ELSE state END, \
      ended_at = CASE WHEN state = 'queued' THEN $1 ELSE NULL END, \
-     cancel_requested = 1, version = version + 1 \
+     cancel_requested = 1, version = version + 1, updated_at = $1 \
      WHERE id IN (SELECT id FROM jobs WHERE batch_id = (SELECT id FROM batches WHERE id = $2 AND tenant = $4) \
      AND ended_at IS NULL AND cancel_requested = 0 LIMIT $3) \
      RETURNING id, state, slices";
@@ -106,14 +106,17 @@ impl SqliteStore {
             Err(refusal) => return Ok(BatchBegun::Refused(refusal)),
         }
         sqlx::query(
-            "INSERT INTO batches (id, tenant, created_at, count, rejected, reserved) VALUES ($1, $2, $3, $4, $5, $4) \
-             ON CONFLICT (id) DO UPDATE SET count = $4, rejected = $5, reserved = $4",
+            "INSERT INTO batches (id, tenant, created_at, count, rejected, reserved, name, labels) \
+             VALUES ($1, $2, $3, $4, $5, $4, $6, $7) \
+             ON CONFLICT (id) DO UPDATE SET count = $4, rejected = $5, reserved = $4, name = $6, labels = $7",
         )
         .bind(new.id.to_string())
         .bind(&*new.tenant)
         .bind(new.created_at)
         .bind(new.count)
         .bind(new.rejected)
+        .bind(&new.name)
+        .bind(to_json(&new.labels)?)
         .execute(&mut *transaction)
         .await?;
         if let Some(template) = &new.template {
@@ -223,40 +226,6 @@ impl SqliteStore {
             .fetch_all(&self.readers)
             .await?;
         rows.iter().map(read_id).collect()
-    }
-
-    /// A complete batch with its counts.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(crate) async fn batch(&self, tenant: &str, id: Uuid) -> Result<Option<Batch>, StoreError> {
-        let row = sqlx::query(
-            "SELECT id, tenant, created_at, count, rejected FROM batches WHERE id = $1 AND complete = 1 AND tenant = $2",
-        )
-        .bind(id.to_string())
-        .bind(tenant)
-        .fetch_optional(&self.readers)
-        .await?;
-        let Some(row) = row else { return Ok(None) };
-        let rows = sqlx::query(
-            "SELECT state, COUNT(*) AS jobs FROM jobs WHERE batch_id = $1 GROUP BY state",
-        )
-        .bind(id.to_string())
-        .fetch_all(&self.readers)
-        .await?;
-        let mut states: BTreeMap<State, u64> =
-            State::ALL.into_iter().map(|state| (state, 0)).collect();
-        for row in &rows {
-            states.insert(read_state(row)?, read_count(row, "jobs")?);
-        }
-        Ok(Some(Batch {
-            id,
-            tenant: row.try_get("tenant")?,
-            created_at: row.try_get("created_at")?,
-            count: row.try_get("count")?,
-            rejected: row.try_get("rejected")?,
-            states,
-        }))
     }
 
     /// Cancels the queued ones among the next `limit` jobs of a batch that were not cancelled yet, and asks the workers of

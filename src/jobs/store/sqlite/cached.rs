@@ -52,7 +52,7 @@ pub(crate) async fn end_pairs(
     }
     let mut update = with_pairs(pairs);
     update.push(
-        " UPDATE jobs SET state = 'succeeded', started_at = pairs.at, ended_at = pairs.at, progress = 1.0, cached = 1, \
+        " UPDATE jobs SET state = 'succeeded', started_at = pairs.at, ended_at = pairs.at, updated_at = pairs.at, progress = 1.0, cached = 1, \
          remarks = source.remarks, blob_id = source.blob_id, field_patches = source.field_patches, \
          cache_key = NULL, lease_until = NULL, worker = NULL, version = jobs.version + 1, \
          attempt = jobs.attempt - (pairs.lease_number IS NOT NULL) \

@@ -12,8 +12,8 @@ use crate::jobs::model::{Failure, Job, State};
 use crate::jobs::store::claim::{Claim, ClaimRequest, QueueAhead, Reap, ReleaseReason, Renewal};
 use crate::jobs::store::ending::{Ending, NewSlice, ResultRef, SliceRecord, StoredResult};
 use crate::jobs::store::error::StoreError;
-use crate::jobs::store::list::{Filter, Page};
-use crate::jobs::store::retention::{Deleted, Moment, Overdue, RetentionRule, Stats};
+use crate::jobs::store::list::{BatchFilter, Change, Filter, Page};
+use crate::jobs::store::retention::{Deleted, Moment, Overdue, RetentionRule, Stats, Usage};
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::submission::{
     BatchBegun, CacheKey, Enqueued, NewBatch, NewJob, QueueBounds, Refusal, StoredCase,
@@ -28,6 +28,10 @@ impl Store for SqliteStore {
 
     async fn stats(&self) -> Result<Stats, StoreError> {
         self.stats().await
+    }
+
+    async fn usage(&self, tenant: &str) -> Result<Usage, StoreError> {
+        self.usage(tenant).await
     }
 
     async fn close(&self) {
@@ -108,8 +112,28 @@ impl Store for SqliteStore {
         filter: &Filter,
         after: Option<Uuid>,
         limit: u32,
-    ) -> Result<Page, StoreError> {
+    ) -> Result<Page<Job>, StoreError> {
         self.list(tenant, filter, after, limit).await
+    }
+
+    async fn batches(
+        &self,
+        tenant: &str,
+        filter: &BatchFilter,
+        after: Option<Uuid>,
+        limit: u32,
+    ) -> Result<Page<Batch>, StoreError> {
+        self.batches(tenant, filter, after, limit).await
+    }
+
+    async fn changes(
+        &self,
+        tenant: &str,
+        since: i64,
+        after: Option<Uuid>,
+        limit: u32,
+    ) -> Result<Vec<Change>, StoreError> {
+        self.changes(tenant, since, after, limit).await
     }
 
     async fn batch(&self, tenant: &str, id: Uuid) -> Result<Option<Batch>, StoreError> {

@@ -84,6 +84,7 @@ impl SqliteStore {
         update.push_bind(request.lease_until);
         update.push(", worker = ").push_bind(request.worker);
         update.push(", started_at = ").push_bind(request.now);
+        update.push(", updated_at = ").push_bind(request.now);
         update.push(", group_size = ");
         update.push_bind(i64::try_from(ids.len()).unwrap_or(i64::MAX));
         // A suspect has to wait until nothing else is solved.

@@ -15,7 +15,7 @@ use crate::jobs::store::sqlite::rows::{read_id, read_state, to_json};
 const LATE: &str = "SELECT id, state FROM jobs WHERE deadline <= $1 AND deadline IS NOT NULL AND ended_at IS NULL \
      AND (created_at >= $2 OR deadline <= $3)";
 
-const FAIL_LATE: &str = "UPDATE jobs SET state = 'failed', failure = $4, ended_at = $1, version = version + 1 \
+const FAIL_LATE: &str = "UPDATE jobs SET state = 'failed', failure = $4, ended_at = $1, updated_at = $1, version = version + 1 \
      WHERE id IN (SELECT id FROM jobs WHERE deadline <= $1 AND deadline IS NOT NULL AND ended_at IS NULL \
      AND (created_at >= $2 OR deadline <= $3) AND state || '' = 'queued' LIMIT $5) RETURNING id, state, slices";
 

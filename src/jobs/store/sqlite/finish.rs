@@ -122,6 +122,7 @@ async fn end_solved(
     });
     update.push(") UPDATE jobs SET state = done.state, ended_at = ");
     update.push_bind(now);
+    update.push(", updated_at = ").push_bind(now);
     update.push(
         ", remarks = done.remarks, failure = done.failure, blob_id = done.blob, \
          field_patches = done.patches, \

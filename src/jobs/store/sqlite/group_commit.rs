@@ -199,6 +199,7 @@ fn queued(new: &NewJob) -> Job {
         batch_id: None,
         priority: new.options.priority,
         created_at: new.created_at,
+        updated_at: new.created_at,
         started_at: None,
         ended_at: None,
         deadline: new.deadline(),

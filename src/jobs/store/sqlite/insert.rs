@@ -8,7 +8,7 @@ use crate::jobs::store::sqlite::cached::end_with_sources;
 use crate::jobs::store::sqlite::rows::to_json;
 use crate::jobs::store::submission::{CacheKey, NewJob};
 
-/// Jobs in one statement; with 17 values each far below the bound of SQLite.
+/// Jobs in one statement; with 18 values each far below the bound of SQLite.
 const ROWS_PER_STATEMENT: usize = 250;
 
 /// Queues jobs within the caller's transaction, those of a batch with their places in it. Returns those that ended at
@@ -26,7 +26,7 @@ pub(crate) async fn insert_jobs(
             .map(|(_, job)| to_json(&job.labels))
             .collect::<Result<Vec<_>, _>>()?;
         let mut rows = QueryBuilder::<Sqlite>::new(
-            "INSERT INTO jobs (id, state, name, labels, method, created_at, batch_id, batch_index, cost_us, slice_us, outputs, \
+            "INSERT INTO jobs (id, state, name, labels, method, created_at, updated_at, batch_id, batch_index, cost_us, slice_us, outputs, \
              cache_key, tenant, bypass_cache, rank, deadline, traceparent) ",
         );
         rows.push_values(
@@ -37,6 +37,7 @@ pub(crate) async fn insert_jobs(
                     .push_bind(&job.name)
                     .push_bind(labels)
                     .push_bind(&job.method)
+                    .push_bind(job.created_at)
                     .push_bind(job.created_at)
                     .push_bind(&batch)
                     .push_bind(*index)

@@ -34,7 +34,7 @@ impl SqliteStore {
         let row = sqlx::query(concat!(
             "UPDATE jobs SET state = CASE WHEN state = 'queued' THEN 'cancelled' ELSE state END, \
              ended_at = CASE WHEN state = 'queued' THEN $1 ELSE NULL END, \
-             cancel_requested = 1, version = version + 1 \
+             cancel_requested = 1, version = version + 1, updated_at = $1 \
              WHERE id = $2 AND tenant = $3 AND cancel_requested = 0 AND state IN ('queued', 'running') RETURNING ",
             job_columns!(),
             ", slices"

@@ -157,6 +157,7 @@ impl SqliteStore {
                 query.push(")");
             }
         }
+        query.push(", updated_at = ").push_bind(now);
         query.push(", ended_at = CASE WHEN cancel_requested = 1 THEN ");
         query.push_bind(now);
         query

@@ -1,106 +1,268 @@
-//! Lists of the embedded job table: one indexed statement per page, whatever the filter.
+//! Lists of the embedded job table: one indexed statement per page and state, whatever the filter.
 
-use sqlx::{QueryBuilder, Sqlite};
+use std::cmp::Reverse;
+
+use sqlx::sqlite::SqliteRow;
+use sqlx::{QueryBuilder, Row, Sqlite};
 use uuid::Uuid;
 
+use crate::jobs::model::{Job, State};
 use crate::jobs::store::error::StoreError;
-use crate::jobs::store::list::{Filter, Page};
+use crate::jobs::store::list::{Change, Filter, Page, Total};
 use crate::jobs::store::sqlite::database::SqliteStore;
-use crate::jobs::store::sqlite::rows::{job_columns, read_job};
+use crate::jobs::store::sqlite::rows::{job_columns, read_count, read_id, read_job};
+
+/// Most jobs that are looked at for one page where no index finds them.
+const LOOKED_AT: u32 = 20_000;
+/// How far the jobs of a list are counted.
+const COUNTED: u32 = 1_000;
 
 impl SqliteStore {
     /// One page of the list of a tenant, newest first, at most `limit` jobs.
     ///
     /// # Errors
-    /// The cursor is not one of this filter, or the database failed.
+    /// The database failed.
     pub(crate) async fn list(
         &self,
         tenant: &str,
         filter: &Filter,
         after: Option<Uuid>,
         limit: u32,
-    ) -> Result<Page, StoreError> {
-        let mut query = page_query(tenant, filter, after, limit);
-        let rows = query.build().fetch_all(&self.readers).await?;
-        let mut jobs = rows.iter().map(read_job).collect::<Result<Vec<_>, _>>()?;
-        // One row more than asked for was read: it says whether there is a next page.
+    ) -> Result<Page<Job>, StoreError> {
+        let (mut jobs, mut looked_to) = (Vec::new(), None);
+        for state in walked(filter) {
+            let mut query = page_query(tenant, filter, state, after, limit);
+            for row in &query.build().fetch_all(&self.readers).await? {
+                jobs.push(read_job(row)?);
+            }
+            if filter.looks_at_jobs() {
+                let mut query = end_query(tenant, filter, state, after);
+                let end = query.build().fetch_optional(&self.readers).await?;
+                looked_to = looked_to.max(end.as_ref().map(read_id).transpose()?);
+            }
+        }
+        jobs.sort_unstable_by_key(|job| Reverse(job.id));
+        // Below, not every state was looked at.
+        jobs.retain(|job| looked_to.is_none_or(|to| job.id >= to));
+        // One job more than asked for was read: it says whether there is a next page.
         let more = jobs.len() > limit as usize;
         jobs.truncate(limit as usize);
-        let next_cursor = jobs
-            .last()
-            .filter(|_| more)
-            .map(|job| filter.cursor_after(job.id));
-        Ok(Page { jobs, next_cursor })
+        let last = if more {
+            jobs.last().map(|job| job.id)
+        } else {
+            looked_to
+        };
+        Ok(Page {
+            next_cursor: last.map(|last| filter.cursor_after(last)),
+            total: match filter.looks_at_jobs() {
+                true => Total::AtLeast(jobs.len() as u64),
+                false => self.count(tenant, filter).await?,
+            },
+            entries: jobs,
+        })
+    }
+
+    async fn count(&self, tenant: &str, filter: &Filter) -> Result<Total, StoreError> {
+        let restricted = filter.batch.is_some()
+            || !filter.labels.is_empty()
+            || filter.created_after.or(filter.created_before).is_some();
+        let (mut total, mut all) = (0, true);
+        for state in walked(filter) {
+            let mut query = if restricted {
+                count_query(tenant, filter, state)
+            } else {
+                kept_count_query(tenant, state)
+            };
+            let row = query.build().fetch_one(&self.readers).await?;
+            let number = read_count(&row, "number")?;
+            all &= !restricted || number < u64::from(COUNTED);
+            total += number;
+        }
+        Ok(match all {
+            true => Total::Exactly(total),
+            false => Total::AtLeast(total),
+        })
+    }
+
+    /// Jobs of a tenant that changed at `since` or later, in the order of their changes, after the one given.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub(crate) async fn changes(
+        &self,
+        tenant: &str,
+        since: i64,
+        after: Option<Uuid>,
+        limit: u32,
+    ) -> Result<Vec<Change>, StoreError> {
+        let rows = sqlx::query(CHANGES)
+            .bind(tenant)
+            .bind(since)
+            .bind(after.map_or_else(String::new, |id| id.to_string()))
+            .bind(limit)
+            .fetch_all(&self.readers)
+            .await?;
+        let change = |row: &SqliteRow| {
+            let batch: Option<&str> = row.try_get("batch_id")?;
+            let batch = batch.map(Uuid::try_parse).transpose();
+            Ok(Change {
+                id: read_id(row)?,
+                batch: batch.map_err(|error| StoreError::Corrupt(format!("batch id: {error}")))?,
+                at: row.try_get("updated_at")?,
+            })
+        };
+        rows.iter().map(change).collect()
     }
 }
 
-/// The statement of one page. Labels have a table of their own, sorted by job within each label, so that every kind of list
-/// walks an index from its newest entry and stops at the limit.
+const CHANGES: &str = "SELECT id, batch_id, updated_at FROM jobs WHERE tenant = $1 AND (updated_at, id) > ($2, $3) \
+     ORDER BY updated_at, id LIMIT $4";
+
+/// The states whose jobs are walked one after the other; `None` stands for all of them.
+fn walked(filter: &Filter) -> Vec<Option<State>> {
+    let all = State::ALL.iter().all(|state| filter.states.contains(state));
+    match filter.states.is_empty() || all {
+        true => vec![None],
+        false => filter.states.iter().copied().map(Some).collect(),
+    }
+}
+
+/// The statement of one page of the jobs in one state, or in any.
 fn page_query(
     tenant: &str,
     filter: &Filter,
+    state: Option<State>,
     after: Option<Uuid>,
     limit: u32,
 ) -> QueryBuilder<Sqlite> {
-    let (source, id) = match filter.label {
+    let most = i64::from(limit) + 1;
+    if !filter.looks_at_jobs() {
+        let mut query = QueryBuilder::new("");
+        walk(&mut query, job_columns!(), tenant, filter, state, after);
+        query.push(" LIMIT ").push_bind(most);
+        return query;
+    }
+    let mut query = QueryBuilder::new(concat!("SELECT ", job_columns!(), " FROM ("));
+    walk(&mut query, job_columns!(), tenant, filter, state, after);
+    query.push(" LIMIT ").push_bind(LOOKED_AT);
+    query.push(") AS looked_at WHERE TRUE");
+    if let Some(time) = filter.updated_after {
+        query.push(" AND updated_at >= ").push_bind(time);
+    }
+    if let Some(name) = &filter.name {
+        query.push(" AND instr(lower(COALESCE(name, '')), ");
+        query.push_bind(name.to_ascii_lowercase()).push(") > 0");
+    }
+    for (key, value) in filter.labels.iter().skip(1) {
+        query.push(" AND EXISTS (SELECT 1 FROM job_labels WHERE of_tenant = ");
+        query.push_bind(tenant.to_owned()).push(" AND key = ");
+        query.push_bind(key.clone()).push(" AND value = ");
+        query.push_bind(value.clone());
+        query.push(" AND job_id = looked_at.id)");
+    }
+    query.push(" ORDER BY id DESC LIMIT ").push_bind(most);
+    query
+}
+
+/// The last of the jobs that are looked at for one page, if it was not the last of all.
+fn end_query(
+    tenant: &str,
+    filter: &Filter,
+    state: Option<State>,
+    after: Option<Uuid>,
+) -> QueryBuilder<Sqlite> {
+    let mut query = QueryBuilder::new("");
+    walk(&mut query, "id", tenant, filter, state, after);
+    query.push(" LIMIT 1 OFFSET ").push_bind(LOOKED_AT - 1);
+    query
+}
+
+fn count_query(tenant: &str, filter: &Filter, state: Option<State>) -> QueryBuilder<Sqlite> {
+    let mut query = QueryBuilder::new("SELECT COUNT(*) AS number FROM (");
+    walk(&mut query, "id", tenant, filter, state, None);
+    query.push(" LIMIT ").push_bind(COUNTED).push(")");
+    query
+}
+
+/// The counts that the database keeps itself.
+fn kept_count_query(tenant: &str, state: Option<State>) -> QueryBuilder<Sqlite> {
+    let mut query = QueryBuilder::new(
+        "SELECT COALESCE(SUM(number), 0) AS number FROM job_counts WHERE tenant = ",
+    );
+    query.push_bind(tenant.to_owned());
+    if let Some(state) = state {
+        query.push(" AND state = ").push_bind(state.name());
+    }
+    query
+}
+
+/// Walks the jobs of a filter, as far as an index finds them, from the newest. Labels have a table of their own, sorted by job
+/// within each label, so that every kind of list walks an index and stops at its limit.
+fn walk(
+    query: &mut QueryBuilder<Sqlite>,
+    columns: &str,
+    tenant: &str,
+    filter: &Filter,
+    state: Option<State>,
+    after: Option<Uuid>,
+) {
+    let label = filter.labels.first();
+    let (source, id) = match label {
         Some(_) => (
             " FROM (SELECT of_tenant, key, value, job_id, state AS label_state FROM job_labels) AS job_labels JOIN jobs ON jobs.id = job_id",
             "job_id",
         ),
         None => (" FROM jobs", "id"),
     };
-    let mut query = QueryBuilder::<Sqlite>::new(concat!("SELECT ", job_columns!()));
-    query.push(source);
+    query.push("SELECT ").push(columns).push(source);
     let mut joint = " WHERE ";
     let mut and = |query: &mut QueryBuilder<Sqlite>, condition: &str, value: String| {
         query.push(joint).push(condition).push_bind(value);
         joint = " AND ";
     };
     // Within a batch one of its indices is walked, not that of the tenant: a bare expression keeps that out.
-    let owner = match (&filter.label, filter.batch) {
+    let owner = match (label, filter.batch) {
         (Some(_), _) => "of_tenant = ",
         (None, Some(_)) => "tenant || '' = ",
         (None, None) => "tenant = ",
     };
-    and(&mut query, owner, tenant.to_owned());
-    if let Some((key, value)) = &filter.label {
-        and(&mut query, "key = ", key.clone());
-        and(&mut query, "value = ", value.clone());
+    and(query, owner, tenant.to_owned());
+    if let Some((key, value)) = label {
+        and(query, "key = ", key.clone());
+        and(query, "value = ", value.clone());
     }
     if let Some(batch) = filter.batch {
         // Nothing of a batch of another tenant is walked.
-        let column = match filter.label {
+        let column = match label {
             Some(_) => "batch_id || '' = (SELECT id FROM batches WHERE id = ",
             None => "batch_id = (SELECT id FROM batches WHERE id = ",
         };
-        and(&mut query, column, batch.to_string());
+        and(query, column, batch.to_string());
         query
             .push(" AND tenant = ")
             .push_bind(tenant.to_owned())
             .push(")");
     }
-    if let Some(state) = filter.state {
-        let column = match (&filter.label, filter.batch) {
+    if let Some(state) = state {
+        let column = match (label, filter.batch) {
             (Some(_), _) => "label_state = ",
             (None, _) => "state = ",
         };
-        and(&mut query, column, state.name().to_owned());
+        and(query, column, state.name().to_owned());
     }
     // Of several bounds only the closest is passed on, so that the index is entered at one place.
     let before = [after, filter.id_before()].into_iter().flatten().min();
-    if let (Some(_), Some(batch)) = (&filter.label, filter.batch) {
-        within_batch(&mut query, batch, filter.id_from(), before);
+    if let (Some(_), Some(batch)) = (label, filter.batch) {
+        within_batch(query, batch, filter.id_from(), before);
     } else {
         if let Some(first) = filter.id_from() {
-            and(&mut query, &format!("{id} >= "), first.to_string());
+            and(query, &format!("{id} >= "), first.to_string());
         }
         if let Some(before) = before {
-            and(&mut query, &format!("{id} < "), before.to_string());
+            and(query, &format!("{id} < "), before.to_string());
         }
     }
-    query.push(format!(" ORDER BY {id} DESC LIMIT "));
-    query.push_bind(i64::from(limit) + 1);
-    query
+    query.push(format!(" ORDER BY {id} DESC"));
 }
 
 /// Ids within a batch lie between its first and its last, so no more of a label is walked than was sent meanwhile.
@@ -129,7 +291,6 @@ pub(crate) mod tests {
     use sqlx::{AssertSqlSafe, Row};
 
     use super::*;
-    use crate::jobs::model::State;
 
     /// The steps SQLite takes for a statement.
     pub(crate) async fn plan(store: &SqliteStore, statement: &str) -> Vec<String> {
@@ -150,11 +311,10 @@ pub(crate) mod tests {
             .unwrap();
         for (state, after) in [(None, None), (Some(State::Queued), Some(Uuid::now_v7()))] {
             let filter = Filter {
-                state,
                 batch: Some(Uuid::now_v7()),
                 ..Filter::default()
             };
-            let query = page_query("t", &filter, after, 50);
+            let query = page_query("t", &filter, state, after, 50);
             let steps = plan(&store, query.sql().as_str()).await;
             let seek = match state {
                 None => "jobs_by_batch (batch_id=?",
@@ -178,12 +338,11 @@ pub(crate) mod tests {
             .unwrap();
         for (state, after) in [(None, Some(Uuid::now_v7())), (Some(State::Failed), None)] {
             let filter = Filter {
-                state,
                 batch: Some(Uuid::now_v7()),
-                label: Some(("line".to_owned(), "A12".to_owned())),
+                labels: vec![("line".to_owned(), "A12".to_owned())],
                 ..Filter::default()
             };
-            let query = page_query("t", &filter, after, 50);
+            let query = page_query("t", &filter, state, after, 50);
             let steps = plan(&store, query.sql().as_str()).await;
             assert!(steps[0].contains("job_id>? AND job_id<?)"), "{steps:?}");
             let ends = steps.iter().filter(|step| step.contains("(batch_id=?)"));
@@ -205,13 +364,12 @@ pub(crate) mod tests {
                 for window in [None, Some(1_000_000)] {
                     for after in [None, Some(Uuid::now_v7())] {
                         let filter = Filter {
-                            state,
-                            batch: None,
-                            label: label.clone(),
+                            labels: label.clone().into_iter().collect(),
                             created_after: window,
                             created_before: window.map(|time| time + 5),
+                            ..Filter::default()
                         };
-                        let query = page_query("t", &filter, after, 50);
+                        let query = page_query("t", &filter, state, after, 50);
                         let steps = plan(&store, query.sql().as_str()).await;
                         assert!(
                             !steps.iter().any(|step| step.contains("TEMP B-TREE")),

@@ -1,6 +1,7 @@
 //! The job table on one machine, embedded: SQLite.
 
-pub mod batches;
+mod batch_lists;
+mod batches;
 pub mod blob_refs;
 pub mod blobs;
 pub mod cached;

@@ -15,7 +15,7 @@ use crate::jobs::submit_options::Priority;
 /// The columns a [`Job`] is read from.
 macro_rules! job_columns {
     () => {
-        "id, tenant, state, name, labels, batch_id, created_at, started_at, ended_at, attempt, progress, remarks, failure, cached, version, rank, deadline"
+        "id, tenant, state, name, labels, batch_id, created_at, updated_at, started_at, ended_at, attempt, progress, remarks, failure, cached, version, rank, deadline"
     };
 }
 pub(crate) use job_columns;
@@ -38,6 +38,7 @@ pub(crate) fn read_job(row: &SqliteRow) -> Result<Job, StoreError> {
         priority: Priority::from_rank(row.try_get("rank")?)
             .ok_or_else(|| StoreError::Corrupt("a rank is none of 0 to 2".to_owned()))?,
         created_at: row.try_get("created_at")?,
+        updated_at: row.try_get("updated_at")?,
         started_at: row.try_get("started_at")?,
         ended_at: row.try_get("ended_at")?,
         deadline: row.try_get("deadline")?,
@@ -100,7 +101,7 @@ pub(crate) fn to_json<T: Serialize>(value: &T) -> Result<String, StoreError> {
     serde_json::to_string(value).map_err(|error| StoreError::Corrupt(error.to_string()))
 }
 
-fn from_json<T: DeserializeOwned>(text: &str) -> Result<T, StoreError> {
+pub(crate) fn from_json<T: DeserializeOwned>(text: &str) -> Result<T, StoreError> {
     serde_json::from_str(text).map_err(|error| StoreError::Corrupt(format!("{text:.80}: {error}")))
 }
 

@@ -19,6 +19,7 @@ CREATE TABLE jobs (
     batch_id         TEXT REFERENCES batches (id) ON DELETE CASCADE,
     batch_index      INTEGER,                    -- place of the case in what was sent, from 0
     created_at       INTEGER NOT NULL,
+    updated_at       INTEGER NOT NULL,           -- of the last change, progress aside
     started_at       INTEGER,
     ended_at         INTEGER,
     attempt          INTEGER NOT NULL DEFAULT 0, -- attempts that count against the limit
@@ -41,6 +42,8 @@ CREATE TABLE jobs (
 -- Lists of a tenant, the next tenant with queued jobs, and the reaper (running).
 CREATE INDEX jobs_by_state ON jobs (state, tenant, id);
 CREATE INDEX jobs_by_tenant ON jobs (tenant, id);
+-- What changed last, for those who follow all that is a tenant's.
+CREATE INDEX jobs_by_change ON jobs (tenant, updated_at, id, batch_id);
 -- The claim: the next job of the tenant whose turn it is. Jobs leave it when they are claimed.
 CREATE INDEX jobs_queued ON jobs (tenant, rank, id, cost_us) WHERE state = 'queued';
 -- Those that are solved in part.
@@ -131,8 +134,15 @@ CREATE TABLE batches (
     count      INTEGER NOT NULL DEFAULT 0, -- jobs
     rejected   INTEGER NOT NULL DEFAULT 0, -- faulty cases that were left out
     reserved   INTEGER NOT NULL DEFAULT 0, -- places in the queue that are kept for jobs still to come
-    complete   INTEGER NOT NULL DEFAULT 0  -- 0: still being staged or filled, and not acknowledged
+    complete   INTEGER NOT NULL DEFAULT 0, -- 0: still being staged or filled, and not acknowledged
+    name       TEXT,
+    labels     TEXT    NOT NULL DEFAULT '{}', -- JSON object
+    ended_at   INTEGER                     -- when the last of its jobs that have ended did so
 ) STRICT, WITHOUT ROWID;
+CREATE INDEX batches_by_tenant ON batches (tenant, id) WHERE complete = 1;
+CREATE TRIGGER job_of_batch_ends AFTER UPDATE OF ended_at ON jobs WHEN NEW.ended_at IS NOT NULL AND NEW.batch_id IS NOT NULL BEGIN
+    UPDATE batches SET ended_at = NEW.ended_at WHERE id = NEW.batch_id;
+END;
 CREATE INDEX batches_incomplete ON batches (tenant, id, reserved) WHERE complete = 0;
 
 -- The case that the rows of a table fill.

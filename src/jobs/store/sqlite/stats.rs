@@ -8,7 +8,7 @@ use std::path::Path;
 
 use crate::jobs::model::State;
 use crate::jobs::store::error::StoreError;
-use crate::jobs::store::retention::Stats;
+use crate::jobs::store::retention::{Stats, Usage};
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::rows::{read_count, read_state};
 
@@ -17,6 +17,29 @@ const COUNT: &str = "SELECT state, SUM(number) AS jobs FROM job_counts GROUP BY 
 const RESULT_BYTES: &str = "SELECT COALESCE(SUM(bytes), 0) FROM blobs WHERE key IS NOT NULL";
 
 impl SqliteStore {
+    /// What a tenant has here, read from what the database counts itself.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub(crate) async fn usage(&self, tenant: &str) -> Result<Usage, StoreError> {
+        let rows = sqlx::query("SELECT state, number FROM job_counts WHERE tenant = $1")
+            .bind(tenant)
+            .fetch_all(&self.readers)
+            .await?;
+        let mut usage = Usage::default();
+        for row in &rows {
+            usage
+                .jobs
+                .insert(read_state(row)?, read_count(row, "number")?);
+        }
+        let reserved = sqlx::query(
+            "SELECT COALESCE(SUM(reserved), 0) AS reserved FROM batches WHERE complete = 0 AND tenant = $1",
+        );
+        let row = reserved.bind(tenant).fetch_one(&self.readers).await?;
+        usage.reserved = read_count(&row, "reserved")?;
+        Ok(usage)
+    }
+
     /// Counts and sizes as they are now.
     ///
     /// # Errors

@@ -1,0 +1,215 @@
+//! `GET /v1/jobs`: the jobs of the tenant, filtered, page by page.
+
+use axum::Json;
+use axum::http::Uri;
+use serde::Serialize;
+use serde_json::Value;
+use utoipa::openapi::{RefOr, Schema};
+use utoipa::{PartialSchema, ToSchema};
+use uuid::Uuid;
+
+use crate::http::dto::job::JobAnswer;
+use crate::http::extract::caller::Caller;
+use crate::http::extract::labels::{label, name, time};
+use crate::http::extract::query::{Parameters, Reader, Repeated, count, id, query, reader};
+use crate::http::problem::catalogue::problems;
+use crate::http::problem::error::ApiError;
+use crate::jobs::model::State as JobState;
+use crate::jobs::{Filter, PAGE_MAX, Total};
+
+/// Jobs in one page of a list when nothing is said.
+const LIST_LIMIT_DEFAULT: u32 = 50;
+
+/// Members of a job that `fields` can name.
+const MEMBERS: [&str; 18] = [
+    "id",
+    "state",
+    "name",
+    "labels",
+    "batch_id",
+    "priority",
+    "created_at",
+    "updated_at",
+    "started_at",
+    "ended_at",
+    "deadline_at",
+    "expires_at",
+    "attempt",
+    "cached",
+    "progress",
+    "remarks",
+    "error",
+    "links",
+];
+
+/// A page of jobs, newest first.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct JobPage {
+    /// The jobs of this page; with the members that `fields` names.
+    #[schema(value_type = Vec<ListedJob>)]
+    jobs: Vec<Value>,
+    /// Give this as `cursor` for the next page; null on the last one.
+    next_cursor: Option<String>,
+    #[serde(flatten)]
+    count: ListTotal,
+}
+
+/// Number of entries of a list: one of the two is there.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct ListTotal {
+    /// Number of entries of the whole list.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    total: Option<u64>,
+    /// There are at least so many; where they are too many to be counted, or found only by looking at each.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    total_at_least: Option<u64>,
+}
+
+impl From<Total> for ListTotal {
+    fn from(total: Total) -> Self {
+        let (total, total_at_least) = match total {
+            Total::Exactly(number) => (Some(number), None),
+            Total::AtLeast(number) => (None, Some(number)),
+        };
+        ListTotal {
+            total,
+            total_at_least,
+        }
+    }
+}
+
+/// A job in a list, in the contract: any of its members may have been left out.
+pub struct ListedJob;
+
+impl PartialSchema for ListedJob {
+    fn schema() -> RefOr<Schema> {
+        let mut schema = JobAnswer::schema();
+        if let RefOr::T(Schema::Object(job)) = &mut schema {
+            job.required.clear();
+            job.description =
+                Some("A job, with all its members or those that `fields` names.".to_owned());
+        }
+        schema
+    }
+}
+
+impl ToSchema for ListedJob {
+    fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
+        JobAnswer::schemas(schemas);
+    }
+}
+
+problems! {
+    /// What `GET /v1/jobs` can fail with.
+    ListProblems: BadQuery
+}
+
+query! {
+    /// Filters and page of a list of jobs.
+    ListQuery(() => ()) {
+        /// Only jobs in this state; may be repeated for jobs in one of several
+        state: Vec<JobState> as Vec<JobState> = Repeated(reader(JobState::ALL.map(JobState::name).join(", "), JobState::from_name));
+        /// Only jobs of this batch
+        #[param(format = "uuid")]
+        batch: Uuid as String = id("batch");
+        /// Only jobs with this label, written `key:value`; may be repeated for jobs that have all of them
+        #[param(example = json!(["line:A12"]))]
+        label: Vec<(String, String)> as Vec<String> = Repeated(label());
+        /// Only jobs whose name contains this text; the letters A to Z match in either case
+        #[param(min_length = 1, max_length = 200, example = "crown")]
+        name: String as String = name();
+        /// Only jobs submitted at or after this time (RFC 3339)
+        #[param(format = "date-time", example = "2026-01-31T09:30:00Z")]
+        created_after: i64 as String = time();
+        /// Only jobs submitted before this time (RFC 3339)
+        #[param(format = "date-time")]
+        created_before: i64 as String = time();
+        /// Only jobs that changed at or after this time (RFC 3339), progress aside
+        #[param(format = "date-time")]
+        updated_after: i64 as String = time();
+        /// Members of the jobs to answer, with commas between; all when left out
+        #[param(pattern = "^[a-z_]+(,[a-z_]+)*$", example = "id,state,progress")]
+        fields: Vec<&'static str> as String = fields();
+        /// Jobs in one page; 50 when left out
+        #[param(minimum = 1, maximum = 1000)]
+        limit: u32 as u32 = count(1, PAGE_MAX);
+        /// `next_cursor` of the page before, with the same filters
+        #[param(pattern = "^[0-9a-f]{40}$")]
+        cursor: String as String = reader("a cursor of this service", |text| Some(text.to_owned()));
+    }
+}
+
+/// Names of members with commas between.
+fn fields() -> Reader<Vec<&'static str>> {
+    reader(
+        format!("names with commas between, of {}", MEMBERS.join(", ")),
+        |text| {
+            let member = |name: &str| MEMBERS.into_iter().find(|member| *member == name);
+            text.split(',').map(member).collect()
+        },
+    )
+}
+
+/// Lists jobs, newest first.
+///
+/// A filter by `name`, `updated_after` or a second `label` looks at each job that the other filters leave, at most 20 000 for one page: such a page
+/// may have fewer jobs than asked for, or none, although `next_cursor` is there.
+#[utoipa::path(
+    get,
+    path = "/v1/jobs",
+    tag = "jobs",
+    operation_id = "list_jobs",
+    params(ListQuery),
+    responses((status = 200, description = "A page of jobs", body = JobPage), ListProblems)
+)]
+pub async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Json<JobPage>, ApiError> {
+    let query = ListQuery::read(&uri, &())?;
+    let mut states = query.state.unwrap_or_default();
+    states.sort_unstable();
+    states.dedup();
+    let filter = Filter {
+        states,
+        batch: query.batch,
+        labels: query.label.unwrap_or_default(),
+        name: query.name,
+        created_after: query.created_after,
+        created_before: query.created_before,
+        updated_after: query.updated_after,
+    };
+    let limit = query.limit.unwrap_or(LIST_LIMIT_DEFAULT);
+    let page = jobs.list(&filter, query.cursor.as_deref(), limit).await?;
+    let shown = page.entries.into_iter().map(|job| {
+        let mut job = serde_json::to_value(JobAnswer::new(job))?;
+        if let (Some(fields), Value::Object(members)) = (&query.fields, &mut job) {
+            members.retain(|name, _| fields.contains(&name.as_str()));
+        }
+        Ok::<_, serde_json::Error>(job)
+    });
+    let shown = shown.collect::<Result<_, _>>();
+    Ok(Json(JobPage {
+        jobs: shown.map_err(|error| ApiError::internal(&error))?,
+        next_cursor: page.next_cursor,
+        count: page.total.into(),
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_member_of_a_listed_job_can_be_named() {
+        let schema = serde_json::to_value(JobAnswer::schema()).unwrap();
+        let members = schema["properties"].as_object().unwrap().keys();
+        // These two are never in a list.
+        let mut members: Vec<_> = members
+            .filter(|name| !["queue", "result"].contains(&name.as_str()))
+            .collect();
+        let mut named = MEMBERS.to_vec();
+        named.sort_unstable();
+        members.sort_unstable();
+        assert_eq!(members, named);
+    }
+}

@@ -1,0 +1,98 @@
+//! `GET /v1/me`: who asks, what it uses, and what it may use.
+
+use std::collections::BTreeMap;
+
+use axum::Json;
+use axum::extract::State;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::http::extract::caller::Caller;
+use crate::http::options::HttpOptions;
+use crate::http::problem::catalogue::PlainProblems;
+use crate::http::problem::error::ApiError;
+use crate::jobs::model::State as JobState;
+
+/// Who asks, what it uses, and what it may use.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct Me {
+    /// The tenant that the key belongs to; `anonymous` without a key.
+    tenant: String,
+    /// What the tenant may use at most.
+    quota: Quota,
+    /// What the tenant uses at present.
+    used: Used,
+    /// Limits of requests.
+    limits: OwnLimits,
+}
+
+/// What a tenant may use at most.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct Quota {
+    /// Queued jobs, with those of batches that are being received.
+    queued: u64,
+    /// Bytes that batches being received stand for.
+    staged_bytes: u64,
+}
+
+/// What a tenant uses at present.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct Used {
+    /// Queued jobs, with the places that are reserved for batches being received.
+    queued: u64,
+    /// Bytes that batches being received stand for.
+    staged_bytes: u64,
+    /// Number of its jobs in each state.
+    #[schema(value_type = BTreeMap<String, u64>)]
+    jobs: BTreeMap<&'static str, u64>,
+}
+
+/// Limits of the requests of a tenant.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct OwnLimits {
+    /// Requests under way, streams of events and waits aside.
+    requests: usize,
+    /// Streams of events.
+    streams: usize,
+    /// Requests that wait for the end of a job or a batch.
+    waits: usize,
+    /// Requests per second of one key, or of one address without a key; 0 for any number.
+    requests_per_second: u32,
+}
+
+/// Who the service takes the client for, how many jobs it has, and how many it may have.
+#[utoipa::path(
+    get,
+    path = "/v1/me",
+    tag = "service",
+    operation_id = "get_me",
+    responses((status = 200, description = "The tenant with its use and its limits", body = Me), PlainProblems)
+)]
+pub async fn me(
+    Caller(jobs): Caller,
+    State(options): State<HttpOptions>,
+) -> Result<Json<Me>, ApiError> {
+    let own = jobs.options();
+    let usage = jobs.usage().await?;
+    let number = |state| usage.jobs.get(&state).copied().unwrap_or(0);
+    Ok(Json(Me {
+        tenant: jobs.tenant().to_owned(),
+        quota: Quota {
+            queued: own.tenant_queue_max.min(own.queue_max),
+            staged_bytes: own.staging.tenant.min(own.staging.all),
+        },
+        used: Used {
+            queued: number(JobState::Queued) + usage.reserved,
+            staged_bytes: usage.staged_bytes,
+            jobs: JobState::ALL
+                .map(|state| (state.name(), number(state)))
+                .into(),
+        },
+        limits: OwnLimits {
+            requests: options.tenant_requests_max,
+            streams: options.tenant_streams_max,
+            waits: options.tenant_waits_max,
+            requests_per_second: options.requests_per_second,
+        },
+    }))
+}

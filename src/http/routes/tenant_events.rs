@@ -1,0 +1,101 @@
+//! `/v1/events`: everything of the tenant in one stream of server-sent events.
+
+use std::convert::Infallible;
+
+use axum::Extension;
+use axum::extract::State;
+use axum::http::HeaderMap;
+use axum::response::Response;
+use axum::response::sse::Event;
+use futures_util::StreamExt;
+use futures_util::stream::{once, unfold};
+use serde::Serialize;
+use serde_json::json;
+use utoipa::openapi::{RefOr, Schema};
+use utoipa::{PartialSchema, ToSchema};
+
+use crate::http::dto::batch::BatchAnswer;
+use crate::http::dto::job::JobAnswer;
+use crate::http::extract::accept::{Format, choose};
+use crate::http::extract::caller::{Caller, Credential, revoked};
+use crate::http::limits::concurrency::ConcurrencyLimits;
+use crate::http::limits::holding_body::{HeldShares, hold_while_sent};
+use crate::http::problem::catalogue::PlainProblems;
+use crate::http::problem::error::ApiError;
+use crate::http::routes::events::{RETRY, answer, changed, event_schema, last_event_id};
+use crate::jobs::changes::{Changed, Follower};
+
+/// What an event of `/v1/events` tells, one by the name of the event.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(untagged)]
+#[expect(dead_code, reason = "names the data of an event in the contract")]
+pub enum TenantEvent {
+    /// `job`: the job as `/v1/jobs/{id}` answers it.
+    Job(Box<JobAnswer>),
+    /// `batch`: the batch as `/v1/batches/{id}` answers it.
+    Batch(Box<BatchAnswer>),
+}
+
+/// One event of the stream, in the contract.
+pub struct TenantEventSent;
+
+impl PartialSchema for TenantEventSent {
+    fn schema() -> RefOr<Schema> {
+        event_schema::<TenantEvent>("`start`, `job` or `batch`")
+    }
+}
+
+impl ToSchema for TenantEventSent {
+    fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
+        schemas.push((TenantEvent::name().into_owned(), TenantEvent::schema()));
+        TenantEvent::schemas(schemas);
+    }
+}
+
+/// Follows everything of the tenant: jobs that were submitted alone, and batches.
+///
+/// The first event is `start`; to have no gap, connect first, and read the lists once it has come. An event `job` or `batch` then
+/// tells whatever changed, as `/v1/jobs/{id}` or `/v1/batches/{id}` answers it; jobs of batches are told with their batch. Several changes between
+/// two looks are one event, and after `Last-Event-ID` some are told again. What was deleted is not told. The stream ends when the service
+/// shuts down.
+#[utoipa::path(
+    get,
+    path = "/v1/events",
+    tag = "jobs",
+    operation_id = "follow_all",
+    params(("Last-Event-ID" = Option<String>, Header, description = "Id of the last event that was seen: the stream goes on from there")),
+    responses((status = 200, description = "One event per change", content((TenantEventSent = "text/event-stream"))), PlainProblems)
+)]
+pub async fn follow(
+    Caller(jobs): Caller,
+    State(crowds): State<ConcurrencyLimits>,
+    Extension(held): Extension<HeldShares>,
+    key: Option<Extension<Credential>>,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    choose(&headers, None, &[Format::Events])?;
+    let place = crowds.stream(jobs.tenant())?;
+    held.release();
+    let seen = last_event_id(&headers).and_then(|text| text.parse().ok());
+    let revoked = revoked(jobs.clone(), key.map(|Extension(key)| key));
+    let follower = jobs.follow(seen);
+    let start = event("start", follower.since(), &json!({}));
+    let changes = unfold(follower, next);
+    let events = once(std::future::ready(start)).filter_map(std::future::ready);
+    let events = answer(events.map(Ok).chain(changes).take_until(revoked));
+    Ok(hold_while_sent(events, place))
+}
+
+async fn next(mut follower: Follower) -> Option<(Result<Event, Infallible>, Follower)> {
+    let (change, since) = changed(follower.next().await)?;
+    let event = match change {
+        Changed::Job(job) => event("job", since, &JobAnswer::new(*job)),
+        Changed::Batch(batch) => event("batch", since, &BatchAnswer::from(*batch)),
+    };
+    Some((Ok(event?), follower))
+}
+
+fn event<T: Serialize>(name: &str, since: i64, data: &T) -> Option<Event> {
+    let event = Event::default().event(name).id(since.to_string());
+    event.retry(RETRY).json_data(data).ok()
+}

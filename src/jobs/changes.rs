@@ -1,0 +1,168 @@
+//! Following everything that is a tenant's: jobs that were submitted alone, and batches.
+//!
+//! The store is asked again and again what changed since a moment; nothing is kept for a client. Changes are ordered by their
+//! time, but may become visible a little later than they say, so each look reaches back, and what was told already is left out.
+
+use std::collections::{HashMap, HashSet, VecDeque};
+use std::time::Duration;
+
+use tokio::time::sleep;
+use uuid::Uuid;
+
+use crate::jobs::batch::model::Batch;
+use crate::jobs::error::JobsError;
+use crate::jobs::handle::Jobs;
+use crate::jobs::model::{Job, State};
+use crate::jobs::store::list::{Change, Filter};
+
+/// Time between two looks.
+const PAUSE: Duration = Duration::from_millis(250);
+/// How far each look reaches back, in ms.
+const REACH_MS: i64 = 2000;
+/// Changes read at once.
+const AT_ONCE: u32 = 1000;
+/// Running jobs whose progress is followed.
+const RUNNING_MAX: u32 = 100;
+
+/// Something of the tenant that changed.
+#[derive(Debug, Clone)]
+pub enum Changed {
+    /// A job that was submitted alone.
+    Job(Box<Job>),
+    /// A batch: its jobs are told together.
+    Batch(Box<Batch>),
+}
+
+/// Where somebody who follows a tenant stands.
+#[derive(Debug)]
+pub struct Follower {
+    jobs: Jobs,
+    /// Everything that changed before this time was told.
+    since: i64,
+    told: VecDeque<(Changed, i64)>,
+    /// What was told of what changed lately: version of a job with its progress, counts of a batch.
+    known: HashMap<Uuid, (i64, String)>,
+}
+
+impl Jobs {
+    /// Follows the tenant from a moment on (epoch milliseconds), or from now on.
+    #[must_use]
+    pub fn follow(&self, since: Option<i64>) -> Follower {
+        Follower {
+            jobs: self.clone(),
+            since: since.unwrap_or_else(|| self.shared.now_ms()),
+            told: VecDeque::new(),
+            known: HashMap::new(),
+        }
+    }
+}
+
+impl Follower {
+    /// The moment up to which everything was told, from which another one can go on.
+    #[must_use]
+    pub fn since(&self) -> i64 {
+        self.since
+    }
+
+    /// Waits for the next change, with the moment up to which everything was told with it; `None` when the service is about to
+    /// stop.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn next(&mut self) -> Result<Option<(Changed, i64)>, JobsError> {
+        let shared = self.jobs.shared.clone();
+        loop {
+            if let Some(next) = self.told.pop_front() {
+                return Ok(Some(next));
+            }
+            self.look().await?;
+            if self.told.is_empty() {
+                tokio::select! {
+                    () = sleep(PAUSE) => {}
+                    () = shared.draining.cancelled() => return Ok(None),
+                }
+            }
+        }
+    }
+
+    async fn look(&mut self) -> Result<(), JobsError> {
+        let (mut from, mut after) = (self.since.saturating_sub(REACH_MS), None);
+        let mut batches = HashSet::new();
+        loop {
+            let store = &self.jobs.shared.store;
+            let tenant = &self.jobs.tenant;
+            let changes = store.changes(tenant, from, after, AT_ONCE).await?;
+            for change in &changes {
+                match change.batch {
+                    Some(batch) => drop(batches.insert((batch, change.at))),
+                    None => self.tell_job(*change).await?,
+                }
+                self.since = self.since.max(change.at);
+            }
+            let Some(last) = changes.last().filter(|_| changes.len() == AT_ONCE as usize) else {
+                break;
+            };
+            (from, after) = (last.at, Some(last.id));
+        }
+        let mut latest: HashMap<Uuid, i64> = HashMap::new();
+        for (batch, at) in batches {
+            let time = latest.entry(batch).or_insert(at);
+            *time = at.max(*time);
+        }
+        for (batch, at) in latest {
+            self.tell_batch(batch, at).await?;
+        }
+        self.tell_progress().await?;
+        let horizon = self.since.saturating_sub(2 * REACH_MS);
+        self.known.retain(|_, (at, _)| *at >= horizon);
+        Ok(())
+    }
+
+    async fn tell_job(&mut self, change: Change) -> Result<(), JobsError> {
+        let job = match self.jobs.recent(change.id, PAUSE).await {
+            Ok(job) => job,
+            Err(JobsError::NotFound | JobsError::Expired) => return Ok(()),
+            Err(error) => return Err(error),
+        };
+        self.tell(job.id, change.at, tag(&job), Changed::Job(Box::new(job)));
+        Ok(())
+    }
+
+    async fn tell_batch(&mut self, id: Uuid, at: i64) -> Result<(), JobsError> {
+        let batch = match self.jobs.recent_batch(id, PAUSE).await {
+            Ok(batch) => batch,
+            // Not acknowledged yet, or gone.
+            Err(JobsError::BatchNotFound | JobsError::Expired) => return Ok(()),
+            Err(error) => return Err(error),
+        };
+        self.tell(id, at, batch.change_tag(), Changed::Batch(Box::new(batch)));
+        Ok(())
+    }
+
+    async fn tell_progress(&mut self) -> Result<(), JobsError> {
+        let filter = Filter {
+            states: vec![State::Running],
+            ..Filter::default()
+        };
+        let running = self.jobs.list(&filter, None, RUNNING_MAX).await?;
+        for job in running.entries {
+            if job.batch_id.is_none() {
+                let at = self.since.max(job.updated_at);
+                self.tell(job.id, at, tag(&job), Changed::Job(Box::new(job)));
+            }
+        }
+        Ok(())
+    }
+
+    fn tell(&mut self, id: Uuid, at: i64, tag: String, changed: Changed) {
+        let known = self.known.get(&id).is_some_and(|(_, known)| *known == tag);
+        self.known.insert(id, (at, tag));
+        if !known {
+            self.told.push_back((changed, self.since));
+        }
+    }
+}
+
+fn tag(job: &Job) -> String {
+    format!("{} {:.2}", job.version, job.progress)
+}

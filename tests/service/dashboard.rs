@@ -1,0 +1,277 @@
+//! What a page that shows the service needs: lists, batches, one stream of events, who asks.
+
+use std::time::Duration;
+
+use reqwest::Method;
+use serde_json::{Value, json};
+use tokio::time::timeout;
+
+use crate::batches::small;
+use crate::errors::assert_problem;
+use crate::results::path_of;
+use crate::server::{Server, example};
+
+const AT_MOST: Duration = Duration::from_secs(60);
+
+fn case(name: &str, load: u32) -> Value {
+    let mut case = small(name);
+    case["load"]["normal_force_n"] = json!(load);
+    case
+}
+
+#[tokio::test]
+async fn a_list_is_narrowed_counted_and_not_sent_twice() {
+    let server = Server::idle().await;
+    for number in 0..4 {
+        server
+            .submit(&case(&format!("Crown {number}"), 50_000 + number))
+            .await;
+    }
+    let own = server.submit(&case("to be cancelled", 60_000)).await;
+    let cancelled = own.rsplit('/').next().expect("an id");
+    let path = format!("{own}/cancel");
+    server.send(Method::POST, &path, |request| request).await;
+    let all = server.get("/v1/jobs?limit=2").await;
+    assert_eq!(
+        (&all.json["total"], &all.json["total_at_least"]),
+        (&json!(5), &Value::Null)
+    );
+    let two = server
+        .get("/v1/jobs?state=queued&state=cancelled&name=CROWN")
+        .await
+        .json;
+    assert_eq!(two["jobs"].as_array().map(Vec::len), Some(4));
+    assert_eq!(two["total_at_least"], 4);
+    let slim = server
+        .get("/v1/jobs?fields=id,state&state=cancelled")
+        .await
+        .json;
+    assert_eq!(
+        slim["jobs"],
+        json!([{ "id": cancelled, "state": "cancelled" }])
+    );
+    let since = server.get(&own).await.json["updated_at"].clone();
+    let changed = format!("/v1/jobs?updated_after={}", since.as_str().expect("a time"));
+    let changed = server.get(&changed).await.json;
+    assert_eq!(changed["jobs"][0]["id"], cancelled);
+    let tag = all.header("etag").expect("a tag").to_owned();
+    let again = |request: reqwest::RequestBuilder| request.header("if-none-match", tag);
+    let again = server.send(Method::GET, "/v1/jobs?limit=2", again).await;
+    assert_eq!((again.status, again.bytes.len()), (304, 0));
+    for (query, word) in [
+        ("fields=colour", "fields"),
+        ("state=new", "state"),
+        ("label=x", "label"),
+        ("name=", "name"),
+    ] {
+        let answer = server.get(&format!("/v1/jobs?{query}")).await;
+        assert_problem(&answer, 400, "bad-query", word);
+    }
+}
+
+#[tokio::test]
+async fn batches_have_names_and_labels_and_are_listed() {
+    let server = Server::start().await;
+    let cases = json!([case("a", 50_001), case("b", 50_002)]);
+    let path = "/v1/batches?name=Timetable%202026&label=line:A12&label=km:37.2";
+    let batch = server.post(path, &cases).await.json;
+    let own = batch["links"]["self"].as_str().expect("a link").to_owned();
+    server.get(&format!("{own}/results?wait=60")).await;
+    let shown = server.get(&own).await.json;
+    assert_eq!(shown["name"], "Timetable 2026");
+    assert_eq!(shown["labels"], json!({ "line": "A12", "km": "37.2" }));
+    assert_eq!(
+        (&shown["state"], shown["ended_at"].is_string()),
+        (&json!("ended"), true)
+    );
+    server
+        .post("/v1/batches", &json!([case("c", 50_003)]))
+        .await;
+    let all = server.get("/v1/batches").await.json;
+    assert_eq!(
+        (all["batches"].as_array().map(Vec::len), &all["total"]),
+        (Some(2), &json!(2))
+    );
+    assert_eq!(all["batches"][1], shown);
+    for query in [
+        "name=timetable",
+        "label=line:A12",
+        "label=line:A12&label=km:37.2",
+    ] {
+        let found = server.get(&format!("/v1/batches?{query}")).await.json;
+        assert_eq!(found["batches"], json!([shown]), "{query}");
+    }
+    let page = server.get("/v1/batches?limit=1").await.json;
+    let cursor = page["next_cursor"].as_str().expect("a cursor");
+    let next = server
+        .get(&format!("/v1/batches?limit=1&cursor={cursor}"))
+        .await
+        .json;
+    assert_eq!(
+        (&next["batches"], &next["next_cursor"]),
+        (&json!([shown]), &Value::Null)
+    );
+    for query in ["label=a:1&label=a:2", "label=nocolon", "name=%0A"] {
+        let answer = server.post(&format!("/v1/batches?{query}"), &cases).await;
+        assert_problem(&answer, 400, "bad-query", "");
+    }
+}
+
+#[tokio::test]
+async fn a_client_learns_who_it_is_and_what_it_uses() {
+    let server = Server::idle().await;
+    server.submit(&small("one")).await;
+    let me = server.get("/v1/me").await.json;
+    assert_eq!(
+        (&me["tenant"], &me["used"]["queued"]),
+        (&json!("anonymous"), &json!(1))
+    );
+    assert_eq!(
+        me["used"]["jobs"],
+        json!({ "queued": 1, "running": 0, "succeeded": 0, "failed": 0, "cancelled": 0 })
+    );
+    let methods = server.get("/v1/methods").await.json;
+    assert_eq!(me["quota"]["queued"], methods["limits"]["queue_max"]);
+    assert_eq!(me["limits"]["streams"], methods["limits"]["streams_max"]);
+}
+
+#[tokio::test]
+async fn examples_are_the_shipped_ones_and_each_can_be_asked() {
+    let server = Server::idle().await;
+    let examples = server.get("/v1/examples").await.json;
+    let examples = examples.as_array().expect("a list");
+    let shipped =
+        std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/api/examples")).expect("a folder");
+    let names = shipped.map(|file| {
+        file.expect("a file")
+            .file_name()
+            .into_string()
+            .expect("a name")
+    });
+    let cases = names.filter(|name| name.ends_with(".case.json") && !name.starts_with("faulty"));
+    assert_eq!(examples.len(), cases.count());
+    for shown in examples {
+        let name = shown["name"].as_str().expect("a name");
+        assert_eq!(shown["case"], example(&format!("{name}.case.json")));
+        let checked = server.post("/v1/cases/check", &shown["case"]).await;
+        assert_eq!(checked.status, 200, "{name}: {}", checked.text);
+    }
+}
+
+#[tokio::test]
+async fn a_job_and_its_result_can_be_waited_for() {
+    let server = Server::start().await;
+    let own = server.submit(&example("spin.case.json")).await;
+    let waiting = |request: reqwest::RequestBuilder| request.header("prefer", "wait=60");
+    let paths = [format!("{own}/result"), own];
+    let (result, job) = tokio::join!(
+        server.send(Method::GET, &paths[0], waiting),
+        server.send(Method::GET, &paths[1], waiting)
+    );
+    assert_eq!(
+        (result.status, &job.json["state"]),
+        (200, &json!("succeeded"))
+    );
+    assert!(result.json["patches"].is_array());
+    for answer in [&result, &job] {
+        assert_eq!(answer.header("preference-applied"), Some("wait=60"));
+    }
+    let idle = Server::idle().await;
+    let own = idle.submit(&small("never")).await;
+    let short = |request: reqwest::RequestBuilder| request.header("prefer", "wait=0");
+    let early = idle
+        .send(Method::GET, &format!("{own}/result"), short)
+        .await;
+    assert_problem(&early, 409, "result-not-ready", "queued");
+}
+
+/// The events of a stream, as they come.
+struct Events {
+    answer: reqwest::Response,
+    text: String,
+}
+
+impl Events {
+    async fn open(server: &Server, last: Option<&str>) -> Events {
+        let request = reqwest::Client::new().get(format!("http://{}/v1/events", server.address));
+        let request = match last {
+            Some(id) => request.header("last-event-id", id),
+            None => request,
+        };
+        let answer = request.send().await.expect("an answer");
+        assert_eq!(answer.status(), 200);
+        Events {
+            answer,
+            text: String::new(),
+        }
+    }
+
+    /// Name, id and data of the next event.
+    async fn next(&mut self) -> (String, String, Value) {
+        loop {
+            if let Some((event, rest)) = self.text.split_once("\n\n") {
+                let (event, rest) = (event.to_owned(), rest.to_owned());
+                self.text = rest;
+                let line = |name: &str| event.lines().find_map(|line| line.strip_prefix(name));
+                if let (Some(name), Some(id), Some(data)) =
+                    (line("event: "), line("id: "), line("data: "))
+                {
+                    let data = serde_json::from_str(data).expect("JSON");
+                    return (name.to_owned(), id.to_owned(), data);
+                }
+                continue;
+            }
+            let piece = timeout(AT_MOST, self.answer.chunk())
+                .await
+                .expect("an event in time");
+            let piece = piece.expect("a stream").expect("no end");
+            self.text.push_str(&String::from_utf8_lossy(&piece));
+        }
+    }
+
+    /// Reads until an event tells of this job or batch in this state; its id.
+    async fn until(&mut self, id: &str, state: &str) -> String {
+        loop {
+            let (_, event, data) = self.next().await;
+            if data["id"] == id && data["state"] == state {
+                return event;
+            }
+        }
+    }
+}
+
+#[tokio::test]
+async fn one_stream_tells_all_jobs_and_batches_and_goes_on_where_it_was() {
+    let server = Server::start().await;
+    let before = path_of(&server.solve(&case("before", 70_000)).await);
+    tokio::time::sleep(Duration::from_millis(2_100)).await;
+    let mut events = Events::open(&server, None).await;
+    let (name, start, _) = events.next().await;
+    assert_eq!(name, "start");
+    let job = server.solve(&case("alone", 70_001)).await["id"].clone();
+    let job = job.as_str().expect("an id");
+    let seen = events.until(job, "succeeded").await;
+    let batch = server
+        .post(
+            "/v1/batches",
+            &json!([case("x", 70_002), case("y", 70_003)]),
+        )
+        .await;
+    let batch = batch.json["id"].as_str().expect("an id").to_owned();
+    events.until(&batch, "ended").await;
+    // Another stream from where the first one was: the batch, and nothing of long ago.
+    let mut later = Events::open(&server, Some(&seen)).await;
+    assert_eq!(later.next().await.0, "start");
+    loop {
+        let (name, _, data) = later.next().await;
+        assert!(
+            !before.ends_with(data["id"].as_str().expect("an id")),
+            "{data}"
+        );
+        if name == "batch" && data["state"] == "ended" {
+            assert_eq!(data["id"], batch.as_str());
+            break;
+        }
+    }
+    assert!(seen.parse::<i64>().expect("a moment") >= start.parse().expect("a moment"));
+}
