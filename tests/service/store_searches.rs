@@ -6,6 +6,7 @@ use railhead::jobs::State;
 use railhead::jobs::store::list::{BatchFilter, Change, Filter, Total};
 use railhead::jobs::store::retention::Usage;
 use railhead::jobs::store::submission::{BatchBegun, NewBatch, NewJob, QueueBounds};
+use uuid::Uuid;
 
 use crate::store::{StoreKind, Table, conformance, failure, new_batch, new_job, success};
 
@@ -16,8 +17,8 @@ conformance!(
     batches_are_listed_with_their_counts_and_found_by_name_and_label,
 );
 
-async fn several_states_labels_and_words_of_the_name_are_found_page_by_page(kind: StoreKind) {
-    let table = Table::new(kind).await;
+/// Twelve jobs with names and labels: 0 to 3 have ended, 4 runs.
+async fn twelve(table: &Table) -> Vec<Uuid> {
     let mut ids = Vec::new();
     for number in 0..12 {
         let labels = [("even", number % 2 == 0), ("third", number % 3 == 0)];
@@ -31,7 +32,6 @@ async fn several_states_labels_and_words_of_the_name_are_found_page_by_page(kind
         };
         ids.push(table.add(new).await.id);
     }
-    // 0 to 3 have ended, 4 runs.
     for place in 0..5 {
         let claim = table.claim(1_000).await.unwrap();
         assert_eq!(claim.id, ids[place]);
@@ -40,6 +40,12 @@ async fn several_states_labels_and_words_of_the_name_are_found_page_by_page(kind
             table.finish(&claim, &ending, 2_000).await.unwrap();
         }
     }
+    ids
+}
+
+async fn several_states_labels_and_words_of_the_name_are_found_page_by_page(kind: StoreKind) {
+    let table = Table::new(kind).await;
+    let ids = twelve(&table).await;
     let found = async |filter: &Filter| {
         let (mut found, mut after, mut total) = (Vec::new(), None, None);
         loop {
@@ -187,8 +193,8 @@ async fn changes_are_told_in_their_order_once_and_to_their_tenant_alone(kind: St
     assert_eq!(store.changes("other", 0, None, 9).await.unwrap(), []);
 }
 
-async fn batches_are_listed_with_their_counts_and_found_by_name_and_label(kind: StoreKind) {
-    let table = Table::new(kind).await;
+/// Four batches of two jobs, the last one never acknowledged; one job of the first has succeeded.
+async fn four_batches(table: &Table) -> Vec<Uuid> {
     let store = &table.store;
     let mut ids = Vec::new();
     for (number, name) in ["Plan A", "plan b", "other", "unfinished"]
@@ -213,6 +219,13 @@ async fn batches_are_listed_with_their_counts_and_found_by_name_and_label(kind: 
     }
     let claim = table.claim(7).await.unwrap();
     table.finish(&claim, &success(), 8).await.unwrap();
+    ids
+}
+
+async fn batches_are_listed_with_their_counts_and_found_by_name_and_label(kind: StoreKind) {
+    let table = Table::new(kind).await;
+    let store = &table.store;
+    let ids = four_batches(&table).await;
     let list = async |filter: &BatchFilter, after, limit| {
         let page = store
             .batches("anonymous", filter, after, limit)

@@ -84,6 +84,7 @@ const ORDER: &[&str] = &[
     "jobs::result_cache",
     "jobs::submit",
     "jobs::notify",
+    "jobs::changes",
     "jobs::results",
     "jobs::maintenance",
     "jobs::batch",

@@ -56,23 +56,7 @@ impl Jobs {
         traceparent: Option<Arc<str>>,
     ) -> Result<(Batch, bool), JobsError> {
         let id = draft.id;
-        if draft.name.is_some() || !draft.labels.is_empty() {
-            // The text of a pair ends where its quotes say.
-            let words = format!("{:?} {:?}", draft.name, draft.labels);
-            draft.digest.update(words.as_bytes());
-        }
-        let digest = draft.options.digest(draft.digest.finalize().as_bytes());
-        let new = NewBatch {
-            id,
-            tenant: self.tenant.clone(),
-            created_at: created_at(id),
-            count: draft.cases - draft.rejected,
-            rejected: draft.rejected,
-            name: draft.name.clone(),
-            labels: draft.labels.clone(),
-            template: draft.template.clone(),
-            idempotency: idempotency_key.map(|key| (key, digest)),
-        };
+        let new = draft.as_new(idempotency_key);
         let mut pause = FILLING_PAUSE.0;
         loop {
             if self.shared.draining.is_cancelled() {

@@ -13,6 +13,8 @@ use crate::jobs::batch::template::Cell;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::idempotency;
+use crate::jobs::model::created_at;
+use crate::jobs::store::submission::NewBatch;
 use crate::jobs::submit::{cost_us, outputs_text};
 use crate::jobs::submit_options::SubmitOptions;
 
@@ -41,7 +43,7 @@ pub struct BatchUpload {
     pub(crate) id: Uuid,
     pub(crate) staging: Option<Staging>,
     pub(crate) template: Option<Bytes>,
-    pub(crate) digest: blake3::Hasher,
+    digest: blake3::Hasher,
     /// Cases seen so far.
     pub cases: u32,
     /// Faulty ones among them.
@@ -189,6 +191,32 @@ impl BatchUpload {
             return self.require_place();
         }
         Ok(())
+    }
+
+    /// The batch as it is to be stored.
+    pub(crate) fn as_new(&mut self, idempotency_key: Option<String>) -> NewBatch {
+        let digest = self.digest();
+        NewBatch {
+            id: self.id,
+            tenant: self.jobs.tenant.clone(),
+            created_at: created_at(self.id),
+            count: self.cases - self.rejected,
+            rejected: self.rejected,
+            name: self.name.clone(),
+            labels: self.labels.clone(),
+            template: self.template.clone(),
+            idempotency: idempotency_key.map(|key| (key, digest)),
+        }
+    }
+
+    /// Digest of all cases, with the name, the labels and the options of the batch.
+    fn digest(&mut self) -> [u8; 32] {
+        if self.name.is_some() || !self.labels.is_empty() {
+            // Quotes say where a text ends.
+            let words = format!("{:?} {:?}", self.name, self.labels);
+            self.digest.update(words.as_bytes());
+        }
+        self.options.digest(self.digest.finalize().as_bytes())
     }
 
     /// Nothing of it is left to be given back but its bytes.
