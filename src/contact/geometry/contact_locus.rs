@@ -10,6 +10,7 @@ use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::grouping::{Grouping, Overlap};
 use crate::contact::geometry::local_gap::{Detail, LocalGap};
 use crate::contact::geometry::wheel_rail::WheelRail;
+use crate::contact::numerics::bisection::bisect;
 
 /// Spacing of the search across and along the curves, in mm.
 pub(crate) const STEP: f64 = 0.01;
@@ -143,14 +144,10 @@ impl<'g> ContactLocus<'g> {
         while self.estimated_force(high) < force && high < LOWERING_MAX {
             (low, high) = (high, 2.0 * high);
         }
-        for _ in 0..30 {
-            let middle = 0.5 * (low + high);
-            if self.estimated_force(middle) < force {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
+        // The estimate jumps where one more line overlaps, so that nothing but its side can be relied on.
+        let [low, high] = bisect([low, high], 30, |lowering| {
+            self.estimated_force(lowering) < force
+        });
         0.5 * (low + high)
     }
 

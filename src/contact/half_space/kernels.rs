@@ -2,6 +2,8 @@
 //!
 //! This is the slow, proven path; [`strips`](crate::contact::half_space::strip_operator::operator) evaluates the same forms in bulk.
 
+use crate::contact::numerics::quadrature::FOUR_POINTS;
+
 /// A rectangle `x0 < x < x1`, `y0 < y < y1`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rectangle {
@@ -88,24 +90,11 @@ fn by_corners(x: f64, y: f64, cell: Rectangle) -> [f64; 3] {
 }
 
 fn by_quadrature(x: f64, y: f64, cell: Rectangle) -> [f64; 3] {
-    // Gauss–Legendre with 4 points on −1 … 1.
-    const NODES: [f64; 4] = [
-        -0.861_136_311_594_052_6,
-        -0.339_981_043_584_856_3,
-        0.339_981_043_584_856_3,
-        0.861_136_311_594_052_6,
-    ];
-    const WEIGHTS: [f64; 4] = [
-        0.347_854_845_137_453_85,
-        0.652_145_154_862_546_1,
-        0.652_145_154_862_546_1,
-        0.347_854_845_137_453_85,
-    ];
     let (half_x, half_y) = (0.5 * (cell.x1 - cell.x0), 0.5 * (cell.y1 - cell.y0));
     let (mid_x, mid_y) = (0.5 * (cell.x0 + cell.x1), 0.5 * (cell.y0 + cell.y1));
     let mut sum = [0.0; 3];
-    for (u, wu) in NODES.iter().zip(WEIGHTS) {
-        for (v, wv) in NODES.iter().zip(WEIGHTS) {
+    for (u, wu) in FOUR_POINTS {
+        for (v, wv) in FOUR_POINTS {
             let (dx, dy) = (x - mid_x - half_x * u, y - mid_y - half_y * v);
             let r = dx.hypot(dy);
             let weight = wu * wv * half_x * half_y / (r * r * r);

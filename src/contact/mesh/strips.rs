@@ -4,6 +4,9 @@
 //! trailing end (smaller x) to the leading end (larger x).
 
 use std::f64::consts::PI;
+
+use crate::contact::numerics::monotone_root;
+use crate::contact::numerics::monotone_root::{CloseEnough, Course};
 use std::ops::Range;
 
 /// The part of a strip's mid-line that lies in a patch, in mm.
@@ -129,25 +132,14 @@ impl Gathering {
             return 2.0 * share.clamp(0.0, 1.0) - 1.0;
         }
         let goal = share * self.cumulated(1.0);
-        let (mut low, mut high) = (from, 1.0);
-        let mut t = from + (goal - self.cumulated(from)) / self.density(from).min(2.0);
-        // The sum rises steadily, so that the bracket holds one place: after sixty halvings it is narrower than the last digit.
-        for step in 0..120 {
-            if t <= low || t >= high || step >= 60 {
-                t = 0.5 * (low + high);
-            }
-            let excess = self.cumulated(t) - goal;
-            if excess.abs() < 1e-14 {
-                break;
-            }
-            if excess > 0.0 {
-                high = t;
-            } else {
-                low = t;
-            }
-            t -= excess / self.density(t);
-        }
-        t
+        let start = from + (goal - self.cumulated(from)) / self.density(from).min(2.0);
+        let close = CloseEnough {
+            value: 1e-14,
+            place: 0.0,
+        };
+        monotone_root::find([from, 1.0], start, Course::Rising, close, |t| {
+            [self.cumulated(t) - goal, self.density(t)]
+        })
     }
 }
 

@@ -3,6 +3,9 @@
 //! Tangents at the nodes are those of the parabola through the node and its two neighbours, so the curve has a
 //! continuous derivative and reproduces parabolas exactly (Catmull and Rom 1974, for unequal spacing).
 
+use crate::contact::numerics::monotone_root;
+use crate::contact::numerics::monotone_root::{CloseEnough, Course};
+
 /// A cubic `c0 + c1 s + c2 s² + c3 s³` on an interval, with s from 0 at its start to 1 at its end.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Cubic {
@@ -103,35 +106,23 @@ impl Cubic {
         }
     }
 
-    /// The root in a monotone piece with a change of sign: Newton's steps, and halving where they leave the bracket or have not
-    /// ended after sixty, as at a triple root. Sixty halvings leave less than the last digit of the bracket, so that the search cannot fail.
-    fn root(&self, mut low: f64, mut high: f64) -> f64 {
-        const NEWTON_STEPS: usize = 60;
-        const STEPS: usize = 2 * NEWTON_STEPS;
+    /// The root in a monotone piece with a change of sign.
+    fn root(&self, low: f64, high: f64) -> f64 {
         const CLOSE: f64 = 4.0 * f64::EPSILON;
         let [_, c1, c2, c3] = self.coefficients;
-        let positive_at_high = self.value(high) > 0.0;
-        let mut at = 0.5 * (low + high);
-        for step in 0..STEPS {
-            let value = self.value(at);
-            if (value > 0.0) == positive_at_high {
-                high = at;
-            } else {
-                low = at;
-            }
-            let next = at - value / (c1 + at * (2.0 * c2 + 3.0 * at * c3));
-            let next = if next > low && next < high && step < NEWTON_STEPS {
-                next
-            } else {
-                0.5 * (low + high)
-            };
-            let step = (next - at).abs();
-            at = next;
-            if step <= CLOSE || high - low <= CLOSE {
-                break;
-            }
-        }
-        at
+        let course = if self.value(high) > 0.0 {
+            Course::Rising
+        } else {
+            Course::Falling
+        };
+        let close = CloseEnough {
+            value: 0.0,
+            place: CLOSE.next_up(),
+        };
+        monotone_root::find([low, high], 0.5 * (low + high), course, close, |at| {
+            let slope = c1 + at * (2.0 * c2 + 3.0 * at * c3);
+            [self.value(at), slope]
+        })
     }
 }
 

@@ -1,7 +1,13 @@
 //! Numerical tools that know nothing of contact: one of each.
 
+pub mod bisection;
 pub mod bracketed_root;
 pub mod cubic;
 pub mod dense_lu;
+pub mod flood_fill;
 pub mod gmres;
+pub mod lagrange;
+pub mod maximum;
+pub mod monotone_root;
+pub mod quadrature;
 pub mod simd_ln;

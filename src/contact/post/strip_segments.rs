@@ -1,5 +1,6 @@
 //! Strips and their segments recovered from stored cells, with the neighbours that continue a segment.
 
+use crate::contact::numerics::lagrange;
 use crate::contact::solution::words::PatchCells;
 
 /// Cells that belong together and gaps between cells are told apart at this fraction of a cell's width.
@@ -133,14 +134,14 @@ impl Strips {
             .take(2)
             .map(|s| (s.y, 0.5 * (s.left + s.right)))
             .collect();
-        let half = extrapolate(&squared, y).clamp(0.0, squared[0].1).sqrt();
+        let half = lagrange::value(&squared, y).clamp(0.0, squared[0].1).sqrt();
         // Round-off of the parabola leaves half-lengths of this size where the true one is 0.
         let half = if half < 1e-6 * squared[0].1.sqrt() {
             0.0
         } else {
             half
         };
-        let centre = extrapolate(&centres, y).clamp(first.left + half, first.right - half);
+        let centre = lagrange::value(&centres, y).clamp(first.left + half, first.right - half);
         (centre - half, centre + half)
     }
 
@@ -174,21 +175,6 @@ impl Strips {
 /// Edges closer than this are the same edge: a fraction of the cell, but never below the rounding of coordinates.
 pub(crate) fn join_tolerance(coordinate: f64, width: f64) -> f64 {
     (JOIN * width).max(8.0 * f64::EPSILON * coordinate.abs())
-}
-
-/// Polynomial through the given points (at least one) at `x`, after Lagrange.
-fn extrapolate(points: &[(f64, f64)], x: f64) -> f64 {
-    points
-        .iter()
-        .enumerate()
-        .map(|(i, &(xi, value))| {
-            let others = points.iter().enumerate().filter(|&(k, _)| k != i);
-            value
-                * others
-                    .map(|(_, &(xk, _))| (x - xk) / (xi - xk))
-                    .product::<f64>()
-        })
-        .sum()
 }
 
 /// Patches for the unit tests of this folder.

@@ -6,6 +6,8 @@
 
 use std::f64::consts::PI;
 
+use crate::contact::numerics::lagrange;
+
 /// Rows of the table: a/b from 1/32 to 32, two to an octave.
 pub const RATIOS: usize = 21;
 /// Columns of the table.
@@ -26,8 +28,8 @@ pub fn coefficients(a_over_b: f64, poisson_ratio: f64) -> [f64; 3] {
     let inside = a_over_b.clamp(ratio(0), ratio(RATIOS - 1));
     let place = 2.0 * inside.log2() + 0.5 * (RATIOS - 1) as f64;
     let first = (place.floor() as usize).clamp(1, RATIOS - 3) - 1;
-    let along = lagrange([0.0, 1.0, 2.0, 3.0], place - first as f64);
-    let across = lagrange(POISSON_RATIOS, poisson_ratio);
+    let along = lagrange::weights(&[0.0, 1.0, 2.0, 3.0], place - first as f64);
+    let across = lagrange::weights(&POISSON_RATIOS, poisson_ratio);
     let mut found = [0, 1, 2].map(|k| {
         let row = |r: usize| -> f64 {
             let entries = TABLE[first + r][k].iter().zip(across);
@@ -70,16 +72,6 @@ fn slender(a_over_b: f64, poisson_ratio: f64) -> [f64; 3] {
         2.0 * PI / (g * y) * (1.0 + (1.0 - nu) * beside / y),
         2.0 * PI / (3.0 * g.powf(1.5) * spin),
     ]
-}
-
-/// Weights of Lagrange's interpolation at `t` between the nodes.
-fn lagrange<const N: usize>(nodes: [f64; N], t: f64) -> [f64; N] {
-    std::array::from_fn(|i| {
-        (0..N)
-            .filter(|j| *j != i)
-            .map(|j| (t - nodes[j]) / (nodes[i] - nodes[j]))
-            .product()
-    })
 }
 
 /// `[[C11], [C22], [C23]]` at [`POISSON_RATIOS`], one entry for each a/b.

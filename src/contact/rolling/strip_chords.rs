@@ -2,14 +2,7 @@
 
 use crate::contact::mesh::strips::Chord;
 use crate::contact::normal::footprint::Footprint;
-
-/// Gauss–Legendre points and weights on −1 … 1 for the mean length over a strip.
-const GAUSS: [(f64, f64); 4] = [
-    (-0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
-    (-0.339_981_043_584_856_3, 0.652_145_154_862_546_1),
-    (0.339_981_043_584_856_3, 0.652_145_154_862_546_1),
-    (0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
-];
+use crate::contact::numerics::quadrature::FOUR_POINTS;
 
 /// A strip's chord and the line of the region it was made from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -94,7 +87,7 @@ impl StripLoad {
     /// The strip about a line.
     fn of(footprint: &Footprint, patch: usize, line: &Chord) -> StripLoad {
         let (mut length, mut load, mut moment) = (Some(0.0), 0.0, 0.0);
-        for (place, weight) in GAUSS {
+        for (place, weight) in FOUR_POINTS {
             let y = line.y + 0.5 * line.dy * place;
             let across = footprint.chords(patch, &[(y, line.dy)]);
             if across.len() > 1 {

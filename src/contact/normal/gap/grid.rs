@@ -7,6 +7,7 @@ use crate::contact::normal::gap::conjugate_gradients::Pressed;
 use crate::contact::normal::gap::edges;
 use crate::contact::normal::gap::search_box::Reach;
 use crate::contact::normal::gap::surface::{GapSurface, Window};
+use crate::contact::numerics::flood_fill::groups;
 
 /// Most cells along either axis.
 const CELLS_MAX: usize = 200;
@@ -308,32 +309,7 @@ impl PressureGrid {
 
     /// Cells in contact, patch by patch; cells hang together over edges and corners.
     pub(crate) fn patches(&self, pressure: &[f64]) -> Vec<Vec<usize>> {
-        let [nx, ny] = self.cells;
-        let mut seen = vec![false; nx * ny];
-        let mut patches = Vec::new();
-        for start in 0..nx * ny {
-            if seen[start] || pressure[start] <= 0.0 {
-                continue;
-            }
-            seen[start] = true;
-            let mut patch = vec![start];
-            let mut next = 0;
-            while let Some(&k) = patch.get(next) {
-                next += 1;
-                let (i, j) = (k % nx, k / nx);
-                for j in j.saturating_sub(1)..(j + 2).min(ny) {
-                    for i in i.saturating_sub(1)..(i + 2).min(nx) {
-                        let neighbour = j * nx + i;
-                        if !seen[neighbour] && pressure[neighbour] > 0.0 {
-                            seen[neighbour] = true;
-                            patch.push(neighbour);
-                        }
-                    }
-                }
-            }
-            patches.push(patch);
-        }
-        patches
+        groups(self.cells, |cell| pressure[cell] > 0.0)
     }
 }
 

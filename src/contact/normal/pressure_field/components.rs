@@ -1,6 +1,7 @@
 //! Finds the separate patches of a grid: which positive samples hang together.
 
 use crate::contact::normal::pressure_field::sample_grid::{PATCHES_MAX, SampleGrid};
+use crate::contact::numerics::flood_fill::groups;
 
 /// Label of samples and cells that belong to no patch.
 pub(crate) const NOWHERE: u8 = u8::MAX;
@@ -13,40 +14,19 @@ pub(crate) const NOWHERE: u8 = u8::MAX;
 /// # Errors
 /// The number of patches, if there are more than [`PATCHES_MAX`].
 pub(crate) fn label_samples(grid: &SampleGrid, q: &[f64]) -> Result<(Vec<u8>, usize), usize> {
-    let (nx, ny) = (grid.x.len(), grid.y.len());
-    let mut labels = vec![NOWHERE; nx * ny];
-    let mut seen = vec![false; nx * ny];
-    let mut stack = Vec::new();
-    let mut count = 0;
+    let size = [grid.x.len(), grid.y.len()];
     // The order of storage is that of y, so patches are met in the order wanted.
-    for start in 0..nx * ny {
-        if seen[start] || q[start] <= 0.0 {
-            continue;
-        }
-        seen[start] = true;
-        stack.push(start);
-        while let Some(k) = stack.pop() {
-            if count < PATCHES_MAX {
-                labels[k] = count as u8;
-            }
-            let (i, j) = (k % nx, k / nx);
-            for j in j.saturating_sub(1)..(j + 2).min(ny) {
-                for i in i.saturating_sub(1)..(i + 2).min(nx) {
-                    let neighbour = j * nx + i;
-                    if !seen[neighbour] && q[neighbour] > 0.0 {
-                        seen[neighbour] = true;
-                        stack.push(neighbour);
-                    }
-                }
-            }
-        }
-        count += 1;
+    let patches = groups(size, |sample| q[sample] > 0.0);
+    if patches.len() > PATCHES_MAX {
+        return Err(patches.len());
     }
-    if count > PATCHES_MAX {
-        Err(count)
-    } else {
-        Ok((labels, count))
+    let mut labels = vec![NOWHERE; q.len()];
+    for (label, patch) in patches.iter().enumerate() {
+        for sample in patch {
+            labels[*sample] = label as u8;
+        }
     }
+    Ok((labels, patches.len()))
 }
 
 /// Label of every cell between four samples, stored like the samples at its corner of smallest x and y: that of its

@@ -15,6 +15,7 @@ use crate::contact::normal::pressure_field::sample_grid::{
 };
 use crate::contact::normal::pressure_field::{components, level_set, line};
 use crate::contact::numerics::cubic::{interval, weights};
+use crate::contact::numerics::quadrature::{GaussPoints, integral};
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 
@@ -175,8 +176,14 @@ impl GridPressure {
             return self.pressure_max * cubic.at(low).sqrt();
         }
         let centre = 0.5 * (chord.right + chord.left);
-        let three = |from: f64, to: f64| (to - from) * INTERVALS_MANY < chord.right - chord.left;
-        let mut integral = 0.0;
+        let points = |from: f64, to: f64| {
+            if (to - from) * INTERVALS_MANY < chord.right - chord.left {
+                GaussPoints::Three
+            } else {
+                GaussPoints::Five
+            }
+        };
+        let mut sum = 0.0;
         for i in first..=last {
             if i > first {
                 values = [values[1], values[2], values[3], value(i + 2)];
@@ -186,18 +193,18 @@ impl GridPressure {
             let pressure = |x: f64| cubic.at(x).sqrt();
             if from < centre.min(to) {
                 let s = [from, centre.min(to)].map(|x| (x - chord.left).max(0.0).sqrt());
-                integral += gauss(s, three(from, to), |s| {
+                sum += integral(s, points(from, to), |s| {
                     2.0 * s * pressure(chord.left + s * s)
                 });
             }
             if to > centre.max(from) {
                 let s = [to, centre.max(from)].map(|x| (chord.right - x).max(0.0).sqrt());
-                integral += gauss(s, three(from, to), |s| {
+                sum += integral(s, points(from, to), |s| {
                     2.0 * s * pressure(chord.right - s * s)
                 });
             }
         }
-        self.pressure_max * integral / (x1 - x0)
+        self.pressure_max * sum / (x1 - x0)
     }
 
     /// Where the line at y lies in a patch: segments from smaller to larger x.
@@ -291,22 +298,4 @@ impl GridPressure {
     fn column_interval(&self, x: f64) -> usize {
         interval(&self.grid.x, x).clamp(1, self.grid.x.len() - 3)
     }
-}
-
-/// Gauss–Legendre quadrature with five points, or three where they do (Abramowitz and Stegun 1964, table 25.4).
-fn gauss([from, to]: [f64; 2], three: bool, f: impl Fn(f64) -> f64) -> f64 {
-    const THREE: [(f64, f64); 2] = [
-        (0.0, 0.888_888_888_888_889),
-        (0.774_596_669_241_483_4, 0.555_555_555_555_555_6),
-    ];
-    const FIVE: [(f64, f64); 3] = [
-        (0.0, 0.568_888_888_888_888_9),
-        (0.538_469_310_105_683_1, 0.478_628_670_499_366_47),
-        (0.906_179_845_938_664, 0.236_926_885_056_189_08),
-    ];
-    let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
-    let points = if three { &THREE[..] } else { &FIVE[..] };
-    let pair = |(at, weight): &(f64, f64)| weight * (f(middle - half * at) + f(middle + half * at));
-    let outer: f64 = points[1..].iter().map(pair).sum();
-    half * (points[0].1 * f(middle) + outer)
 }

@@ -5,6 +5,7 @@
 //! inside. For Hertz's pressure q is a parabola and the continuation is exact.
 
 use crate::contact::normal::pressure_field::sample_grid::SampleGrid;
+use crate::contact::numerics::lagrange;
 
 /// Samples outside that get a value, counted from the nearest one inside along either axis.
 const RINGS: usize = 3;
@@ -142,7 +143,7 @@ fn edge_value(at: f64, inside: &[(f64, f64)]) -> (f64, State) {
     if inside.len() == 1 {
         return (-last, State::Step);
     }
-    let value = extrapolate(at, inside);
+    let value = lagrange::value(inside, at);
     if value <= 0.0 {
         return (
             value,
@@ -153,7 +154,7 @@ fn edge_value(at: f64, inside: &[(f64, f64)]) -> (f64, State) {
             },
         );
     }
-    let value = value.min(extrapolate(at, &inside[..2]));
+    let value = value.min(lagrange::value(&inside[..2], at));
     if value <= EDGE_AT_SAMPLE * last {
         return (value.min(0.0), State::Rough);
     }
@@ -163,27 +164,12 @@ fn edge_value(at: f64, inside: &[(f64, f64)]) -> (f64, State) {
 
 /// Value of a sample farther out, from one to three known ones; it does not rise outward.
 fn outward_value(at: f64, known: &[(f64, f64)]) -> (f64, State) {
-    let value = extrapolate(at, known);
+    let value = lagrange::value(known, at);
     let smooth = known.len() == 3 && value <= known[0].1;
     (
         value.min(known[0].1),
         if smooth { State::Smooth } else { State::Rough },
     )
-}
-
-/// Value at `at` of the polynomial of least degree through the points (Lagrange).
-fn extrapolate(at: f64, points: &[(f64, f64)]) -> f64 {
-    let mut value = 0.0;
-    for (k, (xk, qk)) in points.iter().enumerate() {
-        let mut weight = 1.0;
-        for (m, (xm, _)) in points.iter().enumerate() {
-            if m != k {
-                weight *= (at - xm) / (xk - xm);
-            }
-        }
-        value += weight * qk;
-    }
-    value
 }
 
 #[cfg(test)]

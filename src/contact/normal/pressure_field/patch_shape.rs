@@ -7,6 +7,8 @@ use crate::contact::normal::pressure_field::components::NOWHERE;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::normal::pressure_field::patch_cells::PatchShape;
 use crate::contact::normal::pressure_field::sample_grid::PADDING;
+use crate::contact::numerics::bisection::bisect;
+use crate::contact::numerics::maximum::maximum;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 
@@ -103,20 +105,13 @@ impl GridPressure {
     /// First and last y of lines that meet the patch.
     fn extent_across(&self, shape: &PatchShape, label: usize) -> [f64; 2] {
         // Two spacings halved so often are too small to matter.
-        const STEPS: usize = 36;
+        const HALVINGS: u32 = 36;
         let y = &self.grid.y;
         // The outermost samples are two lines inside the range of cells (see `shapes_from_samples`).
         let [first, last] = [*shape.rows.start(), *shape.rows.end() + 1];
         [(first, first + 2), (last, last - 2)].map(|(outside, inside)| {
-            let (mut outside, mut inside) = (y[outside], y[inside]);
-            for _ in 0..STEPS {
-                let middle = 0.5 * (outside + inside);
-                if self.segments(label, middle).is_empty() {
-                    outside = middle;
-                } else {
-                    inside = middle;
-                }
-            }
+            let empty = |y: f64| self.segments(label, y).is_empty();
+            let [_, inside] = bisect([y[outside], y[inside]], HALVINGS, empty);
             inside
         })
     }
@@ -143,80 +138,5 @@ impl GridPressure {
             }
         }
         remarks
-    }
-}
-
-/// Largest value of a function with one hump in an interval, by parabolas and golden sections (Brent 1973); its place is
-/// found to 1e-5 of the interval, so that the value is exact to about the square of this.
-fn maximum([mut low, mut high]: [f64; 2], f: impl Fn(f64) -> f64) -> f64 {
-    const STEPS: usize = 40;
-    const SHORT: f64 = 0.381_966_011_250_105_1;
-    let close = 1e-5 * (high - low);
-    let best = low + SHORT * (high - low);
-    // The best place, the second best and the one before, each with its value.
-    let mut places = [(best, f(best)); 3];
-    let (mut step, mut before) = (0.0_f64, 0.0_f64);
-    for _ in 0..STEPS {
-        let [(x, fx), (w, fw), (v, fv)] = places;
-        let middle = 0.5 * (low + high);
-        if (x - middle).abs() <= 2.0 * close - 0.5 * (high - low) {
-            break;
-        }
-        let (r, q) = ((x - w) * (fx - fv), (x - v) * (fx - fw));
-        let parabola = ((x - w) * r - (x - v) * q) / (2.0 * (q - r));
-        let inside = parabola > low - x && parabola < high - x;
-        if inside && parabola.abs() < 0.5 * before.abs() {
-            (before, step) = (step, parabola);
-        } else {
-            before = if x < middle { high - x } else { low - x };
-            step = SHORT * before;
-        }
-        let at = x + step.abs().max(close).copysign(step);
-        let value = f(at);
-        if value >= fx {
-            *(if at >= x { &mut low } else { &mut high }) = x;
-            places = [(at, value), (x, fx), (w, fw)];
-            continue;
-        }
-        *(if at < x { &mut low } else { &mut high }) = at;
-        if value >= fw || w == x {
-            places = [(x, fx), (at, value), (w, fw)];
-        } else if value >= fv || v == x || v == w {
-            places[2] = (at, value);
-        }
-    }
-    places[0].1
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_top_of_a_hump_is_found_in_few_looks() {
-        let humps: [(&dyn Fn(f64) -> f64, f64); 3] = [
-            (&|x: f64| 1.0 - (x - 0.3).powi(2), 1.0),
-            (&|x: f64| (x - 1.2).cos() * (1.0 + 1e-3 * x), 0.0),
-            (&|x: f64| -(x - 0.77).abs(), 0.0),
-        ];
-        for (k, (hump, top)) in humps.into_iter().enumerate() {
-            let looks = std::cell::Cell::new(0);
-            let counted = |x: f64| {
-                looks.set(looks.get() + 1);
-                hump(x)
-            };
-            let found = maximum([-0.5, 2.0], counted);
-            let exact = if k == 1 {
-                (0..=250_000)
-                    .map(|n| hump(-0.5 + 1e-5 * f64::from(n)))
-                    .fold(f64::MIN, f64::max)
-            } else {
-                top
-            };
-            // A kink is only as good as its place.
-            let allowed = if k == 2 { 5e-5 } else { 1e-9 };
-            assert!((found - exact).abs() < allowed, "{k}: {found} {exact}");
-            assert!(looks.get() <= 32, "{k}: {} looks", looks.get());
-        }
     }
 }
