@@ -1,4 +1,4 @@
-//! The files of the page, as they are in the program: those of `web`, and the examples of the API.
+//! The files of the page, as they are in the program.
 
 use std::sync::LazyLock;
 
@@ -12,15 +12,16 @@ pub struct PageFile {
 }
 
 macro_rules! files {
-    ($folder:literal, $prefix:literal: $($name:literal),* $(,)?) => {
+    ($($path:literal),* $(,)?) => {
         &[$(PageFile {
-            path: concat!($prefix, $name),
-            body: include_bytes!(concat!($folder, $name)),
+            path: $path,
+            body: include_bytes!(concat!("web/", $path)),
         }),*]
     };
 }
 
-const WEB: &[PageFile] = files!("web/", "":
+/// Every file of the page.
+pub const FILES: &[PageFile] = files!(
     "icon.svg",
     "index.html",
     "js/api.js",
@@ -38,7 +39,6 @@ const WEB: &[PageFile] = files!("web/", "":
     "js/drawing/profiles.js",
     "js/editing.js",
     "js/events.js",
-    "js/examples.js",
     "js/field.js",
     "js/field/cells.js",
     "js/field/colours.js",
@@ -67,6 +67,7 @@ const WEB: &[PageFile] = files!("web/", "":
     "js/resultview.js",
     "js/routes.js",
     "js/shell.js",
+    "js/starts.js",
     "js/state.js",
     "js/store.js",
     "js/strips.js",
@@ -82,37 +83,16 @@ const WEB: &[PageFile] = files!("web/", "":
     "vendor/vendor.json",
 );
 
-const EXAMPLES: &[PageFile] = files!("../../../api/examples/", "examples/":
-    "area-132re-crown.case.json",
-    "faulty.case.json",
-    "hertz-steel.case.json",
-    "paper-figure-3.case.json",
-    "paper-figure-4.case.json",
-    "paper-figure-5.case.json",
-    "pressure-grid.case.json",
-    "spin.case.json",
-    "sweep.case.json",
-    "two-patches.case.json",
-    "uic60-crown.case.json",
-    "wheel-rail-flange.case.json",
-    "wheel-rail.case.json",
-);
-
-/// Every file of the page.
-pub fn all() -> impl Iterator<Item = &'static PageFile> {
-    WEB.iter().chain(EXAMPLES)
-}
-
 /// The file at a path below the page.
 #[must_use]
 pub fn find(path: &str) -> Option<&'static PageFile> {
-    all().find(|file| file.path == path)
+    FILES.iter().find(|file| file.path == path)
 }
 
 /// Digest of all files: it changes with any of them, so that addresses with it may be kept for good.
 pub static DIGEST: LazyLock<String> = LazyLock::new(|| {
     let mut hasher = blake3::Hasher::new();
-    for file in all() {
+    for file in FILES {
         hasher.update(file.path.as_bytes());
         hasher.update(&(file.body.len() as u64).to_le_bytes());
         hasher.update(file.body);
@@ -124,37 +104,28 @@ pub static DIGEST: LazyLock<String> = LazyLock::new(|| {
 mod tests {
     use std::collections::BTreeSet;
     use std::fs;
-    use std::path::{Path, PathBuf};
+    use std::path::Path;
 
     use super::*;
 
-    fn below(folder: &str, ending: &str) -> BTreeSet<String> {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
+    #[test]
+    fn every_file_of_the_page_is_in_the_program() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/http/page/web");
         let mut folders = vec![root.clone()];
-        let mut found = BTreeSet::new();
+        let mut there = BTreeSet::new();
         while let Some(folder) = folders.pop() {
             for entry in fs::read_dir(&folder).expect("a folder") {
-                let path: PathBuf = entry.expect("an entry").path();
+                let path = entry.expect("an entry").path();
                 if path.is_dir() {
                     folders.push(path);
-                } else if path.display().to_string().ends_with(ending) {
+                } else {
                     let place = path.strip_prefix(&root).expect("below the folder");
-                    found.insert(place.display().to_string().replace('\\', "/"));
+                    there.insert(place.display().to_string().replace('\\', "/"));
                 }
             }
         }
-        found
-    }
-
-    fn listed(files: &[PageFile], prefix: &str) -> BTreeSet<String> {
-        let paths = files.iter().map(|file| file.path);
-        paths.map(|path| path.replacen(prefix, "", 1)).collect()
-    }
-
-    #[test]
-    fn every_file_of_the_page_is_in_the_program() {
-        assert_eq!(listed(WEB, ""), below("src/http/page/web", ""));
-        let examples = below("api/examples", ".case.json");
-        assert_eq!(listed(EXAMPLES, "examples/"), examples);
+        let listed: BTreeSet<String> = FILES.iter().map(|file| file.path.to_owned()).collect();
+        assert_eq!(listed, there);
+        assert_eq!(listed.len(), FILES.len());
     }
 }

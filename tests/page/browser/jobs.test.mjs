@@ -21,7 +21,7 @@ test('a job is followed from the queue to its end, and another is cancelled', ()
   await row(page, 'slow two').locator('.state.queued').waitFor();
   await page.getByRole('button', { name: 'Cancel slow two' }).click();
   await row(page, 'slow two').locator('.state.cancelled').waitFor();
-  await page.getByRole('radio', { name: 'cancelled', exact: true }).check();
+  await page.getByRole('checkbox', { name: 'cancelled', exact: true }).check();
   await row(page, 'slow one').waitFor({ state: 'detached' });
   assert.equal(await page.locator('.rows.job').count(), 1);
   await page.getByRole('button', { name: 'Delete slow two' }).click();
@@ -45,10 +45,11 @@ test('the result appears by itself though the service died meanwhile', () => onP
 
 test('a batch shows its progress and is cancelled as a whole', () => onPage('#/compose', async (page) => {
   const cases = Array.from({ length: 12 }, (_, i) => slow(`part ${i}`, 200 + i));
-  await service.ask('/v1/batches', { json: cases });
+  const { id } = await service.ask('/v1/batches?name=timetable&label=line:A12', { json: cases });
   await page.goto(`${service.base}/#/jobs`);
-  const batch = page.locator('.batch').first();
-  await batch.getByText('Batch of 12').waitFor();
+  const batch = page.locator(`.batch[data-batch="${id}"]`);
+  await batch.getByText('timetable').waitFor();
+  await batch.getByText('line: A12').waitFor();
   await batch.getByRole('button', { name: 'Cancel all' }).click();
   await batch.getByText('100 %').waitFor();
   await batch.getByRole('button', { name: 'Delete the batch of 12' }).click();
@@ -96,8 +97,13 @@ test('10 000 jobs scroll without a stutter, in few rows', () => onPage('#/compos
   await page.goBack();
   await row(page, name ?? '').waitFor();
   assert.ok(Math.abs((await page.locator('.list').evaluate((list) => list.scrollTop)) - place) < 200);
-  await page.getByRole('radio', { name: 'failed' }).check();
-  await page.getByText('No jobs that are failed').waitFor();
+  assert.match((await page.locator('#h-jobs').innerText()).replace(/\u2009/g, ''), /Jobs 1000\d/);
+  await page.getByLabel('Name').fill('case 99');
+  await page.getByLabel('Name').blur();
+  await page.waitForFunction(() => document.querySelectorAll('.rows.job').length > 0 && [...document.querySelectorAll('.rows.job .name')].every((link) => link.textContent?.includes('case 99')));
+  await page.getByRole('checkbox', { name: 'failed' }).check();
+  await page.getByRole('checkbox', { name: 'running' }).check();
+  await page.getByText('No jobs that are failed or running').waitFor();
 }));
 
 test('without a key the line for it opens; a key works, and a revoked one says so', async () => {

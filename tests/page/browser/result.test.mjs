@@ -164,6 +164,23 @@ test('two patches have one scale of colours, and stand on the profiles', () => o
   assert.ok(far.every((distance) => distance < 1), `${far}`);
 }));
 
+test('colours can be those of cividis, and stay so', () => onPage('#/compose', async (page) => {
+  const { id } = await service.solved(withFields('spin'));
+  await page.goto(`${service.base}/#/jobs/${id}`);
+  await drawn(page);
+  const middle = () => page.locator('field-map.main canvas').first().evaluate((canvas) => {
+    const { width, height } = /** @type {HTMLCanvasElement} */ (canvas);
+    return [.../** @type {CanvasRenderingContext2D} */ (/** @type {HTMLCanvasElement} */ (canvas).getContext('2d')).getImageData(width * 0.3, height * 0.3, 1, 1).data];
+  });
+  const viridis = await middle();
+  await page.locator('select.slim').selectOption('cividis');
+  const cividis = await middle();
+  assert.notDeepEqual(cividis, viridis);
+  await page.reload();
+  await drawn(page);
+  assert.deepEqual(await middle(), cividis);
+}));
+
 test('a field of many cells comes as arrays, and is the same', () => onPage('#/compose', async (page) => {
   const { id } = await service.solved({ ...withFields('spin'), solver: { mesh: { strips: 64, cells: 64 } }, outputs: ['zones', 'tractions'] });
   const [asked] = await Promise.all([page.waitForRequest(/fields.*format=npz/), page.goto(`${service.base}/#/jobs/${id}`)]);

@@ -82,10 +82,11 @@ export async function request(path, asked = {}) {
  */
 const json = async (path, asked) => (await request(path, asked)).json();
 
-/** @param {Record<string, string | number | undefined>} members Those that are undefined or empty are left out. */
+/** @param {Record<string, string | number | undefined | readonly string[]>} members Those that are undefined or empty are left out. */
 function search(members) {
-  const pairs = Object.entries(members).filter(([, value]) => value !== undefined && value !== '');
-  return new URLSearchParams(pairs.map(([name, value]) => [name, String(value)])).toString();
+  const pairs = Object.entries(members).flatMap(([name, value]) =>
+    (Array.isArray(value) ? value : [value ?? '']).filter((item) => item !== '').map((item) => [name, String(item)]));
+  return new URLSearchParams(pairs).toString();
 }
 
 /** @returns {Promise<Schemas['Health']>} */
@@ -119,13 +120,26 @@ export const result = (id) => json(`/v1/jobs/${id}/result`);
 /** @type {(id: string) => Promise<JsonObject>} */
 export const caseOf = (id) => json(`/v1/jobs/${id}/case`);
 
-/** @typedef {{ state?: string, batch?: string, label?: string, name?: string, cursor?: string, limit?: number }} Filter */
+/** @typedef {{ state?: readonly string[], label?: string, name?: string, fields?: string, cursor?: string, limit?: number }} Filter */
+/** @typedef {Omit<Schemas['JobPage'], 'jobs'> & { jobs: Job[] }} JobPage With all members of the jobs that are asked for. */
 
 /**
  * @param {Filter} filter
- * @returns {Promise<Schemas['JobPage']>}
+ * @returns {Promise<JobPage>}
  */
-export const jobs = (filter) => json(`/v1/jobs?${search({ limit: 200, ...filter })}`);
+export const jobs = (filter) => json(`/v1/jobs?${search(filter)}`);
+
+/**
+ * @param {{ label?: string, name?: string, limit?: number }} filter
+ * @returns {Promise<Schemas['BatchPage']>}
+ */
+export const batches = (filter) => json(`/v1/batches?${search(filter)}`);
+
+/** @returns {Promise<Schemas['Me']>} */
+export const me = () => json('/v1/me');
+
+/** @returns {Promise<Schemas['ExampleCase'][]>} */
+export const examples = () => json('/v1/examples');
 
 /** @type {(id: string) => Promise<Batch>} */
 export const batch = (id) => json(`/v1/batches/${id}`);

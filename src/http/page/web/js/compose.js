@@ -8,7 +8,6 @@ import { drawEllipse } from './drawing/patch.js';
 import { drawGapCurve, drawGrid } from './drawing/gaps.js';
 import { drawGap, drawProfiles } from './drawing/profiles.js';
 import { editText, openExample, queue, solve, solveLive } from './editing.js';
-import { EXAMPLES } from './examples.js';
 import { offered, rangeOf } from './field/quantities.js';
 import { fieldId } from './field.js';
 import { caseForm } from './form.js';
@@ -53,11 +52,11 @@ export function compose(app) {
 
 /** @param {App} app */
 function examplePicker(app) {
-  const { example } = app.store.get().compose;
+  const { example, examples } = app.store.get().compose;
   const open = (/** @type {Event} */ event) => openExample(app, /** @type {HTMLSelectElement} */ (event.target).value);
   return html`<label class="inline">Example <select @change=${open}>
     ${example ? nothing : html`<option value="" selected>–</option>`}
-    ${EXAMPLES.map(({ file, title }) => html`<option value=${file} ?selected=${example === file}>${title}</option>`)}</select></label>`;
+    ${examples.map(({ name, summary }) => html`<option value=${name} ?selected=${example === name}>${summary}</option>`)}</select></label>`;
 }
 
 /** @type {{ of: unknown, drawn: ReturnType<typeof placed> } | null} */

@@ -3,7 +3,7 @@
 import { html, nothing } from '../vendor/lit-html.js';
 import { at, isObject, numberAt, put } from './document.js';
 import { change, editDocument } from './editing.js';
-import { withContact } from './examples.js';
+import { withContact } from './starts.js';
 import { faultAt, field, fieldId } from './field.js';
 import { number } from './format.js';
 import { parseGapCurve, parseGrid, profileKind } from './tables.js';

@@ -1,8 +1,7 @@
 // What happens to the case that is being written: changes, checks while writing, the result while typing, solving.
 
-import { checkCase, Refused, remove, result as resultOf, submit } from './api.js';
+import { cancel, checkCase, examples as examplesOf, Refused, remove, result as resultOf, submit } from './api.js';
 import { at, pretty, put } from './document.js';
-import { EXAMPLES } from './examples.js';
 import { hasFields, loadField } from './fields.js';
 import { formatRoute } from './routes.js';
 import { adoptJob } from './result.js';
@@ -14,17 +13,25 @@ import { adoptJob } from './result.js';
 const KEPT = 'railhead.case';
 const PAUSE_MS = 120;
 const WAIT_S = 10;
+/** The example that a new tab begins with. */
+const FIRST = 'hertz-steel';
 /** Estimated seconds up to which a case is solved while it is written. */
 const LIVE_SECONDS_MAX = 0.05;
 
 let timer = 0;
+let began = -Infinity;
 let asking = new AbortController();
 
 /** The case as it was left in this tab, or the first example. @param {App} app */
-export function openKept(app) {
+export async function openKept(app) {
   const kept = sessionStorage.getItem(KEPT);
   if (kept) editText(app, kept);
-  else openExample(app, EXAMPLES[0].file);
+  try {
+    app.compose({ examples: await examplesOf() });
+    if (!kept) openExample(app, FIRST);
+  } catch (error) {
+    app.refused(error);
+  }
 }
 
 /** @param {App} app @param {string} text */
@@ -52,16 +59,12 @@ export function change(app, pointer, value) {
   editDocument(app, put(app.store.get().compose.document ?? {}, pointer, value));
 }
 
-/** @param {App} app @param {string} file */
-export async function openExample(app, file) {
-  try {
-    const answer = await fetch(new URL(`../examples/${file}.case.json`, import.meta.url));
-    if (!answer.ok) throw new Error(`The example ${file} is not there.`);
-    app.compose({ example: file, typing: null });
-    editDocument(app, await answer.json());
-  } catch (error) {
-    app.refused(error);
-  }
+/** @param {App} app @param {string} name */
+export function openExample(app, name) {
+  const example = app.store.get().compose.examples.find((known) => known.name === name);
+  if (!example) return;
+  app.compose({ example: name, typing: null });
+  editDocument(app, /** @type {JsonObject} */ (/** @type {unknown} */ (example.case)));
 }
 
 /**
@@ -73,13 +76,17 @@ export async function openExample(app, file) {
 function take(app, document, text, unreadable) {
   app.compose({ document, text, unreadable, refusal: '', ...(unreadable ? { faults: [], checked: null } : {}) });
   sessionStorage.setItem(KEPT, text);
-  clearTimeout(timer);
   asking.abort();
-  if (!unreadable) timer = window.setTimeout(() => check(app, text), PAUSE_MS);
+  // The first change is checked at once, those of a moving slider one after another.
+  timer ||= window.setTimeout(() => check(app), Math.max(0, began + PAUSE_MS - performance.now()));
 }
 
-/** @param {App} app @param {string} text */
-async function check(app, text) {
+/** @param {App} app */
+async function check(app) {
+  timer = 0;
+  const { text, unreadable } = app.store.get().compose;
+  if (unreadable) return;
+  began = performance.now();
   const mine = (asking = new AbortController());
   try {
     const checked = await checkCase(text, mine.signal);
@@ -116,14 +123,16 @@ async function preview(app, digest, signal) {
   }
   if (known?.digest === digest) return;
   const text = JSON.stringify({ ...document, name: 'result while typing' });
-  const job = await submit(text, { wait: 2, signal });
+  // Not given up when the next character is written: its job would stay.
+  const job = await submit(text, { wait: 2 });
   try {
     if (job.state !== 'succeeded') return;
     const result = job.result ?? (await resultOf(job.id));
     const field = hasFields(result) ? await loadField(job.id, result, 0, 0) : null;
     if (!signal.aborted) app.compose({ preview: { digest, result, field } });
   } finally {
-    if (job.state === 'succeeded' || job.state === 'failed') await remove('jobs', job.id).catch(() => {});
+    if (job.state === 'queued' || job.state === 'running') await cancel('jobs', job.id).catch(() => {});
+    await remove('jobs', job.id).catch(() => {});
   }
 }
 

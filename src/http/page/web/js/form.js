@@ -4,7 +4,7 @@ import { html, nothing } from '../vendor/lit-html.js';
 import { at, isObject, numberAt } from './document.js';
 import { change, editDocument } from './editing.js';
 import { contactFields } from './contactform.js';
-import { ALL_OUTPUTS, withContact } from './examples.js';
+import { ALL_OUTPUTS, withContact } from './starts.js';
 import { faultAt, field } from './field.js';
 
 /** @typedef {import('./state.js').App} App */

@@ -14,6 +14,8 @@ import { formatRoute } from './routes.js';
 
 const ROW = 44;
 const SPARE_ROWS = 8;
+/** Batches that have ended and are still shown. */
+const ENDED_SHOWN = 3;
 const STATES = /** @type {const} */ (['queued', 'running', 'succeeded', 'failed', 'cancelled']);
 /** @type {Record<State, string>} */
 const GLYPHS = { queued: '○', running: '◔', succeeded: '●', failed: '✕', cancelled: '⊘' };
@@ -21,22 +23,39 @@ const GLYPHS = { queued: '○', running: '◔', succeeded: '●', failed: '✕',
 /** @param {App} app */
 export function jobsView(app) {
   const queue = queueSeen();
+  const newest = [...queue.batches.values()].sort((one, two) => (one.id < two.id ? 1 : -1));
+  // Those that go on are always in sight; of the others the newest few.
+  const shown = newest.filter((batch, at) => !batch.ended || at < ENDED_SHOWN);
+  const number = queue.loaded ? html` <span class="quiet n">${count(queue.total)}${queue.more ? ' or more' : ''}</span>` : nothing;
   return html`<h1 class="visually-hidden">Jobs</h1>
-    ${[...queue.batches.values()].sort((one, two) => (one.id < two.id ? 1 : -1)).map((batch) => batchPanel(app, batch))}
+    ${shown.map((batch) => batchPanel(app, batch))}
     <section class="panel jobs" aria-labelledby="h-jobs">
-      <header class="bar"><h2 id="h-jobs">Jobs</h2>${filters(app)}${compareLink()}</header>
+      <header class="bar"><h2 id="h-jobs">Jobs${number}</h2>${filters(app)}${compareLink()}</header>
+      ${usage(queue.me)}
       <div class="rows head" aria-hidden="true"><span></span><span>State</span><span>Name</span><span>Labels</span><span>Submitted</span><span>Took</span><span></span></div>
       ${list(app)}
     </section>`;
 }
 
+/** What the tenant uses, where it waits or is nobody's. @param {import('./api.js').Schemas['Me'] | null} me */
+function usage(me) {
+  if (!me || (me.tenant === 'anonymous' && !me.used.queued)) return nothing;
+  const share = me.used.queued / Math.max(1, me.quota.queued);
+  return html`<p class=${share > 0.9 ? 'pad warn' : 'pad quiet'}>${me.tenant === 'anonymous' ? '' : html`<strong>${me.tenant}</strong>, `}${count(me.used.queued)} of
+    ${count(me.quota.queued)} places of the queue in use</p>`;
+}
+
 /** @param {App} app */
 function filters(app) {
   const queue = queueSeen();
-  const labelled = (/** @type {Event} */ event) => filterQueue(app, { label: /** @type {HTMLInputElement} */ (event.target).value.trim() });
-  return html`<div class="segs" role="group" aria-label="State">${['', ...STATES].map((state) => html`<label class="seg">
-      <input type="radio" name="state" .checked=${queue.state === state} @change=${() => filterQueue(app, { state })}><span>${state || 'all'}</span></label>`)}</div>
-    <label class="inline">Label <input class="search" placeholder="line:A12" .value=${queue.label} @change=${labelled}></label>`;
+  const text = (/** @type {'label' | 'name'} */ what) => (/** @type {Event} */ event) =>
+    filterQueue(app, { [what]: /** @type {HTMLInputElement} */ (event.target).value.trim() });
+  const toggle = (/** @type {string} */ state) => () =>
+    filterQueue(app, { states: queue.states.includes(state) ? queue.states.filter((other) => other !== state) : [...queue.states, state] });
+  return html`<div class="segs" role="group" aria-label="States">${STATES.map((state) => html`<label class="seg">
+      <input type="checkbox" .checked=${queue.states.includes(state)} @change=${toggle(state)}><span>${state}</span></label>`)}</div>
+    <label class="inline">Name <input class="search" placeholder="part of it" .value=${queue.name} @change=${text('name')}></label>
+    <label class="inline">Label <input class="search" placeholder="line:A12" .value=${queue.label} @change=${text('label')}></label>`;
 }
 
 function compareLink() {
@@ -61,7 +80,7 @@ function list(app) {
   const after = queue.jobs.length - first - rows.length;
   return html`<div class="list" tabindex="0" role="group" aria-label="Jobs, newest first" @scroll=${scrolled}>
     ${spacer(first)}${rows.map((job) => row(app, job))}${spacer(after)}
-    ${queue.loaded && !queue.jobs.length ? html`<p class="quiet pad">No jobs${queue.state ? ` that are ${queue.state}` : ''}${queue.label ? ` with the label ${queue.label}` : ''}.
+    ${queue.loaded && !queue.jobs.length ? html`<p class="quiet pad">No jobs${queue.states.length ? ` that are ${queue.states.join(' or ')}` : ''}${queue.name ? ` with “${queue.name}” in their names` : ''}${queue.label ? ` with the label ${queue.label}` : ''}.
       <a href="#/compose">Compose one.</a></p>` : nothing}
     ${queue.loaded ? nothing : html`<p class="quiet pad">Loading …</p>`}
   </div>`;
@@ -104,8 +123,9 @@ function batchPanel(app, batch) {
     forgetBatch(batch.id);
     refreshSoon(app);
   }, app.refused);
-  return html`<section class="panel batch" aria-label=${`Batch of ${batch.count}`}>
-    <strong>Batch of ${count(batch.count)}</strong>
+  return html`<section class="panel batch" aria-label=${`Batch of ${batch.count}`} data-batch=${batch.id}>
+    <strong>${batch.name || `Batch of ${count(batch.count)}`}</strong>${batch.name ? html`<span class="quiet">${count(batch.count)} cases</span>` : nothing}
+    ${Object.entries(batch.labels).map(([key, value]) => html`<span class="chip">${key}: ${value}</span>`)}
     <svg class="shares" viewBox="0 0 1000 10" preserveAspectRatio="none" role="img" aria-label=${`${Math.round(100 * batch.progress)} percent ended`}>${shares(batch)}</svg>
     <span class="n">${Math.floor(100 * batch.progress)} %</span><span class="quiet">${states.join(' · ')}</span>
     <span class="do">${batch.ended ? html`

@@ -1,6 +1,6 @@
 // The jobs of a batch along a label that is a number, such as the chainage: what the strips show of each.
 
-import { batch as batchOf, request } from './api.js';
+import { batch as batchOf, batches as batchesOf, request } from './api.js';
 import { formatRoute } from './routes.js';
 
 /** @typedef {import('./state.js').App} App */
@@ -38,10 +38,22 @@ let line = null;
 
 export const lineSeen = () => line;
 
+/** @type {import('./api.js').Batch[] | null} */
+let ended = null;
+
+/** Batches to choose from; null as long as they are being loaded. */
+export const endedBatches = () => ended;
+
 /** @param {App} app @param {string | undefined} id @param {Record<string, string>} query */
 export async function openLine(app, id, query) {
   if (!id) {
     line = null;
+    try {
+      ended = (await batchesOf({ limit: 50 })).batches.filter((batch) => batch.ended);
+      app.redraw();
+    } catch (error) {
+      app.refused(error);
+    }
     return;
   }
   if (line?.batch === id) return;

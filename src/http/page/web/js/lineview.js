@@ -1,9 +1,8 @@
 // Line: strips along a label that is a number, limits, the worst places, and the way from there to the contact.
 
 import { html, nothing } from '../vendor/lit-html.js';
-import { chooseLine, lineSeen, placeOf, STRIPS, worstRows } from './line.js';
+import { chooseLine, endedBatches, lineSeen, placeOf, STRIPS, worstRows } from './line.js';
 import { count, number } from './format.js';
-import { queueSeen } from './queue.js';
 import { formatRoute } from './routes.js';
 
 /** @typedef {import('./state.js').App} App */
@@ -15,7 +14,7 @@ const WORST = 8;
 /** @param {App} app */
 export function lineView(app) {
   const line = lineSeen();
-  if (!line) return choice();
+  if (!line) return choice(endedBatches());
   if (!line.rows.length && line.done) return html`<section class="panel wait"><h1>Along the line</h1><p>This batch has no results.</p></section>`;
   const shown = {
     rows: line.rows, by: line.by, limits: line.limits, zoom: line.zoom,
@@ -32,12 +31,12 @@ export function lineView(app) {
     : html`<progress max=${line.count || 1} .value=${line.rows.length} aria-label="Loading"></progress>`}</div>`;
 }
 
-/** No batch is chosen yet. */
-function choice() {
-  const batches = [...queueSeen().batches.values()].filter((batch) => batch.ended);
+/** No batch is chosen yet. @param {readonly import('./api.js').Batch[] | null} batches */
+function choice(batches) {
+  if (!batches) return html`<p class="pad quiet">Loading …</p>`;
   return html`<section class="panel wait"><h1>Along the line</h1>
     ${batches.length ? html`<p>Choose a batch:</p>${batches.map((batch) => html`<a class="button" href=${formatRoute('line', [batch.id])}>
-      ${count(batch.count)} cases of ${batch.created_at.slice(0, 16).replace('T', ' ')}</a>`)}`
+      ${batch.name ? `${batch.name}: ` : ''}${count(batch.count)} cases of ${batch.created_at.slice(0, 16).replace('T', ' ')}</a>`)}`
     : html`<p>There is no batch that has ended. Send many cases with a label that is a number, such as <code>"km": "37.2"</code>, to <code>/v1/batches</code>.</p>`}
     <a class="button" href="#/jobs">To the jobs</a></section>`;
 }

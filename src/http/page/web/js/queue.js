@@ -1,6 +1,6 @@
-// The jobs and batches of the tenant: what is loaded of them, and how they are kept up to date.
+// The jobs and batches of the tenant: what is loaded of them, and how events keep them up to date.
 
-import { batch as batchOf, jobs as jobsOf, Refused } from './api.js';
+import { batches as batchesOf, jobs as jobsOf, me as askMe } from './api.js';
 import { follow } from './events.js';
 
 /** @typedef {import('./state.js').App} App */
@@ -12,55 +12,75 @@ import { follow } from './events.js';
  * @property {Job[]} jobs The newest first, as far as they are loaded.
  * @property {string} cursor Where the next page begins; empty at the end.
  * @property {boolean} loaded
- * @property {string} state Only jobs in this state; empty for all.
+ * @property {number} total Of all that pass the filter.
+ * @property {boolean} more There are more than `total`.
+ * @property {string[]} states Only jobs in one of these; none for all.
  * @property {string} label Only jobs with this label, `key:value`; empty for all.
+ * @property {string} name Only jobs whose name contains this.
  * @property {Map<string, Batch>} batches
+ * @property {import('./api.js').Schemas['Me'] | null} me Who asks, and what is used.
  * @property {number} top Pixels that the list is scrolled by.
  */
 
 const PAGE = 200;
-const REFRESH_MS = 2000;
-const HIDDEN_REFRESH_MS = 15_000;
-/** A browser keeps six connections to one server. */
-const FOLLOWED_MAX = 3;
+const MORE = 1000;
+const BATCHES = 20;
+/** Events of batches say nothing of their jobs: these are looked at again, but not more often than this. */
+const REFRESH_MS = 1000;
+/** What was deleted elsewhere is told by no event. */
+const SELDOM_MS = 20_000;
 
 /** @type {Queue} */
-const queue = { jobs: [], cursor: '', loaded: false, state: '', label: '', batches: new Map(), top: 0 };
+const queue = {
+  jobs: [], cursor: '', loaded: false, total: 0, more: false, states: [], label: '', name: '', batches: new Map(), me: null, top: 0,
+};
 let stopping = new AbortController();
-let timer = 0;
+let seldom = 0;
+let soon = 0;
 let turn = 0;
 let loadingMore = false;
-/** @type {Set<string>} */
-const followed = new Set();
 
 export const queueSeen = () => queue;
 
-/** @param {App} app */
+/** Shows the lists, and follows everything of the tenant in one stream. @param {App} app */
 export function startQueue(app) {
   stopQueue();
+  stopping = new AbortController();
+  const { signal } = stopping;
   // The list is where it was left, as soon as its rows are there.
   requestAnimationFrame(() => {
     const list = document.querySelector('.list');
     if (list) list.scrollTop = queue.top;
   });
-  stopping = new AbortController();
   refresh(app);
+  seldom = window.setInterval(() => document.hidden || refresh(app), SELDOM_MS);
+  follow('/v1/events', ({ event, data }) => {
+    if (event === 'start') refresh(app);
+    else if (event === 'job') takeJob(app, JSON.parse(data));
+    else if (event === 'batch') takeBatch(app, JSON.parse(data));
+  }, signal).catch(app.refused);
 }
 
 export function stopQueue() {
-  clearTimeout(timer);
+  clearInterval(seldom);
+  clearTimeout(soon);
+  soon = 0;
   stopping.abort();
-  followed.clear();
 }
 
-const filter = () => ({ state: queue.state || undefined, label: queue.label || undefined });
+const filter = () => ({
+  state: queue.states,
+  label: queue.label,
+  name: queue.name,
+  fields: 'id,state,name,labels,created_at,started_at,ended_at,cached,progress',
+});
 
-/** Loads the newest page again and puts it before what is loaded. @param {App} app */
+/** Loads batches and the newest page again, and puts it before what is loaded. @param {App} app */
 async function refresh(app) {
   const { signal } = stopping;
   const mine = turn;
   try {
-    const page = await jobsOf({ ...filter(), limit: PAGE });
+    const [page, listed, me] = await Promise.all([jobsOf({ ...filter(), limit: PAGE }), batchesOf({ limit: BATCHES }), askMe()]);
     if (signal.aborted || mine !== turn) return;
     const fresh = new Set(page.jobs.map((job) => job.id));
     const oldest = page.jobs[page.jobs.length - 1]?.id ?? '';
@@ -68,26 +88,47 @@ async function refresh(app) {
     const older = page.next_cursor ? queue.jobs.filter((job) => job.id < oldest && !fresh.has(job.id)) : [];
     queue.jobs = [...page.jobs, ...older];
     if (!older.length) queue.cursor = page.next_cursor ?? '';
+    queue.total = page.total ?? page.total_at_least ?? queue.jobs.length;
+    queue.more = page.total === undefined;
+    queue.batches = new Map(listed.batches.map((batch) => [batch.id, batch]));
+    queue.me = me;
     queue.loaded = true;
     app.redraw();
-    followBatches(app, page.jobs);
   } catch (error) {
-    app.refused(error);
+    if (!signal.aborted) app.refused(error);
   }
-  if (!signal.aborted) timer = window.setTimeout(() => refresh(app), document.hidden ? HIDDEN_REFRESH_MS : REFRESH_MS);
 }
 
-/** Looks at once, after something was changed. @param {App} app */
-export function refreshSoon(app) {
-  clearTimeout(timer);
-  refresh(app);
+/** Looks again before long, after something was changed. @param {App} app */
+export function refreshSoon(app, pause = 0) {
+  soon ||= window.setTimeout(() => {
+    soon = 0;
+    refresh(app);
+  }, pause);
 }
 
-/** @param {App} app @param {{ state?: string, label?: string }} wanted */
+/** A job that was submitted alone has changed. @param {App} app @param {Job} job */
+function takeJob(app, job) {
+  const known = queue.jobs.some(({ id }) => id === job.id);
+  const filtered = queue.states.length || queue.label || queue.name;
+  if (known && !filtered) {
+    queue.jobs = queue.jobs.map((other) => (other.id === job.id ? job : other));
+    app.redraw();
+  } else refreshSoon(app, REFRESH_MS / 4);
+}
+
+/** @param {App} app @param {Batch} batch */
+function takeBatch(app, batch) {
+  queue.batches.set(batch.id, batch);
+  app.redraw();
+  refreshSoon(app, REFRESH_MS);
+}
+
+/** @param {App} app @param {Partial<Pick<Queue, 'states' | 'label' | 'name'>>} wanted */
 export function filterQueue(app, wanted) {
   turn += 1;
   Object.assign(queue, wanted, { jobs: [], cursor: '', loaded: false, top: 0 });
-  clearTimeout(timer);
+  app.redraw();
   refresh(app);
 }
 
@@ -97,7 +138,7 @@ export async function loadMore(app) {
   loadingMore = true;
   const mine = turn;
   try {
-    const page = await jobsOf({ ...filter(), limit: 1000, cursor: queue.cursor });
+    const page = await jobsOf({ ...filter(), limit: MORE, cursor: queue.cursor });
     if (mine !== turn) return;
     const known = new Set(queue.jobs.map((job) => job.id));
     queue.jobs = [...queue.jobs, ...page.jobs.filter((job) => !known.has(job.id))];
@@ -107,31 +148,6 @@ export async function loadMore(app) {
     app.refused(error);
   } finally {
     loadingMore = false;
-  }
-}
-
-/** Batches of these jobs: those that go on are followed by events. @param {App} app @param {readonly Job[]} jobs */
-async function followBatches(app, jobs) {
-  const { signal } = stopping;
-  const ids = [...new Set(jobs.flatMap((job) => job.batch_id ?? []))].slice(0, 8);
-  for (const id of ids) {
-    if (followed.has(id) || queue.batches.get(id)?.ended) continue;
-    try {
-      if (!queue.batches.has(id)) queue.batches.set(id, await batchOf(id));
-    } catch (error) {
-      if (error instanceof Refused && error.status === 404) continue;
-      throw error;
-    }
-    app.redraw();
-    if (queue.batches.get(id)?.ended || followed.size >= FOLLOWED_MAX || signal.aborted) continue;
-    followed.add(id);
-    follow(`/v1/batches/${id}/events`, ({ data }) => {
-      /** @type {Batch} */
-      const batch = JSON.parse(data);
-      queue.batches.set(id, batch);
-      app.redraw();
-      return batch.ended;
-    }, signal).catch(app.refused).finally(() => followed.delete(id));
   }
 }
 

@@ -7,10 +7,12 @@ import { put } from './document.js';
 import { downloads } from './downloads.js';
 import { drawProfiles } from './drawing/profiles.js';
 import { editDocument, solve } from './editing.js';
-import { ALL_OUTPUTS } from './examples.js';
+import { ALL_OUTPUTS } from './starts.js';
 import { indexOf } from './field/cells.js';
 import { hasFields } from './fields.js';
+import { chooseAmounts, chosenAmounts } from './field/palette.js';
 import { offered, quantityOf } from './field/quantities.js';
+import { FieldMap } from './fieldmap.js';
 import { count, degrees, number, seconds, withError } from './format.js';
 import { choose, frictionOf, lookedAt, rememberView, sharedRange } from './result.js';
 import { formatRoute } from './routes.js';
@@ -152,12 +154,22 @@ function fieldPanel(app, looked, answer) {
       <div class="segs" role="group" aria-label="Quantity">${all.map(({ key, label }) => html`<label class=${key.includes('_') ? 'seg minor' : 'seg'}>
         <input type="radio" name="quantity" .checked=${looked.quantity === key} @change=${() => choose(app, { quantity: key })}><span>${label}</span></label>`)}</div>
       <div class="toggles">${toggles.map(([key, label]) => html`<label><input type="checkbox" .checked=${looked[key]}
-        @change=${(/** @type {Event} */ event) => choose(app, { [key]: /** @type {HTMLInputElement} */ (event.target).checked })}> ${label}</label>`)}</div>
+        @change=${(/** @type {Event} */ event) => choose(app, { [key]: /** @type {HTMLInputElement} */ (event.target).checked })}> ${label}</label>`)}
+        ${colourChoice()}</div>
     </header>
     ${answer.patches.length > 1 ? thumbnails(app, looked, answer) : nothing}
     ${shown ? html`<field-map class="main" .shown=${shown} @crosshair=${moved}></field-map>` : html`<p class="pad quiet">Loading the field …</p>`}
     ${field ? cellTable(field) : nothing}
   </section>`;
+}
+
+/** Two maps of amounts, both for every kind of colour vision. */
+function colourChoice() {
+  const pick = (/** @type {Event} */ event) => {
+    chooseAmounts(/** @type {HTMLSelectElement} */ (event.target).value === 'cividis' ? 'cividis' : 'viridis');
+    document.querySelectorAll('field-map').forEach((map) => map instanceof FieldMap && map.draw());
+  };
+  return html`<label>colours <select class="slim" @change=${pick}>${['viridis', 'cividis'].map((name) => html`<option ?selected=${chosenAmounts() === name}>${name}</option>`)}</select></label>`;
 }
 
 /** Small maps of all patches, at one scale of length and one of colour. @param {App} app @param {Looked} looked @param {JobResult} answer */

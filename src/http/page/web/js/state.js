@@ -27,7 +27,8 @@
  *   kind of contact: the drawing stays while faults are being corrected.
  * @property {readonly Fault[]} faults
  * @property {string} refusal Why it could not be checked, where that is no fault of the case.
- * @property {string} example
+ * @property {readonly import('./api.js').Schemas['ExampleCase'][]} examples Those of the service.
+ * @property {string} example The one that is chosen; empty for none.
  * @property {boolean} solving
  * @property {boolean} live Solve while typing, where it costs milliseconds.
  * @property {Preview | null} preview
@@ -62,7 +63,7 @@ export const initialState = () => ({
   toast: '',
   turn: 0,
   compose: {
-    document: null, text: '', unreadable: '', typing: null, checked: null, understood: null, faults: [], refusal: '', example: '', solving: false,
+    document: null, text: '', unreadable: '', typing: null, checked: null, understood: null, faults: [], refusal: '', examples: [], example: '', solving: false,
     live: true, preview: null,
   },
 });

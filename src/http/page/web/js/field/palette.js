@@ -8,12 +8,28 @@ import { COLOURS } from './colours.js';
 /** @type {Map<MapName, Uint32Array>} */
 const tables = new Map();
 
-/** @type {MapName} */
-let amounts = 'viridis';
+const KEPT = 'railhead.colours';
 
-/** @param {MapName} name The map of amounts: viridis or cividis. */
+/** @type {MapName} */
+let amounts = kept();
+
+/** @returns {MapName} */
+function kept() {
+  try {
+    return localStorage.getItem(KEPT) === 'cividis' ? 'cividis' : 'viridis';
+  } catch {
+    return 'viridis';
+  }
+}
+
+/** @param {'viridis' | 'cividis'} name The map of amounts. */
 export function chooseAmounts(name) {
   amounts = name;
+  try {
+    localStorage.setItem(KEPT, name);
+  } catch {
+    // Storage is switched off; the choice holds until the page is left.
+  }
 }
 
 export const chosenAmounts = () => amounts;

@@ -1,22 +1,6 @@
-// The examples of the API, as the page offers them, and the beginning of a case of each kind of contact.
+// The beginning of a case of each kind of contact.
 
 /** @typedef {import('./document.js').JsonObject} JsonObject */
-
-export const EXAMPLES = [
-  { file: 'hertz-steel', title: 'Hertz contact' },
-  { file: 'wheel-rail', title: 'Wheel on rail: tread' },
-  { file: 'wheel-rail-flange', title: 'Wheel on rail: gauge corner and flange' },
-  { file: 'spin', title: 'Ellipse with spin' },
-  { file: 'sweep', title: 'Creep curve' },
-  { file: 'two-patches', title: 'Two patches' },
-  { file: 'uic60-crown', title: 'Crown of 60E1: three radii' },
-  { file: 'area-132re-crown', title: 'Crown of 132RE' },
-  { file: 'pressure-grid', title: 'A pressure of any shape' },
-  { file: 'paper-figure-3', title: 'Zones under growing creepage' },
-  { file: 'paper-figure-4', title: 'Zones under growing spin' },
-  { file: 'paper-figure-5', title: 'Force and moment curves' },
-  { file: 'faulty', title: 'A case with five faults' },
-];
 
 /** Parts of an answer that are fields; the page draws all of them. */
 export const ALL_OUTPUTS = ['resultants', 'zones', 'tractions', 'pressure', 'slip'];
