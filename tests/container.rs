@@ -128,7 +128,10 @@ fn files_compiled_into(source: &Path) -> Vec<PathBuf> {
     let mut files = vec![source.to_owned()];
     for name in ["include_str!(", "include_bytes!("] {
         for rest in text.split(name).skip(1) {
-            let literal = rest.trim_start().strip_prefix('"');
+            // Of a path that a macro puts together its folder is known.
+            let rest = rest.trim_start();
+            let rest = rest.strip_prefix("concat!(").unwrap_or(rest);
+            let literal = rest.strip_prefix('"');
             let (path, _) = literal
                 .and_then(|rest| rest.split_once('"'))
                 .expect("a path");

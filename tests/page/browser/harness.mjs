@@ -12,7 +12,7 @@ export const OUTPUT = join(import.meta.dirname, '../output');
 export const SLACK = process.env.CI ? 3 : 1;
 
 const BROWSER_ARGUMENTS = [
-  '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update',
+  '--no-sandbox', '--disable-gpu', '--disable-dev-shm-usage', '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update',
   '--disable-sync',
 ];
 
