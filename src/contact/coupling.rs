@@ -27,23 +27,23 @@ use crate::contact::solution::track_axes::merge;
 use crate::contact::solution::words::{Fields, NormalReport, Solution};
 use crate::contact::time_limit::TimeLimit;
 
-/// The vertical force may be missed by this part of it, and by this part of the target error if that is less; the bound for
-/// a change of friction's share in one round.
+/// The vertical force may be missed by this fraction; it bounds the change of friction's share in one round.
 const BALANCE: f64 = 5e-4;
+/// And by this fraction of the target error, if that is less.
 const BALANCE_OF_TARGET: f64 = 0.1;
 /// When the rounds are used up, a share that still changes by no more than this is answered with a remark.
 const BALANCE_POOR: f64 = 5e-3;
 /// Rounds of the balance; each leaves about a tenth of the difference before, on steep flanges a third, less by the secant.
 const ROUNDS_MAX: u32 = 12;
-/// Slopes of the friction found over the friction counted on that a secant step believes.
+/// Range of the slope of the friction found over the friction assumed that a secant step uses. Numeric safety, not tuned.
 const SLOPES: [f64; 2] = [-0.9, 0.6];
-/// Part of its normal forces' vertical part that a wheel carries at least; on a steep flange friction may take away all of it.
+/// Least fraction of the vertical part of its normal forces that a wheel carries; on a steep flange friction may take away all of it.
 const CARRIED_MIN: f64 = 0.1;
 /// Allowed error of the resultants in the first round, relative to μN.
 const TARGET_FIRST: f64 = 0.05;
-/// What patches may do to each other without a remark where no target is given, relative to the load.
+/// Largest change of a patch's force by its neighbours, relative to the load, that is not remarked on where no target is given.
 const UNCOUPLED: f64 = 0.01;
-/// By which part the first rest may miss the force: friction's share hardly depends on it.
+/// Tolerance of the force at the first height: friction's share hardly depends on it.
 const TOLERANCE_FIRST: f64 = 0.1;
 
 /// Solves a problem whose region is a wheel on a rail.

@@ -72,7 +72,7 @@ fn distance_to_plain_newton(contact: &Ellipse) -> f64 {
         let report = Newton::new(&equations)
             .solve(&law, &mut t, &mut workspace, &Unmonitored)
             .expect("never stopped");
-        assert!(report.converged, "{rule:?}: {report:?}");
+        assert!(report.exit.converged(), "{rule:?}: {report:?}");
     }
     let padded = t.len() / 2;
     (0..level.mesh.cells())

@@ -120,7 +120,7 @@ fn newton_and_gmres_allocate_nothing_in_a_workspace_that_has_served_before() {
                 t.fill(0.0);
                 let report = newton.solve(&law, &mut t, &mut workspace, &Unmonitored);
                 let report = report.expect("never stopped");
-                assert!(report.converged, "{report:?}");
+                assert!(report.exit.converged(), "{report:?}");
                 *iterations = report.iterations;
             };
             solve();

@@ -1,4 +1,4 @@
-//! What solving a normal problem gives, and why it may give nothing.
+//! The result of a normal problem, or the reason why there is none.
 
 use crate::contact::monitor::Stop;
 use crate::contact::normal::gap::conjugate_gradients;
@@ -34,7 +34,7 @@ pub struct NormalWork {
     pub pressure_change: f64,
 }
 
-/// Why a gap has no contact to show.
+/// Why a normal problem has no answer.
 #[derive(Debug, Clone, PartialEq)]
 pub enum NormalError {
     /// A reason, as a sentence.

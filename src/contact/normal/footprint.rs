@@ -72,7 +72,7 @@ impl Footprint {
         &self.patches
     }
 
-    /// What computing region and pressure left uncertain, where they were computed.
+    /// The uncertainty of region and pressure, where they were computed.
     #[must_use]
     pub fn uncertainty(&self) -> Option<&NormalUncertainty> {
         self.uncertainty.as_ref()

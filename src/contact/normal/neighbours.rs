@@ -1,4 +1,4 @@
-//! What the patches of a wheel that lie in gaps of their own would do to each other.
+//! How much the patches of a wheel that are solved in gaps of their own would change each other.
 //!
 //! Every gap is solved as if nothing else pressed on its half-space. A patch that carries the force F at the distance r lets the
 //! surface sink by `F / (π E* r)` (Boussinesq 1885, both bodies). By Hertz's power 3/2 the force of a patch with the approach δ
@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 
 use crate::contact::geometry::frame::Frame;
 
-/// One gap as far as its neighbours feel it.
+/// One gap, as it acts on its neighbours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Neighbour {
     /// Its frame, at its load centre.

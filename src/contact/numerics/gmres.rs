@@ -4,9 +4,9 @@ use std::ops::ControlFlow;
 
 use crate::contact::monitor::Stop;
 
-/// Basis vectors kept before a restart.
+/// Basis vectors kept before a restart. Sensitivity not measured.
 const BASIS_MAX: usize = 60;
-/// Restarts before giving up.
+/// Restarts after which a system is given up.
 const RESTARTS_MAX: usize = 3;
 
 /// Buffers that live as long as a solve.
@@ -23,7 +23,7 @@ pub struct Gmres {
     weights: Vec<f64>,
 }
 
-/// How a linear solve went.
+/// Result of a linear solve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinearReport {
     /// Products with the matrix.

@@ -1,25 +1,41 @@
-//! How does it drag? Tractions and slips for given pressure and motion.
+//! The tangential answer on one level: tractions, slips and zones, how they came about, and the work done for them.
 
 use crate::contact::monitor::Stop;
 use crate::contact::remark::list::Remark;
+use crate::contact::rolling::skip::Skip;
 
 /// The tangential answer on one level for one motion, dimensionless, one value per cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LevelAnswer {
     /// Tractions along x and across, for forces.
     pub traction: [Vec<f64>; 2],
-    /// A second opinion on the tractions from another discretisation rule, where there is one.
+    /// The tractions by a second discretisation rule, where the method has one; the difference of the two tells of the error.
     pub second: Option<[Vec<f64>; 2]>,
     /// Slips along x and across.
     pub slip: [Vec<f64>; 2],
     /// Does the cell slip?
     pub slips: Vec<bool>,
-    /// What it took.
+    /// How the tractions came about.
+    pub exit: LevelExit,
+    /// Work done.
     pub work: Work,
-    /// Work that was recognised as unnecessary.
-    pub skipped: Vec<String>,
+    /// Work that was not needed.
+    pub skips: Vec<Skip>,
     /// Remarks for the client.
     pub remarks: Vec<Remark>,
+}
+
+/// How the tractions of a level came about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LevelExit {
+    /// Nothing moves: they are 0.
+    NoMotion,
+    /// There is no friction: they are 0.
+    NoFriction,
+    /// The rigid slip is so large that they follow it, to one part in a million.
+    RigidSlip,
+    /// The method solved for them.
+    Solved,
 }
 
 /// Counted work of a solve.
@@ -27,9 +43,9 @@ pub struct LevelAnswer {
 pub struct Work {
     /// Newton iterations.
     pub iterations: u32,
-    /// Products of the influence with a vector.
+    /// Products of the operator with a vector.
     pub products: u32,
-    /// Entries of the influence that these products touched.
+    /// Entries of the operator that these products touched.
     pub entries: u64,
     /// Last residual of the friction law relative to the traction scale.
     pub residual: f64,
@@ -50,9 +66,9 @@ impl Work {
 pub enum LevelFailure {
     /// The caller stopped the work.
     Stopped(Stop),
-    /// The iteration did not converge; the residual of its best iterate, what was needed, and advice as a clause.
+    /// The iteration did not converge.
     NotConverged {
-        /// Work done.
+        /// Work done, with the residual of the best iterate.
         work: Work,
         /// Residual needed.
         tolerance: f64,
@@ -67,8 +83,8 @@ impl From<Stop> for LevelFailure {
     }
 }
 
-/// Brings every traction into its disc (it may be outside by the solver's tolerance) and returns the slips: none in
-/// cells that stick, the part of the given slip along the traction in cells that slip.
+/// Brings every traction into its disc, which it may exceed by the tolerance of the solver, and returns the slips: 0 in cells that
+/// stick, the component of the given slip along the traction in cells that slip.
 pub(crate) fn project_on_bound(
     bound: &[f64],
     slips: &[bool],

@@ -1,9 +1,10 @@
 //! Which creepages give the tangential forces that were asked for?
 //!
-//! The law of friction is monotone: a force grows with its creepage, the other components kept. So one force is found
-//! between two creepages that give too little and too much, and of two the first inside the second. Creepages are searched as
-//! *places*: the place r stands for the creepage that gives the force r μN by Vermeulen and Johnson's cubic law with
-//! Kalker's coefficients (Vermeulen & Johnson 1964; Kalker 1990, §2.2.3), so that forces are nearly the places themselves.
+//! The friction law is monotone: while the other components are kept, a force grows with its creepage. A single force is therefore
+//! bracketed between a creepage that gives too little and one that gives too much; for two forces the search for the first runs
+//! inside the search for the second. The unknown is not the creepage but its *place* r: by Vermeulen and Johnson's cubic law with
+//! Kalker's coefficients (Vermeulen & Johnson 1964; Kalker 1990, §2.2.3) the creepage at r gives the force r μN, so that the force
+//! found is close to r.
 
 use std::time::Duration;
 
@@ -25,25 +26,27 @@ use crate::contact::rolling::task::RollingTask;
 
 /// A prescribed force may be missed by this part of the target error.
 const SHARE_OF_TARGET: f64 = 0.02;
-/// The least of this, relative to μN: ten times the residual that tractions are solved to, since a start that meets it is left as it
-/// is.
+/// Smallest tolerance of a force with a target, relative to μN: ten times the residual to which tractions are solved, because a
+/// starting iterate that meets this residual is accepted unchanged.
 const MISSED_FOR_TARGET: f64 = 1e-5;
-/// The same on an explicit mesh and for the simplified theory.
+/// Tolerance of a force on an explicit mesh and for the simplified theory, relative to μN.
 const MISSED: f64 = 1e-6;
-/// Near μN the creepage hangs on what is left to it: that may be missed by so much more only.
+/// Near μN the creepage depends on the small remainder `1 − force/μN`; the tolerance is at most this multiple of the remainder.
 const NEAR_LIMIT: f64 = 10.0;
-/// Where everything slips, elastic slip still turns the tractions by this much. No force is found more closely than this, relative to μN or to the forces of the first motion tried if they are smaller.
+/// No force is sought more closely than this, relative to μN or, if they are smaller, to the forces of the first motion tried: where
+/// everything slips, elastic slip still turns the tractions by this much.
 const MISSED_LEAST: f64 = 2e-7;
 /// From this place on the cubic law is continued by its tangent.
 const KNEE: f64 = 0.9;
 /// Motions tried for two forces at once.
 const TRIALS_AT_ONCE: u32 = 14;
-/// Longest step of two places at once, and trials in a row that may be worse.
+/// Longest step of a place when two are searched at once.
 const STEP_MAX: f64 = 0.4;
+/// Trials in a row without improvement after which the search for two places at once is given up.
 const WORSE_MAX: u32 = 3;
-/// How often a found motion may turn out to need other levels.
+/// How often the levels are chosen anew because the motion that was found does not meet its target on them.
 const CLIMBS_MAX: u32 = 3;
-/// How far the last motion's places may correct those of the next.
+/// Largest correction of a starting place by what the cubic law was off at the motion before.
 const CORRECTION_MAX: f64 = 0.3;
 
 /// Solves motion `index` of a problem; where forces are prescribed, finds the creepages that give them. `before` is the answer to
@@ -100,7 +103,7 @@ impl CubicLaw {
         CubicLaw { stiffness }
     }
 
-    /// The linear force over μN that the cubic law brings down to `place`.
+    /// Force of linear theory over μN at which the cubic law gives the force `place` μN.
     fn linear(place: f64) -> f64 {
         let inside = place.abs().min(KNEE);
         let slope = (1.0 - KNEE).powf(-2.0 / 3.0);
@@ -128,7 +131,7 @@ impl CubicLaw {
     }
 }
 
-/// One motion on its way to the prescribed forces.
+/// The search for the creepages of one motion.
 struct ForceSearch<'a, 'p> {
     task: &'a RollingTask<'a>,
     levels: &'a mut Levels<'p>,
@@ -176,7 +179,7 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
         }
     }
 
-    /// Places to begin at: those of the cubic law, corrected by as much as the motion before was off it.
+    /// Places to start from: those of the cubic law, corrected by what the law was off at the motion before.
     fn start(&self, before: Option<&MotionAnswer>) -> [f64; 2] {
         let wanted = self.forces.map(|f| f.unwrap_or(0.0) / self.limit);
         let mut place = self.guess(wanted);
@@ -205,7 +208,7 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
         [0, 1].map(|k| self.law.place(k, linear * force[k] / self.law.stiffness[k]))
     }
 
-    /// Finds the places where the forces are as prescribed, or the nearest that can be had.
+    /// Finds the places at which the forces are as prescribed, or as near to that as can be.
     fn find(&mut self, start: [f64; 2]) -> Result<[f64; 2], SolveError> {
         match self.forces {
             [Some(_), Some(_)] => {
@@ -230,7 +233,7 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
         }
     }
 
-    /// Broyden's iteration; nothing if it does not settle.
+    /// Broyden's iteration for both places; nothing if it does not settle.
     fn both_at_once(&mut self, start: [f64; 2]) -> Result<Option<[f64; 2]>, SolveError> {
         let (mut place, mut off) = (start, self.trial(start)?);
         let mut inverse = [[1.0, 0.0], [0.0, 1.0]];
@@ -267,7 +270,8 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
         Ok(None)
     }
 
-    /// For every place across, the place along x that gives the force along x: between bounds both, and slow.
+    /// For every trial of the place across, finds the place along x that gives the force along x. Both searches are bracketed: slow but
+    /// sure.
     fn one_in_the_other(&mut self, start: [f64; 2]) -> Result<[f64; 2], SolveError> {
         let mut along = start[0];
         let mut exit_along = RootExit::Found;
@@ -282,7 +286,7 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
             *tolerance = self.tolerance();
             Ok::<f64, SolveError>(off[1])
         })?;
-        // What keeps its sign is out of reach, however the other search ended.
+        // A force whose error keeps its sign is out of reach, however the other search ended.
         let exits = [root.exit, exit_along];
         let worse = exits.into_iter().find(|exit| *exit == RootExit::SignKept);
         self.end(worse.unwrap_or(if root.exit.converged() {
@@ -298,7 +302,7 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
         self.exit = exit;
     }
 
-    /// The remark on forces that are neither met nor out of reach.
+    /// The remark if the forces are neither met nor out of reach.
     fn inexact(&self) -> Option<Remark> {
         let (residual, _) = self.best.as_ref()?;
         let tolerance = self.tolerance();
@@ -367,7 +371,7 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
         }
     }
 
-    /// Does the best answer meet the target, as far as its method can?
+    /// Does the best answer meet the target? Yes if its method or an explicit mesh has none to meet.
     fn met(&self) -> bool {
         let Resolution::Target(target) = self.task.resolution else {
             return true;

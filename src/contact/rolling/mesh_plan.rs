@@ -1,22 +1,23 @@
-//! What a mesh is made from: its size, and what the tractions look like that it is made for.
+//! What a mesh is made from: its size, and the regime of the tractions that it is to resolve.
 
 use crate::contact::mesh::size::MeshSize;
 
-/// A mesh serves as long as the pole is this near to where the cells gather: within the bump of their density.
+/// A mesh gathered about a pole serves motions whose pole is no farther away than this: within the bump of the density of cells (see
+/// `BUMP` in `mesh/strips.rs`; lengths relative to half chords). Sensitivity not measured.
 const POLE_MOVED: f64 = 0.15;
 
-/// What the tractions of a motion look like, as far as the mesh should know.
+/// The regime of the tractions of a motion, as far as it decides the mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Regime {
     /// Nothing is known yet.
     Unknown,
-    /// A stick zone of some size; with spin in a patch that is longer than wide (others do not care).
+    /// A stick zone of some size.
     Sticking {
-        /// There is spin, and the patch is longer than wide.
+        /// There is spin, and the patch is longer than wide; the mesh of other patches does not depend on spin.
         spinning: bool,
     },
-    /// Hardly any stick, and tractions that turn about a place in the patch: along its chord and across the patch,
-    /// each from −1 to 1.
+    /// Hardly any stick, and tractions that turn about a point of the patch, given along its chord and across the patch, each from −1
+    /// to 1.
     Spinning([f64; 2]),
 }
 
@@ -39,7 +40,7 @@ impl Regime {
 pub struct MeshPlan {
     /// Strips and cells.
     pub size: MeshSize,
-    /// What it was made for.
+    /// The regime it is made for.
     pub regime: Regime,
 }
 

@@ -11,6 +11,7 @@ pub mod own_blocks;
 pub mod refinement;
 pub mod regime;
 pub mod resultants;
+pub mod skip;
 pub mod slip_equations;
 pub mod slip_rules;
 pub mod strip_chords;

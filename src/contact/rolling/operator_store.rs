@@ -16,17 +16,17 @@ use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::own_blocks;
 use crate::contact::rolling::own_blocks::SharedBlocks;
 
-/// Bytes of a store when nothing else is asked for: two of the largest operators that targets from 0.0005 on lead to (52 MB each
-/// without mirror symmetry) or some hundred usual ones. A creep map of 900 motions at fixed spin takes the same time with 0, 64, 128 and
+/// Default size of a store in bytes: room for two of the largest operators that targets from 0.0005 on lead to (52 MB each without
+/// mirror symmetry), or for some hundred usual ones. A creep map of 900 motions at fixed spin takes the same time with 0, 64, 128 and
 /// 256 MiB (`cargo bench --bench stress -- --only creep-map`); what is kept pays for batches of one shape (`cargo bench --bench report`).
 pub const BYTES_DEFAULT: u64 = 128 << 20;
-/// An operator larger than this part of the bound is not kept: it would push out all others.
+/// An operator larger than this fraction of the bound is not kept, because it would push out all others.
 const LARGEST_PART: u64 = 2;
 
 /// What the fast solver prepares for a mesh, whatever the motion, friction and load.
 #[derive(Debug)]
 pub struct LevelOperator {
-    /// The influence of the mesh.
+    /// The operator of the mesh.
     pub influence: StripOperator,
     /// Own blocks of its strips.
     pub own_blocks: SharedBlocks,
@@ -57,14 +57,14 @@ impl OperatorKind {
     }
 }
 
-/// Operators, the least recently used of which leave first.
+/// Operators within a bound of bytes; the least recently used leave first.
 #[derive(Debug)]
 pub struct OperatorStore {
     bytes_max: u64,
     kept: Mutex<Shelf>,
 }
 
-/// What is kept, by digest, and in which order it was used last.
+/// The operators that are kept, by digest, and the order of their last use.
 #[derive(Debug, Default)]
 struct Shelf {
     operators: HashMap<u64, Kept>,
@@ -145,13 +145,13 @@ impl OperatorStore {
         Ok(operator)
     }
 
-    /// Bytes of what is kept, with all own blocks that it may get.
+    /// Bytes of the operators that are kept, counted with all own blocks that they may get.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.shelf().bytes
     }
 
-    /// What the process needs for this store at most.
+    /// The bound of the store in bytes.
     #[must_use]
     pub fn bytes_max(&self) -> u64 {
         self.bytes_max
@@ -199,8 +199,8 @@ impl Shelf {
     }
 }
 
-/// Where the levels of one case get their operators: the store, and the operator used last, so that one which is too large for
-/// the store is not computed for every motion.
+/// Where the levels of one case get their operators from: the store, and the operator used last. An operator too large for the store
+/// is thereby computed once, not for every motion.
 #[derive(Debug)]
 pub struct CaseOperators {
     store: Arc<OperatorStore>,
@@ -239,7 +239,7 @@ impl CaseOperators {
         if let Some(held) = last.as_ref().filter(same) {
             return Ok(Arc::clone(&held.operator));
         }
-        // The last one goes before the next is computed: a case needs one at a time.
+        // A case needs one operator at a time: the last one is dropped before the next is computed.
         *last = None;
         let operator = self.store.get(mesh, kind, monitor)?;
         *last = Some(Held {
@@ -271,7 +271,7 @@ fn digest(mesh: &Mesh, kind: OperatorKind) -> u64 {
     hasher.finish()
 }
 
-/// Have two meshes the same influence, to the last digit?
+/// Do two meshes have the same operator, to the last digit?
 fn alike(a: &Mesh, b: &Mesh) -> bool {
     let segments = a.segments.iter().zip(&b.segments);
     (a.segments.len(), a.cells()) == (b.segments.len(), b.cells())

@@ -61,8 +61,8 @@ impl OwnBlocks {
     }
 }
 
-/// Bytes of all own blocks that an operator may get, of segments with these numbers of cells: three rules, and if half of the
-/// influence is enough, two parities of one half each beside both together.
+/// Bytes of all own blocks that an operator may get, for segments with these numbers of cells: one set for each of the three rules. A
+/// folded operator has a second set for each, one half of it for either parity.
 #[must_use]
 pub fn bytes_max(lengths: impl Iterator<Item = usize>, folded: bool) -> u64 {
     let one: usize = lengths.map(|n| 2 * n * n).sum();

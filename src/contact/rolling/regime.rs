@@ -1,4 +1,4 @@
-//! What do the tractions of a level look like, as far as the next mesh should know: how much sticks, and about which pole they turn.
+//! The regime of the tractions of a level, from which the next mesh is made: how much sticks, and about which pole they turn.
 
 use crate::contact::mesh::strips::Segment;
 use crate::contact::rolling::answer::LevelAnswer;
@@ -13,7 +13,7 @@ const POLE_INSIDE: f64 = 0.9;
 /// Cells gather no farther out than here.
 const POLE_OUTMOST: f64 = 0.95;
 
-/// Which mesh the next level should have, seen from this one.
+/// The regime that the next level should be made for, judged by this one.
 #[must_use]
 pub fn regime(level: &StripMesh, answer: &LevelAnswer, spinning: bool) -> Regime {
     if !spinning || stick_share(level, answer) >= STICK_NEGLIGIBLE {

@@ -14,12 +14,12 @@ pub struct Resultants {
 }
 
 impl Resultants {
-    /// `F_x = Σ T_x A`, `F_y = Σ T_y A`, `M_z = Σ (x T_y − y T_x) A` over the cells of one patch, with x in the
-    /// middle of the cell (there the moment of its constant traction is exact; at the node the error of M_z is about
-    /// twice as large) and y
-    /// halfway between the mid-line and the load's centre (at the one, moments of a vortex are too large, at the other too
-    /// small: the mean of `y²` over the strip is larger than the square of the mean); `traction` is dimensionless as the level's, the moment is about the
-    /// origin of the case.
+    /// `F_x = Σ T_x A`, `F_y = Σ T_y A`, `M_z = Σ (x T_y − y T_x) A` over the cells of one patch. `traction` is dimensionless as on the
+    /// level; the moment is about the origin of the case.
+    ///
+    /// x is taken in the middle of the cell, where the moment of its constant traction is exact; at the node the error of M_z is about
+    /// twice as large. y is taken halfway between the mid-line and the centre of the load: at the mid-line the moment of a vortex comes
+    /// out too large, at the centre too small, because the mean of `y²` over a strip exceeds the square of the mean.
     #[must_use]
     pub fn of_patch(level: &StripMesh, traction: &[Vec<f64>; 2], patch: usize) -> Resultants {
         let mut sum = Resultants::default();

@@ -14,7 +14,7 @@ use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::slip_rules::{Rule, Stencils};
 
-/// A rule on a mesh with its influence: the linear map from tractions to slips.
+/// A rule on a mesh with its operator: the linear map from tractions to slips.
 #[derive(Debug)]
 pub struct SlipEquations<'a> {
     /// The rule in use.
@@ -31,8 +31,9 @@ pub struct SlipEquations<'a> {
     y: Vec<f64>,
 }
 
-/// Slip of every cell beside rigid and elastic slip, in the units of the motion, at [`SlipEquations::sampled_at`]. In steady rolling of
-/// like bodies there is none; unlike bodies have one from their pressure, transient rolling one from the step before.
+/// Slip of every cell that neither the motion nor the tractions cause, in the units of the motion, at [`SlipEquations::sampled_at`].
+/// Steady rolling of like bodies has none. The pressure of unlike bodies is such a source, and so is the state before in transient
+/// rolling.
 #[derive(Debug, Clone, Copy)]
 pub struct SlipSource<'a> {
     /// Along x.
@@ -51,7 +52,8 @@ pub struct SlipScratch {
 }
 
 impl<'a> SlipEquations<'a> {
-    /// Sets up a rule for a mesh and its influence; with a parity, only the first half of the segments has unknowns.
+    /// Sets up a rule for a mesh and its operator. With a parity only the first half of the segments has unknowns; it is ignored if the
+    /// operator is not folded.
     #[must_use]
     pub fn new(
         rule: Rule,
@@ -117,7 +119,7 @@ impl<'a> SlipEquations<'a> {
         self.cells[j].clone()
     }
 
-    /// Elastic slip `M T` of tractions `t`; values of `slip` behind the cells of a component stay as they are.
+    /// Elastic slip `M T` of tractions `t`. The padding of `slip` is left as it is.
     pub fn elastic(&self, t: &[f64], slip: &mut [f64], scratch: &mut SlipScratch) {
         let (tx, ty) = t.split_at(self.padded);
         let (sx, sy) = slip.split_at_mut(self.padded);
@@ -144,7 +146,7 @@ impl<'a> SlipEquations<'a> {
         self.given(motion, None)
     }
 
-    /// Rigid slip of a motion and a source: slip of every cell that has another cause than motion and tractions.
+    /// Rigid slip of a motion with the slip of a source added.
     #[must_use]
     pub fn given(&self, motion: &Motion, source: Option<SlipSource>) -> Vec<f64> {
         let mut slip = vec![0.0; 2 * self.padded];
@@ -251,7 +253,7 @@ impl<'a> SlipEquations<'a> {
         Ok(matrix)
     }
 
-    /// Entries of the influence that one product touches.
+    /// Entries of the operator that one product touches.
     #[must_use]
     pub fn entries(&self) -> usize {
         self.differences.entries(self.parity)

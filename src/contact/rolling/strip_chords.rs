@@ -7,8 +7,7 @@ use crate::contact::numerics::quadrature::FOUR_POINTS;
 /// A strip's chord and the line of the region it was made from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StripChord {
-    /// The chord to mesh: about the middle of the line, as long as the mean of the line's length and the mean length
-    /// over the strip.
+    /// The chord that is meshed: centred on the line, its length between that of the line and the mean over the strip (see [`chords`]).
     pub chord: Chord,
     /// The region's own chord on the mid-line of the strip.
     pub line: Chord,
@@ -72,7 +71,7 @@ pub fn chords(footprint: &Footprint, patch: usize, strips: &[(f64, f64)]) -> Vec
     lines.iter().map(fit).collect()
 }
 
-/// What a strip holds between its two sides.
+/// Mean length, load and load centre of a strip between its two sides.
 #[derive(Debug, Clone, Copy)]
 struct StripLoad {
     /// Mean length of the chords; nothing if there is more than one on any of its lines.

@@ -1,4 +1,4 @@
-//! One mesh level of a contact: cells and pressures, shared by all motions and methods, and where its operator comes from.
+//! One mesh level of a contact: cells, pressures and bounds, shared by all motions and methods, and access to its operator.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -18,8 +18,8 @@ use crate::contact::rolling::strip_chords;
 use crate::contact::rolling::strip_chords::StripChord;
 use crate::contact::rolling::task::RollingTask;
 
-/// Dimensionless coordinates in single precision are multiples of this: patches of one shape get the same mesh, to the last
-/// digit, whatever their size.
+/// With an operator in single precision, dimensionless coordinates are rounded to multiples of this, so that patches of one shape get
+/// the same mesh to the last digit whatever their size. 2⁻³⁴ is a thousandth of the last digit of single precision.
 const COORDINATE_STEP: f64 = 1.0 / (1_u64 << 34) as f64;
 
 /// The contact made dimensionless: lengths by `length`, tractions by `traction`, slips by `traction / G`.
@@ -58,7 +58,7 @@ impl Scale {
     }
 }
 
-/// A mesh with its pressures; its operator lies in the store of the process.
+/// A mesh with its pressures and bounds. It is not changed once it is made; its operator is kept by the store of the process.
 #[derive(Debug)]
 pub struct StripMesh {
     /// What it was made from.
@@ -82,8 +82,8 @@ pub struct StripMesh {
 }
 
 impl StripMesh {
-    /// Meshes every patch of the problem's region: equal strips and cosine-graded cells, or both gathered about the
-    /// plan's pole.
+    /// Meshes every patch of the footprint: with equal strips and cosine-graded cells, or with both gathered about the pole of the plan.
+    /// Its operator is not kept.
     ///
     /// # Errors
     /// [`SolveError::Unmeshable`] if no strip meets a patch.
@@ -92,7 +92,7 @@ impl StripMesh {
         StripMesh::with_operators(task, plan, CaseOperators::new(&store))
     }
 
-    /// The same, with the operators of a case to take its own from.
+    /// The same; its operator comes from those of the case.
     ///
     /// # Errors
     /// The same.
@@ -116,7 +116,8 @@ impl StripMesh {
         };
         let mut mesh = Mesh::new(&chords, &grading);
         if plan.pole().is_some() {
-            // Where all slips, tractions turn with the slip at the load's centre; sticking strips go with their mid-lines.
+            // Where everything slips, the traction of a strip follows the slip at the centre of its load; sticking strips
+            // follow their mid-lines.
             mesh.arm = fitted.iter().map(|f| f.load_y).collect();
         }
         let area = mesh.areas();
@@ -124,7 +125,7 @@ impl StripMesh {
         let largest = patches.iter().map(|p| p.pressure_max).fold(0.0, f64::max);
         let middles = mesh.node.iter().zip(mesh.rows()).map(|(x, y)| [*x, y]);
         let bound = task.friction.bounds(middles, &pressure, largest);
-        // The equations know pressures by their bounds alone.
+        // Pressures enter the equations through their bounds only, so that bounds decide the symmetry.
         let mirror = mesh.mirror_line().filter(|_| bounds_mirror(&mesh, &bound));
         let [x, y] = middle(&patches.iter().map(|p| p.extent).collect::<Vec<_>>());
         let scale = Scale {
@@ -153,7 +154,7 @@ impl StripMesh {
         })
     }
 
-    /// The operator of the dimensionless mesh; from the store, or computed.
+    /// The operator of the dimensionless mesh, from the store or computed.
     ///
     /// # Errors
     /// The monitor may stop the work.
@@ -166,8 +167,8 @@ impl StripMesh {
         self.operators.get(&self.normalised, kind, monitor)
     }
 
-    /// Which half of the unknowns a dimensionless motion moves, if the level has a mirror line and the motion only
-    /// one of the two.
+    /// The parity of the tractions under a dimensionless motion, if the level has a mirror line and the motion is symmetric or
+    /// antisymmetric about it.
     #[must_use]
     pub fn parity(&self, motion: &Motion) -> Option<Parity> {
         if !self.mirrored {
@@ -181,7 +182,7 @@ impl StripMesh {
         }
     }
 
-    /// Is half of the influence enough because patch and pressure are mirror-symmetric?
+    /// Are patch and bounds mirror-symmetric, so that half of the operator is enough?
     #[must_use]
     pub fn is_mirrored(&self) -> bool {
         self.mirrored

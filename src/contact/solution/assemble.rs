@@ -11,6 +11,7 @@ use crate::contact::rolling::refinement::level_solve::MotionAnswer;
 use crate::contact::rolling::refinement::levels::Levels;
 use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
+use crate::contact::rolling::skip::Skip;
 use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::solution::words::{
     CombinedMaterial, ErrorEstimate, Fields, MeshReport, NormalisedMotion, Origin, PatchCells,
@@ -193,12 +194,17 @@ fn point_solution(
             iterations: point.work.iterations,
             products: point.work.products,
             residual: point.work.residual,
-            skipped: point.tangential.skipped.clone(),
+            skipped: skipped(&point.tangential.skips),
             seconds: point.seconds,
         },
         target_met: target_met(case, point),
         saturated: point.saturated,
     }
+}
+
+/// What was skipped, as the client reads it.
+fn skipped(skips: &[Skip]) -> Vec<String> {
+    skips.iter().map(|skip| skip.text().to_owned()).collect()
 }
 
 /// Does the estimate of the sum over the patches stay within the target?

@@ -1,7 +1,7 @@
 //! Pressure on a regular grid by conjugate gradients that never leave the contact conditions.
 //!
-//! Sought are `p ≥ 0` and `g = u(p) + h − δ ≥ 0` with `p g = 0` at every cell, and either the sum of p or the approach
-//! δ prescribed (Polonsky and Keer 1999). Cells may differ in size: scalar products are weighted with their areas, and
+//! The unknowns satisfy `p ≥ 0`, `g = u(p) + h − δ ≥ 0` and `p g = 0` at every cell; either the sum of p or the approach δ is
+//! prescribed (Polonsky and Keer 1999). Cells may differ in size: scalar products are weighted with their areas, and
 //! distances are scaled by what a cell's own pressure displaces, so that small cells take no more iterations than large ones.
 
 use crate::contact::half_space::grid_operator::{GridOperator, GridWorkspace};
@@ -11,7 +11,7 @@ use crate::contact::normal::hertz::Pressing;
 
 /// Displacements that pressures on cells cause, cells of one size or of several.
 pub(crate) trait PressureInfluence {
-    /// Up to so many changed pressures are added to the displacement one by one, for less than a whole product costs.
+    /// Up to so many changed pressures are added to the displacement one by one, which costs less than a whole product.
     const CHANGES_MAX: usize;
     /// Buffers of a product.
     type Workspace;
@@ -60,7 +60,7 @@ impl<T: Width> PressureInfluence for GridOperator<T> {
 /// Iterations after which something is wrong: smooth gaps take 10 to 30, rough ones up to about 100.
 const ITERATIONS_MAX: u32 = 500;
 
-/// How far the two bodies are from touching where they should, and what they press.
+/// Pressures, distances and approach of two bodies pressed together, and how well they meet the contact conditions.
 #[derive(Debug, Clone)]
 pub(crate) struct Pressed {
     /// Pressure of every cell in MPa.
@@ -176,7 +176,7 @@ struct PressureIterate {
     /// Direction of the step, 0 outside the contact, and its displacement.
     t: Vec<f64>,
     r: Vec<f64>,
-    /// Cells whose pressure is not where the step leads to, and by how much it is more.
+    /// Cells whose pressure differs from that of the full step, with the difference.
     changes: Vec<(usize, f64)>,
 }
 
@@ -219,7 +219,7 @@ impl PressureIterate {
         }
     }
 
-    /// Takes the approach from the distances; their largest violation, and the sum of their squares in the contact.
+    /// Subtracts the approach from the distances; returns their largest violation and the sum of their squares in the contact.
     fn part_from(&mut self, influence: &impl PressureInfluence, approach: f64) -> (f64, f64) {
         let mut violation = 0.0_f64;
         for (g, p) in self.g.iter_mut().zip(&self.p) {
@@ -259,7 +259,7 @@ impl PressureIterate {
             Pressing::Force(_) => product - sum / count * along,
             Pressing::Approach(_) => product,
         };
-        // A single cell under a force leaves nothing to minimise; its own stiffness lets others in.
+        // A single cell under a force leaves nothing to minimise; a step by its own stiffness lets other cells in.
         if below > 0.0 && above > 0.0 {
             above / below
         } else {
@@ -267,8 +267,8 @@ impl PressureIterate {
         }
     }
 
-    /// Takes the step, and notes where the pressures had to be changed beside it. Says whether the next direction may
-    /// build on this one: no cell came into contact.
+    /// Takes the step, and records the cells whose pressure had to be changed otherwise. Returns whether the next direction may be
+    /// conjugate to this one: no cell came into contact.
     fn advance(&mut self, influence: &impl PressureInfluence, step: f64) -> bool {
         let mut follow = true;
         self.changes.clear();

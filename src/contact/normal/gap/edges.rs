@@ -1,7 +1,7 @@
-//! Pressures near the edge of the contact, freed from the steps of the grid.
+//! Pressures near the edge of the contact, corrected for the steps of the grid.
 
-/// How far outward a piecewise constant pressure places the edge of the contact, by the distance from the edge it tells:
-/// `(distance, displacement)`, both in cells along the normal.
+/// How far outward a piecewise constant pressure places the edge of the contact: `(distance, displacement)`, where the distance is that
+/// from the edge as pressure and gradient give it. Both are in cells along the normal.
 ///
 /// Near an edge the square of the pressure falls linearly, so that a pressure and its gradient tell the distance of the
 /// edge. Measured on Hertz's contact (a/b 0.25 to 1.4, 20 to 42 cells across, all positions and directions of the edge);
@@ -27,8 +27,8 @@ const DISPLACEMENT: [(f64, f64); 18] = [
     (4.00, 0.007),
 ];
 
-/// The squared pressures as they would be without the grid: moved back by [`DISPLACEMENT`], so that they vanish at the
-/// edge. Cells without pressure keep 0; others may come out negative, where the edge leaves out their centre.
+/// The squared pressures as they would be without the grid: moved back by [`DISPLACEMENT`], so that they vanish at the edge. Cells
+/// without pressure keep 0; others become negative where the edge excludes their centre.
 ///
 /// `pressure` belongs to a grid with `nx` cells along x.
 pub(crate) fn squares(nx: usize, pressure: &[f64]) -> Vec<f64> {
@@ -73,8 +73,8 @@ fn displacement(distance: f64) -> f64 {
     y0 + (y1 - y0) * (distance - x0) / (x1 - x0)
 }
 
-/// The squares with values below 0 in the cells next to the contact: the mean of what two cells inside in a row say, in
-/// all eight directions; of one alone the opposite.
+/// The squares, continued below 0 in the cells next to the contact: the mean over all eight directions of the extrapolation from two
+/// cells inside in a row, or of the negative of one cell where there is only one.
 pub(crate) fn continued(nx: usize, squares: Vec<f64>) -> Vec<f64> {
     let (nx, ny) = (nx as isize, (squares.len() / nx) as isize);
     let value = |i: isize, j: isize| {

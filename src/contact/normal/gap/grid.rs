@@ -1,4 +1,4 @@
-//! Equal rectangles over a box of the contact plane, and what the contact looks like on them.
+//! Grids of equal rectangles over a box of the contact plane: where they are in contact, and which grid should follow.
 
 use std::f64::consts::PI;
 
@@ -11,7 +11,7 @@ use crate::contact::numerics::flood_fill::groups;
 
 /// Most cells along either axis.
 const CELLS_MAX: usize = 200;
-/// A box that turned out too small grows by this part of its length.
+/// A box that turned out too small grows by this fraction of its length. Numeric choice, sensitivity not measured.
 const GROWTH: f64 = 0.25;
 
 /// Cells of a box; cell (i, j) is stored at `j * cells[0] + i`.
@@ -40,18 +40,18 @@ pub(crate) struct GridSide {
 pub(crate) struct NextGrid {
     pub(crate) window: Window,
     pub(crate) cells: [usize; 2],
-    /// So many cells are not allowed: some patch will be too coarse.
+    /// More cells were wanted than a grid may have: some patch will be too coarse.
     pub(crate) capped: bool,
 }
 
-/// How many cells are wanted across what.
+/// Numbers of cells that are wanted across the contact and its patches.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct GridFineness {
     /// Across everything in contact.
     pub(crate) contact: f64,
     /// Across the smallest patch that counts.
     pub(crate) patch: f64,
-    /// Patches with a smaller part of the load do not count.
+    /// Patches that carry a smaller fraction of the load do not count.
     pub(crate) share_min: f64,
 }
 
@@ -97,7 +97,7 @@ impl PressureGrid {
         [self.middle[axis] - half, self.middle[axis] + half]
     }
 
-    /// Single precision does for the violations of the contact conditions that are asked for.
+    /// The influence of the cells on each other, in single precision, which is enough for the tolerances of the contact conditions.
     pub(crate) fn influence(
         &self,
         contact_modulus: f64,

@@ -1,4 +1,4 @@
-//! The answer of a gap: pressures of the last grids as a field, and what is to be said of them.
+//! The answer of a gap: pressures of the last grids as a field, and remarks on them.
 
 use crate::contact::normal::answer::{NormalAnswer, NormalError, NormalWork};
 use crate::contact::normal::gap::edges;
@@ -10,13 +10,13 @@ use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 
-/// A patch longer than this part of the rolling radius (half against whole) is no half-space contact.
+/// Half-length over rolling radius from which on half-spaces are a poor likeness of the bodies (a usual limit of the theory).
 const HALF_LENGTH_USUAL_MAX: f64 = 0.3;
-/// Nor is one whose approach is more than this part of its smaller half width.
+/// Approach over the smaller half width from which on strains are too large for linear elasticity (a usual limit of the theory).
 const APPROACH_USUAL_MAX: f64 = 0.15;
-/// A patch with at least this part of the load and fewer cells across is not resolved: with so many cells, Hertz's width and
-/// pressure come out within 1 %.
+/// A patch with less than this fraction of the load need not be resolved.
 const SHARE_MIN: f64 = 0.02;
+/// Fewest cells across a patch that is resolved: Hertz's width and pressure then come out within 1 %.
 const CELLS_ACROSS_MIN: f64 = 11.0;
 
 /// A patch with too few cells.
@@ -109,7 +109,7 @@ impl GapTask {
     }
 }
 
-/// Patches that matter and are not resolved, from the heaviest on.
+/// Patches that should be resolved and are not, the heaviest first.
 fn coarse(tiles: &[Tile]) -> Vec<Coarse> {
     let total: f64 = tiles.iter().map(Tile::load).sum();
     let mut found = Vec::new();

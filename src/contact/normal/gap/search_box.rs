@@ -1,17 +1,17 @@
-//! Where a contact can be: a box that holds every point the bodies could touch at, before anything is solved.
+//! The box in which a contact can be: it holds every point at which the bodies could touch, and is found before anything is solved.
 
 use crate::contact::normal::gap::surface::{GapSurface, Window};
 use crate::contact::normal::hertz::Pressing;
 
 /// Points of a box along each axis when it is looked through.
 const POINTS: usize = 48;
-/// Samples of the data along one axis that are looked at one by one; of more, every second or so.
+/// Most samples along one axis that are evaluated one by one; of more samples, only every second or third is.
 const SAMPLES_MAX: usize = 400;
-/// Looks at ever smaller boxes until one is filled; each look shrinks a box that is too large at least by half.
+/// Most boxes that are tried until one is filled; each try shrinks a box that is too large at least by half.
 const LOOKS_MAX: usize = 40;
-/// A box is filled if the region found takes this part of it along both axes.
+/// A box is filled if the region found takes this fraction of it along both axes.
 const FILLED: f64 = 0.5;
-/// The estimated approach is this much too small at most, measured on smooth gaps; the solution tells if it was not.
+/// Factor on the estimated approach: on smooth gaps it was never too small by more. If it is, the solution shows it and the box grows.
 const MARGIN: f64 = 1.3;
 
 /// A box of the contact plane and the depth of overlap it was made for.
@@ -24,14 +24,14 @@ pub(crate) struct Reach {
     pub(crate) least: f64,
 }
 
-/// Points at which a gap is looked at, and its values there.
+/// The points at which a gap is evaluated, and its values there.
 struct Look {
     axes: [Vec<f64>; 2],
     values: Vec<f64>,
     least: f64,
 }
 
-/// The box in which contact can be under this load, found by looking at the gap.
+/// The box in which contact can be under this load, found by evaluating the gap.
 ///
 /// Contact lies where the gap is smaller than the approach, whatever the pressure. The approach belonging to a force is
 /// estimated as if the region overlapping by half of it were a circle of the same area pressed by a sphere, which is

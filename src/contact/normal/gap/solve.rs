@@ -1,7 +1,7 @@
 //! Any gap: contact region and pressure under a load or an approach.
 //!
-//! A box that holds the contact is found by looking at the gap, the pressure on ever finer grids of that box by
-//! conjugate gradients, each grid started from the one before and shrunk to the contact. Where one grid cannot resolve all
+//! A box that holds the contact is found by evaluating the gap, then the pressure by conjugate gradients on ever finer grids of that
+//! box. Each grid starts from the solution on the one before and is shrunk to the contact. Where one grid cannot resolve all
 //! patches, each gets a grid of its own (see `tiles.rs`). At the end the edges are placed between the cells.
 
 use crate::contact::half_space::grid_operator::GridWorkspace;
@@ -61,8 +61,8 @@ impl GapTask {
         self.solve_on(RESOLUTION.for_target(target), workspace, monitor)
     }
 
-    /// The same at a third of the cost for whoever looks for a height: forces within some tenths of a per cent, edges
-    /// within a cell of a twentieth of the contact. Roughness is not followed.
+    /// The same at a third of the cost, for the search of a height: forces within some tenths of a per cent, edges within one cell, a
+    /// twentieth of the contact. Roughness is not resolved.
     ///
     /// # Errors
     /// As [`GapTask::solve_for`].
@@ -170,7 +170,7 @@ impl GapTask {
         Ok(pressed)
     }
 
-    /// What to do after a grid: enlarge it, refine it, or be content.
+    /// Whether a grid is to be enlarged, to be refined, or is the last one.
     fn next_grid(
         &self,
         grid: &PressureGrid,
@@ -217,11 +217,11 @@ impl GapTask {
 /// What follows a grid.
 enum NextStep {
     PressureGrid(PressureGrid),
-    /// Nothing changes any more; `capped` if a patch would want more cells than a grid may have.
+    /// The result no longer changes; `capped` if a patch would want more cells than a grid may have.
     Settled {
         capped: bool,
     },
-    /// Something still changes, and no finer grid is allowed.
+    /// The result still changes, and no finer grid is allowed.
     Rough {
         capped: bool,
     },
@@ -237,7 +237,7 @@ impl NextStep {
 }
 
 impl GridFineness {
-    /// The resolution for a target of the resultants' error relative to μN; as it is from [`TARGET_USUAL`] on.
+    /// The resolution for a target of the resultants' error relative to μN; unchanged for targets from [`TARGET_USUAL`] on.
     fn for_target(self, target: f64) -> GridFineness {
         let finer = (target.min(TARGET_USUAL) / TARGET_USUAL).powf(TARGET_POWER);
         GridFineness {

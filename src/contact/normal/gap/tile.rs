@@ -3,7 +3,7 @@
 use crate::contact::normal::gap::conjugate_gradients::Pressed;
 use crate::contact::normal::gap::grid::PressureGrid;
 
-/// A grid with its part of the solution; distances and pressures are its own, the rest belongs to all.
+/// A grid with its part of the solution: distances and pressures are its own, the rest is common to all tiles.
 #[derive(Debug, Clone)]
 pub(crate) struct Tile {
     pub(crate) grid: PressureGrid,
@@ -27,9 +27,9 @@ pub(crate) struct GapOutcome {
     pub(crate) tiles: Vec<Tile>,
     /// Iterations over all grids.
     pub(crate) iterations: u32,
-    /// Nothing changes any more with the grids.
+    /// Finer grids no longer change the result.
     pub(crate) settled: bool,
-    /// See [`Report`](crate::contact::normal::answer::NormalWork).
+    /// See [`NormalWork`](crate::contact::normal::answer::NormalWork).
     pub(crate) pressure_change: f64,
     /// The least gap in mm.
     pub(crate) least: f64,

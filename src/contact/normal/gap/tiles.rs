@@ -21,18 +21,19 @@ use crate::contact::normal::gap::tiles_influence::TilesInfluence;
 
 /// More grids than this are not coupled: such a gap is rough, not a few patches of different size.
 const TILES_MAX: usize = 6;
-/// Cells of all grids together. Three patches of like size have 89 × 89 cells each, a small one beside a large one up to 30 000 in all;
-/// what wants more is rough, and took up to 10 s with 60 000 cells, to be told at the end that it is not settled.
+/// Most cells of all grids together. Three patches of like size have 89 × 89 cells each, a small patch beside a large one up to 30 000
+/// in all. A gap that wants more is rough: with 60 000 cells such gaps took up to 10 s and did not settle.
 const CELLS_MAX: usize = 36_000;
 /// Cells along either axis of a grid whose patch is hardly known yet, at least and at most.
 const CELLS_FIRST: [f64; 2] = [24.0, 56.0];
 /// Violation of the contact conditions relative to the deepest overlap. Small patches yield less than large ones: a quarter of
 /// what serves for one grid.
 const TOLERANCE: f64 = 5e-5;
-/// A patch with less than this part of the load needs fewer cells.
+/// A patch with less than this fraction of the load needs fewer cells.
 const SHARE_LARGE: f64 = 0.25;
+/// Cells across such a patch over those across a large one. Sensitivity not measured.
 const RESOLUTION_SMALL: f64 = 0.7;
-/// Cells across a patch with less of the load than counts.
+/// Cells across a patch whose load does not count (see `GridFineness::share_min`).
 const CELLS_TINY: f64 = 10.0;
 
 /// What follows the grid of a patch.
@@ -138,7 +139,7 @@ impl GapTask {
         Ok(parts.map(tile).collect())
     }
 
-    /// What to do after the grid of a patch: enlarge it, refine it, or be content. See `GapTask::next_grid`.
+    /// Whether the grid of a patch is to be enlarged, refined or kept. See `GapTask::next_grid`.
     fn next_tile(
         &self,
         tile: &Tile,

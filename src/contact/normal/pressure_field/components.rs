@@ -1,4 +1,4 @@
-//! Finds the separate patches of a grid: which positive samples hang together.
+//! The patches of a grid: groups of connected positive samples.
 
 use crate::contact::normal::pressure_field::sample_grid::{PATCHES_MAX, SampleGrid};
 use crate::contact::numerics::flood_fill::groups;

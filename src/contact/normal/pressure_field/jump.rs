@@ -1,6 +1,6 @@
 //! A jump of a sampled pressure.
 
-/// A place where a pressure falls from one sample to the next as no edge of a contact does.
+/// A place where a pressure falls from one sample to the next more steeply than at any edge of a contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Jump {
     /// Coordinates in mm, halfway between the two samples.

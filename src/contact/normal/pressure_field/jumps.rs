@@ -4,9 +4,9 @@ use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::normal::pressure_field::jump::Jump;
 use crate::contact::normal::pressure_field::sample_grid::PADDING;
 
-/// A fall of the squared pressure over one interval beyond what the interval before lets expect, relative to the largest
-/// squared pressure, from which on it is a jump. An edge of Hertz's kind expects all of its fall; powers of a lens from 0.5
-/// to 1.5 reach 0.21 on 12 samples a side, a hole 0.9.
+/// A jump is a fall of the squared pressure over one interval that exceeds the extrapolation from the interval before by this, relative
+/// to the largest squared pressure. At an edge of Hertz's kind the excess is 0; powers of a lens from 0.5 to 1.5 reach 0.21 on 12
+/// samples a side, a hole 0.9.
 const JUMP: f64 = 0.35;
 
 impl GridPressure {
@@ -39,7 +39,7 @@ impl GridPressure {
                         (row as usize) * nx + column as usize
                     };
                     let [before, here, next] = [-1, 0, 1].map(|steps| self.q[index(steps)]);
-                    // What the two samples before continue to, less what is there.
+                    // The value extrapolated from the two samples before, less the sample itself.
                     let surprise = 2.0 * here - before.max(here) - next;
                     if here > 0.0 && surprise > largest.0 {
                         let middle = |axis: &[f64], k: usize, d: isize| {

@@ -67,7 +67,7 @@ impl GridLine<'_> {
             tell(low, high);
             return;
         }
-        // Between two others a bulge is believed where it continues a smooth edge.
+        // Between two others a bulge counts only where it continues a smooth edge.
         if here <= 0.0 && next <= 0.0 && !self.smooth[k] {
             return;
         }

@@ -5,14 +5,14 @@
 
 use crate::contact::remark::list::Remark;
 
-/// A bracket narrower than this part of the lowering holds a jump of the force, or only what differs between grids.
+/// A bracket narrower than this fraction of the lowering is closed: it holds a jump of the force, or only differences between grids.
+/// Sensitivity not measured.
 const BRACKET_MIN: f64 = 2e-4;
 /// Steps in a row that may leave the bracket more than half as wide.
 const SLOW_MAX: u32 = 3;
-/// So close to a lowering that cannot be solved, relative to it, the search ends.
+/// The search ends when it comes this close, relatively, to a lowering that cannot be solved. Sensitivity not measured.
 const CLOSE: f64 = 0.02;
-/// A closed bracket holds a jump of the force if the force is missed by more than this part; what differs between grids is
-/// less.
+/// A closed bracket holds a jump of the force if the force is missed by more than this fraction; differences between grids are smaller.
 const JUMP_MIN: f64 = 5e-3;
 
 /// How the search for a height ends, with the part by which the force is missed.

@@ -24,18 +24,19 @@ use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 
-/// Heights looked at before giving up.
+/// Heights after which the search is given up.
 const HEIGHTS_MAX: u32 = 40;
-/// The force found may differ from the one wanted by the target of the resultants' error, but by no more and no less than this; the
-/// contact is then grown to the force as Hertz's would be. What is left is of second order for Hertz's contacts, about a third
-/// of this part in pressures and lengths at worst. Below the lower bound heights differ by no more than their grids do.
+/// Bounds of the tolerance of the force, which is the target of the resultants' error. The contact is then scaled to the force as Hertz's
+/// contacts scale; the error left is of second order for these, and at worst about a third of the tolerance in pressures and lengths.
+/// Below the lower bound the forces of neighbouring heights differ by no more than those of different grids.
 const FORCE_TOLERANCE: [f64; 2] = [5e-4, 5e-3];
-/// That third, as an error of the load.
+/// The third that is left, as an error of the load.
 const CORRECTED: f64 = 1.0 / 3.0;
-/// A coarse look that misses the force by no more than this is followed by a fine one.
+/// Coarse gaps are replaced by fine ones when the force is missed by no more than this. Sensitivity not measured.
 const NEAR: f64 = 0.02;
-/// A patch that overlaps by less than this part of the deepest overlap carries nothing to speak of (about its power 3/2).
+/// A gap whose overlap is less than this fraction of the deepest one is left out: its force is about the power 3/2 of this, 1e-4.
 const DEPTH_SHARE_MIN: f64 = 2e-3;
+
 /// The wheel at rest on its rail.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PressedWheel {
@@ -49,9 +50,9 @@ pub struct PressedWheel {
     pub force_residual: f64,
     /// Height of the wheel's centre over the top of the rail, in mm.
     pub centre: f64,
-    /// Heights looked at.
+    /// Heights that were solved.
     pub heights: u32,
-    /// What presses, from smaller to larger y of the track; never empty.
+    /// The gaps in contact, from smaller to larger y of the track; never empty.
     pub patches: Vec<PressedGap>,
     /// Remarks for the answer.
     pub remarks: Vec<RemarkEntry>,
@@ -236,7 +237,7 @@ impl WheelTask {
             let mut found = match self.looked_at(search, lowering, fineness, workspace, monitor) {
                 Ok(found) => found,
                 Err(NormalError::NoAnswer(reason)) => {
-                    // Too deep, perhaps; the load may be carried higher up.
+                    // The wheel may lie too deep; the load may be carried higher up.
                     let higher = bracket.refuse(lowering, reason);
                     lowering = higher.map_err(NormalError::NoAnswer)?;
                     continue;
@@ -266,7 +267,7 @@ impl WheelTask {
             }
             lowering = if closed { found.lowering } else { next };
             if closed || !fine && near(carried, target) {
-                // What coarse looks said of the forces on either side is not sharp enough to go on from, the slope is.
+                // Forces of coarse gaps are too inexact as ends of the bracket; their slope is exact enough.
                 fineness.detail = Detail::Fine;
                 bracket = bracket.opened(found.found[1]);
             }
@@ -276,7 +277,7 @@ impl WheelTask {
         )))
     }
 
-    /// The wheel at one height; where a coarse look has no answer, a fine one may.
+    /// The wheel at one height; where coarse gaps have no answer, fine ones may.
     fn looked_at(
         &self,
         search: &ContactLocus,
@@ -428,7 +429,7 @@ impl WheelTask {
     }
 }
 
-/// May a fine look follow a coarse one that found this force?
+/// Is a force found with coarse gaps near enough to go on with fine ones?
 fn near(force: f64, target: f64) -> bool {
     (force / target - 1.0).abs() <= NEAR
 }

@@ -1,4 +1,4 @@
-//! Kalker's simplified theory: every cell gives way by its own traction alone, so that a strip is solved in one pass.
+//! Kalker's simplified theory: the displacement of a cell depends on its own traction only, so that a strip is solved in one pass.
 //!
 //! With `u = L T` steady rolling becomes `s = w + L ∂T/∂x` on each strip by itself (Kalker, *A fast algorithm for the simplified
 //! theory of rolling contact*, 1982). Tractions grow from 0 at the leading edge and are scaled back to the bound where they exceed
@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 use crate::contact::mesh::size::MeshSize;
 use crate::contact::mesh::strips::Segment;
 use crate::contact::normal::patch::Patch;
-use crate::contact::rolling::answer::{LevelAnswer, Work};
+use crate::contact::rolling::answer::{LevelAnswer, LevelExit, Work};
 use crate::contact::rolling::linear_theory;
 use crate::contact::rolling::methods::full_slip;
 use crate::contact::rolling::methods::method::TractionBound;
@@ -18,13 +18,13 @@ use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::rolling::task::RollingTask;
 
-/// The mesh unless one is given: finer ones change the resultants by a small part of the method's own error.
+/// The mesh if none is given: finer ones change the resultants by a small fraction of the error of the theory.
 pub const MESH: MeshSize = MeshSize {
     strips: 10,
     cells: 16,
 };
 
-/// Fewest strips, and cells in one, of meshes that add little to the error of the theory.
+/// Meshes with at least so many strips, and cells in one, add little to the error of the theory.
 const SIDE_GOOD: u32 = 8;
 
 /// The error of the resultants relative to μN (moment: μN√(A/π)) that is stated for every answer of a mesh: the largest
@@ -57,11 +57,12 @@ pub fn solve(task: &RollingTask, level: &StripMesh, motion: &Motion) -> LevelAns
         second: None,
         slip: [vec![0.0; cells], vec![0.0; cells]],
         slips: vec![false; cells],
+        exit: LevelExit::Solved,
         work: Work {
             iterations: 1,
             ..Work::default()
         },
-        skipped: Vec::new(),
+        skips: Vec::new(),
         remarks: Vec::new(),
     };
     let mut bound = level.bound.clone();

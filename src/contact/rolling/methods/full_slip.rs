@@ -1,11 +1,12 @@
 //! States that need no Newton iteration: nothing slips because nothing moves, or everything slips.
 
-use crate::contact::rolling::answer::{LevelAnswer, Work};
+use crate::contact::rolling::answer::{LevelAnswer, LevelExit, Work};
 use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::skip::Skip;
 use crate::contact::rolling::strip_mesh::StripMesh;
 
-/// No elastic slip of a patch in full slip was seen above a third of this, in units of (μ p_max)/G, for a/b from
-/// 1/50 to 50 and any ν.
+/// Upper bound of the elastic slip in full slip, in units of (μ p_max)/G: three times the largest that was seen for a/b from 1/50 to 50
+/// and any ν.
 const ELASTIC_SLIP_MAX: f64 = 10.0;
 /// Rigid slip must be this many times larger for the elastic slip to be left out: the direction of the traction then
 /// changes by less than the inverse.
@@ -47,8 +48,8 @@ fn along(level: &StripMesh, slip: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
     })
 }
 
-/// The answer if the rigid slip decides everything: no motion, no friction, or a rigid slip so large that elastic
-/// slip cannot turn it (relative change of the tractions below 1e-6).
+/// The answer where the rigid slip alone decides: no motion, or a rigid slip so large that elastic slip cannot turn the tractions
+/// (relative change below 1e-6).
 #[must_use]
 pub fn rigid_answer(level: &StripMesh, motion: &Motion) -> Option<LevelAnswer> {
     let cells = level.mesh.cells();
@@ -56,10 +57,10 @@ pub fn rigid_answer(level: &StripMesh, motion: &Motion) -> Option<LevelAnswer> {
     let sizes = slip[0].iter().zip(&slip[1]).map(|(x, y)| x.hypot(*y));
     let smallest = sizes.fold(f64::INFINITY, f64::min);
     let still = motion.creepage_x == 0.0 && motion.creepage_y == 0.0 && motion.spin_per_mm == 0.0;
-    let reason = if still {
-        "no creepage and no spin: nothing to solve"
+    let (exit, skip) = if still {
+        (LevelExit::NoMotion, Skip::NoMotion)
     } else if smallest > ELASTIC_SLIP_MAX * NEGLIGIBLE && !pole_inside(level, motion) {
-        "rigid slip exceeds any elastic slip a million times: everything slips along it"
+        (LevelExit::RigidSlip, Skip::RigidSlip)
     } else {
         return None;
     };
@@ -69,8 +70,9 @@ pub fn rigid_answer(level: &StripMesh, motion: &Motion) -> Option<LevelAnswer> {
         second: None,
         slips: vec![!still; cells],
         slip,
+        exit,
         work: Work::default(),
-        skipped: vec![reason.to_owned()],
+        skips: vec![skip],
         remarks: Vec::new(),
     })
 }
@@ -96,8 +98,9 @@ pub fn frictionless_answer(level: &StripMesh, motion: &Motion) -> LevelAnswer {
                 .collect(),
         ],
         slips: vec![!still; cells],
+        exit: LevelExit::NoFriction,
         work: Work::default(),
-        skipped: vec!["no friction: no tractions".to_owned()],
+        skips: vec![Skip::NoFriction],
         remarks: Vec::new(),
     }
 }

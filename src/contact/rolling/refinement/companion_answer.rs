@@ -1,14 +1,14 @@
-//! What a companion of a mesh says.
+//! The answer on a companion of a mesh.
 
 use crate::contact::rolling::resultants::Resultants;
 
-/// What is known of the error from a companion.
+/// What is known from a companion.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum CompanionAnswer {
-    /// Nobody looked.
+    /// It was not solved.
     #[default]
     Untried,
-    /// It cannot be had: the mesh is too small to be halved, or the iteration did not converge.
+    /// There is none: the mesh is too small to be halved, or the iteration did not converge.
     Missing,
     /// Resultants of every patch on the companion, and by how much their change from the mesh would be larger on exactly half the
     /// strips or cells if errors are of second order.

@@ -1,5 +1,5 @@
-//! Companions of a mesh: the same motion on half the strips, and on half the cells. Their differences to the mesh tell its
-//! error across and along the strips apart.
+//! Companions of a mesh: meshes with half its strips, and with half its cells, for the same motion. Their differences to the mesh
+//! measure its error across and along the strips separately.
 
 use crate::contact::error::SolveError;
 use crate::contact::mesh::size::MeshSize;
@@ -41,7 +41,7 @@ impl Companion {
         halved.then_some(MeshPlan { size, ..plan })
     }
 
-    /// See [`CompanionAnswer::Found`]; six strips have four for a half.
+    /// The factor of [`CompanionAnswer::Found`]. Strips are kept even, so that half of six are four.
     fn reach(self, fine: MeshSize, halved: MeshSize) -> f64 {
         let (fine, halved) = match self {
             Companion::Across => (fine.strips, halved.strips),

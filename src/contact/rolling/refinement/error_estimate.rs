@@ -1,8 +1,8 @@
-//! How wrong are the resultants? From two rules, two companion meshes, the level before, and the cell that holds the spin
-//! pole.
+//! The error of the resultants, estimated from two rules, two companion meshes, the level before and the cell that holds the centre of
+//! the vortex.
 
 use crate::contact::normal::patch::Patch;
-use crate::contact::rolling::answer::LevelAnswer;
+use crate::contact::rolling::answer::{LevelAnswer, LevelExit};
 use crate::contact::rolling::mesh_plan::Regime;
 use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::methods::{fastsim, full_slip};
@@ -22,10 +22,10 @@ use crate::contact::rolling::task::RollingTask;
 
 /// Relative error where everything slips along the rigid slip.
 const RIGID: f64 = 1e-6;
-/// Relative errors of every patch, then of the sum over them; nothing where there is no second opinion.
+/// Relative errors of every patch, then of the sum over them; nothing where there is nothing to compare with.
 pub type RelativeErrors = Vec<Option<f64>>;
 
-/// The coarser level that was solved before this one, where it says something.
+/// The coarser level that was solved before this one, if it is coarse enough to compare with.
 #[derive(Debug, Clone, Copy)]
 pub struct CoarserLevel<'a> {
     /// Its resultants.
@@ -36,7 +36,7 @@ pub struct CoarserLevel<'a> {
     pub share: f64,
 }
 
-/// What an estimate depends on beside the answer on its level.
+/// What an estimate depends on, apart from the answer on its level.
 #[derive(Debug, Clone, Copy)]
 pub struct EstimateContext<'a> {
     /// The motion in mm.
@@ -45,19 +45,19 @@ pub struct EstimateContext<'a> {
     pub before: Option<CoarserLevel<'a>>,
     /// A finer level, where everything slips or the pressure jumps.
     pub finer: Option<&'a StripMesh>,
-    /// How many times more slender the patch is than the factors of an explicit mesh were found for; at least 1.
+    /// Slenderness of the patch over that of the population of the factors for explicit meshes; at least 1.
     pub slenderness: f64,
     /// Residual of the solve.
     pub tolerance: f64,
 }
 
-/// What the error of one solved level is judged by, relative to μN (moment: μN√(A/π)): of every patch, then of the sum.
-/// Distances are the largest component, since single ones cross zero.
+/// The quantities that the error of a solved level is estimated from, relative to μN (moment: μN√(A/π)), for every patch, then for the
+/// sum. A difference of resultants counts by its largest component, since single components cross zero.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Indicators {
-    /// Nothing is left to find out.
+    /// The error is known without companions.
     Known(RelativeErrors),
-    /// Differences that a factor turns into an error.
+    /// Differences whose root of squares, times a factor, is the estimate.
     Measured(Box<Measured>),
 }
 
@@ -70,7 +70,7 @@ pub struct Measured {
     before: Option<Vec<f64>>,
     /// To half the strips and to half the cells.
     companions: [Option<Vec<f64>>; 2],
-    /// A companion that was tried cannot be had.
+    /// A companion was tried and has no answer.
     missing: bool,
     /// From sampling the vortex of the tractions, weighted.
     pole: f64,
@@ -98,19 +98,17 @@ impl Indicators {
         let patches = task.footprint.patches();
         let none = vec![0.0; patches.len() + 1];
         let all = |value| Indicators::Known(vec![value; patches.len() + 1]);
-        if task.friction.is_frictionless() {
-            return all(Some(0.0));
-        }
         let slides = answer.slips.iter().all(|slips| *slips);
         let sums = finer.filter(|_| slides).map_or_else(
             || none.clone(),
             |finer| sum_errors(task, patches, [level, finer], motion),
         );
-        if answer.second.is_none() && answer.work.products == 0 && answer.work.iterations == 0 {
-            if !answer.slips.iter().any(|s| *s) {
-                return all(Some(0.0));
+        match answer.exit {
+            LevelExit::NoMotion | LevelExit::NoFriction => return all(Some(0.0)),
+            LevelExit::RigidSlip => {
+                return Indicators::Known(sums.iter().map(|e| Some(e.max(RIGID))).collect());
             }
-            return Indicators::Known(sums.iter().map(|e| Some(e.max(RIGID))).collect());
+            LevelExit::Solved => {}
         }
         if task.method == Method::Fastsim {
             // No mesh tells what the theory leaves out.
@@ -156,7 +154,7 @@ impl Indicators {
         }))
     }
 
-    /// Takes in what companion `k` (0: half the strips, 1: half the cells) says of the resultants that were `found`.
+    /// Adds the difference of the resultants `found` to those of companion `k` (0: half the strips, 1: half the cells).
     pub fn see(
         &mut self,
         task: &RollingTask,
@@ -307,7 +305,7 @@ fn change(
     change
 }
 
-/// The dense method has one rule; the change between its levels is all there is.
+/// The dense method has one rule, so that only the change between its levels is known.
 fn dense_errors(
     task: &RollingTask,
     patches: &[Patch],
@@ -354,8 +352,8 @@ fn mesh_errors(
         .collect()
 }
 
-/// Errors of the sums over cells, which both rules share: where everything slips along the rigid slip, those sums are all there is.
-/// The change to a level of four times as many cells tells them.
+/// Errors of the sums over cells, which both rules share: where everything slips along the rigid slip there is no other error. They are
+/// estimated by the change to a level of four times as many cells.
 fn sum_errors(
     task: &RollingTask,
     patches: &[Patch],

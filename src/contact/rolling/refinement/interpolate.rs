@@ -5,7 +5,7 @@ use crate::contact::mesh::strips::{Mesh, Segment};
 /// Interpolates `values` (one per coarse cell) to the cells of the fine mesh: linearly along the normalised chord,
 /// linearly in y between the coarse strips of the same patch. Cells beyond the outermost strip take its value.
 ///
-/// It is only a first iterate: where segments have no counterpart, the nearest segment of the patch serves.
+/// The result is only a first iterate: a segment without counterpart takes the values of the nearest segment of the patch.
 #[must_use]
 pub fn interpolate(coarse: &Mesh, values: &[f64], fine: &Mesh) -> Vec<f64> {
     let mut out = vec![0.0; fine.cells()];

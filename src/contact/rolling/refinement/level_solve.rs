@@ -23,7 +23,7 @@ use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::rolling::task::RollingTask;
 
-/// The coarse mesh that gives the method of Liu and Hsu its spin pole: fewer than 30 cells, as they found.
+/// The coarse mesh on which the method of Liu and Hsu finds its spin pole; they recommend fewer than 30 cells (see `liu_hsu`).
 const POLE_MESH: MeshSize = MeshSize {
     strips: 5,
     cells: 5,
@@ -71,7 +71,7 @@ impl MotionAnswer {
     }
 }
 
-/// A point with what its error is judged by.
+/// An answer with the indicators of its error.
 #[derive(Debug, Clone)]
 pub struct JudgedAnswer {
     /// The answer.
@@ -80,8 +80,8 @@ pub struct JudgedAnswer {
     pub indicators: Indicators,
 }
 
-/// Solves a motion on the level of one size, from the point of a coarser one if there is one. Estimates are those before
-/// companions, see `judge`.
+/// Solves a motion on one level, started from the answer on a coarser one if there is one. The estimates are those without companions
+/// (see `judge` in `refine.rs`).
 ///
 /// # Errors
 /// Why there is no answer.
@@ -143,7 +143,7 @@ pub fn solve_level(
     Ok(JudgedAnswer { point, indicators })
 }
 
-/// The level before, if it is coarse enough to say something.
+/// The level before, if it is coarse enough to compare with.
 pub(crate) fn before<'a>(
     levels: &Levels,
     level: &StripMesh,
@@ -158,8 +158,8 @@ pub(crate) fn before<'a>(
     })
 }
 
-/// A level of four times as many cells, where the pressure jumps, or everything slips and the tractions turn: how they add up
-/// depends on the cells. Without spin all tractions point the same way, and cells of any size add up to the load.
+/// A level of four times as many cells for the error of sums over cells, where the pressure jumps or where everything slips under spin.
+/// In full slip without spin all tractions point the same way, and cells of any size add up to the load.
 fn finer_for_sums(
     task: &RollingTask,
     level: &StripMesh,
@@ -176,7 +176,7 @@ fn finer_for_sums(
     StripMesh::new(task, MeshPlan { size, ..level.plan }).ok()
 }
 
-/// `auto` is the fast solver today.
+/// The method that solved; the reader of cases has resolved `auto`.
 fn method_used(task: &RollingTask) -> Method {
     task.method
 }

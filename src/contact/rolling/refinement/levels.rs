@@ -11,8 +11,9 @@ use crate::contact::rolling::refinement::warm_start::SweepState;
 use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::rolling::task::RollingTask;
 
-/// Levels that are kept from one motion to the next: a few paths of about four levels. Sweeps come back to levels of the last few
-/// motions only; of a creep map of 900 motions at fixed spin, half as many make no difference.
+/// Levels that are kept from one motion to the next: a few paths of about four levels. Sweeps return to the levels of the last few
+/// motions only; in a creep map of 900 motions at fixed spin, half as many make no difference (`cargo bench --bench stress -- --only
+/// creep-map`).
 pub const LEVELS_KEPT: usize = 32;
 
 /// The levels of a case that exist; the least recently used are dropped between motions.
@@ -31,7 +32,7 @@ pub struct Levels<'a> {
     pub begin: Option<MeshPlan>,
     /// Which meshes suit the patches.
     pub policy: MeshPolicy,
-    /// Buffers of the iterations, of all motions and levels.
+    /// Buffers of the iterations on all levels.
     pub workspace: NewtonWorkspace,
 }
 
@@ -58,7 +59,7 @@ impl<'a> Levels<'a> {
     /// If no strip meets a patch.
     pub fn level(&mut self, plan: MeshPlan) -> Result<usize, SolveError> {
         if let Some(place) = self.kept.iter().position(|(_, level)| level.plan == plan) {
-            // The last used stand last.
+            // The most recently used stand last.
             self.kept[place..].rotate_left(1);
             return Ok(self.kept[self.kept.len() - 1].0);
         }

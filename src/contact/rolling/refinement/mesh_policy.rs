@@ -112,7 +112,7 @@ impl MeshPolicy {
         }
     }
 
-    /// Can a mesh of so many cells be refined?
+    /// May a mesh of so many cells be refined?
     #[must_use]
     pub fn is_refinable(&self, cells: usize) -> bool {
         let largest = (2.0 * (f64::from(CELLS_MAX) / self.cells_first()).log2() + 1e-9).floor();

@@ -18,8 +18,9 @@ use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::rolling::regime::regime;
 use crate::contact::rolling::task::RollingTask;
 
-/// A mesh of so many cells is worth a start on a coarser one, whose sides are no shorter than this.
+/// Explicit meshes of at least so many cells are started from a coarser mesh. Sensitivity not measured.
 const CELLS_NESTED: u64 = 1000;
+/// Fewest strips, and cells in one, of that coarser mesh.
 const SIDE_HALVED: u32 = 8;
 
 /// Solves a motion, from the coarsest level up to the first that meets the target, each started from
@@ -49,7 +50,7 @@ pub fn solve(
     }
 }
 
-/// Solves a motion on a mesh of the client's, a large one from a start on meshes of half as many strips and cells.
+/// Solves a motion on a mesh given by the client; a large mesh is started from one of half as many strips and cells.
 fn on_mesh(
     task: &RollingTask,
     levels: &mut Levels,
@@ -70,7 +71,7 @@ fn on_mesh(
     if !started && cells(size) >= CELLS_NESTED && 2 * cells(half) <= cells(size) {
         coarser = match on_mesh(task, levels, asked, half, monitor) {
             Ok(point) => Some(point),
-            // The mesh that was asked for may do better.
+            // The mesh that was asked for may have an answer all the same.
             Err(SolveError::NotConverged { .. } | SolveError::Unmeshable { .. }) => None,
             Err(error) => return Err(error),
         };
@@ -103,8 +104,8 @@ pub fn on_levels(
 
 /// Solves a motion from the coarsest mesh, or where the last motion of a sweep ended, up to the first mesh that meets the target.
 ///
-/// A mesh is refused on what it says itself; only one that is not is solved again on its companions, first on half the
-/// strips, then on half the cells.
+/// A mesh whose own indicators exceed the target is refused at once. Only one that passes is solved again on its companions, first on
+/// half the strips, then on half the cells.
 ///
 /// # Errors
 /// Why there is no answer.
@@ -158,8 +159,8 @@ pub(crate) fn to_target(
     Ok(solved.point)
 }
 
-/// Solves the companions of a level and what they tell of value and error; with a target only as long as the estimate may
-/// still meet it.
+/// Solves the companions of a level and adds what they tell of value and error. With a target it stops as soon as the estimate exceeds
+/// it.
 ///
 /// # Errors
 /// Why there is no answer.
@@ -239,7 +240,7 @@ fn begin_on(
     if plan.serves(found) {
         return Ok(Some(solved));
     }
-    // The tractions are a good start for a mesh that does.
+    // Its tractions are still a good start for a mesh that does serve.
     levels.path.clear();
     let cells = levels.get(number).mesh.cells() as u32;
     let plan = levels.policy.plan(cells, found);

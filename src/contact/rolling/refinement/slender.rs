@@ -3,10 +3,11 @@
 use crate::contact::normal::patch::Patch;
 use crate::contact::rolling::task::RollingTask;
 
-/// Patches longer along rolling than so many times their width are named where a solve does not converge; nearly all of them are solved.
+/// If a solve does not converge, a patch longer along rolling than this many times its width is named as the likely reason; nearly all
+/// such patches are solved.
 const SLENDER: f64 = 20.0;
 
-/// The patch that is longest along rolling for its width, as a clause, if it may be the reason why there is no answer.
+/// A clause that names the patch of the largest ratio of length along rolling to width, if this may be why there is no answer.
 pub(crate) fn slender(task: &RollingTask) -> Option<String> {
     let ratio = |patch: &Patch| {
         let [x_min, x_max, y_min, y_max] = patch.extent;

@@ -1,11 +1,12 @@
-//! What the last motions left on each level: the start of the next motion of a sweep.
+//! Warm starts: the answers of the last motions on each level, from which the next motion of a sweep starts.
 
 use crate::contact::rolling::answer::LevelAnswer;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::refinement::interpolate;
 use crate::contact::rolling::strip_mesh::StripMesh;
 
-/// A motion that leaves the line of the last two by more than this share of its step is not extrapolated.
+/// A start is extrapolated only for motions on the line through the last two; the distance from it may be this fraction of the step.
+/// Numeric safety, not tuned.
 const STRAIGHT: f64 = 1e-6;
 /// Longest step that is extrapolated, in steps between the last two motions.
 const STEP_MAX: f64 = 1.5;
@@ -17,7 +18,7 @@ const NEAR: f64 = 0.25;
 pub struct Start {
     /// For the three-point rule.
     pub mirror: [Vec<f64>; 2],
-    /// For the trapezoid rule, where there is a better one than the three-point solution.
+    /// For the trapezoid rule, if there is a better one than the three-point solution.
     pub trapezoid: Option<[Vec<f64>; 2]>,
 }
 
@@ -60,8 +61,7 @@ impl SweepState {
         self.steps.retain(|step| step.level != number);
     }
 
-    /// A start for a motion on a level: the line through the last two answers continued, or the last answer itself if the
-    /// motion is near.
+    /// A start for a motion on a level: the last two answers extrapolated, or the last answer itself if its motion is near.
     #[must_use]
     pub fn start(&self, number: usize, level: &StripMesh, motion: &Motion) -> Option<Start> {
         let mut steps = self.steps.iter().rev().filter(|s| s.level == number);
@@ -130,7 +130,7 @@ pub(crate) fn nested_start(coarse: &StripMesh, answer: &LevelAnswer, level: &Str
     }
 }
 
-/// Tractions of one level on another; relative to the friction bound they vary less than as they are.
+/// Tractions of one level interpolated to another. Interpolated are their ratios to the friction bound, which vary less.
 pub(crate) fn nested_tractions(
     from: &StripMesh,
     traction: &[Vec<f64>; 2],

@@ -1,19 +1,20 @@
-//! Tractions along the slip, where the rigid slip is large everywhere.
+//! A fixed point for the tractions where the rigid slip is large everywhere.
 
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
-use crate::contact::rolling::methods::boundary_element::task::{Convergence, NewtonTask};
+use crate::contact::rolling::methods::boundary_element::task::{
+    Convergence, NewtonExit, NewtonTask,
+};
 use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 
-/// Rigid slip above this, in the same units, makes the fixed point worth trying.
+/// The fixed point is tried if the rigid slip of every cell exceeds this, in units of (μ p_max)/G. Sensitivity not measured.
 const FIXED_POINT_FROM: f64 = 30.0;
 
-/// Sweeps of the fixed point before Newton takes over.
+/// Iterations of the fixed point before Newton's take over. Sensitivity not measured.
 const SWEEPS_MAX: u32 = 12;
 
-/// Tries `T ← g s/|s|` where the rigid slip is large on every cell: each sweep costs one product, and what it finds is
-/// accepted only by the residual that Newton's iterates are held to. Returns nothing where it does not settle; `t`
-/// is then still a fair start.
+/// Iterates `T ← g s/|s|` if the rigid slip is large on every cell. An iteration costs one product, and its result has to meet the
+/// residual that Newton's iterates have to meet. Returns nothing if it does not settle; `t` is then still a fair start.
 ///
 /// # Errors
 /// Only if the monitor stops the work.
@@ -32,13 +33,7 @@ pub fn fixed_point(
     if smallest < FIXED_POINT_FROM {
         return Ok(None);
     }
-    let mut report = Convergence {
-        converged: false,
-        iterations: 0,
-        products: 0,
-        residual: f64::INFINITY,
-        inexact_steps: 0,
-    };
+    let mut report = Convergence::default();
     let follow = |t: &mut [f64], slip: &[f64]| {
         for i in 0..cells {
             let factor = law.bound[i] / slip[i].hypot(slip[padded + i]);
@@ -54,8 +49,9 @@ pub fn fixed_point(
         report.residual = newton.evaluate(law, t, workspace, &mut report);
         report.iterations += 1;
         if report.residual <= law.tolerance {
-            report.converged = (0..cells).all(|i| newton.slips(law.bound, t, workspace.slip(), i));
-            return Ok(report.converged.then_some(report));
+            report.exit = NewtonExit::Converged;
+            let full_slip = (0..cells).all(|i| newton.slips(law.bound, t, workspace.slip(), i));
+            return Ok(full_slip.then_some(report));
         }
         follow(t, workspace.slip());
     }

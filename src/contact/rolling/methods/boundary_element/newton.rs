@@ -12,26 +12,29 @@ use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::gmres::LinearSystem;
 use crate::contact::rolling::methods::boundary_element::linearisation::Linearisation;
 use crate::contact::rolling::methods::boundary_element::preconditioner::StripFactors;
-use crate::contact::rolling::methods::boundary_element::task::{Convergence, NewtonTask};
+use crate::contact::rolling::methods::boundary_element::task::{
+    Convergence, NewtonExit, NewtonTask,
+};
 use crate::contact::rolling::methods::boundary_element::workspace::{
     NewtonWorkspace, StepVectors, zeroed,
 };
 use crate::contact::rolling::own_blocks::OwnBlocks;
 use crate::contact::rolling::slip_equations::{SlipEquations, SlipScratch};
 
-/// Projection parameter times `M_ii`.
+/// Projection parameter r times `M_ii`. Sensitivity not measured.
 const PROJECTION: f64 = 0.3;
-/// Newton steps before giving up.
+/// Newton steps after which the iteration is given up: usual solves take 3 to 12.
 const ITERATIONS_MAX: u32 = 60;
-/// The first steps are never halved: far from the solution the residual may grow for a step or two.
+/// The first so many steps are never halved: far from the solution the residual may grow for a step or two. Sensitivity not measured.
 const FREE_STEPS: u32 = 8;
-/// A step is halved at most this often.
+/// A step is halved at most so many times. Sensitivity not measured.
 const HALVINGS_MAX: u32 = 5;
-/// Tractions this close to the tangents of their discs, relative to the residual, are left where they are.
+/// If the tractions of slipping cells are this close to the tangents of their discs, relative to the residual, they are not moved there,
+/// which saves a product. Sensitivity not measured.
 const LIFT_NEGLIGIBLE: f64 = 0.1;
-/// A linear system is solved at most this exactly, and at least that.
+/// Smallest and largest tolerance of a linear system. Sensitivity not measured.
 const INNER_TOLERANCE: (f64, f64) = (1e-4, 1e-1);
-/// The residual may grow by this factor against the largest of the last steps before a step is halved.
+/// A step is halved if the residual exceeds the largest of the last three by this factor. Sensitivity not measured.
 const GROWTH_ALLOWED: f64 = 1.5;
 
 /// Solver for one rule on one mesh. It is not changed by a solve, and threads may share it.
@@ -91,13 +94,7 @@ impl<'a> Newton<'a> {
         workspace: &mut NewtonWorkspace,
         monitor: &dyn Monitor,
     ) -> Result<Convergence, Stop> {
-        let mut report = Convergence {
-            converged: false,
-            iterations: 0,
-            products: 0,
-            residual: f64::INFINITY,
-            inexact_steps: 0,
-        };
+        let mut report = Convergence::default();
         let mut vectors = std::mem::take(&mut workspace.vectors);
         vectors.copy(t);
         let StepVectors {
@@ -117,7 +114,7 @@ impl<'a> Newton<'a> {
                 best.copy_from_slice(t);
             }
             if report.residual <= law.tolerance {
-                report.converged = true;
+                report.exit = NewtonExit::Converged;
                 break;
             }
             recent[report.iterations as usize % 3] = report.residual;
@@ -139,7 +136,7 @@ impl<'a> Newton<'a> {
             self.halve(law, [before, candidate], allowed, t, workspace, &mut report);
             report.iterations += 1;
         }
-        if !report.converged {
+        if !report.exit.converged() {
             report.residual = least;
             t.copy_from_slice(best);
         }
@@ -259,7 +256,8 @@ impl<'a> Newton<'a> {
             }
             let (dx, dy) = (zx / length, zy / length);
             linear.direction.push((-dy, dx));
-            // A cell without pressure has no freedom: an infinite stiffness would spoil the factors, a large one serves.
+            // A cell without pressure carries no traction, which is an infinite stiffness. A large finite one keeps the
+            // factorisation sound.
             let stiffness = if bound > 0.0 {
                 (length - bound) / (bound * r)
             } else {
@@ -270,7 +268,7 @@ impl<'a> Newton<'a> {
             to_tangent.push((lift * dx, lift * dy));
             lifted += law.area[i] * lift * lift;
         }
-        // Near the solution the tangent differs from the circle by less than the step will leave over.
+        // Near the solution the distance to the tangent is less than the residual that the step leaves.
         if (lifted / weight).sqrt() > LIFT_NEGLIGIBLE * residual * law.scale {
             for (i, (x, y)) in to_tangent.iter().enumerate() {
                 t[i] += x;
@@ -359,8 +357,8 @@ impl<'a> Newton<'a> {
     }
 }
 
-/// How exactly a linear system deserves to be solved: loosely while the zones still move, then as the squared progress
-/// of the residual (Eisenstat & Walker 1996, choice 2), never beyond what the end needs.
+/// Tolerance of a linear system: loose while the zones still move, then the square of the progress of the residual (Eisenstat & Walker
+/// 1996, choice 2), but no tighter than the last step needs.
 fn inner_tolerance(residual: f64, last: f64, goal: f64) -> f64 {
     let progress = if last.is_finite() {
         0.5 * (residual / last).powi(2)

@@ -1,15 +1,17 @@
 //! The fast solver: projection form, semismooth Newton, strip-preconditioned GMRES.
 //!
-//! Every level is solved twice: with the three-point rule from the given start, then with the trapezoid rule from
-//! that solution. Tractions, zones and forces come from the trapezoid, whose resultants are the more exact; the size of
-//! the slip from the three-point rule, whose slips are smooth, along the traction as Coulomb's law demands; the
-//! difference of the two rules is a second opinion on the error.
+//! Every level is solved twice: with the three-point rule from the given start, then with the trapezoid rule from that solution.
+//! Tractions, zones and forces are those of the trapezoid rule, whose resultants are more exact. The size of the slip is that of the
+//! three-point rule, whose slips are smooth; its direction is that of the traction, as Coulomb's law demands. The difference of the
+//! two rules is one of the indicators of the error.
 
 use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::gmres::GmresExit;
 use crate::contact::remark::list::Remark;
-use crate::contact::rolling::answer::{LevelAnswer, LevelFailure, Work, project_on_bound};
+use crate::contact::rolling::answer::{
+    LevelAnswer, LevelExit, LevelFailure, Work, project_on_bound,
+};
 use crate::contact::rolling::methods::boundary_element::fixed_point::fixed_point;
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
 use crate::contact::rolling::methods::boundary_element::task::{Convergence, NewtonTask};
@@ -19,6 +21,7 @@ use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::LevelOperator;
 use crate::contact::rolling::own_blocks::OwnBlocks;
 use crate::contact::rolling::refinement::warm_start::Start;
+use crate::contact::rolling::skip::Skip;
 use crate::contact::rolling::slip_equations::SlipEquations;
 use crate::contact::rolling::slip_rules::Rule;
 use crate::contact::rolling::strip_mesh::StripMesh;
@@ -47,16 +50,16 @@ pub fn solve(
         monitor,
     };
     let mut solve = RuleSequence::new(level, motion, &operator, parity, control);
-    let mut skipped = Vec::new();
+    let mut skips = Vec::new();
     if parity.is_some() {
-        skipped.push("mirror symmetry of patch and motion: half the cells".to_owned());
+        skips.push(Skip::HalfTheCells);
     } else if level.is_mirrored() {
-        skipped.push("mirror symmetry of the patch: half the influence".to_owned());
+        skips.push(Skip::HalfTheOperator);
     }
     let mut t = solve.start(start.map(|start| &start.mirror));
     let mirror = solve.mirror(&mut t, start.is_some())?;
     if mirror.by_fixed_point {
-        skipped.push("everything slips: fixed point instead of Newton".to_owned());
+        skips.push(Skip::FullSlip);
     }
     let by_mirror = solve.expand(&t);
     let mut remarks = Vec::new();
@@ -76,13 +79,14 @@ pub fn solve(
         second,
         slip,
         slips,
+        exit: LevelExit::Solved,
         work: solve.work,
-        skipped,
+        skips,
         remarks,
     })
 }
 
-/// Tractions of the trapezoid rule alone, from a start that is near: what a companion of a mesh is asked for.
+/// Tractions of the trapezoid rule alone, from a start that is near; for the companions of a mesh.
 ///
 /// # Errors
 /// [`LevelFailure::NotConverged`] if neither the start nor the upwind solution leads to a solution; [`LevelFailure::Stopped`] if the
@@ -120,7 +124,7 @@ pub fn trapezoid(
     Ok((traction, solve.work))
 }
 
-/// Why there is no answer, as far as is known, and what to do, as a clause.
+/// A clause that says why there is no answer, as far as is known, and what to do.
 fn advice(report: &Convergence) -> String {
     let linear = match report.inexact_steps {
         0 => String::new(),
@@ -132,7 +136,7 @@ fn advice(report: &Convergence) -> String {
     format!("{linear}try another mesh, with cells and strips of similar width")
 }
 
-/// What the three-point rule gave besides tractions.
+/// What the three-point rule gives besides tractions.
 struct ThreePointAnswer {
     slip: [Vec<f64>; 2],
     slips: Vec<bool>,
@@ -263,16 +267,16 @@ impl<'a> RuleSequence<'a> {
         let rigid = equations.rigid(self.motion);
         let newton = self.newton(&equations);
         let (mut report, by_fixed_point) = self.rule(&newton, &rigid, t, true)?;
-        if !report.converged && started {
+        if !report.exit.converged() && started {
             t.fill(0.0);
             report = self.rule(&newton, &rigid, t, false)?.0;
         }
-        if !report.converged {
+        if !report.exit.converged() {
             t.fill(0.0);
             self.upwind(t)?;
             report = self.rule(&newton, &rigid, t, false)?.0;
         }
-        if !report.converged {
+        if !report.exit.converged() {
             return Err(LevelFailure::NotConverged {
                 work: self.work,
                 tolerance: self.control.tolerance,
@@ -304,7 +308,7 @@ impl<'a> RuleSequence<'a> {
         let equations = self.equations(Rule::Upwind);
         let rigid = equations.rigid(self.motion);
         let newton = self.newton(&equations);
-        Ok(self.rule(&newton, &rigid, t, false)?.0.converged)
+        Ok(self.rule(&newton, &rigid, t, false)?.0.exit.converged())
     }
 
     /// The trapezoid rule from a start of its own if there is one, else from the three-point solution in `t`, else from the
@@ -322,15 +326,30 @@ impl<'a> RuleSequence<'a> {
         let mut found = t.to_vec();
         if let Some(warm) = warm {
             found.copy_from_slice(&warm);
-            converged = self.rule(&newton, &rigid, &mut found, true)?.0.converged;
+            converged = self
+                .rule(&newton, &rigid, &mut found, true)?
+                .0
+                .exit
+                .converged();
             if !converged {
                 found.copy_from_slice(t);
             }
         }
-        if !converged && !self.rule(&newton, &rigid, &mut found, true)?.0.converged {
+        if !converged
+            && !self
+                .rule(&newton, &rigid, &mut found, true)?
+                .0
+                .exit
+                .converged()
+        {
             found.fill(0.0);
             self.upwind(&mut found)?;
-            if !self.rule(&newton, &rigid, &mut found, false)?.0.converged {
+            if !self
+                .rule(&newton, &rigid, &mut found, false)?
+                .0
+                .exit
+                .converged()
+            {
                 self.work.residual = residual;
                 return Ok(None);
             }

@@ -15,11 +15,28 @@ pub struct NewtonTask<'a> {
     pub tolerance: f64,
 }
 
-/// How a solve ended.
+/// How an iteration for the tractions ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NewtonExit {
+    /// The residual reached the tolerance.
+    Converged,
+    /// The steps were used up before.
+    StepsUsedUp,
+}
+
+impl NewtonExit {
+    /// Was the tolerance met?
+    #[must_use]
+    pub fn converged(self) -> bool {
+        self == NewtonExit::Converged
+    }
+}
+
+/// How a solve went.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Convergence {
-    /// Did the residual reach the tolerance?
-    pub converged: bool,
+    /// How it ended.
+    pub exit: NewtonExit,
     /// Newton steps.
     pub iterations: u32,
     /// Products of the influence with a vector.
@@ -28,4 +45,17 @@ pub struct Convergence {
     pub residual: f64,
     /// Steps whose linear system was not solved to its tolerance; harmless if the residual still came down.
     pub inexact_steps: u32,
+}
+
+impl Default for Convergence {
+    /// Before the first step.
+    fn default() -> Self {
+        Convergence {
+            exit: NewtonExit::StepsUsedUp,
+            iterations: 0,
+            products: 0,
+            residual: f64::INFINITY,
+            inexact_steps: 0,
+        }
+    }
 }

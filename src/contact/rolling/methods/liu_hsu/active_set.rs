@@ -3,7 +3,7 @@
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::methods::liu_hsu::initial_guess::InitialGuess;
 use crate::contact::rolling::methods::liu_hsu::newton_raphson;
-use crate::contact::rolling::methods::liu_hsu::newton_raphson::StepRule;
+use crate::contact::rolling::methods::liu_hsu::newton_raphson::{NewtonRaphsonExit, StepRule};
 use crate::contact::rolling::methods::liu_hsu::stick_block::{
     DenseProblem, SlipSystem, both_components,
 };
@@ -179,7 +179,7 @@ impl RootChoice<'_> {
     fn find(&mut self, mut t: Vec<f64>, steps: StepRule) -> Result<Option<Vec<f64>>, Stop> {
         let end = newton_raphson::solve(self.system, &self.bound, steps, &mut t, self.monitor)?;
         self.iterations += end.iterations;
-        Ok(end.converged.then_some(t))
+        Ok((end.exit == NewtonRaphsonExit::Converged).then_some(t))
     }
 
     /// A root with as few cells as possible that pull against their slip. Eq. 9 has a root for every choice of such

@@ -25,9 +25,20 @@ pub enum StepRule {
 
 /// How an iteration ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NewtonRaphsonExit {
+    /// The last step was small.
+    Converged,
+    /// A step was no number.
+    Diverged,
+    /// The steps were used up.
+    StepsUsedUp,
+}
+
+/// How an iteration went.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NewtonEnd {
-    /// Did the steps become small?
-    pub converged: bool,
+    /// How it ended.
+    pub exit: NewtonRaphsonExit,
     /// Steps taken.
     pub iterations: u32,
 }
@@ -48,10 +59,14 @@ pub fn solve(
     monitor: &dyn Monitor,
 ) -> Result<NewtonEnd, Stop> {
     let mut end = NewtonEnd {
-        converged: bound.is_empty(),
+        exit: NewtonRaphsonExit::StepsUsedUp,
         iterations: 0,
     };
-    while !end.converged && end.iterations < ITERATIONS_MAX {
+    if bound.is_empty() {
+        end.exit = NewtonRaphsonExit::Converged;
+        return Ok(end);
+    }
+    while end.iterations < ITERATIONS_MAX {
         check(monitor)?;
         let step = newton_step(system, bound, t, monitor)?;
         end.iterations += 1;
@@ -64,6 +79,7 @@ pub fn solve(
                     |a: f64, b| if b.is_nan() { f64::NAN } else { a.max(b) },
                 );
         if !largest.is_finite() {
+            end.exit = NewtonRaphsonExit::Diverged;
             break;
         }
         match steps {
@@ -74,7 +90,10 @@ pub fn solve(
             }
             StepRule::OnCircles => search_on_circles(system, bound, &step, t),
         }
-        end.converged = largest <= STEP_SMALL;
+        if largest <= STEP_SMALL {
+            end.exit = NewtonRaphsonExit::Converged;
+            break;
+        }
     }
     Ok(end)
 }

@@ -1,7 +1,9 @@
 //! The method on a mesh level of a case, as the recipe calls it.
 
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::rolling::answer::{LevelAnswer, LevelFailure, Work, project_on_bound};
+use crate::contact::rolling::answer::{
+    LevelAnswer, LevelExit, LevelFailure, Work, project_on_bound,
+};
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
 use crate::contact::rolling::methods::boundary_element::task::NewtonTask;
 use crate::contact::rolling::methods::full_slip;
@@ -69,8 +71,9 @@ pub fn solve(
         second: None,
         slip,
         slips: outcome.slips,
+        exit: LevelExit::Solved,
         work,
-        skipped: Vec::new(),
+        skips: Vec::new(),
         remarks: Vec::new(),
     })
 }

@@ -207,13 +207,7 @@ impl<'a> ZonesSearch<'a> {
     /// Residual of the projected friction law, the measure both methods share.
     fn residual(&mut self, tractions: &[f64]) -> f64 {
         let padded = self.task.padded(tractions);
-        let mut unused = Convergence {
-            converged: false,
-            iterations: 0,
-            products: 0,
-            residual: 0.0,
-            inexact_steps: 0,
-        };
+        let mut unused = Convergence::default();
         let workspace = &mut self.workspace;
         self.newton
             .evaluate(&self.stage.law, &padded, workspace, &mut unused)

@@ -1,0 +1,35 @@
+//! Work that a motion did not need, and why.
+
+/// A part of the usual work that was recognised as unnecessary.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Skip {
+    /// The tractions of a motion without creepage and spin are 0.
+    NoMotion,
+    /// Without friction there are no tractions.
+    NoFriction,
+    /// The rigid slip is so large that elastic slip cannot turn the tractions.
+    RigidSlip,
+    /// Everything slips, and a fixed point found the tractions.
+    FullSlip,
+    /// Patch and motion are mirror-symmetric, so that half the cells are unknowns.
+    HalfTheCells,
+    /// The patch alone is mirror-symmetric, so that half the operator is enough.
+    HalfTheOperator,
+}
+
+impl Skip {
+    /// The sentence a client reads.
+    #[must_use]
+    pub fn text(self) -> &'static str {
+        match self {
+            Skip::NoMotion => "no creepage and no spin: nothing to solve",
+            Skip::NoFriction => "no friction: no tractions",
+            Skip::RigidSlip => {
+                "rigid slip exceeds any elastic slip a million times: everything slips along it"
+            }
+            Skip::FullSlip => "everything slips: fixed point instead of Newton",
+            Skip::HalfTheCells => "mirror symmetry of patch and motion: half the cells",
+            Skip::HalfTheOperator => "mirror symmetry of the patch: half the influence",
+        }
+    }
+}
