@@ -1,5 +1,6 @@
 //! What can go wrong in `contact`: a case that cannot be asked, and a solve that has no answer.
 
+use serde_json::{Number, Value};
 use thiserror::Error;
 
 use crate::contact::monitor::Stop;
@@ -12,6 +13,75 @@ pub struct Fault {
     pub pointer: String,
     /// The value given and what is allowed, as a sentence.
     pub detail: String,
+    /// The same for programs, as far as it is that simple.
+    pub figures: Box<FaultFigures>,
+}
+
+impl Fault {
+    /// A fault of which no more is known than the sentence.
+    #[must_use]
+    pub fn new(pointer: impl Into<String>, detail: impl Into<String>) -> Fault {
+        Fault {
+            pointer: pointer.into(),
+            detail: detail.into(),
+            figures: Box::default(),
+        }
+    }
+}
+
+/// What a fault is, for programs.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct FaultFigures {
+    /// The kind of the fault.
+    pub code: FaultCode,
+    /// The value given, where it is no array, no object and no long text.
+    pub value: Option<Value>,
+    /// Smallest number allowed.
+    pub minimum: Option<Number>,
+    /// The smallest number itself is not allowed.
+    pub minimum_excluded: bool,
+    /// Largest number, or number of elements or characters, allowed.
+    pub maximum: Option<Number>,
+    /// Unit of these numbers.
+    pub unit: Option<&'static str>,
+    /// The words that are allowed.
+    pub allowed: Vec<String>,
+}
+
+/// Kinds of faults.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum FaultCode {
+    /// Another one, which the sentence tells.
+    #[default]
+    Invalid,
+    /// A member that is needed is not there.
+    Missing,
+    /// A member is not known here.
+    UnknownMember,
+    /// A value of another type is needed.
+    WrongType,
+    /// A number is too small or too large.
+    OutOfRange,
+    /// A word is none of those allowed.
+    UnknownWord,
+    /// A text is too long.
+    TooLong,
+}
+
+impl FaultCode {
+    /// The code that clients read.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            FaultCode::Invalid => "invalid",
+            FaultCode::Missing => "missing",
+            FaultCode::UnknownMember => "unknown-member",
+            FaultCode::WrongType => "wrong-type",
+            FaultCode::OutOfRange => "out-of-range",
+            FaultCode::UnknownWord => "unknown-word",
+            FaultCode::TooLong => "too-long",
+        }
+    }
 }
 
 /// Every fault of a case at once; never empty.

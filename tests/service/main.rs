@@ -3,6 +3,7 @@
 mod access;
 mod admission;
 mod api;
+mod batch_columns;
 mod batch_deletion;
 mod batch_tables;
 mod batches;
@@ -19,6 +20,7 @@ mod dashboard;
 mod documents;
 mod errors;
 mod events;
+mod faults;
 mod forces;
 mod formats;
 mod fuzzed;

@@ -157,8 +157,8 @@ fn normal_force(task: Option<&NormalTask>, load: Option<&Load>) -> Option<f64> {
 }
 
 pub(crate) fn missing_load() -> Fault {
-    Fault {
-        pointer: "/load".to_owned(),
-        detail: "missing; exactly one of normal_force_n, approach_mm is needed".to_owned(),
-    }
+    Fault::new(
+        "/load",
+        "missing; exactly one of normal_force_n, approach_mm is needed".to_owned(),
+    )
 }

@@ -165,8 +165,5 @@ fn pressing(load: &Load) -> Pressing {
 }
 
 fn fault(pointer: &str, detail: String) -> Fault {
-    Fault {
-        pointer: pointer.to_owned(),
-        detail,
-    }
+    Fault::new(pointer, detail)
 }

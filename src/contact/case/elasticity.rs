@@ -36,13 +36,13 @@ impl Elasticity {
         let nu = 0.5 * g * (nu1 / g1 + nu2 / g2);
         let k = 0.25 * g * ((1.0 - 2.0 * nu1) / g1 - (1.0 - 2.0 * nu2) / g2);
         if k.abs() > DIFFERENCE_MAX {
-            return Err(Fault {
-                pointer: "/material".to_owned(),
-                detail: format!(
+            return Err(Fault::new(
+                "/material",
+                format!(
                     "the two bodies give the difference parameter K = {k:.4}; at most {DIFFERENCE_MAX} in size is allowed, \
                      because the coupling of pressure and traction is not solved by this version"
                 ),
-            });
+            ));
         }
         Ok(Elasticity {
             shear_modulus: g,

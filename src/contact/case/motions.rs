@@ -65,7 +65,7 @@ impl ExpandedMotions {
             } else {
                 continue;
             };
-            let fault = Fault { pointer, detail };
+            let fault = Fault::new(pointer, detail);
             if faults.len() < FAULTS_MAX
                 && !faults.iter().any(|f: &Fault| f.pointer == fault.pointer)
             {
@@ -109,13 +109,13 @@ fn list(motions: &Motions, limits: &Limits) -> Result<Vec<AskedMotion>, Fault> {
         Motions::Sweep { sweep } => sweep_length(sweep),
     };
     if count > limits.motions_max as u128 {
-        return Err(Fault {
-            pointer: "/motion".to_owned(),
-            detail: format!(
+        return Err(Fault::new(
+            "/motion",
+            format!(
                 "{count} motions given; at most {} are allowed in one case",
                 limits.motions_max
             ),
-        });
+        ));
     }
     Ok(match motions {
         Motions::One(motion) => vec![*motion],

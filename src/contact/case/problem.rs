@@ -24,6 +24,7 @@ use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::rolling::methods::method::{Method, TractionBound};
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::solution::words::Asked;
 
 /// Which motions of a case a problem asks about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -92,7 +93,7 @@ pub struct Run {
 }
 
 /// What a case is called; the answer does not depend on it.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Label {
     /// Free text of the client.
     pub name: Option<String>,
@@ -100,6 +101,8 @@ pub struct Label {
     pub labels: BTreeMap<String, String>,
     /// Hexadecimal digest of everything that determines the answer, the solver version included.
     pub digest: String,
+    /// What of the case stands in the answer.
+    pub asked: Asked,
 }
 
 impl CheckedCase {
@@ -161,6 +164,11 @@ impl CheckedCase {
                 name: case.name.clone(),
                 labels: case.labels.clone(),
                 digest,
+                asked: Asked {
+                    contact: case.contact.name().to_owned(),
+                    friction_coefficient: case.friction.coefficient,
+                    load: case.load,
+                },
             },
             remarks,
         })

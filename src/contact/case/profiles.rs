@@ -192,5 +192,5 @@ fn profile(body: Body, section: &CrossSection) -> Result<Profile, Fault> {
 }
 
 fn fault(pointer: String, detail: String) -> Fault {
-    Fault { pointer, detail }
+    Fault::new(pointer, detail)
 }

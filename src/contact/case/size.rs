@@ -128,40 +128,31 @@ impl SizeInput {
         let mut faults = Vec::new();
         let (cells, _) = self.finest();
         if self.method == Method::LiuHsu && cells > LIU_HSU_CELLS_MAX {
-            faults.push(Fault {
-                pointer: pointer.to_owned(),
-                detail: format!(
+            faults.push(Fault::new(pointer, format!(
                     "{cells:.0} cells over all patches; at most {LIU_HSU_CELLS_MAX} are allowed with liu_hsu, \
                      use boundary_element for more"
-                ),
-            });
+                )));
         }
         let fast = matches!(self.method, Method::BoundaryElement);
         if let Some(ratio) = self
             .ellipse
             .filter(|ratio| fast && *ratio > LENGTH_OVER_WIDTH_MAX)
         {
-            faults.push(Fault {
-                pointer: "/contact".to_owned(),
-                detail: format!(
+            faults.push(Fault::new("/contact", format!(
                     "a patch {ratio:.1} times as long along rolling as wide; boundary_element solves up to \
                      {LENGTH_OVER_WIDTH_MAX} times, fastsim any"
-                ),
-            });
+                )));
         }
         let bytes = self.bytes() as u64;
         if bytes > limits.memory_bytes {
             let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
-            faults.push(Fault {
-                pointer: pointer.to_owned(),
-                detail: format!(
+            faults.push(Fault::new(pointer, format!(
                     "{cells:.0} cells over all patches and {} motions need about {:.0} MiB; at most {:.0} MiB are \
                      allowed for one case",
                     self.motions,
                     mebibytes(bytes),
                     mebibytes(limits.memory_bytes)
-                ),
-            });
+                )));
         }
         faults
     }

@@ -101,7 +101,9 @@ impl<'a> Assembly<'a> {
         let case = self.case;
         let patches = self.patches.iter().zip(self.points);
         let solution = Solution {
-            patches: patches.map(patch_solution).collect(),
+            patches: patches
+                .map(|(patch, points)| patch_solution(case, patch, points))
+                .collect(),
             total: self.total,
             remarks: merged(self.remarks),
             normal: self.pressed.report,
@@ -124,6 +126,7 @@ impl<'a> Assembly<'a> {
             },
             solver_version: env!("CARGO_PKG_VERSION").to_owned(),
             case_digest: case.label.digest.clone(),
+            asked: Some(case.label.asked.clone()),
         };
         (solution, self.fields)
     }
@@ -135,9 +138,10 @@ pub fn wants_fields(case: &CheckedCase) -> bool {
     case.run.outputs.iter().any(|o| *o != Output::Resultants)
 }
 
-fn patch_solution((patch, points): (&Patch, Vec<PointSolution>)) -> PatchSolution {
+fn patch_solution(case: &CheckedCase, patch: &Patch, points: Vec<PointSolution>) -> PatchSolution {
     PatchSolution {
         normal_force_n: patch.normal_force,
+        friction_limit_n: Some(case.problem.friction.limit(patch)),
         approach_mm: patch.approach,
         area_mm2: patch.area,
         pressure_max_mpa: patch.pressure_max,

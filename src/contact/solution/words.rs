@@ -6,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::contact::case::words::contact::Load;
 use crate::contact::case::words::motion::MotionWords;
 use crate::contact::case::words::solver::MethodName;
 use crate::contact::remark::entry::RemarkEntry;
@@ -38,6 +39,23 @@ pub struct Solution {
     pub solver_version: String,
     /// Digest of the canonical case; equal cases have equal digests.
     pub case_digest: String,
+    /// What of the case is needed to read the numbers.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub asked: Option<Asked>,
+}
+
+/// What of a case is needed to read its answer.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Asked {
+    /// The `type` of the contact.
+    pub contact: String,
+    /// Coefficient of friction: no tangential traction exceeds it times the pressure.
+    pub friction_coefficient: f64,
+    /// The load; absent where the case has none.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub load: Option<Load>,
 }
 
 /// How the normal problem of a gap was solved.
@@ -88,6 +106,10 @@ pub struct CombinedMaterial {
 pub struct PatchSolution {
     /// Normal force in N.
     pub normal_force_n: f64,
+    /// The largest tangential force that friction allows, in N.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub friction_limit_n: Option<f64>,
     /// Approach of distant points in mm; absent where the pressure was given.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub approach_mm: Option<f64>,

@@ -1,8 +1,12 @@
 //! The body of a failure as the client reads it, in an answer or inside a job (RFC 9457).
 
+use std::borrow::Cow;
+
 use serde::Serialize;
+use serde_json::{Number, Value};
 use utoipa::ToSchema;
 
+use crate::contact::error::{Fault as CaseFault, FaultCode};
 use crate::http::problem::kinds::ProblemKind;
 use crate::jobs::model::{Failure, FailureKind, Job};
 
@@ -43,7 +47,7 @@ pub struct ProblemBody {
 }
 
 /// One fault of a request. Exactly one of `pointer`, `parameter` and `header` says where it is.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
 pub struct Fault {
     /// JSON pointer (RFC 6901) into the body; empty for the body as a whole.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -58,8 +62,36 @@ pub struct Fault {
     /// Line of the body that holds the faulty case of a batch, counted from 1; only of NDJSON.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub line: Option<u64>,
+    /// Kind of the fault: `invalid` where only `detail` tells more, else `missing`, `unknown-member`, `wrong-type`, `out-of-range`,
+    /// `unknown-word`, `too-long`, `unknown-parameter`, or `repeated`. There may be more.
+    #[schema(example = "out-of-range")]
+    pub code: Cow<'static, str>,
     /// The value given and what is allowed.
     pub detail: String,
+    /// The value given, where it is no array, no object and no long text.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<Value>)]
+    pub value: Option<Value>,
+    /// Smallest number allowed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<f64>, nullable = false)]
+    pub minimum: Option<Number>,
+    /// The smallest number itself is not allowed; absent if it is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub minimum_excluded: Option<bool>,
+    /// Largest number, or number of characters, allowed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<f64>, nullable = false)]
+    pub maximum: Option<Number>,
+    /// Unit of these numbers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<String>, nullable = false)]
+    pub unit: Option<&'static str>,
+    /// The words that are allowed.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schema(required = false)]
+    pub allowed: Vec<String>,
 }
 
 impl Fault {
@@ -67,11 +99,35 @@ impl Fault {
     #[must_use]
     pub fn parameter(name: &str, detail: impl Into<String>) -> Self {
         Fault {
-            pointer: None,
             parameter: Some(name.to_owned()),
-            header: None,
-            line: None,
+            ..Fault::invalid(detail)
+        }
+    }
+
+    /// A fault of which no more is known than the sentence; where it is has to be filled in.
+    #[must_use]
+    pub fn invalid(detail: impl Into<String>) -> Self {
+        Fault {
+            code: FaultCode::default().name().into(),
             detail: detail.into(),
+            ..Fault::default()
+        }
+    }
+}
+
+impl From<CaseFault> for Fault {
+    fn from(fault: CaseFault) -> Self {
+        let figures = *fault.figures;
+        Fault {
+            pointer: Some(fault.pointer),
+            code: figures.code.name().into(),
+            value: figures.value,
+            minimum: figures.minimum,
+            minimum_excluded: figures.minimum_excluded.then_some(true),
+            maximum: figures.maximum,
+            unit: figures.unit,
+            allowed: figures.allowed,
+            ..Fault::invalid(fault.detail)
         }
     }
 }
@@ -114,10 +170,7 @@ impl ProblemBody {
             .errors
             .extend(failure.pointer.as_ref().map(|pointer| Fault {
                 pointer: Some(pointer.clone()),
-                parameter: None,
-                header: None,
-                line: None,
-                detail: failure.detail.clone(),
+                ..Fault::invalid(failure.detail.clone())
             }));
         problem
     }

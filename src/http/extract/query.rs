@@ -228,10 +228,13 @@ impl Query {
                 } else {
                     quoted(known)
                 };
-                query.faults.push(Fault::parameter(
-                    &name,
-                    format!("`{name}` is not a parameter here; allowed: {allowed}"),
-                ));
+                let detail = format!("`{name}` is not a parameter here; allowed: {allowed}");
+                query.faults.push(Fault {
+                    code: "unknown-parameter".into(),
+                    value: Some(value.into()),
+                    allowed: known.iter().map(ToString::to_string).collect(),
+                    ..Fault::parameter(&name, detail)
+                });
             } else {
                 query.pairs.push((name, value));
             }
@@ -255,10 +258,11 @@ impl Query {
         match reader.read(&texts) {
             Ok(value) => Some(value),
             Err((text, allowed)) => {
-                self.faults.push(Fault::parameter(
-                    name,
-                    format!("`{name}` is `{text}`; allowed: {allowed}"),
-                ));
+                let detail = format!("`{name}` is `{text}`; allowed: {allowed}");
+                self.faults.push(Fault {
+                    value: Some(text.into()),
+                    ..Fault::parameter(name, detail)
+                });
                 None
             }
         }
@@ -275,7 +279,10 @@ impl Query {
                 .filter(|(other, _)| other == name);
             if before.count() == 1 && !self.repeatable.contains(name) {
                 let detail = format!("`{name}` is given more than once; give it once");
-                self.faults.push(Fault::parameter(name, detail));
+                self.faults.push(Fault {
+                    code: "repeated".into(),
+                    ..Fault::parameter(name, detail)
+                });
             }
         }
         if self.faults.is_empty() {

@@ -138,11 +138,8 @@ impl ApiError {
         let detail = detail.into();
         let mut failure = ApiError::new(ProblemKind::BadHeader, detail.clone());
         failure.problem.errors = vec![Fault {
-            pointer: None,
-            parameter: None,
             header: Some(name.to_owned()),
-            line: None,
-            detail,
+            ..Fault::invalid(detail)
         }];
         failure
     }
@@ -161,13 +158,7 @@ impl From<CaseError> for ApiError {
         failure.problem.errors = faults
             .into_iter()
             .take(FAULTS_LISTED)
-            .map(|fault| Fault {
-                pointer: Some(fault.pointer),
-                parameter: None,
-                header: None,
-                line: None,
-                detail: fault.detail,
-            })
+            .map(Fault::from)
             .collect();
         failure
     }

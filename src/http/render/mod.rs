@@ -1,5 +1,6 @@
 //! The forms of an answer other than JSON; one format is one file.
 
+pub mod batch_csv;
 pub mod csv;
 pub mod npz;
 pub mod picture;

@@ -1,6 +1,7 @@
 //! `/v1/batches/{id}/results`: one line per case in the order they were sent, written while it is read.
 
 use std::pin::Pin;
+use std::sync::Arc;
 use std::time::Duration;
 
 use axum::Extension;
@@ -14,21 +15,19 @@ use tokio::time::Instant;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::solution::words::Solution;
 use crate::http::dto::problem::ProblemBody;
 use crate::http::dto::result::JobResult;
 use crate::http::extract::accept::{Format, choose, one_of};
 use crate::http::extract::caller::{Caller, Credential, revoked};
 use crate::http::extract::ids::BatchId;
-use crate::http::extract::query::{Parameters, query, seconds};
+use crate::http::extract::query::{Parameters, Repeated, id, query, reader, seconds};
 use crate::http::layers::compression::StreamedUnbuffered;
 use crate::http::limits::concurrency::ConcurrencyLimits;
 use crate::http::limits::holding_body::{HeldShares, hold_while_sent};
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
-use crate::http::render::csv::number;
+use crate::http::render::batch_csv::Columns;
 use crate::jobs::Jobs;
 use crate::jobs::batch::model::{BatchItem, ItemResult};
 use crate::jobs::error::JobsError;
@@ -71,6 +70,14 @@ query! {
         /// Wait for jobs that have not ended, at most this many seconds in all; lines are sent as soon as everything before them is there
         #[param(minimum = 0, maximum = 3600)]
         wait: u32 as u32 = seconds(0, WAIT_MAX_SECONDS);
+        /// Only lines after that of this job, as to go on after the last line that was read
+        #[param(format = "uuid")]
+        after: Uuid as String = id("job");
+        /// Only lines of jobs in this state; may be repeated for jobs in one of several
+        state: Vec<JobState> as Vec<JobState> = Repeated(reader(JobState::ALL.map(JobState::name).join(", "), JobState::from_name));
+        /// Columns of the CSV, with commas between, such as `label:km,force_y_n`; with `patch` among them there is a line for each patch. See `docs/formats.md`
+        #[param(example = "label:km,pressure_max_mpa,target_met")]
+        columns: Columns as String = reader(Columns::allowed(), Columns::read);
         /// `ndjson` or `csv`; overrides `Accept`
         #[param(pattern = "^(ndjson|csv)$", example = "csv")]
         format: Format as String = one_of(FORMATS);
@@ -85,7 +92,7 @@ problems! {
 /// The results of a batch in the order its cases were sent.
 ///
 /// NDJSON: exactly one line per job, nothing else. CSV: a header, then one line per job and motion with the sums over
-/// all patches; a job without a result has one line without numbers. Without `wait` unfinished jobs appear with their state.
+/// all patches, or with the column `patch` one line per job, motion and patch; a job without a result has one line without numbers. Without `wait` unfinished jobs appear with their state.
 #[utoipa::path(
     get,
     path = "/v1/batches/{id}/results",
@@ -106,8 +113,13 @@ pub async fn results(
     key: Option<Extension<Credential>>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    let BatchResultsQuery { wait, format } = BatchResultsQuery::read(&uri, &())?;
-    let format = choose(&headers, format, FORMATS)?;
+    let query = BatchResultsQuery::read(&uri, &())?;
+    let wait = query.wait;
+    let format = choose(&headers, query.format, FORMATS)?;
+    if query.columns.is_some() && format != Format::Csv {
+        let detail = "only CSV has columns; ask for it with `format=csv`";
+        return Err(ApiError::bad_parameter("columns", detail));
+    }
     // Unknown batches are answered before the stream begins.
     jobs.batch(id).await?;
     let place = match wait {
@@ -118,8 +130,12 @@ pub async fn results(
         held.release();
     }
     let until = wait.map(|seconds| Instant::now() + Duration::from_secs(seconds.into()));
+    let columns = Arc::new(query.columns.unwrap_or_default());
     let head = match format {
-        Format::Csv => Some(Bytes::from(csv_head())),
+        Format::Csv => {
+            let head = columns.head().map_err(|error| ApiError::internal(&error))?;
+            Some(Bytes::from(head))
+        }
         _ => None,
     };
     let revoked = Box::pin(revoked(jobs.clone(), key.map(|Extension(key)| key)));
@@ -129,7 +145,9 @@ pub async fn results(
         batch: id,
         format,
         until,
-        after: None,
+        after: query.after,
+        states: query.state.unwrap_or_default(),
+        columns,
         page: FIRST_PAGE_JOBS,
         head,
     };
@@ -154,6 +172,9 @@ struct StreamPosition {
     format: Format,
     until: Option<Instant>,
     after: Option<Uuid>,
+    /// States of the jobs that have lines; all if there is none.
+    states: Vec<JobState>,
+    columns: Arc<Columns>,
     /// Jobs to read at once; large results are read few at a time.
     page: u32,
     head: Option<Bytes>,
@@ -165,29 +186,50 @@ async fn next_piece(
     if let Some(head) = place.head.take() {
         return Ok(Some((head, place)));
     }
-    let lines = place
-        .jobs
-        .batch_items(place.batch, place.after, place.page, place.until);
-    let lines = tokio::select! {
-        lines = lines => lines?,
-        // Broken off, so that what was sent is not taken for all there is.
-        () = &mut place.revoked => return Err(JobsError::BatchNotFound),
-    };
-    let read = u32::try_from(lines.len()).unwrap_or(PAGE_JOBS);
-    place.page = (2 * read).clamp(4, PAGE_JOBS);
-    let Some(last) = lines.last() else {
-        return Ok(None);
-    };
-    place.after = Some(last.job.id);
-    let format = place.format;
-    let written = tokio::task::spawn_blocking(move || match format {
-        Format::Csv => write_csv(&lines),
-        _ => write_ndjson(&lines),
+    loop {
+        let read = place.jobs.batch_items(
+            place.batch,
+            place.after,
+            place.page,
+            place.until,
+            &place.states,
+        );
+        let (lines, last) = tokio::select! {
+            read = read => read?,
+            // Broken off, so that what was sent is not taken for all there is.
+            () = &mut place.revoked => return Err(JobsError::BatchNotFound),
+        };
+        let Some(last) = last else {
+            return Ok(None);
+        };
+        place.after = Some(last);
+        let read = u32::try_from(lines.len()).unwrap_or(PAGE_JOBS);
+        place.page = match place.states.is_empty() {
+            true => (2 * read).clamp(4, PAGE_JOBS),
+            false => PAGE_JOBS,
+        };
+        if lines.is_empty() {
+            continue;
+        }
+        let (format, columns) = (place.format, place.columns.clone());
+        let written = tokio::task::spawn_blocking(move || match format {
+            Format::Csv => write_csv(&columns, &lines),
+            _ => write_ndjson(&lines),
+        });
+        let piece = written
+            .await
+            .map_err(|error| JobsError::Damaged(error.to_string()))??;
+        return Ok(Some((Bytes::from(piece), place)));
+    }
+}
+
+/// Writes lines of CSV, without the header.
+fn write_csv(columns: &Columns, lines: &[BatchItem]) -> Result<Vec<u8>, JobsError> {
+    let written = columns.lines(lines, |line| {
+        let error = error_of(line).map(|problem| problem.detail);
+        error.or_else(|| line.result.as_ref().map(|_| UNREADABLE.to_owned()))
     });
-    let piece = written
-        .await
-        .map_err(|error| JobsError::Damaged(error.to_string()))??;
-    Ok(Some((Bytes::from(piece), place)))
+    written.map_err(|error| JobsError::Damaged(error.to_string()))
 }
 
 /// The part of a line before the result.
@@ -261,123 +303,4 @@ fn error_of(line: &BatchItem) -> Option<ProblemBody> {
 
 fn outputs(line: &BatchItem) -> Vec<String> {
     serde_json::from_str(&line.outputs).unwrap_or_default()
-}
-
-const CSV_COLUMNS: [&str; 18] = [
-    "index",
-    "id",
-    "name",
-    "state",
-    "point",
-    "creepage_x",
-    "creepage_y",
-    "spin_per_mm",
-    "normal_force_n",
-    "force_x_n",
-    "force_y_n",
-    "moment_z_n_mm",
-    "error_force_x_n",
-    "error_force_y_n",
-    "error_moment_z_n_mm",
-    "friction_power_n",
-    "remarks",
-    "error",
-];
-
-fn csv_head() -> String {
-    CSV_COLUMNS.join(",") + "\n"
-}
-
-/// Writes lines of CSV, without the header.
-fn write_csv(lines: &[BatchItem]) -> Result<Vec<u8>, JobsError> {
-    let damaged = |error: &dyn std::fmt::Display| JobsError::Damaged(error.to_string());
-    let mut out = csv::Writer::from_writer(Vec::new());
-    for line in lines {
-        let job = &line.job;
-        let front = [
-            line.index.to_string(),
-            job.id.to_string(),
-            for_sheets(job.name.as_deref().unwrap_or_default()),
-            job.state.name().to_owned(),
-        ];
-        let solution = match &line.result {
-            Some(ItemResult::Solution(text)) => serde_json::from_slice::<Solution>(text).ok(),
-            _ => None,
-        };
-        let Some(solution) = solution else {
-            let error = error_of(line).map(|problem| problem.detail);
-            let unread = || line.result.as_ref().map(|_| UNREADABLE.to_owned());
-            let empty = vec![String::new(); CSV_COLUMNS.len() - front.len() - 1];
-            let row = front
-                .into_iter()
-                .chain(empty)
-                .chain([error.or_else(unread).unwrap_or_default()]);
-            out.write_record(row).map_err(|error| damaged(&error))?;
-            continue;
-        };
-        for numbers in csv_numbers(&solution) {
-            let row = front.iter().cloned().chain(numbers).chain([String::new()]);
-            out.write_record(row).map_err(|error| damaged(&error))?;
-        }
-    }
-    out.into_inner().map_err(|error| damaged(&error))
-}
-
-/// The codes of the remarks that hold for a motion, each once.
-fn codes(remarks: &[RemarkEntry], point: usize) -> String {
-    let mut codes: Vec<&str> = Vec::new();
-    for remark in remarks.iter().filter(|remark| remark.holds_at(point)) {
-        if !codes.contains(&&*remark.code) {
-            codes.push(&remark.code);
-        }
-    }
-    codes.join(" ")
-}
-
-/// A text of a client as a field of a table. Programs for sheets take what begins like a formula for one; an apostrophe
-/// says that it is none.
-fn for_sheets(text: &str) -> String {
-    if text.starts_with(['=', '+', '-', '@']) {
-        format!("'{text}")
-    } else {
-        text.to_owned()
-    }
-}
-
-/// The numbers of each motion: sums over all patches.
-fn csv_numbers(solution: &Solution) -> impl Iterator<Item = Vec<String>> {
-    let normal: f64 = solution
-        .patches
-        .iter()
-        .map(|patch| patch.normal_force_n)
-        .sum();
-    solution
-        .total
-        .iter()
-        .enumerate()
-        .map(move |(point, total)| {
-            let parts = solution
-                .patches
-                .iter()
-                .filter_map(|patch| patch.points.get(point));
-            let power: f64 = parts.clone().map(|part| part.friction_power_n).sum();
-            let motion = parts.clone().next().map(|part| part.motion);
-            let estimate = total.error_estimate;
-            let text = |value: Option<f64>| value.map_or_else(String::new, number);
-            vec![
-                point.to_string(),
-                text(motion.map(|motion| motion.creepage_x)),
-                text(motion.map(|motion| motion.creepage_y)),
-                text(motion.map(|motion| motion.spin_per_mm)),
-                number(normal),
-                number(total.force_x_n),
-                number(total.force_y_n),
-                number(total.moment_z_n_mm),
-                text(estimate.map(|estimate| estimate.force_x_n)),
-                text(estimate.map(|estimate| estimate.force_y_n)),
-                text(estimate.map(|estimate| estimate.moment_z_n_mm)),
-                number(power),
-                codes(&solution.remarks, point),
-            ]
-        })
 }

@@ -152,10 +152,8 @@ fn faults(draft: &BatchUpload) -> Vec<Fault> {
     let faults = cases.flat_map(|case| {
         case.faults.iter().map(|fault| Fault {
             pointer: Some(format!("/{}{}", case.index, fault.pointer)),
-            parameter: None,
-            header: None,
             line: case.line,
-            detail: fault.detail.clone(),
+            ..Fault::from(fault.clone())
         })
     });
     faults.collect()

@@ -8,6 +8,7 @@ use uuid::Uuid;
 use crate::jobs::batch::model::{BatchItem, ItemResult};
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
+use crate::jobs::model::State;
 use crate::jobs::shared::POLL_INTERVAL;
 
 /// Solutions read at once: once they are this large together, the rest is left for the next page.
@@ -19,7 +20,8 @@ const REREAD_PAUSE: Duration = Duration::from_millis(10);
 impl Jobs {
     /// The next jobs of a batch after the job `after`, in the order they were sent, at most `limit`, fewer if their
     /// results are large. With `until`, only jobs that have ended are returned as long as that time is not reached, and at
-    /// least one is waited for. Empty at the end of the batch.
+    /// least one is waited for. Of these, the ones in one of `states` are returned (all if there is none), with the job after which to go on;
+    /// nothing at the end of the batch.
     ///
     /// # Errors
     /// A failed database.
@@ -29,7 +31,8 @@ impl Jobs {
         after: Option<Uuid>,
         limit: u32,
         until: Option<Instant>,
-    ) -> Result<Vec<BatchItem>, JobsError> {
+        states: &[State],
+    ) -> Result<(Vec<BatchItem>, Option<Uuid>), JobsError> {
         let until = until.unwrap_or_else(Instant::now);
         loop {
             // Subscribe first, then read: what ends in between is announced.
@@ -72,6 +75,10 @@ impl Jobs {
                 }
                 lines.truncate(done);
             }
+            let mut last = lines.last().map(|line| line.job.id);
+            if !states.is_empty() {
+                lines.retain(|line| states.contains(&line.job.state));
+            }
             let mut bytes = 0;
             for place in 0..lines.len() {
                 let line = &mut lines[place];
@@ -80,11 +87,12 @@ impl Jobs {
                 }
                 bytes += line.result.as_ref().map_or(0, ItemResult::bytes);
                 if bytes >= PAGE_BYTES {
+                    last = Some(line.job.id);
                     lines.truncate(place + 1);
                     break;
                 }
             }
-            return Ok(lines);
+            return Ok((lines, last));
         }
     }
 

@@ -123,10 +123,7 @@ impl BatchUpload {
             }
             Err(reason) => {
                 self.digest.update(text);
-                Err(vec![Fault {
-                    pointer: String::new(),
-                    detail: reason.clone(),
-                }])
+                Err(vec![Fault::new("", reason.clone())])
             }
         };
         let checked = match checked {

@@ -2,7 +2,8 @@
 
 use serde_json::Value;
 
-use crate::contact::case::read::object::{Interval, Object, shown};
+use crate::contact::case::read::faults::Interval;
+use crate::contact::case::read::object::{Object, shown};
 use crate::contact::case::read::profiles;
 use crate::contact::case::read::samples::{Quantity, axis, line, samples};
 use crate::contact::case::words::contact::{Contact, Load};

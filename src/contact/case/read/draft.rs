@@ -9,7 +9,8 @@ use serde_json::Value;
 
 use crate::contact::case::checks::{PartialCase, faults_of};
 use crate::contact::case::limits::Limits;
-use crate::contact::case::read::object::{Faults, Interval, Object, has_controls, join, shown};
+use crate::contact::case::read::faults::{Faults, Interval};
+use crate::contact::case::read::object::{Object, has_controls, join, shown};
 use crate::contact::case::read::{contact, material, motion, solver};
 use crate::contact::case::words::contact::{Contact, Load};
 use crate::contact::case::words::material::{Friction, Material};

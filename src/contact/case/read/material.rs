@@ -1,6 +1,7 @@
 //! Reads `material`: one set of elastic constants, or one for each body.
 
-use crate::contact::case::read::object::{Interval, Object};
+use crate::contact::case::read::faults::Interval;
+use crate::contact::case::read::object::Object;
 use crate::contact::case::words::material::{Elastic, Material};
 
 const MODULUS: Interval = Interval::positive(1e12, "MPa");

@@ -2,6 +2,7 @@
 
 pub mod contact;
 pub mod draft;
+pub mod faults;
 pub mod material;
 pub mod motion;
 pub mod object;

@@ -2,7 +2,8 @@
 
 use serde_json::Value;
 
-use crate::contact::case::read::object::{Faults, Interval, Object, join, shown};
+use crate::contact::case::read::faults::{Faults, Interval};
+use crate::contact::case::read::object::{Object, join, shown};
 use crate::contact::case::words::motion::{AskedMotion, Combine, Motions, Range, Sweep, Wheelset};
 
 const CREEPAGE: Interval = Interval::closed(-1e6, 1e6, "");

@@ -1,105 +1,11 @@
-//! A JSON object under examination: typed members, ranges, and a list of everything that is wrong.
+//! A JSON object under examination: typed members and their faults.
 
 use std::fmt;
 
 use serde_json::{Map, Value};
 
-use crate::contact::error::Fault;
-
-/// Faults listed one by one before the rest is only counted.
-const FAULTS_MAX: usize = 100;
-/// Characters of a received value that a fault repeats.
-const SHOWN_MAX: usize = 60;
-
-/// The faults found so far, in the order of the examination.
-#[derive(Debug, Default)]
-pub(crate) struct Faults {
-    listed: Vec<Fault>,
-    unlisted: usize,
-}
-
-impl Faults {
-    /// Notes one fault; beyond the first hundred only their number is kept.
-    pub(crate) fn add(&mut self, pointer: impl Into<String>, detail: impl Into<String>) {
-        if self.listed.len() < FAULTS_MAX {
-            self.listed.push(Fault {
-                pointer: pointer.into(),
-                detail: detail.into(),
-            });
-        } else {
-            self.unlisted += 1;
-        }
-    }
-
-    /// The list, with a last entry that counts what did not fit.
-    pub(crate) fn into_list(self) -> Vec<Fault> {
-        let mut listed = self.listed;
-        if self.unlisted > 0 {
-            listed.push(Fault {
-                pointer: String::new(),
-                detail: format!("{} more faults are not listed", self.unlisted),
-            });
-        }
-        listed
-    }
-}
-
-/// The numbers a member may have.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Interval {
-    low: f64,
-    low_excluded: bool,
-    high: f64,
-    unit: &'static str,
-}
-
-impl Interval {
-    /// `low <= value <= high`.
-    pub(crate) const fn closed(low: f64, high: f64, unit: &'static str) -> Self {
-        Interval {
-            low,
-            low_excluded: false,
-            high,
-            unit,
-        }
-    }
-
-    /// `0 < value <= high`.
-    pub(crate) const fn positive(high: f64, unit: &'static str) -> Self {
-        Interval {
-            low: 0.0,
-            low_excluded: true,
-            high,
-            unit,
-        }
-    }
-
-    /// Is the number allowed?
-    pub(crate) fn contains(&self, number: f64) -> bool {
-        let above = if self.low_excluded {
-            number > self.low
-        } else {
-            number >= self.low
-        };
-        above && number <= self.high
-    }
-}
-
-impl fmt::Display for Interval {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (low, high) = (plain(self.low), plain(self.high));
-        if self.low_excluded {
-            write!(f, "a number more than {low} and at most {high}")?;
-        } else {
-            write!(f, "a number from {low} to {high}")?;
-        }
-        if self.unit.is_empty() {
-            Ok(())
-        } else {
-            write!(f, " {}", self.unit)
-        }
-    }
-}
+use crate::contact::case::read::faults::{Faults, Interval, SHOWN_MAX, code_of, figures};
+use crate::contact::error::{FaultCode, FaultFigures};
 
 /// An object, where it stands in the case, and the list its faults go to.
 ///
@@ -121,9 +27,10 @@ impl<'v, 'f> Object<'v, 'f> {
                 faults,
             })
         } else {
-            faults.add(
+            faults.add_with(
                 pointer,
                 format!("{} given; an object is needed", shown(value)),
+                figures(FaultCode::WrongType, Some(value)),
             );
             None
         }
@@ -151,8 +58,19 @@ impl<'v, 'f> Object<'v, 'f> {
 
     /// Notes a fault of a member.
     pub(crate) fn fault(&mut self, name: &str, detail: impl Into<String>) {
+        let figures = figures(FaultCode::Invalid, self.members.get(name));
+        self.fault_with(name, detail, figures);
+    }
+
+    /// The same with what programs can read of it.
+    pub(crate) fn fault_with(
+        &mut self,
+        name: &str,
+        detail: impl Into<String>,
+        figures: FaultFigures,
+    ) {
         let pointer = self.pointer_to(name);
-        self.faults.add(pointer, detail);
+        self.faults.add_with(pointer, detail, figures);
     }
 
     /// Notes a fault of the object as a whole.
@@ -165,14 +83,16 @@ impl<'v, 'f> Object<'v, 'f> {
         let members = self.members;
         for (name, value) in members {
             if !allowed.contains(&name.as_str()) && !reserved.contains(&name.as_str()) {
-                self.fault(
-                    name,
-                    format!(
-                        "unknown member with the value {}; allowed here: {}",
-                        shown(value),
-                        allowed.join(", ")
-                    ),
+                let detail = format!(
+                    "unknown member with the value {}; allowed here: {}",
+                    shown(value),
+                    allowed.join(", ")
                 );
+                let figures = FaultFigures {
+                    allowed: allowed.iter().map(ToString::to_string).collect(),
+                    ..figures(FaultCode::UnknownMember, Some(value))
+                };
+                self.fault_with(name, detail, figures);
             }
         }
     }
@@ -181,7 +101,8 @@ impl<'v, 'f> Object<'v, 'f> {
     pub(crate) fn required(&mut self, name: &str, what: &str) -> Option<&'v Value> {
         let value = self.members.get(name);
         if value.is_none() {
-            self.fault(name, format!("missing; {what} is needed"));
+            let detail = format!("missing; {what} is needed");
+            self.fault_with(name, detail, figures(FaultCode::Missing, None));
         }
         value
     }
@@ -195,7 +116,10 @@ impl<'v, 'f> Object<'v, 'f> {
 
     /// A number that has to be there.
     pub(crate) fn required_number(&mut self, name: &str, allowed: Interval) -> Option<f64> {
-        self.required(name, &allowed.to_string())?;
+        if !self.has(name) {
+            let detail = format!("missing; {allowed} is needed");
+            self.fault_with(name, detail, allowed.figures(FaultCode::Missing, None));
+        }
         self.number(name, allowed)
     }
 
@@ -207,7 +131,10 @@ impl<'v, 'f> Object<'v, 'f> {
         match number {
             Some(n) if f64::from(low) <= n && n <= f64::from(high) => Some(n as u32),
             _ => {
-                self.fault(name, format!("{} given; {what} is needed", shown(value)));
+                let detail = format!("{} given; {what} is needed", shown(value));
+                let allowed = Interval::closed(low.into(), high.into(), "");
+                let code = code_of(value, Value::is_number);
+                self.fault_with(name, detail, allowed.figures(code, Some(value)));
                 None
             }
         }
@@ -219,13 +146,19 @@ impl<'v, 'f> Object<'v, 'f> {
         match value.as_str() {
             Some(text) if text.chars().count() <= length_max => Some(text.to_owned()),
             _ => {
-                self.fault(
-                    name,
-                    format!(
-                        "{} given; a text of at most {length_max} characters is needed",
-                        shown(value)
-                    ),
+                let detail = format!(
+                    "{} given; a text of at most {length_max} characters is needed",
+                    shown(value)
                 );
+                let code = match value {
+                    Value::String(_) => FaultCode::TooLong,
+                    _ => FaultCode::WrongType,
+                };
+                let figures = FaultFigures {
+                    maximum: Some(length_max.into()),
+                    ..figures(code, Some(value))
+                };
+                self.fault_with(name, detail, figures);
                 None
             }
         }
@@ -275,10 +208,9 @@ pub(crate) fn number(
     match value.as_f64() {
         Some(number) if allowed.contains(number) => Some(number + 0.0),
         _ => {
-            faults.add(
-                pointer,
-                format!("{} given; {allowed} is needed", shown(value)),
-            );
+            let detail = format!("{} given; {allowed} is needed", shown(value));
+            let code = code_of(value, Value::is_number);
+            faults.add_with(pointer, detail, allowed.figures(code, Some(value)));
             None
         }
     }
@@ -303,21 +235,24 @@ pub(crate) fn word<T: Copy>(
     if let Some((_, meaning)) = table.iter().find(|(word, _)| Some(*word) == text) {
         return Some(*meaning);
     }
-    if text.is_some_and(|text| later.contains(&text)) {
-        faults.add(
-            pointer,
-            format!(
-                "{} is not offered by this version; offered: {}",
-                shown(value),
-                offered()
-            ),
-        );
+    let detail = if text.is_some_and(|text| later.contains(&text)) {
+        format!(
+            "{} is not offered by this version; offered: {}",
+            shown(value),
+            offered()
+        )
     } else {
-        faults.add(
-            pointer,
-            format!("{} given; allowed: {}", shown(value), offered()),
-        );
-    }
+        format!("{} given; allowed: {}", shown(value), offered())
+    };
+    let code = match value {
+        Value::String(_) => FaultCode::UnknownWord,
+        _ => FaultCode::WrongType,
+    };
+    let figures = FaultFigures {
+        allowed: table.iter().map(|(word, _)| (*word).to_owned()).collect(),
+        ..figures(code, Some(value))
+    };
+    faults.add_with(pointer, detail, figures);
     None
 }
 
@@ -350,15 +285,6 @@ fn cut(text: &str) -> String {
     short
 }
 
-/// A limit as people write it: `1e9` rather than `1000000000`.
-fn plain(number: f64) -> String {
-    if number.abs() >= 1e5 {
-        format!("{number:e}")
-    } else {
-        format!("{number}")
-    }
-}
-
 /// Line breaks, tabs and the like: they tear tables and lines of logs apart.
 pub(crate) fn has_controls(text: &str) -> bool {
     text.chars().any(char::is_control)
@@ -367,6 +293,7 @@ pub(crate) fn has_controls(text: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::case::read::faults::FAULTS_MAX;
     use serde_json::json;
 
     #[test]

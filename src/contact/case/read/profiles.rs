@@ -2,7 +2,8 @@
 
 use serde_json::Value;
 
-use crate::contact::case::read::object::{Interval, Object, join, number, shown};
+use crate::contact::case::read::faults::Interval;
+use crate::contact::case::read::object::{Object, join, number, shown};
 use crate::contact::case::words::contact::{
     Contact, CrossSection, FormatName, SideName, Smoothing, SmoothingWord,
 };

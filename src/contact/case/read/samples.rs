@@ -2,7 +2,8 @@
 
 use serde_json::Value;
 
-use crate::contact::case::read::object::{Faults, Interval, Object, join, number, shown};
+use crate::contact::case::read::faults::{Faults, Interval};
+use crate::contact::case::read::object::{Object, join, number, shown};
 
 const COORDINATE: Interval = Interval::closed(-1e6, 1e6, "mm");
 /// Points of one axis of a grid.

@@ -1,6 +1,7 @@
 //! Reads `solver` and `outputs`: how to solve, how exactly, and what to answer.
 
-use crate::contact::case::read::object::{Interval, Object, join, shown, word};
+use crate::contact::case::read::faults::Interval;
+use crate::contact::case::read::object::{Object, join, shown, word};
 use crate::contact::case::resolution::TARGET_ERROR_DEFAULT;
 use crate::contact::case::words::solver::{
     MeshSizeWords, MethodName, Output, Solver, TractionBoundName,

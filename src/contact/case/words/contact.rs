@@ -1,6 +1,6 @@
 //! Where the bodies touch, and how hard they are pressed together.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 /// Where the bodies touch.
@@ -154,8 +154,23 @@ pub enum SmoothingWord {
     Auto,
 }
 
+impl Contact {
+    /// The word for `contact.type`.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Contact::Radii { .. } => "radii",
+            Contact::Ellipse { .. } => "ellipse",
+            Contact::GapProfile { .. } => "gap_profile",
+            Contact::GapGrid { .. } => "gap_grid",
+            Contact::PressureGrid { .. } => "pressure_grid",
+            Contact::Profiles { .. } => "profiles",
+        }
+    }
+}
+
 /// How hard the bodies are pressed together; exactly one member is given.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Load {
     /// Normal force in N, more than 0. For `profiles` the sum over all patches, each along its own normal.
     #[serde(skip_serializing_if = "Option::is_none")]

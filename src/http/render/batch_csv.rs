@@ -1,0 +1,320 @@
+//! Results of a batch as a table: one line per job and motion, or per patch too, with the columns that were asked for.
+
+use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::solution::words::{ErrorEstimate, PatchSolution, PointSolution, Solution};
+use crate::http::render::csv::{finish, number};
+use crate::jobs::batch::model::{BatchItem, ItemResult};
+
+/// Columns of a table for which none are named.
+const DEFAULT: [&str; 21] = [
+    "index",
+    "id",
+    "name",
+    "state",
+    "point",
+    "creepage_x",
+    "creepage_y",
+    "spin_per_mm",
+    "normal_force_n",
+    "force_x_n",
+    "force_y_n",
+    "moment_z_n_mm",
+    "error_force_x_n",
+    "error_force_y_n",
+    "error_moment_z_n_mm",
+    "friction_power_n",
+    "area_mm2",
+    "pressure_max_mpa",
+    "target_met",
+    "remarks",
+    "error",
+];
+
+/// What else can be named, besides labels.
+const MORE: [&str; 17] = [
+    "patch",
+    "cached",
+    "friction_coefficient",
+    "friction_limit_n",
+    "friction_power_without_spin_n",
+    "traction_max_mpa",
+    "stick_share",
+    "saturated",
+    "contact_angle_rad",
+    "rolling_radius_mm",
+    "track_y_mm",
+    "track_z_mm",
+    "force_track_y_n",
+    "force_track_z_n",
+    "semi_axis_x_mm",
+    "semi_axis_y_mm",
+    "wheel_lowering_mm",
+];
+
+/// Before the key of a label.
+const LABEL: &str = "label:";
+
+/// The columns of a table.
+#[derive(Debug, Clone)]
+pub struct Columns(Vec<String>);
+
+impl Default for Columns {
+    fn default() -> Self {
+        Columns(DEFAULT.map(str::to_owned).into())
+    }
+}
+
+impl Columns {
+    /// Reads names with commas between.
+    #[must_use]
+    pub fn read(text: &str) -> Option<Columns> {
+        let known = |name: &str| {
+            DEFAULT.contains(&name)
+                || MORE.contains(&name)
+                || name.strip_prefix(LABEL).is_some_and(|key| !key.is_empty())
+        };
+        let names: Vec<String> = text.split(',').map(str::to_owned).collect();
+        names
+            .iter()
+            .all(|name| known(name))
+            .then_some(Columns(names))
+    }
+
+    /// The names that there are, in words.
+    #[must_use]
+    pub fn allowed() -> String {
+        let names: Vec<&str> = DEFAULT.iter().chain(&MORE).copied().collect();
+        format!(
+            "names with commas between, of {} and `label:KEY`",
+            names.join(", ")
+        )
+    }
+
+    /// The line with the names.
+    ///
+    /// # Errors
+    /// None that memory does not have.
+    pub fn head(&self) -> Result<Vec<u8>, csv::Error> {
+        let mut out = csv::Writer::from_writer(Vec::new());
+        out.write_record(&self.0)?;
+        finish(out)
+    }
+
+    /// Some lines. Without a result a job has one line, with `error` saying why.
+    ///
+    /// # Errors
+    /// None that memory does not have.
+    pub fn lines(
+        &self,
+        items: &[BatchItem],
+        error_of: impl Fn(&BatchItem) -> Option<String>,
+    ) -> Result<Vec<u8>, csv::Error> {
+        let mut out = csv::Writer::from_writer(Vec::new());
+        let by_patch = self.0.iter().any(|name| name == "patch");
+        for item in items {
+            let solution = match &item.result {
+                Some(ItemResult::Solution(text)) => serde_json::from_slice::<Solution>(text).ok(),
+                _ => None,
+            };
+            let Some(solution) = solution else {
+                let error = error_of(item).unwrap_or_default();
+                out.write_record(self.0.iter().map(|name| match name.as_str() {
+                    "error" => error.clone(),
+                    name => of_job(item, name).unwrap_or_default(),
+                }))?;
+                continue;
+            };
+            for point in 0..solution.total.len() {
+                let rows = match by_patch {
+                    true => (0..solution.patches.len()).map(Some).collect(),
+                    false => vec![None],
+                };
+                for patch in rows {
+                    let row = TableLine {
+                        item,
+                        solution: &solution,
+                        point,
+                        patch,
+                    };
+                    out.write_record(self.0.iter().map(|name| row.value(name)))?;
+                }
+            }
+        }
+        finish(out)
+    }
+}
+
+/// What a column says of the job itself.
+fn of_job(item: &BatchItem, name: &str) -> Option<String> {
+    let job = &item.job;
+    Some(match name {
+        "index" => item.index.to_string(),
+        "id" => job.id.to_string(),
+        "name" => for_sheets(job.name.as_deref().unwrap_or_default()),
+        "state" => job.state.name().to_owned(),
+        "cached" => job.cached.to_string(),
+        _ => {
+            let label = job.labels.get(name.strip_prefix(LABEL)?);
+            for_sheets(label.map_or("", String::as_str))
+        }
+    })
+}
+
+/// One line: a motion of a job, of one patch or of all of them together.
+struct TableLine<'a> {
+    item: &'a BatchItem,
+    solution: &'a Solution,
+    point: usize,
+    patch: Option<usize>,
+}
+
+impl TableLine<'_> {
+    fn value(&self, name: &str) -> String {
+        if let Some(text) = of_job(self.item, name) {
+            return text;
+        }
+        match name {
+            "point" => self.point.to_string(),
+            "patch" => self
+                .patch
+                .map_or_else(String::new, |patch| patch.to_string()),
+            "remarks" => codes(&self.solution.remarks, self.point, self.patch),
+            "target_met" => self.verdict(|point| point.target_met, false),
+            "saturated" => self.verdict(|point| Some(point.saturated), true),
+            "error" => String::new(),
+            name => self.number(name).map_or_else(String::new, number),
+        }
+    }
+
+    /// The patches of the line, each with the motion of the line.
+    fn parts(&self) -> impl Iterator<Item = (&PatchSolution, &PointSolution)> + Clone {
+        let patches = self.solution.patches.iter().enumerate();
+        let own = patches.filter(|(place, _)| self.patch.is_none_or(|patch| patch == *place));
+        own.filter_map(|(_, patch)| Some((patch, patch.points.get(self.point)?)))
+    }
+
+    /// True if it is of all patches, or of any of them; nothing where it is not told.
+    fn verdict(&self, of: fn(&PointSolution) -> Option<bool>, any: bool) -> String {
+        let mut told = self.parts().filter_map(|(_, point)| of(point)).peekable();
+        if told.peek().is_none() {
+            return String::new();
+        }
+        match any {
+            true => told.any(|verdict| verdict),
+            false => told.all(|verdict| verdict),
+        }
+        .to_string()
+    }
+
+    fn number(&self, name: &str) -> Option<f64> {
+        let of_patches = |of: fn(&PatchSolution) -> Option<f64>| {
+            self.parts()
+                .map(|(patch, _)| of(patch))
+                .sum::<Option<f64>>()
+        };
+        let largest = |of: fn(&(&PatchSolution, &PointSolution)) -> f64| {
+            self.parts().map(|part| of(&part)).reduce(f64::max)
+        };
+        let of_points = |of: fn(&PointSolution) -> Option<f64>| {
+            self.parts()
+                .map(|(_, point)| of(point))
+                .sum::<Option<f64>>()
+        };
+        let motion = self.parts().next().map(|(_, point)| point.motion);
+        match name {
+            "creepage_x" => Some(motion?.creepage_x),
+            "creepage_y" => Some(motion?.creepage_y),
+            "spin_per_mm" => Some(motion?.spin_per_mm),
+            "normal_force_n" => of_patches(|patch| Some(patch.normal_force_n)),
+            "area_mm2" => of_patches(|patch| Some(patch.area_mm2)),
+            "friction_limit_n" => of_patches(|patch| patch.friction_limit_n),
+            "pressure_max_mpa" => largest(|(patch, _)| patch.pressure_max_mpa),
+            "traction_max_mpa" => largest(|(_, point)| point.traction_max_mpa),
+            "friction_power_n" => of_points(|point| Some(point.friction_power_n)),
+            "friction_power_without_spin_n" => {
+                of_points(|point| Some(point.friction_power_without_spin_n))
+            }
+            "stick_share" => {
+                let stick = of_points(|point| point.stick_area_mm2)?;
+                Some(stick / of_patches(|patch| Some(patch.area_mm2))?)
+            }
+            "friction_coefficient" => Some(self.solution.asked.as_ref()?.friction_coefficient),
+            "wheel_lowering_mm" => self.solution.wheel_lowering_mm,
+            _ => self.force(name).or_else(|| self.place(name)),
+        }
+    }
+
+    /// Forces and their errors.
+    fn force(&self, name: &str) -> Option<f64> {
+        let (x, y, moment, error) = match self.patch {
+            None => {
+                let total = self.solution.total.get(self.point)?;
+                let [x, y] = [total.force_x_n, total.force_y_n];
+                (x, y, total.moment_z_n_mm, total.error_estimate)
+            }
+            Some(_) => {
+                let (_, point) = self.parts().next()?;
+                let [x, y] = [point.force_x_n, point.force_y_n];
+                (x, y, point.moment_z_n_mm, point.error_estimate)
+            }
+        };
+        let error = |of: fn(ErrorEstimate) -> f64| error.map(of);
+        match name {
+            "force_x_n" => Some(x),
+            "force_y_n" => Some(y),
+            "moment_z_n_mm" => Some(moment),
+            "error_force_x_n" => error(|error| error.force_x_n),
+            "error_force_y_n" => error(|error| error.force_y_n),
+            "error_moment_z_n_mm" => error(|error| error.moment_z_n_mm),
+            _ => None,
+        }
+    }
+
+    /// Where a patch lies, and its force in track axes; nothing for several patches together.
+    fn place(&self, name: &str) -> Option<f64> {
+        self.patch
+            .or((self.solution.patches.len() == 1).then_some(0))?;
+        let (patch, point) = self.parts().next()?;
+        if let Some([x, y]) = patch.semi_axes_mm {
+            match name {
+                "semi_axis_x_mm" => return Some(x),
+                "semi_axis_y_mm" => return Some(y),
+                _ => {}
+            }
+        }
+        let position = patch.position?;
+        // The normal of the patch is (0, −sin, cos); the rail is pressed against it.
+        let (sin, cos) = position.contact_angle_rad.sin_cos();
+        match name {
+            "contact_angle_rad" => Some(position.contact_angle_rad),
+            "rolling_radius_mm" => Some(position.rolling_radius_mm),
+            "track_y_mm" => Some(position.track_mm[1]),
+            "track_z_mm" => Some(position.track_mm[2]),
+            "force_track_y_n" => Some(point.force_y_n * cos + patch.normal_force_n * sin),
+            "force_track_z_n" => Some(point.force_y_n * sin - patch.normal_force_n * cos),
+            _ => None,
+        }
+    }
+}
+
+/// The codes of the remarks that hold for a motion, and for a patch if one is given, each once.
+fn codes(remarks: &[RemarkEntry], point: usize, patch: Option<usize>) -> String {
+    let mut codes: Vec<&str> = Vec::new();
+    for remark in remarks.iter().filter(|remark| remark.holds_at(point)) {
+        let elsewhere = patch.is_some() && remark.patch.is_some() && remark.patch != patch;
+        if !elsewhere && !codes.contains(&&*remark.code) {
+            codes.push(&remark.code);
+        }
+    }
+    codes.join(" ")
+}
+
+/// A text of a client as a field of a table. Programs for sheets take what begins like a formula for one; an apostrophe
+/// says that it is none.
+fn for_sheets(text: &str) -> String {
+    if text.starts_with(['=', '+', '-', '@']) {
+        format!("'{text}")
+    } else {
+        text.to_owned()
+    }
+}

@@ -1,0 +1,206 @@
+//! Results of a batch as a narrow table: the columns asked for, the lines asked for.
+
+use serde_json::{Value, json};
+
+use crate::errors::assert_problem;
+use crate::results::number;
+use crate::server::{Answer, Server, example};
+
+fn case(file: &str, name: &str, km: &str) -> Value {
+    let mut case = example(&format!("{file}.case.json"));
+    case["name"] = json!(name);
+    case["labels"] = json!({ "km": km });
+    case["outputs"] = json!(["resultants", "zones"]);
+    case
+}
+
+/// Header and rows of a CSV.
+fn table(answer: &Answer) -> (Vec<String>, Vec<Vec<String>>) {
+    assert_eq!(answer.status, 200, "{}", answer.text);
+    let mut reader = csv::Reader::from_reader(answer.text.as_bytes());
+    let head = reader
+        .headers()
+        .expect("a header")
+        .iter()
+        .map(str::to_owned)
+        .collect();
+    let rows = reader
+        .records()
+        .map(|row| row.expect("a row").iter().map(str::to_owned).collect());
+    (head, rows.collect())
+}
+
+/// The path of the results of these cases, all ended, and their lines as NDJSON.
+async fn solved(server: &Server, cases: &[Value]) -> (String, Vec<Value>) {
+    let batch = server.post("/v1/batches", &json!(cases)).await.json;
+    let path = batch["links"]["results"]
+        .as_str()
+        .expect("a link")
+        .to_owned();
+    let lines = server.get(&format!("{path}?wait=60")).await.text;
+    let lines = lines
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("JSON"));
+    let lines: Vec<Value> = lines.collect();
+    assert_eq!(lines.len(), cases.len());
+    (path, lines)
+}
+
+#[tokio::test]
+async fn columns_are_those_asked_for_and_say_what_the_result_says() {
+    let server = Server::start().await;
+    let mut endless = case("spin", "late", "3");
+    endless["solver"]["time_limit_s"] = json!(1e-9);
+    let cases = [
+        case("hertz-steel", "=a", "1"),
+        case("two-patches", "b", "2"),
+        endless,
+    ];
+    let (path, lines) = solved(&server, &cases).await;
+    let columns = "label:km,name,area_mm2,pressure_max_mpa,stick_share,friction_limit_n,target_met,saturated,error";
+    let (head, rows) = table(
+        &server
+            .get(&format!("{path}?format=csv&columns={columns}"))
+            .await,
+    );
+    assert_eq!(head.join(","), columns);
+    assert_eq!(rows.len(), 3);
+    assert_eq!((rows[0][0].as_str(), rows[0][1].as_str()), ("1", "'=a"));
+    for (row, line) in rows.iter().zip(&lines).take(2) {
+        let patches = line["result"]["patches"].as_array().expect("patches");
+        let sum = |name: &str| {
+            patches
+                .iter()
+                .map(|patch| number(&patch[name]))
+                .sum::<f64>()
+        };
+        let read = |column: usize| row[column].parse::<f64>().expect("a number");
+        let largest = patches
+            .iter()
+            .map(|patch| number(&patch["pressure_max_mpa"]))
+            .fold(0.0, f64::max);
+        let stick: f64 = patches
+            .iter()
+            .map(|patch| number(&patch["points"][0]["stick_area_mm2"]))
+            .sum();
+        let expected = [
+            sum("area_mm2"),
+            largest,
+            stick / sum("area_mm2"),
+            sum("friction_limit_n"),
+        ];
+        for (column, expected) in expected.into_iter().enumerate() {
+            assert!(
+                (read(2 + column) - expected).abs() <= 1e-12 * expected,
+                "{}",
+                head[2 + column]
+            );
+        }
+        let met = patches
+            .iter()
+            .all(|patch| patch["points"][0]["target_met"] == true);
+        assert_eq!(
+            (row[6].as_str(), row[7].as_str()),
+            (met.to_string().as_str(), "false")
+        );
+    }
+    assert_eq!(rows[2][..8], ["3", "late", "", "", "", "", "", ""]);
+    assert!(rows[2][8].contains("time"), "{}", rows[2][8]);
+}
+
+#[tokio::test]
+async fn without_columns_there_are_the_usual_ones_and_unknown_ones_are_refused() {
+    let server = Server::start().await;
+    let (path, _) = solved(&server, &[case("spin", "a", "1")]).await;
+    let (head, rows) = table(&server.get(&format!("{path}?format=csv")).await);
+    for name in ["area_mm2", "pressure_max_mpa", "target_met"] {
+        assert!(head.iter().any(|column| column == name), "{name}");
+    }
+    assert_eq!(rows.len(), 1);
+    for (query, word) in [
+        ("format=csv&columns=colour", "columns"),
+        ("columns=index", "columns"),
+        ("state=done", "state"),
+        ("after=1", "after"),
+    ] {
+        assert_problem(
+            &server.get(&format!("{path}?{query}")).await,
+            400,
+            "bad-query",
+            word,
+        );
+    }
+}
+
+#[tokio::test]
+async fn a_table_by_patch_has_the_forces_of_each_in_track_axes() {
+    let server = Server::start().await;
+    let (path, lines) = solved(&server, &[case("wheel-rail-flange", "curve", "1")]).await;
+    let columns = "patch,normal_force_n,force_x_n,contact_angle_rad,rolling_radius_mm,force_track_y_n,force_track_z_n";
+    let (_, rows) = table(
+        &server
+            .get(&format!("{path}?format=csv&columns={columns}"))
+            .await,
+    );
+    let result = &lines[0]["result"];
+    let patches = result["patches"].as_array().expect("patches");
+    assert!(patches.len() > 1 && rows.len() == patches.len());
+    let mut sums = [0.0; 3];
+    for (row, patch) in rows.iter().zip(patches) {
+        let row: Vec<f64> = row
+            .iter()
+            .map(|value| value.parse().expect("a number"))
+            .collect();
+        assert_eq!(row[1], number(&patch["normal_force_n"]));
+        assert_eq!(row[3], number(&patch["position"]["contact_angle_rad"]));
+        assert_eq!(row[4], number(&patch["position"]["rolling_radius_mm"]));
+        for (sum, column) in sums.iter_mut().zip([2, 5, 6]) {
+            *sum += row[column];
+        }
+    }
+    let total = &result["total"][0];
+    for (sum, name) in sums
+        .into_iter()
+        .zip(["force_x_n", "force_y_n", "force_z_n"])
+    {
+        let expected = number(&total[name]);
+        assert!(
+            (sum - expected).abs() < 1e-6 * expected.abs().max(1e3),
+            "{name}: {sum}, not {expected}"
+        );
+    }
+}
+
+#[tokio::test]
+async fn lines_are_chosen_by_state_and_go_on_after_the_last_one_read() {
+    let server = Server::start().await;
+    let mut cases: Vec<Value> = (0..7)
+        .map(|km| case("spin", "good", &km.to_string()))
+        .collect();
+    for (number, case) in cases.iter_mut().enumerate() {
+        case["load"]["normal_force_n"] = json!(50_000 + number);
+        if number % 3 == 1 {
+            case["solver"]["time_limit_s"] = json!(1e-9);
+        }
+    }
+    let (path, lines) = solved(&server, &cases).await;
+    let indices = async |query: &str| {
+        let text = server.get(&format!("{path}?{query}")).await.text;
+        let lines = text
+            .lines()
+            .map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
+        lines
+            .map(|line| line["index"].as_u64().expect("an index"))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(indices("state=failed").await, [1, 4]);
+    assert_eq!(indices("state=succeeded&wait=1").await, [0, 2, 3, 5, 6]);
+    assert_eq!(
+        indices("state=failed&state=succeeded").await,
+        [0, 1, 2, 3, 4, 5, 6]
+    );
+    assert_eq!(indices("state=queued").await, [0; 0]);
+    let third = lines[2]["id"].as_str().expect("an id");
+    assert_eq!(indices(&format!("after={third}")).await, [3, 4, 5, 6]);
+    assert_eq!(indices(&format!("after={third}&state=failed")).await, [4]);
+}

@@ -1,0 +1,144 @@
+//! What programs can read of a fault, besides the sentence.
+
+use serde_json::{Value, json};
+
+use crate::server::{Server, example};
+
+/// The fault at a pointer, without its sentence.
+fn at(problem: &Value, pointer: &str) -> Value {
+    let faults = problem["errors"].as_array().expect("faults");
+    let fault = faults.iter().find(|fault| fault["pointer"] == pointer);
+    let mut fault = fault
+        .unwrap_or_else(|| panic!("{pointer} in {problem}"))
+        .clone();
+    let members = fault.as_object_mut().expect("an object");
+    assert!(
+        members
+            .remove("detail")
+            .is_some_and(|detail| detail.is_string())
+    );
+    members.remove("pointer");
+    fault
+}
+
+#[tokio::test]
+async fn faults_of_a_case_have_codes_values_ranges_units_and_words() {
+    let server = Server::idle().await;
+    let mut case = example("hertz-steel.case.json");
+    case["friction"]["coefficient"] = json!(-0.5);
+    case["load"]["normal_force_n"] = json!("much");
+    case["contact"]["type"] = json!("round");
+    case["motion"]["creepage_z"] = json!(1);
+    case["name"] = json!("x".repeat(300));
+    case["solver"] = json!({ "method": "magic" });
+    case.as_object_mut().expect("an object").remove("material");
+    let answer = server.post("/v1/cases/check", &case).await;
+    assert_eq!(answer.status, 422);
+    let fault = |pointer| at(&answer.json, pointer);
+    let range = json!({ "code": "out-of-range", "value": -0.5, "minimum": 0.0, "maximum": 100.0 });
+    assert_eq!(fault("/friction/coefficient"), range);
+    let load = fault("/load/normal_force_n");
+    assert_eq!(
+        (&load["code"], &load["value"], &load["unit"]),
+        (&json!("wrong-type"), &json!("much"), &json!("N"))
+    );
+    assert_eq!(
+        (&load["minimum"], &load["minimum_excluded"]),
+        (&json!(0.0), &json!(true))
+    );
+    assert!(load["maximum"].is_number());
+    assert_eq!(fault("/material"), json!({ "code": "missing" }));
+    let word = fault("/contact/type");
+    assert_eq!(
+        (&word["code"], &word["value"]),
+        (&json!("unknown-word"), &json!("round"))
+    );
+    assert!(
+        word["allowed"]
+            .as_array()
+            .expect("words")
+            .contains(&json!("gap_profile"))
+    );
+    let member = fault("/motion/creepage_z");
+    assert_eq!(
+        (&member["code"], &member["value"]),
+        (&json!("unknown-member"), &json!(1))
+    );
+    assert!(
+        member["allowed"]
+            .as_array()
+            .expect("names")
+            .contains(&json!("creepage_x"))
+    );
+    assert_eq!(
+        fault("/name"),
+        json!({ "code": "too-long", "maximum": 200 })
+    );
+    assert_eq!(fault("/solver/method")["code"], "unknown-word");
+}
+
+#[tokio::test]
+async fn faults_of_a_query_have_codes_and_values() {
+    let server = Server::idle().await;
+    let answer = server
+        .get("/v1/jobs?limit=0&colour=red&cursor=a&cursor=b")
+        .await;
+    let faults = answer.json["errors"].as_array().expect("faults");
+    let codes = faults
+        .iter()
+        .map(|fault| [&fault["parameter"], &fault["code"], &fault["value"]]);
+    let codes: Vec<_> = codes.collect();
+    for expected in [
+        [json!("colour"), json!("unknown-parameter"), json!("red")],
+        [json!("limit"), json!("invalid"), json!("0")],
+        [json!("cursor"), json!("repeated"), Value::Null],
+    ] {
+        assert!(
+            codes.contains(&expected.each_ref()),
+            "{expected:?} in {codes:?}"
+        );
+    }
+}
+
+#[tokio::test]
+async fn faults_of_a_batch_say_the_same_with_their_case() {
+    let server = Server::idle().await;
+    let mut case = example("hertz-steel.case.json");
+    case["friction"]["coefficient"] = json!(200);
+    let answer = server
+        .post("/v1/batches", &json!([example("spin.case.json"), case]))
+        .await;
+    let range = json!({ "code": "out-of-range", "value": 200, "minimum": 0.0, "maximum": 100.0 });
+    assert_eq!(at(&answer.json, "/1/friction/coefficient"), range);
+}
+
+#[tokio::test]
+async fn a_result_says_what_is_needed_to_read_it() {
+    let server = Server::start().await;
+    for (file, contact) in [
+        ("hertz-steel", "radii"),
+        ("pressure-grid", "pressure_grid"),
+        ("wheel-rail", "profiles"),
+        ("two-patches", "gap_grid"),
+    ] {
+        let case = example(&format!("{file}.case.json"));
+        let result = server.solve(&case).await["result"].take();
+        let asked = &result["asked"];
+        assert_eq!(asked["contact"], contact);
+        assert_eq!(
+            asked["friction_coefficient"], case["friction"]["coefficient"],
+            "{file}"
+        );
+        assert_eq!(
+            asked["load"].is_object(),
+            case["load"].is_object(),
+            "{file}"
+        );
+        for patch in result["patches"].as_array().expect("patches") {
+            let limit = patch["friction_limit_n"].as_f64().expect("a limit");
+            let force = patch["normal_force_n"].as_f64().expect("a force");
+            let friction = case["friction"]["coefficient"].as_f64().expect("a number");
+            assert!((limit - friction * force).abs() <= 1e-9 * limit, "{file}");
+        }
+    }
+}
