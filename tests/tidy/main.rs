@@ -32,6 +32,37 @@ fn assert_free(below: &str, words: &[&str]) {
     assert_eq!(found, Vec::<String>::new(), "{below}");
 }
 
+/// Numbers of the physics are tuned, measured or chosen, and each says which: a constant has a line above it, or stands in a group
+/// whose first line speaks for all. In the files named for their constants every single one has its own.
+#[test]
+fn every_number_of_the_physics_says_what_it_is() {
+    let sources = Sources::below(&["src/contact"]);
+    let mut bare = Vec::new();
+    for (path, text) in sources.within("src/contact/") {
+        let mut above = "";
+        for (number, line) in text.lines().enumerate() {
+            if line.starts_with("mod tests") || path.ends_with("/tests.rs") {
+                break;
+            }
+            let declared = line.trim_start_matches("pub(crate) ");
+            let declared = declared.trim_start_matches("pub ");
+            let kind = declared
+                .strip_prefix("const ")
+                .and_then(|rest| rest.split_once(": "))
+                .map_or("", |(_, kind)| kind);
+            let is_number = ["f64", "f32", "u32", "u64", "usize", "[f64", "(f64"]
+                .iter()
+                .any(|number| kind.starts_with(number));
+            let grouped = above.contains("const ") && !path.ends_with("/constants.rs");
+            if is_number && !above.starts_with("///") && !grouped {
+                bare.push(format!("{path}:{}: {line}", number + 1));
+            }
+            above = line;
+        }
+    }
+    assert_eq!(bare, Vec::<String>::new());
+}
+
 #[test]
 fn rooms_mention_only_the_rooms_before_them() {
     for (room, forbidden) in [

@@ -10,11 +10,15 @@ use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::remark::entry::RemarkEntry;
 
-/// Pressures in MPa, lengths in mm and ratios of semi-axes beyond which a patch is a mistake rather than a contact.
+/// Largest pressure of a patch in MPa; a larger one is a mistake rather than a contact.
 const PRESSURE_MAX: f64 = 1e12;
+/// Smallest one.
 const PRESSURE_MIN: f64 = 1e-20;
+/// Largest semi-axis in mm.
 const SEMI_AXIS_MAX: f64 = 1e6;
+/// Smallest one.
 const SEMI_AXIS_MIN: f64 = 1e-9;
+/// Largest ratio of the semi-axes.
 const SLENDERNESS_MAX: f64 = 1e4;
 
 /// Hertz's ellipse for `radii` or `ellipse`, with the contact modulus `E*` in MPa.

@@ -10,16 +10,18 @@ use crate::contact::rolling::refinement::mesh_policy::{CELLS_MAX, MeshPolicy};
 use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::rolling::task::precision_of;
 
-/// Cells of the finest mesh for a target of 0.02, on average, and how they grow as it falls.
+/// Cells of the finest mesh for a target of 0.02, on average.
 const TARGET_CELLS: f64 = 160.0;
+/// Power by which they grow as the target falls.
 const TARGET_GROWTH: f64 = 0.65;
 /// Cells that a patch has at least.
 const PATCH_CELLS_MIN: f64 = 64.0;
-/// Patches of a longer shape are not for the fast solver: its preconditioner knows each strip for itself, and where strips lie closer than
-/// the cells in them are long, linear systems no longer converge. Ellipses up to 70 under 20 loads and motions did, from 100 on
-/// some did not (`cargo bench --bench stress` goes to 50). Wide patches need no bound: b/a 1000 converges in a few steps.
+/// Largest length over width of a patch for the fast solver. Its preconditioner treats every strip by itself, so that linear systems no
+/// longer converge where strips lie closer than the cells in them are long. Of ellipses under 20 loads and motions all converged up
+/// to 70, and from 100 on some did not (`cargo bench --bench stress` goes to 50). Wide patches need no bound: b/a 1000 converges in
+/// a few steps.
 const LENGTH_OVER_WIDTH_MAX: f64 = 60.0;
-/// Cells the dense method may use.
+/// Most cells of the dense method.
 const LIU_HSU_CELLS_MAX: f64 = 1000.0;
 /// Dense square matrices the method of Liu and Hsu holds at once.
 const LIU_HSU_MATRICES: f64 = 4.0;

@@ -12,18 +12,21 @@ use crate::contact::geometry::local_gap::{Detail, LocalGap};
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::numerics::bisection::bisect;
 
-/// Spacing of the search across and along the curves, in mm.
+/// Spacing of the search across the track, in mm.
 pub(crate) const STEP: f64 = 0.01;
+/// Spacing of the points along the curves, in mm.
 const CURVE_STEP: f64 = 0.02;
-/// The window of a gap is larger than the overlap by this part and this length.
+/// The window of a gap is larger than the overlap by this fraction on either side.
 const MARGIN: f64 = 0.15;
+/// And by this length in mm.
 const MARGIN_MM: f64 = 0.1;
-/// A window that is too short along x is made longer by this factor, so many times.
+/// A window that is too short along x is made longer by this factor.
 const WIDENING: f64 = 1.5;
+/// So many times at most.
 const WIDENINGS_MAX: usize = 5;
-/// Slope with which surfaces are bent apart beyond a cut.
+/// Slope with which surfaces are bent apart beyond a cut: steep enough that they do not touch there, whatever the load.
 const APART: f64 = 0.5;
-/// No wheel is lowered farther than this, in mm.
+/// Largest lowering of a wheel in mm; more is no contact of wheel and rail.
 const LOWERING_MAX: f64 = 16.0;
 
 /// Wheel and rail over each other, line by line.

@@ -7,21 +7,24 @@
 use crate::contact::geometry::contact_locus::{ContactLocus, LocusPoint, STEP};
 use crate::contact::geometry::grouping::{Grouping, Overlap};
 
-/// Overlaps nearer to each other than this along the rail, in mm, whose mean inclinations differ less, in rad, share one gap:
-/// there they influence each other. (CONTACT keeps apart what is 8 mm or 30° from each other.)
+/// Overlaps nearer to each other than this along the rail, in mm, share one gap, because they influence each other. CONTACT, too,
+/// separates patches that are 8 mm or 30° apart.
 const TOGETHER: f64 = 8.0;
+/// They do so if their mean inclinations differ by less than this, in rad.
 const TOGETHER_ANGLE: f64 = 0.5;
 
-/// An overlap is cut where it is thinner than this part of the lobes on both sides. Two bodies touch where they overlap by more
-/// than half of the deepest overlap (Hertz), so that the surfaces of a lobe may be taken apart where it is thin.
+/// An overlap is cut where it is thinner than this fraction of the lobes on both sides. By Hertz's law two bodies touch where they
+/// overlap by more than half of the deepest overlap, so that a lobe may be cut where it is thin. Sensitivity not measured.
 const VALLEY: f64 = 0.35;
+/// A cut overlap ends, for its gap, where it is thinner than this fraction of its depth. Sensitivity not measured.
 const THIN: f64 = 0.4;
 
-/// Lowerings in mm at which overlaps are divided among gaps: this one times a power of the ratio. Loads that lower the wheel by 0.05 to
+/// Lowering in mm at which overlaps are divided among gaps; others are this one times a power of [`GROUPED_RATIO`]. Loads that lower the wheel by 0.05 to
 /// 0.2 mm, as all usual ones do, share one division, so that forces do not jump along a sweep of loads or heights either.
 const GROUPED_AT: f64 = 0.1;
+/// Ratio of neighbouring lowerings at which overlaps are divided anew.
 const GROUPED_RATIO: f64 = 4.0;
-/// Groups grow into one where the overlap between them is deeper than this part of the lobes on both sides.
+/// Groups merge where the overlap between them is deeper than this fraction of the lobes on both sides. Sensitivity not measured.
 const MERGED: f64 = 0.6;
 
 impl ContactLocus<'_> {

@@ -285,23 +285,11 @@ fn alike(a: &Mesh, b: &Mesh) -> bool {
 mod tests {
     use super::*;
     use crate::contact::half_space::strip_operator::kind;
-    use crate::contact::mesh::strips::{Chord, Grading, equal_strips};
+    use crate::contact::mesh::samples::mesh_between;
     use crate::contact::monitor::Unmonitored;
 
     fn mesh(half_width: f64) -> Mesh {
-        let chords: Vec<Chord> = equal_strips(-half_width, half_width, 4)
-            .into_iter()
-            .enumerate()
-            .map(|(strip, (y, dy))| Chord {
-                patch: 0,
-                strip,
-                y,
-                dy,
-                left: -1.0,
-                right: 1.0,
-            })
-            .collect();
-        Mesh::new(&chords, &Grading::cosine(6))
+        mesh_between(half_width, [4, 6], |_| [-1.0, 1.0])
     }
 
     const KIND: OperatorKind = OperatorKind {

@@ -264,23 +264,11 @@ impl<'a> SlipEquations<'a> {
 mod tests {
     use super::*;
     use crate::contact::half_space::strip_operator::kind::Precision;
-    use crate::contact::mesh::strips::{Chord, Grading, equal_strips};
+    use crate::contact::mesh::samples::mesh_between;
     use crate::contact::monitor::Unmonitored;
 
     fn parabolic_mesh() -> Mesh {
-        let chords: Vec<Chord> = equal_strips(-0.6, 0.6, 4)
-            .into_iter()
-            .enumerate()
-            .map(|(strip, (y, dy))| Chord {
-                patch: 0,
-                strip,
-                y,
-                dy,
-                left: -1.0 + y * y,
-                right: 0.8 - y * y,
-            })
-            .collect();
-        Mesh::new(&chords, &Grading::cosine(5))
+        mesh_between(0.6, [4, 5], |y| [-1.0 + y * y, 0.8 - y * y])
     }
 
     #[test]

@@ -122,31 +122,25 @@ fn member<T: Serialize + ?Sized>(name: &str, value: &T) -> Result<(), Path> {
     look.map_err(|path| path.under(format_args!(".{name}")))
 }
 
-impl SerializeSeq for Members {
-    type Ok = ();
-    type Error = Path;
+/// Lists and tuples are looked through alike.
+macro_rules! items {
+    ($($kind:ident),+) => {
+        $(impl $kind for Members {
+            type Ok = ();
+            type Error = Path;
 
-    fn serialize_element<T: Serialize + ?Sized>(&mut self, item: &T) -> Result<(), Path> {
-        self.item(item)
-    }
+            fn serialize_element<T: Serialize + ?Sized>(&mut self, item: &T) -> Result<(), Path> {
+                self.item(item)
+            }
 
-    fn end(self) -> Result<(), Path> {
-        Ok(())
-    }
+            fn end(self) -> Result<(), Path> {
+                Ok(())
+            }
+        })+
+    };
 }
 
-impl SerializeTuple for Members {
-    type Ok = ();
-    type Error = Path;
-
-    fn serialize_element<T: Serialize + ?Sized>(&mut self, item: &T) -> Result<(), Path> {
-        self.item(item)
-    }
-
-    fn end(self) -> Result<(), Path> {
-        Ok(())
-    }
-}
+items!(SerializeSeq, SerializeTuple);
 
 impl SerializeMap for Members {
     type Ok = ();

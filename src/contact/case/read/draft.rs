@@ -19,12 +19,16 @@ use crate::contact::case::words::question::Case;
 use crate::contact::case::words::solver::{Output, Solver};
 use crate::contact::error::{CaseError, Fault};
 
+/// Most characters of the name of a case.
 const NAME_LENGTH_MAX: usize = 200;
+/// Most labels of a case.
 const LABELS_MAX: usize = 32;
+/// Most characters of the key of a label.
 const LABEL_KEY_LENGTH_MAX: usize = 64;
+/// Most characters of its value.
 const LABEL_VALUE_LENGTH_MAX: usize = 256;
 const FRICTION: Interval = Interval::closed(0.0, 100.0, "");
-/// Less friction than this is none, and dimensionless motions would not be numbers.
+/// A smaller friction coefficient is refused unless it is 0: dimensionless motions would overflow.
 const FRICTION_LEAST: f64 = 1e-12;
 
 /// What could be read of a case: the parts without a fault.

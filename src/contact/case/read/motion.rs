@@ -12,6 +12,7 @@ const SPEED: Interval = Interval::positive(1e9, "mm/s");
 const VELOCITY: Interval = Interval::closed(-1e9, 1e9, "mm/s");
 const RATE: Interval = Interval::closed(-1e6, 1e6, "rad/s");
 const RADIUS: Interval = Interval::positive(1e9, "mm");
+/// Most motions of a sweep, before the limit of the service.
 const POINTS_MAX: u32 = 1_000_000;
 const FORCE: Interval = Interval::closed(-1e15, 1e15, "N");
 /// The forces stand in the order of the creepages they replace.
@@ -22,7 +23,9 @@ const COMPONENTS: [&str; 5] = [
     "force_x_n",
     "force_y_n",
 ];
+/// Place of the spin in [`COMPONENTS`].
 const SPIN_AT: usize = 2;
+/// Place of the first force.
 const FORCES_FROM: usize = 3;
 
 /// Reads the required member `motion` of a case.

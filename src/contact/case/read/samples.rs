@@ -8,9 +8,10 @@ use crate::contact::case::read::object::{Object, join, number, shown};
 const COORDINATE: Interval = Interval::closed(-1e6, 1e6, "mm");
 /// Points of one axis of a grid.
 const AXIS_POINTS: std::ops::RangeInclusive<usize> = 2..=1000;
-/// Neighbouring coordinates of an axis are at least this far apart, relative to the length of the axis and to the
-/// largest coordinate: closer ones cannot be told apart in the arithmetic.
+/// Least distance of neighbouring coordinates of an axis, relative to the length of the axis: closer ones cannot be told apart in the
+/// arithmetic.
 const SPACING_MIN: f64 = 1e-9;
+/// The same relative to the largest coordinate.
 const SPACING_TO_COORDINATE_MIN: f64 = 1e-12;
 /// Neighbouring spacings differ by at most this factor; the edge of the contact cannot be told from more uneven samples.
 const SPACING_RATIO_MAX: f64 = 1000.0;

@@ -9,6 +9,7 @@ use crate::contact::case::words::solver::{
 
 const TARGET_ERROR: Interval = Interval::closed(1e-4, 0.5, "");
 const TIME_LIMIT: Interval = Interval::positive(86_400.0, "s");
+/// Most strips, and cells in one, of an explicit mesh.
 const MESH_SIDE_MAX: u32 = 1000;
 
 const METHODS: [(&str, MethodName); 4] = [

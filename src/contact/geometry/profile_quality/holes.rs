@@ -3,8 +3,9 @@
 use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::profile::Body;
 
-/// Shorter chords hide nothing, in mm, nor do those below this multiple of the width of the contact.
+/// Chords shorter than this, in mm, are no holes.
 const LENGTH_MIN: f64 = 1.0;
+/// Nor are chords shorter than this multiple of the width of the contact.
 const WIDTH_MIN: f64 = 1.0;
 /// Chords longer than this part of the width of the contact leave open whether the contact is there at all.
 const WIDE: f64 = 1.5;

@@ -2,13 +2,15 @@
 
 use crate::contact::geometry::profile_quality::samples::Points;
 
-/// Chords of one window of the noise, and its greatest length in mm: over longer ones the shape itself is not a cubic.
+/// Chords of one window in which noise is measured.
 const NOISE_CHORDS: usize = 4;
+/// Greatest length of such a window in mm: over longer ones the shape itself is no cubic.
 const NOISE_SPAN_MAX: f64 = 3.0;
 /// Windows that a median needs.
 const WINDOWS_MIN: usize = 12;
-/// Windows of coarse points that a quartile needs, and their greatest length in mm.
+/// Windows of coarse points that a quartile needs.
 const COARSE_WINDOWS_MIN: usize = 30;
+/// Their greatest length in mm.
 const COARSE_SPAN_MAX: f64 = 12.0;
 /// A quarter of the absolute values of a normal variable of deviation 1 are less.
 const QUARTILE_OF_NORMAL: f64 = 0.3186;
@@ -21,23 +23,28 @@ const COARSE_SHAPE: f64 = 6e-5;
 const COARSE_TELLS: f64 = 1.8;
 /// Median of the absolute value of a normal variable of deviation 1.
 pub const MEDIAN_OF_NORMAL: f64 = 0.6745;
-/// A point is odd from this many local medians and this distance in mm on.
-/// Population: seeded damage of the stress bench (class *damaged profile*); outliers of 2 µm may be worth half of the largest pressure.
+/// A point is odd from this many local medians on. Population: seeded damage of the stress bench (class *damaged profile*); outliers of 2 µm may be worth half of the largest pressure.
 const ODD_MEDIANS: f64 = 12.0;
+/// And from this distance in mm on; the same population.
 const ODD_MIN: f64 = 1.2e-3;
 /// Points farther apart than this, in mm, are off by the square of their distance more where the curvature jumps: arcs that meet, the
 /// polynomials of a tread.
 const ODD_SPACING: f64 = 0.25;
+/// Points of a local median.
 const ODD_WINDOW: usize = 15;
 /// Longest stretch in mm over which six neighbours are taken for points of one cubic.
 const ODD_SPAN_MAX: f64 = 3.5;
 /// Two neighbours off to either side are a step where the smaller distance is this part of the larger one.
 const STEP_PAIR: f64 = 0.7;
-/// A polygon has nearly all its turning in fewer points than this part of them, alone or in pairs.
+/// A polygon has at least this share of its turning in few points, alone or in pairs.
 const TURNING: f64 = 0.9;
+/// Those points are at most this fraction of all.
 const POLYGON_SHARE_MAX: f64 = 0.5;
+/// Fewest points of which that can be said.
 const POLYGON_POINTS_MIN: usize = 24;
+/// Fewest corners of a polygon.
 const POLYGON_CORNERS_MIN: usize = 4;
+/// Most points in a row, on average, that make one corner.
 const POLYGON_PAIR_MAX: f64 = 2.3;
 
 /// One point off the curve of its neighbours.

@@ -16,8 +16,9 @@ const NOISE_LEFT: f64 = 0.07;
 const NOISE_HARMLESS: f64 = 0.01;
 /// A smoothing by so many chords turns a polygon into a curve.
 const CHORDS: f64 = 2.0;
-/// Outliers and steps count up to this distance from the contact, in its half widths, and what noise is by this in mm beyond.
+/// Outliers and steps count up to this distance from the contact, in its half widths.
 const NEAR: f64 = 2.0;
+/// Noise is measured up to this distance in mm beyond that.
 const AROUND: f64 = 10.0;
 
 /// What the points of one body are like under one contact.

@@ -5,16 +5,17 @@ use crate::contact::geometry::profile_quality::samples::Points;
 
 /// How far below the highest point the head of a rail is measured, and above the lowest one the tip of a flange, in mm.
 const PIECE: f64 = 2.0;
-/// Least width of the head in mm, and least distance of its top from both ends.
-/// Population: 12 rails and rollers with heads of 37 to 56 mm, 15 to 64 mm from an end.
+/// Least width of the head in mm. Population: 12 rails and rollers with heads of 37 to 56 mm, 15 to 64 mm from an end.
 const HEAD_MIN: f64 = 25.0;
+/// Least distance of its top from both ends, in mm; the same population.
 const HEAD_FROM_END: f64 = 10.0;
-/// Width of the tip of a flange in mm, and its least distance from both ends.
-/// Population: 8 complete wheels with tips of 12 to 18 mm, 5 to 60 mm from an end.
+/// Least and largest width of the tip of a flange in mm. Population: 8 complete wheels with tips of 12 to 18 mm, 5 to 60 mm from an end.
 const TIP: [f64; 2] = [5.0, 25.0];
+/// Its least distance from both ends, in mm; the same population.
 const TIP_FROM_END: f64 = 3.0;
-/// A chord at an end of the profile is stray from this length in mm and this multiple of the median chord on.
+/// Least length in mm of a stray chord at an end of a profile.
 const STRAY: f64 = 10.0;
+/// And its least length over the median chord.
 const STRAY_MEDIANS: f64 = 8.0;
 /// Points beyond a stray chord at most.
 const STRAY_POINTS_MAX: usize = 2;

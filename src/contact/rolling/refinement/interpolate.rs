@@ -75,22 +75,10 @@ fn along(mesh: &Mesh, segment: &Segment, values: &[f64], place: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::mesh::strips::{Chord, Grading, equal_strips};
+    use crate::contact::mesh::samples::mesh_between;
 
     fn square(strips: usize, cells: usize) -> Mesh {
-        let chords: Vec<Chord> = equal_strips(-1.0, 1.0, strips)
-            .into_iter()
-            .enumerate()
-            .map(|(strip, (y, dy))| Chord {
-                patch: 0,
-                strip,
-                y,
-                dy,
-                left: -1.0,
-                right: 1.0,
-            })
-            .collect();
-        Mesh::new(&chords, &Grading::cosine(cells))
+        mesh_between(1.0, [strips, cells], |_| [-1.0, 1.0])
     }
 
     #[test]

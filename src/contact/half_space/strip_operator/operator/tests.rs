@@ -6,26 +6,15 @@ use super::*;
 
 use crate::contact::half_space::kernels::{Rectangle, rectangle};
 use crate::contact::mesh::observation::observation_points;
-use crate::contact::mesh::strips::{Chord, Grading, equal_strips};
+use crate::contact::mesh::samples::mesh_between;
+use crate::contact::mesh::strips::{Chord, Grading};
 use crate::contact::monitor::Unmonitored;
 
 fn ellipse(a: f64, b: f64, strips: usize, cells: usize) -> Mesh {
-    let chords: Vec<Chord> = equal_strips(-b, b, strips)
-        .into_iter()
-        .enumerate()
-        .map(|(strip, (y, dy))| {
-            let half = a * (1.0 - (y / b).powi(2)).sqrt();
-            Chord {
-                patch: 0,
-                strip,
-                y,
-                dy,
-                left: -half,
-                right: half,
-            }
-        })
-        .collect();
-    Mesh::new(&chords, &Grading::cosine(cells))
+    mesh_between(b, [strips, cells], |y| {
+        let half = a * (1.0 - (y / b).powi(2)).sqrt();
+        [-half, half]
+    })
 }
 
 /// Two patches of different strip widths side by side, one with two segments in a strip.
