@@ -2,6 +2,7 @@
 
 use crate::contact::case::words::contact::{Contact, Load};
 use crate::contact::error::Fault;
+use crate::contact::normal::gap::pilot::PilotOnce;
 use crate::contact::normal::gap::surface::GapSurface;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::hertz::{Ellipse, Pressing};
@@ -112,6 +113,7 @@ pub(crate) fn gap(
         gap,
         pressing: pressing(load),
         contact_modulus,
+        pilot: PilotOnce::default(),
     };
     contact
         .check()

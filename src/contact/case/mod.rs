@@ -9,6 +9,7 @@ pub mod elasticity;
 pub mod limits;
 pub mod motions;
 pub mod pair_quality;
+pub mod patch_guess;
 pub mod plausibility;
 pub mod press;
 pub mod problem;

@@ -40,6 +40,8 @@ pub(crate) struct GridSide {
 pub(crate) struct NextGrid {
     pub(crate) window: Window,
     pub(crate) cells: [usize; 2],
+    /// So many cells along each axis would resolve it.
+    pub(crate) needed: [usize; 2],
     /// More cells were wanted than a grid may have: some patch will be too coarse.
     pub(crate) capped: bool,
 }
@@ -280,6 +282,7 @@ impl PressureGrid {
         NextGrid {
             window,
             cells: needed.map(|cells| cells.clamp(4, CELLS_MAX)),
+            needed,
             capped: needed.iter().any(|cells| *cells > CELLS_MAX),
         }
     }

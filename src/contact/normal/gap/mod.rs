@@ -1,11 +1,13 @@
 //! Region and pressure of a given gap.
 
+pub mod coarse_look;
 pub mod conjugate_gradients;
 pub mod constants;
 pub mod coupling;
 pub mod edges;
 pub mod grid;
 pub mod outcome;
+pub mod pilot;
 pub mod search_box;
 pub mod solve;
 pub mod summits;

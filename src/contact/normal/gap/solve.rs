@@ -140,7 +140,7 @@ impl GapTask {
         })
     }
 
-    fn press(
+    pub(crate) fn press(
         &self,
         grid: &PressureGrid,
         before: Option<&(PressureGrid, Pressed)>,

@@ -13,6 +13,7 @@ use crate::contact::geometry::local_gap::{Detail, LocalGap};
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::answer::{NormalError, NormalWork};
+use crate::contact::normal::gap::pilot::PilotOnce;
 use crate::contact::normal::gap::surface::GapSurface;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::hertz::Pressing;
@@ -359,6 +360,7 @@ impl WheelTask {
             gap: GapSurface::grid(&gap.x, &gap.y, &above),
             pressing: Pressing::Approach(depth),
             contact_modulus: self.contact_modulus,
+            pilot: PilotOnce::default(),
         };
         let found = match fineness.detail {
             Detail::Coarse => contact.estimate(workspace, monitor)?,

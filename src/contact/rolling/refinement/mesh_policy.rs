@@ -6,7 +6,7 @@ use crate::contact::normal::footprint::Footprint;
 use crate::contact::rolling::mesh_plan::{MeshPlan, Regime};
 use crate::contact::rolling::methods::fastsim;
 use crate::contact::rolling::methods::method::Method;
-use crate::contact::rolling::refinement::constants::{MARGIN, SLACK};
+use crate::contact::rolling::refinement::constants::{MARGIN, SLACK, SLACK_POLE};
 use crate::contact::rolling::refinement::resolution::Resolution;
 
 /// Cells of the first mesh of a patch that is not slender.
@@ -149,7 +149,11 @@ impl MeshPolicy {
     #[must_use]
     pub fn next_begin(&self, plan: MeshPlan, cells: usize, excess: Option<f64>) -> MeshPlan {
         let here = self.half_doublings(cells);
-        if here >= 2 && excess.is_some_and(|excess| excess < SLACK) {
+        let slack = match plan.regime {
+            Regime::Spinning(_) => SLACK_POLE,
+            Regime::Unknown | Regime::Sticking { .. } => SLACK,
+        };
+        if here >= 2 && excess.is_some_and(|excess| excess < slack) {
             return self.at(here - 2, plan.regime);
         }
         plan

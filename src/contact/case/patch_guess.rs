@@ -1,0 +1,286 @@
+//! How long one motion on a patch takes to solve, as far as the patch is known before region and pressure are found. Where the numbers
+//! come from: see `solve_time.rs`.
+
+use crate::contact::half_space::elasticity::Elasticity;
+use crate::contact::normal::gap::pilot::PilotPatch;
+use crate::contact::normal::gap::summits::GapOutlook;
+use crate::contact::normal::gap::task::GapTask;
+use crate::contact::normal::hertz::{Ellipse, Pressing};
+use crate::contact::normal::patch::Patch;
+use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
+use crate::contact::rolling::motion::Motion;
+
+/// Time in s of a motion at a target of 0.005, and the powers with which it grows as the target falls, above and below 0.005:
+/// everything sticks; everything slips; creepages alone; spin whose pole lies in the patch. Medians of 900 ellipses with a/b from
+/// 1/50 to 50; a factor of 1.5 about them changes the share within 3 times by less than 2 % of cases.
+const STICK: MotionTime = MotionTime::new(2.5e-4, [0.0, 0.1]);
+const SLIDE: MotionTime = MotionTime::new(1.6e-4, [0.1, 0.8]);
+const CREEP: MotionTime = MotionTime::new(4.0e-4, [0.4, 1.3]);
+const SPIN: MotionTime = MotionTime::new(1.5e-3, [0.8, 1.6]);
+/// The same with a pole so far outside the patch, in half-lengths and half-widths, over that with a pole within.
+const POLE_FAR: f64 = 1.5;
+const POLE_FAR_TIMES: f64 = 0.35;
+pub(crate) const TARGET_USUAL: f64 = 0.005;
+/// Below this target the largest mesh is the end.
+pub(crate) const TARGET_LEAST: f64 = 4e-4;
+/// Normalised motions below which everything sticks, and parts of the creepage below which spin does not matter.
+const MOTION_SMALL: f64 = 0.03;
+const SPIN_SMALL: f64 = 0.03;
+/// Normalised creepage beyond which little sticks, without spin and with spin of 1, and how many times the spin it then is.
+const CREEP_LARGE_ALONE: f64 = 1.0;
+const CREEP_LARGE: f64 = 20.0;
+const CREEP_OVER_SPIN: f64 = 3.0;
+/// The time grows with the length over the width of a patch beyond a ratio, with a power; and with its inverse with another power.
+/// Without spin and with spin.
+const LONG: [(f64, f64); 2] = [(5.0, 0.7), (3.0, 1.25)];
+const WIDE_POWER: [f64; 2] = [0.25, 0.1];
+const SLENDER: f64 = 5.0;
+const RATIO_MAX: f64 = 1e4;
+/// How many times longer a motion with a prescribed force takes than one with its spin and creepages alone: without much spin; with
+/// spin about 1, which grows with the length over the width beyond `TRIALS_LONG`; on a wide patch; and with a spin that saturates.
+const TRIALS_CREEP: f64 = 2.0;
+const TRIALS_SPIN: f64 = 2.0;
+const TRIALS_LONG: f64 = 2.0;
+const TRIALS_LONG_POWER: f64 = 1.0;
+const TRIALS_WIDE: f64 = 1.2;
+const TRIALS_SATURATED: f64 = 5.0;
+/// Normalised spin below which a prescribed force does not meet it, on patches up to `SLENDER` times as long as wide and on longer
+/// ones; and beyond which it saturates.
+const SPIN_LOW: f64 = 0.3;
+const SPIN_LOW_LONG: f64 = 0.06;
+const SPIN_HIGH: f64 = 3.0;
+/// A relative radius of curvature across a rail, in mm.
+const RAIL_RADIUS: f64 = 300.0;
+
+/// Time of one motion by target.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct MotionTime {
+    usual: f64,
+    powers: [f64; 2],
+}
+
+impl MotionTime {
+    const fn new(usual: f64, powers: [f64; 2]) -> MotionTime {
+        MotionTime { usual, powers }
+    }
+
+    fn at(self, target: f64) -> f64 {
+        let finer = TARGET_USUAL / target.max(TARGET_LEAST);
+        let [above, below] = self.powers;
+        self.usual * finer.powf(if finer < 1.0 { above } else { below })
+    }
+}
+
+/// What the tractions of a motion will look like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Tractions {
+    Stick,
+    Slide,
+    Creep,
+    Spin,
+}
+
+impl Tractions {
+    /// From the creepage and the spin, normalised as in an answer.
+    fn of(creepage: f64, spin: f64) -> Tractions {
+        let alone = spin < SPIN_SMALL * creepage.max(0.3);
+        if creepage.max(spin) < MOTION_SMALL {
+            Tractions::Stick
+        } else if alone && creepage > CREEP_LARGE_ALONE
+            || creepage > CREEP_LARGE * spin.sqrt().max(1.0) && creepage > CREEP_OVER_SPIN * spin
+        {
+            Tractions::Slide
+        } else if alone {
+            Tractions::Creep
+        } else {
+            Tractions::Spin
+        }
+    }
+
+    fn time(self) -> MotionTime {
+        match self {
+            Tractions::Stick => STICK,
+            Tractions::Slide => SLIDE,
+            Tractions::Creep => CREEP,
+            Tractions::Spin => SPIN,
+        }
+    }
+}
+
+/// A patch as far as it is known before region and pressure are found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PatchGuess {
+    /// Half-length along rolling and half-width in mm.
+    pub(crate) half: [f64; 2],
+    /// Load in N.
+    pub(crate) force: f64,
+    /// How many times longer its motions take than those of an ellipse.
+    pub(crate) times: f64,
+}
+
+impl PatchGuess {
+    pub(crate) fn of_patch(patch: &Patch) -> PatchGuess {
+        let [x_min, x_max, y_min, y_max] = patch.extent;
+        PatchGuess {
+            half: [0.5 * (x_max - x_min), 0.5 * (y_max - y_min)],
+            force: patch.normal_force,
+            times: 1.0,
+        }
+    }
+
+    pub(crate) fn of_ellipse(ellipse: &Ellipse) -> PatchGuess {
+        PatchGuess {
+            half: [ellipse.a, ellipse.b],
+            force: ellipse.normal_force,
+            times: 1.0,
+        }
+    }
+
+    pub(crate) fn of_gap(task: &GapTask, outlook: &GapOutlook) -> PatchGuess {
+        let area = std::f64::consts::PI * outlook.half[0] * outlook.half[1];
+        let force = match task.pressing {
+            Pressing::Force(force) => force,
+            // A paraboloid's, see `search_box`.
+            Pressing::Approach(_) => {
+                let radius = (area / std::f64::consts::PI).sqrt();
+                4.0 / 3.0 * task.contact_modulus * radius * outlook.depth
+            }
+        };
+        let count = outlook.summits as f64;
+        PatchGuess {
+            half: outlook.half.map(|half| half / count.sqrt()),
+            force: force / count,
+            times: 1.0,
+        }
+    }
+
+    pub(crate) fn of_pilot(patch: &PilotPatch) -> PatchGuess {
+        PatchGuess {
+            half: patch.half,
+            force: patch.force,
+            times: 1.0,
+        }
+    }
+
+    pub(crate) fn of_wheel(task: &WheelTask) -> PatchGuess {
+        let pressing = match task.loading {
+            WheelLoad::Vertical(force) | WheelLoad::Normal(force) => Pressing::Force(force),
+            WheelLoad::Lowering(lowering) => Pressing::Approach(lowering),
+        };
+        let radius = task.geometry.placement.rolling_radius;
+        let ellipse = Ellipse::of_radii(radius, RAIL_RADIUS, pressing, task.contact_modulus);
+        PatchGuess::of_ellipse(&ellipse)
+    }
+
+    /// Time in s of a motion alone, solved to a target.
+    pub(crate) fn seconds(
+        &self,
+        target: f64,
+        elasticity: &Elasticity,
+        friction: f64,
+        motion: &Motion,
+        prescribed: bool,
+    ) -> (Tractions, f64) {
+        let c = (self.half[0] * self.half[1]).sqrt();
+        let bound = (friction * self.force).max(f64::MIN_POSITIVE);
+        let unit =
+            2.0 * elasticity.shear_modulus / (1.0 - elasticity.poisson_ratio) * c * c / bound;
+        let creepage = unit * motion.creepage_x.hypot(motion.creepage_y);
+        let spin = unit * c * motion.spin_per_mm.abs();
+        let ratio = match self.half[0] / self.half[1] {
+            // A load too small to tell a patch.
+            ratio if ratio.is_nan() => 1.0,
+            ratio => ratio.clamp(1.0 / RATIO_MAX, RATIO_MAX),
+        };
+        let (tractions, trials) = if prescribed {
+            trials(spin, ratio)
+        } else {
+            (Tractions::of(creepage, spin), 1.0)
+        };
+        let spinning = usize::from(tractions == Tractions::Spin);
+        let (long, power) = LONG[spinning];
+        let slender =
+            (ratio / long).max(1.0).powf(power) * (1.0 / ratio).max(1.0).powf(WIDE_POWER[spinning]);
+        // The place at which creepages and spin cancel.
+        let pole =
+            [motion.creepage_y, motion.creepage_x].map(|creepage| creepage / motion.spin_per_mm);
+        let outside = (pole[0] / self.half[0]).hypot(pole[1] / self.half[1]) > POLE_FAR;
+        let far = if outside && !prescribed && tractions == Tractions::Spin {
+            POLE_FAR_TIMES
+        } else {
+            1.0
+        };
+        (
+            tractions,
+            self.times * trials * far * slender * tractions.time().at(target),
+        )
+    }
+}
+
+/// Of a motion with a prescribed force: what its tractions will look like, and how many times longer it takes for that.
+fn trials(spin: f64, ratio: f64) -> (Tractions, f64) {
+    let low = if ratio > SLENDER {
+        SPIN_LOW_LONG
+    } else {
+        SPIN_LOW
+    };
+    if spin < low {
+        (Tractions::Creep, TRIALS_CREEP)
+    } else if spin > SPIN_HIGH {
+        (Tractions::Spin, TRIALS_SATURATED)
+    } else if ratio < 1.0 / SLENDER {
+        (Tractions::Spin, TRIALS_WIDE)
+    } else {
+        let long = (ratio / TRIALS_LONG).max(1.0);
+        (Tractions::Spin, TRIALS_SPIN * long.powf(TRIALS_LONG_POWER))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn motions_are_told_by_creepage_and_spin() {
+        assert_eq!(Tractions::of(0.0, 0.0), Tractions::Stick);
+        assert_eq!(Tractions::of(0.5, 0.0), Tractions::Creep);
+        assert_eq!(Tractions::of(5.0, 0.0), Tractions::Slide);
+        assert_eq!(Tractions::of(1.0, 1.0), Tractions::Spin);
+        assert_eq!(Tractions::of(0.0, 1.0), Tractions::Spin);
+        assert_eq!(Tractions::of(50.0, 1.0), Tractions::Slide);
+    }
+
+    #[test]
+    fn the_time_of_any_patch_is_a_number() {
+        let elasticity = Elasticity {
+            shear_modulus: 82_000.0,
+            poisson_ratio: 0.28,
+            difference: 0.0,
+        };
+        let motion = Motion {
+            creepage_x: 0.001,
+            creepage_y: 0.0,
+            spin_per_mm: 0.001,
+        };
+        let lengths = [0.0, 1e-300, 1.0, 1e300, f64::INFINITY, f64::NAN];
+        for (a, b) in lengths.iter().flat_map(|a| lengths.map(|b| (*a, b))) {
+            for force in [0.0, 1e-300, 1.0, 1e300, f64::NAN] {
+                let patch = PatchGuess {
+                    half: [a, b],
+                    force,
+                    times: 1.0,
+                };
+                let (_, seconds) = patch.seconds(0.005, &elasticity, 0.3, &motion, force == 1.0);
+                assert!(seconds.is_finite(), "{patch:?}: {seconds}");
+            }
+        }
+    }
+
+    #[test]
+    fn time_never_falls_as_the_target_does() {
+        for time in [STICK, SLIDE, CREEP, SPIN] {
+            let targets = [0.05, 0.02, 0.005, 0.002, 0.001, 4e-4, 1e-4];
+            assert!(targets.is_sorted_by(|a, b| time.at(*a) <= time.at(*b)));
+        }
+    }
+}
