@@ -59,6 +59,8 @@ export function field(app, pointer, label, unit, look = {}) {
   </div>`;
 }
 
+/** @typedef {{ minimum?: number | null, maximum?: number | null, minimum_excluded?: boolean | null }} Limits Those of a fault, where there are any. */
+
 /**
  * What is wrong, in the unit of the field where the limits are known.
  * @param {Fault} fault
@@ -66,9 +68,11 @@ export function field(app, pointer, label, unit, look = {}) {
  * @param {string} unit
  */
 function faultText(fault, factor, unit) {
-  const { minimum, maximum } = /** @type {{ minimum?: number | null, maximum?: number | null }} */ (fault);
-  if (!factor || typeof minimum !== 'number' || typeof maximum !== 'number') return fault.detail;
-  return `A number from ${number(minimum / factor)} to ${number(maximum / factor)} ${unit} is needed.`;
+  const { minimum, maximum, minimum_excluded: excluded } = /** @type {Limits} */ (fault);
+  if (!factor || (typeof minimum !== 'number' && typeof maximum !== 'number')) return fault.detail;
+  const low = typeof minimum === 'number' ? `${excluded ? 'more than' : 'at least'} ${number(minimum / factor)}` : '';
+  const high = typeof maximum === 'number' ? `at most ${number(maximum / factor)}` : '';
+  return `A number of ${[low, high].filter(Boolean).join(' and ')} ${unit} is needed.`;
 }
 
 /** @param {JsonValue | undefined} value @param {number} [factor] */
