@@ -72,6 +72,7 @@ pub const FILES: &[PageFile] = files!(
     "js/store.js",
     "js/strips.js",
     "js/tables.js",
+    "js/typed.js",
     "page.css",
     "theme.css",
     "theme.js",

@@ -153,6 +153,8 @@ test('a cheap case is solved while it is written, and leaves no job behind', () 
   await drawn(page, '.preview field-map');
   await page.getByRole('checkbox', { name: 'result while typing' }).uncheck();
   await page.locator('.preview').waitFor({ state: 'detached' });
-  const after = (await service.ask('/v1/jobs?limit=1000')).jobs.length;
-  assert.equal(after, before);
+  await page.waitForFunction(async (expected) => {
+    const { jobs } = await (await fetch('/v1/jobs?limit=1000')).json();
+    return jobs.length === expected;
+  }, before, { polling: 100 });
 }));

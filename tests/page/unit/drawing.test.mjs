@@ -1,7 +1,8 @@
-// What drawings compute: the gap between wheel and rail, tables of files.
+// What drawings compute, what files say, and the order of a case.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { gapOf } from '../../../src/http/page/web/js/placing.js';
+import { inOrder } from '../../../src/http/page/web/js/starts.js';
 import { parseGapCurve, parseGrid, profileKind } from '../../../src/http/page/web/js/tables.js';
 
 test('the gap is the vertical distance of the lower side of the wheel from the upper side of the rail', () => {
@@ -31,4 +32,12 @@ test('the name of a file tells its format and body', () => {
   assert.deepEqual(profileKind('a.prw'), { format: 'simpack', body: 'wheel' });
   assert.deepEqual(profileKind('my-rail.csv'), { format: 'columns', body: 'rail' });
   assert.deepEqual(profileKind('x.txt'), { format: 'columns', body: null });
+});
+
+test('a case is written in the order that a person would choose, and loses nothing', () => {
+  const document = { outputs: [], contact: { lateral_mm: 1, type: 'radii' }, extra: 1, name: 'x', motion: {} };
+  const ordered = inOrder(document);
+  assert.deepEqual(Object.keys(ordered), ['name', 'contact', 'motion', 'outputs', 'extra']);
+  assert.deepEqual(Object.keys(/** @type {object} */ (ordered.contact)), ['type', 'lateral_mm']);
+  assert.deepEqual(ordered, document);
 });

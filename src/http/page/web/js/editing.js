@@ -5,6 +5,8 @@ import { at, pretty, put } from './document.js';
 import { hasFields, loadField } from './fields.js';
 import { formatRoute } from './routes.js';
 import { adoptJob } from './result.js';
+import { inOrder } from './starts.js';
+import { removeTyped, TYPED } from './typed.js';
 
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./document.js').JsonObject} JsonObject */
@@ -28,6 +30,7 @@ export async function openKept(app) {
   if (kept) editText(app, kept);
   try {
     app.compose({ examples: await examplesOf() });
+    removeTyped().catch(() => {});
     if (!kept) openExample(app, FIRST);
   } catch (error) {
     app.refused(error);
@@ -64,7 +67,7 @@ export function openExample(app, name) {
   const example = app.store.get().compose.examples.find((known) => known.name === name);
   if (!example) return;
   app.compose({ example: name, typing: null });
-  editDocument(app, /** @type {JsonObject} */ (/** @type {unknown} */ (example.case)));
+  editDocument(app, inOrder(/** @type {JsonObject} */ (/** @type {unknown} */ (example.case))));
 }
 
 /**
@@ -122,7 +125,7 @@ async function preview(app, digest, signal) {
     return;
   }
   if (known?.digest === digest) return;
-  const text = JSON.stringify({ ...document, name: 'result while typing' });
+  const text = JSON.stringify({ ...document, ...TYPED });
   // Not given up when the next character is written: its job would stay.
   const job = await submit(text, { wait: 2 });
   try {

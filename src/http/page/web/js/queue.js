@@ -2,6 +2,7 @@
 
 import { batches as batchesOf, jobs as jobsOf, me as askMe } from './api.js';
 import { follow } from './events.js';
+import { isTyped } from './typed.js';
 
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./api.js').Job} Job */
@@ -86,7 +87,7 @@ async function refresh(app) {
     const oldest = page.jobs[page.jobs.length - 1]?.id ?? '';
     // Ids sort by time: what is older than the page stays as it was loaded.
     const older = page.next_cursor ? queue.jobs.filter((job) => job.id < oldest && !fresh.has(job.id)) : [];
-    queue.jobs = [...page.jobs, ...older];
+    queue.jobs = [...page.jobs.filter((job) => !isTyped(job)), ...older];
     if (!older.length) queue.cursor = page.next_cursor ?? '';
     queue.total = page.total ?? page.total_at_least ?? queue.jobs.length;
     queue.more = page.total === undefined;
@@ -109,6 +110,7 @@ export function refreshSoon(app, pause = 0) {
 
 /** A job that was submitted alone has changed. @param {App} app @param {Job} job */
 function takeJob(app, job) {
+  if (isTyped(job)) return;
   const known = queue.jobs.some(({ id }) => id === job.id);
   const filtered = queue.states.length || queue.label || queue.name;
   if (known && !filtered) {

@@ -7,7 +7,7 @@ import { put } from './document.js';
 import { downloads } from './downloads.js';
 import { drawProfiles } from './drawing/profiles.js';
 import { editDocument, solve } from './editing.js';
-import { ALL_OUTPUTS } from './starts.js';
+import { ALL_OUTPUTS, inOrder } from './starts.js';
 import { indexOf } from './field/cells.js';
 import { hasFields } from './fields.js';
 import { chooseAmounts, chosenAmounts } from './field/palette.js';
@@ -43,7 +43,7 @@ export function result(app) {
 
 /** @param {App} app @param {Looked} looked */
 function edit(app, looked) {
-  if (looked.document) editDocument(app, looked.document);
+  if (looked.document) editDocument(app, inOrder(looked.document));
   app.compose({ example: '' });
   app.go(formatRoute('compose'));
 }

@@ -1,4 +1,6 @@
-// The beginning of a case of each kind of contact.
+// The beginning of a case of each kind of contact, and the order of its members.
+
+import { isObject } from './document.js';
 
 /** @typedef {import('./document.js').JsonObject} JsonObject */
 
@@ -62,4 +64,19 @@ export function withContact(document, type) {
     motion: (type === 'profiles') === (contact.type === 'profiles') && before.motion ? before.motion : start.motion,
     outputs: ALL_OUTPUTS,
   };
+}
+
+const MEMBERS = ['name', 'labels', 'material', 'friction', 'contact', 'load', 'motion', 'solver', 'outputs'];
+
+/**
+ * A case with its members as a person would order them: the kind of contact first, what is in no list last.
+ * @param {JsonObject} document
+ * @returns {JsonObject}
+ */
+export function inOrder(document) {
+  const { contact } = document;
+  /** @type {JsonObject} */
+  const first = isObject(contact) && 'type' in contact ? { ...document, contact: { type: contact.type, ...contact } } : document;
+  const keys = [...MEMBERS.filter((key) => key in first), ...Object.keys(first).filter((key) => !MEMBERS.includes(key))];
+  return Object.fromEntries(keys.map((key) => [key, first[key]]));
 }
