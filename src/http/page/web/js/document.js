@@ -115,11 +115,12 @@ export function pretty(value, indent = '') {
  * @param {string} indent
  */
 function filled(items, indent) {
+  const room = Math.max(32, LINE_LENGTH - indent.length);
   const lines = [];
   let line = '';
   items.forEach((item, place) => {
     const text = place < items.length - 1 ? `${item},` : item;
-    if (line && line.length + text.length + 1 > LINE_LENGTH) {
+    if (line && line.length + text.length + 1 > room) {
       lines.push(indent + line);
       line = '';
     }

@@ -39,9 +39,16 @@ export function drawGrid(document) {
   const [low, high] = all.reduce(([least, most], value) => [Math.min(least, value), Math.max(most, value)], [Infinity, -Infinity]);
   const what = gap ? `gap from ${number(low)} to ${number(high)} mm` : `pressure to ${number(high)} MPa`;
   return html`<figure class="gridded">
-    <value-grid .values=${values} .reversed=${gap}></value-grid>
+    <value-grid .values=${values} .reversed=${gap} .aspect=${extent(document, '/contact/x_mm') / extent(document, '/contact/y_mm')}></value-grid>
     <figcaption>${fixed(values[0].length, 0)} × ${fixed(values.length, 0)} values, ${what}; x along rolling →, y to the left ↑</figcaption>
   </figure>`;
+}
+
+/** How far coordinates reach; 1 where that is not known. @param {JsonObject} document @param {string} pointer */
+function extent(document, pointer) {
+  const places = numbersAt(document, pointer);
+  const length = places[places.length - 1] - places[0];
+  return length > 0 ? length : 1;
 }
 
 /** @param {JsonObject} document @param {string} pointer */
@@ -51,11 +58,15 @@ function rowsOf(document, pointer) {
   return rows.map((row) => row.map((value) => (typeof value === 'number' ? value : NaN)));
 }
 
-/** <value-grid>: numbers on a grid as colours, one pixel each, scaled without smoothing. */
+const LONGER_SIDE = 640;
+
+/** <value-grid>: numbers on a grid as colours, to scale and without smoothing. */
 class ValueGrid extends HTMLElement {
   #canvas = document.createElement('canvas');
   /** Small values are the bright ones. */
   reversed = false;
+  /** Width over height. */
+  aspect = 1;
   /** @type {number[][]} */ #values = [];
 
   connectedCallback() {
@@ -74,9 +85,10 @@ class ValueGrid extends HTMLElement {
     const height = this.#values.length;
     const width = this.#values[0]?.length ?? 0;
     if (!width) return;
-    this.#canvas.width = width;
-    this.#canvas.height = height;
-    const pen = /** @type {CanvasRenderingContext2D} */ (this.#canvas.getContext('2d'));
+    const sheet = document.createElement('canvas');
+    sheet.width = width;
+    sheet.height = height;
+    const pen = /** @type {CanvasRenderingContext2D} */ (sheet.getContext('2d'));
     const image = pen.createImageData(width, height);
     const pixels = new Uint32Array(image.data.buffer);
     const words = wordsOf(mapOf('amount'));
@@ -86,6 +98,12 @@ class ValueGrid extends HTMLElement {
       pixels[(height - 1 - j) * width + i] = words[Math.round(255 * (this.reversed ? 1 - share : share))];
     }));
     pen.putImageData(image, 0, 0);
+    const aspect = Math.max(0.05, Math.min(20, this.aspect));
+    this.#canvas.width = Math.round(LONGER_SIDE * Math.min(1, aspect));
+    this.#canvas.height = Math.round(LONGER_SIDE * Math.min(1, 1 / aspect));
+    const shown = /** @type {CanvasRenderingContext2D} */ (this.#canvas.getContext('2d'));
+    shown.imageSmoothingEnabled = false;
+    shown.drawImage(sheet, 0, 0, this.#canvas.width, this.#canvas.height);
   }
 }
 
