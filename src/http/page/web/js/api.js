@@ -120,7 +120,7 @@ export const result = (id) => json(`/v1/jobs/${id}/result`);
 /** @type {(id: string) => Promise<JsonObject>} */
 export const caseOf = (id) => json(`/v1/jobs/${id}/case`);
 
-/** @typedef {{ state?: readonly string[], label?: string, name?: string, fields?: string, cursor?: string, limit?: number }} Filter */
+/** @typedef {{ state?: readonly string[], batch?: string, label?: string, name?: string, fields?: string, cursor?: string, limit?: number }} Filter */
 /** @typedef {Omit<Schemas['JobPage'], 'jobs'> & { jobs: Job[] }} JobPage With all members of the jobs that are asked for. */
 
 /**

@@ -1,10 +1,9 @@
 // The jobs of a batch along a label that is a number, such as the chainage: what the strips show of each.
 
-import { batch as batchOf, batches as batchesOf, request } from './api.js';
+import { batch as batchOf, batches as batchesOf, jobs as jobsOf, request } from './api.js';
 import { formatRoute } from './routes.js';
 
 /** @typedef {import('./state.js').App} App */
-/** @typedef {import('./api.js').JobResult} JobResult */
 
 /** @typedef {'wear' | 'used' | 'pressure' | 'stick'} StripKey */
 
@@ -16,7 +15,7 @@ export const STRIPS = [
   { key: 'stick', label: 'stick', short: 'stick', unit: '% of the area', colour: '--stick' },
 ];
 
-/** @typedef {{ id: string, name: string, index: number, labels: Record<string, string> } & Record<StripKey, number>} Row */
+/** @typedef {{ id: string, index: number, labels: Record<string, string> } & Record<StripKey, number>} Row */
 
 /**
  * @typedef {object} Line
@@ -77,42 +76,76 @@ export async function openLine(app, id, query) {
   }
 }
 
-/** Results arrive one by one, as lines of JSON. @param {App} app @param {Line} mine */
+/** What the strips need of every patch, besides labels. */
+const COLUMNS = ['id', 'index', 'point', 'patch', 'normal_force_n', 'force_x_n', 'force_y_n', 'friction_power_n', 'pressure_max_mpa', 'area_mm2', 'stick_share'];
+
+/** The narrow table of the batch arrives in pieces, one line for each patch and motion. @param {App} app @param {Line} mine */
 async function readRows(app, mine) {
-  const answer = await request(`/v1/batches/${mine.batch}/results`, { headers: { Accept: 'application/x-ndjson' } });
+  const [first] = (await jobsOf({ batch: mine.batch, limit: 1, fields: 'labels' })).jobs;
+  const labels = Object.keys(first?.labels ?? {}).filter((key) => !key.includes(','));
+  const columns = [...COLUMNS, ...labels.map((key) => `label:${key}`)].join(',');
+  const answer = await request(`/v1/batches/${mine.batch}/results?format=csv&columns=${encodeURIComponent(columns)}`);
   const stream = /** @type {ReadableStream<Uint8Array<ArrayBuffer>>} */ (answer.body);
   const reader = stream.pipeThrough(new TextDecoderStream()).getReader();
+  const take = rowReader(labels);
   let rest = '';
   let drawn = performance.now();
   for (let piece = await reader.read(); !piece.done && line === mine; piece = await reader.read()) {
-    const lines = (rest + piece.value).split('\n');
+    const lines = (rest + piece.value).split(/\r?\n/);
     rest = lines.pop() ?? '';
     for (const text of lines) {
-      const row = text && rowOf(JSON.parse(text));
+      const row = take(text);
       if (row) mine.rows.push(row);
     }
     if (performance.now() - drawn < REDRAW_MS) continue;
     drawn = performance.now();
     app.redraw();
   }
+  const last = take('');
+  if (last) mine.rows.push(last);
 }
 
 /**
- * The first motion of all patches together.
- * @param {{ id: string, name?: string | null, index: number, labels?: Record<string, string>, result?: JobResult }} entry
- * @returns {Row | null} Null for a job without a result.
+ * Makes rows of the lines of a table: the first motion of all patches of a job together.
+ * @param {readonly string[]} labels
+ * @returns {(text: string) => Row | null} Answers a row when the line of the next job, or an empty one, has come; lines without a result are
+ *   left out, as the header is.
  */
-export function rowOf({ id, name, index, labels = {}, result }) {
-  if (!result) return null;
-  const sum = (/** @type {(patch: JobResult['patches'][number]) => number} */ of) => result.patches.reduce((all, patch) => all + of(patch), 0);
-  const area = sum((patch) => patch.area_mm2);
-  return {
-    id, name: name ?? id, index, labels,
-    wear: sum(({ points }) => points[0].friction_power_n),
-    used: (100 * sum(({ points }) => Math.hypot(points[0].force_x_n, points[0].force_y_n))) / sum((patch) => patch.normal_force_n),
-    pressure: Math.max(...result.patches.map((patch) => patch.pressure_max_mpa)),
-    stick: (100 * sum(({ points }) => points[0].stick_area_mm2 ?? NaN)) / area,
+export function rowReader(labels) {
+  /** @type {{ row: Row, force: number, load: number, area: number, stick: number } | null} */
+  let open = null;
+  const close = () => {
+    if (!open) return null;
+    const { row, force, load, area, stick } = open;
+    return { ...row, used: (100 * force) / load, stick: (100 * stick) / area };
   };
+  return (text) => {
+    const cells = splitLine(text);
+    const [load, x, y, wear, pressure, area, stick] = cells.slice(4).map((cell) => (cell === '' ? NaN : Number(cell)));
+    const [id, index, point] = cells;
+    if (text && (!(load > 0) || point !== '0')) return null;
+    const same = open !== null && open.row.id === id;
+    const done = same ? null : close();
+    if (!same) {
+      const named = Object.fromEntries(labels.map((key, at) => [key, cells[COLUMNS.length + at] ?? '']));
+      open = text ? { row: { id, index: Number(index), labels: named, wear: 0, used: 0, pressure: 0, stick: 0 }, force: 0, load: 0, area: 0, stick: 0 } : null;
+    }
+    if (open) {
+      open.row.wear += wear;
+      open.row.pressure = Math.max(open.row.pressure, pressure);
+      open.force += Math.hypot(x, y);
+      open.load += load;
+      open.area += area;
+      open.stick += stick * area;
+    }
+    return done;
+  };
+}
+
+/** The cells of a line of CSV. @param {string} text */
+export function splitLine(text) {
+  const cells = text.match(/(?<=^|,)("(?:[^"]|"")*"|[^,]*)/g) ?? [''];
+  return cells.map((cell) => (cell.startsWith('"') ? cell.slice(1, -1).replaceAll('""', '"') : cell));
 }
 
 /** Labels that are a number in every row. @param {readonly Row[]} rows */
