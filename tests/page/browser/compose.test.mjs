@@ -40,6 +40,8 @@ test('faults stand at their fields and in a list that leads to them', () => onPa
     assert.equal(await page.locator(`#field-${id}`).getAttribute('aria-invalid'), 'true', id);
     assert.ok((await page.locator(`#field-${id}-fault`).innerText()).length > 10, id);
   }
+  // The limits are told in the unit of the field.
+  assert.match(await page.locator('#field-load-normal_force_n-fault').innerText(), /more than 0 and at most 10⁹ kN/);
   const link = page.getByRole('button', { name: '/friction/coefficient' });
   await link.focus();
   await page.keyboard.press('Enter');

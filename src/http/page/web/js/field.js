@@ -59,8 +59,6 @@ export function field(app, pointer, label, unit, look = {}) {
   </div>`;
 }
 
-/** @typedef {{ minimum?: number | null, maximum?: number | null, minimum_excluded?: boolean | null }} Limits Those of a fault, where there are any. */
-
 /**
  * What is wrong, in the unit of the field where the limits are known.
  * @param {Fault} fault
@@ -68,7 +66,7 @@ export function field(app, pointer, label, unit, look = {}) {
  * @param {string} unit
  */
 function faultText(fault, factor, unit) {
-  const { minimum, maximum, minimum_excluded: excluded } = /** @type {Limits} */ (fault);
+  const { minimum, maximum, minimum_excluded: excluded } = fault;
   if (!factor || (typeof minimum !== 'number' && typeof maximum !== 'number')) return fault.detail;
   const low = typeof minimum === 'number' ? `${excluded ? 'more than' : 'at least'} ${number(minimum / factor)}` : '';
   const high = typeof maximum === 'number' ? `at most ${number(maximum / factor)}` : '';
