@@ -24,7 +24,7 @@ const MARGIN_MM: f64 = 0.1;
 const WIDENING: f64 = 1.5;
 /// So many times at most.
 const WIDENINGS_MAX: usize = 5;
-/// Slope with which surfaces are bent apart beyond a cut: steep enough that they do not touch there, whatever the load.
+/// Slope with which surfaces are bent apart beyond a cut: steep enough that they do not touch there.
 const APART: f64 = 0.5;
 /// Largest lowering of a wheel in mm; more is no contact of wheel and rail.
 const LOWERING_MAX: f64 = 16.0;

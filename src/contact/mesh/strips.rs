@@ -90,7 +90,9 @@ impl Grading {
     }
 }
 
-/// Share β of the cells' density that is graded toward the ends where cells gather about a pole.
+/// Share β of the cells' density that is graded toward the ends where cells gather about a pole. On the first 160 ellipses of
+/// `cargo bench --bench calibrate ellipse`, 0.6 and 0.9 change the median error at the targets 0.005 and 0.001 by 4 % at most and take 24
+/// and 5 % more work at the first, 5 % less at the second.
 const GATHERED_AT_ENDS: f64 = 0.75;
 /// Weight g and half width d of the Lorentz bump `L(t) = 1/(πd(1 + t²/d²))` at the pole. Any weight from 0.08 to 0.25 and
 /// any half width from 0.05 to 0.15 serve.

@@ -1,7 +1,7 @@
 //! Tuned numbers of the gap solver: how fine its grids are, and when they are fine enough.
 //!
 //! Errors at these numbers are those of `tests/physics/gap_hertz.rs` and `gap_reference.rs`; `cargo bench --bench gaps` prints times and
-//! errors of 26 gaps. Where no sensitivity is given it was not measured.
+//! errors of the reference gaps. Where no sensitivity is given it was not measured.
 
 use crate::contact::normal::gap::grid::GridFineness;
 
@@ -34,7 +34,7 @@ pub(crate) const TARGET_POWER: f64 = -2.0 / 3.0;
 pub(crate) const COARSER_MAX: f64 = 0.8;
 
 /// A gap is solved on finer grids until the approach changes by no more than this, relative to the depth of overlap and times the ratio
-/// of the cells' sizes. Smooth gaps meet it on the first grid that is fine enough.
+/// of the cells' sizes.
 pub(crate) const APPROACH_CHANGE: f64 = 0.002;
 
 /// The same for the largest pressure.
@@ -47,10 +47,10 @@ pub(crate) const REFINEMENT: f64 = 1.6;
 /// box.
 pub(crate) const TOLERANCE_FIRST: f64 = 2e-3;
 
-/// The same on later grids: pressures are then off by less than the grid's own error, 0.1 %.
+/// The same on later grids.
 pub(crate) const TOLERANCE: f64 = 2e-4;
 
-/// Most grids that are tried; each is larger, shifted or finer than the one before. Usual gaps take 3 to 5.
+/// Most grids that are tried; each is larger, shifted or finer than the one before. Numeric safety.
 pub(crate) const GRIDS_MAX: usize = 12;
 
 /// Cells outside the contact that nearly touch, relative to the deepest overlap, belong to the next grid.

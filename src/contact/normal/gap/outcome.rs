@@ -10,9 +10,9 @@ use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 
-/// Half-length over rolling radius from which on half-spaces are a poor likeness of the bodies (a usual limit of the theory).
+/// Half-length over rolling radius from which on half-spaces are a poor likeness of the bodies. A judgement, not a measurement.
 const HALF_LENGTH_USUAL_MAX: f64 = 0.3;
-/// Approach over the smaller half width from which on strains are too large for linear elasticity (a usual limit of the theory).
+/// Approach over the smaller half width from which on strains are too large for linear elasticity. A judgement, not a measurement.
 const APPROACH_USUAL_MAX: f64 = 0.15;
 /// A patch with less than this fraction of the load need not be resolved.
 const SHARE_MIN: f64 = 0.02;

@@ -9,15 +9,17 @@ use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::refinement::constants::{MARGIN, SLACK, SLACK_POLE};
 use crate::contact::rolling::refinement::resolution::Resolution;
 
-/// Cells of the first mesh of a patch that is not slender.
+/// Cells of the first mesh of a patch that is not slender. On the first 160 ellipses of `cargo bench --bench calibrate ellipse` at the
+/// targets 0.005 and 0.001, 48 takes 4 to 10 % more work and 90 takes 15 % less, with one case more or less covered.
 pub const CELLS_FIRST: f64 = 64.0;
 /// Cells of the finest mesh a target may ask for.
 pub const CELLS_MAX: u32 = 2048;
 /// Fewest strips, and cells in one, that the rules are good for; twice as many in slender patches.
 const SIDE_MIN: f64 = 4.0;
-/// Patches longer than this many times their width, or the reverse, are slender.
+/// Patches longer than this many times their width, or the reverse, are slender. On the same ellipses 4 takes 17 % less work at 0.005 and
+/// 15 % more at 0.001, 7 takes 12 and 7 % more; errors and coverage are alike.
 const SLENDER: f64 = 5.0;
-/// Coordinates of a vortex centre are rounded to multiples of this.
+/// Coordinates of a vortex centre are rounded to multiples of this. 0.02 and 0.1 take 1 to 6 % more work on the same ellipses.
 const POLE_GRID: f64 = 0.05;
 /// Half-doublings of the number of cells from which on steps of less than two times the cells do not pay.
 const SMALL_STEPS_BELOW: i32 = 4;

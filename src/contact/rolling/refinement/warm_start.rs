@@ -8,9 +8,11 @@ use crate::contact::rolling::strip_mesh::StripMesh;
 /// A start is extrapolated only for motions on the line through the last two; the distance from it may be this fraction of the step.
 /// Numeric safety, not tuned.
 const STRAIGHT: f64 = 1e-6;
-/// Longest step that is extrapolated, in steps between the last two motions.
+/// Longest step that is extrapolated, in steps between the last two motions: equal steps with some room. 1.1 and 2.5 are alike on sweeps
+/// of equal steps.
 const STEP_MAX: f64 = 1.5;
-/// Longest step, relative to the motion, over which the last tractions serve as they are.
+/// Longest step, relative to the motion, over which the last tractions serve as a start unchanged. On 12 sweeps of 9 motions on ellipses
+/// of `benches/calibrate`, 0.12 takes 6 % more products and 0.5 takes 6 % fewer.
 const NEAR: f64 = 0.25;
 
 /// First iterates of both rules, dimensionless, one value per cell.

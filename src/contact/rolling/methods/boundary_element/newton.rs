@@ -21,20 +21,26 @@ use crate::contact::rolling::methods::boundary_element::workspace::{
 use crate::contact::rolling::own_blocks::OwnBlocks;
 use crate::contact::rolling::slip_equations::{SlipEquations, SlipScratch};
 
-/// Projection parameter r times `M_ii`. Sensitivity not measured.
+// Sensitivities of the numbers below: each changed alone, on the first 160 ellipses of `cargo bench --bench calibrate ellipse` at the
+// targets 0.005 and 0.001, and on 12 sweeps of 9 motions. No change made a solve fail or moved an error beyond its scatter.
+
+/// Projection parameter r times `M_ii`. 0.2 takes 2 to 8 % more Newton steps, 0.45 takes 1 to 4 % fewer but is nearer to values that
+/// cycle.
 const PROJECTION: f64 = 0.3;
-/// Newton steps after which the iteration is given up: usual solves take 3 to 12.
+/// Newton steps after which an iteration is given up. A case of these takes 18 on average over all its levels, rules and companions.
 const ITERATIONS_MAX: u32 = 60;
-/// The first so many steps are never halved: far from the solution the residual may grow for a step or two. Sensitivity not measured.
+/// The first so many steps are never halved: far from the solution the residual may grow for a step or two. With 4 or 16 the steps
+/// change by 0.6 % at most.
 const FREE_STEPS: u32 = 8;
-/// A step is halved at most so many times. Sensitivity not measured.
+/// A step is halved at most so many times. 3 and 8 give the same steps.
 const HALVINGS_MAX: u32 = 5;
 /// If the tractions of slipping cells are this close to the tangents of their discs, relative to the residual, they are not moved there,
-/// which saves a product. Sensitivity not measured.
+/// which saves a product. 0.03 takes 1 % more products, 0.3 takes 1 % fewer and 1 % more steps.
 const LIFT_NEGLIGIBLE: f64 = 0.1;
-/// Smallest and largest tolerance of a linear system. Sensitivity not measured.
+/// Smallest and largest tolerance of a linear system. 3e-5 and 3e-4 in place of the first change nothing; 0.05 and 0.2 in place of the
+/// second take 3 to 5 % more products in 5 % fewer steps, and the reverse.
 const INNER_TOLERANCE: (f64, f64) = (1e-4, 1e-1);
-/// A step is halved if the residual exceeds the largest of the last three by this factor. Sensitivity not measured.
+/// A step is halved if the residual exceeds the largest of the last three by this factor. 1.2 is alike, 2 takes up to 2 % more steps.
 const GROWTH_ALLOWED: f64 = 1.5;
 
 /// Solver for one rule on one mesh. It is not changed by a solve, and threads may share it.
