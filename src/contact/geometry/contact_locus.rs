@@ -18,18 +18,18 @@ pub(crate) const STEP: f64 = 0.01;
 const CURVE_STEP: f64 = 0.02;
 /// The window of a gap is larger than the overlap by this fraction on either side.
 const MARGIN: f64 = 0.15;
-/// And by this length in mm.
+/// Length in mm by which it is larger on either side as well.
 const MARGIN_MM: f64 = 0.1;
 /// A window that is too short along x is made longer by this factor.
 const WIDENING: f64 = 1.5;
-/// So many times at most.
+/// Number of times a window is made longer at most.
 const WIDENINGS_MAX: usize = 5;
 /// Slope with which surfaces are bent apart beyond a cut: steep enough that they do not touch there.
 const APART: f64 = 0.5;
 /// Largest lowering of a wheel in mm; more is no contact of wheel and rail.
 const LOWERING_MAX: f64 = 16.0;
 
-/// Wheel and rail over each other, line by line.
+/// Rail and wheel above each other, line by line along x.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactLocus<'g> {
     pub(crate) geometry: &'g WheelRail,
@@ -50,7 +50,7 @@ pub(crate) struct LocusPoint {
 }
 
 impl<'g> ContactLocus<'g> {
-    /// Lays the wheel over the rail and finds the height of first touch.
+    /// Places the wheel above the rail and finds the height of first touch.
     ///
     /// # Errors
     /// A sentence, if no part of the wheel lies above the rail.
@@ -147,7 +147,7 @@ impl<'g> ContactLocus<'g> {
         while self.estimated_force(high) < force && high < LOWERING_MAX {
             (low, high) = (high, 2.0 * high);
         }
-        // The estimate jumps where one more line overlaps, so that nothing but its side can be relied on.
+        // The estimate jumps where one more line overlaps: only its being more or less than the force can be relied on.
         let [low, high] = bisect([low, high], 30, |lowering| {
             self.estimated_force(lowering) < force
         });

@@ -1,5 +1,5 @@
-//! Does a chain of points run through itself? Chords are looked at in a tree of boxes, so that chains of many points cost
-//! about as much as sorting them.
+//! Does a chain of points cross itself? The chords are searched through a tree of boxes, so that a long chain costs about as much as
+//! sorting its points.
 
 use std::cell::Cell;
 
@@ -21,7 +21,7 @@ struct Tree {
     /// Chords, and their number rounded up to a power of 2.
     chords: usize,
     leaves: usize,
-    /// Pairs of boxes looked at.
+    /// Pairs of boxes that were compared.
     looks: Cell<usize>,
 }
 

@@ -4,10 +4,11 @@ use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::surface_exit::{SurfaceExit, SurfaceMissed};
 use crate::contact::geometry::wheel_rail::WheelRail;
 
-/// How closely a gap is sampled. Along x it is as smooth as the wheel is round; across it has what the profiles have.
+/// How closely a gap is sampled: along x, where it is as smooth as the wheel is round, less closely than across, where it has the detail
+/// of the profiles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Detail {
-    /// Enough to tell what a height of the wheel carries, to some tenths of a per cent.
+    /// Enough for the force at a height of the wheel, to some tenths of a per cent.
     Coarse,
     /// Enough for the answer.
     Fine,
@@ -25,10 +26,10 @@ impl Detail {
 
 /// Spacing along the rail's curve, in mm.
 const CURVE_STEP: f64 = 0.1;
-/// The rail belongs to a patch as far as its tangent keeps this much of the frame's direction.
+/// The rail belongs to a patch as far as the component of its tangent along the plane of the frame is at least this.
 const TANGENT_MIN: f64 = 0.1;
 
-/// How much farther away a surface is taken to be than its neighbour, in mm, where it has no point.
+/// Where a surface has no point, it is taken to be this much farther away than at the neighbouring place, in mm.
 const OPEN: f64 = 1.0;
 
 /// The gap of one patch at one height of the wheel.
@@ -183,9 +184,10 @@ impl<'g> RailInFrame<'g> {
         })
     }
 
-    /// Height over the plane at v, which the rail reaches, and the parameter there, by bracketed secant steps along the curve and a halving after every
-    /// second one: v runs steadily along the chosen part of the curve, so that the bracket of 0.1 mm holds one place and is
-    /// narrower than the tolerance before the steps are used up.
+    /// Height over the plane at v, which the rail reaches, and the parameter there, by bracketed secant steps along the curve with a halving
+    /// after every second one. v increases along the chosen part of the curve, so that the bracket of 0.1 mm holds one place and is narrower
+    /// than the tolerance before the steps are used up. The values at both ends of the bracket are known from the samples, so that no slope
+    /// is needed as in `numerics::monotone_root`.
     fn height(&self, v: f64) -> [f64; 2] {
         const STEPS: u32 = 120;
         let k = self
@@ -276,7 +278,7 @@ impl WheelInFrame<'_> {
                     if mirrored {
                         rows[j][x.len() - 1 - i] = found.height;
                     }
-                    // The surface goes on as it came.
+                    // The surface is continued in a straight line.
                     (before, guess) = (found, found.beyond(before));
                 }
             }

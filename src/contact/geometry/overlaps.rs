@@ -31,7 +31,7 @@ impl ContactLocus<'_> {
     /// The same with the overlaps divided among gaps, at every height, as near the lowering that is given in mm.
     #[must_use]
     pub fn grouped_near(self, lowering: f64) -> Self {
-        // Less if the contact would reach the end of a profile there.
+        // A smaller lowering, if the contact would reach the end of a profile at this one.
         const HALVINGS: i32 = 12;
         let rung = (lowering / GROUPED_AT).log(GROUPED_RATIO).round();
         let start = GROUPED_AT * GROUPED_RATIO.powf(rung);
@@ -51,7 +51,7 @@ impl ContactLocus<'_> {
         self.divided(lowering, self.grouping.as_ref())
     }
 
-    /// The same, divided as known as far as that says something of them.
+    /// The same, divided among gaps as was decided, where that decision covers them.
     fn divided(&self, lowering: f64, grouping: Option<&Grouping>) -> Result<Vec<Overlap>, String> {
         let inside = |k: &usize| self.lines[*k].clearance < lowering;
         let places: Vec<usize> = (0..self.lines.len()).filter(inside).collect();
@@ -97,7 +97,7 @@ impl ContactLocus<'_> {
         let mut lobes = vec![whole];
         for pair in grouping.groups.windows(2) {
             let (low, high) = (pair[0][1].min(pair[1][0]), pair[0][1].max(pair[1][0]));
-            // Beside an overlap nothing is cut: that is where groups end by themselves.
+            // Beside an overlap nothing is cut: groups end there by themselves.
             if low <= first || high >= last {
                 continue;
             }

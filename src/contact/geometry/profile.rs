@@ -44,7 +44,7 @@ impl Body {
     }
 }
 
-/// What is said about a profile beside its points.
+/// How the points of a profile are to be read.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Reading {
     /// The y of the points is positive to the track centre; for a wheel without a statement the flange tells.
@@ -61,7 +61,7 @@ pub struct Profile {
     y: Spline,
     z: Spline,
     measured: Arc<MeasuredCurve>,
-    /// What was found and changed on the way.
+    /// Remarks on what was found and changed when it was read.
     pub remarks: Vec<Remark>,
 }
 
@@ -374,7 +374,7 @@ fn points_up(body: Body, points: &[[f64; 2]]) -> Option<bool> {
     (departure.abs() > 0.02 * (high - low)).then_some(departure > 0.0)
 }
 
-/// Drops points that run back between their neighbours, as stitched measurements have them.
+/// Drops points that run back between their neighbours, as they occur where measurements were stitched.
 fn straighten(
     body: Body,
     points: &mut Vec<[f64; 2]>,
@@ -405,7 +405,7 @@ fn straighten(
     Ok(())
 }
 
-/// Drops one or two points at an end that a long chord parts from all others, as measurements have them.
+/// Drops one or two points at an end that a long chord separates from all others, as they occur in measurements.
 fn cut_stray_ends(body: Body, points: &mut Vec<[f64; 2]>, remarks: &mut Vec<Remark>) {
     let [first, last] = shape::stray_ends(points);
     let profile = body.name();

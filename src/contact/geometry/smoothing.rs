@@ -1,6 +1,6 @@
 //! Natural cubic splines through samples, smoothed on request.
 //!
-//! The spline f of the samples `(s_i, d_i)` is least in `Σ w_i (d_i − f(s_i))² + λ ∫ f'' ds` (square of f''), with
+//! The spline f of the samples `(s_i, d_i)` minimises `Σ w_i (d_i − f(s_i))² + λ ∫ (f'')² ds`, with
 //! `w_i` half the distance between the neighbours of `s_i`, so that `λ = (L/2π)⁴` halves waves of length L whatever the
 //! spacing. Source: Reinsch, "Smoothing by spline functions", Numerische Mathematik 10 (1967).
 

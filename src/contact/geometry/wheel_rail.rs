@@ -29,7 +29,7 @@ impl Side {
     }
 }
 
-/// How wheelset and rail lie to each other; lengths in mm, angles in rad.
+/// How wheelset and rail are placed relative to each other; lengths in mm, angles in rad.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {
     /// Which wheel and rail.
@@ -57,7 +57,7 @@ pub struct Placement {
 /// A wheel and a rail in place, except for the height of the wheel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WheelRail {
-    /// How they lie.
+    /// Their placement.
     pub placement: Placement,
     rail_given: Profile,
     rail: Profile,
