@@ -72,6 +72,9 @@ pub enum KeysAction {
         /// What the key is for.
         #[arg(long, value_name = "TEXT")]
         name: Option<String>,
+        /// The key reads what is the tenant's and checks cases, but makes, cancels and deletes nothing.
+        #[arg(long)]
+        read_only: bool,
         /// Data folder of the service.
         #[arg(
             long,

@@ -28,8 +28,13 @@ async fn act(args: &KeysArgs) -> anyhow::Result<ExitCode> {
     }
     let keys = Keyring::open(data_dir).await?;
     let done = match &args.action {
-        KeysAction::Create { tenant, name, .. } => {
-            let (key, secret) = keys.create(tenant, name.clone()).await?;
+        KeysAction::Create {
+            tenant,
+            name,
+            read_only,
+            ..
+        } => {
+            let (key, secret) = keys.create(tenant, name.clone(), *read_only).await?;
             print_error(&format!(
                 "key {} of tenant {} in {} follows; it is shown this one time",
                 key.id,
@@ -54,14 +59,15 @@ fn table(keys: &[Key]) -> String {
         jiff::Timestamp::from_millisecond(epoch_ms)
             .map_or_else(|_| epoch_ms.to_string(), |time| format!("{time:.0}"))
     };
-    let mut lines = vec!["id\ttenant\tcreated\trevoked\tname".to_owned()];
+    let mut lines = vec!["id\ttenant\tcreated\trevoked\tmay\tname".to_owned()];
     lines.extend(keys.iter().map(|key| {
         format!(
-            "{}\t{}\t{}\t{}\t{}",
+            "{}\t{}\t{}\t{}\t{}\t{}",
             key.id,
             key.tenant,
             time(key.created_at),
             key.revoked_at.map_or_else(|| "-".to_owned(), time),
+            if key.read_only { "read" } else { "all" },
             // Escaped, so that a name cannot send control sequences to the operator's terminal.
             key.name.as_deref().unwrap_or("-").escape_debug()
         )

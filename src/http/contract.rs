@@ -100,8 +100,15 @@ fn require_keys(document: &mut utoipa::openapi::OpenApi) {
     let components = document.components.get_or_insert_default();
     components.add_security_scheme("key", SecurityScheme::Http(scheme));
     for (path, item) in &mut document.paths.paths {
-        let operations = [&mut item.get, &mut item.post, &mut item.delete];
-        for operation in operations.into_iter().filter_map(Option::as_mut) {
+        let operations = [
+            (&mut item.get, false),
+            (&mut item.post, path != "/v1/cases/check"),
+            (&mut item.delete, true),
+        ];
+        let operations = operations.into_iter();
+        let operations =
+            operations.filter_map(|(operation, changes)| Some((operation.as_mut()?, changes)));
+        for (operation, changes) in operations {
             if !matches!(path.as_str(), "/healthz" | "/readyz" | "/metrics") {
                 describe_also(
                     &mut operation.responses.responses,
@@ -110,8 +117,9 @@ fn require_keys(document: &mut utoipa::openapi::OpenApi) {
             }
             let tags = operation.tags.as_deref().unwrap_or_default();
             let open = tags.iter().any(|tag| tag == "service");
-            let metrics = operation.operation_id.as_deref() == Some("get_metrics");
-            let lists = ["list_methods", "list_remarks"].map(Some);
+            let keyed = ["get_metrics", "get_me"].map(Some);
+            let metrics = keyed.contains(&operation.operation_id.as_deref());
+            let lists = ["list_methods", "list_remarks", "list_examples"].map(Some);
             if (open && !metrics) || lists.contains(&operation.operation_id.as_deref()) {
                 continue;
             }
@@ -125,6 +133,9 @@ fn require_keys(document: &mut utoipa::openapi::OpenApi) {
                 ProblemKind::BadHeader,
             ];
             kinds.extend([ProblemKind::HostNotAllowed, ProblemKind::CrossSite]);
+            if changes {
+                kinds.push(ProblemKind::Forbidden);
+            }
             if path.contains("{id}") {
                 kinds.push(ProblemKind::Expired);
             }

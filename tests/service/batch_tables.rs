@@ -82,7 +82,7 @@ async fn faults_of_a_table_are_named_by_line() {
     );
     let taken = send(
         &server,
-        &format!("{query}&accept=valid"),
+        &format!("{query}&on_invalid=skip"),
         "text/csv",
         table.to_owned(),
     )

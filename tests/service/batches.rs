@@ -108,7 +108,7 @@ async fn one_faulty_case_refuses_the_batch_and_names_its_line() {
     let jobs = server.get("/v1/jobs").await.json;
     assert_eq!(jobs["jobs"], json!([]), "nothing was stored");
 
-    let answer = send(&server, "?accept=valid", "application/x-ndjson", body).await;
+    let answer = send(&server, "?on_invalid=skip", "application/x-ndjson", body).await;
     assert_eq!((answer.status, &answer.json["count"]), (202, &json!(2)));
     assert_eq!(answer.json["rejected"], 2);
     assert_eq!(
@@ -136,11 +136,17 @@ async fn bodies_that_are_no_batch_are_refused() {
         ("application/x-ndjson", "\n \n", 422, "faulty-batch"),
         ("text/plain", "a,b", 415, "unsupported-media-type"),
     ] {
-        let answer = send(&server, "?accept=valid", content, body.to_owned()).await;
+        let answer = send(&server, "?on_invalid=skip", content, body.to_owned()).await;
         assert_problem(&answer, status, kind, "");
     }
-    let answer = send(&server, "?accept=some", "application/json", "[]".to_owned()).await;
-    assert_problem(&answer, 400, "bad-query", "accept");
+    let answer = send(
+        &server,
+        "?on_invalid=some",
+        "application/json",
+        "[]".to_owned(),
+    )
+    .await;
+    assert_problem(&answer, 400, "bad-query", "on_invalid");
     for path in ["", "/results"] {
         let unknown = "/v1/batches/0196f0a0-0000-7000-8000-000000000000";
         let answer = server.get(&format!("{unknown}{path}")).await;

@@ -101,8 +101,10 @@ async fn batches_have_names_and_labels_and_are_listed() {
         let found = server.get(&format!("/v1/batches?{query}")).await.json;
         assert_eq!(found["batches"], json!([shown]), "{query}");
     }
-    let page = server.get("/v1/batches?limit=1").await.json;
-    let cursor = page["next_cursor"].as_str().expect("a cursor");
+    let page = server.get("/v1/batches?limit=1").await;
+    let cursor = page.json["next_cursor"].as_str().expect("a cursor");
+    let link = format!("</v1/batches?limit=1&cursor={cursor}>; rel=\"next\"");
+    assert_eq!(page.header("link"), Some(link.as_str()));
     let next = server
         .get(&format!("/v1/batches?limit=1&cursor={cursor}"))
         .await

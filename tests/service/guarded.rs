@@ -21,7 +21,7 @@ impl Guarded {
         change(&mut setup.options);
         setup.http.anonymous = false;
         let keys = Keyring::open(&setup.options.data_dir).await.unwrap();
-        let make = async |tenant: &str| keys.create(tenant, None).await.unwrap().1;
+        let make = async |tenant: &str| keys.create(tenant, None, false).await.unwrap().1;
         let (north, south) = (make("north").await, make("south").await);
         let operator = make("operator").await;
         let server = setup.start().await;

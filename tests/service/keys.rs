@@ -84,6 +84,61 @@ async fn a_key_works_at_once_and_is_refused_seconds_after_it_was_revoked() {
 }
 
 #[tokio::test]
+async fn a_key_that_may_only_read_changes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &["--anonymous", "always"]);
+    let own = make_key(folder.path(), "north");
+    let flags = ["create", "--tenant", "north", "--read-only"];
+    let made = String::from_utf8(keys(folder.path(), &flags).stdout).unwrap();
+    let reader = made.trim();
+    let ask = async |key: &str, method: Method, path: &str, body: Option<&Value>| {
+        let request = service.request(method, path).bearer_auth(key);
+        let request = match body {
+            Some(body) => request.json(body),
+            None => request,
+        };
+        let answer = request.send().await.unwrap();
+        (
+            answer.status().as_u16(),
+            answer.json().await.unwrap_or(Value::Null),
+        )
+    };
+    let case = crate::support::case("shown in a hall");
+    let (status, job) = ask(&own, Method::POST, "/v1/jobs", Some(&case)).await;
+    assert_eq!(status, 202);
+    let path = job["links"]["self"].as_str().unwrap();
+    for read in [path, "/v1/jobs", "/v1/me", &format!("{path}/case")] {
+        assert_eq!(ask(reader, Method::GET, read, None).await.0, 200, "{read}");
+    }
+    let checked = ask(reader, Method::POST, "/v1/cases/check", Some(&case)).await;
+    assert_eq!(checked.0, 200);
+    let cases = Value::Array(vec![case.clone()]);
+    for (method, changed, body) in [
+        (Method::POST, "/v1/jobs".to_owned(), Some(&case)),
+        (Method::POST, "/v1/batches".to_owned(), Some(&cases)),
+        (Method::POST, format!("{path}/cancel"), None),
+        (Method::DELETE, path.to_owned(), None),
+    ] {
+        let (status, problem) = ask(reader, method, &changed, body).await;
+        assert_eq!(
+            (status, &problem["type"]),
+            (403, &Value::from("/problems/forbidden")),
+            "{changed}"
+        );
+    }
+    let listed = String::from_utf8(keys(folder.path(), &["list"]).stdout).unwrap();
+    let may = |key: &str| {
+        let id = key.split('_').nth(1).unwrap();
+        let line = listed.lines().find(|line| line.starts_with(id)).unwrap();
+        line.split('\t').nth(4).unwrap().to_owned()
+    };
+    assert_eq!(
+        (may(&own), may(reader)),
+        ("all".to_owned(), "read".to_owned())
+    );
+}
+
+#[tokio::test]
 async fn a_revoked_key_ends_the_streams_that_it_opened() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(folder.path(), &[]);

@@ -141,7 +141,7 @@ fn seeds(template: &str) -> Vec<(String, &'static str, Vec<u8>)> {
     assert!(seeds.len() > 4, "{}", seeds.len());
     let small = case("malformed").to_string();
     let batches = "/v1/batches".to_owned();
-    let valid = format!("{batches}?accept=valid");
+    let valid = format!("{batches}?on_invalid=skip");
     let lines = format!("{small}\n\n{small}\n");
     let table = "label:km,normal_force_n,/motion/creepage_x,name\r\n1.5,80000,0.002,\"a, \"\"b\"\"\"\r\n,9e4,,\r\n";
     seeds.extend([

@@ -28,7 +28,7 @@ pub struct BatchReceipt {
     pub id: String,
     /// Number of jobs made.
     pub count: u32,
-    /// Number of faulty cases that were left out; 0 unless the request said `accept=valid`.
+    /// Number of faulty cases that were left out; 0 unless the request said `on_invalid=skip`.
     pub rejected: u32,
     /// The faults of the cases that were left out, those of the first 1000.
     pub errors: Vec<Fault>,

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use axum::http::header;
 use axum::http::request::Parts;
+use axum::http::{Method, header};
 use tracing::field::display;
 
 use crate::http::layers::origin_guard::Guard;
@@ -13,6 +13,9 @@ use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::http::server::connection::Peer;
 use crate::jobs::Jobs;
+
+/// The one path where a body is sent and nothing is changed.
+const CHECK: &str = "/v1/cases/check";
 
 /// Who may ask, and how often; clones share it.
 #[derive(Debug, Clone)]
@@ -75,8 +78,19 @@ impl Access {
         span.record("tenant", display(&key.tenant));
         span.record("key", display(&key.id));
         self.rate.require_turn(RateKey::Key(key.id), "this key")?;
+        if key.read_only && changes(parts) {
+            return Err(ApiError::new(
+                ProblemKind::Forbidden,
+                "this key may only read; make, cancel and delete jobs with another key of the tenant",
+            ));
+        }
         Ok(Some(key.tenant))
     }
+}
+
+/// Would this request change anything? Checking a case does not.
+fn changes(parts: &Parts) -> bool {
+    !matches!(parts.method, Method::GET | Method::HEAD) && parts.uri.path() != CHECK
 }
 
 fn unauthorized(detail: &str) -> ApiError {

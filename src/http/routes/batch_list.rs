@@ -2,6 +2,7 @@
 
 use axum::Json;
 use axum::http::Uri;
+use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -11,6 +12,7 @@ use crate::http::extract::labels::{label, name, time};
 use crate::http::extract::query::{Parameters, Repeated, count, query, reader};
 use crate::http::problem::error::ApiError;
 use crate::http::routes::job_list::{ListProblems, ListTotal};
+use crate::http::routes::next_page::link_next;
 use crate::jobs::{BATCH_PAGE_MAX, BatchFilter};
 
 /// Batches in one page of a list when nothing is said.
@@ -58,9 +60,11 @@ query! {
     tag = "batches",
     operation_id = "list_batches",
     params(BatchListQuery),
-    responses((status = 200, description = "A page of batches", body = BatchPage), ListProblems)
+    responses((status = 200, description = "A page of batches", body = BatchPage, headers(
+        ("Link" = String, description = "The next page (`rel=next`), unless this is the last one")
+    )), ListProblems)
 )]
-pub async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Json<BatchPage>, ApiError> {
+pub async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Response, ApiError> {
     let query = BatchListQuery::read(&uri, &())?;
     let filter = BatchFilter {
         labels: query.label.unwrap_or_default(),
@@ -72,9 +76,12 @@ pub async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Json<BatchPage>, Api
     let page = jobs
         .batches(&filter, query.cursor.as_deref(), limit)
         .await?;
-    Ok(Json(BatchPage {
+    let cursor = page.next_cursor.clone();
+    let page = BatchPage {
         batches: page.entries.into_iter().map(BatchAnswer::from).collect(),
         next_cursor: page.next_cursor,
         count: page.total.into(),
-    }))
+    };
+    let response = Json(page).into_response();
+    Ok(link_next(&uri, cursor.as_deref(), response))
 }

@@ -33,11 +33,11 @@ problems! {
 query! {
     /// What the query of a submission says about the batch itself.
     BatchQuery(() => ()) {
-        /// `all` (when left out): one faulty case refuses the batch; `valid`: faulty cases are left out and reported
-        #[param(pattern = "^(all|valid)$", example = "valid")]
-        accept: bool as String = reader("`all` or `valid`", |text| match text {
-            "all" => Some(false),
-            "valid" => Some(true),
+        /// `reject` (when left out): one faulty case refuses the batch; `skip`: faulty cases are left out and reported
+        #[param(pattern = "^(reject|skip)$", example = "skip")]
+        on_invalid: bool as String = reader("`reject` or `skip`", |text| match text {
+            "reject" => Some(false),
+            "skip" => Some(true),
             _ => None,
         });
         /// Name of the batch
@@ -56,7 +56,7 @@ query! {
 ///
 /// The body is a JSON array of cases, one case per line (`application/x-ndjson`), or a table (`text/csv`) whose lines fill the cells of
 /// a template case; it is read as it arrives. All jobs of
-/// a batch answered with `202` are stored durably. Without `accept=valid` one faulty case refuses the whole batch (`422`), and
+/// a batch answered with `202` are stored durably. Without `on_invalid=skip` one faulty case refuses the whole batch (`422`), and
 /// nothing is stored; every fault names its case, and its line in NDJSON and CSV. A JSON array that is not JSON is `400`; a line that is not JSON is a faulty case.
 #[utoipa::path(
     post,
@@ -98,7 +98,7 @@ pub async fn submit(
     draft.options = submit_options;
     draft.name = batch.name;
     draft.labels = labels;
-    if draft.cases == draft.rejected || (draft.rejected > 0 && !batch.accept.unwrap_or(false)) {
+    if draft.cases == draft.rejected || (draft.rejected > 0 && !batch.on_invalid.unwrap_or(false)) {
         return Err(refusal(&draft));
     }
     let errors = faults(&draft);

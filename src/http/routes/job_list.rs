@@ -2,6 +2,7 @@
 
 use axum::Json;
 use axum::http::Uri;
+use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use serde_json::Value;
 use utoipa::openapi::{RefOr, Schema};
@@ -14,6 +15,7 @@ use crate::http::extract::labels::{label, name, time};
 use crate::http::extract::query::{Parameters, Reader, Repeated, count, id, query, reader};
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
+use crate::http::routes::next_page::link_next;
 use crate::jobs::model::State as JobState;
 use crate::jobs::{Filter, PAGE_MAX, Total};
 
@@ -162,9 +164,11 @@ fn fields() -> Reader<Vec<&'static str>> {
     tag = "jobs",
     operation_id = "list_jobs",
     params(ListQuery),
-    responses((status = 200, description = "A page of jobs", body = JobPage), ListProblems)
+    responses((status = 200, description = "A page of jobs", body = JobPage, headers(
+        ("Link" = String, description = "The next page (`rel=next`), unless this is the last one")
+    )), ListProblems)
 )]
-pub async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Json<JobPage>, ApiError> {
+pub async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Response, ApiError> {
     let query = ListQuery::read(&uri, &())?;
     let mut states = query.state.unwrap_or_default();
     states.sort_unstable();
@@ -188,11 +192,14 @@ pub async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Json<JobPage>, ApiEr
         Ok::<_, serde_json::Error>(job)
     });
     let shown = shown.collect::<Result<_, _>>();
-    Ok(Json(JobPage {
+    let cursor = page.next_cursor.clone();
+    let page = JobPage {
         jobs: shown.map_err(|error| ApiError::internal(&error))?,
         next_cursor: page.next_cursor,
         count: page.total.into(),
-    }))
+    };
+    let response = Json(page).into_response();
+    Ok(link_next(&uri, cursor.as_deref(), response))
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ pub mod fields;
 pub mod job_list;
 pub mod jobs;
 pub mod me;
+pub mod next_page;
 pub mod plots;
 pub mod point_fields;
 pub mod prefer_wait;

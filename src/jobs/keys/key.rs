@@ -30,6 +30,8 @@ pub struct Key {
     pub created_at: i64,
     /// Time since which it is refused.
     pub revoked_at: Option<i64>,
+    /// It reads what is the tenant's, and changes nothing.
+    pub read_only: bool,
 }
 
 /// Keys found good, with the time at which they were looked up.

@@ -43,6 +43,7 @@ impl Keyring {
         &self,
         tenant: &str,
         name: Option<String>,
+        read_only: bool,
     ) -> Result<(Key, String), JobsError> {
         if !is_tenant(tenant) {
             return Err(JobsError::BadTenant);
@@ -61,6 +62,7 @@ impl Keyring {
             name,
             created_at: Clock::system().now_ms(),
             revoked_at: None,
+            read_only,
         };
         self.store.add_key(&key).await?;
         Ok((key, text))

@@ -7,10 +7,10 @@ use crate::jobs::keys::key::Key;
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::database::SqliteStore;
 
-const ALL: &str = "SELECT id, hash, tenant, name, created_at, revoked_at FROM api_keys";
+const ALL: &str = "SELECT id, hash, tenant, name, created_at, revoked_at, read_only FROM api_keys";
 
 const ONE: &str =
-    "SELECT id, hash, tenant, name, created_at, revoked_at FROM api_keys WHERE id = $1";
+    "SELECT id, hash, tenant, name, created_at, revoked_at, read_only FROM api_keys WHERE id = $1";
 
 impl SqliteStore {
     /// Stores a key.
@@ -19,7 +19,7 @@ impl SqliteStore {
     /// The database failed, or there is a key with this id.
     pub(crate) async fn add_key(&self, key: &Key) -> Result<(), StoreError> {
         sqlx::query(
-            "INSERT INTO api_keys (id, hash, tenant, name, created_at, revoked_at) VALUES ($1, $2, $3, $4, $5, $6)",
+            "INSERT INTO api_keys (id, hash, tenant, name, created_at, revoked_at, read_only) VALUES ($1, $2, $3, $4, $5, $6, $7)",
         )
         .bind(&key.id)
         .bind(key.hash.as_bytes().as_slice())
@@ -27,6 +27,7 @@ impl SqliteStore {
         .bind(&key.name)
         .bind(key.created_at)
         .bind(key.revoked_at)
+        .bind(key.read_only)
         .execute(&self.writer)
         .await?;
         Ok(())
@@ -80,5 +81,6 @@ fn read_key(row: &SqliteRow) -> Result<Key, StoreError> {
         name: row.try_get("name")?,
         created_at: row.try_get("created_at")?,
         revoked_at: row.try_get("revoked_at")?,
+        read_only: row.try_get("read_only")?,
     })
 }

@@ -185,5 +185,6 @@ CREATE TABLE api_keys (
     tenant     TEXT    NOT NULL,
     name       TEXT,
     created_at INTEGER NOT NULL,
-    revoked_at INTEGER
+    revoked_at INTEGER,
+    read_only  INTEGER NOT NULL DEFAULT 0    -- 1: it changes nothing
 ) STRICT, WITHOUT ROWID;
