@@ -1,7 +1,7 @@
 //! Influence coefficients between equal rectangles on a regular grid, see
 //! [`GridOperator`](crate::contact::half_space::grid_operator::GridOperator).
 
-/// Displacement at the distance of (i, j) cells from a cell with unit pressure, stored at `j * nx + i`.
+/// Displacement i cells along x and j cells along y away from a cell with unit pressure, stored at `j * nx + i`.
 pub(crate) fn coefficients(
     nx: usize,
     ny: usize,
@@ -10,8 +10,8 @@ pub(crate) fn coefficients(
     contact_modulus: f64,
 ) -> Vec<f64> {
     let factor = 1.0 / (std::f64::consts::PI * contact_modulus);
-    // The corners lie half a cell before and after the centres; neighbouring cells share them, and the two before and
-    // after the first centre differ in sign only.
+    // Corners lie half a cell before and after the centres. Neighbouring cells share them, so each is evaluated once; the
+    // two corners of the first cell differ only in sign.
     let places = |n: usize, d: f64| -> Vec<[f64; 2]> {
         let at = |i: usize| (i as f64 + 0.5) * d;
         (0..n).map(|i| [at(i), at(i).ln()]).collect()
@@ -48,7 +48,7 @@ pub(crate) fn coefficients(
     out
 }
 
-/// The coefficients with their mirror images along x, row by row.
+/// The coefficients and their mirror images for negative i, row by row.
 pub(crate) fn lines(nx: usize, coefficients: &[f64]) -> Vec<f64> {
     let both = |row: &[f64]| -> Vec<f64> {
         let images = row[1..].iter().rev().copied();

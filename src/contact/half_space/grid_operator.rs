@@ -6,7 +6,7 @@ use rustfft::num_complex::Complex;
 use crate::contact::half_space::grid_coefficients::{coefficients, lines};
 use crate::contact::half_space::transforms::{Planners, Plans, Width};
 
-/// Rows that are moved to the columns together, so that whole cache lines are used.
+/// Rows copied into the columns at a time, so that whole cache lines are written.
 const BLOCK: usize = 8;
 
 /// Normal displacement at the centres of `nx` by `ny` equal rectangles caused by uniform pressures on them, both bodies
@@ -14,7 +14,7 @@ const BLOCK: usize = 8;
 ///
 /// With `E* = G/(1−ν)` the displacement is `1/(πE*) Σ p [[ q asinh(p/|q|) + p asinh(q/|p|) ]]` (Boussinesq; Love 1929),
 /// the coefficient [`rectangle`](crate::contact::half_space::kernels::rectangle) calls `zz`. Values are stored at
-/// `j * nx + i`, i along x. The grid is padded to twice its size, so that the product is that of the dense matrix, to about
+/// `j * nx + i`, i along x. The grid is padded to twice its size, so that the product equals that of the dense matrix to about
 /// 1e-14 (`f64`) or 1e-6 (`f32`) of the largest displacement.
 pub struct GridOperator<T> {
     nx: usize,
@@ -23,17 +23,17 @@ pub struct GridOperator<T> {
     width: usize,
     /// Padded length along y.
     height: usize,
-    /// Coefficient of a cell's own pressure.
+    /// Displacement of a cell per unit of its own pressure.
     own: f64,
-    /// Coefficients at the distance of (i, j) cells, i from `1 − nx` to `nx − 1` and j from 0, row by row.
+    /// Coefficients at a distance of i and j cells, i from `1 − nx` to `nx − 1` and j from 0, row by row.
     lines: Vec<f64>,
-    /// Transform of the coefficients over the own one (real, as they are even), divided by the size of the padded grid;
-    /// column by column.
+    /// Transform of the coefficients relative to `own`, divided by the size of the padded grid; column by column. It is real
+    /// because the coefficients are even.
     spectrum: Vec<T>,
     plans: Plans<T>,
 }
 
-/// Plans and buffers of the products of one solve. It fits grids of any size, and means nothing between two products.
+/// Plans and buffers for the products of one solve. It fits grids of any size and carries no state from one product to the next.
 pub struct GridWorkspace<T: Width> {
     planners: Planners<T>,
     row: Vec<T>,
@@ -56,7 +56,7 @@ impl<T: Width> Default for GridWorkspace<T> {
 }
 
 impl<T: Width> GridWorkspace<T> {
-    /// Makes the buffers as long as an operator needs them.
+    /// Resizes the buffers for an operator.
     fn fit(&mut self, operator: &GridOperator<T>) {
         let (half, plans) = (operator.half(), &operator.plans);
         let scratch = [
@@ -100,7 +100,7 @@ impl<T: Width> GridOperator<T> {
         operator
     }
 
-    /// Length of the spectrum of a row.
+    /// Number of values in the spectrum of a row.
     fn half(&self) -> usize {
         self.width / 2 + 1
     }
@@ -154,7 +154,7 @@ impl<T: Width> GridOperator<T> {
         }
     }
 
-    /// Adds the displacement in mm at every centre for one more pressure in MPa, at cell `cell`.
+    /// Adds the displacement in mm at every centre caused by an additional pressure in MPa on cell `cell`.
     pub fn add(&self, cell: usize, pressure: f64, displacement: &mut [f64]) {
         let (nx, stride) = (self.nx, 2 * self.nx - 1);
         let (i, j) = (cell % nx, cell / nx);
@@ -193,7 +193,7 @@ impl<T: Width> GridOperator<T> {
             ..
         } = workspace;
         let spectrum = &mut spectra[k * half..(k + 1) * half];
-        // The transform of real values has no imaginary part there, except for rounding.
+        // The first and last values of a real row's transform are real; rounding left an imaginary part that the inverse rejects.
         (spectrum[0].im, spectrum[half - 1].im) = (T::zero(), T::zero());
         let done = self
             .plans
@@ -263,7 +263,7 @@ fn transform_columns<T: Width>(plan: &dyn Fft<T>, workspace: &mut GridWorkspace<
     plan.process_with_scratch(&mut workspace.columns, &mut workspace.scratch);
 }
 
-/// The least even number from `n` on without prime factors beyond 5, for which transforms are fast.
+/// The smallest even number not below `n` with no prime factor above 5, because transforms of such lengths are fast.
 fn smooth_even(n: usize) -> usize {
     let smooth = |mut n: usize| {
         for factor in [2, 3, 5] {
@@ -329,7 +329,7 @@ mod tests {
             let mut double = GridWorkspace::<f64>::default();
             let operator = GridOperator::new(cells, size, modulus, &mut double);
             compare(&operator, &mut double, &pressure, &expected, 1e-12);
-            // A workspace of another size that was used for other products.
+            // A workspace already used for products of another size.
             let mut single = GridWorkspace::<f32>::default();
             let other = GridOperator::new([9, 40], [0.2, 0.1], modulus, &mut single);
             other.apply(&[1.0; 360], &mut [0.0; 360], &mut single);
@@ -348,7 +348,7 @@ mod tests {
     ) {
         let mut found = vec![f64::NAN; pressure.len()];
         let largest = expected.iter().fold(0.0_f64, |m, u| m.max(u.abs()));
-        // The second product must not see anything of the first.
+        // The first product must not affect the second.
         for _ in 0..2 {
             operator.apply(pressure, &mut found, workspace);
             for (a, b) in found.iter().zip(expected) {

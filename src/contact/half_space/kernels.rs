@@ -1,6 +1,6 @@
 //! Surface displacement caused by a uniformly loaded rectangle: closed forms, one point at a time.
 //!
-//! This is the slow, proven path; [`strips`](crate::contact::half_space::strip_operator::operator) evaluates the same forms in bulk.
+//! This is the slow reference implementation; [`strips`](crate::contact::half_space::strip_operator::operator) evaluates the same forms in bulk.
 
 use crate::contact::numerics::quadrature::FOUR_POINTS;
 
@@ -32,8 +32,8 @@ pub struct Influence {
     pub zz: f64,
 }
 
-/// Beyond this distance in units of the rectangle's longer side the four corner terms cancel and quadrature is
-/// more exact.
+/// Distance, in units of the rectangle's longer side, beyond which the four corner terms cancel so much that quadrature is
+/// more accurate.
 const FAR: f64 = 40.0;
 
 /// Influence of a rectangle at the point `(x, y)` for Poisson's ratio `nu`.
@@ -57,7 +57,7 @@ pub fn rectangle(x: f64, y: f64, cell: Rectangle, nu: f64) -> Influence {
     combine(xx_over_r3, yy_over_r3, xy_over_r3, nu)
 }
 
-/// Puts the three integrals `∬X²/r³`, `∬Y²/r³`, `∬XY/r³` together to the four coefficients.
+/// Combines the three integrals `∬X²/r³`, `∬Y²/r³`, `∬XY/r³` into the four coefficients.
 #[inline]
 fn combine(ixx: f64, iyy: f64, ixy: f64, nu: f64) -> Influence {
     use std::f64::consts::FRAC_1_PI;

@@ -1,4 +1,4 @@
-//! The elastic half-space: influence of tractions and pressures on displacements.
+//! The elastic half-space: surface displacements caused by pressures and tractions.
 
 pub mod elasticity;
 pub mod grid_coefficients;

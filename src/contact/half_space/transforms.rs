@@ -1,13 +1,13 @@
-//! Fourier transforms of rows and columns of a grid, in single or double width.
+//! Fourier transforms of rows and columns of a grid, in single or double precision.
 
 use std::sync::Arc;
 
 use realfft::{ComplexToReal, FftNum, RealFftPlanner, RealToComplex};
 use rustfft::{Fft, FftPlanner};
 
-/// A width of numbers in which transforms are done.
+/// The floating-point precision of the transforms.
 pub trait Width: FftNum + Into<f64> {
-    /// The nearest number of this width.
+    /// The nearest number of this precision.
     fn of(value: f64) -> Self;
 }
 
@@ -23,7 +23,7 @@ impl Width for f64 {
     }
 }
 
-/// How rows and columns are transformed.
+/// Plans for the transforms of rows and columns.
 pub struct Plans<T> {
     pub(crate) forward: Arc<dyn RealToComplex<T>>,
     pub(crate) backward: Arc<dyn ComplexToReal<T>>,
@@ -31,8 +31,8 @@ pub struct Plans<T> {
     pub(crate) columns_backward: Arc<dyn Fft<T>>,
 }
 
-/// Plans made so far. A solve meets few padded sizes, and the plans of one cost 2 µs (64 × 64) to 14 µs (400 × 400), about a tenth
-/// of a product, so they are kept for one solve only.
+/// Plans made so far. A solve uses few padded sizes, and planning one takes 2 µs (64 × 64) to 14 µs (400 × 400), about a tenth
+/// of a product; plans are therefore kept only during one solve.
 pub struct Planners<T: FftNum> {
     real: RealFftPlanner<T>,
     complex: FftPlanner<T>,

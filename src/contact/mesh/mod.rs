@@ -1,4 +1,4 @@
-//! Strips along rolling and their cells.
+//! Strips along the rolling direction, divided into cells.
 
 pub mod observation;
 #[cfg(test)]

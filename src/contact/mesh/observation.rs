@@ -1,8 +1,8 @@
-//! Where the displacements of a strip are observed.
+//! The points of a strip at which displacements are evaluated.
 
 use crate::contact::mesh::strips::{Mesh, Segment};
 
-/// The observation points of a segment: its nodes, its leading edge, and the images of its last two nodes behind that edge.
+/// The observation points of a segment: its nodes, its leading edge, and its last two nodes reflected in that edge.
 #[must_use]
 pub fn observation_points(mesh: &Mesh, segment: &Segment) -> Vec<f64> {
     let mut points = Vec::with_capacity(segment.cells.len() + 3);
@@ -10,7 +10,7 @@ pub fn observation_points(mesh: &Mesh, segment: &Segment) -> Vec<f64> {
     points
 }
 
-/// The same in place of what `points` held.
+/// As [`observation_points`], but written into `points`, whose contents are replaced.
 pub fn observe(mesh: &Mesh, segment: &Segment, points: &mut Vec<f64>) {
     let nodes = &mesh.node[segment.cells.clone()];
     let edge = segment.chord.right;

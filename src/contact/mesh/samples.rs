@@ -1,8 +1,8 @@
-//! Meshes for the unit tests of this room.
+//! Meshes for unit tests.
 
 use crate::contact::mesh::strips::{Chord, Grading, Mesh, equal_strips};
 
-/// A patch between y = ± `half_width` with cosine-graded cells; `ends` gives the trailing and leading end of the chord at y.
+/// A patch from y = −`half_width` to `half_width` with cosine-graded cells; `ends` returns the trailing and leading end of the chord at y.
 pub(crate) fn mesh_between(
     half_width: f64,
     [strips, cells]: [usize; 2],

@@ -1,6 +1,6 @@
-//! How many strips and cells a mesh has.
+//! The number of strips and cells of a mesh.
 
-/// Equal strips across every patch, and cells along each.
+/// The number of strips across every patch and of cells in each strip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MeshSize {
     /// Strips across each patch.

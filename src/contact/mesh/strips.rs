@@ -36,19 +36,19 @@ pub struct Grading {
 }
 
 impl Grading {
-    /// Edges `−cos(kπ/n)`, nodes at the mid-angles: cells gather at both ends, where traction has square roots.
+    /// Edges `−cos(kπ/n)`, nodes at the mid-angles: cells are smallest at both ends, where traction varies as the square root of distance.
     #[must_use]
     pub fn cosine(cells: usize) -> Grading {
         let at = |k: f64| -(k * PI / cells as f64).cos();
         let mut edges: Vec<f64> = (0..=cells).map(|k| at(k as f64)).collect();
         let mut nodes: Vec<f64> = (0..cells).map(|k| at(k as f64 + 0.5)).collect();
-        // Exact mirror images: symmetry is recognised by comparing coordinates.
+        // Made exactly symmetric, because symmetry is recognised by comparing coordinates.
         symmetrise(&mut edges);
         symmetrise(&mut nodes);
         Grading { edges, nodes }
     }
 
-    /// Equal cells with the node in the middle.
+    /// Equal cells with nodes at their centres.
     #[must_use]
     pub fn uniform(cells: usize) -> Grading {
         let at = |k: f64| 2.0 * k / cells as f64 - 1.0;
@@ -57,7 +57,7 @@ impl Grading {
         Grading { edges, nodes }
     }
 
-    /// Cells that gather at both ends and about `pole`: their density is `(1 − β)/2 + β/(π√(1 − ξ²)) + g L(ξ − pole)`.
+    /// Cells graded toward both ends and toward `pole`: their density is `(1 − β)/2 + β/(π√(1 − ξ²)) + g L(ξ − pole)`.
     #[must_use]
     pub fn about(pole: f64, cells: usize) -> Grading {
         let gathering = Gathering {
@@ -90,12 +90,12 @@ impl Grading {
     }
 }
 
-/// Share β of the cells' density that is graded toward the ends where cells gather about a pole. On the first 160 ellipses of
-/// `cargo bench --bench calibrate ellipse`, 0.6 and 0.9 change the median error at the targets 0.005 and 0.001 by 4 % at most and take 24
-/// and 5 % more work at the first, 5 % less at the second.
+/// Share β of the density of cells that is graded toward the ends when cells are also graded toward a pole. On the first 160 ellipses
+/// of `cargo bench --bench calibrate ellipse`, 0.6 and 0.9 change the median error at the targets 0.005 and 0.001 by 4 % at most; they
+/// take 24 and 5 % more work at the first target, 5 % less at the second.
 const GATHERED_AT_ENDS: f64 = 0.75;
 /// Weight g and half width d of the Lorentz bump `L(t) = 1/(πd(1 + t²/d²))` at the pole. Any weight from 0.08 to 0.25 and
-/// any half width from 0.05 to 0.15 serve.
+/// any half width from 0.05 to 0.15 work as well.
 const BUMP: (f64, f64) = (0.15, 0.1);
 
 /// A density of cells or strips over −1 … 1 with a bump at the pole.
@@ -128,7 +128,7 @@ impl Gathering {
         0.5 * (1.0 - self.at_ends) * (t + 1.0) + ends + bump(t) - bump(-1.0)
     }
 
-    /// Where a share of the density lies to the left; `from` is a place left of it.
+    /// The coordinate to the left of which `share` of the density lies; `from` is a coordinate left of it.
     fn place(self, share: f64, from: f64) -> f64 {
         if share <= 0.0 || share >= 1.0 {
             return 2.0 * share.clamp(0.0, 1.0) - 1.0;
@@ -162,7 +162,7 @@ fn symmetrise(values: &mut [f64]) {
 pub struct Segment {
     /// The chord in mm.
     pub chord: Chord,
-    /// The numbers of its cells.
+    /// Indices of its cells.
     pub cells: Range<usize>,
 }
 
@@ -175,9 +175,9 @@ pub struct Mesh {
     pub left: Vec<f64>,
     /// Leading edge of each cell, in mm.
     pub right: Vec<f64>,
-    /// Node of each cell, in mm: where displacement is observed and traction counted.
+    /// Node of each cell, in mm: where displacement is evaluated and where its traction acts.
     pub node: Vec<f64>,
-    /// y of each segment where its rigid slip is taken, in mm: the mid-line of the strip unless something better is known.
+    /// y in mm at which the rigid slip of each segment is evaluated: the mid-line of the strip unless a more accurate y is known.
     pub arm: Vec<f64>,
 }
 
@@ -231,7 +231,7 @@ impl Mesh {
         areas
     }
 
-    /// y of every cell's traction.
+    /// y in mm at which every cell's traction acts.
     #[must_use]
     pub fn rows(&self) -> Vec<f64> {
         self.segments
@@ -241,7 +241,7 @@ impl Mesh {
             .collect()
     }
 
-    /// The same mesh with all lengths multiplied by `factor` and moved so that `origin` becomes `(0, 0)` first.
+    /// The same mesh, moved so that `origin` becomes `(0, 0)`, then with all lengths multiplied by `factor`.
     #[must_use]
     pub fn normalised(&self, origin: [f64; 2], factor: f64) -> Mesh {
         let along = |values: &[f64]| values.iter().map(|x| (x - origin[0]) * factor).collect();
@@ -264,7 +264,7 @@ impl Mesh {
         }
     }
 
-    /// Rounds all lengths to multiples of `step`; cells that touched still do.
+    /// Rounds all lengths to multiples of `step`; adjacent cells stay adjacent.
     pub fn round(&mut self, step: f64) {
         let round = |value: &mut f64| *value = (*value / step).round() * step;
         let places = [
@@ -361,7 +361,7 @@ mod tests {
                     (gathering.cumulated(*node) / total - (k as f64 + 0.5) / 12.0).abs() < 1e-12
                 );
             }
-            // The density is the slope of its sum.
+            // The density is the derivative of its integral.
             for t in [-0.8, 0.1, 0.6] {
                 let slope = (gathering.cumulated(t + 1e-6) - gathering.cumulated(t - 1e-6)) / 2e-6;
                 assert!((slope / gathering.density(t) - 1.0).abs() < 1e-6);

@@ -1,7 +1,7 @@
-//! Halving a bracket as often as asked: for functions of which nothing but a side is known.
+//! Bisection with a fixed number of halvings, for a condition that only tells on which side of the boundary a point lies.
 
-/// The bracket from `low` to `high` (in either order) after so many halvings, where `is_low` says on which side of the place sought
-/// a point lies: true at `low`, false at `high`. It never fails; the bracket is `2^-halvings` of its length.
+/// The bracket that remains of `low` to `high` (in either order) after the given number of halvings. `is_low` tells on which side of
+/// the boundary a point lies: true at `low`, false at `high`. Never fails; the bracket shrinks to `2^-halvings` of its length.
 pub(crate) fn bisect(
     [mut low, mut high]: [f64; 2],
     halvings: u32,

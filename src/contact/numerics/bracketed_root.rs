@@ -1,32 +1,32 @@
-//! Where an increasing function of one place is 0: between bounds that are found on the way.
+//! The root of an increasing function of one variable, without a bracket to start from.
 
-/// The farthest place: a hundred times the creepage at which everything slips by the cubic law.
+/// Largest argument tried: a hundred times the creepage at which the cubic law predicts full slip.
 pub(crate) const PLACE_MAX: f64 = 65.0;
-/// Places tried.
+/// Most arguments tried.
 const TRIALS_MAX: u32 = 40;
-/// A bracket is closed when its ends differ by this part of themselves.
+/// Width of a bracket, relative to its ends, below which it is not divided further.
 const CLOSED: f64 = 1e-13;
 
 /// How a search ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum RootExit {
-    /// The value is below its tolerance.
+    /// The value is within its tolerance.
     Found,
-    /// The function keeps its sign as far as the farthest place.
+    /// The function keeps its sign up to the largest argument allowed.
     SignKept,
-    /// The sign changes between two places next to each other, but the values there are above the tolerance.
+    /// The sign changes within a bracket too narrow to divide, but the values at its ends exceed the tolerance.
     BracketClosed,
     /// The trials were used up.
     TrialsUsedUp,
 }
 
 impl RootExit {
-    /// Was the tolerance met?
+    /// Whether the tolerance was met.
     pub(crate) fn converged(self) -> bool {
         self == RootExit::Found
     }
 
-    /// The end as a clause for messages.
+    /// The reason as a clause for messages.
     pub(crate) fn reason(self) -> &'static str {
         match self {
             RootExit::Found => "the tolerance was met",
@@ -37,17 +37,17 @@ impl RootExit {
     }
 }
 
-/// Where an increasing function is 0.
+/// The result of a search for a root.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Root {
-    /// The place.
+    /// The argument with the smallest value found.
     pub(crate) place: f64,
     /// How the search ended.
     pub(crate) exit: RootExit,
 }
 
-/// Goes from `start` until the sign changes, then between the bounds by the Illinois rule (regula falsi that halves the value of
-/// a bound that stays). `f` gives the value at a place and sets the size below which it counts as 0.
+/// Searches from `start` until the sign changes, then within the bracket by the Illinois rule (regula falsi that halves the value at
+/// a bound that is kept twice). `f` returns the value at an argument and the magnitude below which it counts as 0.
 pub(crate) fn find_root<E>(
     start: f64,
     mut f: impl FnMut(f64, &mut f64) -> Result<f64, E>,
@@ -85,7 +85,7 @@ pub(crate) fn find_root<E>(
         if place.abs() >= PLACE_MAX && (place < 0.0) != below {
             return ended(place, RootExit::SignKept);
         }
-        // One bound is known: as far as the line through the last two says, but not much farther than before.
+        // Only one bound is known: follow the line through the last two points, but limit how much the step grows.
         let needed = match slope.filter(|slope| *slope > 0.0) {
             Some(slope) => (value / slope).abs(),
             None => value.abs(),
@@ -126,14 +126,14 @@ mod tests {
     fn a_search_without_a_root_says_why_it_ended() {
         assert_eq!(search(1e-9, |at| at - 1e3).exit, RootExit::SignKept);
         assert_eq!(search(1e-9, |at| at + 1e3).exit, RootExit::SignKept);
-        // Nothing is known of a function that never changes, however far the steps lead.
+        // A constant function has no slope that could end the search early.
         assert_eq!(search(1e-9, |_| -1.0).exit, RootExit::TrialsUsedUp);
-        // A jump has no place where the value is small.
+        // At a jump the value is small nowhere.
         let jump = |at: f64| if at < 2.0 { -1.0 } else { 1.0 };
         let ended = search(1e-9, jump);
         assert!(!ended.exit.converged(), "{ended:?}");
         assert!((ended.place - 2.0).abs() < 1e-3, "{ended:?}");
-        // Nothing is exact enough for no tolerance at all, unless the value is 0 to the last digit.
+        // A tolerance of 0 is met only if the value is exactly 0.
         let ended = search(0.0, |at| at.exp() - 1.3);
         assert!(
             !ended.exit.converged() || ended.place.exp() == 1.3,

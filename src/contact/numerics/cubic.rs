@@ -12,8 +12,8 @@ pub(crate) struct Cubic {
     start: f64,
     length: f64,
     coefficients: [f64; 4],
-    /// The value at s = 1, which the sum of the coefficients meets only up to rounding: neighbouring intervals have to
-    /// agree on its sign.
+    /// The value at s = 1. It is stored because the sum of the coefficients differs from it by rounding, and neighbouring
+    /// intervals have to agree on its sign.
     end: f64,
 }
 
@@ -87,7 +87,7 @@ impl Cubic {
         c0 + s * (c1 + s * (c2 + s * c3))
     }
 
-    /// The two points in 0..=1 between which the cubic is monotone, in order; ends stand in for those outside.
+    /// The turning points that divide 0..=1 into monotone pieces, in order; one outside is replaced by the nearer end.
     fn turning_points(&self) -> [f64; 2] {
         let [_, c1, c2, c3] = self.coefficients;
         let discriminant = c2 * c2 - 3.0 * c1 * c3;
@@ -106,7 +106,7 @@ impl Cubic {
         }
     }
 
-    /// The root in a monotone piece with a change of sign.
+    /// The root in a monotone piece over which the sign changes.
     fn root(&self, low: f64, high: f64) -> f64 {
         const CLOSE: f64 = 4.0 * f64::EPSILON;
         let [_, c1, c2, c3] = self.coefficients;
@@ -144,10 +144,10 @@ pub(crate) fn interval(axis: &[f64], x: f64) -> usize {
 
 /// Slopes at the nodes of a curve through at least 2 values.
 ///
-/// Those of the parabola through a node and its neighbours, unless this bends more than a fixed number of times as much as
-/// the ones at both neighbouring nodes: then there is a jump or a kink, and the slope goes over to a mean in which the
-/// less steep side has the greater weight, so that the curve does not swing beyond the values. At the ends the
-/// parabola of the next node is continued.
+/// A slope is that of the parabola through the node and its neighbours, unless this parabola is curved more than a fixed
+/// number of times as strongly as those of both neighbouring nodes. That indicates a jump or a kink; the slope then changes
+/// over to a mean that favours the flatter side, which keeps the curve from overshooting the values. At the ends the
+/// parabola of the adjacent node is used.
 pub(crate) fn sober_slopes(axis: &[f64], values: &[f64]) -> Vec<f64> {
     const BEND_MAX: f64 = 8.0;
     let n = axis.len();
@@ -263,7 +263,7 @@ mod tests {
             let ends = [0.25, 1.5];
             let cubic = Cubic::with_slopes(&AXIS, 3, ends.map(curve), ends.map(slope));
             let changes: Vec<(f64, bool)> = cubic.sign_changes().collect();
-            // The value is rounded to 1e-17 there, of which the third root is taken.
+            // The value is rounded to 1e-17 there, and the error of a triple root is the cube root of that.
             assert!((changes[0].0 - root).abs() < 2e-5, "{root}: {changes:?}");
         }
     }

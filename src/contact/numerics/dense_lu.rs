@@ -1,4 +1,4 @@
-//! Dense LU with row exchanges that can be stopped while it works.
+//! Dense LU factorisation with row exchanges, which a monitor can stop between blocks of columns.
 
 use std::ops::ControlFlow;
 
@@ -15,7 +15,7 @@ use crate::contact::monitor::{Monitor, Stop};
 
 /// Columns eliminated at once.
 const PANEL: usize = 64;
-/// Columns updated or solved between two looks at the monitor: at most 0.3 Gflop with 2000 unknowns.
+/// Columns updated or solved between two calls of the monitor: at most 0.3 Gflop with 2000 unknowns.
 const CHUNK: usize = 64;
 
 /// A factored matrix, `P A = L U`.
@@ -27,10 +27,10 @@ pub struct DenseLu {
 }
 
 impl DenseLu {
-    /// Factors a square matrix. A singular one gives factors that solve to values that are not finite.
+    /// Factors a square matrix. With a singular matrix, solutions are not finite.
     ///
     /// # Errors
-    /// Only if the monitor stops the work; it is asked once per panel and chunk of columns.
+    /// Only if the monitor stops the work; it is called once per panel and per chunk of columns.
     pub fn new(mut matrix: Mat<f64>, monitor: &dyn Monitor) -> Result<DenseLu, Stop> {
         let n = matrix.nrows();
         let mut order: Vec<usize> = (0..n).collect();
@@ -91,7 +91,7 @@ impl DenseLu {
     /// `X ← A⁻¹ X`.
     ///
     /// # Errors
-    /// Only if the monitor stops the work; it is asked once per chunk of columns.
+    /// Only if the monitor stops the work; it is called once per chunk of columns.
     pub fn solve(&self, mut rhs: MatMut<'_, f64>, monitor: &dyn Monitor) -> Result<(), Stop> {
         let (n, columns) = (self.factors.nrows(), rhs.ncols());
         let exchange = PermRef::new_checked(&self.order, &self.order_inverse, n);
@@ -109,7 +109,7 @@ impl DenseLu {
     }
 }
 
-/// `C ← C − A B`, looking at the monitor once per chunk of columns.
+/// `C ← C − A B`; the monitor is called once per chunk of columns.
 ///
 /// # Errors
 /// Only if the monitor stops the work.
@@ -135,10 +135,10 @@ pub fn subtract_product(
     Ok(())
 }
 
-/// Does the monitor want to go on?
+/// Calls the monitor.
 ///
 /// # Errors
-/// The reason to stop.
+/// The reason to stop, if the monitor gives one.
 pub fn check(monitor: &dyn Monitor) -> Result<(), Stop> {
     match monitor.tick(0.0) {
         ControlFlow::Continue(()) => Ok(()),

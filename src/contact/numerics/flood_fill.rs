@@ -1,8 +1,8 @@
-//! Which cells of a grid hang together.
+//! Connected groups of grid cells.
 
-/// The connected groups of the cells of a grid of `width` by `height` (cell (i, j) is `j * width + i`) that are inside; cells hang
-/// together over edges and corners. Groups stand in the order of their first cells, cells of a group in the order in which they
-/// were reached.
+/// Groups the cells of a `width` by `height` grid for which the predicate is true (cell (i, j) is `j * width + i`). Cells that share
+/// an edge or a corner are connected. Groups are ordered by their first cells, cells within a group by when they were
+/// reached.
 pub(crate) fn groups(
     [width, height]: [usize; 2],
     inside: impl Fn(usize) -> bool,

@@ -7,7 +7,7 @@ use crate::contact::monitor::Stop;
 /// Basis vectors kept before a restart. A Newton step takes 4 products on average; 30 gives the same work on the 160 ellipses that
 /// `newton.rs` of the boundary element method names.
 const BASIS_MAX: usize = 60;
-/// Restarts after which a system is given up.
+/// Restarts after which the solve ends without convergence.
 const RESTARTS_MAX: usize = 3;
 
 /// Buffers that live as long as a solve.
@@ -40,18 +40,18 @@ pub struct LinearReport {
 pub enum GmresExit {
     /// The residual fell by the tolerance.
     Converged,
-    /// The restarts were used up before.
+    /// The restarts were used up before the residual fell by the tolerance.
     RestartsUsedUp,
 }
 
 impl GmresExit {
-    /// Was the tolerance met?
+    /// Whether the tolerance was met.
     #[must_use]
     pub fn converged(self) -> bool {
         self == GmresExit::Converged
     }
 
-    /// The end as a clause for messages.
+    /// The reason as a clause for messages.
     #[must_use]
     pub fn reason(self) -> &'static str {
         match self {
@@ -73,7 +73,7 @@ pub trait LinearSystem {
 
 impl Gmres {
     /// Improves `x` (which starts at zero) until the residual of `A x = b` has fallen by `tolerance`, or the limits
-    /// on basis size and restarts are reached; the report says how far it came.
+    /// on basis size and restarts are reached; the report has the residual and the reason for ending.
     ///
     /// # Errors
     /// Only if the system's `tick` stops the work.
@@ -125,7 +125,7 @@ impl Gmres {
         Ok(report)
     }
 
-    /// One Arnoldi cycle; returns the residual norm it reached.
+    /// One Arnoldi cycle; returns the norm of the residual at its end.
     fn cycle(
         &mut self,
         system: &mut dyn LinearSystem,
@@ -170,7 +170,7 @@ impl Gmres {
     }
 
     /// Makes the newest product orthogonal to the basis (modified Gram–Schmidt), appends it, and applies the Givens
-    /// rotations. Returns true if nothing is left of it.
+    /// rotations. Returns true if the product lies in the span of the basis, so that the cycle has to end.
     fn orthogonalise(&mut self, k: usize) -> bool {
         let before = norm(&self.product);
         if self.columns.len() <= k {
@@ -344,7 +344,7 @@ mod tests {
 
     #[test]
     fn a_linear_solve_that_falls_short_says_so() {
-        // A shift of a long ring: nothing is gained until every vector is in the basis.
+        // A cyclic shift: the residual does not fall until the basis spans the whole space.
         struct Ring;
         impl LinearSystem for Ring {
             fn product(&mut self, x: &[f64], out: &mut [f64]) {

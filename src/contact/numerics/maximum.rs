@@ -1,14 +1,14 @@
-//! The largest value of a function of one place.
+//! The maximum of a function of one variable.
 
-/// Largest value of a function with one hump in an interval, by parabolas and golden sections (Brent 1973); its place is
-/// found to 1e-5 of the interval, so that the value is exact to about the square of this. With several humps it is the value of one of
-/// them; forty looks end it in any case.
+/// Maximum of a unimodal function in an interval, by parabolic interpolation and golden sections (Brent 1973). The argument is
+/// found to 1e-5 of the interval, so that the relative error of a smooth maximum is about the square of this. A function with several
+/// maxima gives one of them. At most forty evaluations.
 pub(crate) fn maximum([mut low, mut high]: [f64; 2], f: impl Fn(f64) -> f64) -> f64 {
     const STEPS: usize = 40;
     const SHORT: f64 = 0.381_966_011_250_105_1;
     let close = 1e-5 * (high - low);
     let best = low + SHORT * (high - low);
-    // The best place, the second best and the one before, each with its value.
+    // The best argument, the second best and the previous second best, each with its value.
     let mut places = [(best, f(best)); 3];
     let (mut step, mut before) = (0.0_f64, 0.0_f64);
     for _ in 0..STEPS {
@@ -68,7 +68,7 @@ mod tests {
             } else {
                 top
             };
-            // A kink is only as good as its place.
+            // At a kink the error of the value is proportional to that of the argument.
             let allowed = if k == 2 { 5e-5 } else { 1e-9 };
             assert!((found - exact).abs() < allowed, "{k}: {found} {exact}");
             assert!(looks.get() <= 32, "{k}: {} looks", looks.get());

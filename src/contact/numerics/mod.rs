@@ -1,4 +1,4 @@
-//! Numerical tools that know nothing of contact: one of each.
+//! General numerical algorithms, independent of contact mechanics; one implementation of each.
 
 pub mod bisection;
 pub mod bracketed_root;

@@ -1,27 +1,27 @@
-//! The root of a monotone function in a bracket, by Newton's steps and halvings where these fail: it cannot miss.
+//! The root of a monotone function in a bracket: Newton's method, with bisection where a step fails, so that it always converges.
 
-/// Evaluations whose Newton step is taken if it stays in the bracket; after that the bracket is halved.
+/// Evaluations after which Newton steps are no longer tried and the bracket is halved every time.
 const NEWTON_STEPS: usize = 60;
 
-/// When a search ends: as soon as the value, the last step or the bracket is smaller than this; 0 for never.
+/// When a search ends: as soon as the value, the last step or the bracket is smaller than given here; 0 disables a criterion.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CloseEnough {
-    /// Size of the value.
+    /// Magnitude of the value.
     pub(crate) value: f64,
     /// Length of the last step, or of the bracket.
     pub(crate) place: f64,
 }
 
-/// Which way a function goes.
+/// Whether a function rises or falls.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Course {
     Rising,
     Falling,
 }
 
-/// Where a function that rises or falls from `low` to `high` is 0. `f` gives value and slope; `start` is tried first, or the middle of the bracket
-/// if `start` lies outside. Where no step leads there, as at a triple root, sixty halvings leave less than the last digit of the
-/// bracket.
+/// The root of a function that rises or falls from `low` to `high`. `f` returns value and slope. `start` is tried first, or the middle
+/// of the bracket if `start` lies outside. If Newton steps do not converge, as at a triple root, sixty halvings reduce the bracket to
+/// rounding error.
 pub(crate) fn find(
     [mut low, mut high]: [f64; 2],
     start: f64,
@@ -88,7 +88,7 @@ mod tests {
                     1.0,
                 ]
             },
-            // A slope that says nothing.
+            // A slope of 0 everywhere: no Newton step is possible.
             |x| [x - 0.3, 0.0],
         ];
         for (k, f) in functions.into_iter().enumerate() {

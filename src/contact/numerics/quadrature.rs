@@ -1,6 +1,6 @@
 //! Gauss–Legendre quadrature (Abramowitz and Stegun 1964, table 25.4): exact for polynomials of degree `2 n − 1` with n points.
 
-/// Points on −1 … 1 with their weights, four of them.
+/// The four points on −1 … 1 with their weights.
 pub(crate) const FOUR_POINTS: [(f64, f64); 4] = [
     (-0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
     (-0.339_981_043_584_856_3, 0.652_145_154_862_546_1),
@@ -8,7 +8,7 @@ pub(crate) const FOUR_POINTS: [(f64, f64); 4] = [
     (0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
 ];
 
-/// How many points an integral over an interval takes.
+/// How many points are used for an integral over one interval.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum GaussPoints {
     /// Exact for polynomials of degree 5.
@@ -18,7 +18,7 @@ pub(crate) enum GaussPoints {
 }
 
 impl GaussPoints {
-    /// The middle point, then those of the right half, with their weights.
+    /// The middle point, then the points of the right half, with their weights.
     fn right_half(self) -> &'static [(f64, f64)] {
         match self {
             GaussPoints::Three => &[
@@ -34,7 +34,7 @@ impl GaussPoints {
     }
 }
 
-/// Integral of f from the first to the second bound; negative if they are the other way round.
+/// Integral of f from the first to the second bound; exchanged bounds change its sign.
 pub(crate) fn integral([from, to]: [f64; 2], points: GaussPoints, f: impl Fn(f64) -> f64) -> f64 {
     let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
     let points = points.right_half();

@@ -1,5 +1,4 @@
-//! The two widths of numbers in which influence is computed, with a natural logarithm that the compiler can turn into
-//! SIMD code.
+//! Single and double precision for the influence coefficients, with a natural logarithm that the compiler can vectorise.
 
 use std::ops::{Add, Mul, Neg, Sub};
 
@@ -18,7 +17,7 @@ pub trait Number:
     const ZERO: Self;
     /// Far below every length, far above the smallest normal number.
     const TINY: Self;
-    /// The nearest number of this width.
+    /// The nearest number of this precision.
     fn of(value: f64) -> Self;
     /// Square root.
     fn sqrt(self) -> Self;
@@ -30,7 +29,7 @@ pub trait Number:
 
 /// `ln x` with `x = 2^e m`, `m` in `√½ … √2` and `ln m = 2 artanh s`, `s = (m − 1)/(m + 1)`, by its series in `s²`.
 /// Zero, subnormal, negative and non-finite arguments give meaningless finite or non-finite values, never a panic:
-/// callers keep them out. The products and sums are fused: one rounding, alike on every machine.
+/// callers exclude them. Products and sums are fused: they round once, identically on every machine.
 macro_rules! number {
     (
         $float:ty, $bits:ty, tiny $tiny:expr, sqrt_half $sqrt_half:expr, mantissa $mantissa:expr, bias $bias:expr,
@@ -68,7 +67,7 @@ macro_rules! number {
                     self.to_bits()
                         .wrapping_sub(exponent_bits.wrapping_sub($bias) << $mantissa),
                 );
-                // 2^mantissa + k has k in its lowest bits: an integer to float conversion without an instruction for it.
+                // 2^mantissa + k holds k in its lowest bits: this converts an integer to a float without a conversion instruction.
                 let exponent =
                     <$float>::from_bits(exponent_bits | $magic) - ($magic_value + $bias as $float);
                 let s = (mantissa - 1.0) / (mantissa + 1.0);

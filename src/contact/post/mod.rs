@@ -1,4 +1,4 @@
-//! Derived from stored cell fields: zones, outlines, samples on a grid.
+//! Quantities derived from stored cell values: zones, outlines, samples on a grid.
 
 pub mod outlines;
 pub mod resample;

@@ -1,4 +1,4 @@
-//! Cell values brought onto a regular grid, for pictures and for programs that want arrays.
+//! Interpolates cell values onto a regular grid, for pictures and for programs that read arrays.
 
 use crate::contact::post::strip_segments::{StoredSegment, Strips};
 use crate::contact::solution::words::PatchCells;
@@ -18,16 +18,16 @@ pub struct Gridded<T = f64> {
 /// Interpolates cell values on `nx × ny` points over the bounding box of the patch.
 ///
 /// The points are the centres of `nx × ny` equal rectangles that fill the box, so that the sum of all values times the
-/// area of a rectangle approximates the integral (first order in the rectangles at the patch's border). Along a strip:
-/// linear between the centres of cells, constant beyond the first and last centre up to the end of the chord. Between
-/// the mid-lines of two strips: the ends of the chord are linear in y, the value is linear in y between the values at
+/// area of a rectangle approximates the integral (with a first-order error at the patch's border). Along a strip, values are
+/// linear between the centres of cells, and constant beyond the first and last centre up to the end of the chord. Between
+/// the mid-lines of two strips, the ends of the chord are linear in y, and so is the value between those at
 /// the same relative position in both chords. Beyond the first and last mid-line the chord is extrapolated to the
 /// strip's border as in [`patch_outline`](crate::contact::post::outlines::outline::patch_outline). Where segments branch, every
-/// segment reaches to its strip's borders unchanged. Constants are reproduced everywhere, linear fields wherever the
-/// relative position is not beyond the outermost centres and y not beyond the outermost mid-lines.
+/// segment is continued unchanged to its strip's borders. Constants are reproduced everywhere, linear fields between the
+/// outermost centres of a chord and between the outermost mid-lines.
 ///
 /// # Panics
-/// If `nx` or `ny` is less than 2, or `values` has not one value per cell.
+/// If `nx` or `ny` is less than 2, or the number of `values` differs from that of the cells.
 #[must_use]
 pub fn resample(fields: &PatchCells, values: &[f64], nx: usize, ny: usize) -> Gridded {
     assert_eq!(
@@ -48,7 +48,7 @@ pub fn resample(fields: &PatchCells, values: &[f64], nx: usize, ny: usize) -> Gr
 /// Points and patch as in [`resample`]; the cell is the one at the same relative position in the nearest strip.
 ///
 /// # Panics
-/// If `nx` or `ny` is less than 2, or `zones` has not one zone per cell.
+/// If `nx` or `ny` is less than 2, or the number of `zones` differs from that of the cells.
 #[must_use]
 pub fn resample_zone(fields: &PatchCells, zones: &[Zone], nx: usize, ny: usize) -> Gridded<Zone> {
     assert_eq!(
@@ -64,7 +64,7 @@ pub fn resample_zone(fields: &PatchCells, zones: &[Zone], nx: usize, ny: usize) 
     })
 }
 
-/// A point of one strip: the cells of its segment and the x to look at.
+/// A point of one strip: the cells of its segment and its x.
 struct CellPosition {
     cells: std::ops::Range<usize>,
     x: f64,
@@ -72,9 +72,9 @@ struct CellPosition {
 
 /// A sample point inside the patch.
 struct Spot {
-    /// In the nearest strip.
+    /// The point in the nearest strip.
     near: CellPosition,
-    /// At the same relative position in the next strip on the point's side, if the segment goes on there.
+    /// The point at the same relative position in the next strip on its side, if the segment continues there.
     far: Option<CellPosition>,
     /// Weight of `far`, 0 to ½.
     weight: f64,
@@ -121,7 +121,7 @@ fn centres(from: f64, to: f64, n: usize) -> Vec<f64> {
     (0..n).map(|k| from + (k as f64 + 0.5) * step).collect()
 }
 
-/// What one horizontal line cuts out of a segment.
+/// The intersection of a line of constant y with a segment.
 struct Cut {
     near: usize,
     far: Option<usize>,
@@ -155,7 +155,7 @@ impl Cut {
     }
 }
 
-/// Everything the line at `y` cuts out of the patch.
+/// All intersections of the line at `y` with the patch.
 fn chords(strips: &Strips, y: f64) -> Vec<Cut> {
     let covers = |strip: &&std::ops::Range<usize>| {
         let first = &strips.segments[strip.start];
@@ -266,7 +266,7 @@ mod tests {
         let mut checked = 0;
         for (row, &y) in grid.values.iter().zip(&grid.y_mm) {
             for (value, &x) in row.iter().zip(&grid.x_mm) {
-                // 0.98 keeps away from the half cells at the ends of every chord.
+                // The bound 0.96 excludes the half cells at the ends of every chord, where values are constant.
                 if y.abs() < 0.9 * B && ((x - 0.3 * y) / A).powi(2) + (y / B).powi(2) < 0.96 {
                     let value = value.unwrap();
                     assert!(

@@ -1,9 +1,9 @@
-//! Strips and their segments recovered from stored cells, with the neighbours that continue a segment.
+//! Recovers strips and their segments from stored cells, and finds the neighbours that continue a segment.
 
 use crate::contact::numerics::lagrange;
 use crate::contact::solution::words::PatchCells;
 
-/// Cells that belong together and gaps between cells are told apart at this fraction of a cell's width.
+/// Distance between cells, as a fraction of a cell's width, below which they count as adjacent.
 pub(crate) const JOIN: f64 = 1e-9;
 
 /// An unbroken run of cells of one strip.
@@ -19,13 +19,13 @@ pub(crate) struct StoredSegment {
     pub left: f64,
     /// Leading end in mm.
     pub right: f64,
-    /// The only segment that continues it toward smaller y, if that one also knows no other.
+    /// The segment that continues it toward smaller y, if each is the only neighbour of the other on that side.
     pub below: Option<usize>,
-    /// The only segment that continues it toward larger y, if that one also knows no other.
+    /// The segment that continues it toward larger y, if each is the only neighbour of the other on that side.
     pub above: Option<usize>,
-    /// Several segments touch it from below, or a segment that has others above.
+    /// It touches several segments below, or one that touches other segments above.
     pub branches_below: bool,
-    /// Several segments touch it from above, or a segment that has others below.
+    /// It touches several segments above, or one that touches other segments below.
     pub branches_above: bool,
 }
 
@@ -87,7 +87,7 @@ impl Strips {
         out
     }
 
-    /// One segment per strip, and every strip touches the next.
+    /// Whether every strip has one segment and touches the next strip.
     pub fn is_simple(&self) -> bool {
         !self.segments.is_empty()
             && self.strips.iter().all(|strip| strip.len() == 1)
@@ -96,12 +96,12 @@ impl Strips {
                 .all(|segment| segment.below.is_some())
     }
 
-    /// Trailing and leading end where a segment that nothing continues meets the border of its strip
-    /// (`upper`: the border at larger y).
+    /// Trailing and leading end of a segment without continuation at the border of its strip (`upper`: the border at
+    /// larger y).
     ///
     /// The squared half-length is extrapolated through up to three strips, as a parabola in y (exact for an
     /// ellipse), the centre as a line; the half-length stays between 0 and that of the segment. Where segments
-    /// branch the ends stay where they are.
+    /// branch, the ends of the segment are returned unchanged.
     pub fn tip(&self, segment: usize, upper: bool) -> (f64, f64) {
         let first = &self.segments[segment];
         let branches = if upper {
@@ -135,7 +135,7 @@ impl Strips {
             .map(|s| (s.y, 0.5 * (s.left + s.right)))
             .collect();
         let half = lagrange::value(&squared, y).clamp(0.0, squared[0].1).sqrt();
-        // Round-off of the parabola leaves half-lengths of this size where the true one is 0.
+        // Rounding of the parabola gives half-lengths of this size where the true one is 0.
         let half = if half < 1e-6 * squared[0].1.sqrt() {
             0.0
         } else {
@@ -145,7 +145,7 @@ impl Strips {
         (centre - half, centre + half)
     }
 
-    /// Notes which segments of neighbouring strips continue each other.
+    /// Records which segments of neighbouring strips continue each other.
     fn link(&mut self) {
         for j in 1..self.strips.len() {
             let (lower, upper) = (self.strips[j - 1].clone(), self.strips[j].clone());
@@ -172,7 +172,7 @@ impl Strips {
     }
 }
 
-/// Edges closer than this are the same edge: a fraction of the cell, but never below the rounding of coordinates.
+/// Distance below which two edges are the same: a fraction of the cell's width, but at least the rounding of coordinates.
 pub(crate) fn join_tolerance(coordinate: f64, width: f64) -> f64 {
     (JOIN * width).max(8.0 * f64::EPSILON * coordinate.abs())
 }

@@ -1,4 +1,4 @@
-//! A remark in the words of the answer, with its place; and how the remarks of one answer are merged.
+//! A remark as it stands in the answer, with the part it belongs to; and how the remarks of one answer are merged.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use crate::contact::remark::figure::{AsFigure, Figure};
 use crate::contact::remark::kind::Severity;
 use crate::contact::remark::list::Remark;
 
-/// Motions with the same remark of which the figures are kept; the others are only numbered.
+/// Number of motions with the same remark for which the figures are kept; of the others only the index is kept.
 const KEPT_MAX: usize = 4;
 
 /// Something the client should know about an answer: its code, its place, a sentence, and the figures in it by name.
@@ -109,14 +109,14 @@ impl Remark {
 }
 
 impl RemarkEntry {
-    /// Does it hold for this motion, or for all?
+    /// Whether it applies to this motion, alone or as one of all.
     #[must_use]
     pub fn holds_at(&self, point: usize) -> bool {
         let among = |range: &[usize; 2]| (range[0]..=range[1]).contains(&point);
         self.point.is_none_or(|own| own == point) || self.also_at_points.iter().any(among)
     }
 
-    /// Is it the same remark, further motions aside?
+    /// Whether it is the same remark, apart from `further_points`.
     fn says(&self, other: &RemarkEntry) -> bool {
         self.is_like(other) && self.point == other.point && self.figures == other.figures
     }
@@ -126,12 +126,12 @@ impl RemarkEntry {
     }
 }
 
-/// The remarks of an answer without repetitions: of those that differ in motion and figures only, the first few are
-/// kept, and the first of them numbers the motions of the others.
+/// The remarks of an answer without repetitions. Of those that differ only in motion and figures the first few are
+/// kept, and the first one lists the motions of those left out.
 #[must_use]
 pub fn merged(remarks: impl IntoIterator<Item = RemarkEntry>) -> Vec<RemarkEntry> {
     let mut kept: Vec<RemarkEntry> = Vec::new();
-    // Where the remarks of one kind and place stand in `kept`: the first, and how many.
+    // For each kind and place: the index of the first remark in `kept`, and the number of remarks kept.
     let mut groups: Vec<(usize, usize)> = Vec::new();
     for mut remark in remarks {
         let of_kind = |(first, _): &&mut (usize, usize)| kept[*first].is_like(&remark);
@@ -162,7 +162,7 @@ pub fn merged(remarks: impl IntoIterator<Item = RemarkEntry>) -> Vec<RemarkEntry
     kept
 }
 
-/// Adds motions to ranges, unless they are there; they come in their order.
+/// Adds motions to ranges unless they are included already; calls come in the order of the motions.
 fn add(ranges: &mut Vec<[usize; 2]>, [first, end]: [usize; 2]) {
     if ranges.iter().any(|own| own[0] <= first && end <= own[1]) {
         return;

@@ -15,9 +15,9 @@ pub enum Figure {
     Word(String),
 }
 
-/// What can stand in a remark as a figure.
+/// Types that can be a figure of a remark.
 pub(crate) trait AsFigure {
-    /// The figure; nothing for a number that is not finite or not there.
+    /// The figure; `None` for a number that is absent or not finite.
     fn figure(&self) -> Option<Figure>;
 }
 

@@ -1,7 +1,7 @@
-//! The list of all remarks, in groups by subject. To add one, add it to its group and nowhere else: code, severity, figures and
-//! sentence, and what the client reads about it at `/v1/remarks`.
+//! The list of all remarks, in groups by subject. A new remark is added to its group and nowhere else: the entry has its code,
+//! severity, figures and sentence, and the explanation that clients read at `/v1/remarks`.
 //!
-//! Codes never change. Figures have their unit in their name and must not be named as a member of
+//! Codes never change. A figure's name ends in its unit and must differ from the members of
 //! `RemarkEntry`. A figure may be a number, a count, a pair, a word or optional.
 
 mod case;

@@ -1,7 +1,7 @@
 //! What a client should know about an answer besides its numbers: remarks with a stable code, a place and figures.
 //!
-//! A stage returns the [`Remark`](crate::contact::remark::list::Remark)s of its own result, with the patch or the input they belong to where it knows that;
-//! the motion is added when the solution is put together. `list` holds them all: adding one means adding it there.
+//! A stage returns the [`Remark`](crate::contact::remark::list::Remark)s on its own result, with the patch or the input they concern where it
+//! is known; the motion is added when the solution is assembled. All remarks are declared in `list`.
 
 pub mod entry;
 pub mod figure;

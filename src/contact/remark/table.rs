@@ -1,7 +1,7 @@
-//! The macro that makes the enum of remarks and everything that is said about each from one list.
+//! The macro that generates the enum of remarks, with their codes, severities, sentences and explanations, from one list.
 
-/// Declares the enum `Remark`. The documentation of a variant is its meaning for the client; every figure has a value for the
-/// example; `detail` is an expression of the figures (as references) that gives the sentence.
+/// Declares the enum `Remark`. The documentation of a variant is the explanation that clients read; every figure has a value for the
+/// example; `detail` is an expression that forms the sentence from references to the figures.
 macro_rules! remarks {
     (; $(
         $(#[doc = $meaning:literal])+
@@ -61,7 +61,7 @@ macro_rules! remarks {
                     .collect()
             }
 
-            /// One of each kind, with figures made up.
+            /// One remark of each kind, with invented figures.
             #[must_use]
             pub fn examples() -> Vec<Remark> {
                 vec![ $( Remark::$name { $($figure: $example),* }, )+ ]
