@@ -1,23 +1,25 @@
-//! What is wrong with a profile, in words a measuring engineer can act on.
+//! Defects of a profile, described so that whoever measured it can correct them.
 
 use crate::contact::geometry::profile::Body;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 
-/// Ambiguity of both bodies together that is remarked on where points are coarse, relative to the largest pressure.
+/// Ambiguity of both bodies together, relative to the largest pressure, from which coarse points get a remark.
 ///
-/// Population: as for `CHORD_HIDES_ARC` of `judge.rs`. At 0.08 47 of 487 right and 166 of 174 wrong answers are told, at 0.09 38 and 165, at 0.10
-/// 34 and 163.
+/// Population: as for `CHORD_HIDES_ARC` of `judge.rs`. At 0.08, 47 of 487 correct and 166 of 174 wrong answers get the remark, at 0.09 38 and
+/// 165, at 0.10 34 and 163.
 pub const AMBIGUOUS: f64 = 0.09;
-/// Waviness without noise, outlier or step may be that of two arcs that meet; new 60E1 reaches 0.12 at its gauge corner.
+/// Waviness, relative to the largest pressure, above which it is a defect even without noise, outlier or step. Two arcs that meet have
+/// some too: an unworn 60E1 reaches 0.12 at its gauge corner.
 const WAVES_BEYOND_SHAPE: f64 = 0.3;
-/// They are waves where they are found beside the contact as well.
+/// Median waviness, relative to the largest pressure, above which it extends beyond the contact and indicates waves.
 const WAVES_EVERYWHERE: f64 = 0.03;
-/// A patch that carries less of the load than this is no larger than the place where two arcs meet.
+/// Share of the load below which a patch may lie entirely where two arcs meet.
 const LIGHT: f64 = 0.02;
-/// Roughness that is told although other readings of the points change little, relative to the largest pressure.
+/// Roughness, relative to the largest pressure, that gets a remark even if other readings of the points change the answer little.
 const ROUGH_IN_ANY_CASE: f64 = 0.15;
-/// Noise that a smoothing may leave on each body, relative to the largest pressure; the advised one leaves 0.07 of both.
+/// Noise, relative to the largest pressure, that may remain on each body after smoothing; the advised smoothing leaves 0.07 on both
+/// together.
 const NOISE_LEFT_MAX: f64 = 0.08;
 
 /// One thing that is wrong with a profile under a patch.
@@ -25,54 +27,54 @@ const NOISE_LEFT_MAX: f64 = 0.08;
 pub struct Finding {
     /// Which profile.
     pub body: Body,
-    /// Number of the patch in the answer.
+    /// Index of the patch in the answer.
     pub patch: usize,
-    /// Where on the profile, from and to y in mm.
+    /// Range of y on the profile, in mm.
     pub y: [f64; 2],
     /// Roughness of this body as a pressure in MPa.
     pub pressure: f64,
-    /// That of both bodies relative to the largest pressure of the patch.
+    /// Roughness of both bodies relative to the largest pressure of the patch.
     pub share: f64,
-    /// Part of the load that the patch carries.
+    /// Share of the load that the patch carries.
     pub load_share: f64,
-    /// Noise that its smoothing leaves, as a pressure over the largest one; 0 without a smoothing.
+    /// Noise that remains after smoothing, as a pressure relative to the largest one; 0 without smoothing.
     pub left: f64,
-    /// Waviness of this body as a median over the contact and beside it, relative to the largest pressure.
+    /// Median waviness of this body in and beside the contact, relative to the largest pressure.
     pub everywhere: f64,
-    /// The widest chord, from and to y in mm, and its length.
+    /// The longest chord, as a range of y in mm.
     pub chord: [f64; 2],
     /// Length of that chord in mm.
     pub chord_length: f64,
-    /// That over the width of the patch.
+    /// That length relative to the width of the patch.
     pub over_width: f64,
     /// Smoothing in use, in mm.
     pub smoothing: f64,
-    /// Smoothing that is advised, in mm; 0 for none.
+    /// Smoothing advised, in mm; 0 for none.
     pub advised: f64,
-    /// An answer would mislead: the job fails unless rough profiles are accepted.
+    /// Whether the answer would mislead, so that the job fails unless rough profiles are accepted.
     pub refused: bool,
-    /// What it is.
+    /// The kind of defect.
     pub cause: Cause,
 }
 
-/// What is wrong with a profile.
+/// A kind of defect of a profile.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Cause {
-    /// One point is off, by a distance in mm.
+    /// A single point is displaced.
     Outlier {
-        /// Where, in mm.
+        /// y of the point in mm.
         y: f64,
-        /// How far, in mm.
+        /// Displacement in mm.
         distance: f64,
     },
     /// The profile jumps between two points.
     Step {
-        /// Where, in mm.
+        /// y of the jump in mm.
         y: f64,
-        /// By how much, in mm.
+        /// Height of the jump in mm.
         height: f64,
     },
-    /// The points lie on the chords of fewer points.
+    /// The points were interpolated linearly between fewer points.
     Polygon {
         /// Length of the chords in mm.
         chord: f64,
@@ -86,9 +88,9 @@ pub enum Cause {
         /// Step of rounding in mm.
         rounding: Option<f64>,
     },
-    /// Waves that are neither of these.
+    /// Waves that are none of these.
     Waves,
-    /// The points leave the curve between them open.
+    /// The points are too coarse to determine the curve between them.
     Coarse,
     /// The points are far apart for the width of the patch.
     Spacing,
@@ -98,13 +100,13 @@ pub enum Cause {
     FlangeTip,
     /// The contact is near the end of the profile.
     End {
-        /// What is left of it, in mm.
+        /// Length of the profile beyond the contact, in mm.
         left: f64,
     },
 }
 
 impl Finding {
-    /// Is this about the roughness of a profile, which matters from some measure on?
+    /// Whether this is a kind of roughness, which matters only above a threshold.
     pub fn of_roughness(&self) -> bool {
         matches!(
             self.cause,
@@ -117,7 +119,7 @@ impl Finding {
         )
     }
 
-    /// Is it more than the shape of a sound profile, such as two arcs that meet, may show?
+    /// Whether it exceeds what the shape of a sound profile, such as two arcs that meet, can cause.
     pub fn has_evidence(&self) -> bool {
         match self.cause {
             Cause::Outlier { .. }
@@ -134,13 +136,13 @@ impl Finding {
         }
     }
 
-    /// Is another one the same remark elsewhere?
+    /// Whether `other` would give the same remark about another place.
     pub fn is_like(&self, other: &Finding) -> bool {
         let kind = std::mem::discriminant::<Cause>;
         self.body == other.body && kind(&self.cause) == kind(&other.cause)
     }
 
-    /// Is it told, where another reading of the points changes the patch by much or not?
+    /// Whether it becomes a remark; `changes` is whether another reading of the points changes the patch much.
     pub fn is_told(&self, changes: bool) -> bool {
         match self.cause {
             Cause::Coarse => self.has_evidence(),
@@ -154,7 +156,7 @@ impl Finding {
         }
     }
 
-    /// Does this one do more harm than another of its kind?
+    /// Whether it is worse than another finding of its kind.
     pub fn worse_than(&self, other: &Finding) -> bool {
         [self.share, self.chord_length] > [other.share, other.chord_length]
     }

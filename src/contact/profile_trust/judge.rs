@@ -1,4 +1,4 @@
-//! Looks at the points of both profiles under the patches that were found, and names what is wrong with them.
+//! Examines the points of both profiles under the patches found, and reports their defects.
 
 use crate::contact::geometry::profile::{Body, Profile};
 use crate::contact::geometry::profile_quality::flattening::noise_pressure;
@@ -13,50 +13,51 @@ use crate::contact::normal::wheel_height::search::PressedGap;
 use crate::contact::profile_trust::finding::{AMBIGUOUS, Cause, Finding};
 use crate::contact::solution::profile_quality::{PatchQuality, ProfileQuality};
 
-/// A body is blamed for its share of that from here on.
+/// Share of the roughness of both bodies from which that of one body is reported.
 const BLAMED: f64 = 0.6;
-/// Largest chord over the width of the patch that is remarked on, and what makes a job fail (as does [`AMBIGUOUS_MAX`]).
+/// Longest chord relative to the width of the patch from which there is a remark, and from which a job fails (as with
+/// [`AMBIGUOUS_MAX`]).
 const COARSE: f64 = 1.0;
 const COARSE_MAX: f64 = 1.5;
-/// A chord of this length in mm is fine enough for any patch that carries a load worth the name: a lightly loaded flange touches over some
-/// tenths of a mm.
+/// Chords up to this length in mm count as fine enough for any patch: only a lightly loaded flange, which touches over some tenths of
+/// a mm, has smaller patches.
 const CHORD_MIN: f64 = 1.0;
-/// A straight stretch may have its points as far apart as it likes: below this ambiguity, relative to the pressure.
+/// Ambiguity, relative to the pressure, below which the distance of points does not matter, as on a straight stretch.
 const AMBIGUOUS_LEAST: f64 = 0.02;
-/// Up to this length in mm a chord is judged by its ambiguity alone, however narrow the patch is: the arcs of heads and treads are 10 to 50 mm
-/// long, so that a longer one may hide an arc that neither of the two curves through the points knows of.
+/// Length in mm up to which a chord is judged by its ambiguity alone, however narrow the patch. The arcs of heads and treads are 10 to
+/// 50 mm long, so that a longer chord may hide an arc that neither of the two curves through the points shows.
 /// Population: holes and coarse points at 384 places on the pairs of the thresholds, seeds 1001 to 1004 and 2001 to 2012 of the class *damaged
-/// profile*: with this bound 38 of 487 right and 165 of 174 wrong answers are told, with 0 mm 43 and 166.
+/// profile*: with this bound 38 of 487 correct and 165 of 174 wrong answers get the remark, with 0 mm 43 and 166.
 const CHORD_HIDES_ARC: f64 = 10.0;
 /// Ambiguity relative to the largest pressure that makes a job fail.
 const AMBIGUOUS_MAX: f64 = 0.5;
-/// Pressures in MPa below this do no harm; what is open of them makes no job fail.
+/// Pressure in MPa below which errors do no harm and no job fails because of them.
 const PRESSURE_LIGHT: f64 = 200.0;
-/// A profile goes on beyond its contact by this, in mm.
+/// Length in mm of profile needed beyond a contact; with less there is a remark.
 const BEYOND: f64 = 5.0;
 
-/// A patch as far as the judgement needs it.
+/// What the assessment needs to know of a patch.
 #[derive(Debug, Clone, Copy)]
 pub struct FoundPatch<'a> {
     /// The gap it belongs to.
     pub gap: &'a PressedGap,
     /// Height of the wheel's centre in mm.
     pub centre: f64,
-    /// From and to across, in mm, in the coordinates of the gap.
+    /// Extent across in mm, in the coordinates of the gap.
     pub across: [f64; 2],
     /// Largest pressure in MPa.
     pub pressure: f64,
-    /// Its part of the normal forces of all patches.
+    /// Its share of the sum of the normal forces of all patches.
     pub load_share: f64,
-    /// Its number in the answer.
+    /// Its index in the answer.
     pub number: usize,
 }
 
-/// One body under a patch.
+/// The profile of one body under a patch.
 struct Under<'a> {
     body: Body,
     profile: &'a Profile,
-    /// Along the profile, in mm.
+    /// The contact as a range of the length along the profile, in mm.
     contact: [f64; 2],
     found: UnderContact,
 }
@@ -71,7 +72,7 @@ impl<'a> Under<'a> {
         }
     }
 
-    /// y of a place along the profile.
+    /// y in mm at a length along the profile.
     fn y(&self, s: f64) -> f64 {
         self.profile.at(s).at[0]
     }
@@ -85,7 +86,7 @@ impl<'a> Under<'a> {
         found.waviness.hypot(found.ambiguity)
     }
 
-    /// Pressure in MPa of the noise that the smoothing leaves.
+    /// The noise that remains after smoothing, as a pressure in MPa.
     fn noise_left(&self, modulus: f64) -> f64 {
         let smoothing = self.profile.smoothing();
         match self.found.noise {
@@ -105,7 +106,7 @@ impl<'a> Under<'a> {
     }
 }
 
-/// The quality of both profiles under a patch, and what may be said about it: roughness whether it is large or not.
+/// The quality of both profiles under a patch, and the findings. Roughness is always among them, however small.
 ///
 /// # Errors
 /// The wheel's surface was not found over an end of the patch.
@@ -126,7 +127,7 @@ pub fn judge(
         Under::new(Body::Rail, rail, contacts[0], modulus),
         Under::new(Body::Wheel, wheel, contacts[1], modulus),
     ];
-    // A light patch beside the one that carries the load would ask for far more smoothing than that one.
+    // Without the lower bound, a lightly loaded patch would need far more smoothing than the one that carries the load.
     let pressure = patch.pressure.max(PRESSURE_LIGHT);
     let advised = advised_smoothing([both[0].grain(), both[1].grain()], modulus, pressure);
     let mut findings = Vec::new();
@@ -156,7 +157,7 @@ pub fn judge(
     Ok((quality, findings))
 }
 
-/// What makes the profile rough: outliers, steps, chords, noise or waves, or points that leave the curve open.
+/// The cause of a profile's roughness: outlier, step, chords, noise, waves, or points too coarse to determine the curve.
 fn roughness(own: &Under, both: f64, advised: f64, modulus: f64, patch: FoundPatch) -> Finding {
     let smoothing = own.profile.smoothing();
     let found = &own.found;

@@ -1,5 +1,5 @@
-//! Solves a wheel on a rail and says how far its profiles can be trusted: their quality under every patch, what is wrong with them and
-//! what the measurement leaves open. Where an answer would mislead there is none.
+//! Solves a wheel on a rail and assesses its profiles: their quality under every patch, their defects, and the uncertainty that the
+//! measurement leaves in the answer. If the answer would mislead, the solve fails instead.
 
 pub mod finding;
 pub mod judge;

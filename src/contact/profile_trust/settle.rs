@@ -1,4 +1,4 @@
-//! `smoothing_mm: "auto"`: the smoothing that suits the noise of the profiles and the pressure between them.
+//! `smoothing_mm: "auto"`: the smoothing chosen from the noise of the profiles and the contact pressure.
 
 use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::profile_points;
@@ -14,10 +14,10 @@ use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::time_limit::TimeLimit;
 
-/// By which part the rest for that pressure may miss the force: the length goes with its power −2/9.
+/// Relative error allowed in the force of the solve that finds the pressure; the smoothing varies only as its power −2/9.
 const TOLERANCE: f64 = 0.1;
 
-/// What was chosen, for the answer.
+/// Remarks on the smoothing chosen.
 pub(crate) fn remarks(contact: &WheelTask) -> Vec<RemarkEntry> {
     let profiles = contact
         .geometry
@@ -43,7 +43,7 @@ pub(crate) fn remarks(contact: &WheelTask) -> Vec<RemarkEntry> {
         .collect()
 }
 
-/// Was a smoothing to be chosen from points that do not tell their noise?
+/// Whether an automatic smoothing was requested for points from which the noise cannot be determined.
 pub(crate) fn undecided(contact: &WheelTask) -> bool {
     let profiles = contact.geometry.profiles().into_iter();
     profiles
@@ -51,11 +51,11 @@ pub(crate) fn undecided(contact: &WheelTask) -> bool {
         .any(|(profile, auto)| auto && !profile_points::tells_noise(profile))
 }
 
-/// The contact with the smoothing settled where the case leaves it to the noise: first for a pressure of 1200 MPa, then for the largest one
-/// found with that, on coarse gaps.
+/// The contact with every automatic smoothing replaced by a length: first the one for a pressure of 1200 MPa, then the one for the largest
+/// pressure that a solve on coarse gaps finds with the first.
 ///
 /// # Errors
-/// There is no rest of the wheel, or the monitor stopped the work.
+/// The wheel does not come to rest on the rail, or the monitor stopped the work.
 pub(crate) fn settled(
     case: &CheckedCase,
     contact: &WheelTask,

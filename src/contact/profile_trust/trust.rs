@@ -1,4 +1,4 @@
-//! A wheel on a rail solved with the judge of its profiles beside it.
+//! Solves a wheel on a rail and assesses its profiles.
 
 use std::sync::Arc;
 
@@ -19,10 +19,10 @@ use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::solution::profile_quality::{PatchQuality, ProfileQuality};
 use crate::contact::solution::words::{Fields, Solution};
 
-/// Solves a problem whose region is a wheel on a rail, and judges its profiles.
+/// Solves a wheel on a rail and assesses its profiles.
 ///
 /// # Errors
-/// A named reason why there is no answer; [`SolveError::RoughProfile`] where the points of a profile allow none and rough ones are not
+/// Why there is no answer; [`SolveError::RoughProfile`] where the points of a profile do not allow one and rough profiles are not
 /// accepted.
 pub(crate) fn solve(
     operators: &Arc<OperatorStore>,
@@ -60,7 +60,7 @@ pub(crate) fn solve(
     Ok((solution, fields))
 }
 
-/// A rough profile makes dozens of patches; of what is wrong with a body in the same way the worst place is enough.
+/// The worst finding of each kind and body. A rough profile has dozens of patches, of which one remark each would be too many.
 fn worst_of_each(findings: impl Iterator<Item = Finding>) -> Vec<Finding> {
     let mut worst: Vec<Finding> = Vec::new();
     for finding in findings {
@@ -74,14 +74,14 @@ fn worst_of_each(findings: impl Iterator<Item = Finding>) -> Vec<Finding> {
     worst
 }
 
-/// Judges the profiles under the patches of a wheel at rest.
+/// Assesses the profiles under the patches of a wheel at rest.
 struct Judgement<'a> {
     contact: &'a WheelTask,
 }
 
 impl Judge for Judgement<'_> {
-    /// Where an answer would mislead none is sought: a tangential problem on the ridge under an outlier would fail for reasons that say
-    /// nothing of the outlier.
+    /// Fails before the tangential problem is solved if the answer would mislead: on the ridge under an outlier, for example, that
+    /// solve would fail with an error that does not mention the outlier.
     fn before(&self, wheel: &PressedWheel) -> Result<(), SolveError> {
         if self.contact.trust.accept_rough {
             return Ok(());
@@ -118,10 +118,10 @@ impl Judge for Judgement<'_> {
     }
 }
 
-/// What may be done about a profile that is refused.
+/// Advice that ends the error about a refused profile.
 const ACCEPT: &str = "; to solve all the same give accept_rough_profiles: true";
 
-/// The failure that a finding explains, with what else there is to say.
+/// The error that a finding causes, with a further clause.
 fn rough(finding: &Finding, more: &str) -> SolveError {
     SolveError::RoughProfile {
         pointer: finding.pointer().to_owned(),
@@ -130,7 +130,7 @@ fn rough(finding: &Finding, more: &str) -> SolveError {
 }
 
 impl Judgement<'_> {
-    /// The quality of the profiles under every patch, and what is wrong with them.
+    /// The quality of the profiles under every patch, and the findings.
     fn of(&self, wheel: &PressedWheel) -> Result<(Vec<PatchQuality>, Vec<Finding>), SolveError> {
         let contact = self.contact;
         let (mut qualities, mut findings) = (Vec::new(), Vec::new());
@@ -158,8 +158,8 @@ impl Judgement<'_> {
         Ok((qualities, findings))
     }
 
-    /// Stretches without points where the bodies may touch beside the patches that were found, the widest of which has the width given
-    /// in mm.
+    /// Stretches without points where the bodies may touch in addition to the patches found; `width` in mm is that of the widest
+    /// patch.
     fn hidden(
         &self,
         wheel: &PressedWheel,
@@ -171,7 +171,7 @@ impl Judgement<'_> {
         if longest[0].max(longest[1]) < Hole::least(width) {
             return Vec::new();
         }
-        // The search is a good part of a solve; few profiles have chords so long.
+        // Searched only if there are long chords, because the search takes a considerable part of a solve's time.
         let Ok(search) = ContactLocus::new(geometry) else {
             return Vec::new();
         };
@@ -181,7 +181,7 @@ impl Judgement<'_> {
             .collect()
     }
 
-    /// A hole that lies under no patch, noted at the nearest one.
+    /// The finding about a hole outside all patches, attributed to the nearest one.
     fn beside(&self, hole: &Hole, width: f64, qualities: &mut [PatchQuality]) -> Option<Finding> {
         let [rail, wheel] = self.contact.geometry.profiles();
         let profile = match hole.body {

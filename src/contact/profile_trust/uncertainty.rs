@@ -1,8 +1,8 @@
-//! What the measurement of the profiles leaves open, from the same contact with other readings of its profiles.
+//! The uncertainty due to the measurement of the profiles, from solving the same contact with other readings of its profiles.
 //!
-//! With the smoothing L the contact is solved again with L/2.5 and 2 L: the shorter one shows how much noise is left, the longer one how much
-//! of the shape is lost. The largest difference and 1 % of the pressure, 0.3 % of μN, is the uncertainty. Population: noise of 1 to 20 µm
-//! with L = 5 mm: 97 % of the pressures, 93 % of the forces are within.
+//! With the smoothing L the contact is solved again with L/2.5, which shows how much noise remains, and with 2 L, which shows how much of
+//! the shape is lost. The uncertainty is the largest difference, plus 1 % of the pressure and 0.3 % of μN respectively. Population: noise
+//! of 1 to 20 µm with L = 5 mm; the errors of 97 % of the pressures and 93 % of the forces are within it.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -25,29 +25,31 @@ use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::solution::profile_quality::{ProfileQuality, ProfileUncertainty};
 use crate::contact::solution::words::{PatchSolution, Solution};
 
-/// Companions are solved with these multiples of the smoothing.
+/// The companion solves use the smoothing multiplied by these factors.
 const COMPANIONS: [f64; 2] = [0.4, 2.0];
-/// Smoothing of a companion where there is none, in mm, and in chords of coarse points, which a shorter one would leave as they are.
+/// Smoothing of a companion to a solve without smoothing, in mm, and in lengths of chords for coarse points, which a shorter smoothing
+/// would not change.
 const COMPANION_LEAST: f64 = 2.0;
 const COMPANION_CHORDS: f64 = 2.0;
-/// Waves and noise worth less than this part of the pressure need no companion.
+/// Waves and noise below this share of the pressure need no companion.
 pub(crate) const HARMLESS: f64 = 0.03;
-/// Added to the differences: relative to the largest pressure, and to μN.
+/// Added to the differences, relative to the largest pressure and to μN.
 const PRESSURE_FLOOR: f64 = 0.01;
 const FORCE_FLOOR: f64 = 0.003;
-/// Without companions: pressure by the roughness, and force by that over the pressure, relative to μN.
+/// Uncertainty without companions: of the pressure, as a multiple of the roughness; of the force relative to μN, as a multiple of the
+/// roughness relative to the pressure.
 const BY_ROUGHNESS: f64 = 2.0;
 const FORCE_BY_PRESSURE: f64 = 0.1;
-/// Companions are no more exact than this, relative to μN, and of no more motions of a case.
+/// Smallest target of companions, relative to μN, and most motions that they are solved for.
 const TARGET: f64 = 0.01;
 const MOTIONS_MAX: usize = 5;
-/// What is remarked on: of the largest pressure, and of μN.
+/// Uncertainty, relative to the largest pressure and to μN, from which there is a remark.
 const PRESSURE_OPEN: f64 = 0.06;
 const FORCE_OPEN: f64 = 0.02;
-/// Patches of a companion belong to those that lie within this of them, in mm across the track.
+/// Largest distance across the track, in mm, between corresponding patches of a solve and its companion.
 const SAME_PLACE: f64 = 6.0;
 
-/// Beyond the solve itself the progress stands still.
+/// Monitor of the companions: it can stop them, but reports no progress, because that of the solve is complete.
 struct Afterwards<'a>(&'a dyn Monitor);
 
 impl Monitor for Afterwards<'_> {
@@ -60,7 +62,7 @@ impl Monitor for Afterwards<'_> {
     }
 }
 
-/// Another reading of the profiles is no better than they are.
+/// Companions are solved without an assessment of their profiles.
 struct NoJudge;
 
 impl Judge for NoJudge {
@@ -73,7 +75,7 @@ impl Judge for NoJudge {
     }
 }
 
-/// Writes the uncertainty into every point and total, and says which patches another reading changes so much that it must be told.
+/// Writes the uncertainty into every point and total, and returns which patches another reading changes so much that a remark is due.
 ///
 /// # Errors
 /// The monitor stopped the work.
@@ -109,7 +111,7 @@ pub(crate) fn add(
                 Err(stop @ (SolveError::Cancelled | SolveError::OutOfTime { .. })) => {
                     return Err(stop);
                 }
-                // Another reading has no answer: what the measures say has to do.
+                // The companion has no answer; the uncertainty then follows from roughness alone.
                 Err(_) => {}
             }
         }
@@ -122,7 +124,7 @@ pub(crate) fn add(
     ))
 }
 
-/// The remark on a target that is smaller than what the profiles leave open, where that was looked into.
+/// The remark on a target below the uncertainty due to the profiles, where that was determined.
 pub(crate) fn target_below(case: &CheckedCase, solution: &Solution) -> Option<RemarkEntry> {
     let Resolution::Target(target) = case.run.resolution else {
         return None;
@@ -149,7 +151,7 @@ pub(crate) fn target_below(case: &CheckedCase, solution: &Solution) -> Option<Re
     })
 }
 
-/// Is what noise leaves after a smoothing worth a part of the pressure?
+/// Whether the noise that remains after smoothing is a significant share of the pressure.
 fn noisy(patch: &PatchSolution, modulus: f64) -> bool {
     let Some(quality) = &patch.quality else {
         return false;
@@ -164,7 +166,7 @@ fn noisy(patch: &PatchSolution, modulus: f64) -> bool {
     both > HARMLESS * patch.pressure_max_mpa
 }
 
-/// Ambiguity of both bodies in MPa, with the waviness where it is not that of the shape.
+/// Ambiguity of both bodies in MPa, including waviness that is not due to the shape.
 fn open_by_points(patch: &PatchSolution, rough: bool) -> f64 {
     let Some(quality) = &patch.quality else {
         return 0.0;
@@ -180,7 +182,8 @@ fn open_by_points(patch: &PatchSolution, rough: bool) -> f64 {
     own(&quality.rail).hypot(own(&quality.wheel))
 }
 
-/// The smoothings of the companions, of rail and wheel. Profiles without any are read once more with what suits their noise.
+/// The smoothings of rail and wheel for the companions. Profiles without smoothing have one companion, with the smoothing that suits
+/// their noise.
 fn readings(contact: &WheelTask, solution: &Solution) -> Vec<[f64; 2]> {
     let used = contact.geometry.profiles().map(Profile::smoothing);
     let mut advised = [0.0_f64; 2];
@@ -221,14 +224,14 @@ fn companion(case: &CheckedCase, chosen: &[usize]) -> CheckedCase {
     }
 }
 
-/// Differences of two answers: of forces and of a pressure.
+/// Differences between two answers, in forces and in the largest pressure.
 #[derive(Debug, Clone, Copy, Default)]
 struct Open {
     force: [f64; 2],
     pressure: f64,
 }
 
-/// What is open of a patch: between the readings, and with what the points leave open.
+/// Uncertainty of a patch: from the differences between readings, and from the spacing of its points.
 struct OfPatch {
     between: Open,
     all: Open,
@@ -240,7 +243,7 @@ impl Open {
         self.pressure = self.pressure.max(pressure);
     }
 
-    /// With what is left open in any case, for a normal force times friction and a largest pressure.
+    /// The uncertainty with its lower bounds added, for a given μN and largest pressure.
     fn told(self, limit: f64, pressure: f64) -> ProfileUncertainty {
         ProfileUncertainty {
             force_x_n: self.force[0] + FORCE_FLOOR * limit,
@@ -322,7 +325,7 @@ fn largest(solution: &Solution) -> f64 {
     all.fold(0.0, f64::max)
 }
 
-/// What is open of a patch with μN of `limit`: what its points leave open, and the differences to the companions' nearest patch.
+/// The uncertainty of a patch, `limit` being its μN: from its points, and from the differences to the nearest patch of each companion.
 fn of_patch(
     patch: &PatchSolution,
     chosen: &[usize],
@@ -342,7 +345,7 @@ fn of_patch(
             .min_by(|a, b| far(a).total_cmp(&far(b)))
             .filter(|same| far(same) < SAME_PLACE);
         let Some(same) = same else {
-            // There is no such patch in another reading.
+            // The companion has no such patch, so nothing of it is certain.
             open.widen([limit; 2], patch.pressure_max_mpa);
             continue;
         };

@@ -116,7 +116,7 @@ impl RemarkEntry {
         self.point.is_none_or(|own| own == point) || self.also_at_points.iter().any(among)
     }
 
-    /// Whether it is the same remark, apart from `further_points`.
+    /// Whether it is the same remark, apart from `also_at_points`.
     fn says(&self, other: &RemarkEntry) -> bool {
         self.is_like(other) && self.point == other.point && self.figures == other.figures
     }

@@ -2,7 +2,7 @@
 
 use crate::contact::geometry::formats::profile_file::{ProfileFile, numbers, unreadable};
 
-/// Lines that start with `#`, `!`, `%` or `"` are remarks; one line of titles may stand before the first point.
+/// Reads the points. Lines that start with `#`, `!`, `%` or `"` are comments; one line of titles may precede the first point.
 pub(crate) fn read(text: &str) -> Result<ProfileFile, String> {
     let mut contents = ProfileFile::default();
     let mut title_allowed = true;

@@ -1,9 +1,9 @@
-//! The formats of profile files, and how a text is told to be one of them.
+//! The formats of profile files, and how the format of a text is recognised.
 
 use crate::contact::geometry::formats::profile_file::ProfileFile;
 use crate::contact::geometry::formats::{columns, miniprof, simpack};
 
-/// A file format a client can name; each is a file of that name beside this one.
+/// A file format that a client can name; each is read in the file of that name in this folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// Two columns y and z, separated by blanks, commas, semicolons or tabs.
@@ -14,13 +14,13 @@ pub enum Format {
     Miniprof,
 }
 
-/// Texts shorter than this may be paths.
+/// Length below which a text may be a path.
 const PATH_LENGTH_MAX: usize = 1000;
 
 /// Reads a profile from the text of a file.
 ///
 /// # Errors
-/// A sentence with the number of the line that cannot be read, or with what is missing.
+/// A sentence that names the line that cannot be read, or what is missing.
 pub fn read(format: Format, text: &str) -> Result<ProfileFile, String> {
     if is_path(text) {
         return Err(format!(
@@ -44,7 +44,7 @@ pub fn read(format: Format, text: &str) -> Result<ProfileFile, String> {
     })
 }
 
-/// One line that ends like a file name is no file.
+/// Whether a text is a single line that ends like a file name.
 fn is_path(text: &str) -> bool {
     let line = text.trim();
     let name = line.rsplit(['/', '\\']).next().unwrap_or_default();
@@ -56,7 +56,7 @@ fn is_path(text: &str) -> bool {
         })
 }
 
-/// The format that the words of a text belong to.
+/// The format whose keywords a text contains.
 fn looks_like(text: &str) -> Option<Format> {
     if text.contains("point.begin") {
         Some(Format::Simpack)

@@ -1,13 +1,14 @@
 //! MiniProf's rail and wheel profiles, `.ban` and `.whl`.
 //!
-//! Lines `Name=value`, an empty line, then one point per line in the columns that `ColumnDef` names; `X` is y and `Y`
-//! is z here. Instruments differ in the sense of both: x usually runs toward the track centre, z is told by the shape.
+//! Lines `Name=value`, an empty line, then one point per line in the columns that `ColumnDef` names; its `X` is y here and
+//! its `Y` is z. Instruments differ in the sense of both: `X` usually points to the track centre, the sense of z is found from
+//! the shape.
 
 use crate::contact::geometry::formats::profile_file::{
     ProfileFile, has_decimal_commas, numbers, unreadable,
 };
 
-/// Known by the header: a line with `=` that is not a point.
+/// Reads the points, after a header of lines with `=`.
 pub(crate) fn read(text: &str) -> Result<ProfileFile, String> {
     let mut contents = ProfileFile {
         mirror_y: Some(true),

@@ -1,4 +1,4 @@
-//! Profiles as text files: columns, Simpack and MiniProf. Text comes in, never a path.
+//! Profiles as text files: columns, Simpack and MiniProf. The functions take the text of a file, never a path.
 
 pub mod columns;
 pub mod format;

@@ -1,15 +1,15 @@
-//! What a profile file holds, and how its lines are read.
+//! The contents of a profile file, and how its lines are read.
 
-/// What a file says.
+/// The contents of a file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ProfileFile {
-    /// Points `[y, z]` in mm, with the file's own shifts, rotation and mirroring done.
+    /// Points `[y, z]` in mm, with the file's own shifts, rotation and mirroring applied.
     pub points: Vec<[f64; 2]>,
-    /// y of the points is positive to the track centre, if the format settles that.
+    /// Whether y of the points is positive to the track centre, if the format specifies it.
     pub mirror_y: Option<bool>,
-    /// z of the points is positive up, if the format settles that.
+    /// Whether z of the points is positive up, if the format specifies it.
     pub mirror_z: Option<bool>,
-    /// The body the file says it belongs to: is it a wheel?
+    /// Whether the file describes a wheel, if it states the body.
     pub wheel: Option<bool>,
 }
 
@@ -21,7 +21,7 @@ pub(crate) fn numbers(line: &str) -> Option<Vec<f64>> {
         .collect()
 }
 
-/// Are the numbers of a line written with decimal commas? Each has one comma between digits, and no point.
+/// Whether the numbers of a line have decimal commas: each has one comma between digits, and no point.
 pub(crate) fn has_decimal_commas(line: &str) -> bool {
     let words = line
         .split(|c: char| c.is_whitespace() || c == ';')
@@ -38,7 +38,7 @@ pub(crate) fn has_decimal_commas(line: &str) -> bool {
         }
         count += usize::from(word.contains(','));
     }
-    // One such word is a pair of whole numbers.
+    // A line with only one such word and no separator is a pair of whole numbers.
     count >= 2 || count == 1 && line.trim().contains([';', ' ', '\t'])
 }
 

@@ -14,14 +14,14 @@ struct Settings {
     in_spline: bool,
     shift: [f64; 2],
     rotate: f64,
-    /// Allowed range of y and of z; none where the lower bound exceeds the upper one.
+    /// Allowed range of y and of z; not applied if the lower bound exceeds the upper one.
     bounds: [[f64; 2]; 2],
     mirror: [bool; 2],
     per_metre: f64,
     per_radian: f64,
 }
 
-/// Weights of the points are left aside.
+/// Reads the points; their weights are ignored.
 pub(crate) fn read(text: &str) -> Result<ProfileFile, String> {
     let mut settings = Settings {
         wheel: None,
@@ -66,7 +66,7 @@ pub(crate) fn read(text: &str) -> Result<ProfileFile, String> {
 }
 
 impl Settings {
-    /// Notes one setting; `None` if a known one has no number.
+    /// Stores one setting; `None` if a known setting has no valid number.
     fn take(&mut self, name: &str, value: &str) -> Option<()> {
         let number = || {
             value
@@ -119,7 +119,7 @@ impl Settings {
         }
         Ok(ProfileFile {
             points,
-            // After the mirroring of the file y points to the field side and z down.
+            // After the file's own mirroring, y is positive to the field side and z down.
             mirror_y: Some(false),
             mirror_z: Some(false),
             wheel: self.wheel,

@@ -1,15 +1,16 @@
-//! Differences between two readings of a profile as the pressure that would press them flat.
+//! Expresses the difference between two readings of a profile as the pressure that would flatten it.
 //!
-//! On a half-space a wave of amplitude c and length L is pressed flat by the pressure `π E* c / L` (Johnson, Contact Mechanics, 1985, §13.2),
-//! in wavenumbers k: `q = E* |k| r / 2`. So every difference r(s) becomes a pressure and compares with that of the contact.
+//! On a half-space a wave of amplitude c and length L is flattened by the pressure `π E* c / L` (Johnson, Contact Mechanics, 1985, §13.2),
+//! or `q = E* |k| r / 2` for the wavenumber k. Every difference r(s) is thus converted to a pressure that can be compared with that of the
+//! contact.
 
 use std::f64::consts::{PI, TAU};
 
 use realfft::RealFftPlanner;
 
-/// Heights at both ends are brought to 0 over this length, in mm.
+/// Length in mm over which heights are tapered to 0 at both ends.
 const TAPER: f64 = 2.0;
-/// Zeros beside the heights, so that the ends do not see each other.
+/// Padded length relative to that of the heights; the zeros keep the periodic transform from coupling the two ends.
 const PADDING: usize = 4;
 
 /// Pressure in MPa that flattens `heights` in mm, `step` mm apart, with the contact modulus in MPa; one value per height.
@@ -30,7 +31,7 @@ pub fn flattening(
     let forward = planner.plan_fft_forward(padded);
     let backward = planner.plan_fft_inverse(padded);
     let mut spectrum = forward.make_output_vec();
-    // The lengths are those of the plans, so that neither transform can fail.
+    // The buffers have the lengths of the plans, so that neither transform can fail.
     let done = forward.process(&mut values, &mut spectrum);
     debug_assert!(done.is_ok());
     for (m, entry) in spectrum.iter_mut().enumerate() {

@@ -1,39 +1,39 @@
-//! Stretches without points where the bodies may touch all the same.
+//! Stretches without points in which the bodies may touch.
 
 use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::profile::Body;
 
-/// Chords shorter than this, in mm, are no holes.
+/// Length in mm below which a chord is not a hole.
 const LENGTH_MIN: f64 = 1.0;
-/// Nor are chords shorter than this multiple of the width of the contact.
+/// Length relative to the width of the contact below which a chord is not a hole.
 const WIDTH_MIN: f64 = 1.0;
-/// Chords longer than this part of the width of the contact leave open whether the contact is there at all.
+/// Length relative to the width of the contact above which a chord may hold the whole contact.
 const WIDE: f64 = 1.5;
-/// Radius in mm that a surface may have between two points: a chord c then hides a height of `c²/(8 R)`. Gauge corners and flange roots have
-/// radii of 10 to 20 mm.
+/// Radius R in mm that a surface is assumed to have between two points, so that a chord c may hide a height of `c²/(8 R)`. Gauge corners
+/// and flange roots have radii of 10 to 20 mm.
 const RADIUS_HIDDEN: f64 = 20.0;
 
-/// A chord over which the bodies may touch where no point says so.
+/// A chord without points over which the bodies may touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hole {
     /// Whose profile.
     pub body: Body,
     /// Its ends along the profile in mm.
     pub chord: [f64; 2],
-    /// It is wide enough for the whole contact to be there.
+    /// Whether it is wide enough to hold the whole contact.
     pub wide: bool,
 }
 
 impl Hole {
-    /// Chords that are shorter hide nothing that matters beside a contact of a width, both in mm.
+    /// Length in mm below which chords can be ignored beside a contact of the given width in mm.
     #[must_use]
     pub fn least(width: f64) -> f64 {
         LENGTH_MIN.max(WIDTH_MIN * width)
     }
 }
 
-/// Chords over which the clearance of the bodies, with the wheel lowered by `lowering` mm below first touch, is less than the height that
-/// they may hide; `width` is that of the widest patch.
+/// The chords that may hide a height larger than the clearance of the bodies over them, with the wheel lowered by `lowering` mm below first
+/// touch; `width` in mm is that of the widest patch.
 #[must_use]
 pub fn holes(search: &ContactLocus, lowering: f64, width: f64) -> Vec<Hole> {
     let mut found = Vec::new();

@@ -1,6 +1,6 @@
-//! How far can the points of a profile be trusted? Pure functions of the points, in mm and MPa.
+//! Measures of how reliable the points of a profile are. Pure functions of the points, in mm and MPa.
 //!
-//! The measures are local: what counts is what the points leave open where the bodies touch, expressed as a pressure that compares with
+//! The measures are local: they assess the profile where the bodies touch, and express defects as pressures that can be compared with
 //! that of the contact (see [`flattening`]).
 
 pub mod flattening;

@@ -1,56 +1,57 @@
-//! What the points of a profile say about how they were made: noise, single outliers, steps, polygons, rounding.
+//! Detects measurement artefacts in the points of a profile: noise, outliers, steps, polygons, rounding.
 
 use crate::contact::geometry::profile_quality::samples::Points;
 
-/// Chords of one window in which noise is measured.
+/// Chords in one window of the noise estimate.
 const NOISE_CHORDS: usize = 4;
-/// Greatest length of such a window in mm: over longer ones the shape itself is no cubic.
+/// Largest length of a window in mm: over longer ones the shape itself differs from a cubic.
 const NOISE_SPAN_MAX: f64 = 3.0;
-/// Windows that a median needs.
+/// Fewest windows for a median.
 const WINDOWS_MIN: usize = 12;
-/// Windows of coarse points that a quartile needs.
+/// Fewest windows of coarse points for a quartile.
 const COARSE_WINDOWS_MIN: usize = 30;
-/// Their greatest length in mm.
+/// Largest length of a window of coarse points in mm.
 const COARSE_SPAN_MAX: f64 = 12.0;
-/// A quarter of the absolute values of a normal variable of deviation 1 are less.
+/// Lower quartile of the absolute value of a normal variable of deviation 1.
 const QUARTILE_OF_NORMAL: f64 = 0.3186;
-/// What the quartile makes of shape, in mm for points 1 mm apart; it grows with the fourth power of their distance.
+/// Noise in mm that the quartile finds in the shape alone, for points 1 mm apart; it grows with the fourth power of their distance.
 ///
 /// Population: sound rails and wheels of the class *damaged profile* with true points 0.8 to 4 mm apart: 0.002 to 0.1 µm at 1 mm, each of them
 /// below this; noise of 1 µm at 1.7 mm, 3 µm at 2.5 mm is above it.
 const COARSE_SHAPE: f64 = 6e-5;
-/// Up to this distance of the points in mm the shape of sound profiles makes less than 0.2 µm, worth 1 % of a usual pressure.
+/// Distance of the points in mm up to which the shape of sound profiles contributes less than 0.2 µm, or 1 % of a usual pressure.
 const COARSE_TELLS: f64 = 1.8;
 /// Median of the absolute value of a normal variable of deviation 1.
 pub const MEDIAN_OF_NORMAL: f64 = 0.6745;
-/// A point is odd from this many local medians on. Population: seeded damage of the stress bench (class *damaged profile*); outliers of 2 µm may be worth half of the largest pressure.
+/// Deviation, in local medians, from which a point is an outlier. Population: seeded damage of the stress bench (class *damaged profile*);
+/// an outlier of 2 µm may cause half of the largest pressure.
 const ODD_MEDIANS: f64 = 12.0;
-/// And from this distance in mm on; the same population.
+/// Deviation in mm from which a point is an outlier; same population.
 const ODD_MIN: f64 = 1.2e-3;
-/// Points farther apart than this, in mm, are off by the square of their distance more where the curvature jumps: arcs that meet, the
-/// polynomials of a tread.
+/// Distance of the points in mm above which the threshold grows with its square, as do the deviations where the curvature jumps: between
+/// arcs, and between the polynomials of a tread.
 const ODD_SPACING: f64 = 0.25;
-/// Points of a local median.
+/// Points in a local median.
 const ODD_WINDOW: usize = 15;
-/// Longest stretch in mm over which six neighbours are taken for points of one cubic.
+/// Longest stretch in mm over which a cubic is fitted to six neighbours.
 const ODD_SPAN_MAX: f64 = 3.5;
-/// Two neighbours off to either side are a step where the smaller distance is this part of the larger one.
+/// Two neighbours that deviate to opposite sides are a step if the smaller deviation is at least this share of the larger one.
 const STEP_PAIR: f64 = 0.7;
-/// A polygon has at least this share of its turning in few points, alone or in pairs.
+/// Least share of the total turning that lies at the corners, single points or pairs, of a polygon.
 const TURNING: f64 = 0.9;
-/// Those points are at most this fraction of all.
+/// Corner points are at most this fraction of all points.
 const POLYGON_SHARE_MAX: f64 = 0.5;
-/// Fewest points of which that can be said.
+/// Fewest points for which a polygon can be recognised.
 const POLYGON_POINTS_MIN: usize = 24;
 /// Fewest corners of a polygon.
 const POLYGON_CORNERS_MIN: usize = 4;
-/// Most points in a row, on average, that make one corner.
+/// Largest average number of successive points that form one corner.
 const POLYGON_PAIR_MAX: f64 = 2.3;
 
-/// One point off the curve of its neighbours.
+/// A single point off the curve through its neighbours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outlier {
-    /// Number of the point.
+    /// Index of the point.
     pub point: usize,
     /// Distance from the cubic of its neighbours in mm.
     pub distance: f64,
@@ -59,21 +60,21 @@ pub struct Outlier {
 /// A jump of the profile between two points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
-    /// Number of the point before it.
+    /// Index of the point before the jump.
     pub point: usize,
     /// Height in mm, positive upward.
     pub height: f64,
 }
 
-/// Standard deviation of white noise along the normal in mm, over the points of a range; `None` where too few lie near enough
-/// to each other to tell it.
+/// Standard deviation in mm of white noise along the normal, over the points of a range; `None` if too few of them are close enough
+/// together to determine it.
 ///
-/// The fourth divided difference of five neighbours, `Σ w_i h_i` with `w_i = 1/Π_{j≠i}(t_i − t_j)` and `Σ w_i² = 1`, vanishes on every
-/// cubic; of white noise of deviation s it has the deviation s. The median of its size over 0.6745 is s, whatever single
-/// outliers do. (Correlated noise, as an instrument leaves that filters, is not seen.)
+/// The fourth divided difference of five neighbours, `Σ w_i h_i` with `w_i = 1/Π_{j≠i}(t_i − t_j)` and `Σ w_i² = 1`, vanishes for every
+/// cubic, and for white noise of deviation s it has the deviation s. The median of its magnitude divided by 0.6745 is therefore s,
+/// unaffected by single outliers. (Correlated noise, as left by an instrument that filters, is not detected.)
 ///
-/// Over points more than 0.75 mm apart half of the windows may see arcs meet. There the lower quartile over 0.3186 is s, if it is more
-/// than the shape itself makes of it.
+/// For points more than 0.75 mm apart, half of the windows may contain the junction of two arcs. The lower quartile divided by 0.3186
+/// is then used, if it exceeds the contribution of the shape.
 #[must_use]
 pub fn noise(points: Points, range: [usize; 2]) -> Option<f64> {
     let (mut fine, mut coarse) = (Vec::new(), Vec::new());
@@ -98,7 +99,7 @@ pub fn noise(points: Points, range: [usize; 2]) -> Option<f64> {
     let spacing = length / (NOISE_CHORDS * coarse.len()) as f64;
     coarse.sort_by(f64::total_cmp);
     let found = coarse[coarse.len() / 4] / QUARTILE_OF_NORMAL;
-    // What shape makes of points that lie near enough is harmless as well.
+    // For points close enough together, the contribution of the shape is negligible.
     (spacing <= COARSE_TELLS || found > COARSE_SHAPE * spacing.powi(4)).then_some(found)
 }
 
@@ -119,12 +120,12 @@ fn fourth_difference(window: &[[f64; 2]]) -> Option<(f64, f64)> {
     (span > 0.0 && difference.is_finite()).then_some((span, difference))
 }
 
-/// The farthest outlier and the largest step of a range: points that stand out from the cubic through their six neighbours (least
-/// squares) by more than 12 local medians, 1.2 µm at least (more where points are coarse), and more than the points beside them.
+/// The worst outlier and the largest step of a range: points that deviate from the least-squares cubic of their six neighbours by more
+/// than 12 local medians, by at least 1.2 µm (more where points are coarse), and by more than the adjacent points.
 ///
-/// A step of the height h between two points puts both off by h/2, to either side; an outlier puts its neighbours off by 0.43 of its
-/// own distance. Where two arcs meet, the curvature jumps by some 0.06/mm, which puts points 0.25 mm apart off by 0.2 µm, by the square of
-/// their distance more where they lie farther apart.
+/// A step of height h makes the points on both sides deviate by h/2 in opposite directions; an outlier makes its neighbours deviate by
+/// 0.43 of its own displacement. Where two arcs meet, the curvature jumps by some 0.06/mm, which makes points 0.25 mm apart deviate by
+/// 0.2 µm; for points farther apart the deviation grows with the square of the distance.
 #[must_use]
 pub fn oddities(points: Points, range: [usize; 2]) -> (Option<Outlier>, Option<Step>) {
     let around = [
@@ -145,7 +146,7 @@ pub fn oddities(points: Points, range: [usize; 2]) -> (Option<Outlier>, Option<S
             continue;
         }
         let far = here.saturating_sub(ODD_WINDOW)..(here + ODD_WINDOW + 1).min(off.len());
-        // The neighbours of an odd point are off because of it.
+        // The neighbours are excluded, because an outlier makes them deviate too.
         let mut usual: Vec<f64> = far.filter(|j| !near.contains(j)).map(size).collect();
         if own <= ODD_MEDIANS * median(&mut usual) {
             continue;
@@ -178,13 +179,13 @@ pub fn oddities(points: Points, range: [usize; 2]) -> (Option<Outlier>, Option<S
     (outlier, step)
 }
 
-/// Mean distance in mm of the seven points about one, as far as they are there.
+/// Mean distance in mm of the seven points around a point, fewer at the ends.
 fn spacing_around(points: Points, k: usize) -> f64 {
     let (first, last) = (k.saturating_sub(3), (k + 3).min(points.along.len() - 1));
     (points.along[last] - points.along[first]) / (last - first).max(1) as f64
 }
 
-/// How far a point lies above the cubic through its six neighbours (least squares), in mm.
+/// Height in mm of a point above the least-squares cubic of its six neighbours.
 fn off_neighbours(points: Points, k: usize) -> Option<f64> {
     let window = points.at.get(k.checked_sub(3)?..k + 4)?;
     let local = in_chord(window);
@@ -195,8 +196,8 @@ fn off_neighbours(points: Points, k: usize) -> Option<f64> {
     Some(local[3][1] - fitted::<4>(&others, local[3][0])?)
 }
 
-/// Length in mm of the chords of a polygon, where the points of a range lie on one: resampled linearly from fewer points, they do not
-/// turn but at its corners (or, where no point lies on the corner, at the two beside it).
+/// Length in mm of the chords if the points of a range lie on a polygon, that is, were interpolated linearly between fewer points. Such
+/// points change direction only at the corners (or, if no point lies on a corner, at the two beside it).
 #[must_use]
 pub fn polygon(points: Points, range: [usize; 2]) -> Option<f64> {
     let window = &points.at[range[0]..range[1]];
@@ -251,7 +252,7 @@ pub fn rounding(given: &[[f64; 2]]) -> Option<f64> {
         .map(|places| 1.0 / places)
 }
 
-/// Points in axes along and across the chord from the first to the last of them.
+/// The points in axes along and perpendicular to the chord from the first to the last of them.
 fn in_chord(window: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let (from, to) = (window[0], window[window.len() - 1]);
     let chord = [to[0] - from[0], to[1] - from[1]];
@@ -264,7 +265,7 @@ fn in_chord(window: &[[f64; 2]]) -> Vec<[f64; 2]> {
     window.iter().map(turned).collect()
 }
 
-/// Value at `t` of the polynomial of `N` factors nearest to points `[t, h]` (least squares).
+/// Value at `t` of the least-squares polynomial with `N` coefficients through points `[t, h]`.
 fn fitted<const N: usize>(points: &[[f64; 2]], t: f64) -> Option<f64> {
     let scale = points
         .iter()
@@ -283,8 +284,7 @@ fn fitted<const N: usize>(points: &[[f64; 2]], t: f64) -> Option<f64> {
     first_factor(&rows)
 }
 
-/// First of the `N` factors of functions whose sum is nearest to heights (least squares); `None` where the functions cannot be told
-/// apart.
+/// First of the `N` coefficients of a least-squares fit; `None` if the functions are linearly dependent on the given points.
 fn first_factor<const N: usize>(rows: &[([f64; N], f64)]) -> Option<f64> {
     let mut normal = [[0.0; N]; N];
     let mut right = [0.0; N];
@@ -296,7 +296,7 @@ fn first_factor<const N: usize>(rows: &[([f64; N], f64)]) -> Option<f64> {
             }
         }
     }
-    // From the last function up to the first, of which alone the factor is wanted.
+    // Eliminated from the last coefficient to the first, because only the first is needed.
     for k in (1..N).rev() {
         let (pivot, own) = (normal[k], right[k]);
         if pivot[k].abs() < 1e-12 {
@@ -314,7 +314,7 @@ fn first_factor<const N: usize>(rows: &[([f64; N], f64)]) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
-/// The median, 0 of nothing.
+/// The median; 0 for an empty list.
 #[must_use]
 pub fn median(values: &mut [f64]) -> f64 {
     let middle = values.len() / 2;

@@ -1,4 +1,4 @@
-//! What a profile is like under a contact, and the smoothing that its noise calls for.
+//! The quality of a profile under a contact, and the smoothing that its noise requires.
 
 use crate::contact::geometry::profile_quality::flattening::noise_pressure;
 use crate::contact::geometry::profile_quality::noise;
@@ -6,33 +6,33 @@ use crate::contact::geometry::profile_quality::noise::{Outlier, Step};
 use crate::contact::geometry::profile_quality::readings::{Roughness, roughness};
 use crate::contact::geometry::profile_quality::samples::Points;
 
-/// Smoothing lengths that are advised, in mm: shorter ones leave the noise of neighbouring points, longer ones take away the shape of
-/// gauge corners and flange roots (radii of 13 to 20 mm; at 5 mm 2 % of the largest pressure, at 10 mm 27 % in one of ten).
+/// Range of smoothing lengths that are advised, in mm. Shorter ones do not remove the noise of neighbouring points, longer ones distort
+/// gauge corners and flange roots (radii of 13 to 20 mm; 5 mm changes the largest pressure by 2 %, 10 mm by 27 % in one of ten cases).
 pub const SMOOTHING_ADVISED: [f64; 2] = [2.0, 8.0];
-/// Part of the largest pressure that noise may be worth after the advised smoothing. Between 0.05 and 0.1 neither pressures nor forces change
-/// by more than their scatter; population: 18 places on three pairs with noise of 1 to 20 µm.
+/// Noise, as a share of the largest pressure, that remains after the advised smoothing. Between 0.05 and 0.1 neither pressures nor forces
+/// change by more than their scatter; population: 18 places on three pairs with noise of 1 to 20 µm.
 const NOISE_LEFT: f64 = 0.07;
-/// Noise worth less than this part of the pressure without any smoothing needs none.
+/// Noise without smoothing, as a share of the largest pressure, below which no smoothing is advised.
 const NOISE_HARMLESS: f64 = 0.01;
-/// A smoothing by so many chords turns a polygon into a curve.
+/// Smoothing length, in chords, that turns a polygon into a smooth curve.
 const CHORDS: f64 = 2.0;
-/// Outliers and steps count up to this distance from the contact, in its half widths.
+/// Distance from the contact, in its half widths, up to which outliers and steps are considered.
 const NEAR: f64 = 2.0;
-/// Noise is measured up to this distance in mm beyond that.
+/// Additional distance in mm over which noise is measured.
 const AROUND: f64 = 10.0;
 
-/// What the points of one body are like under one contact.
+/// Quality of the points of one body under one contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UnderContact {
-    /// The widest chord that meets the contact, as its ends along the profile in mm.
+    /// The longest chord that overlaps the contact, as its ends along the profile in mm.
     pub chord: [f64; 2],
-    /// Its length over the width of the contact.
+    /// Its length relative to the width of the contact.
     pub over_width: f64,
-    /// Mean distance of the points around.
+    /// Mean distance of the points around the contact, in mm.
     pub spacing: f64,
-    /// Deviation of the noise along the normal in mm, where there are enough points to tell.
+    /// Standard deviation of the noise along the normal in mm, if there are enough points to determine it.
     pub noise: Option<f64>,
-    /// Waviness and ambiguity as pressures.
+    /// Waviness and ambiguity, as pressures.
     pub roughness: Roughness,
     /// Length of the chords, if the points lie on those of a polygon.
     pub polygon: Option<f64>,
@@ -42,8 +42,8 @@ pub struct UnderContact {
     pub step: Option<Step>,
 }
 
-/// Looks at the points of a body under the contact `[low, high]` (mm along the profile), smoothed by `smoothing` mm, with the contact
-/// modulus in MPa.
+/// Quality of the points of a body under the contact `[low, high]` (mm along the profile), smoothed by `smoothing` mm; the contact
+/// modulus is in MPa.
 #[must_use]
 pub fn under_contact(
     points: Points,
@@ -97,11 +97,11 @@ pub struct Grain {
     pub polygon: Option<f64>,
 }
 
-/// Smoothing in mm that is advised for each of two bodies with a largest pressure and a contact modulus in MPa; 0 where none is needed.
+/// The smoothing advised for each of two bodies, in mm, given the largest pressure and the contact modulus in MPa; 0 if none is needed.
 ///
-/// `L = (2.34 E* √(s₁² h₁ + s₂² h₂) / (0.07 p))^(2/3)` leaves noise of 7 % of the pressure (see [`noise_pressure`]), held between 2 and
-/// 8 mm. A body whose own noise is worth less than 1 % of the pressure without smoothing gets none; a polygon is smoothed by two chords at
-/// least.
+/// `L = (2.34 E* √(s₁² h₁ + s₂² h₂) / (0.07 p))^(2/3)` leaves noise of 7 % of the pressure (see [`noise_pressure`]); it is limited to 2 to
+/// 8 mm. A body whose own noise without smoothing is below 1 % of the pressure is not smoothed; a polygon is smoothed by at least two
+/// chords.
 #[must_use]
 pub fn advised_smoothing(bodies: [Grain; 2], modulus: f64, pressure: f64) -> [f64; 2] {
     let share = |body: &Grain| body.noise * body.spacing.sqrt();

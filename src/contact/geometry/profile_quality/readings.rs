@@ -1,4 +1,4 @@
-//! Two readings of the same points: the spline in use against a smoother one, and against Akima's curve.
+//! Compares two readings of the same points: the spline in use with a smoother one, and with Akima's curve.
 
 use realfft::RealFftPlanner;
 
@@ -9,27 +9,27 @@ use crate::contact::geometry::smoothing::Spline;
 
 /// Spacing of the comparison in mm.
 const STEP: f64 = 0.05;
-/// What is compared reaches beyond twice the half width of the contact by this, in mm.
+/// Distance in mm by which the comparison extends beyond twice the half width of the contact.
 const BEYOND: f64 = 10.0;
-/// Points farther beyond do not change a smoothed curve there, in cut wavelengths.
+/// Distance, in cut wavelengths, beyond which points do not affect a smoothed curve.
 const SUPPORT: f64 = 3.0;
-/// The reference is smoothed by twice the length in use, at least by this, in mm.
+/// Least smoothing of the reference in mm; otherwise it is twice the length in use.
 const REFERENCE_MIN: f64 = 3.0;
-/// The contact is looked at in no more places than this, however wide it is.
+/// Most places at which curves are compared, however wide the contact.
 const SAMPLES_MAX: usize = 4000;
 
 /// Roughness under a contact as pressures in MPa.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Roughness {
-    /// Of the waves between the smoothing in use and twice that, or 3 mm: root of the mean square over the contact.
+    /// Root mean square over the contact of the waves between the smoothing in use and twice that, or 3 mm.
     pub waviness: f64,
-    /// The same as the median over the contact and what lies beside it, as a deviation: small where a single place makes the waviness.
+    /// Deviation of the same waves, from the median in and beside the contact: small if the waviness comes from a single place.
     pub everywhere: f64,
-    /// Of the difference between the spline in use and Akima's curve through the same points; 0 with a smoothing.
+    /// Root mean square of the difference between the spline in use and Akima's curve through the same points; 0 with smoothing.
     pub ambiguity: f64,
 }
 
-/// Roughness of a profile at the contact `middle ± half` (mm along it), with the contact modulus in MPa.
+/// Roughness of a profile at the contact `middle ± half` (mm along the profile); the contact modulus is in MPa.
 #[must_use]
 pub fn roughness(points: Points, smoothing: f64, contact: [f64; 2], modulus: f64) -> Roughness {
     let [low, high] = contact;
@@ -102,7 +102,7 @@ impl HeightCurve {
         }
     }
 
-    /// How far this spline lies above another curve, along its normal.
+    /// Distance from this spline to another curve along its normal, positive if the spline is above.
     fn above(&self, other: &HeightCurve, s: f64) -> f64 {
         let HeightCurve::Spline([y, z]) = self else {
             return 0.0;
@@ -115,8 +115,8 @@ impl HeightCurve {
     }
 }
 
-/// Akima's curve (Journal of the ACM 17, 1970): cubics whose slopes at the points follow the flatter side, so that it keeps to
-/// the chords where a spline swings.
+/// Akima's curve (Journal of the ACM 17, 1970): cubics whose slopes at the points favour the straighter side, so that it stays close to
+/// the chords where a spline overshoots.
 struct Akima {
     knots: Vec<f64>,
     values: Vec<[f64; 2]>,

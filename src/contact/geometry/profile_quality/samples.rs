@@ -5,12 +5,12 @@
 pub struct Points<'a> {
     /// `[y, z]` in mm, z up.
     pub at: &'a [[f64; 2]],
-    /// Length of the chords up to each point.
+    /// Sum of the lengths of the chords up to each point.
     pub along: &'a [f64],
 }
 
 impl<'a> Points<'a> {
-    /// Numbers of the points in a range of the length, first and one past the last.
+    /// Indices of the points in a range of the length: the first, and one past the last.
     #[must_use]
     pub fn numbers(&self, range: [f64; 2]) -> [usize; 2] {
         let first = self.along.partition_point(|s| *s < range[0]);
@@ -18,7 +18,7 @@ impl<'a> Points<'a> {
         [first, last.max(first)]
     }
 
-    /// The points in a range of the length and one beyond on either side, at least four of them where there are as many.
+    /// The points in a range of the length and one beyond on either side; at least four if there are that many.
     #[must_use]
     pub fn within(&self, range: [f64; 2]) -> Points<'a> {
         let [first, last] = self.numbers(range);

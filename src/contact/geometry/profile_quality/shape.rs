@@ -1,9 +1,9 @@
-//! What the shape of a profile tells: is it a rail or a wheel, where is the tip of the flange, which chord leads astray?
+//! What the shape of a profile shows: whether it is a rail or a wheel, where the flange tip is, and which end points are stray.
 
 use crate::contact::geometry::profile_quality::noise::median;
 use crate::contact::geometry::profile_quality::samples::Points;
 
-/// How far below the highest point the head of a rail is measured, and above the lowest one the tip of a flange, in mm.
+/// Distance in mm below the highest point at which the head of a rail is measured, and above the lowest point that of a flange tip.
 const PIECE: f64 = 2.0;
 /// Least width of the head in mm. Population: 12 rails and rollers with heads of 37 to 56 mm, 15 to 64 mm from an end.
 const HEAD_MIN: f64 = 25.0;
@@ -11,25 +11,25 @@ const HEAD_MIN: f64 = 25.0;
 const HEAD_FROM_END: f64 = 10.0;
 /// Least and largest width of the tip of a flange in mm. Population: 8 complete wheels with tips of 12 to 18 mm, 5 to 60 mm from an end.
 const TIP: [f64; 2] = [5.0, 25.0];
-/// Its least distance from both ends, in mm; the same population.
+/// Least distance of the tip from both ends, in mm; the same population.
 const TIP_FROM_END: f64 = 3.0;
 /// Least length in mm of a stray chord at an end of a profile.
 const STRAY: f64 = 10.0;
-/// And its least length over the median chord.
+/// Least length of a stray chord relative to the median chord.
 const STRAY_MEDIANS: f64 = 8.0;
-/// Points beyond a stray chord at most.
+/// Most points beyond a stray chord.
 const STRAY_POINTS_MAX: usize = 2;
 
-/// What a shape looks like.
+/// The body that a shape resembles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Looks {
     /// A rail's head: wide on top and far from both ends.
     Rail,
-    /// A wheel: a narrow tip that stands out.
+    /// A wheel: its flange has a narrow tip.
     Wheel,
 }
 
-/// Which body the points look like, whatever the sense of z; `None` if the shape does not tell.
+/// The body that the points resemble, for either sense of z; `None` if the shape is inconclusive.
 #[must_use]
 pub fn looks_like(points: &[[f64; 2]]) -> Option<Looks> {
     let mirrored: Vec<[f64; 2]> = points.iter().map(|[y, z]| [*y, -z]).collect();
@@ -41,7 +41,7 @@ pub fn looks_like(points: &[[f64; 2]]) -> Option<Looks> {
     }
 }
 
-/// Is the piece within 2 mm of the highest point wide and away from the ends?
+/// Whether the part within 2 mm of the highest point is wide and away from the ends.
 fn has_head(points: &[[f64; 2]]) -> bool {
     let Some((top, piece)) = piece_at_top(points) else {
         return false;
@@ -52,7 +52,7 @@ fn has_head(points: &[[f64; 2]]) -> bool {
         && last - points[top][0] >= HEAD_FROM_END
 }
 
-/// Is the piece within 2 mm of the lowest point narrow and away from the ends?
+/// Whether the part within 2 mm of the lowest point is narrow and away from the ends.
 fn has_tip(points: &[[f64; 2]]) -> bool {
     let mirrored: Vec<[f64; 2]> = points.iter().map(|[y, z]| [*y, -z]).collect();
     let Some((tip, piece)) = piece_at_top(&mirrored) else {
@@ -79,7 +79,7 @@ fn ends(points: &[[f64; 2]]) -> [f64; 2] {
     ]
 }
 
-/// The number of the highest point, and the range of y of its neighbours that are at most 2 mm lower.
+/// The index of the highest point, and the range of y of its neighbours that are at most 2 mm lower.
 fn piece_at_top(points: &[[f64; 2]]) -> Option<(usize, [f64; 2])> {
     let top = (0..points.len()).max_by(|a, b| points[*a][1].total_cmp(&points[*b][1]))?;
     let near = |k: &usize| points[*k][1] > points[top][1] - PIECE;

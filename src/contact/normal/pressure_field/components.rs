@@ -6,16 +6,16 @@ use crate::contact::numerics::flood_fill::groups;
 /// Label of samples and cells that belong to no patch.
 pub(crate) const NOWHERE: u8 = u8::MAX;
 
-/// Label of every sample, from 0 in order of the smallest y (then x), and the number of patches.
+/// The patch of every sample, numbered from 0 in order of smallest y (then x), and the number of patches.
 ///
-/// Samples hang together over edges and corners: a slender patch that lies askew in the grid would fall apart
-/// otherwise, and the interpolated region between two diagonal samples belongs to both.
+/// Samples that are neighbours along an axis or a diagonal are connected: otherwise a slender patch oblique to the grid would
+/// be split, although the interpolated region between two diagonal samples belongs to both.
 ///
 /// # Errors
 /// The number of patches, if there are more than [`PATCHES_MAX`].
 pub(crate) fn label_samples(grid: &SampleGrid, q: &[f64]) -> Result<(Vec<u8>, usize), usize> {
     let size = [grid.x.len(), grid.y.len()];
-    // The order of storage is that of y, so patches are met in the order wanted.
+    // Samples are stored in order of y, so patches are found in the order required.
     let patches = groups(size, |sample| q[sample] > 0.0);
     if patches.len() > PATCHES_MAX {
         return Err(patches.len());
@@ -29,8 +29,8 @@ pub(crate) fn label_samples(grid: &SampleGrid, q: &[f64]) -> Result<(Vec<u8>, us
     Ok((labels, patches.len()))
 }
 
-/// Label of every cell between four samples, stored like the samples at its corner of smallest x and y: that of its
-/// corners, of which no two belong to different patches.
+/// The patch of every cell between four samples, stored at the index of its corner of smallest x and y. It is the patch of its
+/// corners; no two of them belong to different patches.
 pub(crate) fn label_cells(grid: &SampleGrid, samples: &[u8]) -> Vec<u8> {
     let (nx, ny) = (grid.x.len(), grid.y.len());
     let mut labels = vec![NOWHERE; nx * ny];

@@ -1,4 +1,4 @@
-//! A pressure computed on equal cells, and mirror symmetry about y = 0.
+//! Fields from pressures computed on equal cells, and their mirror symmetry about y = 0.
 
 use crate::contact::normal::pressure_field::components::NOWHERE;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
@@ -8,8 +8,8 @@ impl GridPressure {
     /// The field of a pressure computed on equal cells with the centres `(x[i], y[j])` in mm, stored at
     /// `j * x.len() + i`.
     ///
-    /// `squares` are the squared pressures in MPa² with the edge where they vanish (not positive where the edge leaves out
-    /// a centre), `pressure` the pressures in MPa as they were computed: these give the forces of the patches.
+    /// `squares` are the squared pressures in MPa², continued so that the edge is where they vanish (not positive at centres
+    /// outside the edge). `pressure` are the computed pressures in MPa, from which the forces of the patches are taken.
     ///
     /// # Errors
     /// A sentence, if there are more than 64 patches, or none.
@@ -56,7 +56,7 @@ impl GridPressure {
         Ok(field)
     }
 
-    /// The mirror image of every patch about y = 0, if the samples are mirror images one by one.
+    /// Finds the mirror image of every patch about y = 0, if every sample has a mirror image.
     pub(crate) fn find_images(&self, samples: &[u8]) -> Vec<usize> {
         let width = self.grid.x.len();
         let rows = self.grid.y.len();
@@ -74,7 +74,7 @@ impl GridPressure {
         images
     }
 
-    /// Gives mirror images the same numbers to the last digit.
+    /// Makes the values of mirror images equal to the last digit.
     pub(crate) fn make_images_alike(&mut self) {
         for label in 0..self.images.len() {
             let image = self.images[label];
@@ -94,7 +94,7 @@ impl GridPressure {
     }
 }
 
-/// Patch of a sample, or of a neighbour if it has none.
+/// The patch of a sample, or of a neighbour if the sample belongs to none.
 fn nearest_label(samples: &[u8], width: usize, k: usize) -> Option<usize> {
     let neighbours = [
         k,

@@ -11,7 +11,7 @@ use crate::contact::remark::entry::RemarkEntry;
 #[derive(Debug, Clone, PartialEq)]
 pub struct PressureField {
     grids: Vec<GridPressure>,
-    /// Grid of every patch, and the patch's number there; in order of the smallest y.
+    /// For every patch, in order of smallest y: the index of its grid, and its number on that grid.
     places: Vec<[usize; 2]>,
 }
 
@@ -60,7 +60,7 @@ impl PressureField {
         self.places.iter().map(|[g, k]| patches[*g][*k]).collect()
     }
 
-    /// The patch whose extent holds a place `[x, y]` in mm, if there is one.
+    /// The patch whose extent contains the point `[x, y]` in mm, if there is one.
     #[must_use]
     pub fn patch_at(&self, [x, y]: [f64; 2]) -> Option<usize> {
         self.patches().iter().position(|patch| {
@@ -69,7 +69,7 @@ impl PressureField {
         })
     }
 
-    /// Spacings of the grid across each patch, along the axis that has fewer.
+    /// Number of grid spacings across each patch, along the axis with fewer.
     #[must_use]
     pub fn cells_across(&self) -> Vec<f64> {
         let cells: Vec<Vec<f64>> = self.grids.iter().map(GridPressure::cells_across).collect();
@@ -89,7 +89,7 @@ impl PressureField {
         each.fold(0.0, f64::max)
     }
 
-    /// Segments that a strip has on average, for each patch.
+    /// Average number of segments per strip, for each patch.
     #[must_use]
     pub fn segments_per_strip(&self) -> Vec<f64> {
         let segments: Vec<Vec<f64>> = self
@@ -100,8 +100,8 @@ impl PressureField {
         self.places.iter().map(|[g, k]| segments[*g][*k]).collect()
     }
 
-    /// Chords of one patch on the given strips, each `(y, dy)` with its mid-line at y: none where the strip misses the
-    /// patch, several from smaller to larger x where the patch is hollow or bent.
+    /// Chords of one patch on the given strips, each `(y, dy)` with its mid-line at y. A strip that misses the patch has none; one
+    /// that crosses a hollow or curved patch may have several, in order of x.
     #[must_use]
     pub fn chords(&self, patch: usize, strips: &[(f64, f64)]) -> Vec<Chord> {
         let [grid, label] = self.places[patch];
@@ -117,7 +117,7 @@ impl PressureField {
         self.grids[grid].mean_pressure(chord, x0, x1)
     }
 
-    /// Load centre `[x, y]` in mm of one patch, or of all of them: the mean place weighted with the pressure.
+    /// Load centre `[x, y]` in mm of one patch, or of all of them: the mean position weighted with the pressure.
     #[must_use]
     pub fn load_centre(&self, patch: Option<usize>) -> [f64; 2] {
         if let Some(patch) = patch {
@@ -136,7 +136,7 @@ impl PressureField {
         sum.map(|sum| sum / weight)
     }
 
-    /// The same pressure with its coordinates counted from another origin, in mm.
+    /// The same pressure with coordinates relative to another origin, in mm.
     #[must_use]
     pub fn from_origin(mut self, origin: [f64; 2]) -> PressureField {
         let grids = self.grids.into_iter();
@@ -144,8 +144,8 @@ impl PressureField {
         self
     }
 
-    /// The same contact under a force times a factor near 1, with approaches larger by so much in mm: lengths from the origin
-    /// and pressures grow with the cube root of the force, as in Hertz's contacts.
+    /// The same contact with the force multiplied by a factor near 1 and approaches increased by the given amount in mm: lengths
+    /// from the origin and pressures are multiplied by the cube root of the factor, as in Hertzian contact.
     #[must_use]
     pub fn corrected(mut self, factor: f64, approach: f64) -> PressureField {
         let grids = self.grids.into_iter();

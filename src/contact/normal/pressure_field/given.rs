@@ -1,9 +1,9 @@
-//! A pressure given by the client on a grid, brought onto strips without losing load.
+//! A pressure given on a grid, transferred to strips with its load preserved.
 //!
-//! The contact is where the interpolated square of the pressure is positive: squared pressure falls linearly at the
-//! edge, so that edges are found well inside a grid spacing (see `level_set.rs`), and Hertz's pressure is reproduced
-//! exactly. The force of a patch is the sum of its samples times their share of the grid; the mesh scales the
-//! pressures on its strips to carry just that.
+//! The contact is where the interpolated square of the pressure is positive. Squared pressure falls linearly at the
+//! edge, so that the edge is located to a small fraction of a grid spacing (see `level_set.rs`), and Hertz's pressure is
+//! reproduced exactly. The force of a patch is the sum of its samples times the areas they represent; the mesh scales the
+//! pressures on its strips to carry that force.
 
 use crate::contact::mesh::strips::Chord;
 use crate::contact::normal::patch::Patch;
@@ -67,8 +67,8 @@ impl GridPressure {
         Ok((field, remarks))
     }
 
-    /// A field whose patches have no region yet, and the patch of every sample; `q` is as in [`GridPressure::q`] with 0
-    /// outside the contact.
+    /// The field before the regions of its patches are found, and the patch of every sample. `q` is as in [`GridPressure::q`],
+    /// with 0 outside the contact.
     pub(crate) fn from_squares(
         grid: SampleGrid,
         q: Vec<f64>,
@@ -111,14 +111,14 @@ impl GridPressure {
 
     /// The patches found, in order of the smallest y of their samples.
     ///
-    /// `normal_force` is the sum of the samples' pressures times the areas they stand for, which reach half-way to the
+    /// `normal_force` is the sum of the samples' pressures times the areas they represent, which extend half-way to the
     /// neighbouring samples; `area` is that of the interpolated region, `pressure_max` the largest sample.
     #[must_use]
     pub fn patches(&self) -> Vec<Patch> {
         self.shapes.iter().map(|shape| shape.patch).collect()
     }
 
-    /// Segments that a strip has on average, for each patch.
+    /// Average number of segments per strip, for each patch.
     #[must_use]
     pub fn segments_per_strip(&self) -> Vec<f64> {
         self.shapes
@@ -127,14 +127,14 @@ impl GridPressure {
             .collect()
     }
 
-    /// Chords of one patch on the given strips, each `(y, dy)` with its mid-line at y: none where the strip misses the
-    /// patch, several from smaller to larger x where the patch is hollow or bent.
+    /// Chords of one patch on the given strips, each `(y, dy)` with its mid-line at y. A strip that misses the patch has none; one
+    /// that crosses a hollow or curved patch may have several, in order of x.
     #[must_use]
     pub fn chords(&self, patch: usize, strips: &[(f64, f64)]) -> Vec<Chord> {
         let [x_min, x_max, ..] = self.shapes[patch].patch.extent;
         let mut chords = Vec::new();
         for (strip, &(y, dy)) in strips.iter().enumerate() {
-            // Between the lines that gave the extent, rough data may reach a little farther; they are cut at the extent.
+            // Rough data may extend slightly farther between the lines from which the extent was measured.
             let within = |(left, right): (f64, f64)| (left.max(x_min), right.min(x_max));
             let segments = self.segments(patch, y).into_iter().map(within);
             let segments = segments.filter(|(left, right)| right > left);
@@ -153,8 +153,9 @@ impl GridPressure {
     /// Mean of the interpolated pressure in MPa over `x0 < x < x1` on the line of a chord; 0 outside the chord. For
     /// `x0 = x1` the pressure there.
     ///
-    /// Gauss–Legendre quadrature of order 10 per grid interval (6 where intervals are many) in the root of the distance from the nearer end of the
-    /// chord, in which the pressure is smooth; exact to about 1e-9 for Hertz's pressure.
+    /// Gauss–Legendre quadrature of order 10 per grid interval (6 where there are many intervals), with the square root of the
+    /// distance from the nearer end of the chord as variable, in which the pressure is smooth; accurate to about 1e-9 for Hertz's
+    /// pressure.
     #[must_use]
     pub fn mean_pressure(&self, chord: &Chord, x0: f64, x1: f64) -> f64 {
         let (low, high) = (x0.max(chord.left), x1.min(chord.right));
@@ -208,7 +209,7 @@ impl GridPressure {
         self.pressure_max * sum / (x1 - x0)
     }
 
-    /// Where the line at y lies in a patch: segments from smaller to larger x.
+    /// The segments of the line at y that lie in a patch, from smaller to larger x.
     pub(crate) fn segments(&self, label: usize, y: f64) -> Vec<(f64, f64)> {
         let (label, y) = match self.images.get(label) {
             Some(image) if y < 0.0 => (*image, -y),
@@ -222,7 +223,7 @@ impl GridPressure {
         }
         let t = (y - rows[j]) / (rows[j + 1] - rows[j]);
         let weights = weights(rows, j, y);
-        // One more node on either side for the tangents.
+        // One more node on either side, needed for the slopes.
         let nodes = shape.columns.start() - 1..=shape.columns.end() + 2;
         let line = GridLine {
             axis: x,
@@ -244,9 +245,9 @@ impl GridPressure {
 
     /// The part of cell (i, j) along x that may belong to a patch, on the line at the fraction t of its width.
     ///
-    /// Cells that touch a sample of the patch belong to it as a whole. The edge may bulge out of them by a little where
-    /// it is smooth and runs nearly parallel to the grid (by an eighth of the squared spacing over the radius); farther
-    /// out the curve is not to be trusted.
+    /// A cell with a sample of the patch as a corner belongs to it as a whole. Where the edge is smooth and nearly parallel to the
+    /// grid it may extend slightly beyond those cells (by an eighth of the squared spacing over the radius); farther out the
+    /// interpolation is not reliable.
     fn allowed(&self, label: usize, i: usize, j: usize, t: f64) -> [f64; 2] {
         const BULGE: f64 = 0.125;
         let nx = self.grid.x.len();
@@ -268,7 +269,7 @@ impl GridPressure {
         }
     }
 
-    /// Are the four corners of cell (i, j) smooth?
+    /// Whether the four corners of cell (i, j) are smooth.
     fn is_smooth(&self, i: usize, j: usize) -> bool {
         let nx = self.grid.x.len();
         let k = j * nx + i;

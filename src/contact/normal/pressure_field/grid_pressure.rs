@@ -13,12 +13,12 @@ pub struct GridPressure {
     pub(crate) q: Vec<f64>,
     /// Samples that are positive or continued by a parabola.
     pub(crate) smooth: Vec<bool>,
-    /// Patch of every cell of the grid that touches one of its samples.
+    /// The patch of every cell that has one of its samples as a corner.
     pub(crate) cells: Vec<u8>,
     /// Largest pressure in MPa.
     pub(crate) pressure_max: f64,
     pub(crate) shapes: Vec<PatchShape>,
-    /// The patch that is the mirror image about y = 0 of each one; empty if the pressure has no such symmetry.
+    /// For each patch, its mirror image about y = 0; empty if the pressure has no such symmetry.
     pub(crate) images: Vec<usize>,
     /// The largest jump from one given sample to the next.
     pub(crate) jump: Option<Jump>,

@@ -1,4 +1,4 @@
-//! How well samples resolve a pressure: cells across a patch, and jumps from one sample to the next.
+//! How well samples resolve a pressure: spacings across a patch, and discontinuities between samples.
 
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::normal::pressure_field::jump::Jump;
@@ -10,7 +10,7 @@ use crate::contact::normal::pressure_field::sample_grid::PADDING;
 const JUMP: f64 = 0.35;
 
 impl GridPressure {
-    /// Spacings of the grid across each patch, along the axis that has fewer.
+    /// Number of grid spacings across each patch, along the axis with fewer.
     #[must_use]
     pub fn cells_across(&self) -> Vec<f64> {
         let axes = [&self.grid.x, &self.grid.y];
@@ -25,8 +25,8 @@ impl GridPressure {
             .collect()
     }
 
-    /// The largest surprise from one sample to the next, before edges are found (squared pressures are then 0 outside the contact),
-    /// and the jump there, if it is one.
+    /// The largest excess fall between neighbouring samples (see [`JUMP`]), and the jump there if it is one. To be called before
+    /// edges are found, while squared pressures are 0 outside the contact.
     pub(crate) fn find_jump(&self) -> (f64, Option<Jump>) {
         let (nx, ny) = (self.grid.x.len(), self.grid.y.len());
         let mut largest: (f64, Option<Jump>) = (0.0, None);
@@ -62,8 +62,8 @@ impl GridPressure {
         self.jump
     }
 
-    /// The largest fall of the squared pressure over one interval that the interval before does not let expect, relative to the largest
-    /// squared pressure: up to 0.2 on smooth pressures.
+    /// The largest fall of the squared pressure over one interval beyond that extrapolated from the interval before, relative to the
+    /// largest squared pressure: up to 0.2 for smooth pressures.
     #[must_use]
     pub fn surprise(&self) -> f64 {
         self.surprise

@@ -1,22 +1,22 @@
-//! Continues squared pressure beyond the edge of the contact, so that the edge is where it passes through 0.
+//! Continues squared pressure beyond the edge of the contact, so that its zero locates the edge.
 //!
-//! At the edge of a smooth contact the pressure falls like the root of the distance, its square q like the distance
-//! itself. Samples outside the contact (where only `p = 0` is known) therefore get negative values extrapolated from
-//! inside. For Hertz's pressure q is a parabola and the continuation is exact.
+//! At the edge of a smooth contact the pressure is proportional to the square root of the distance, its square q to the
+//! distance. Samples outside the contact, where only `p = 0` is known, therefore get negative values extrapolated from
+//! inside. For Hertz's pressure q is a quadratic function and the continuation is exact.
 
 use crate::contact::normal::pressure_field::sample_grid::SampleGrid;
 use crate::contact::numerics::lagrange;
 
-/// Samples outside that get a value, counted from the nearest one inside along either axis.
+/// Number of samples outside that get an extrapolated value, counted from the nearest one inside along either axis.
 const RINGS: usize = 3;
 /// Value of samples farther out; the largest inside is 1.
 const FAR: f64 = -1.0;
-/// What is known of a sample, from least to best.
+/// How a sample's value was found, from least to most reliable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum State {
-    /// Nothing.
+    /// No value yet.
     Unknown,
-    /// Continued beyond a jump of pressure by repetition; a curve through the jump would fall without end.
+    /// Continued beyond a jump of pressure with a constant value, because a curve extrapolated through the jump would diverge.
     Step,
     /// Continued from fewer than three samples, or limited.
     Rough,
@@ -40,7 +40,7 @@ pub(crate) fn extend(grid: &SampleGrid, q: &mut [f64]) -> Vec<State> {
         .enumerate()
         .filter_map(|(k, near)| (near && states[k] == State::Unknown).then_some(k))
         .collect();
-    // A sample diagonally three away is reached after six steps along the axes.
+    // A sample three away along both axes is reached after six steps.
     for pass in 0..2 * RINGS {
         let found: Vec<_> = missing
             .iter()
@@ -64,7 +64,7 @@ pub(crate) fn extend(grid: &SampleGrid, q: &mut [f64]) -> Vec<State> {
     states
 }
 
-/// Which samples have a positive one at most [`RINGS`] away along x and along y.
+/// Marks the samples with a positive sample at most [`RINGS`] away along x and along y.
 fn near_positive(grid: &SampleGrid, q: &[f64]) -> Vec<bool> {
     let (nx, ny) = (grid.x.len(), grid.y.len());
     let reach = |k: usize, n: usize| k.saturating_sub(RINGS)..(k + RINGS + 1).min(n);
@@ -76,8 +76,8 @@ fn near_positive(grid: &SampleGrid, q: &[f64]) -> Vec<bool> {
         .collect()
 }
 
-/// Value of the unknown sample `k` from the best extrapolations along the axes, if there is any: their harmonic mean,
-/// so that a weak patch is not squeezed by the steep end of a strong one beside it.
+/// Value of the unknown sample `k` from the most reliable extrapolations along the axes, if there are any. Their harmonic mean
+/// is used, so that the steep edge of a heavily loaded patch does not shift that of a lightly loaded one beside it.
 fn continued(
     grid: &SampleGrid,
     q: &[f64],
@@ -123,7 +123,7 @@ fn continued(
             _ if first_pass => edge_value(axis[at], known),
             _ => outward_value(axis[at], known),
         };
-        // Zero stays zero.
+        // An extrapolated value of 0 has to remain 0 in the mean.
         inverse_sum += 1.0 / value.min(-1e-300);
         count += 1.0;
         state = state.min(how).min(worst.max(State::Rough));
@@ -134,7 +134,7 @@ fn continued(
 /// Value of the first sample outside, from one to three samples inside, and how it is known.
 ///
 /// The value is never positive, so the edge lies between the last sample inside and the first outside. Where the
-/// pressure jumps (extrapolation stays well above 0) the edge is put half-way; in between the rule changes over
+/// pressure jumps (the extrapolation is well above 0) the edge is put half-way; between the two cases the rule changes
 /// smoothly.
 fn edge_value(at: f64, inside: &[(f64, f64)]) -> (f64, State) {
     const EDGE_AT_SAMPLE: f64 = 0.25;
@@ -162,7 +162,7 @@ fn edge_value(at: f64, inside: &[(f64, f64)]) -> (f64, State) {
     (-last * jump.min(1.0), State::Step)
 }
 
-/// Value of a sample farther out, from one to three known ones; it does not rise outward.
+/// Value of a sample farther out, from one to three known ones; values never increase outward.
 fn outward_value(at: f64, known: &[(f64, f64)]) -> (f64, State) {
     let value = lagrange::value(known, at);
     let smooth = known.len() == 3 && value <= known[0].1;

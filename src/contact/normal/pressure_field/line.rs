@@ -67,7 +67,7 @@ impl GridLine<'_> {
             tell(low, high);
             return;
         }
-        // Between two others a bulge counts only where it continues a smooth edge.
+        // Between two nodes that are not positive, a positive part counts only where it continues a smooth edge.
         if here <= 0.0 && next <= 0.0 && !self.smooth[k] {
             return;
         }
@@ -96,8 +96,8 @@ pub(crate) fn cubic(axis: &[f64], i: usize, values: [f64; 4]) -> Bounded {
 /// Least and largest value of the curve between two nodes.
 ///
 /// If both are positive it stays above a quarter of the lower one; if none is and they are not smooth, below a quarter
-/// of the higher one, so not positive. It never exceeds twice the largest sample, which is 1: pressure between samples
-/// is larger than on them by some per cent, more comes from very unequal spacing.
+/// of the higher one, so not positive. It never exceeds twice the largest sample, which is 1: between samples the pressure
+/// may be a few per cent larger than on them; a larger excess results from very unequal spacing.
 pub(crate) fn bounds(left: f64, right: f64, smooth: bool) -> [f64; 2] {
     const LARGEST: f64 = 2.0;
     let (lower, higher) = (left.min(right), left.max(right));

@@ -3,7 +3,7 @@
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 
 impl GridPressure {
-    /// Load centre `[x, y]` in mm of one patch, or of all of them: the mean place weighted with the pressure.
+    /// Load centre `[x, y]` in mm of one patch, or of all of them: the mean position weighted with the pressure.
     #[must_use]
     pub fn load_centre(&self, patch: Option<usize>) -> [f64; 2] {
         let width = self.grid.x.len();
@@ -11,7 +11,7 @@ impl GridPressure {
         let (mut weight, mut sum) = (0.0, [0.0; 2]);
         for (k, q) in self.q.iter().enumerate().filter(|(_, q)| **q > 0.0) {
             let [i, j] = [k % width, k / width];
-            // Continued values outside the contact are not positive, so that these are samples, away from the border.
+            // Values continued outside the contact are not positive, so a positive one is a sample and not in the padding.
             if patch.is_some_and(|patch| usize::from(self.cells[k]) != patch) {
                 continue;
             }
@@ -22,7 +22,7 @@ impl GridPressure {
         sum.map(|sum| sum / weight)
     }
 
-    /// The same pressure with its coordinates counted from another origin, in mm.
+    /// The same pressure with coordinates relative to another origin, in mm.
     #[must_use]
     pub fn from_origin(mut self, origin: [f64; 2]) -> GridPressure {
         self.grid.x.iter_mut().for_each(|x| *x -= origin[0]);
@@ -42,8 +42,8 @@ impl GridPressure {
         self
     }
 
-    /// The same contact under a force times a factor near 1, with approaches larger by so much in mm: lengths from the origin
-    /// and pressures grow with the cube root of the force, as in Hertz's contacts.
+    /// The same contact with the force multiplied by a factor near 1 and approaches increased by the given amount in mm: lengths
+    /// from the origin and pressures are multiplied by the cube root of the factor, as in Hertzian contact.
     #[must_use]
     pub fn corrected(mut self, factor: f64, approach: f64) -> GridPressure {
         let root = factor.cbrt();

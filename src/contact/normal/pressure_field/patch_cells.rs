@@ -1,4 +1,4 @@
-//! One patch of a grid, and where its cells are.
+//! One patch of a grid, with the range of its cells.
 
 use std::ops::RangeInclusive;
 

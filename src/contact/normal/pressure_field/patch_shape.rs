@@ -1,4 +1,4 @@
-//! What is known of each patch of a grid as a whole: force, extent, area, and remarks.
+//! Force, extent, area and remarks of each patch of a grid.
 
 use std::f64::consts::PI;
 
@@ -12,12 +12,12 @@ use crate::contact::numerics::maximum::maximum;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 
-/// A patch with fewer samples along or across has an uncertain edge, and a force off by more than about 2 %: measured
-/// on Hertz's pressure, the sum of the samples is off by up to 2 % with 9 of them, 0.5 % with 18.
+/// With fewer samples along or across, the edge of a patch is uncertain and its force wrong by more than about 2 %: for
+/// Hertz's pressure, the sum of the samples is wrong by up to 2 % with 9 samples, 0.5 % with 18.
 const SAMPLES_ACROSS_MIN: usize = 8;
 
 impl GridPressure {
-    /// Patches without their region: force, rows and columns come from the samples.
+    /// Patches before their regions are found: force, rows and columns, from the samples.
     pub(crate) fn shapes_from_samples(&self, samples: &[u8], count: usize) -> Vec<PatchShape> {
         let nx = self.grid.x.len();
         let mut boxes = vec![[usize::MAX, 0, usize::MAX, 0]; count];
@@ -50,7 +50,7 @@ impl GridPressure {
                         semi_axes: None,
                         extent: [0.0; 4],
                     },
-                    // Cells touching the samples, and one more around them.
+                    // Cells with these samples as corners, and one more cell on every side.
                     columns: i0 - 2..=i1 + 1,
                     rows: j0 - 2..=j1 + 1,
                     segments_per_strip: f64::from(runs[label]) / (j1 - j0 + 1) as f64,
@@ -59,10 +59,10 @@ impl GridPressure {
             .collect()
     }
 
-    /// Extent `[x_min, x_max, y_min, y_max]` and area of a patch, by lines through it.
+    /// Extent `[x_min, x_max, y_min, y_max]` in mm and area in mm² of a patch, from its chords on lines along x.
     pub(crate) fn measure(&self, label: usize, shape: &PatchShape) -> ([f64; 4], f64) {
         let [y_min, y_max] = self.extent_across(shape, label);
-        // Chords have a root at both ends of the patch, so the lines crowd there.
+        // The length of chords varies as a square root at both ends of the patch, so lines are closer there.
         let lines = (32 + shape.rows.clone().count()).max(72);
         let (middle, half) = (0.5 * (y_min + y_max), 0.5 * (y_max - y_min));
         let step = PI / lines as f64;
@@ -86,7 +86,7 @@ impl GridPressure {
             area += length * half * (n * step).sin() * step;
             widen(n, left, right);
         }
-        // A rough patch may be longest just on a row of samples.
+        // The longest chord of a rough patch may lie on a row of samples.
         for y in self.grid.y.iter().filter(|y| y_min < **y && **y < y_max) {
             let (left, right, _) = ends(*y);
             widen(((middle - y) / half).acos() / step, left, right);
@@ -104,7 +104,7 @@ impl GridPressure {
 
     /// First and last y of lines that meet the patch.
     fn extent_across(&self, shape: &PatchShape, label: usize) -> [f64; 2] {
-        // Two spacings halved so often are too small to matter.
+        // Two spacings halved this often are below rounding error.
         const HALVINGS: u32 = 36;
         let y = &self.grid.y;
         // The outermost samples are two lines inside the range of cells (see `shapes_from_samples`).

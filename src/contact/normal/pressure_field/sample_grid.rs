@@ -1,9 +1,9 @@
 //! The grid of the samples, padded so that pressures can be continued beyond the contact.
 
-/// Patches of one grid.
+/// Most patches of one grid.
 pub(crate) const PATCHES_MAX: usize = 64;
 
-/// Grid lines added on each side: the contact may reach half a spacing beyond the grid, the interpolation needs more.
+/// Grid lines added on each side: the contact may extend half a spacing beyond the grid, and interpolation needs nodes beyond that.
 pub(crate) const PADDING: usize = 4;
 
 /// Coordinates of a rectangular grid in mm; the value at `(x[i], y[j])` is stored at `j * x.len() + i`.

@@ -9,11 +9,11 @@ use crate::contact::rolling::methods::liu_hsu::stick_block::{
 };
 use crate::contact::rolling::slip_rules::Rule;
 
-/// Divisions tried before giving up.
+/// Divisions into stick and slip after which the run ends without convergence.
 const DIVISIONS_MAX: u32 = 60;
 /// A stick cell slips when its traction exceeds its bound by this share, so that rounding does not decide.
 const STICK_MARGIN: f64 = 1e-9;
-/// A cell of given tractions counts as slipping when they miss its bound by no more than this share.
+/// In given tractions, a cell counts as slipping if its traction is less than its bound by at most this share.
 const START_MARGIN: f64 = 1e-6;
 
 /// How the outer iteration ended.
@@ -23,11 +23,11 @@ pub enum ZonesExit {
     Converged,
     /// Newton–Raphson found no tractions for a division.
     NewtonDiverged,
-    /// A division came up for the second time: the iteration would go round for ever.
+    /// A division occurred for the second time, so that the iteration would cycle.
     ZonesRepeat,
-    /// Too many divisions.
+    /// The limit of divisions was reached.
     IterationLimit,
-    /// The zones agree, but rounding keeps the residual above the tolerance.
+    /// The zones are consistent, but rounding keeps the residual above the tolerance.
     Inexact,
 }
 
@@ -60,12 +60,12 @@ pub struct ZonesRun {
     pub newton_iterations: u32,
 }
 
-/// Tractions and zones, over the cells without padding.
+/// Tractions and zones of the cells, without padding.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Zoning {
     /// Tractions, x of all cells before y.
     pub tractions: Vec<f64>,
-    /// Does the cell slip?
+    /// Whether each cell slips.
     pub slips: Vec<bool>,
 }
 
@@ -117,7 +117,8 @@ pub fn run(
     Ok((attempt, division))
 }
 
-/// All cells stick, or those slip that `start` loads up to their bound. A cell without pressure cannot stick.
+/// The division to start from: all cells stick, or with `start` the cells whose traction there reaches the bound slip. A cell without
+/// pressure never sticks.
 fn first_division(task: &DenseProblem, start: Option<&[f64]>) -> Zoning {
     let n = task.cells;
     let tractions = start.map_or_else(|| vec![0.0; 2 * n], <[f64]>::to_vec);
@@ -127,7 +128,7 @@ fn first_division(task: &DenseProblem, start: Option<&[f64]>) -> Zoning {
     Zoning { tractions, slips }
 }
 
-/// Tractions for one division into zones; `false` if Newton–Raphson finds none.
+/// Solves for the tractions of one division into zones; returns `false` if Newton–Raphson does not converge.
 fn solve_division(
     task: &DenseProblem,
     system: &SlipSystem,
@@ -166,7 +167,7 @@ fn solve_division(
     Ok(true)
 }
 
-/// The search for roots of eq. 8 and 9 with one division.
+/// The search for a root of eq. 8 and 9 for one division.
 struct RootChoice<'a> {
     system: &'a SlipSystem,
     bound: Vec<f64>,
@@ -182,8 +183,8 @@ impl RootChoice<'_> {
         Ok((end.exit == NewtonRaphsonExit::Converged).then_some(t))
     }
 
-    /// A root with as few cells as possible that pull against their slip. Eq. 9 has a root for every choice of such
-    /// cells; the one found from `first` is tried again with those cells turned round, then from `second`.
+    /// A root with as few tractions as possible that oppose their slip. Eq. 9 has a root for every choice of such
+    /// cells. The search starts from `first`, then from the root found with those tractions reversed, then from `second`.
     fn along_slip(&mut self, first: Vec<f64>, second: Vec<f64>) -> Result<Option<Vec<f64>>, Stop> {
         let mut best = self.find(first, StepRule::OnCircles)?;
         let turned = best.as_ref().map(|t| turned(self.system, t));
@@ -203,7 +204,7 @@ impl RootChoice<'_> {
     }
 }
 
-/// The slip cells, counted among themselves, whose tractions oppose their slips (eq. 10).
+/// The slip cells, as indices into the list of slip cells, whose tractions oppose their slips (eq. 10).
 fn opposed(system: &SlipSystem, t: &[f64]) -> Vec<usize> {
     let count = system.slip_cells.len();
     let slip = system.slip(t);
@@ -212,7 +213,7 @@ fn opposed(system: &SlipSystem, t: &[f64]) -> Vec<usize> {
         .collect()
 }
 
-/// The tractions with those that oppose their slips turned round.
+/// The tractions, with those that oppose their slips reversed.
 fn turned(system: &SlipSystem, t: &[f64]) -> Vec<f64> {
     let count = system.slip_cells.len();
     let mut next = t.to_vec();
@@ -223,7 +224,7 @@ fn turned(system: &SlipSystem, t: &[f64]) -> Vec<f64> {
     next
 }
 
-/// The guess on all slip cells, x before y.
+/// The initial guess for all slip cells, x before y.
 fn start_tractions(
     task: &DenseProblem,
     system: &SlipSystem,
@@ -242,7 +243,7 @@ fn start_tractions(
     t
 }
 
-/// The cells that disagree with their zones.
+/// The cells whose tractions or slips contradict their zones.
 fn misplaced(task: &DenseProblem, system: &SlipSystem, t: &[f64]) -> Vec<usize> {
     let n = task.cells;
     let mut found: Vec<usize> = system

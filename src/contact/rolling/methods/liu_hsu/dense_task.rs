@@ -4,7 +4,7 @@ use crate::contact::rolling::methods::boundary_element::task::NewtonTask;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::slip_equations::SlipEquations;
 
-/// One mesh with everything that is asked there. All values are dimensionless, as in [`SlipEquations`].
+/// The problem on one mesh. All values are dimensionless, as in [`SlipEquations`].
 #[derive(Debug, Clone, Copy)]
 pub struct DenseTask<'a> {
     /// The discrete equations over the whole mesh, without parity.
@@ -13,6 +13,6 @@ pub struct DenseTask<'a> {
     pub law: NewtonTask<'a>,
     /// x and y of every cell's node.
     pub nodes: (&'a [f64], &'a [f64]),
-    /// The motion; only the direction of its rigid slip matters here.
+    /// The motion, of which only the direction of rigid slip is used.
     pub motion: Motion,
 }

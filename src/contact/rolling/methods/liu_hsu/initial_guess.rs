@@ -1,8 +1,8 @@
-//! Where the Newton–Raphson iteration starts: the two guesses of the paper, and the tractions of the last division.
+//! Initial guesses for the Newton–Raphson iteration: the two of the paper, and the tractions of the previous division.
 
 use crate::contact::rolling::motion::Motion;
 
-/// A choice of the direction of every slip traction; its size is always the friction bound.
+/// How the directions of the slip tractions are chosen; their magnitude is always the friction bound.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum InitialGuess {
     /// Initial guess 1: along the rigid slip `(ν_x − φ y, ν_y + φ x)` (eq. 14).
@@ -10,15 +10,15 @@ pub enum InitialGuess {
     /// Initial guess 2: around a spin pole, `sgn φ (−(y − y_p), x − x_p)` (eq. 15).
     ///
     /// The paper prints a minus under the root of eq. 15, which must be a plus, and leaves out the sign of φ. With the
-    /// rigid pole `(−ν_y/φ, ν_x/φ)` this would be guess 1 again; the pole of the elastic problem makes the difference.
+    /// rigid pole `(−ν_y/φ, ν_x/φ)` this would equal guess 1; the pole of the elastic problem differs from it.
     SpinPole([f64; 2]),
-    /// Along the tractions of the division before, see the third run in
+    /// Along the tractions of the previous division, see the third run in
     /// [`liu_hsu`](crate::contact::rolling::methods::liu_hsu) (not in the paper).
     Continued,
 }
 
 impl InitialGuess {
-    /// A word for logs and answers.
+    /// The name in logs and answers.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -28,10 +28,10 @@ impl InitialGuess {
         }
     }
 
-    /// Unit direction on a cell at `(x, y)`, for tractions `before` there in the division before.
+    /// Unit direction at a cell at `(x, y)`, where the previous division gave the traction `before`.
     ///
-    /// Where the direction is not defined (at a pole, or without tractions before) it is along the rigid slip, and at
-    /// the rigid pole itself along x: any direction serves there.
+    /// Where the direction is undefined (at a pole, or without a previous traction) it is that of the rigid slip, and at
+    /// the rigid pole that of x; the iteration works with any direction there.
     #[must_use]
     pub fn direction(self, motion: &Motion, at: [f64; 2], before: [f64; 2]) -> [f64; 2] {
         let [x, y] = at;

@@ -1,46 +1,47 @@
 //! The solver of Liu and Hsu: Newton–Raphson on the slip cells inside an iteration over stick and slip zones.
 //!
 //! Source: "Non-Hertzian rolling contact stress analysis" (eq. 6 to 15; "the paper" below), after Liu and Paul. It is
-//! here for fidelity and comparison: it solves the same discrete equations as
+//! included for comparison with the paper: it solves the same discrete equations as
 //! [`boundary_element`](crate::contact::rolling::methods::boundary_element), with dense matrices and a smaller domain of
-//! convergence. The course, as in §4 and §5 of the paper:
+//! convergence. The steps, as in §4 and §5 of the paper:
 //!
 //! 1. All cells stick; their tractions follow from eq. 11.
-//! 2. Stick cells at or above their bound and slip cells that pull against their slip (eq. 10) change zones
+//! 2. Stick cells at or above their bound and slip cells whose traction opposes their slip (eq. 10) change zones
 //!    ([`active_set`]).
 //! 3. The stick tractions are eliminated (eq. 13, [`stick_block`]); Newton–Raphson gives the slip tractions
-//!    (eq. 8 and 9, [`newton_raphson`]) from an initial guess (eq. 14 or 15, [`initial_guess`]). Back to 2 until no cell
-//!    changes.
-//! 4. This is done with guess 1. If it fails, guess 1 on a coarse mesh gives the spin pole ([`vortex`](crate::contact::rolling::vortex)) for guess 2.
+//!    (eq. 8 and 9, [`newton_raphson`]) from an initial guess (eq. 14 or 15, [`initial_guess`]). Steps 2 and 3 are repeated
+//!    until no cell changes.
+//! 4. The first run uses guess 1. If it fails, a solution on a coarse mesh with guess 1 gives the spin pole
+//!    ([`vortex`](crate::contact::rolling::vortex)) for guess 2.
 //!
 //! # What the paper leaves open
 //!
 //! | question | here |
 //! |---|---|
 //! | eq. 6 sums slip along the strip, eq. 12 needs slip itself | rows are differenced along the strip: the map is that of [`Equations`](crate::contact::rolling::slip_equations::SlipEquations) |
-//! | weight of the own cell in eq. 6 | one half, from the centre to the side: [`Rule::Trapezoid`](crate::contact::rolling::slip_rules::Rule::Trapezoid); any other rule serves too |
+//! | weight of the own cell in eq. 6 | one half, from the centre to the side: [`Rule::Trapezoid`](crate::contact::rolling::slip_rules::Rule::Trapezoid); any other rule can be used |
 //! | `x_U`, "the closest boundary" | the leading edge for every cell; with a stick/slip boundary the equations change with the zones, and some have two solutions or none |
 //! | when a stick cell slips | T reaches `μp (1 + 1e-9)` |
 //! | when a slip cell sticks | `s·T < 0`, in the same pass |
 //! | unknowns | slip tractions alone; slips are linear in them, so the steps are the same |
-//! | eq. 14 and 15 at a pole (0/0) | any direction |
+//! | eq. 14 and 15 at a pole (0/0) | any direction works |
 //! | eq. 15 | plus under the root, factor `sgn φ` |
 //! | where the spin pole is | the centre of the vortex of the coarse tractions, least squares weighted with the load; with the rigid pole eq. 15 is eq. 14 |
-//! | a coarse solution that failed | its last tractions still give the pole; a cured coarse solution gave no better one |
-//! | all cells slip, or all stick | eq. 11 or eq. 8 and 9 fall away |
-//! | a division that comes up again | the run ends: it would go round for ever |
+//! | a coarse solution that failed | its last tractions are still used for the pole; a converged coarse solution gave no better one |
+//! | all cells slip, or all stick | eq. 11, or eq. 8 and 9, have no unknowns and are skipped |
+//! | a division that occurs again | the run ends, because it would cycle |
 //!
 //! # Where it converges
 //!
-//! The paper says always. Measured, that holds for the upwind rule without spin only. Most failures are divisions that
-//! repeat, because Newton–Raphson ends on a root of eq. 9 with some tractions against their slips. So a third run
-//! follows where both guesses fail, which is not in the paper ([`Guess::Continued`](crate::contact::rolling::methods::liu_hsu::initial_guess::InitialGuess::Continued)): tractions start from those of the
-//! division before and stay on their circles, and a root with tractions against their slips is tried again with these
-//! turned round. The rules of second order come to it by way of an upwind solution ([`solve_by_upwind`](crate::contact::rolling::methods::liu_hsu::solve::solve_by_upwind)). Of 109 motions
-//! (normalised creepage 0 to 3 in four directions, spin 0 to 20) so many converge, guess 2 with the pole of 25 coarse
-//! cells or guess 1 where there is no spin (`cargo bench --bench convergence_domain` prints more):
+//! The paper says always. Measured, that is true only of the upwind rule without spin. Most failures are divisions that
+//! repeat, because Newton–Raphson converges to a root of eq. 9 at which some tractions oppose their slips. If both guesses
+//! fail, a third run follows, which is not in the paper ([`Guess::Continued`](crate::contact::rolling::methods::liu_hsu::initial_guess::InitialGuess::Continued)): tractions start from those of the
+//! previous division and keep their magnitudes, and where a root has tractions that oppose their slips, the iteration is
+//! repeated with these reversed. Rules of second order start the third run from an upwind solution ([`solve_by_upwind`](crate::contact::rolling::methods::liu_hsu::solve::solve_by_upwind)). The table
+//! counts how many of 109 motions converge (normalised creepage 0 to 3 in four directions, spin 0 to 20). The pole of guess 2
+//! comes from 25 coarse cells; without spin guess 1 stands in its place. `cargo bench --bench convergence_domain` prints more.
 //!
-//! | rule, mesh | region | guess 1 | guess 2 | 1, then 2 (the paper) | and the third run |
+//! | rule, mesh | region | guess 1 | guess 2 | 1, then 2 (the paper) | 1, 2, third run |
 //! |---|---|---|---|---|---|
 //! | upwind, 5 × 5 equal cells | circle | 63 | 101 | 102 | 109 |
 //! | | ellipse, b = 0.3 a | 59 | 88 | 90 | 107 |
@@ -59,8 +60,8 @@
 //! | | ellipse, b = 3.3 a | 92 | 96 | 96 | 109 |
 //! | | egg | 59 | 82 | 84 | 108 |
 //!
-//! A solve that ends otherwise says so; `boundary_element` converges in all these states. All is dense: 1000 cells take
-//! seconds and 100 MB and more, and the checks of a case allow no more.
+//! A solve that does not converge is an error; `boundary_element` converges in all these states. All matrices are dense: 1000
+//! cells take seconds and more than 100 MB, and the checks of a case allow no more cells than that.
 
 pub mod active_set;
 pub mod dense_task;

@@ -6,20 +6,21 @@ use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::dense_lu::{DenseLu, check};
 use crate::contact::rolling::methods::liu_hsu::stick_block::SlipSystem;
 
-/// Steps before giving up.
+/// Steps after which the iteration ends without convergence.
 const ITERATIONS_MAX: u32 = 40;
-/// Converged when no traction moves by more than this share of its bound; the error left is about its square.
+/// The iteration has converged when no traction changes by more than this share of its bound; the remaining error is about the
+/// square of this.
 const STEP_SMALL: f64 = 1e-8;
 /// A step on the circles is halved at most this often.
 const HALVINGS_MAX: u32 = 6;
 
-/// Where the iterates may go.
+/// How a step is taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StepRule {
-    /// As in the paper: full steps, `|T|² = g²` is one of the equations.
+    /// As in the paper: full steps; `|T|² = g²` is one of the equations.
     Full,
-    /// The angle of each traction is the unknown: iterates stay on their circles, and a step is halved until the
-    /// part of the slip across the traction falls.
+    /// The unknown is the angle of each traction, so that tractions stay on their friction circles; a step is halved until
+    /// the component of slip perpendicular to the traction decreases.
     OnCircles,
 }
 
@@ -28,13 +29,13 @@ pub enum StepRule {
 pub enum NewtonRaphsonExit {
     /// The last step was small.
     Converged,
-    /// A step was no number.
+    /// A step was not finite.
     Diverged,
     /// The steps were used up.
     StepsUsedUp,
 }
 
-/// How an iteration went.
+/// Result of an iteration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NewtonEnd {
     /// How it ended.
@@ -45,9 +46,8 @@ pub struct NewtonEnd {
 
 /// Solves `|T|² = g²` (eq. 8) and `s_x T_y − s_y T_x = 0` (eq. 9), `s = q' + K T` (eq. 13), on the slip cells.
 ///
-/// `t` holds the initial guess and receives the answer, x of all slip cells before y; no cell of it may be 0. `bound`
-/// is g of the slip cells, more than 0. Which of the roots is found (traction along or against the slip) is up to the
-/// guess.
+/// `t` holds the initial guess and receives the answer, x of all slip cells before y; no traction in it may be 0. `bound`
+/// is g of the slip cells, more than 0. The guess determines which root is found (traction along or against the slip).
 ///
 /// # Errors
 /// Only if the monitor stops the work.
@@ -100,7 +100,7 @@ pub fn solve(
 
 /// One step of Newton's method on all equations (8) and (9).
 ///
-/// The row of (8) has only the cell's own traction in it, so it is eliminated by hand: with `n ⟂ T` a unit vector, the
+/// The row of (8) contains only the cell's own traction and is eliminated in closed form: with `n ⟂ T` a unit vector, the
 /// step is `ρ T + τ n`, `ρ = (g² − |T|²)/(2|T|²)`, which leaves one unknown τ per cell and the row of (9),
 /// `Σ_j n_i·K_ij n_j τ_j − τ_i s_i·T_i/|T_i|² = −(1 + ρ_i) n_i·s_i − Σ_j n_i·K_ij T_j ρ_j`. The iterates are those of
 /// the full system at an eighth of its cost.
@@ -154,7 +154,7 @@ pub fn newton_step(
     Ok(radial_part)
 }
 
-/// Moves `t` along the step and back to the circles, by the first share of the step that reduces eq. 9.
+/// Moves `t` along the step and projects it onto the circles; takes the first of the halved steps that reduces the residual of eq. 9.
 fn search_on_circles(system: &SlipSystem, bound: &[f64], step: &[f64], t: &mut [f64]) {
     let n = bound.len();
     let before = t.to_vec();
@@ -176,7 +176,7 @@ fn search_on_circles(system: &SlipSystem, bound: &[f64], step: &[f64], t: &mut [
     }
 }
 
-/// Root of the sum of squares of the slip across the traction.
+/// Root of the sum of squares of the slip perpendicular to the traction.
 fn slip_across(system: &SlipSystem, bound: &[f64], t: &[f64]) -> f64 {
     let n = bound.len();
     let slip = system.slip(t);

@@ -1,4 +1,4 @@
-//! The method on a mesh level of a case, as the recipe calls it.
+//! The method applied to one mesh level of a case.
 
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::answer::{
@@ -15,11 +15,11 @@ use crate::contact::rolling::slip_equations::SlipEquations;
 use crate::contact::rolling::slip_rules::Rule;
 use crate::contact::rolling::strip_mesh::StripMesh;
 
-/// Solves one motion (about the origin of the case) with the trapezoid rule, the spin pole from the level `coarse`
-/// (without it, guess 2 is left out).
+/// Solves one motion (about the origin of the case) with the trapezoid rule. The spin pole comes from the level `coarse`;
+/// without it, guess 2 is skipped.
 ///
 /// # Errors
-/// [`LevelFailure::NotConverged`] with the residual of the tractions it ended on; [`LevelFailure::Stopped`].
+/// [`LevelFailure::NotConverged`] with the residual of the final tractions; [`LevelFailure::Stopped`].
 pub fn solve(
     level: &StripMesh,
     coarse: Option<&StripMesh>,
@@ -87,7 +87,7 @@ fn work(outcome: &ZonesOutcome) -> Work {
     }
 }
 
-/// The equations of one rule on a level with everything a [`DenseTask`] borrows.
+/// The equations of one rule on a level, with the data that a [`DenseTask`] borrows.
 struct DenseParts<'a> {
     level: &'a StripMesh,
     equations: SlipEquations<'a>,

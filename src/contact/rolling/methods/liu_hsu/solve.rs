@@ -1,4 +1,4 @@
-//! Attempts in order: the guesses of the paper, then a start from an upwind solution; what is wrong with each is kept.
+//! The attempts in order: the guesses of the paper, then a start from an upwind solution. The outcome of each is kept.
 
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
@@ -12,29 +12,29 @@ use crate::contact::rolling::methods::liu_hsu::stick_block::DenseProblem;
 use crate::contact::rolling::slip_rules::Rule;
 use crate::contact::rolling::vortex;
 
-/// What a solve leaves behind besides the tractions.
+/// The results of a solve besides the tractions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ZonesOutcome {
-    /// Did the residual reach the tolerance?
+    /// Whether the residual reached the tolerance.
     pub converged: bool,
     /// Residual of the tractions returned, as in [`Convergence`].
     pub residual: f64,
-    /// The runs of the outer iteration on the fine mesh, in order; the last one is what counts.
+    /// The runs of the outer iteration on the fine mesh, in order; the last one determines the outcome.
     pub attempts: Vec<ZonesRun>,
     /// Slip of every cell for the tractions returned, in the layout of the equations.
     pub slip: Vec<f64>,
-    /// Does the cell slip?
+    /// Whether each cell slips.
     pub slips: Vec<bool>,
 }
 
 impl ZonesOutcome {
-    /// The run of the outer iteration that counts.
+    /// The run that determines the outcome.
     #[must_use]
     pub fn last(&self) -> &ZonesRun {
         &self.attempts[self.attempts.len() - 1]
     }
 
-    /// Why there is no answer and what to do, as a clause for messages.
+    /// Why the solve did not converge and what to do, as a clause for messages.
     #[must_use]
     pub fn advice(&self) -> String {
         let reason = self.last().exit.reason();
@@ -54,11 +54,11 @@ impl ZonesOutcome {
     }
 }
 
-/// Solves for the tractions of the fine stage: guess 1, then guess 2, then the continued run, see the module's text.
+/// Solves for the tractions on the fine mesh: guess 1, then guess 2, then the continued run (see the [module](super)).
 ///
-/// `t` holds the tractions from which the continued run starts (0 if none are known); it receives the answer, or without
-/// convergence the tractions with the smallest residual met. Without a coarse stage, or without spin, there is no pole
-/// and guess 2 is left out.
+/// `t` holds the tractions from which the continued run starts (0 if none are known). It receives the answer, or without
+/// convergence the tractions with the smallest residual found. Without a coarse mesh, or without spin, there is no pole
+/// and guess 2 is skipped.
 ///
 /// # Errors
 /// Only if the monitor stops the work; an iteration that does not converge is told in the outcome.
@@ -75,8 +75,8 @@ pub fn solve(
     Ok(search.finish(t))
 }
 
-/// Like [`solve`], but the continued run starts from a solution on the stage `upwind`, the same mesh and motion with
-/// [`Rule::Upwind`]. This is for the other rules, whose own continued run fails more often.
+/// Like [`solve`], but the continued run starts from a solution of `upwind`, the same mesh and motion with
+/// [`Rule::Upwind`]. Used for the other rules, because their own continued run fails more often.
 ///
 /// # Errors
 /// Only if the monitor stops the work; an iteration that does not converge is told in the outcome.
@@ -115,7 +115,7 @@ pub fn solve_with(
     Ok(search.finish(t))
 }
 
-/// The first stage: the spin pole from a coarse mesh solved with guess 1; `None` without spin or without a vortex.
+/// The spin pole from a solution on a coarse mesh with guess 1; `None` without spin or without a vortex.
 ///
 /// # Errors
 /// Only if the monitor stops the work.
@@ -141,7 +141,7 @@ struct ZonesSearch<'a> {
     stage: &'a DenseTask<'a>,
     monitor: &'a dyn Monitor,
     task: DenseProblem,
-    /// Tractions given by the caller, over the cells without padding.
+    /// Tractions given by the caller, one pair per cell, without padding.
     start: Vec<f64>,
     newton: Newton<'a>,
     workspace: NewtonWorkspace,
@@ -168,7 +168,7 @@ impl<'a> ZonesSearch<'a> {
         })
     }
 
-    /// Guess 1, then guess 2 about the pole of the coarse stage; did either converge?
+    /// Tries guess 1, then guess 2 about the pole of the coarse mesh; returns whether either converged.
     fn as_in_the_paper(&mut self, coarse: Option<&DenseTask>) -> Result<bool, Stop> {
         if self.attempt(InitialGuess::RigidSlip)? {
             return Ok(true);
@@ -182,7 +182,7 @@ impl<'a> ZonesSearch<'a> {
         }
     }
 
-    /// Runs the outer iteration with one guess; did it converge?
+    /// Runs the outer iteration with one guess; returns whether it converged.
     fn attempt(&mut self, guess: InitialGuess) -> Result<bool, Stop> {
         let start = (guess == InitialGuess::Continued).then_some(&self.start[..]);
         let (mut attempt, division) = active_set::run(&self.task, guess, start, self.monitor)?;
@@ -204,7 +204,7 @@ impl<'a> ZonesSearch<'a> {
         Ok(converged)
     }
 
-    /// Residual of the projected friction law, the measure both methods share.
+    /// Residual of the projected friction law, the measure that `boundary_element` uses as well.
     fn residual(&mut self, tractions: &[f64]) -> f64 {
         let padded = self.task.padded(tractions);
         let mut unused = Convergence::default();
@@ -219,7 +219,7 @@ impl<'a> ZonesSearch<'a> {
             let slips = vec![false; self.task.cells];
             (f64::INFINITY, Zoning { tractions, slips })
         });
-        // Evaluated once more, because the slips kept by the evaluation are those of its last call.
+        // Evaluated again, because the slips kept are those of the most recent evaluation.
         let residual = self.residual(&division.tractions);
         t.copy_from_slice(&self.task.padded(&division.tractions));
         ZonesOutcome {

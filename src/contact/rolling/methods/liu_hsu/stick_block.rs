@@ -1,4 +1,4 @@
-//! The stick tractions eliminated: slip on the slip cells as a function of their own tractions alone (eq. 11 to 13).
+//! Eliminates the stick tractions, which leaves slip on the slip cells as a function of their own tractions (eq. 11 to 13).
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
@@ -28,12 +28,12 @@ pub struct DenseProblem {
     pub x: Vec<f64>,
     /// y of every node.
     pub y: Vec<f64>,
-    /// The motion, for its direction on every cell.
+    /// The motion, of which the direction at every cell is used.
     pub motion: Motion,
 }
 
 impl DenseProblem {
-    /// Writes the map out as a matrix.
+    /// Assembles the map as a matrix.
     ///
     /// # Errors
     /// Only if the monitor stops the work.
@@ -57,14 +57,14 @@ impl DenseProblem {
         })
     }
 
-    /// A vector in the layout of the equations without its padding.
+    /// Removes the padding of a vector in the layout of the equations.
     #[must_use]
     pub fn compact(&self, values: &[f64]) -> Vec<f64> {
         let (n, padded) = (self.cells, self.padded);
         [&values[..n], &values[padded..padded + n]].concat()
     }
 
-    /// The reverse of [`compact`](Self::compact).
+    /// The inverse of [`compact`](Self::compact).
     #[must_use]
     pub fn padded(&self, values: &[f64]) -> Vec<f64> {
         let (n, padded) = (self.cells, self.padded);
@@ -80,7 +80,7 @@ impl DenseProblem {
 /// With the map split by zones, stick cells obey `0 = q_L + M_LL t_L + M_LS t_S` (eq. 11 with `A = −M_LL`,
 /// `B = −M_LS`, `e = q_L`) and slip cells `s = q_S + M_SL t_L + M_SS t_S` (eq. 12 with `C = −M_SL`, `D = −M_SS`).
 /// So `q' = q − C A⁻¹ e` and `K = C A⁻¹ B − D` (eq. 13). Without stick cells there is nothing to eliminate and
-/// `K = −D`. Cells without pressure carry nothing and have no unknowns.
+/// `K = −D`. Cells without pressure carry no traction and have no unknowns.
 #[derive(Debug)]
 pub struct SlipSystem {
     /// The cells with unknown slip tractions.
@@ -91,7 +91,7 @@ pub struct SlipSystem {
     pub response: Mat<f64>,
     /// q'.
     pub constant: Vec<f64>,
-    /// `A⁻¹ B` and, in one more column, `−A⁻¹ e`, so that `t_L = −X (t_S, 1)`.
+    /// X: `A⁻¹ B` with the additional column `−A⁻¹ e`, so that `t_L = −X (t_S, 1)`.
     stick_response: Mat<f64>,
 }
 
@@ -171,7 +171,7 @@ impl SlipSystem {
     }
 }
 
-/// Places of both components of some cells in a vector over all `cells`.
+/// Indices of both components of the given cells in a vector over all `cells`.
 #[must_use]
 pub fn both_components(chosen: &[usize], cells: usize) -> Vec<usize> {
     let y = chosen.iter().map(|i| cells + i);
