@@ -1,4 +1,4 @@
-//! What can go wrong in `contact`: a case that cannot be asked, and a solve that has no answer.
+//! The errors of `contact`: a case with faults, and a solve without an answer.
 
 use serde_json::{Number, Value};
 use thiserror::Error;
@@ -13,12 +13,12 @@ pub struct Fault {
     pub pointer: String,
     /// The value given and what is allowed, as a sentence.
     pub detail: String,
-    /// The same for programs, as far as it is that simple.
+    /// The same in a form for programs, as far as it can be expressed so.
     pub figures: Box<FaultFigures>,
 }
 
 impl Fault {
-    /// A fault of which no more is known than the sentence.
+    /// A fault described by its sentence alone.
     #[must_use]
     pub fn new(pointer: impl Into<String>, detail: impl Into<String>) -> Fault {
         Fault {
@@ -51,7 +51,7 @@ pub struct FaultFigures {
 /// Kinds of faults.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum FaultCode {
-    /// Another one, which the sentence tells.
+    /// Another kind, described by the sentence.
     #[default]
     Invalid,
     /// A member that is needed is not there.
@@ -98,7 +98,7 @@ pub enum SolveError {
         .method.name()
     )]
     NotConverged {
-        /// The method that gave up.
+        /// The method that did not converge.
         method: Method,
         /// Which motion of the case, counted from 0.
         point: usize,
@@ -146,7 +146,7 @@ pub enum SolveError {
         /// Motions done and asked for, where that is known.
         motions: Option<[usize; 2]>,
     },
-    /// The answer holds something that is no number; nothing of it is to be used.
+    /// The answer contains a number that is not finite; none of it is usable.
     #[error(
         "the answer is not finite: {quantity}; check the case for values that are extremely large or small"
     )]

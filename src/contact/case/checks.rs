@@ -1,4 +1,4 @@
-//! The checks of a case: every part by itself, all faults at once.
+//! The checks of a case: each part is checked independently, and all faults are reported together.
 
 use crate::contact::case::limits::Limits;
 use crate::contact::case::motions::ExpandedMotions;
@@ -15,10 +15,10 @@ use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 
-/// A larger friction coefficient is solved, with a remark.
+/// Friction coefficient above which the answer carries a remark.
 const FRICTION_USUAL_MAX: f64 = 1.0;
 
-/// Those parts of a case that could be read.
+/// The parts of a case that could be read.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PartialCase<'a> {
     pub(crate) material: Option<&'a Material>,
@@ -32,7 +32,7 @@ pub(crate) struct PartialCase<'a> {
 
 /// Faults of the parts of a case that can be checked although others are faulty.
 pub(crate) fn faults_of(given: PartialCase, limits: &Limits) -> Vec<Fault> {
-    // Without its load a patch cannot be told; that is a fault already. Profiles are looked at all the same.
+    // Without a load, which is a fault already, no patch can be found; profiles are checked nevertheless.
     let without_load = matches!(
         given.contact,
         Some(Contact::PressureGrid { .. } | Contact::Profiles { .. })
@@ -79,7 +79,7 @@ impl CheckedParts {
             let size = SizeInput {
                 method: solver.method.into(),
                 resolution: resolution(solver),
-                // What is not known counts as the least it can be.
+                // Unknown quantities count with their least possible values.
                 segments: task
                     .as_ref()
                     .map_or_else(|| vec![1.0], |(task, _)| size::segments(task)),

@@ -1,4 +1,4 @@
-//! Is what comes out a contact that the theory is meant for? Remarks for all kinds of contact; nothing is refused here.
+//! Remarks on contacts outside the range for which the theory is intended, for all types of contact; nothing is refused here.
 
 use crate::contact::case::words::contact::Contact;
 use crate::contact::normal::patch::Patch;
@@ -8,13 +8,13 @@ use crate::contact::rolling::motion::Motion;
 
 /// Beyond this pressure, in MPa, wheel and rail steels yield whatever their hardness (about 3 times a yield stress of 1.6 GPa).
 const PRESSURE_USUAL_MAX: f64 = 5000.0;
-/// A load beyond this, in N, is a mistake of unit: about 60 times that of a heavy wheel.
+/// Load in N above which a mistake of unit is likely: about 60 times that of a heavy wheel.
 const LOAD_USUAL_MAX: f64 = 1e7;
-/// Creepages beyond this are no small part of the rolling speed.
+/// Creepage above which sliding is no longer small compared with the rolling speed.
 const CREEPAGE_USUAL_MAX: f64 = 0.2;
-/// Half width over radius from which on half-spaces are a poor likeness of the bodies.
+/// Half width relative to the radius above which half-spaces are a poor approximation of the bodies.
 const HALF_WIDTH_USUAL_MAX: f64 = 0.3;
-/// Approach over the smaller half width from which on strains are too large for linear elasticity.
+/// Approach relative to the smaller half width above which strains are too large for linear elasticity.
 const APPROACH_USUAL_MAX: f64 = 0.15;
 
 /// The remarks on patches that are known from the case alone.
@@ -84,7 +84,7 @@ fn strained(overlap_mm: f64, half_widths: [f64; 2]) -> Option<Remark> {
     })
 }
 
-/// The remark on a largest pressure in MPa, if it deserves one.
+/// The remark on a largest pressure in MPa, if it is unusual.
 pub(crate) fn pressure(pressure_max_mpa: f64) -> Option<Remark> {
     (pressure_max_mpa > PRESSURE_USUAL_MAX).then_some(Remark::PressureImplausible {
         pressure_max_mpa,
@@ -92,7 +92,7 @@ pub(crate) fn pressure(pressure_max_mpa: f64) -> Option<Remark> {
     })
 }
 
-/// The remark on the normal force of all patches in N, if it deserves one.
+/// The remark on the normal force of all patches in N, if it is unusual.
 pub(crate) fn load(normal_force_n: f64) -> Option<Remark> {
     (normal_force_n > LOAD_USUAL_MAX).then_some(Remark::LoadImplausible {
         normal_force_n,
@@ -100,7 +100,7 @@ pub(crate) fn load(normal_force_n: f64) -> Option<Remark> {
     })
 }
 
-/// The remark on a motion over a patch of this length √(area/π) in mm, if it is known and the motion deserves one.
+/// The remark on an unusual motion; `length` is √(area/π) of the patch in mm, if it is known.
 pub(crate) fn creepage(motion: &Motion, length: Option<f64>) -> Option<Remark> {
     let Motion {
         creepage_x,

@@ -19,7 +19,7 @@ pub struct PressedContact {
     pub footprint: Footprint,
     /// How they were found, where they were not known beforehand.
     pub report: Option<NormalReport>,
-    /// What is to be said of them.
+    /// Remarks on them.
     pub remarks: Vec<RemarkEntry>,
 }
 
@@ -73,11 +73,10 @@ impl CheckedCase {
         }
     }
 
-    /// Does a solve stay within the memory allowed? How many patches and segments there are is known only when they are
-    /// found.
+    /// Checks that a solve stays within the memory allowed, once the number of patches and segments is known.
     ///
     /// # Errors
-    /// It needs more.
+    /// The solve needs more memory.
     pub(crate) fn fits(&self, footprint: &Footprint) -> Result<(), SolveError> {
         let segments = footprint.segments_per_strip();
         let (patches, sum) = (footprint.patches().len(), segments.iter().sum::<f64>());

@@ -1,4 +1,4 @@
-//! What can be said about profiles before their contact is known: from their points alone.
+//! The quality of profiles as far as their points alone show it, before the contact is known.
 
 use crate::contact::geometry::profile::{Body, Profile};
 use crate::contact::geometry::profile_quality::noise;
@@ -10,7 +10,7 @@ use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::solution::profile_quality::{PairQuality, SectionQuality};
 
-/// Pressure in MPa that profiles are judged for before their contact is known.
+/// Pressure in MPa assumed for assessing profiles before their contact is known.
 pub(crate) const PRESSURE_USUAL: f64 = 1200.0;
 
 /// Noise and spacing of a whole profile.
@@ -24,7 +24,7 @@ pub fn grain(profile: &Profile) -> Grain {
     }
 }
 
-/// Do the points of a profile tell how noisy they are, or whether they lie on a polygon?
+/// Whether the points of a profile suffice to determine their noise, or lie on a polygon.
 pub fn tells_noise(profile: &Profile) -> bool {
     let points = profile.points();
     let whole = [0, points.at.len()];
