@@ -1,5 +1,5 @@
-//! How long one motion on a patch takes to solve, as far as the patch is known before region and pressure are found. Where the numbers
-//! come from: see `solve_time.rs`.
+//! Estimated time to solve one motion on a patch, from what is known before region and pressure are found. `solve_time.rs` says where the
+//! numbers come from.
 
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::normal::gap::pilot::PilotPatch;
@@ -71,7 +71,7 @@ impl MotionTime {
     }
 }
 
-/// What the tractions of a motion will look like.
+/// The expected regime of the tractions of a motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Tractions {
     Stick,
@@ -188,7 +188,7 @@ impl PatchGuess {
         let creepage = unit * motion.creepage_x.hypot(motion.creepage_y);
         let spin = unit * c * motion.spin_per_mm.abs();
         let ratio = match self.half[0] / self.half[1] {
-            // A load too small to tell a patch.
+            // The load is too small to determine a patch.
             ratio if ratio.is_nan() => 1.0,
             ratio => ratio.clamp(1.0 / RATIO_MAX, RATIO_MAX),
         };
@@ -201,7 +201,7 @@ impl PatchGuess {
         let (long, power) = LONG[spinning];
         let slender =
             (ratio / long).max(1.0).powf(power) * (1.0 / ratio).max(1.0).powf(WIDE_POWER[spinning]);
-        // The place at which creepages and spin cancel.
+        // The point at which creepages and spin cancel.
         let pole =
             [motion.creepage_y, motion.creepage_x].map(|creepage| creepage / motion.spin_per_mm);
         let outside = (pole[0] / self.half[0]).hypot(pole[1] / self.half[1]) > POLE_FAR;

@@ -1,4 +1,4 @@
-//! From stage results to the answer a client reads: units put back, only what was asked for.
+//! Assembles the answer that a client reads from the results of the stages: with units, and only with the outputs requested.
 
 use crate::contact::case::press::PressedContact;
 use crate::contact::case::problem::CheckedCase;
@@ -19,13 +19,13 @@ use crate::contact::solution::words::{
 };
 use crate::contact::solution::zone::Zone;
 
-/// Remarks that are gathered before repetitions are dropped.
+/// Remarks collected before repetitions are merged.
 const REMARKS_AT_ONCE: usize = 1000;
 /// Axes, origin and signs in one sentence.
 const FRAME: &str = "x along rolling (leading edge at larger x), y to the left, z up out of the lower body; forces, moments \
                      and tractions act on the lower body, slip is that of the upper body relative to the lower one";
 
-/// The answer of a problem, motion by motion; of each only what the answer holds is kept.
+/// The answer to a problem, built motion by motion; only what the answer contains is kept.
 #[derive(Debug)]
 pub struct Assembly<'a> {
     case: &'a CheckedCase,
@@ -132,7 +132,7 @@ impl<'a> Assembly<'a> {
     }
 }
 
-/// Is anything asked for that has a value per cell?
+/// Whether any output with values per cell is requested.
 #[must_use]
 pub fn wants_fields(case: &CheckedCase) -> bool {
     case.run.outputs.iter().any(|o| *o != Output::Resultants)
@@ -211,7 +211,7 @@ fn skipped(skips: &[Skip]) -> Vec<String> {
     skips.iter().map(|skip| skip.text().to_owned()).collect()
 }
 
-/// Does the estimate of the sum over the patches stay within the target?
+/// Whether the error estimate of the sum over the patches is within the target.
 fn target_met(case: &CheckedCase, point: &MotionAnswer) -> Option<bool> {
     let Resolution::Target(target) = case.run.resolution else {
         return None;
@@ -280,7 +280,7 @@ fn normalised(case: &CheckedCase, patch: &Patch, motion: &Motion) -> NormalisedM
     }
 }
 
-/// A relative error as absolute ones. The moment's grows with the distance of the patches from the origin.
+/// Converts a relative error to absolute ones. That of the moment grows with the distance of the patches from the origin.
 fn absolute(case: &CheckedCase, patches: &[Patch], relative: f64) -> ErrorEstimate {
     let (mut force, mut area, mut reach) = (0.0, 0.0, 0.0_f64);
     for patch in patches {

@@ -1,5 +1,5 @@
-//! The last look at an answer, whatever it came from: shares of time, dust, remarks on implausible numbers, and that every
-//! number is one.
+//! The final step for every answer: distributes wall time, sets rounding residues to 0, adds remarks on implausible numbers, and
+//! checks that all numbers are finite.
 
 use std::f64::consts::PI;
 use std::time::Duration;
@@ -12,13 +12,13 @@ use crate::contact::remark::list::Remark;
 use crate::contact::solution::finite;
 use crate::contact::solution::words::{Fields, PatchSolution, PointSolution, Solution};
 
-/// What is smaller than this part of its scale is rounding, and reported as 0.
+/// Values below this fraction of their scale are rounding residues and reported as 0.
 const DUST: f64 = 1e-14;
 
-/// Finishes the answer to a whole problem that took so long.
+/// Finishes the answer to a whole problem, given the wall time it took.
 ///
 /// # Errors
-/// [`SolveError::NotFinite`] if the answer holds something that is no number.
+/// [`SolveError::NotFinite`] if a number in the answer is not finite.
 pub fn finish(
     case: &CheckedCase,
     (mut solution, fields): (Solution, Fields),
@@ -42,8 +42,8 @@ pub fn share_seconds(solution: &mut Solution) {
     }
 }
 
-/// Scales shares of time so that they add up to the time that the whole answer took: what belongs to no motion is shared as
-/// they are.
+/// Scales the times of the motions so that they add up to that of the whole answer: time that belongs to no motion is distributed in
+/// proportion.
 fn scale_seconds(solution: &mut Solution, took: f64) {
     let points = |patch: &PatchSolution| patch.points.len();
     let count: usize = solution.patches.iter().map(points).sum();
@@ -62,7 +62,7 @@ fn scale_seconds(solution: &mut Solution, took: f64) {
     }
 }
 
-/// Sets what is rounding of larger numbers to 0.
+/// Sets values that are rounding residues of larger numbers to 0.
 fn clear_dust(case: &CheckedCase, solution: &mut Solution) {
     let (mut limit_all, mut moment_all) = (0.0, 0.0);
     let mut length_all = 0.0_f64;
@@ -102,14 +102,14 @@ fn clear_dust(case: &CheckedCase, solution: &mut Solution) {
     clear(&mut solution.origin.y_mm, length_all);
 }
 
-/// 0 in place of a number that is dust on its scale, and of −0.
+/// Replaces a rounding residue relative to `scale`, and −0, by 0.
 fn clear(value: &mut f64, scale: f64) {
     if value.abs() <= DUST * scale {
         *value = 0.0;
     }
 }
 
-/// Remarks on numbers that no wheel and rail have; `before` motions of the case come before the first of these.
+/// Remarks on numbers that are implausible for wheel and rail; `before` is the number of motions of the case before the first of these.
 fn implausible(solution: &Solution, before: usize) -> Vec<RemarkEntry> {
     let alone = solution.patches.len() == 1;
     let force = solution.patches.iter().map(|patch| patch.normal_force_n);

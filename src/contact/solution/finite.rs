@@ -1,4 +1,4 @@
-//! Is every number of an answer a number? Looks at all that a client could read, by name.
+//! Checks that every number a client can read in an answer is finite, and names the first that is not.
 
 use std::fmt::{self, Display};
 
@@ -74,7 +74,7 @@ fn first_of(all: &[(&str, Option<&Vec<f64>>)]) -> Option<String> {
     })
 }
 
-/// The path to a number that is not finite, from the inside out while it is put together.
+/// The path to a number that is not finite; assembled from the innermost name outwards.
 #[derive(Debug)]
 struct Path(String);
 
@@ -101,7 +101,7 @@ impl Error for Path {
 /// A serializer that writes nothing and fails at the first number that is not finite.
 struct Finder;
 
-/// A list, map or structure that is looked through: the number of the next item, the name of the next value.
+/// A list, map or structure being searched: the index of the next item, or the name of the next value.
 #[derive(Default)]
 struct Members {
     next: usize,
@@ -122,7 +122,7 @@ fn member<T: Serialize + ?Sized>(name: &str, value: &T) -> Result<(), Path> {
     look.map_err(|path| path.under(format_args!(".{name}")))
 }
 
-/// Lists and tuples are looked through alike.
+/// Lists and tuples are searched in the same way.
 macro_rules! items {
     ($($kind:ident),+) => {
         $(impl $kind for Members {
@@ -178,7 +178,7 @@ impl SerializeStruct for Members {
     }
 }
 
-/// Kinds of values that hold no number that could fail to be finite.
+/// Kinds of values that cannot contain a number that is not finite.
 macro_rules! passed {
     ($($method:ident: $kind:ty),+ $(,)?) => {
         $(fn $method(self, _: $kind) -> Result<(), Path> { Ok(()) })+
@@ -293,7 +293,7 @@ impl Serializer for Finder {
     }
 }
 
-/// Answers have no such types; one that gets one is to be looked into as well.
+/// A type that answers do not contain yet. It is reported as an error, so that the search is extended when one does.
 fn unlooked(name: &str) -> Path {
     Path(format!(" (nobody looks into the type {name})"))
 }

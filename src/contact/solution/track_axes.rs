@@ -1,4 +1,4 @@
-//! The answers for the parts of a wheel–rail contact put together, with their places and the sums in track axes.
+//! Merges the answers for the parts of a wheel–rail contact, with their positions and the sums in track axes.
 
 use crate::contact::case::problem::CheckedCase;
 use crate::contact::geometry::frame::Frame;
@@ -19,7 +19,7 @@ const FRAME: &str = "every patch in its own axes: x along rolling (leading edge 
                      z up; forces, moments and tractions act on the lower body, slip is that of the upper body relative to the \
                      lower one";
 
-/// Puts the answers for the parts together, in the order of the wheel's patches; `case` is the whole, `answers` has at
+/// Merges the answers for the parts, in the order of the wheel's patches; `case` is the whole case, `answers` has at
 /// least one entry.
 ///
 /// `total` holds the sums in track axes: `F_x`, `F_y cos α + N sin α` across, `F_y sin α − N cos α` upward, with the contact angle α and
@@ -93,8 +93,8 @@ pub fn merge(
     Ok((solution, fields))
 }
 
-/// A remark on a part of the contact whose first patch has this number in the whole; one on the part as such is given to that
-/// patch, unless the part is the whole.
+/// A remark on a part of the contact, renumbered for the whole; `first` is the index of the part's first patch. A remark without a
+/// patch is attributed to that one, unless the part is the whole contact.
 fn in_wheel(remark: &RemarkEntry, first: usize, alone: bool) -> RemarkEntry {
     let patch = match remark.patch {
         Some(own) => Some(first + own),
@@ -106,7 +106,7 @@ fn in_wheel(remark: &RemarkEntry, first: usize, alone: bool) -> RemarkEntry {
     }
 }
 
-/// By how much the rail's inclination changes over a patch, in rad.
+/// Change of the rail's inclination over a patch, in rad.
 fn turn(geometry: &WheelRail, gap: &PressedGap, across: [f64; 2]) -> Result<f64, SurfaceMissed> {
     let inclination = |y: f64| {
         let rail = geometry.rail_over(&gap.frame, y)?;
@@ -156,7 +156,7 @@ impl Part {
     }
 }
 
-/// Mean place of the parts in track axes, weighted with their normal forces.
+/// Mean position of the parts in track axes, weighted with their normal forces.
 fn load_centre(parts: &[Part]) -> [f64; 2] {
     let force: f64 = parts.iter().map(|part| part.normal_force).sum();
     [0, 1].map(|k| {
