@@ -146,8 +146,17 @@ async fn pictures_that_cannot_be_drawn_say_why() {
     let path = path_of(&server.solve(&case).await);
     for (query, status, kind, word) in [
         ("plot.svg?field=stress", 400, "bad-query", "`traction`"),
-        ("plot.png?width=100", 400, "bad-query", "200 to 2400"),
-        ("plot.svg?width=2401", 400, "bad-query", "200 to 2400"),
+        ("plot.png?width=47", 400, "bad-query", "48 to 2400"),
+        ("plot.svg?width=2401", 400, "bad-query", "48 to 2400"),
+        ("plot.svg?range=3", 400, "bad-query", "`low,high`"),
+        ("plot.svg?range=3,3", 400, "bad-query", "`low,high`"),
+        ("plot.svg?range=0,inf", 400, "bad-query", "`low,high`"),
+        (
+            "plot.svg?field=zones&range=0,1",
+            400,
+            "bad-query",
+            "no scale",
+        ),
         ("plot.svg?patch=1", 400, "bad-query", "patch"),
         ("plot.svg?point=1", 400, "bad-query", "point"),
         ("plot.svg?grid=4x4", 400, "bad-query", "`grid`"),
@@ -167,4 +176,134 @@ async fn pictures_that_cannot_be_drawn_say_why() {
     let path = idle.submit(&example("spin.case.json")).await;
     let answer = idle.get(&format!("{path}/plot.svg")).await;
     assert_problem(&answer, 409, "result-not-ready", "");
+}
+
+/// Every drawn shape: its fill, its stroke and its box `[x from, x to, y from, y to]` in units of the picture.
+fn shapes(svg: &str) -> Vec<(bool, [f64; 4])> {
+    fn gather(group: &resvg::usvg::Group, into: &mut Vec<(bool, [f64; 4])>) {
+        for node in group.children() {
+            match node {
+                resvg::usvg::Node::Group(inner) => gather(inner, into),
+                resvg::usvg::Node::Path(path) => {
+                    let shape = path.abs_bounding_box();
+                    let sides = [shape.left(), shape.right(), shape.top(), shape.bottom()];
+                    into.push((path.fill().is_some(), sides.map(f64::from)));
+                }
+                _ => {}
+            }
+        }
+    }
+    let tree = Tree::from_str(svg, &Options::default()).expect("well-formed SVG");
+    let mut found = Vec::new();
+    gather(tree.root(), &mut found);
+    found
+}
+
+/// A case at default accuracy, of few cells.
+fn at_default_accuracy() -> Value {
+    let mut case = asked("spin.case.json", &everything());
+    case.as_object_mut().expect("a case").remove("solver");
+    case
+}
+
+#[tokio::test]
+async fn values_are_smooth_and_end_at_the_border_of_the_patch() {
+    let server = Server::start().await;
+    let path = path_of(&server.solve(&at_default_accuracy()).await);
+    for field in ["traction", "pressure", "slip", "zones"] {
+        let svg = server
+            .get(&format!("{path}/plot.svg?field={field}&width=160"))
+            .await;
+        // Nothing but the patch is drawn on a small picture; its ellipse of 16 mm by 8 mm is 156 wide.
+        let shapes = shapes(&svg.text);
+        let filled: Vec<[f64; 4]> = shapes
+            .iter()
+            .filter(|(filled, _)| *filled)
+            .map(|s| s.1)
+            .collect();
+        let [left, right, top, bottom] = filled[0];
+        assert!(
+            (right - left - 156.0).abs() < 0.5,
+            "{field}: {:?}",
+            filled[0]
+        );
+        assert!(
+            (bottom - top - 78.0).abs() < 1.0,
+            "{field}: {:?}",
+            filled[0]
+        );
+        // Places are rounded to a tenth, and curves may be missed by less than half a pixel.
+        for (_, inner) in &shapes {
+            let inside = inner[0] >= left - 0.3 && inner[1] <= right + 0.3;
+            let inside = inside && inner[2] >= top - 0.3 && inner[3] <= bottom + 0.3;
+            assert!(inside, "{field}: {inner:?} outside {:?}", filled[0]);
+        }
+        assert!(!svg.text.contains("crispEdges"), "no cells are drawn");
+    }
+}
+
+#[tokio::test]
+async fn pictures_share_a_scale_when_asked() {
+    let server = Server::start().await;
+    let path = path_of(&server.solve(&at_default_accuracy()).await);
+    let get = async |query: &str| {
+        let answer = server
+            .get(&format!("{path}/plot.png?field=pressure&width=100{query}"))
+            .await;
+        assert_eq!(answer.status, 200, "{query}");
+        Pixmap::decode_png(&answer.bytes).expect("a PNG")
+    };
+    let middle = |pixels: &Pixmap| light(pixels, pixels.width() / 2, pixels.height() / 2);
+    let own = get("").await;
+    let result = server.get(&format!("{path}/result")).await.json;
+    let largest = result["patches"][0]["pressure_max_mpa"]
+        .as_f64()
+        .expect("a number");
+    let same = get(&format!("&range=0,{largest}")).await;
+    let wider = get(&format!("&range=0,{}", 3.0 * largest)).await;
+    let above = get(&format!("&range={},{}", 2.0 * largest, 3.0 * largest)).await;
+    assert!((middle(&own) - middle(&same)).abs() < 12.0);
+    assert!(
+        middle(&wider) < 0.6 * middle(&same),
+        "a third of the scale is darker"
+    );
+    assert!(
+        middle(&above) < middle(&wider),
+        "below the scale is its first colour"
+    );
+    let svg = server
+        .get(&format!("{path}/plot.svg?field=pressure&range=-1000,5000"))
+        .await;
+    assert!(
+        svg.text.contains(">−1000<") && svg.text.contains(">5000<"),
+        "the scale shows both ends"
+    );
+}
+
+#[tokio::test]
+async fn small_pictures_are_small_files() {
+    let server = Server::start().await;
+    let path = path_of(&server.solve(&at_default_accuracy()).await);
+    let mut sizes = Vec::new();
+    for (width, most) in [(120, 10_000), (800, 80_000)] {
+        for field in ["traction", "pressure", "slip", "zones"] {
+            for form in ["svg", "png"] {
+                let query = format!("{path}/plot.{form}?field={field}&width={width}");
+                let bytes = server.get(&query).await.bytes;
+                if let Ok(folder) = std::env::var("RAILHEAD_PICTURES") {
+                    std::fs::write(format!("{folder}/{field}-{width}.{form}"), &bytes)
+                        .expect("written");
+                }
+                sizes.push((field, form, width, bytes.len(), most));
+            }
+        }
+    }
+    let large = sizes.iter().filter(|size| form_limit(size));
+    assert_eq!(large.count(), 0, "{sizes:?}");
+    println!("{sizes:?}");
+}
+
+/// Is a file larger than allowed? Pixels of a large picture are not counted.
+fn form_limit((_, form, width, bytes, most): &(&str, &str, u32, usize, usize)) -> bool {
+    bytes > most && (*width == 120 || *form == "svg")
 }

@@ -2,4 +2,5 @@
 
 pub mod outlines;
 pub mod resample;
+pub mod smooth;
 pub mod strip_segments;

@@ -181,6 +181,7 @@ impl Selection {
             patch: self.patch,
             point: self.point,
             width: WIDTH_DEFAULT,
+            range: None,
         };
         let mut response = picture(jobs, memory, id, wish, self.format).await?;
         let vary = HeaderValue::from_static("Accept");

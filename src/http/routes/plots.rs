@@ -25,7 +25,7 @@ use crate::jobs::Jobs;
 /// Width of a picture in pixels when nothing is said.
 pub const WIDTH_DEFAULT: u32 = 800;
 /// Limits of the width in pixels.
-const WIDTH: [u32; 2] = [200, 2400];
+const WIDTH: [u32; 2] = [48, 2400];
 
 query! {
     /// The parameters of a picture.
@@ -44,9 +44,13 @@ query! {
         point: usize as u32 = index();
         /// The patch, counted from 0; 0 when left out
         patch: usize as u32 = index();
-        /// Width in pixels; 800 when left out. The height follows from the patch
-        #[param(minimum = 200, maximum = 2400)]
+        /// Width in pixels; 800 when left out. The height follows from the patch. Below 200 the patch is drawn alone, for lists
+        #[param(minimum = 48, maximum = 2400)]
         width: u32 as u32 = count(WIDTH[0], WIDTH[1]);
+        /// `low,high`: the values at both ends of the scale, in the unit of the field, so that several pictures share one; from 0 to the
+        /// largest value of the picture when left out. Zones have none
+        #[param(example = "0,400")]
+        range: [f64; 2] as String = reader("`low,high`: two numbers, the second above the first", range);
     }
 }
 
@@ -61,13 +65,33 @@ pub struct PlotOptions {
     pub point: usize,
     /// Width in pixels.
     pub width: u32,
+    /// Both ends of the scale, if they are given.
+    pub range: Option<[f64; 2]>,
+}
+
+/// Two finite numbers with a finite way from the first up to the second.
+fn range(text: &str) -> Option<[f64; 2]> {
+    let (low, high) = text.split_once(',')?;
+    let (low, high): (f64, f64) = (low.trim().parse().ok()?, high.trim().parse().ok()?);
+    let wide = high - low;
+    // Ticks of a narrower range could not be told apart.
+    let apart = wide > 1e-9 * low.abs().max(high.abs());
+    (low.is_finite() && high.is_finite() && wide.is_finite() && apart).then_some([low, high])
 }
 
 impl PlotOptions {
     fn read(uri: &Uri) -> Result<PlotOptions, ApiError> {
         let query = PlotQuery::read(uri, &())?;
+        let shown = query.field.unwrap_or(Output::Tractions);
+        if shown == Output::Zones && query.range.is_some() {
+            return Err(ApiError::bad_parameter(
+                "range",
+                "zones have no scale; leave `range` out",
+            ));
+        }
         Ok(PlotOptions {
-            shown: query.field.unwrap_or(Output::Tractions),
+            shown,
+            range: query.range,
             patch: query.patch.unwrap_or(0),
             point: query.point.unwrap_or(0),
             width: query.width.unwrap_or(WIDTH_DEFAULT),
@@ -77,7 +101,7 @@ impl PlotOptions {
 
 /// A picture of a patch as SVG.
 ///
-/// A heat map of the cells with a scale, the border of the stick zone, arrows along the traction or the slip, axes in mm with the same
+/// A smooth heat map inside the border of the patch with a scale, the border of the stick zone, arrows along the traction or the slip, axes in mm with the same
 /// scale, and the rolling direction. Readable without colour.
 #[utoipa::path(
     get,
@@ -158,6 +182,7 @@ pub async fn picture(
         title: job.name.unwrap_or_else(|| format!("job {id}")),
         remarks,
         shown: wish.shown,
+        range: wish.range,
         fields,
         values,
     };

@@ -1,7 +1,10 @@
 //! Colours: a ramp whose lightness rises evenly, so that it reads the same in print without colour, and two for zones.
 
+/// Places at which the ramp is given; linear in between.
+pub const VIRIDIS_PLACES: usize = 17;
+
 /// The map viridis (S. van der Walt, N. Smith and E. Firing 2015, CC0) at 17 even places from 0 to 1; linear in between.
-const VIRIDIS: [[u8; 3]; 17] = [
+const VIRIDIS: [[u8; 3]; VIRIDIS_PLACES] = [
     [68, 1, 84],
     [72, 24, 106],
     [71, 45, 123],
@@ -21,7 +24,7 @@ const VIRIDIS: [[u8; 3]; 17] = [
     [253, 231, 37],
 ];
 
-/// Steps of the ramp in a picture.
+/// Steps of the ramp.
 pub const LEVELS: usize = 128;
 
 /// Cells that stick.
@@ -48,6 +51,12 @@ pub fn level(value: f64) -> usize {
 pub fn ramp(level: usize) -> String {
     let [r, g, b] = rgb(level);
     format!("#{r:02x}{g:02x}{b:02x}")
+}
+
+/// The colour at a share of the ramp from 0 to 1, as `#rrggbb`.
+#[must_use]
+pub fn at(share: f64) -> String {
+    ramp(level(share))
 }
 
 fn rgb(level: usize) -> [u8; 3] {

@@ -1,18 +1,37 @@
-//! Draws a scene as SVG: heat map or zones, the border of the stick zone, arrows, axes in mm and a scale.
+//! Draws a scene as SVG: heat map or zones, the border of the stick zone, arrows, axes in mm and a scale; or small, the patch alone.
 
 use crate::contact::case::words::solver::Output;
+use crate::http::render::picture::bar::colour_bar;
 use crate::http::render::picture::frame::{Frame, WIDTH};
 use crate::http::render::picture::layers;
-use crate::http::render::picture::scene::{Scene, extent, heat};
+use crate::http::render::picture::map::Ground;
+use crate::http::render::picture::scene::{Scene, heat};
 use crate::http::render::picture::svg::{Anchor, FONTS, Svg, escape, px, shorten};
 
 /// Characters of a title that fit.
 const TITLE_MAX: usize = 74;
 
+/// Pictures narrower than this show the patch alone: nothing written on them could be read.
+const ALONE_BELOW: u32 = 200;
+/// Colours of a scale: from this many on the eye sees no steps.
+const BANDS: u32 = 48;
+/// Colours in a picture of the patch alone.
+const BANDS_ALONE: u32 = 14;
+/// By how much a curve may be missed, in pixels.
+const TOLERANCE: f64 = 0.2;
+
 /// Draws a scene as SVG, `width` pixels wide.
 #[must_use]
 pub fn draw(scene: &Scene, width: u32) -> String {
-    let frame = Frame::around(extent(&scene.fields));
+    if width < ALONE_BELOW {
+        return draw_alone(scene, width);
+    }
+    let ground = Ground::of(
+        scene,
+        BANDS,
+        TOLERANCE * (WIDTH / f64::from(width)).max(1.0),
+    );
+    let frame = Frame::around(ground.extent());
     let height = frame.height();
     let shown_height = f64::from(width) * height / WIDTH;
     let mut svg = Svg::default();
@@ -48,18 +67,13 @@ pub fn draw(scene: &Scene, width: u32) -> String {
     layers::grid(&mut svg, &frame);
     match heat(scene) {
         Some(heat) => {
-            let largest = heat.values.iter().copied().fold(0.0, f64::max);
-            layers::heat_map(&mut svg, &frame, &scene.fields, &heat.values, largest);
-            layers::colour_bar(&mut svg, &frame, &heat, largest);
+            let range = heat.range(scene.range);
+            ground.heat(&mut svg, &frame, &heat, range);
+            colour_bar(&mut svg, &frame, &heat, range);
         }
-        None => layers::zone_map(
-            &mut svg,
-            &frame,
-            &scene.fields,
-            scene.values.zone.as_deref(),
-        ),
+        None => ground.zones(&mut svg, &frame),
     }
-    layers::outlines_of(&mut svg, &frame, scene);
+    ground.borders(&mut svg, &frame);
     let arrows = match scene.shown {
         Output::Slip => (&scene.values.slip_x, &scene.values.slip_y),
         Output::Pressure => (&None, &None),
@@ -71,6 +85,25 @@ pub fn draw(scene: &Scene, width: u32) -> String {
     };
     layers::axes(&mut svg, &frame);
     layers::legend(&mut svg, &frame, scene, drawn);
+    svg.raw("</svg>\n");
+    svg.finish()
+}
+
+/// Draws the patch of a scene alone, for lists.
+fn draw_alone(scene: &Scene, width: u32) -> String {
+    let ground = Ground::of(scene, BANDS_ALONE, 1.5 * TOLERANCE);
+    let frame = Frame::alone(ground.extent(), f64::from(width));
+    let height = px(frame.height_alone());
+    let mut svg = Svg::default();
+    svg.raw(&format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" role=\"img\">\n",
+    ));
+    svg.raw(&format!("<title>{}</title>\n", escape(&scene.title)));
+    match heat(scene) {
+        Some(heat) => ground.heat(&mut svg, &frame, &heat, heat.range(scene.range)),
+        None => ground.zones(&mut svg, &frame),
+    }
+    ground.border_thin(&mut svg, &frame);
     svg.raw("</svg>\n");
     svg.finish()
 }

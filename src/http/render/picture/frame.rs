@@ -14,6 +14,8 @@ const AREA_HEIGHT: [f64; 2] = [220.0, 520.0];
 const BELOW: f64 = 88.0;
 /// Share of the patch left free around it.
 const MARGIN: f64 = 0.06;
+/// Room around the patch in a picture without axes.
+const ALONE_MARGIN: f64 = 2.0;
 
 /// Maps mm to units of the picture; y points upward in mm and downward in the picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,6 +43,31 @@ impl Frame {
             shown: [x - half_x, x + half_x, y - half_y, y + half_y],
             scale,
         }
+    }
+
+    /// Shows a box alone, `width` units wide, without room for axes.
+    #[must_use]
+    pub fn alone([x0, x1, y0, y1]: [f64; 4], width: f64) -> Frame {
+        let inner = width - 2.0 * ALONE_MARGIN;
+        let (wide, high) = (
+            (x1 - x0).max(f64::MIN_POSITIVE),
+            (y1 - y0).max(f64::MIN_POSITIVE),
+        );
+        let height = (inner * high / wide).clamp(0.25 * inner, 1.5 * inner);
+        let scale = (inner / wide).min(height / high);
+        let (half_x, half_y) = (0.5 * inner / scale, 0.5 * height / scale);
+        let (x, y) = (0.5 * (x0 + x1), 0.5 * (y0 + y1));
+        Frame {
+            area: [ALONE_MARGIN, ALONE_MARGIN, inner, height],
+            shown: [x - half_x, x + half_x, y - half_y, y + half_y],
+            scale,
+        }
+    }
+
+    /// Height of a picture without axes.
+    #[must_use]
+    pub fn height_alone(&self) -> f64 {
+        self.area[3] + 2.0 * ALONE_MARGIN
     }
 
     /// Height of the whole picture.

@@ -3,13 +3,11 @@
 use std::fmt::Write;
 
 use crate::contact::case::words::solver::Output;
-use crate::contact::post::outlines::outline::{outlines, patch_outline};
 use crate::contact::post::resample::resample;
 use crate::contact::solution::words::PatchCells;
-use crate::contact::solution::zone::Zone;
-use crate::http::render::picture::colour::{LEVELS, SLIP, STICK, level, ramp};
-use crate::http::render::picture::frame::{Frame, exponent, ticks};
-use crate::http::render::picture::scene::{Heat, Scene, extent, zones_present};
+use crate::http::render::picture::colour::{SLIP, STICK};
+use crate::http::render::picture::frame::{Frame, ticks};
+use crate::http::render::picture::scene::{Scene, extent, zones_present};
 use crate::http::render::picture::svg::{Anchor, Svg, polyline, px};
 
 /// Distance between arrows.
@@ -47,75 +45,6 @@ pub(super) fn grid(svg: &mut Svg, frame: &Frame) {
         );
     }
     svg.path(&data, "fill=\"none\" stroke=\"#e6e6e6\"");
-}
-
-/// Rectangles of the given cells as one path.
-fn rectangles(frame: &Frame, fields: &PatchCells, cells: impl Iterator<Item = usize>) -> String {
-    let mut data = String::new();
-    for cell in cells {
-        let (dx, dy) = (fields.dx_mm[cell], fields.dy_mm[cell]);
-        let left = fields.x_mm[cell] - 0.5 * dx;
-        let (x, y) = frame.at(left, fields.y_mm[cell] + 0.5 * dy);
-        let (w, h) = (dx * frame.scale, dy * frame.scale);
-        let _ = write!(data, "M{} {}h{}v{}h-{}z", px(x), px(y), px(w), px(h), px(w));
-    }
-    data
-}
-
-/// One rectangle per cell, coloured from 0 to the largest value; cells of one colour are one path.
-pub(super) fn heat_map(
-    svg: &mut Svg,
-    frame: &Frame,
-    fields: &PatchCells,
-    values: &[f64],
-    largest: f64,
-) {
-    let mut cells_at: Vec<Vec<usize>> = vec![Vec::new(); LEVELS];
-    for (cell, value) in values.iter().enumerate() {
-        cells_at[level(value / largest)].push(cell);
-    }
-    // Crisp edges leave no light seams between cells.
-    svg.raw("<g shape-rendering=\"crispEdges\">\n");
-    for (level, cells) in cells_at.into_iter().enumerate() {
-        if !cells.is_empty() {
-            let data = rectangles(frame, fields, cells.into_iter());
-            svg.path(&data, &format!("fill=\"{}\"", ramp(level)));
-        }
-    }
-    svg.raw("</g>\n");
-}
-
-/// One rectangle per cell in the colour of its zone.
-pub(super) fn zone_map(svg: &mut Svg, frame: &Frame, fields: &PatchCells, zones: Option<&[Zone]>) {
-    svg.raw("<g shape-rendering=\"crispEdges\">\n");
-    for (zone, colour) in [(Zone::Stick, STICK), (Zone::Slip, SLIP)] {
-        let of = zones.unwrap_or(&[]).iter().enumerate();
-        let cells = of
-            .filter(|(_, found)| **found == zone)
-            .map(|(cell, _)| cell);
-        let data = rectangles(frame, fields, cells);
-        svg.path(&data, &format!("fill=\"{colour}\""));
-    }
-    svg.raw("</g>\n");
-}
-
-/// The border of the patch, and of the stick zone where zones are known.
-pub(super) fn outlines_of(svg: &mut Svg, frame: &Frame, scene: &Scene) {
-    let path = |loops: Vec<Vec<[f64; 2]>>| {
-        let data = loops
-            .into_iter()
-            .map(|points| polyline(points.into_iter().map(|[x, y]| frame.at(x, y)), true));
-        data.collect::<String>()
-    };
-    let patch = path(patch_outline(&scene.fields));
-    svg.path(&patch, "fill=\"none\" stroke=\"#111\" stroke-width=\"1.2\"");
-    if zones_present(scene).0 {
-        let zones = scene.values.zone.as_deref();
-        let stick = path(outlines(&scene.fields, zones, Some(Zone::Stick)));
-        // White within black shows on every colour of the ramp.
-        svg.path(&stick, "fill=\"none\" stroke=\"#000\" stroke-width=\"3.4\"");
-        svg.path(&stick, "fill=\"none\" stroke=\"#fff\" stroke-width=\"1.6\"");
-    }
 }
 
 /// Arrows on a regular grid, each beginning at its sample; says whether there was anything to draw.
@@ -240,7 +169,7 @@ pub(super) fn axes(svg: &mut Svg, frame: &Frame) {
 }
 
 /// A number at a tick; never a minus before zero.
-fn label(value: f64, digits: usize) -> String {
+pub(super) fn label(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$}");
     let text = if text.trim_start_matches(['-', '0', '.']).is_empty() {
         text.trim_start_matches('-').to_owned()
@@ -248,78 +177,6 @@ fn label(value: f64, digits: usize) -> String {
         text
     };
     text.replace('-', "−")
-}
-
-/// The scale of the heat map, from 0 to the largest value.
-pub(super) fn colour_bar(svg: &mut Svg, frame: &Frame, heat: &Heat, largest: f64) {
-    let [left, y, width, height] = frame.area;
-    let x = left + width + 26.0;
-    svg.raw("<g shape-rendering=\"crispEdges\">\n");
-    #[expect(clippy::cast_precision_loss, reason = "a few steps")]
-    for step in 0..LEVELS {
-        let share = (step + 1) as f64 / LEVELS as f64;
-        let attributes = format!(
-            "x=\"{}\" y=\"{}\" width=\"18\" height=\"{}\" fill=\"{}\"",
-            px(x),
-            px(y + height * (1.0 - share)),
-            px(height / LEVELS as f64 + 0.6),
-            ramp(step)
-        );
-        svg.element("rect", &attributes);
-    }
-    svg.raw("</g>\n");
-    let (px_x, px_y, px_height) = (px(x), px(y), px(height));
-    svg.element(
-        "rect",
-        &format!("x=\"{px_x}\" y=\"{px_y}\" width=\"18\" height=\"{px_height}\" fill=\"none\" stroke=\"#333\""),
-    );
-    let power = exponent(largest);
-    let factor = 10f64.powi(power);
-    let (values, digits) = ticks(0.0, largest / factor, height / 45.0);
-    for tick in values {
-        let at = y + height * (1.0 - tick * factor / largest);
-        svg.path(
-            &format!("M{} {}h5", px(x + 18.0), px(at)),
-            "stroke=\"#333\"",
-        );
-        svg.text(
-            (x + 27.0, at + 4.0),
-            12.0,
-            Anchor::Start,
-            "",
-            &label(tick, digits),
-        );
-    }
-    let unit = match (power, heat.unit) {
-        (0, "") => String::new(),
-        (0, unit) => format!(" in {unit}"),
-        (power, unit) => format!(" in {} {unit}", power_of_ten(power))
-            .trim_end()
-            .to_owned(),
-    };
-    let (place_x, place_y) = (x + 92.0, y + 0.5 * height);
-    let turned = format!("transform=\"rotate(-90 {} {})\"", px(place_x), px(place_y));
-    let text = format!("{}{unit}", heat.label);
-    svg.text((place_x, place_y), 13.0, Anchor::Middle, &turned, &text);
-}
-
-/// `10⁻³` and the like.
-fn power_of_ten(power: i32) -> String {
-    let raised = |c: char| match c {
-        '-' => '⁻',
-        '1' => '¹',
-        '2' => '²',
-        '3' => '³',
-        '0' => '⁰',
-        c => c
-            .to_digit(10)
-            .and_then(|digit| char::from_u32(0x2070 + digit))
-            .unwrap_or(c),
-    };
-    format!(
-        "10{}",
-        power.to_string().chars().map(raised).collect::<String>()
-    )
 }
 
 /// What lines and arrows mean, below the axes.

@@ -1,6 +1,7 @@
 //! What a picture shows, and what follows from it: the coloured values, the box around the cells, the zones.
 
 use crate::contact::case::words::solver::Output;
+use crate::contact::post::smooth::sheet::AtBorder;
 use crate::contact::solution::words::{PatchCells, PointFields};
 use crate::contact::solution::zone::Zone;
 
@@ -17,6 +18,8 @@ pub struct Scene {
     pub fields: PatchCells,
     /// The values of one motion.
     pub values: PointFields,
+    /// The values at both ends of the scale; from 0 to the largest where nothing is said.
+    pub range: Option<[f64; 2]>,
 }
 
 /// The coloured values: magnitudes per cell, their name and unit.
@@ -27,6 +30,16 @@ pub struct Heat {
     pub label: &'static str,
     /// Their unit; empty if they have none.
     pub unit: &'static str,
+    /// What they do at the border of the patch.
+    pub edge: AtBorder,
+}
+
+impl Heat {
+    /// Both ends of the scale, the second above the first.
+    pub fn range(&self, asked: Option<[f64; 2]>) -> [f64; 2] {
+        let largest = self.values.iter().copied().fold(0.0, f64::max);
+        asked.unwrap_or([0.0, if largest > 0.0 { largest } else { 1.0 }])
+    }
 }
 
 /// The magnitudes that a heat map shows; `None` for zones.
@@ -41,16 +54,19 @@ pub fn heat(scene: &Scene) -> Option<Heat> {
             values: magnitude(&values.traction_x_mpa, &values.traction_y_mpa),
             label: "traction",
             unit: "MPa",
+            edge: AtBorder::Vanishes,
         }),
         Output::Pressure => Some(Heat {
             values: scene.fields.pressure_mpa.clone().unwrap_or_default(),
             label: "pressure",
             unit: "MPa",
+            edge: AtBorder::Vanishes,
         }),
         Output::Slip => Some(Heat {
             values: magnitude(&values.slip_x, &values.slip_y),
             label: "slip / rolling speed",
             unit: "",
+            edge: AtBorder::Continues,
         }),
         Output::Zones | Output::Resultants => None,
     }

@@ -89,6 +89,81 @@ pub fn polyline(points: impl IntoIterator<Item = (f64, f64)>, closed: bool) -> S
     data
 }
 
+/// Closed curves through points, to a tenth: every point within `tolerance` of a straight line through its neighbours is left out.
+#[must_use]
+pub fn curves(loops: impl IntoIterator<Item = Vec<(f64, f64)>>, tolerance: f64) -> String {
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "places in a picture, in tenths"
+    )]
+    let tenths = |(x, y): (f64, f64)| [(10.0 * x).round() as i64, (10.0 * y).round() as i64];
+    let mut data = String::new();
+    for points in loops {
+        let Some(&first) = points.first() else {
+            continue;
+        };
+        let mut kept = vec![first];
+        // The point farthest from the first divides a closed curve into two open ones.
+        let far = |at: &(f64, f64)| (at.0 - first.0).hypot(at.1 - first.1);
+        let middle = (0..points.len())
+            .max_by(|a, b| far(&points[*a]).total_cmp(&far(&points[*b])))
+            .unwrap_or(0);
+        simplify(&points[..=middle], tolerance, &mut kept);
+        let back: Vec<(f64, f64)> = points[middle..].iter().copied().chain([first]).collect();
+        simplify(&back, tolerance, &mut kept);
+        let [mut x, mut y] = tenths(first);
+        let mut steps = String::new();
+        for point in &kept[1..kept.len() - 1] {
+            let [to_x, to_y] = tenths(*point);
+            if (to_x, to_y) != (x, y) {
+                let _ = write!(steps, "{}{}", step(to_x - x), step(to_y - y));
+                (x, y) = (to_x, to_y);
+            }
+        }
+        if !steps.is_empty() {
+            let [x, y] = tenths(first);
+            let _ = write!(
+                data,
+                "M{}{}l{}z",
+                step(x).trim_start(),
+                step(y),
+                steps.trim_start()
+            );
+        }
+    }
+    data
+}
+
+/// A number in tenths, with what divides it from the number before.
+fn step(tenths: i64) -> String {
+    let sign = if tenths < 0 { "-" } else { " " };
+    let (whole, rest) = (tenths.abs() / 10, tenths.abs() % 10);
+    match (whole, rest) {
+        (whole, 0) => format!("{sign}{whole}"),
+        (0, rest) => format!("{sign}.{rest}"),
+        (whole, rest) => format!("{sign}{whole}.{rest}"),
+    }
+}
+
+/// Adds what follows the first point, without what lies within the tolerance of the rest (D. H. Douglas and T. K. Peucker, 1973).
+fn simplify(points: &[(f64, f64)], tolerance: f64, kept: &mut Vec<(f64, f64)>) {
+    let (Some(&from), Some(&to)) = (points.first(), points.last()) else {
+        return;
+    };
+    let (dx, dy) = (to.0 - from.0, to.1 - from.1);
+    let length = dx.hypot(dy).max(f64::MIN_POSITIVE);
+    let away = |at: &(f64, f64)| ((at.0 - from.0) * dy - (at.1 - from.1) * dx).abs() / length;
+    let farthest = (1..points.len().saturating_sub(1))
+        .max_by(|a, b| away(&points[*a]).total_cmp(&away(&points[*b])));
+    match farthest {
+        Some(middle) if away(&points[middle]) > tolerance => {
+            simplify(&points[..=middle], tolerance, kept);
+            simplify(&points[middle..], tolerance, kept);
+        }
+        _ => kept.push(to),
+    }
+}
+
 /// Text as XML character data. What XML cannot hold, other control characters, and marks that turn the direction of the text
 /// beyond its end are replaced by U+FFFD.
 #[must_use]
@@ -139,6 +214,25 @@ mod tests {
         for (value, text) in [(1.0, "1"), (-0.001, "0"), (12.345, "12.35"), (100.0, "100")] {
             assert_eq!(px(value), text);
         }
+    }
+
+    #[test]
+    fn curves_keep_their_corners_and_lose_what_lies_between() {
+        let square = [
+            (0.0, 0.0),
+            (5.0, 0.01),
+            (10.0, 0.0),
+            (10.0, 10.0),
+            (4.0, 10.0),
+            (0.0, 10.0),
+        ];
+        assert_eq!(curves([square.to_vec()], 0.1), "M0 0l10 0 0 10-10 0z");
+        let dot = vec![(1.0, 1.0), (1.01, 1.0), (1.0, 1.01)];
+        assert_eq!(curves([dot, Vec::new()], 0.1), "");
+        assert_eq!(
+            curves([vec![(0.5, 1.0), (0.0, 2.5), (-0.4, 1.0)]], 0.1),
+            "M.5 1l-.5 1.5-.4-1.5z"
+        );
     }
 
     #[test]

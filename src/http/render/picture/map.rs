@@ -1,0 +1,213 @@
+//! The coloured ground of a picture: values or zones inside the border of the patch, and the lines around them.
+
+use std::fmt::Write;
+
+use crate::contact::post::outlines::outline::{outlines, patch_outline};
+use crate::contact::post::smooth::sheet::{AtBorder, Sheet};
+use crate::contact::solution::words::PatchCells;
+use crate::contact::solution::zone::Zone;
+use crate::http::render::picture::colour::{SLIP, STICK, at};
+use crate::http::render::picture::frame::Frame;
+use crate::http::render::picture::scene::{Heat, Scene, extent, zones_present};
+use crate::http::render::picture::svg::{Svg, curves, polyline, px};
+
+/// Where and how finely a patch is drawn.
+pub(super) struct Ground<'a> {
+    pub scene: &'a Scene,
+    /// Absent where the patch has gaps or very few strips: then every cell has its own colour.
+    pub sheet: Option<Sheet>,
+    /// Colours between both ends of the scale.
+    pub bands: u32,
+    /// By how much a curve may be missed, in units of the picture.
+    pub tolerance: f64,
+}
+
+impl<'a> Ground<'a> {
+    pub(super) fn of(scene: &'a Scene, bands: u32, tolerance: f64) -> Ground<'a> {
+        let sheet = Sheet::new(&scene.fields);
+        Ground {
+            scene,
+            sheet,
+            bands,
+            tolerance,
+        }
+    }
+
+    /// Box around the patch in mm.
+    pub(super) fn extent(&self) -> [f64; 4] {
+        let cells = || extent(&self.scene.fields);
+        self.sheet.as_ref().map_or_else(cells, Sheet::extent)
+    }
+
+    fn curves(&self, frame: &Frame, loops: Vec<Vec<[f64; 2]>>) -> String {
+        let placed = loops
+            .into_iter()
+            .map(|points| points.into_iter().map(|[x, y]| frame.at(x, y)).collect());
+        curves(placed, self.tolerance)
+    }
+
+    /// The band of a value of the scale, from 0.
+    fn band(&self, value: f64, [low, high]: [f64; 2]) -> u32 {
+        let share = ((value - low) / (high - low)).clamp(0.0, 1.0);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "clamped to the bands; a NaN becomes 0"
+        )]
+        let band = (share * f64::from(self.bands)) as u32;
+        band.min(self.bands - 1)
+    }
+
+    fn colour(&self, band: u32) -> String {
+        at((f64::from(band) + 0.5) / f64::from(self.bands))
+    }
+
+    /// Values between both ends of a scale; every band lies on those below it, so that there are no seams.
+    pub(super) fn heat(&self, svg: &mut Svg, frame: &Frame, heat: &Heat, range: [f64; 2]) {
+        let Some(sheet) = &self.sheet else {
+            return self.cells(
+                svg,
+                frame,
+                self.bands,
+                |cell| self.band(heat.values[cell], range),
+                |band| self.colour(band),
+            );
+        };
+        let nodes = sheet.nodes(&heat.values, &self.scene.fields, heat.edge);
+        let bands = heat.values.iter().map(|value| self.band(*value, range));
+        let (lowest, highest) =
+            bands.fold((self.bands, 0), |(a, b), band| (a.min(band), b.max(band)));
+        let lowest = if heat.edge == AtBorder::Vanishes {
+            0
+        } else {
+            lowest
+        };
+        let border = self.curves(frame, vec![sheet.border()]);
+        svg.path(&border, &format!("fill=\"{}\"", self.colour(lowest)));
+        for band in lowest + 1..=highest {
+            let share = f64::from(band) / f64::from(self.bands);
+            let level = range[0] + share * (range[1] - range[0]);
+            let data = self.curves(frame, sheet.reaching(&nodes, level));
+            if !data.is_empty() {
+                svg.path(&data, &format!("fill=\"{}\"", self.colour(band)));
+            }
+        }
+    }
+
+    /// Stick and slip, each in its colour.
+    pub(super) fn zones(&self, svg: &mut Svg, frame: &Frame) {
+        let Some(zones) = self.scene.values.zone.as_deref() else {
+            return;
+        };
+        let Some((sheet, stick)) = self.smooth_stick() else {
+            let of = |cell: usize| u32::from(zones[cell] == Zone::Slip);
+            let colour = |zone: u32| [STICK, SLIP][zone as usize].to_owned();
+            return self.cells(svg, frame, 2, of, colour);
+        };
+        let border = self.curves(frame, vec![sheet.border()]);
+        svg.path(&border, &format!("fill=\"{SLIP}\""));
+        let stick = self.curves(frame, stick);
+        svg.path(&stick, &format!("fill=\"{STICK}\" fill-rule=\"evenodd\""));
+    }
+
+    fn smooth_stick(&self) -> Option<(&Sheet, Vec<Vec<[f64; 2]>>)> {
+        let sheet = self.sheet.as_ref()?;
+        let stick = sheet.stick(&self.scene.fields, &self.scene.values)?;
+        Some((sheet, stick))
+    }
+
+    /// One rectangle for each run of cells of one class.
+    fn cells(
+        &self,
+        svg: &mut Svg,
+        frame: &Frame,
+        classes: u32,
+        class: impl Fn(usize) -> u32,
+        colour: impl Fn(u32) -> String,
+    ) {
+        let fields = &self.scene.fields;
+        let classed: Vec<u32> = (0..fields.x_mm.len()).map(class).collect();
+        // Crisp edges leave no light seams between cells.
+        svg.raw("<g shape-rendering=\"crispEdges\">\n");
+        for wanted in 0..classes {
+            let data = rectangles(frame, fields, |cell| classed[cell] == wanted);
+            if !data.is_empty() {
+                svg.path(&data, &format!("fill=\"{}\"", colour(wanted)));
+            }
+        }
+        svg.raw("</g>\n");
+    }
+
+    /// The border of the stick zone as a thin line, for small pictures.
+    pub(super) fn border_thin(&self, svg: &mut Svg, frame: &Frame) {
+        if let Some((_, stick)) = self.smooth_stick() {
+            let stick = self.curves(frame, stick);
+            if !stick.is_empty() {
+                svg.path(&stick, "fill=\"none\" stroke=\"#fff\"");
+            }
+        }
+    }
+
+    /// The border of the patch, and of the stick zone where zones are known.
+    pub(super) fn borders(&self, svg: &mut Svg, frame: &Frame) {
+        let scene = self.scene;
+        let path = |loops: Vec<Vec<[f64; 2]>>| {
+            let data = loops
+                .into_iter()
+                .map(|points| polyline(points.into_iter().map(|[x, y]| frame.at(x, y)), true));
+            data.collect::<String>()
+        };
+        let patch = match &self.sheet {
+            Some(sheet) => self.curves(frame, vec![sheet.border()]),
+            None => path(patch_outline(&scene.fields)),
+        };
+        svg.path(&patch, "fill=\"none\" stroke=\"#111\" stroke-width=\"1.2\"");
+        if !zones_present(scene).0 {
+            return;
+        }
+        let stick = match self.smooth_stick() {
+            Some((_, stick)) => self.curves(frame, stick),
+            None => {
+                let zones = scene.values.zone.as_deref();
+                path(outlines(&scene.fields, zones, Some(Zone::Stick)))
+            }
+        };
+        // White within black shows on every colour of the ramp.
+        svg.path(
+            &stick,
+            "fill=\"none\" stroke=\"#000\" stroke-width=\"3.4\" stroke-linejoin=\"round\"",
+        );
+        svg.path(
+            &stick,
+            "fill=\"none\" stroke=\"#fff\" stroke-width=\"1.6\" stroke-linejoin=\"round\"",
+        );
+    }
+}
+
+/// Rectangles of the chosen cells as one path; neighbours along a strip are one.
+fn rectangles(frame: &Frame, fields: &PatchCells, chosen: impl Fn(usize) -> bool) -> String {
+    let mut data = String::new();
+    let mut cell = 0;
+    while cell < fields.x_mm.len() {
+        let first = cell;
+        cell += 1;
+        if !chosen(first) {
+            continue;
+        }
+        let end = |cell: usize| fields.x_mm[cell] + 0.5 * fields.dx_mm[cell];
+        let joins = |cell: usize| {
+            let start = fields.x_mm[cell] - 0.5 * fields.dx_mm[cell];
+            fields.strip[cell] == fields.strip[first]
+                && (start - end(cell - 1)).abs() <= 1e-6 * fields.dx_mm[cell]
+        };
+        while cell < fields.x_mm.len() && chosen(cell) && joins(cell) {
+            cell += 1;
+        }
+        let left = fields.x_mm[first] - 0.5 * fields.dx_mm[first];
+        let dy = fields.dy_mm[first];
+        let (x, y) = frame.at(left, fields.y_mm[first] + 0.5 * dy);
+        let (w, h) = ((end(cell - 1) - left) * frame.scale, dy * frame.scale);
+        let _ = write!(data, "M{} {}h{}v{}h-{}z", px(x), px(y), px(w), px(h), px(w));
+    }
+    data
+}
