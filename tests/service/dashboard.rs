@@ -134,7 +134,10 @@ async fn a_client_learns_who_it_is_and_what_it_uses() {
     );
     let methods = server.get("/v1/methods").await.json;
     assert_eq!(me["quota"]["queued"], methods["limits"]["queue_max"]);
-    assert_eq!(me["limits"]["streams"], methods["limits"]["streams_max"]);
+    assert_eq!(
+        me["limits"]["streams_max"],
+        methods["limits"]["streams_max"]
+    );
 }
 
 #[tokio::test]

@@ -5,6 +5,7 @@ mod admission;
 mod api;
 mod batch_columns;
 mod batch_deletion;
+mod batch_memory;
 mod batch_tables;
 mod batches;
 mod cache;

@@ -6,3 +6,4 @@ pub mod job;
 pub mod problem;
 pub mod result;
 pub mod resultants;
+pub mod tenant_limits;

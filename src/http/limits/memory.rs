@@ -129,6 +129,12 @@ impl Memory {
         share.map(Some).ok_or_else(|| no_memory(ANSWERS, bytes))
     }
 
+    /// Could there ever be memory for an answer of so many bytes?
+    #[must_use]
+    pub fn has_room_for(&self, bytes: usize) -> bool {
+        bytes <= SMALL_BYTES || self.answers.of_one() >= units(bytes) as usize
+    }
+
     /// A turn and memory for an answer of so many bytes; to be taken before anything is loaded for it.
     ///
     /// # Errors

@@ -34,6 +34,12 @@ impl Shares {
         }
     }
 
+    /// The most that one tenant may hold.
+    #[must_use]
+    pub fn of_one(&self) -> usize {
+        self.of_tenant
+    }
+
     /// Takes so many at once if they are free.
     #[must_use]
     pub fn try_take(&self, tenant: &str, many: u32) -> Option<Share> {

@@ -24,6 +24,7 @@ macro_rules! files {
 pub const FILES: &[PageFile] = files!(
     "icon.svg",
     "index.html",
+    "js/adopt.js",
     "js/api.js",
     "js/compare.js",
     "js/compareview.js",

@@ -57,6 +57,12 @@ impl ApiError {
         self
     }
 
+    /// The sentence about this occurrence.
+    #[must_use]
+    pub fn detail(&self) -> &str {
+        &self.problem.detail
+    }
+
     /// The same in other words.
     #[must_use]
     pub fn saying(mut self, detail: impl Into<String>) -> Self {

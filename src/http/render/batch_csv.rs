@@ -1,27 +1,16 @@
 //! Results of a batch as a table: one line per job and motion, or per patch too, with the columns that were asked for.
 
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::solution::words::{ErrorEstimate, PatchSolution, PointSolution, Solution};
-use crate::http::render::csv::{finish, number};
-use crate::jobs::batch::model::{BatchItem, ItemResult};
+use std::ops::Range;
 
-/// Columns of a table for which none are named.
-const DEFAULT: [&str; 21] = [
-    "index",
-    "id",
-    "name",
-    "state",
-    "point",
-    "creepage_x",
-    "creepage_y",
-    "spin_per_mm",
-    "normal_force_n",
-    "force_x_n",
-    "force_y_n",
-    "moment_z_n_mm",
-    "error_force_x_n",
-    "error_force_y_n",
-    "error_moment_z_n_mm",
+use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::solution::words::{PatchSolution, PointSolution, Solution};
+use crate::http::render::csv::{finish, number};
+use crate::http::render::forces::Forces;
+use crate::jobs::batch::model::BatchItem;
+
+/// Columns of a table for which none are named: these, [`Forces::COLUMNS`] and the rest.
+const FIRST: [&str; 5] = ["index", "id", "name", "state", "point"];
+const LAST: [&str; 6] = [
     "friction_power_n",
     "area_mm2",
     "pressure_max_mpa",
@@ -60,7 +49,7 @@ pub struct Columns(Vec<String>);
 
 impl Default for Columns {
     fn default() -> Self {
-        Columns(DEFAULT.map(str::to_owned).into())
+        Columns(default_names().map(str::to_owned).collect())
     }
 }
 
@@ -69,7 +58,7 @@ impl Columns {
     #[must_use]
     pub fn read(text: &str) -> Option<Columns> {
         let known = |name: &str| {
-            DEFAULT.contains(&name)
+            default_names().any(|own| own == name)
                 || MORE.contains(&name)
                 || name.strip_prefix(LABEL).is_some_and(|key| !key.is_empty())
         };
@@ -83,7 +72,7 @@ impl Columns {
     /// The names that there are, in words.
     #[must_use]
     pub fn allowed() -> String {
-        let names: Vec<&str> = DEFAULT.iter().chain(&MORE).copied().collect();
+        let names: Vec<&str> = default_names().chain(MORE).collect();
         format!(
             "names with commas between, of {} and `label:KEY`",
             names.join(", ")
@@ -100,48 +89,55 @@ impl Columns {
         finish(out)
     }
 
-    /// Some lines. Without a result a job has one line, with `error` saying why.
+    /// The line of a job without a result, with `error` saying why.
     ///
     /// # Errors
     /// None that memory does not have.
-    pub fn lines(
+    pub fn write_without_result(
         &self,
-        items: &[BatchItem],
-        error_of: impl Fn(&BatchItem) -> Option<String>,
-    ) -> Result<Vec<u8>, csv::Error> {
-        let mut out = csv::Writer::from_writer(Vec::new());
+        out: &mut csv::Writer<Vec<u8>>,
+        item: &BatchItem,
+        error: &str,
+    ) -> Result<(), csv::Error> {
+        out.write_record(self.0.iter().map(|name| match name.as_str() {
+            "error" => error.to_owned(),
+            name => of_job(item, name).unwrap_or_default(),
+        }))
+    }
+
+    /// The lines of these motions of a job.
+    ///
+    /// # Errors
+    /// None that memory does not have.
+    pub fn write(
+        &self,
+        out: &mut csv::Writer<Vec<u8>>,
+        item: &BatchItem,
+        solution: &Solution,
+        points: Range<usize>,
+    ) -> Result<(), csv::Error> {
         let by_patch = self.0.iter().any(|name| name == "patch");
-        for item in items {
-            let solution = match &item.result {
-                Some(ItemResult::Solution(text)) => serde_json::from_slice::<Solution>(text).ok(),
-                _ => None,
+        for point in points {
+            let rows = match by_patch {
+                true => (0..solution.patches.len()).map(Some).collect(),
+                false => vec![None],
             };
-            let Some(solution) = solution else {
-                let error = error_of(item).unwrap_or_default();
-                out.write_record(self.0.iter().map(|name| match name.as_str() {
-                    "error" => error.clone(),
-                    name => of_job(item, name).unwrap_or_default(),
-                }))?;
-                continue;
-            };
-            for point in 0..solution.total.len() {
-                let rows = match by_patch {
-                    true => (0..solution.patches.len()).map(Some).collect(),
-                    false => vec![None],
+            for patch in rows {
+                let row = TableLine {
+                    item,
+                    solution,
+                    point,
+                    patch,
                 };
-                for patch in rows {
-                    let row = TableLine {
-                        item,
-                        solution: &solution,
-                        point,
-                        patch,
-                    };
-                    out.write_record(self.0.iter().map(|name| row.value(name)))?;
-                }
+                out.write_record(self.0.iter().map(|name| row.value(name)))?;
             }
         }
-        finish(out)
+        Ok(())
     }
+}
+
+fn default_names() -> impl Iterator<Item = &'static str> {
+    FIRST.into_iter().chain(Forces::COLUMNS).chain(LAST)
 }
 
 /// What a column says of the job itself.
@@ -220,11 +216,7 @@ impl TableLine<'_> {
                 .map(|(_, point)| of(point))
                 .sum::<Option<f64>>()
         };
-        let motion = self.parts().next().map(|(_, point)| point.motion);
         match name {
-            "creepage_x" => Some(motion?.creepage_x),
-            "creepage_y" => Some(motion?.creepage_y),
-            "spin_per_mm" => Some(motion?.spin_per_mm),
             "normal_force_n" => of_patches(|patch| Some(patch.normal_force_n)),
             "area_mm2" => of_patches(|patch| Some(patch.area_mm2)),
             "friction_limit_n" => of_patches(|patch| patch.friction_limit_n),
@@ -244,30 +236,22 @@ impl TableLine<'_> {
         }
     }
 
-    /// Forces and their errors.
+    /// Motion, forces and their errors.
     fn force(&self, name: &str) -> Option<f64> {
-        let (x, y, moment, error) = match self.patch {
-            None => {
-                let total = self.solution.total.get(self.point)?;
-                let [x, y] = [total.force_x_n, total.force_y_n];
-                (x, y, total.moment_z_n_mm, total.error_estimate)
-            }
+        let first = self.parts().next().map(|(_, point)| point);
+        let motion = first.map(|point| point.motion);
+        let forces = match self.patch {
+            None => Forces::of_total(motion, self.solution.total.get(self.point)?),
             Some(_) => {
-                let (_, point) = self.parts().next()?;
-                let [x, y] = [point.force_x_n, point.force_y_n];
-                (x, y, point.moment_z_n_mm, point.error_estimate)
+                let point = first?;
+                Forces {
+                    motion,
+                    resultants: [point.force_x_n, point.force_y_n, point.moment_z_n_mm],
+                    error: point.error_estimate,
+                }
             }
         };
-        let error = |of: fn(ErrorEstimate) -> f64| error.map(of);
-        match name {
-            "force_x_n" => Some(x),
-            "force_y_n" => Some(y),
-            "moment_z_n_mm" => Some(moment),
-            "error_force_x_n" => error(|error| error.force_x_n),
-            "error_force_y_n" => error(|error| error.force_y_n),
-            "error_moment_z_n_mm" => error(|error| error.moment_z_n_mm),
-            _ => None,
-        }
+        forces.number(name)
     }
 
     /// Where a patch lies, and its force in track axes; nothing for several patches together.

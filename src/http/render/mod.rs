@@ -2,6 +2,7 @@
 
 pub mod batch_csv;
 pub mod csv;
+pub mod forces;
 pub mod npz;
 pub mod picture;
 pub mod pieces;

@@ -5,9 +5,9 @@ use std::ops::Range;
 use axum::body::Body;
 use serde::Serialize;
 
-use crate::contact::solution::words::{ErrorEstimate, Total};
-use crate::http::dto::resultants::{PatchResultants, PointResultants, Resultants, Sum};
+use crate::http::dto::resultants::{PatchResultants, Resultants, Sum};
 use crate::http::render::csv::{finish, number};
+use crate::http::render::forces::Forces;
 use crate::http::render::pieces::body;
 
 /// Motions written at once.
@@ -55,7 +55,7 @@ pub fn json_body(resultants: Resultants) -> Result<Body, serde_json::Error> {
 
 /// One line per patch and motion, then one per motion with the sums over all patches.
 pub fn csv_body(resultants: Resultants, sums: Vec<Sum>) -> Body {
-    let head = line(CSV_COLUMNS);
+    let head = head();
     let mut parts = Vec::new();
     for (place, patch) in resultants.patches.iter().enumerate() {
         parts.extend(ranges(patch.points.len()).map(|range| Section::Points(place, range)));
@@ -88,52 +88,39 @@ fn values<T: Serialize>(all: &[T], range: Range<usize>) -> Result<Vec<u8>, serde
     Ok(text)
 }
 
-const CSV_COLUMNS: [&str; 15] = [
-    "patch",
-    "point",
-    "creepage_x",
-    "creepage_y",
-    "spin_per_mm",
-    "normal_force_n",
-    "force_x_n",
-    "force_y_n",
-    "moment_z_n_mm",
-    "error_force_x_n",
-    "error_force_y_n",
-    "error_moment_z_n_mm",
+/// Before and behind the columns of [`Forces`].
+const PLACE: [&str; 2] = ["patch", "point"];
+const REST: [&str; 3] = [
     "friction_power_n",
     "friction_power_without_spin_n",
     "saturated",
 ];
 
+fn head() -> Result<Vec<u8>, csv::Error> {
+    let mut out = csv::Writer::from_writer(Vec::new());
+    out.write_record(PLACE.iter().chain(&Forces::COLUMNS).chain(&REST))?;
+    finish(out)
+}
+
 fn patch_lines(patch: &PatchResultants, range: Range<usize>) -> Result<Vec<u8>, csv::Error> {
     let mut out = csv::Writer::from_writer(Vec::new());
     let number = patch.patch.to_string();
     for point in &patch.points[range] {
-        let (sum, total) = as_total(patch.normal_force_n, point);
-        out.write_record(csv_line(&number, point.point, &sum, &total))?;
+        let sum = Sum {
+            motion: point.motion,
+            normal_force_n: patch.normal_force_n,
+            friction_power_n: point.friction_power_n,
+            friction_power_without_spin_n: point.friction_power_without_spin_n,
+            saturated: point.saturated,
+        };
+        let forces = Forces {
+            motion: Some(point.motion),
+            resultants: [point.force_x_n, point.force_y_n, point.moment_z_n_mm],
+            error: point.error_estimate,
+        };
+        out.write_record(csv_line(&number, point.point, &sum, &forces))?;
     }
     finish(out)
-}
-
-/// A patch for one motion in the words of a sum over patches.
-fn as_total(normal_force_n: f64, point: &PointResultants) -> (Sum, Total) {
-    let sum = Sum {
-        motion: point.motion,
-        normal_force_n,
-        friction_power_n: point.friction_power_n,
-        friction_power_without_spin_n: point.friction_power_without_spin_n,
-        saturated: point.saturated,
-    };
-    let total = Total {
-        force_x_n: point.force_x_n,
-        force_y_n: point.force_y_n,
-        force_z_n: None,
-        moment_z_n_mm: point.moment_z_n_mm,
-        error_estimate: point.error_estimate,
-        profile_uncertainty: point.profile_uncertainty.as_deref().copied(),
-    };
-    (sum, total)
 }
 
 fn total_lines(
@@ -149,42 +136,30 @@ fn total_lines(
         if let Some((point, sum)) =
             point.and_then(|point| Some((point.point, sums.get(point.point)?)))
         {
-            out.write_record(csv_line("total", point, sum, &resultants.total[place]))?;
+            let forces = Forces::of_total(Some(sum.motion), &resultants.total[place]);
+            out.write_record(csv_line("total", point, sum, &forces))?;
         }
     }
     finish(out)
 }
 
-fn line<const N: usize>(fields: [&str; N]) -> Result<Vec<u8>, csv::Error> {
-    let mut out = csv::Writer::from_writer(Vec::new());
-    out.write_record(fields)?;
-    finish(out)
-}
-
-fn csv_line(patch: &str, point: usize, sum: &Sum, total: &Total) -> [String; 15] {
-    let estimate = |value: fn(&ErrorEstimate) -> f64| {
-        total
-            .error_estimate
-            .as_ref()
-            .map_or_else(String::new, |errors| number(value(errors)))
-    };
-    [
-        patch.to_owned(),
-        point.to_string(),
-        number(sum.motion.creepage_x),
-        number(sum.motion.creepage_y),
-        number(sum.motion.spin_per_mm),
-        number(sum.normal_force_n),
-        number(total.force_x_n),
-        number(total.force_y_n),
-        number(total.moment_z_n_mm),
-        estimate(|errors| errors.force_x_n),
-        estimate(|errors| errors.force_y_n),
-        estimate(|errors| errors.moment_z_n_mm),
+fn csv_line(
+    patch: &str,
+    point: usize,
+    sum: &Sum,
+    forces: &Forces,
+) -> impl IntoIterator<Item = String> {
+    let values = Forces::COLUMNS.map(|name| match name {
+        "normal_force_n" => number(sum.normal_force_n),
+        name => forces.number(name).map_or_else(String::new, number),
+    });
+    let rest = [
         number(sum.friction_power_n),
         number(sum.friction_power_without_spin_n),
         sum.saturated.to_string(),
-    ]
+    ];
+    let place = [patch.to_owned(), point.to_string()];
+    place.into_iter().chain(values).chain(rest)
 }
 
 #[cfg(test)]
@@ -194,7 +169,8 @@ mod tests {
 
     use super::*;
     use crate::contact::case::words::motion::MotionWords;
-    use crate::contact::solution::words::Origin;
+    use crate::contact::solution::words::{Origin, Total};
+    use crate::http::dto::resultants::PointResultants;
 
     fn resultants(patches: usize, points: usize) -> Resultants {
         let point = |point: usize| PointResultants {
@@ -214,7 +190,15 @@ mod tests {
             saturated: false,
         };
         let points: Vec<_> = (0..points).map(point).collect();
-        let total = points.iter().map(|point| as_total(1.0, point).1).collect();
+        let total = points.iter().map(|point| Total {
+            force_x_n: point.force_x_n,
+            force_y_n: point.force_y_n,
+            force_z_n: None,
+            moment_z_n_mm: point.moment_z_n_mm,
+            error_estimate: None,
+            profile_uncertainty: None,
+        });
+        let total = total.collect();
         let patch = |patch: usize| PatchResultants {
             patch,
             normal_force_n: 0.1 + patch as f64,
@@ -242,7 +226,13 @@ mod tests {
             let whole = serde_json::to_value(resultants(patches, points)).unwrap();
             let pieces = text(json_body(resultants(patches, points)).unwrap()).await;
             assert_eq!(serde_json::from_str::<Value>(&pieces).unwrap(), whole);
-            let sum = as_total(1.0, &resultants(1, 1).patches[0].points[0]).0;
+            let sum = Sum {
+                motion: resultants(1, 1).patches[0].points[0].motion,
+                normal_force_n: 1.0,
+                friction_power_n: 0.0,
+                friction_power_without_spin_n: 0.0,
+                saturated: false,
+            };
             let table = csv_body(resultants(patches, points), vec![sum; points]);
             let lines = text(table).await.lines().count();
             let totals = if patches == 0 { 0 } else { points };

@@ -1,18 +1,16 @@
 //! `GET /v1/batches`: the batches of the tenant, filtered, page by page.
 
-use axum::Json;
 use axum::http::Uri;
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::http::dto::batch::BatchAnswer;
 use crate::http::extract::caller::Caller;
-use crate::http::extract::labels::{label, name, time};
-use crate::http::extract::query::{Parameters, Repeated, count, query, reader};
+use crate::http::extract::query::{Parameters, count};
 use crate::http::problem::error::ApiError;
 use crate::http::routes::job_list::{ListProblems, ListTotal};
-use crate::http::routes::next_page::link_next;
+use crate::http::routes::next_page::{answer, list_query};
 use crate::jobs::{BATCH_PAGE_MAX, BatchFilter};
 
 /// Batches in one page of a list when nothing is said.
@@ -29,27 +27,12 @@ pub struct BatchPage {
     count: ListTotal,
 }
 
-query! {
+list_query! {
     /// Filters and page of a list of batches.
-    BatchListQuery(() => ()) {
-        /// Only batches with this label, written `key:value`; may be repeated for batches that have all of them
-        #[param(example = json!(["line:A12"]))]
-        label: Vec<(String, String)> as Vec<String> = Repeated(label());
-        /// Only batches whose name contains this text; the letters A to Z match in either case
-        #[param(min_length = 1, max_length = 200, example = "timetable")]
-        name: String as String = name();
-        /// Only batches submitted at or after this time (RFC 3339)
-        #[param(format = "date-time", example = "2026-01-31T09:30:00Z")]
-        created_after: i64 as String = time();
-        /// Only batches submitted before this time (RFC 3339)
-        #[param(format = "date-time")]
-        created_before: i64 as String = time();
+    BatchListQuery {
         /// Batches in one page; 20 when left out
         #[param(minimum = 1, maximum = 100)]
         limit: u32 as u32 = count(1, BATCH_PAGE_MAX);
-        /// `next_cursor` of the page before, with the same filters
-        #[param(pattern = "^[0-9a-f]{40}$")]
-        cursor: String as String = reader("a cursor of this service", |text| Some(text.to_owned()));
     }
 }
 
@@ -82,6 +65,5 @@ pub async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Response, ApiError> 
         next_cursor: page.next_cursor,
         count: page.total.into(),
     };
-    let response = Json(page).into_response();
-    Ok(link_next(&uri, cursor.as_deref(), response))
+    Ok(answer(&uri, cursor.as_deref(), page))
 }

@@ -4,15 +4,11 @@
 //! seen, so `Last-Event-ID` resumes over lost connections and restarts of the service alike.
 
 use std::convert::Infallible;
-use std::time::Duration;
 
-use axum::Extension;
-use axum::extract::State;
-use axum::http::{HeaderMap, HeaderName, StatusCode};
-use axum::response::sse::{Event, KeepAlive, Sse};
+use axum::http::StatusCode;
+use axum::response::sse::Event;
 use axum::response::{IntoResponse, Response};
 use futures_util::stream::unfold;
-use futures_util::{Stream, StreamExt};
 use serde::Serialize;
 use serde_json::json;
 use utoipa::openapi::extensions::Extensions;
@@ -22,23 +18,13 @@ use utoipa::{PartialSchema, ToSchema};
 use uuid::Uuid;
 
 use crate::http::dto::batch::BatchAnswer;
-use crate::http::extract::accept::{Format, choose};
-use crate::http::extract::caller::{Caller, Credential, revoked};
 use crate::http::extract::ids::{BatchId, JobId};
-use crate::http::limits::concurrency::ConcurrencyLimits;
-use crate::http::limits::holding_body::{HeldShares, hold_while_sent};
 use crate::http::problem::error::ApiError;
 use crate::http::routes::batches::GetBatchProblems;
+use crate::http::routes::event_stream::{EventRequest, changed, event};
 use crate::http::routes::jobs::GetProblems;
 use crate::jobs::Jobs;
 use crate::jobs::model::{Job, State as JobState};
-
-/// A comment is sent when nothing has happened for this long, so that no one in between closes the connection.
-const KEEP_ALIVE: Duration = Duration::from_secs(15);
-/// When a client should connect again after the connection was lost.
-pub const RETRY: Duration = Duration::from_secs(1);
-
-const LAST_EVENT_ID: HeaderName = HeaderName::from_static("last-event-id");
 
 /// The data of an event of a job.
 #[derive(Debug, Serialize, ToSchema)]
@@ -136,29 +122,17 @@ impl JobEvent {
         GetProblems
     )
 )]
-pub async fn job(
-    Caller(jobs): Caller,
-    JobId(id): JobId,
-    State(crowds): State<ConcurrencyLimits>,
-    Extension(held): Extension<HeldShares>,
-    key: Option<Extension<Credential>>,
-    headers: HeaderMap,
-) -> Result<Response, ApiError> {
-    choose(&headers, None, &[Format::Events])?;
+pub async fn job(request: EventRequest, JobId(id): JobId) -> Result<Response, ApiError> {
+    let jobs = request.jobs.clone();
     let job = jobs.get(id).await?;
-    let seen = last_event_id(&headers).and_then(|text| text.parse().ok());
+    let seen = request.seen.as_ref().and_then(|text| text.parse().ok());
     if job.state.ended() && seen == Some(job.version) {
         return Ok(StatusCode::NO_CONTENT.into_response());
     }
-    let place = crowds.stream(jobs.tenant())?;
-    held.release();
-    let revoked = revoked(jobs.clone(), key.map(|Extension(key)| key));
-    let events = unfold(Some(seen), move |seen| {
+    request.answer(unfold(Some(seen), move |seen| {
         let jobs = jobs.clone();
         async move { next_of_job(&jobs, id, seen?).await }
-    });
-    let events = answer(events.take_until(revoked));
-    Ok(hold_while_sent(events, place))
+    }))
 }
 
 /// The next event of a job and what has then been seen; nothing after the final one.
@@ -168,7 +142,7 @@ async fn next_of_job(
     seen: Option<u64>,
 ) -> Option<(Result<Event, Infallible>, Option<Option<u64>>)> {
     let job = changed(jobs.job_changed_since(id, seen).await)?;
-    let event = event(&job.version.to_string(), &JobEvent::of(&job))?;
+    let event = event("state", &job.version.to_string(), &JobEvent::of(&job))?;
     let next = (!job.state.ended()).then_some(Some(job.version));
     Some((Ok(event), next))
 }
@@ -192,30 +166,18 @@ async fn next_of_job(
         GetBatchProblems
     )
 )]
-pub async fn batch(
-    Caller(jobs): Caller,
-    BatchId(id): BatchId,
-    State(crowds): State<ConcurrencyLimits>,
-    Extension(held): Extension<HeldShares>,
-    key: Option<Extension<Credential>>,
-    headers: HeaderMap,
-) -> Result<Response, ApiError> {
-    choose(&headers, None, &[Format::Events])?;
+pub async fn batch(request: EventRequest, BatchId(id): BatchId) -> Result<Response, ApiError> {
+    let jobs = request.jobs.clone();
     let batch = jobs.batch(id).await?;
-    let seen = last_event_id(&headers);
+    let seen = request.seen.clone();
     let (ended, all) = batch.ended();
     if ended == all && seen.as_deref() == Some(&batch.change_tag()) {
         return Ok(StatusCode::NO_CONTENT.into_response());
     }
-    let place = crowds.stream(jobs.tenant())?;
-    held.release();
-    let revoked = revoked(jobs.clone(), key.map(|Extension(key)| key));
-    let events = unfold(Some(seen), move |seen| {
+    request.answer(unfold(Some(seen), move |seen| {
         let jobs = jobs.clone();
         async move { next_of_batch(&jobs, id, seen?).await }
-    });
-    let events = answer(events.take_until(revoked));
-    Ok(hold_while_sent(events, place))
+    }))
 }
 
 async fn next_of_batch(
@@ -225,32 +187,6 @@ async fn next_of_batch(
 ) -> Option<(Result<Event, Infallible>, Option<Option<String>>)> {
     let batch = changed(jobs.batch_changed_since(id, seen.as_deref()).await)?;
     let (mark, (ended, all)) = (batch.change_tag(), batch.ended());
-    let event = event(&mark, &BatchAnswer::from(batch))?;
+    let event = event("state", &mark, &BatchAnswer::from(batch))?;
     Some((Ok(event), (ended < all).then_some(Some(mark))))
-}
-
-/// The stream as an answer.
-pub fn answer(events: impl Stream<Item = Result<Event, Infallible>> + Send + 'static) -> Response {
-    Sse::new(events)
-        .keep_alive(KeepAlive::new().interval(KEEP_ALIVE))
-        .into_response()
-}
-
-/// The change, if there is one; a failure ends the stream, and the client connects again.
-pub fn changed<T>(change: Result<Option<T>, impl std::fmt::Display>) -> Option<T> {
-    change
-        .inspect_err(|reason| tracing::debug!(%reason, "a stream of events ended early"))
-        .ok()
-        .flatten()
-}
-
-fn event<T: Serialize>(id: &str, data: &T) -> Option<Event> {
-    let event = Event::default().event("state").id(id).retry(RETRY);
-    event.json_data(data).ok()
-}
-
-/// What the client says that it saw last.
-pub fn last_event_id(headers: &HeaderMap) -> Option<String> {
-    let value = headers.get(LAST_EVENT_ID)?;
-    value.to_str().ok().map(str::to_owned)
 }

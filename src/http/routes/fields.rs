@@ -1,32 +1,26 @@
 //! `/v1/jobs/{id}/tractions`, `/pressure` and `/slip`: values per cell, or on a regular grid.
 
 use axum::body::Body;
-use axum::extract::State;
-use axum::http::{HeaderMap, HeaderValue, Uri, header};
+use axum::http::{HeaderValue, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
-use uuid::Uuid;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::solution::words::{PatchCells, PointFields};
 use crate::http::dto::cells::{Cells, GriddedField, Outlines, gridded, per_cell};
 use crate::http::dto::result::name_of;
 use crate::http::extract::accept::{Format, choose, one_of};
-use crate::http::extract::caller::Caller;
-use crate::http::extract::ids::JobId;
 use crate::http::extract::query::{Parameters, Reader, index, query, reader, whole};
-use crate::http::layers::etag::{Known, tagged};
 use crate::http::limits::holding_body::hold_while_sent;
-use crate::http::limits::memory::{Memory, Rendering};
+use crate::http::limits::memory::Rendering;
 use crate::http::problem::error::ApiError;
 use crate::http::render::pieces::{csv_body, json_body};
 use crate::http::render::table::{File, Precision, Table};
 use crate::http::render::{npz, vtk};
+use crate::http::routes::part_request::PartRequest;
 use crate::http::routes::plots::{PlotOptions, WIDTH_DEFAULT, picture};
 use crate::http::routes::stored_fields::{FieldProblems, stored};
-use crate::http::state::AppState;
-use crate::jobs::Jobs;
 
 /// Most samples along one axis of a regular grid.
 const GRID_AXIS_MAX: u32 = 1000;
@@ -145,13 +139,14 @@ impl Selection {
     ///
     /// # Errors
     /// `bad-query` with every fault, or `not-acceptable`.
-    pub fn read(uri: &Uri, headers: &HeaderMap, samples_max: usize) -> Result<Self, ApiError> {
-        let query = FieldQuery::read(uri, &samples_max)?;
+    pub fn read(request: &PartRequest) -> Result<Self, ApiError> {
+        let samples_max = request.shared.options.grid_max_samples;
+        let query = FieldQuery::read(&request.uri, &samples_max)?;
         Ok(Selection {
             patch: query.patch.unwrap_or(0),
             point: query.point.unwrap_or(0),
             grid: query.grid,
-            format: choose(headers, query.format, FORMATS)?,
+            format: choose(&request.headers, query.format, FORMATS)?,
             precision: query.precision.unwrap_or_default(),
         })
     }
@@ -162,9 +157,7 @@ impl Selection {
     /// `bad-query` if there is a `grid`, else as [`picture`].
     pub async fn picture(
         &self,
-        jobs: &Jobs,
-        memory: &Memory,
-        id: Uuid,
+        request: &PartRequest,
         shown: Output,
     ) -> Result<Option<Response>, ApiError> {
         if !matches!(self.format, Format::Svg | Format::Png) {
@@ -183,7 +176,7 @@ impl Selection {
             width: WIDTH_DEFAULT,
             range: None,
         };
-        let mut response = picture(jobs, memory, id, wish, self.format).await?;
+        let mut response = picture(request, wish, self.format).await?;
         let vary = HeaderValue::from_static("Accept");
         response.headers_mut().insert(header::VARY, vary);
         Ok(Some(response))
@@ -238,14 +231,8 @@ pub fn grid(samples_max: usize) -> Reader<(usize, usize)> {
         (File = "image/png")
     )), FieldProblems)
 )]
-pub async fn tractions(
-    Caller(jobs): Caller,
-    JobId(id): JobId,
-    State(shared): State<AppState>,
-    uri: Uri,
-    headers: HeaderMap,
-) -> Result<Response, ApiError> {
-    answer(&jobs, &shared, id, &uri, &headers, Output::Tractions).await
+pub async fn tractions(request: PartRequest) -> Result<Response, ApiError> {
+    answer(&request, Output::Tractions).await
 }
 
 /// Pressure of a succeeded job; the same for every motion.
@@ -266,14 +253,8 @@ pub async fn tractions(
         (File = "image/png")
     )), FieldProblems)
 )]
-pub async fn pressure(
-    Caller(jobs): Caller,
-    JobId(id): JobId,
-    State(shared): State<AppState>,
-    uri: Uri,
-    headers: HeaderMap,
-) -> Result<Response, ApiError> {
-    answer(&jobs, &shared, id, &uri, &headers, Output::Pressure).await
+pub async fn pressure(request: PartRequest) -> Result<Response, ApiError> {
+    answer(&request, Output::Pressure).await
 }
 
 /// Slip of a succeeded job: the upper body relative to the lower one, divided by rolling speed.
@@ -294,40 +275,23 @@ pub async fn pressure(
         (File = "image/png")
     )), FieldProblems)
 )]
-pub async fn slip(
-    Caller(jobs): Caller,
-    JobId(id): JobId,
-    State(shared): State<AppState>,
-    uri: Uri,
-    headers: HeaderMap,
-) -> Result<Response, ApiError> {
-    answer(&jobs, &shared, id, &uri, &headers, Output::Slip).await
+pub async fn slip(request: PartRequest) -> Result<Response, ApiError> {
+    answer(&request, Output::Slip).await
 }
 
-async fn answer(
-    jobs: &Jobs,
-    shared: &AppState,
-    id: Uuid,
-    uri: &Uri,
-    headers: &HeaderMap,
-    output: Output,
-) -> Result<Response, ApiError> {
-    let selection = Selection::read(uri, headers, shared.options.grid_max_samples)?;
-    let tag = match Known::of(jobs, id, uri, headers, selection.format).await? {
-        Known::Unchanged(answer) => return Ok(answer),
-        Known::Tag(tag) => tag,
+async fn answer(request: &PartRequest, output: Output) -> Result<Response, ApiError> {
+    let selection = Selection::read(request)?;
+    let answer = async {
+        if let Some(picture) = selection.picture(request, output).await? {
+            return Ok(picture);
+        }
+        let rendering = request.rendering(selection.bytes()).await?;
+        let (jobs, id) = (&request.jobs, request.id);
+        let (cells, values) = stored(jobs, id, selection.patch, selection.point, output).await?;
+        let make = move || Field::of(selection, &[output], cells, values);
+        write_as(rendering, selection, name_of(output), make).await
     };
-    if let Some(picture) = selection.picture(jobs, &shared.memory, id, output).await? {
-        return Ok(tagged(&tag, picture));
-    }
-    let (patch, point) = (selection.patch, selection.point);
-    let rendering = shared.memory.rendering(jobs.tenant(), selection.bytes());
-    let rendering = rendering.await?;
-    let (cells, values) = stored(jobs, id, patch, point, output).await?;
-    let written = write_as(rendering, selection, name_of(output), move || {
-        Field::of(selection, &[output], cells, values)
-    });
-    Ok(tagged(&tag, written.await?))
+    request.unless_known(selection.format, answer).await
 }
 
 /// What an answer is written from.

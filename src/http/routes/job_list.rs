@@ -1,8 +1,7 @@
 //! `GET /v1/jobs`: the jobs of the tenant, filtered, page by page.
 
-use axum::Json;
 use axum::http::Uri;
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 use serde::Serialize;
 use serde_json::Value;
 use utoipa::openapi::{RefOr, Schema};
@@ -11,11 +10,11 @@ use uuid::Uuid;
 
 use crate::http::dto::job::JobAnswer;
 use crate::http::extract::caller::Caller;
-use crate::http::extract::labels::{label, name, time};
-use crate::http::extract::query::{Parameters, Reader, Repeated, count, id, query, reader};
+use crate::http::extract::labels::time;
+use crate::http::extract::query::{Parameters, Reader, Repeated, count, id, reader};
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
-use crate::http::routes::next_page::link_next;
+use crate::http::routes::next_page::{answer, list_query};
 use crate::jobs::model::State as JobState;
 use crate::jobs::{Filter, PAGE_MAX, Total};
 
@@ -108,26 +107,14 @@ problems! {
     ListProblems: BadQuery
 }
 
-query! {
+list_query! {
     /// Filters and page of a list of jobs.
-    ListQuery(() => ()) {
+    ListQuery {
         /// Only jobs in this state; may be repeated for jobs in one of several
         state: Vec<JobState> as Vec<JobState> = Repeated(reader(JobState::ALL.map(JobState::name).join(", "), JobState::from_name));
         /// Only jobs of this batch
         #[param(format = "uuid")]
         batch: Uuid as String = id("batch");
-        /// Only jobs with this label, written `key:value`; may be repeated for jobs that have all of them
-        #[param(example = json!(["line:A12"]))]
-        label: Vec<(String, String)> as Vec<String> = Repeated(label());
-        /// Only jobs whose name contains this text; the letters A to Z match in either case
-        #[param(min_length = 1, max_length = 200, example = "crown")]
-        name: String as String = name();
-        /// Only jobs submitted at or after this time (RFC 3339)
-        #[param(format = "date-time", example = "2026-01-31T09:30:00Z")]
-        created_after: i64 as String = time();
-        /// Only jobs submitted before this time (RFC 3339)
-        #[param(format = "date-time")]
-        created_before: i64 as String = time();
         /// Only jobs that changed at or after this time (RFC 3339), progress aside
         #[param(format = "date-time")]
         updated_after: i64 as String = time();
@@ -137,9 +124,6 @@ query! {
         /// Jobs in one page; 50 when left out
         #[param(minimum = 1, maximum = 1000)]
         limit: u32 as u32 = count(1, PAGE_MAX);
-        /// `next_cursor` of the page before, with the same filters
-        #[param(pattern = "^[0-9a-f]{40}$")]
-        cursor: String as String = reader("a cursor of this service", |text| Some(text.to_owned()));
     }
 }
 
@@ -198,8 +182,7 @@ pub async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Response, ApiError> 
         next_cursor: page.next_cursor,
         count: page.total.into(),
     };
-    let response = Json(page).into_response();
-    Ok(link_next(&uri, cursor.as_deref(), response))
+    Ok(answer(&uri, cursor.as_deref(), page))
 }
 
 #[cfg(test)]

@@ -22,7 +22,7 @@ use crate::http::limits::memory::Memory;
 use crate::http::limits::shares::Share;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
-use crate::http::routes::prefer_wait::{preferred_wait, say_applied, wait_for_end};
+use crate::http::routes::prefer_wait::{Awaited, preferred_wait, say_applied};
 use crate::http::routes::results::result_text;
 use crate::jobs::Jobs;
 use crate::jobs::model::{Job, State as JobState};
@@ -195,16 +195,10 @@ problems! {
         ("Preference-Applied" = String, description = "The wait that was applied, if one was asked for")
     )), GetProblems)
 )]
-pub async fn get(
-    Caller(jobs): Caller,
-    JobId(id): JobId,
-    State(crowds): State<ConcurrencyLimits>,
-    Extension(held): Extension<HeldShares>,
-    headers: HeaderMap,
-) -> Result<Response, ApiError> {
-    let applied = wait_for_end(&jobs, &crowds, &held, id, &headers).await?;
-    let job = Json(JobAnswer::new(jobs.get_with_queue_place(id).await?));
-    Ok(say_applied(job.into_response(), applied))
+pub async fn get(awaited: Awaited) -> Result<Response, ApiError> {
+    let job = awaited.jobs.get_with_queue_place(awaited.id).await?;
+    let job = Json(JobAnswer::new(job));
+    Ok(say_applied(job.into_response(), awaited.applied))
 }
 
 /// The case of a job, as it was submitted.

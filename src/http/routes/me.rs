@@ -7,6 +7,7 @@ use axum::extract::State;
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use crate::http::dto::tenant_limits::TenantLimits;
 use crate::http::extract::caller::Caller;
 use crate::http::options::HttpOptions;
 use crate::http::problem::catalogue::PlainProblems;
@@ -23,7 +24,7 @@ pub struct Me {
     /// What the tenant uses at present.
     used: Used,
     /// Limits of requests.
-    limits: OwnLimits,
+    limits: TenantLimits,
 }
 
 /// What a tenant may use at most.
@@ -45,19 +46,6 @@ pub struct Used {
     /// Number of its jobs in each state.
     #[schema(value_type = BTreeMap<String, u64>)]
     jobs: BTreeMap<&'static str, u64>,
-}
-
-/// Limits of the requests of a tenant.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct OwnLimits {
-    /// Requests under way, streams of events and waits aside.
-    requests: usize,
-    /// Streams of events.
-    streams: usize,
-    /// Requests that wait for the end of a job or a batch.
-    waits: usize,
-    /// Requests per second of one key, or of one address without a key; 0 for any number.
-    requests_per_second: u32,
 }
 
 /// Who the service takes the client for, how many jobs it has, and how many it may have.
@@ -88,11 +76,6 @@ pub async fn me(
                 .map(|state| (state.name(), number(state)))
                 .into(),
         },
-        limits: OwnLimits {
-            requests: options.tenant_requests_max,
-            streams: options.tenant_streams_max,
-            waits: options.tenant_waits_max,
-            requests_per_second: options.requests_per_second,
-        },
+        limits: TenantLimits::of(&options),
     }))
 }

@@ -1,26 +1,20 @@
 //! `/v1/jobs/{id}/plot.svg` and `/plot.png`: a picture of one patch for one motion.
 
-use axum::extract::State;
-use axum::http::{HeaderMap, HeaderValue, Uri, header};
+use axum::http::{HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
-use uuid::Uuid;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::solution::words::PointSolution;
 use crate::http::extract::accept::Format;
-use crate::http::extract::caller::Caller;
-use crate::http::extract::ids::JobId;
 use crate::http::extract::query::{Parameters, count, index, query, reader, require_index};
-use crate::http::layers::etag::{Known, tagged};
 use crate::http::limits::holding_body::hold_while_sent;
-use crate::http::limits::memory::Memory;
 use crate::http::problem::error::ApiError;
 use crate::http::render::picture::draw::draw;
 use crate::http::render::picture::raster;
 use crate::http::render::picture::scene::Scene;
 use crate::http::render::table::File;
+use crate::http::routes::part_request::PartRequest;
 use crate::http::routes::stored_fields::{FieldProblems, stored};
-use crate::jobs::Jobs;
 
 /// Width of a picture in pixels when nothing is said.
 pub const WIDTH_DEFAULT: u32 = 800;
@@ -111,14 +105,8 @@ impl PlotOptions {
     params(("id" = String, Path, description = "Id of the job", format = "uuid"), PlotQuery),
     responses((status = 200, description = "The picture", content((String = "image/svg+xml"))), FieldProblems)
 )]
-pub async fn svg(
-    Caller(jobs): Caller,
-    JobId(id): JobId,
-    State(memory): State<Memory>,
-    uri: Uri,
-    headers: HeaderMap,
-) -> Result<Response, ApiError> {
-    plot(&jobs, &memory, id, &uri, &headers, Format::Svg).await
+pub async fn svg(request: PartRequest) -> Result<Response, ApiError> {
+    plot(&request, Format::Svg).await
 }
 
 /// The same picture as PNG.
@@ -130,29 +118,14 @@ pub async fn svg(
     params(("id" = String, Path, description = "Id of the job", format = "uuid"), PlotQuery),
     responses((status = 200, description = "The picture", content((File = "image/png"))), FieldProblems)
 )]
-pub async fn png(
-    Caller(jobs): Caller,
-    JobId(id): JobId,
-    State(memory): State<Memory>,
-    uri: Uri,
-    headers: HeaderMap,
-) -> Result<Response, ApiError> {
-    plot(&jobs, &memory, id, &uri, &headers, Format::Png).await
+pub async fn png(request: PartRequest) -> Result<Response, ApiError> {
+    plot(&request, Format::Png).await
 }
 
-async fn plot(
-    jobs: &Jobs,
-    memory: &Memory,
-    id: Uuid,
-    uri: &Uri,
-    headers: &HeaderMap,
-    format: Format,
-) -> Result<Response, ApiError> {
-    let wish = PlotOptions::read(uri)?;
-    match Known::of(jobs, id, uri, headers, format).await? {
-        Known::Unchanged(answer) => Ok(answer),
-        Known::Tag(tag) => Ok(tagged(&tag, picture(jobs, memory, id, wish, format).await?)),
-    }
+async fn plot(request: &PartRequest, format: Format) -> Result<Response, ApiError> {
+    let wish = PlotOptions::read(&request.uri)?;
+    let drawn = picture(request, wish, format);
+    request.unless_known(format, drawn).await
 }
 
 /// Draws the picture.
@@ -160,14 +133,13 @@ async fn plot(
 /// # Errors
 /// The output was not asked for, there is no such patch or motion, or there is no result.
 pub async fn picture(
-    jobs: &Jobs,
-    memory: &Memory,
-    id: Uuid,
+    request: &PartRequest,
     wish: PlotOptions,
     format: Format,
 ) -> Result<Response, ApiError> {
     // Its pixels are there during its turn only; what is sent is small.
-    let rendering = memory.rendering(jobs.tenant(), 0).await?;
+    let rendering = request.rendering(0).await?;
+    let (jobs, id) = (&request.jobs, request.id);
     let job = jobs.get(id).await?;
     let solution = jobs.solution(id).await?;
     let patches = solution.patches.len();

@@ -1,7 +1,5 @@
 //! `/v1/jobs/{id}/fields`: all that was stored per cell for one patch and motion, in one answer.
 
-use axum::extract::State;
-use axum::http::{HeaderMap, Uri};
 use axum::response::Response;
 use uuid::Uuid;
 
@@ -9,16 +7,13 @@ use crate::contact::case::words::solver::Output;
 use crate::contact::solution::words::{PatchCells, PointFields};
 use crate::http::dto::result::name_of;
 use crate::http::extract::accept::{Format, choose, one_of};
-use crate::http::extract::caller::Caller;
-use crate::http::extract::ids::JobId;
 use crate::http::extract::query::{Parameters, Reader, index, query, reader};
-use crate::http::layers::etag::{Known, tagged};
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::http::render::table::{File, Precision};
 use crate::http::routes::fields::{Field, Selection, grid, precision, write_as};
+use crate::http::routes::part_request::PartRequest;
 use crate::http::routes::stored_fields::{FieldProblems, has, not_asked};
-use crate::http::state::AppState;
 use crate::jobs::Jobs;
 use crate::jobs::error::JobsError;
 
@@ -91,35 +86,24 @@ fn parts() -> Reader<Vec<Output>> {
         (File = "application/x-vtk")
     )), FieldProblems)
 )]
-pub async fn fields(
-    Caller(jobs): Caller,
-    JobId(id): JobId,
-    State(shared): State<AppState>,
-    uri: Uri,
-    headers: HeaderMap,
-) -> Result<Response, ApiError> {
-    let query = FieldsQuery::read(&uri, &shared.options.grid_max_samples)?;
+pub async fn fields(request: PartRequest) -> Result<Response, ApiError> {
+    let query = FieldsQuery::read(&request.uri, &request.shared.options.grid_max_samples)?;
     let selection = Selection {
         patch: query.patch.unwrap_or(0),
         point: query.point.unwrap_or(0),
         grid: query.grid,
-        format: choose(&headers, query.format, FORMATS)?,
+        format: choose(&request.headers, query.format, FORMATS)?,
         precision: query.precision.unwrap_or_default(),
     };
-    let tag = match Known::of(&jobs, id, &uri, &headers, selection.format).await? {
-        Known::Unchanged(answer) => return Ok(answer),
-        Known::Tag(tag) => tag,
+    let answer = async {
+        let most = query.parts.as_ref().map_or(PARTS.len(), Vec::len);
+        let rendering = request.rendering(most * selection.bytes()).await?;
+        let (jobs, id) = (&request.jobs, request.id);
+        let (parts, cells, values) = stored_parts(jobs, id, selection, query.parts).await?;
+        let make = move || Field::of(selection, &parts, cells, values);
+        write_as(rendering, selection, "fields", make).await
     };
-    let most = query.parts.as_ref().map_or(PARTS.len(), Vec::len);
-    let rendering = shared
-        .memory
-        .rendering(jobs.tenant(), most * selection.bytes());
-    let rendering = rendering.await?;
-    let (parts, cells, values) = stored_parts(&jobs, id, selection, query.parts).await?;
-    let written = write_as(rendering, selection, "fields", move || {
-        Field::of(selection, &parts, cells, values)
-    });
-    Ok(tagged(&tag, written.await?))
+    request.unless_known(selection.format, answer).await
 }
 
 /// The parts that are wanted, else all that are stored, with the cells of the patch and the values of the motion.

@@ -2,10 +2,15 @@
 
 use std::time::Duration;
 
+use axum::extract::{FromRef, FromRequestParts};
+use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
 use axum::response::Response;
 use uuid::Uuid;
 
+use crate::http::extract::caller::Caller;
+use crate::http::extract::ids::JobId;
+use crate::http::layers::auth::Access;
 use crate::http::limits::concurrency::ConcurrencyLimits;
 use crate::http::limits::holding_body::HeldShares;
 use crate::http::problem::error::ApiError;
@@ -35,27 +40,40 @@ pub fn preferred_wait(headers: &HeaderMap) -> Option<u32> {
     waits.next().map(|seconds| seconds.min(WAIT_MAX_SECONDS))
 }
 
-/// Waits for the end of a job for as long as `Prefer` says; returns the wait in s if one was applied.
-///
-/// # Errors
-/// There is no such job.
-pub async fn wait_for_end(
-    jobs: &Jobs,
-    crowds: &ConcurrencyLimits,
-    held: &HeldShares,
-    id: Uuid,
-    headers: &HeaderMap,
-) -> Result<Option<u32>, ApiError> {
-    let Some(seconds) = preferred_wait(headers) else {
-        return Ok(None);
-    };
-    let Some(_place) = crowds.wait(jobs.tenant()) else {
-        return Ok(None);
-    };
-    // From here on the request only waits, which is counted apart.
-    held.release();
-    jobs.wait(id, Duration::from_secs(seconds.into())).await?;
-    Ok(Some(seconds))
+/// The job in the path, once it has ended or the wait that the client prefers is over.
+pub struct Awaited {
+    /// The jobs of the client.
+    pub jobs: Jobs,
+    /// The job in the path.
+    pub id: Uuid,
+    /// The wait in s, if one was applied.
+    pub applied: Option<u32>,
+}
+
+impl<S: Send + Sync> FromRequestParts<S> for Awaited
+where
+    Access: FromRef<S>,
+    ConcurrencyLimits: FromRef<S>,
+{
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+        let Caller(jobs) = Caller::from_request_parts(parts, state).await?;
+        let JobId(id) = JobId::from_request_parts(parts, state).await?;
+        let crowds = ConcurrencyLimits::from_ref(state);
+        let place = preferred_wait(&parts.headers)
+            .and_then(|seconds| Some((seconds, crowds.wait(jobs.tenant())?)));
+        let mut applied = None;
+        if let Some((seconds, _place)) = place {
+            // From here on the request only waits, which is counted apart.
+            if let Some(held) = parts.extensions.get::<HeldShares>() {
+                held.release();
+            }
+            jobs.wait(id, Duration::from_secs(seconds.into())).await?;
+            applied = Some(seconds);
+        }
+        Ok(Awaited { jobs, id, applied })
+    }
 }
 
 /// Says which wait was applied.

@@ -1,21 +1,17 @@
 //! `/v1/jobs/{id}/resultants`: forces and moments, per patch and in sum, as JSON or as a table.
 
-use axum::extract::State;
-use axum::http::{HeaderMap, Uri, header};
+use axum::http::header;
 use axum::response::{IntoResponse, Response};
 
 use crate::contact::solution::words::Solution;
 use crate::http::dto::resultants::{Resultants, sums};
 use crate::http::extract::accept::{Format, choose, one_of};
-use crate::http::extract::caller::Caller;
-use crate::http::extract::ids::JobId;
 use crate::http::extract::query::{Parameters, index, query, require_index};
-use crate::http::layers::etag::{Known, tagged};
 use crate::http::limits::holding_body::hold_while_sent;
-use crate::http::limits::memory::Memory;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 use crate::http::render::resultants::{csv_body, json_body};
+use crate::http::routes::part_request::PartRequest;
 
 problems! {
     /// What parts of a result can fail with.
@@ -50,27 +46,22 @@ query! {
     ),
     responses((status = 200, description = "Forces and moments on the lower body. CSV: one line per patch and motion, then one per motion with `total` as its patch", content((Resultants = "application/json"), (String = "text/csv"))), PartProblems)
 )]
-pub async fn resultants(
-    Caller(jobs): Caller,
-    JobId(id): JobId,
-    State(memory): State<Memory>,
-    uri: Uri,
-    headers: HeaderMap,
+pub async fn resultants(request: PartRequest) -> Result<Response, ApiError> {
+    let query = ResultantsQuery::read(&request.uri, &())?;
+    let format = choose(&request.headers, query.format, FORMATS)?;
+    let answer = write(&request, query.point, query.patch, format);
+    request.unless_known(format, answer).await
+}
+
+async fn write(
+    request: &PartRequest,
+    point: Option<usize>,
+    patch: Option<usize>,
+    format: Format,
 ) -> Result<Response, ApiError> {
-    let query = ResultantsQuery::read(&uri, &())?;
-    let ResultantsQuery {
-        point,
-        patch,
-        format,
-    } = query;
-    let format = choose(&headers, format, FORMATS)?;
-    let tag = match Known::of(&jobs, id, &uri, &headers, format).await? {
-        Known::Unchanged(answer) => return Ok(answer),
-        Known::Tag(tag) => tag,
-    };
+    let (jobs, id) = (&request.jobs, request.id);
     // The stored text is read whole and cut to what was asked for.
-    let turn = memory.rendering(jobs.tenant(), 2 * jobs.answer_bytes(id).await?);
-    let turn = turn.await?;
+    let turn = request.rendering(2 * jobs.answer_bytes(id).await?).await?;
     let text = jobs.answer(id).await?.solution;
     let read = move || {
         let solution: Solution =
@@ -98,8 +89,5 @@ pub async fn resultants(
         (header::CONTENT_TYPE, format.media_type()),
         (header::VARY, "Accept"),
     ];
-    Ok(tagged(
-        &tag,
-        hold_while_sent((headers, body).into_response(), share),
-    ))
+    Ok(hold_while_sent((headers, body).into_response(), share))
 }

@@ -1,6 +1,5 @@
 //! `/v1/jobs/{id}/result`: everything small about the answer of a job.
 
-use axum::Extension;
 use axum::body::{Body, Bytes};
 use axum::extract::State;
 use axum::http::{HeaderMap, Uri, header};
@@ -10,16 +9,13 @@ use uuid::Uuid;
 
 use crate::http::dto::result::JobResult;
 use crate::http::extract::accept::Format;
-use crate::http::extract::caller::Caller;
-use crate::http::extract::ids::JobId;
 use crate::http::layers::etag::{Known, tagged};
-use crate::http::limits::concurrency::ConcurrencyLimits;
-use crate::http::limits::holding_body::{HeldShares, hold_while_sent};
+use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::limits::memory::{Memory, SMALL_BYTES};
 use crate::http::limits::shares::Share;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
-use crate::http::routes::prefer_wait::{say_applied, wait_for_end};
+use crate::http::routes::prefer_wait::{Awaited, say_applied};
 use crate::jobs::Jobs;
 
 problems! {
@@ -42,15 +38,11 @@ problems! {
     )), ResultProblems)
 )]
 pub async fn result(
-    Caller(jobs): Caller,
-    JobId(id): JobId,
+    Awaited { jobs, id, applied }: Awaited,
     State(memory): State<Memory>,
-    State(crowds): State<ConcurrencyLimits>,
-    Extension(held): Extension<HeldShares>,
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    let applied = wait_for_end(&jobs, &crowds, &held, id, &headers).await?;
     let tag = match Known::of(&jobs, id, &uri, &headers, Format::Json).await? {
         Known::Unchanged(answer) => return Ok(answer),
         Known::Tag(tag) => tag,

@@ -2,9 +2,6 @@
 
 use std::convert::Infallible;
 
-use axum::Extension;
-use axum::extract::State;
-use axum::http::HeaderMap;
 use axum::response::Response;
 use axum::response::sse::Event;
 use futures_util::StreamExt;
@@ -16,13 +13,10 @@ use utoipa::{PartialSchema, ToSchema};
 
 use crate::http::dto::batch::BatchAnswer;
 use crate::http::dto::job::JobAnswer;
-use crate::http::extract::accept::{Format, choose};
-use crate::http::extract::caller::{Caller, Credential, revoked};
-use crate::http::limits::concurrency::ConcurrencyLimits;
-use crate::http::limits::holding_body::{HeldShares, hold_while_sent};
 use crate::http::problem::catalogue::PlainProblems;
 use crate::http::problem::error::ApiError;
-use crate::http::routes::events::{RETRY, answer, changed, event_schema, last_event_id};
+use crate::http::routes::event_stream::{EventRequest, changed, event};
+use crate::http::routes::events::event_schema;
 use crate::jobs::changes::{Changed, Follower};
 
 /// What an event of `/v1/events` tells, one by the name of the event.
@@ -66,36 +60,21 @@ impl ToSchema for TenantEventSent {
     params(("Last-Event-ID" = Option<String>, Header, description = "Id of the last event that was seen: the stream goes on from there")),
     responses((status = 200, description = "One event per change", content((TenantEventSent = "text/event-stream"))), PlainProblems)
 )]
-pub async fn follow(
-    Caller(jobs): Caller,
-    State(crowds): State<ConcurrencyLimits>,
-    Extension(held): Extension<HeldShares>,
-    key: Option<Extension<Credential>>,
-    headers: HeaderMap,
-) -> Result<Response, ApiError> {
-    choose(&headers, None, &[Format::Events])?;
-    let place = crowds.stream(jobs.tenant())?;
-    held.release();
-    let seen = last_event_id(&headers).and_then(|text| text.parse().ok());
-    let revoked = revoked(jobs.clone(), key.map(|Extension(key)| key));
-    let follower = jobs.follow(seen);
-    let start = event("start", follower.since(), &json!({}));
+pub async fn follow(request: EventRequest) -> Result<Response, ApiError> {
+    let seen = request.seen.as_ref().and_then(|text| text.parse().ok());
+    let follower = request.jobs.follow(seen);
+    let start = event("start", &follower.since().to_string(), &json!({}));
     let changes = unfold(follower, next);
     let events = once(std::future::ready(start)).filter_map(std::future::ready);
-    let events = answer(events.map(Ok).chain(changes).take_until(revoked));
-    Ok(hold_while_sent(events, place))
+    request.answer(events.map(Ok).chain(changes))
 }
 
 async fn next(mut follower: Follower) -> Option<(Result<Event, Infallible>, Follower)> {
     let (change, since) = changed(follower.next().await)?;
+    let since = since.to_string();
     let event = match change {
-        Changed::Job(job) => event("job", since, &JobAnswer::new(*job)),
-        Changed::Batch(batch) => event("batch", since, &BatchAnswer::from(*batch)),
+        Changed::Job(job) => event("job", &since, &JobAnswer::new(*job)),
+        Changed::Batch(batch) => event("batch", &since, &BatchAnswer::from(*batch)),
     };
     Some((Ok(event?), follower))
-}
-
-fn event<T: Serialize>(name: &str, since: i64, data: &T) -> Option<Event> {
-    let event = Event::default().event(name).id(since.to_string());
-    event.retry(RETRY).json_data(data).ok()
 }

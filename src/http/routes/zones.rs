@@ -1,7 +1,5 @@
 //! `/v1/jobs/{id}/zones`: where the patch sticks and where it slips.
 
-use axum::extract::State;
-use axum::http::{HeaderMap, Uri};
 use axum::response::Response;
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -10,15 +8,12 @@ use uuid::Uuid;
 use crate::contact::case::words::solver::Output;
 use crate::http::dto::cells::{Cells, GriddedField, Outlines, per_cell};
 use crate::http::extract::accept::Format;
-use crate::http::extract::caller::Caller;
-use crate::http::extract::ids::JobId;
 use crate::http::extract::query::require_index;
-use crate::http::layers::etag::{Known, tagged};
 use crate::http::problem::error::ApiError;
 use crate::http::render::table::File;
 use crate::http::routes::fields::{Field, FieldQuery, Selection, Written, write, write_file};
+use crate::http::routes::part_request::PartRequest;
 use crate::http::routes::stored_fields::{FieldProblems, not_asked, stored};
-use crate::http::state::AppState;
 use crate::jobs::Jobs;
 
 /// Stick and slip zones of one patch for one motion.
@@ -75,29 +70,27 @@ pub struct ZoneCells {
         (File = "image/png")
     )), FieldProblems)
 )]
-pub async fn zones(
-    Caller(jobs): Caller,
-    JobId(id): JobId,
-    State(shared): State<AppState>,
-    uri: Uri,
-    headers: HeaderMap,
-) -> Result<Response, ApiError> {
-    let selection = Selection::read(&uri, &headers, shared.options.grid_max_samples)?;
-    let tag = match Known::of(&jobs, id, &uri, &headers, selection.format).await? {
-        Known::Unchanged(answer) => return Ok(answer),
-        Known::Tag(tag) => tag,
-    };
+pub async fn zones(request: PartRequest) -> Result<Response, ApiError> {
+    let selection = Selection::read(&request)?;
     let shown = Output::Zones;
-    if let Some(picture) = selection.picture(&jobs, &shared.memory, id, shown).await? {
-        return Ok(tagged(&tag, picture));
-    }
-    let rendering = shared.memory.rendering(jobs.tenant(), selection.bytes());
-    let rendering = rendering.await?;
-    let Some(sizes) = zone_sizes(&jobs, id, selection).await? else {
-        return not_asked(&jobs, id, shown).await;
+    let answer = async {
+        match selection.picture(&request, shown).await? {
+            Some(picture) => Ok(picture),
+            None => cells(&request, selection).await,
+        }
+    };
+    request.unless_known(selection.format, answer).await
+}
+
+async fn cells(request: &PartRequest, selection: Selection) -> Result<Response, ApiError> {
+    let shown = Output::Zones;
+    let (jobs, id) = (&request.jobs, request.id);
+    let rendering = request.rendering(selection.bytes()).await?;
+    let Some(sizes) = zone_sizes(jobs, id, selection).await? else {
+        return not_asked(jobs, id, shown).await;
     };
     let (patch, point) = (selection.patch, selection.point);
-    let (fields, values) = stored(&jobs, id, patch, point, shown).await?;
+    let (fields, values) = stored(jobs, id, patch, point, shown).await?;
     let written = write(rendering, selection, "zones", move |format| {
         if selection.grid.is_some() || format != Format::Json {
             let (mut table, outlines) = Field::of(selection, &[shown], fields, values).into();
@@ -122,7 +115,7 @@ pub async fn zones(
             text.map_err(|error| ApiError::internal(&error))?,
         ))
     });
-    Ok(tagged(&tag, written.await?))
+    written.await
 }
 
 /// The areas and cells of the zones of one patch for one motion.

@@ -59,28 +59,24 @@ pub struct BatchItem {
     pub outputs: String,
     /// What there is to show; `None` until the job has succeeded.
     pub result: Option<ItemResult>,
-    pub(crate) key: Option<String>,
 }
 
 /// The result of one job of a batch.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ItemResult {
-    /// The solution as JSON text.
+    /// The solution as JSON text: a small one.
     Solution(Bytes),
+    /// It lies under this key and is read by `Jobs::open_item`.
+    Stored(String),
+}
+
+/// Why the result of a job of a batch cannot be shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ItemFault {
     /// It was removed while the lines were read: the job has expired or was deleted.
     Gone,
     /// It cannot be read.
     Unreadable,
-}
-
-impl ItemResult {
-    /// Size in bytes of what is there.
-    pub(crate) fn bytes(&self) -> usize {
-        match self {
-            ItemResult::Solution(text) => text.len(),
-            ItemResult::Gone | ItemResult::Unreadable => 0,
-        }
-    }
 }
 
 impl Batch {

@@ -2,24 +2,29 @@
 
 use std::time::Duration;
 
+use bytes::Bytes;
+use futures_util::stream::BoxStream;
 use tokio::time::{Instant, timeout_at};
 use uuid::Uuid;
 
-use crate::jobs::batch::model::{BatchItem, ItemResult};
+use crate::jobs::batch::model::{BatchItem, ItemFault};
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::State;
 use crate::jobs::shared::POLL_INTERVAL;
 
-/// Solutions read at once: once they are this large together, the rest is left for the next page.
-const PAGE_BYTES: usize = 1 << 20;
+/// Small solutions read at once: once they are this large together, the rest is left for the next page.
+pub const PAGE_BYTES: usize = 256 << 10;
 
 /// Pause between two reads of a job that a reader of results waits for.
 const REREAD_PAUSE: Duration = Duration::from_millis(10);
 
+/// Size of a solution, and its text without the closing brace.
+pub type OpenedItem = (usize, BoxStream<'static, Result<Bytes, JobsError>>);
+
 impl Jobs {
-    /// The next jobs of a batch after the job `after`, in the order they were sent, at most `limit`, fewer if their
-    /// results are large. With `until`, only jobs that have ended are returned as long as that time is not reached, and at
+    /// The next jobs of a batch after the job `after`, in the order they were sent, at most `limit`, fewer once
+    /// the small results, which are read with them, come to [`PAGE_BYTES`]; large ones are left to [`Jobs::open_item`]. With `until`, only jobs that have ended are returned as long as that time is not reached, and at
     /// least one is waited for. Of these, the ones in one of `states` are returned (all if there is none), with the job after which to go on;
     /// nothing at the end of the batch.
     ///
@@ -40,7 +45,7 @@ impl Jobs {
             let mut lines = self
                 .shared
                 .store
-                .batch_items(&self.tenant, id, after, limit)
+                .batch_items(&self.tenant, id, after, limit, PAGE_BYTES)
                 .await?;
             lines.retain(|line| *line.job.tenant == *self.tenant);
             let waiting = Instant::now() < until && !self.shared.draining.is_cancelled();
@@ -75,38 +80,28 @@ impl Jobs {
                 }
                 lines.truncate(done);
             }
-            let mut last = lines.last().map(|line| line.job.id);
+            let last = lines.last().map(|line| line.job.id);
             if !states.is_empty() {
                 lines.retain(|line| states.contains(&line.job.state));
-            }
-            let mut bytes = 0;
-            for place in 0..lines.len() {
-                let line = &mut lines[place];
-                if let Some(key) = &line.key {
-                    line.result = Some(self.item_result(line.job.id, key).await?);
-                }
-                bytes += line.result.as_ref().map_or(0, ItemResult::bytes);
-                if bytes >= PAGE_BYTES {
-                    last = Some(line.job.id);
-                    lines.truncate(place + 1);
-                    break;
-                }
             }
             return Ok((lines, last));
         }
     }
 
-    /// The result of a line that lies outside the table. What cannot be read costs its own line and no other.
-    async fn item_result(&self, id: Uuid, key: &str) -> Result<ItemResult, JobsError> {
-        Ok(match self.shared.blobs.solution(key).await {
-            Ok(solution) => ItemResult::Solution(solution),
-            Err(error) => match self.gone_meanwhile(id, error).await {
-                JobsError::Expired => ItemResult::Gone,
-                error => {
-                    tracing::error!(job = %id, %error, "a stored result cannot be read");
-                    ItemResult::Unreadable
-                }
-            },
-        })
+    /// The result of a line that lies outside the table: its size, and its text without the closing brace, read while it is taken. What cannot be
+    /// read costs its own line and no other.
+    ///
+    /// # Errors
+    /// It went in between, or cannot be read.
+    pub async fn open_item(&self, id: Uuid, key: &str) -> Result<OpenedItem, ItemFault> {
+        let error = match self.shared.blobs.open_solution(key).await {
+            Ok(opened) => return Ok(opened),
+            Err(error) => self.gone_meanwhile(id, error).await,
+        };
+        if matches!(error, JobsError::Expired) {
+            return Err(ItemFault::Gone);
+        }
+        tracing::error!(job = %id, %error, "a stored result cannot be read");
+        Err(ItemFault::Unreadable)
     }
 }

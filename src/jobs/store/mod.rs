@@ -158,13 +158,15 @@ pub trait Store: KeyStore + Send + Sync + Debug {
     /// An acknowledged batch with its counts.
     async fn batch(&self, tenant: &str, id: Uuid) -> Result<Option<Batch>, StoreError>;
 
-    /// The jobs of a batch after the job `after`, in the order in which they were sent; small solutions are read with them.
+    /// The jobs of a batch after the job `after`, in the order in which they were sent, at most `limit`; small solutions are read with
+    /// them, and none after those of `bytes` together.
     async fn batch_items(
         &self,
         tenant: &str,
         id: Uuid,
         after: Option<Uuid>,
         limit: u32,
+        bytes: usize,
     ) -> Result<Vec<BatchItem>, StoreError>;
 
     /// The case of a job as it was submitted.

@@ -6,6 +6,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::contact::case::words::solver::{MethodName, Output};
+use crate::http::dto::tenant_limits::TenantLimits;
 use crate::http::extract::caller::AnyTenant;
 use crate::http::options::HttpOptions;
 use crate::http::problem::catalogue::PlainProblems;
@@ -94,14 +95,9 @@ pub struct RequestLimits {
     queue_max: u64,
     /// Most samples of a `grid` that a result is resampled on.
     grid_max_samples: usize,
-    /// Most requests of the tenant under way, streams of events and waits aside.
-    requests_max: usize,
-    /// Most streams of events of the tenant.
-    streams_max: usize,
-    /// Most requests of the tenant that wait for the end of a job or a batch.
-    waits_max: usize,
-    /// Requests per second of one key, or of one address without a key; 0 for any number.
-    requests_per_second: u32,
+    /// Limits of the requests of the tenant.
+    #[serde(flatten)]
+    tenant: TenantLimits,
 }
 
 /// The methods, contacts and outputs that a case can name.
@@ -148,10 +144,7 @@ pub async fn methods(
             batch_max_cases: options.batch_max_cases,
             queue_max: own.tenant_queue_max.min(own.queue_max),
             grid_max_samples: options.grid_max_samples,
-            requests_max: options.tenant_requests_max,
-            streams_max: options.tenant_streams_max,
-            waits_max: options.tenant_waits_max,
-            requests_per_second: options.requests_per_second,
+            tenant: TenantLimits::of(&options),
         },
         version: env!("CARGO_PKG_VERSION"),
     })

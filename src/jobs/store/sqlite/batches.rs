@@ -6,6 +6,7 @@
 use crate::jobs::store::sqlite::blob_refs::drop_slices_of_ended;
 use std::collections::HashSet;
 
+use futures_util::TryStreamExt;
 use sqlx::{Row, SqliteConnection};
 use uuid::Uuid;
 
@@ -289,7 +290,8 @@ impl SqliteStore {
         Ok(last)
     }
 
-    /// The next jobs of a batch in the order they were sent, with the solutions that lie in the database.
+    /// The next jobs of a batch in the order they were sent, with the solutions that lie in the database; reads no further once
+    /// these are `bytes` together.
     ///
     /// # Errors
     /// The database failed.
@@ -299,8 +301,9 @@ impl SqliteStore {
         id: Uuid,
         after: Option<Uuid>,
         limit: u32,
+        bytes: usize,
     ) -> Result<Vec<BatchItem>, StoreError> {
-        let rows = sqlx::query(concat!(
+        let mut rows = sqlx::query(concat!(
             "SELECT ",
             job_columns!(),
             ", batch_index, outputs, blob_key, solution FROM jobs \
@@ -311,20 +314,24 @@ impl SqliteStore {
         .bind(after.map_or_else(String::new, |id| id.to_string()))
         .bind(limit)
         .bind(tenant)
-        .fetch_all(&self.readers)
-        .await?;
-        rows.iter()
-            .map(|row| {
-                let solution: Option<Vec<u8>> = row.try_get("solution")?;
-                Ok(BatchItem {
-                    index: row.try_get("batch_index")?,
-                    job: read_job(row)?,
-                    outputs: row.try_get("outputs")?,
-                    key: row.try_get("blob_key")?,
-                    result: solution.map(|solution| ItemResult::Solution(solution.into())),
-                })
-            })
-            .collect()
+        .fetch(&self.readers);
+        let mut items = Vec::new();
+        let mut read = 0;
+        while read < bytes
+            && let Some(row) = rows.try_next().await?
+        {
+            let solution: Option<Vec<u8>> = row.try_get("solution")?;
+            read += solution.as_ref().map_or(0, Vec::len);
+            let key: Option<String> = row.try_get("blob_key")?;
+            let inline = solution.map(|solution| ItemResult::Solution(solution.into()));
+            items.push(BatchItem {
+                index: row.try_get("batch_index")?,
+                job: read_job(&row)?,
+                outputs: row.try_get("outputs")?,
+                result: key.map(ItemResult::Stored).or(inline),
+            });
+        }
+        Ok(items)
     }
 }
 

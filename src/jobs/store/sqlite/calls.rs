@@ -146,8 +146,9 @@ impl Store for SqliteStore {
         id: Uuid,
         after: Option<Uuid>,
         limit: u32,
+        bytes: usize,
     ) -> Result<Vec<BatchItem>, StoreError> {
-        self.batch_items(tenant, id, after, limit).await
+        self.batch_items(tenant, id, after, limit, bytes).await
     }
 
     async fn case(&self, tenant: &str, id: Uuid) -> Result<Option<StoredCase>, StoreError> {

@@ -2,7 +2,7 @@
 
 import uPlot from '../vendor/uPlot.esm.js';
 import { number, tickLabel } from './format.js';
-import { adoptShown } from './late.js';
+import { adoptShown } from './adopt.js';
 
 /** @typedef {import('./curvedata.js').Curve} Curve */
 /** @typedef {import('./curvedata.js').Line} Line */

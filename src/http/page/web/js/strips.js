@@ -2,7 +2,7 @@
 
 import uPlot from '../vendor/uPlot.esm.js';
 import { number, tickLabel } from './format.js';
-import { adoptShown } from './late.js';
+import { adoptShown } from './adopt.js';
 import { placeOf, STRIPS } from './line.js';
 
 /** @typedef {import('./line.js').Row} Row */

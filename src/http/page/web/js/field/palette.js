@@ -35,8 +35,7 @@ export function chooseAmounts(name) {
 export const chosenAmounts = () => amounts;
 
 export function isDark() {
-  const chosen = document.documentElement.dataset.theme;
-  return chosen ? chosen === 'dark' : matchMedia('(prefers-color-scheme: dark)').matches;
+  return document.documentElement.dataset.theme === 'dark';
 }
 
 /**

@@ -1,0 +1,359 @@
+//! The lines of the results of a batch, written while the client takes them. Small results are read a page at a time. A large one is passed
+//! on from its file as NDJSON; for CSV it is read whole, and its memory is counted until its lines have been sent.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use axum::BoxError;
+use axum::body::Bytes;
+use futures_util::stream::{self, BoxStream, Stream, StreamExt, TryStreamExt, try_unfold};
+use serde::Serialize;
+use tokio::time::Instant;
+use uuid::Uuid;
+
+use crate::contact::case::words::solver::Output;
+use crate::contact::solution::words::Solution;
+use crate::http::dto::problem::ProblemBody;
+use crate::http::dto::result::JobResult;
+use crate::http::limits::memory::Memory;
+use crate::http::limits::shares::Share;
+use crate::http::problem::error::ApiError;
+use crate::http::problem::kinds::ProblemKind;
+use crate::http::render::batch_csv::Columns;
+use crate::http::render::csv::finish;
+use crate::jobs::Jobs;
+use crate::jobs::batch::model::{BatchItem, ItemFault, ItemResult};
+use crate::jobs::batch::results::{OpenedItem, PAGE_BYTES};
+use crate::jobs::error::JobsError;
+use crate::jobs::model::State as JobState;
+
+/// What a reader holds of small results: those of a page, and the text written of them.
+pub const STREAM_BYTES: usize = 2 * PAGE_BYTES;
+/// How many jobs are read the first time.
+pub const FIRST_PAGE_JOBS: u32 = 50;
+/// Most jobs read at once.
+const PAGE_JOBS: u32 = 500;
+/// Motions of a large result written at once.
+const POINTS: usize = 64;
+
+/// What lines are made from.
+pub struct Source {
+    pub jobs: Jobs,
+    pub memory: Memory,
+    /// Columns of the CSV; none for NDJSON.
+    pub columns: Option<Arc<Columns>>,
+}
+
+/// The lines of a batch from some place on.
+pub struct Lines {
+    pub source: Source,
+    pub batch: Uuid,
+    /// Until then jobs that have not ended are waited for.
+    pub until: Option<Instant>,
+    /// The job of the last line.
+    pub after: Option<Uuid>,
+    /// States of the jobs that have lines; all if there is none.
+    pub states: Vec<JobState>,
+    /// Jobs to read at once.
+    pub page: u32,
+    /// Jobs that have been read and not yet been written.
+    pub read: VecDeque<BatchItem>,
+    /// The rest of a large line.
+    pub large: Option<BoxStream<'static, Result<Bytes, BoxError>>>,
+}
+
+impl Lines {
+    /// The pieces. They break off once `revoked` ends, so that what was sent is not taken for all there is.
+    pub fn until(
+        self,
+        revoked: impl Future<Output = ()> + Send,
+    ) -> impl Stream<Item = Result<Bytes, BoxError>> + Send {
+        let revoked = Box::pin(revoked);
+        try_unfold((self, revoked), |(lines, mut revoked)| async move {
+            tokio::select! {
+                piece = lines.next() => Ok(piece?.map(|(piece, lines)| (piece, (lines, revoked)))),
+                () = &mut revoked => Err(JobsError::BatchNotFound.into()),
+            }
+        })
+    }
+
+    async fn next(mut self) -> Result<Option<(Bytes, Lines)>, BoxError> {
+        loop {
+            if let Some(large) = &mut self.large {
+                match large.try_next().await? {
+                    Some(piece) => return Ok(Some((piece, self))),
+                    None => self.large = None,
+                }
+            }
+            let large = |item: &BatchItem| matches!(item.result, Some(ItemResult::Stored(_)));
+            if self.read.is_empty() && !self.read_page().await? {
+                return Ok(None);
+            }
+            match self.read.front() {
+                None => {}
+                Some(item) if large(item) => {
+                    if let Some(item) = self.read.pop_front() {
+                        self.large = Some(self.source.open_large(item).await?);
+                    }
+                }
+                Some(_) => {
+                    let small = self.read.iter().take_while(|item| !large(item)).count();
+                    let small: Vec<BatchItem> = self.read.drain(..small).collect();
+                    let columns = self.source.columns.clone();
+                    let written = tokio::task::spawn_blocking(move || match columns {
+                        Some(columns) => write_csv(&columns, &small),
+                        None => write_ndjson(&small),
+                    });
+                    return Ok(Some((Bytes::from(written.await??), self)));
+                }
+            }
+        }
+    }
+
+    /// Reads more jobs; false at the end of the batch.
+    async fn read_page(&mut self) -> Result<bool, JobsError> {
+        let (items, last) = self
+            .source
+            .jobs
+            .batch_items(self.batch, self.after, self.page, self.until, &self.states)
+            .await?;
+        let Some(last) = last else {
+            return Ok(false);
+        };
+        self.after = Some(last);
+        let read = u32::try_from(items.len()).unwrap_or(PAGE_JOBS);
+        self.page = match self.states.is_empty() {
+            true => (2 * read).clamp(4, PAGE_JOBS),
+            false => PAGE_JOBS,
+        };
+        self.read = items.into();
+        Ok(true)
+    }
+}
+
+impl Source {
+    /// The text of a job whose result is large.
+    async fn open_large(
+        &self,
+        item: BatchItem,
+    ) -> Result<BoxStream<'static, Result<Bytes, BoxError>>, BoxError> {
+        let id = item.job.id;
+        let opened = match &item.result {
+            Some(ItemResult::Stored(key)) => self.jobs.open_item(id, key).await,
+            _ => Err(ItemFault::Unreadable),
+        };
+        let without = |error: ProblemBody| match &self.columns {
+            Some(columns) => {
+                let mut out = csv::Writer::from_writer(Vec::new());
+                columns.write_without_result(&mut out, &item, &error.detail)?;
+                Ok::<_, BoxError>(one(finish(out)?))
+            }
+            None => {
+                let mut text = Vec::new();
+                write_json(&mut text, &Front::of(&item, Some(error)))?;
+                text.push(b'\n');
+                Ok(one(text))
+            }
+        };
+        let (bytes, solution) = match opened {
+            Ok(opened) => opened,
+            Err(fault) => return without(told(&item, fault)),
+        };
+        let Some(columns) = self.columns.clone() else {
+            return Ok(ndjson_of(&item, solution)?);
+        };
+        // The text and what is read from it.
+        let needed = 2 * bytes;
+        if !self.memory.has_room_for(needed) {
+            let detail = format!(
+                "the result of {bytes} bytes takes more memory than a table may (`--tenant-request-memory-mb`); ask for NDJSON"
+            );
+            return without(problem(&item, ProblemKind::Overloaded, detail));
+        }
+        match self.read_large(needed, (bytes, solution)).await? {
+            Some((solution, share)) => Ok(table_of(columns, item, solution, share)),
+            None => without(told(&item, ItemFault::Unreadable)),
+        }
+    }
+
+    /// The solution and its memory; nothing if the text is none.
+    async fn read_large(
+        &self,
+        needed: usize,
+        (bytes, mut pieces): OpenedItem,
+    ) -> Result<Option<(Solution, Option<Share>)>, BoxError> {
+        let refused = |error: ApiError| BoxError::from(error.detail().to_owned());
+        let turn = self.memory.rendering(self.jobs.tenant(), needed).await;
+        let turn = turn.map_err(refused)?;
+        let mut text = Vec::with_capacity(bytes);
+        while let Some(piece) = pieces.try_next().await? {
+            text.extend_from_slice(&piece);
+        }
+        text.push(b'}');
+        let read = move || Ok(serde_json::from_slice::<Solution>(&text).ok());
+        let read = turn.run(read, move |_| bytes).await;
+        let (solution, share) = read.map_err(refused)?;
+        Ok(solution.map(|solution| (solution, share)))
+    }
+}
+
+fn one(text: Vec<u8>) -> BoxStream<'static, Result<Bytes, BoxError>> {
+    stream::iter([Ok(Bytes::from(text))]).boxed()
+}
+
+/// A line of NDJSON; `solution` is an object whose closing brace is missing.
+fn ndjson_of(
+    item: &BatchItem,
+    solution: BoxStream<'static, Result<Bytes, JobsError>>,
+) -> Result<BoxStream<'static, Result<Bytes, BoxError>>, JobsError> {
+    let mut front = Vec::new();
+    open_line(&mut front, item)?;
+    let mut tail = Vec::new();
+    close_line(&mut tail, item)?;
+    let middle = solution.map_err(BoxError::from);
+    Ok(one(front).chain(middle).chain(one(tail)).boxed())
+}
+
+/// Lines of CSV of one job, some motions at a time.
+fn table_of(
+    columns: Arc<Columns>,
+    item: BatchItem,
+    solution: Solution,
+    share: Option<Share>,
+) -> BoxStream<'static, Result<Bytes, BoxError>> {
+    let held = (columns, item, solution, share);
+    let lines = try_unfold((0, held), |(start, held)| async move {
+        let (columns, item, solution, _) = &held;
+        let end = (start + POINTS).min(solution.total.len());
+        if start == end {
+            return Ok(None);
+        }
+        let mut out = csv::Writer::from_writer(Vec::new());
+        columns.write(&mut out, item, solution, start..end)?;
+        Ok(Some((Bytes::from(finish(out)?), (end, held))))
+    });
+    lines.boxed()
+}
+
+/// Writes lines of CSV of jobs with small results, without the header.
+fn write_csv(columns: &Columns, items: &[BatchItem]) -> Result<Vec<u8>, JobsError> {
+    let mut out = csv::Writer::from_writer(Vec::new());
+    let mut write = || {
+        for item in items {
+            let solution = match &item.result {
+                Some(ItemResult::Solution(text)) => serde_json::from_slice::<Solution>(text).ok(),
+                _ => None,
+            };
+            match solution {
+                Some(solution) => {
+                    let points = 0..solution.total.len();
+                    columns.write(&mut out, item, &solution, points)?;
+                }
+                None => {
+                    let error = failure(item).map(|problem| problem.detail);
+                    let error = error.unwrap_or_else(|| match item.result {
+                        Some(_) => UNREADABLE.to_owned(),
+                        None => String::new(),
+                    });
+                    columns.write_without_result(&mut out, item, &error)?;
+                }
+            }
+        }
+        Ok::<_, csv::Error>(())
+    };
+    let written = write().and_then(|()| finish(out));
+    written.map_err(|error| JobsError::Damaged(error.to_string()))
+}
+
+/// Writes lines of NDJSON of jobs with small results. A stored solution is passed on as it is, without reading it.
+fn write_ndjson(items: &[BatchItem]) -> Result<Vec<u8>, JobsError> {
+    let mut out = Vec::with_capacity(items.len() * 2048);
+    for item in items {
+        let Some(ItemResult::Solution(solution)) = &item.result else {
+            write_json(&mut out, &Front::of(item, failure(item)))?;
+            out.push(b'\n');
+            continue;
+        };
+        let open = solution.strip_suffix(b"}").ok_or_else(|| {
+            JobsError::Damaged(format!("solution of job {} is no object", item.job.id))
+        })?;
+        open_line(&mut out, item)?;
+        out.extend_from_slice(open);
+        close_line(&mut out, item)?;
+    }
+    Ok(out)
+}
+
+/// The part of a line before the result.
+#[derive(Serialize)]
+struct Front<'a> {
+    index: u32,
+    id: String,
+    name: Option<&'a str>,
+    labels: &'a std::collections::BTreeMap<String, String>,
+    state: JobState,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error: Option<ProblemBody>,
+}
+
+impl Front<'_> {
+    fn of(item: &BatchItem, error: Option<ProblemBody>) -> Front<'_> {
+        let job = &item.job;
+        Front {
+            index: item.index,
+            id: job.id.to_string(),
+            name: job.name.as_deref(),
+            labels: &job.labels,
+            state: job.state,
+            error,
+        }
+    }
+}
+
+/// Writes what stands before a solution.
+fn open_line(out: &mut Vec<u8>, item: &BatchItem) -> Result<(), JobsError> {
+    write_json(out, &Front::of(item, None))?;
+    // The object is continued: its closing brace makes way.
+    out.pop();
+    out.extend_from_slice(b",\"result\":");
+    Ok(())
+}
+
+/// Writes what stands behind a solution without its closing brace.
+fn close_line(out: &mut Vec<u8>, item: &BatchItem) -> Result<(), JobsError> {
+    let outputs: Vec<Output> = serde_json::from_str(&item.outputs).unwrap_or_default();
+    let tail = JobResult::tail(item.job.id, item.job.cached, &outputs);
+    let tail = tail.map_err(|error| JobsError::Damaged(error.detail().to_owned()))?;
+    out.extend_from_slice(tail.as_bytes());
+    out.extend_from_slice(b"}\n");
+    Ok(())
+}
+
+fn write_json<T: Serialize>(out: &mut Vec<u8>, value: &T) -> Result<(), JobsError> {
+    serde_json::to_writer(out, value).map_err(|error| JobsError::Damaged(error.to_string()))
+}
+
+const UNREADABLE: &str = "the stored result cannot be read";
+
+/// Why a job that has ended has no result.
+fn failure(item: &BatchItem) -> Option<ProblemBody> {
+    let job = &item.job;
+    Some(ProblemBody::of_job(job, job.failure.as_ref()?))
+}
+
+/// Why the result of a succeeded job is not shown.
+fn told(item: &BatchItem, fault: ItemFault) -> ProblemBody {
+    match fault {
+        ItemFault::Gone => {
+            let detail = "the job was removed with its result while the results were read";
+            problem(item, ProblemKind::Expired, detail)
+        }
+        ItemFault::Unreadable => problem(item, ProblemKind::Internal, UNREADABLE),
+    }
+}
+
+fn problem(item: &BatchItem, kind: ProblemKind, detail: impl Into<String>) -> ProblemBody {
+    let mut problem = ProblemBody::new(kind, detail);
+    problem.instance = Some(format!("/v1/jobs/{}", item.job.id));
+    problem
+}
