@@ -165,7 +165,11 @@ fn coulomb(
         let [u, v] = [sx[i], sy[i]].map(|s| s / scales.slip.max(f64::MIN_POSITIVE));
         worst[0] = worst[0].max(x.hypot(y) - friction * pressure[i] / scales.bound);
         worst[1] = worst[1].max(x.hypot(y) * u.hypot(v) - (x * u + y * v));
-        if zone[i] == Zone::Stick {
+        // The last cell of a strip may stick on the whole and slip at its trailing end.
+        let last = i == 0
+            || cells.y_mm[i - 1] != cells.y_mm[i]
+            || cells.x_mm[i - 1] + cells.dx_mm[i - 1] < cells.x_mm[i];
+        if zone[i] == Zone::Stick && !last {
             worst[2] = worst[2].max(u.hypot(v));
         }
     }

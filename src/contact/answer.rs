@@ -46,7 +46,7 @@ fn motions(
             // What all motions share is charged to the first.
             point.seconds += pressed.report.map_or(0.0, |report| report.seconds);
         }
-        assembly.add(&levels, &point);
+        assembly.add(&levels, &point, watch)?;
         levels.trim();
         before = Some(point);
         watch.advance();

@@ -104,9 +104,18 @@ fn answered(contact: &Ellipse, n: u32) -> Cells {
     let point = &patch.points[0];
     let [vx, vy, phi] = contact.motion;
     let take = |values: &Option<Vec<f64>>| values.clone().expect("was asked for");
+    let mut slip = [take(&point.slip_x), take(&point.slip_y)];
+    let zones = point.zone.as_ref().expect("was asked for");
+    for (i, zone) in zones.iter().enumerate() {
+        // The last cell of a strip may stick on the whole and slip at its trailing end.
+        let last = i % n as usize == 0;
+        if last && *zone == railhead::contact::solution::zone::Zone::Stick {
+            slip.iter_mut().for_each(|slip| slip[i] = 0.0);
+        }
+    }
     Cells {
         traction: [take(&point.traction_x_mpa), take(&point.traction_y_mpa)],
-        slip: [take(&point.slip_x), take(&point.slip_y)],
+        slip,
         bound: take(&patch.cells(0).pressure_mpa)
             .iter()
             .map(|p| contact.friction * p)

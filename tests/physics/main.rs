@@ -36,6 +36,7 @@ mod memory;
 mod paper_figures;
 #[path = "../../benches/calibrate/population.rs"]
 mod population;
+mod power;
 mod pressure_grid;
 mod pressure_grid_faults;
 mod pressure_grid_shapes;

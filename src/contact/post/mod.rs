@@ -1,5 +1,6 @@
-//! Quantities derived from stored cell values: zones, outlines, samples on a grid.
+//! Quantities derived from cell values: friction power, outlines, samples on a grid.
 
+pub mod local_power;
 pub mod outlines;
 pub mod resample;
 pub mod smooth;

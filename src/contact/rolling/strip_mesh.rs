@@ -182,6 +182,18 @@ impl StripMesh {
         }
     }
 
+    /// Poisson's ratio of the pair.
+    #[must_use]
+    pub fn poisson_ratio(&self) -> f64 {
+        self.poisson_ratio
+    }
+
+    /// Width of the numbers of its operator.
+    #[must_use]
+    pub fn precision(&self) -> Precision {
+        self.precision
+    }
+
     /// Are patch and bounds mirror-symmetric, so that half of the operator is enough?
     #[must_use]
     pub fn is_mirrored(&self) -> bool {

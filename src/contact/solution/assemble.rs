@@ -3,7 +3,10 @@
 use crate::contact::case::press::PressedContact;
 use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::words::solver::Output;
+use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::patch::Patch;
+use crate::contact::post::local_power;
+use crate::contact::post::local_power::PowerTask;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::motion::Motion;
@@ -13,11 +16,11 @@ use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::skip::Skip;
 use crate::contact::rolling::strip_mesh::StripMesh;
+use crate::contact::solution::cell_values::{patch_cells, point_fields};
 use crate::contact::solution::words::{
-    CombinedMaterial, ErrorEstimate, Fields, MeshReport, NormalisedMotion, Origin, PatchCells,
-    PatchFields, PatchSolution, PointFields, PointSolution, Solution, SolverReport, Total,
+    CombinedMaterial, ErrorEstimate, Fields, MeshReport, NormalisedMotion, Origin, PatchFields,
+    PatchSolution, PointFields, PointSolution, Solution, SolverReport, Total,
 };
-use crate::contact::solution::zone::Zone;
 
 /// Remarks collected before repetitions are merged.
 const REMARKS_AT_ONCE: usize = 1000;
@@ -59,7 +62,15 @@ impl<'a> Assembly<'a> {
     }
 
     /// Adds the next motion.
-    pub fn add(&mut self, levels: &Levels, point: &MotionAnswer) {
+    ///
+    /// # Errors
+    /// The monitor may stop the work on values per cell.
+    pub fn add(
+        &mut self,
+        levels: &Levels,
+        point: &MotionAnswer,
+        monitor: &dyn Monitor,
+    ) -> Result<(), Stop> {
         let (case, level) = (self.case, levels.get(point.level));
         self.remarks.extend(remarks(case, self.total.len(), point));
         if self.remarks.len() > REMARKS_AT_ONCE {
@@ -70,13 +81,23 @@ impl<'a> Assembly<'a> {
         }
         self.total.push(total(case, &self.patches, point));
         if wants_fields(case) {
-            self.add_fields(&level, point);
+            self.add_fields(&level, point, monitor)?;
         }
+        Ok(())
     }
 
     /// Values per cell of the next motion; motions that were solved on one level share its cells.
-    fn add_fields(&mut self, level: &StripMesh, point: &MotionAnswer) {
+    fn add_fields(
+        &mut self,
+        level: &StripMesh,
+        point: &MotionAnswer,
+        monitor: &dyn Monitor,
+    ) -> Result<(), Stop> {
         let case = self.case;
+        let slip = match case.run.wants(Output::Slip) {
+            true => Some(self.slips(level, point, monitor)?),
+            false => None,
+        };
         let patches = self.patches.len();
         self.fields
             .patches
@@ -90,9 +111,39 @@ impl<'a> Assembly<'a> {
             if known.is_none() {
                 fields.meshes.push(patch_cells(case, level, index));
             }
-            let values = point_fields(case, level, level.patch_cells(index), point);
-            fields.points.push(PointFields { mesh, ..values });
+            let cells = level.patch_cells(index);
+            let [slip_x, slip_y] = [0, 1].map(|k| {
+                let slip: Option<&[Vec<f64>; 2]> = slip.as_ref();
+                slip.map(|slip| slip[k][cells.clone()].to_vec())
+            });
+            let values = point_fields(case, level, cells, point);
+            fields.points.push(PointFields {
+                mesh,
+                slip_x,
+                slip_y,
+                ..values
+            });
         }
+        Ok(())
+    }
+
+    /// Slip of every cell over the rolling speed, such that its power adds up to that of the patch.
+    fn slips(
+        &self,
+        level: &StripMesh,
+        point: &MotionAnswer,
+        monitor: &dyn Monitor,
+    ) -> Result<[Vec<f64>; 2], Stop> {
+        let newest = self.points.iter().filter_map(|points| points.last());
+        let totals: Vec<f64> = newest.map(|point| point.friction_power_n).collect();
+        let task = PowerTask {
+            level,
+            answer: &point.tangential,
+            motion: &point.motion,
+            method: point.method,
+            totals: &totals,
+        };
+        local_power::slips(&task, monitor)
     }
 
     /// The answer.
@@ -350,63 +401,4 @@ fn target_missed(case: &CheckedCase, point: &MotionAnswer) -> Option<Remark> {
     };
     let estimate = point.error();
     (target_met(case, point) == Some(false)).then_some(Remark::TargetMissed { estimate, target })
-}
-
-fn patch_cells(case: &CheckedCase, level: &StripMesh, patch: usize) -> PatchCells {
-    let cells = level.patch_cells(patch);
-    let mesh = &level.mesh;
-    let mut fields = PatchCells::default();
-    for segment in mesh.segments.iter().filter(|s| s.chord.patch == patch) {
-        for i in segment.cells.clone() {
-            fields.x_mm.push(0.5 * (mesh.left[i] + mesh.right[i]));
-            fields.y_mm.push(segment.chord.y);
-            fields.dx_mm.push(mesh.right[i] - mesh.left[i]);
-            fields.dy_mm.push(segment.chord.dy);
-            fields
-                .strip
-                .push(u32::try_from(segment.chord.strip).unwrap_or(u32::MAX));
-        }
-    }
-    fields.pressure_mpa = case
-        .run
-        .wants(Output::Pressure)
-        .then(|| level.pressure[cells].to_vec());
-    fields
-}
-
-fn point_fields(
-    case: &CheckedCase,
-    level: &StripMesh,
-    cells: std::ops::Range<usize>,
-    point: &MotionAnswer,
-) -> PointFields {
-    let answer = &point.tangential;
-    let scaled = |values: &[f64], factor: f64| {
-        values[cells.clone()]
-            .iter()
-            .map(|v| v * factor)
-            .collect::<Vec<_>>()
-    };
-    let traction = |k: usize| {
-        case.run
-            .wants(Output::Tractions)
-            .then(|| scaled(&answer.traction[k], level.scale.traction))
-    };
-    let slip = |k: usize| {
-        case.run
-            .wants(Output::Slip)
-            .then(|| scaled(&answer.slip[k], level.scale.slip()))
-    };
-    let zone = |slips: &bool| if *slips { Zone::Slip } else { Zone::Stick };
-    PointFields {
-        mesh: 0,
-        zone: case
-            .run
-            .wants(Output::Zones)
-            .then(|| answer.slips[cells.clone()].iter().map(zone).collect()),
-        traction_x_mpa: traction(0),
-        traction_y_mpa: traction(1),
-        slip_x: slip(0),
-        slip_y: slip(1),
-    }
 }

@@ -1,6 +1,7 @@
 //! The answer, in the words that clients read.
 
 pub mod assemble;
+pub mod cell_values;
 pub mod finish;
 pub mod finite;
 pub mod profile_quality;

@@ -322,7 +322,8 @@ pub struct PointFields {
     pub traction_x_mpa: Option<Vec<f64>>,
     /// Traction on the lower body across in MPa.
     pub traction_y_mpa: Option<Vec<f64>>,
-    /// Slip of the upper body relative to the lower along x, divided by rolling speed.
+    /// Mean slip of the cell, upper body relative to the lower, along x, divided by rolling speed: along the traction, and such that the
+    /// power of the cells adds up to that of the patch (see [`local_power`](crate::contact::post::local_power)).
     pub slip_x: Option<Vec<f64>>,
     /// Slip across, divided by rolling speed.
     pub slip_y: Option<Vec<f64>>,

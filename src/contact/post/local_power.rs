@@ -1,0 +1,324 @@
+//! Friction power cell by cell: never negative, and adding up to the power of the patch.
+//!
+//! For tractions that are constant in every cell, `∬ T·∂u/∂x dA` of their exact displacements is 0, because the x-derivative of the
+//! influence is odd. So the *mean* slip of a cell, taken from the displacements at its two **edges**,
+//! `s̄ = w + [u(leading edge) − u(trailing edge)]/h`, gives powers `A T·s̄` that add up to `ν_x F_x + ν_y F_y + φ M_z`, whatever rule or
+//! method the tractions come from. Strips of different widths see each other at their mid-lines only, which breaks the symmetry by
+//! some 0.1 %; half of the derivative less half of its transpose restores it to rounding.
+
+use std::ops::Range;
+
+use pulp::Arch;
+
+use crate::contact::half_space::strip_operator::assembly::{CellEdges, SegmentRows};
+use crate::contact::half_space::strip_operator::kind::Precision;
+use crate::contact::mesh::strips::{Mesh, Segment};
+use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::numerics::simd_ln::Number;
+use crate::contact::rolling::answer::{LevelAnswer, LevelExit};
+use crate::contact::rolling::methods::method::Method;
+use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::strip_mesh::StripMesh;
+
+/// What the power of the cells is taken from.
+#[derive(Debug, Clone, Copy)]
+pub struct PowerTask<'a> {
+    /// The level.
+    pub level: &'a StripMesh,
+    /// Tractions, slips and zones on it.
+    pub answer: &'a LevelAnswer,
+    /// The motion, about the origin of the case.
+    pub motion: &'a Motion,
+    /// The method that gave the tractions.
+    pub method: Method,
+    /// Friction power of every patch over the rolling speed, in N: what the powers of its cells are scaled to.
+    pub totals: &'a [f64],
+}
+
+impl PowerTask<'_> {
+    /// Is there power in every patch?
+    fn is_in_every_patch(&self, power: &[f64]) -> bool {
+        let of_patch = |patch| power[self.level.patch_cells(patch)].iter().sum::<f64>();
+        (0..self.totals.len()).all(|patch| of_patch(patch) > 0.0)
+    }
+}
+
+/// Slip of every cell over the rolling speed, along x and across: along the traction, and as large as its power asks for.
+///
+/// A cell that sticks hands its power to the cell behind it, where the material goes, and so does one whose power is negative. The last
+/// cell of a strip keeps what reaches it: if it sticks on the whole it slips at its trailing end. Cells without traction have the slip
+/// of the method.
+///
+/// # Errors
+/// The monitor is asked once per strip and may stop the work.
+pub fn slips(task: &PowerTask, monitor: &dyn Monitor) -> Result<[Vec<f64>; 2], Stop> {
+    let (level, answer) = (task.level, task.answer);
+    let unit = level.scale.slip();
+    let mut slip = [0, 1].map(|k| answer.slip[k].iter().map(|s| s * unit).collect::<Vec<_>>());
+    if matches!(answer.exit, LevelExit::NoMotion | LevelExit::NoFriction) {
+        return Ok(slip);
+    }
+    let power = powers(task, monitor)?;
+    for (i, power) in power.iter().enumerate() {
+        let traction = [0, 1].map(|k| answer.traction[k][i] * level.scale.traction);
+        let length = traction[0].hypot(traction[1]);
+        if length > 0.0 {
+            let size = power / (level.area[i] * length);
+            for k in [0, 1] {
+                slip[k][i] = size * traction[k] / length;
+            }
+        }
+    }
+    Ok(slip)
+}
+
+/// Power of every cell over the rolling speed, in N.
+fn powers(task: &PowerTask, monitor: &dyn Monitor) -> Result<Vec<f64>, Stop> {
+    let (level, answer) = (task.level, task.answer);
+    let mut power = match task.method {
+        // The simplified theory has displacements, and slips, of its own; where nothing slips it does not say where the power is.
+        Method::Fastsim => match own_powers(level, answer) {
+            own if task.is_in_every_patch(&own) => own,
+            _ => cell_mean_powers(task, monitor)?,
+        },
+        Method::BoundaryElement | Method::LiuHsu => cell_mean_powers(task, monitor)?,
+    };
+    for segment in &level.mesh.segments {
+        carry(&mut power, &answer.slips, segment.cells.clone());
+    }
+    for (patch, total) in task.totals.iter().enumerate() {
+        let power = &mut power[level.patch_cells(patch)];
+        power.iter_mut().for_each(|power| *power = power.max(0.0));
+        let sum: f64 = power.iter().sum();
+        // A power that is not positive is an error of the resultants; there is nothing to share out then.
+        let factor = if sum > 0.0 { total.max(0.0) / sum } else { 0.0 };
+        power.iter_mut().for_each(|power| *power *= factor);
+    }
+    Ok(power)
+}
+
+/// Traction times slip of the method.
+fn own_powers(level: &StripMesh, answer: &LevelAnswer) -> Vec<f64> {
+    let of_cell = |i: usize| {
+        let [x, y] = [0, 1].map(|k| answer.traction[k][i] * answer.slip[k][i]);
+        (x + y) * level.area[i]
+    };
+    (0..level.area.len()).map(of_cell).collect()
+}
+
+/// Traction times mean slip on a level, up to a common factor.
+fn cell_mean_powers(task: &PowerTask, monitor: &dyn Monitor) -> Result<Vec<f64>, Stop> {
+    let (level, traction) = (task.level, &task.answer.traction);
+    let (mesh, nu) = (&level.normalised, level.poisson_ratio());
+    let mut power = rigid_powers(mesh, &level.scale.motion(task.motion), traction);
+    if task.answer.exit != LevelExit::RigidSlip {
+        let differences = match level.precision() {
+            Precision::Single => Differences::of::<f32>(mesh, nu, traction, monitor)?,
+            Precision::Double => Differences::of::<f64>(mesh, nu, traction, monitor)?,
+        };
+        differences.add_powers(mesh, traction, &mut power);
+    }
+    Ok(power)
+}
+
+/// `A T·w` of a motion.
+fn rigid_powers(mesh: &Mesh, motion: &Motion, traction: &[Vec<f64>; 2]) -> Vec<f64> {
+    let mut power = Vec::with_capacity(mesh.cells());
+    for (segment, arm) in mesh.segments.iter().zip(&mesh.arm) {
+        // The arm that the moment is summed with.
+        let y = 0.5 * (segment.chord.y + arm);
+        for i in segment.cells.clone() {
+            let x = 0.5 * (mesh.left[i] + mesh.right[i]);
+            let area = (mesh.right[i] - mesh.left[i]) * segment.chord.dy;
+            let along = motion.creepage_x - motion.spin_per_mm * y;
+            let across = motion.creepage_y + motion.spin_per_mm * x;
+            power.push(area * (traction[0][i] * along + traction[1][i] * across));
+        }
+    }
+    power
+}
+
+/// `D T` and `Dᵀ dy T`, along x and across.
+struct Differences {
+    applied: [Vec<f64>; 2],
+    transposed: [Vec<f64>; 2],
+}
+
+impl Differences {
+    /// The rows of `D` are computed strip by strip and used at once; none is kept.
+    fn of<T: Number + Into<f64>>(
+        mesh: &Mesh,
+        nu: f64,
+        traction: &[Vec<f64>; 2],
+        monitor: &dyn Monitor,
+    ) -> Result<Differences, Stop> {
+        let cells = mesh.cells();
+        let zeros = || [vec![0.0; cells], vec![0.0; cells]];
+        let mut sums = Differences {
+            applied: zeros(),
+            transposed: zeros(),
+        };
+        let mut edges = CellEdges::<T>::new(mesh);
+        let (arch, mut rows) = (Arch::new(), Vec::new());
+        for segment in &mesh.segments {
+            if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.0) {
+                return Err(stop);
+            }
+            rows.resize(3 * cells * segment.cells.len(), T::ZERO);
+            edges.look_from(mesh, segment.chord.y);
+            arch.dispatch(SegmentRows {
+                edges: &mut edges,
+                points: &edges_of(mesh, segment),
+                mesh,
+                nu,
+                folded: false,
+                stride: cells,
+                target: &mut rows,
+            });
+            sums.add(segment, &rows, traction);
+        }
+        Ok(sums)
+    }
+
+    /// Adds `½ dy T·(D T) − ½ T·(Dᵀ dy T)`.
+    fn add_powers(&self, mesh: &Mesh, traction: &[Vec<f64>; 2], power: &mut [f64]) {
+        for segment in &mesh.segments {
+            for i in segment.cells.clone() {
+                for (k, traction) in traction.iter().enumerate() {
+                    let own = segment.chord.dy * self.applied[k][i];
+                    power[i] += 0.5 * traction[i] * (own - self.transposed[k][i]);
+                }
+            }
+        }
+    }
+
+    fn add<T: Number + Into<f64>>(
+        &mut self,
+        segment: &Segment,
+        rows: &[T],
+        traction: &[Vec<f64>; 2],
+    ) {
+        let cells = traction[0].len();
+        let [tx, ty] = [&traction[0][..cells], &traction[1][..cells]];
+        let [back_x, back_y] = &mut self.transposed;
+        let (back_x, back_y) = (&mut back_x[..cells], &mut back_y[..cells]);
+        for (row, i) in rows.chunks_exact(3 * cells).zip(segment.cells.clone()) {
+            let (xx, rest) = row.split_at(cells);
+            let (xy, yy) = rest.split_at(cells);
+            let [own_x, own_y] = [0, 1].map(|k| segment.chord.dy * traction[k][i]);
+            let mut sum = [0.0; 2];
+            for k in 0..cells {
+                let (xx, xy, yy): (f64, f64, f64) = (xx[k].into(), xy[k].into(), yy[k].into());
+                sum[0] += xx * tx[k] + xy * ty[k];
+                sum[1] += xy * tx[k] + yy * ty[k];
+                back_x[k] += xx * own_x + xy * own_y;
+                back_y[k] += xy * own_x + yy * own_y;
+            }
+            for k in [0, 1] {
+                self.applied[k][i] = sum[k];
+            }
+        }
+    }
+}
+
+/// The edges of the cells of a segment, from its trailing to its leading end.
+fn edges_of(mesh: &Mesh, segment: &Segment) -> Vec<f64> {
+    let cells = segment.cells.clone();
+    let last = mesh.right[cells.end - 1];
+    let mut edges = mesh.left[cells].to_vec();
+    edges.push(last);
+    edges
+}
+
+/// From the leading cell backwards, cells that stick or whose power is negative hand it to the cell behind. What is missing at the
+/// trailing end is taken from the cells ahead. The sum is kept, and if it is not negative no cell is.
+fn carry(power: &mut [f64], slips: &[bool], cells: Range<usize>) {
+    let mut carried = 0.0;
+    for i in cells.clone().rev() {
+        power[i] += carried;
+        carried = 0.0;
+        let last = i == cells.start;
+        if !last && (!slips[i] || power[i] < 0.0) {
+            carried = std::mem::take(&mut power[i]);
+        }
+    }
+    let mut debt = 0.0;
+    for i in cells.clone() {
+        power[i] += debt;
+        debt = 0.0;
+        if power[i] < 0.0 && i + 1 < cells.end {
+            debt = std::mem::take(&mut power[i]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::mesh::strips::{Chord, Grading, strips_about};
+    use crate::contact::monitor::Unmonitored;
+
+    /// Whatever the tractions: the cells give the power of the forces, on strips of one width and of many.
+    #[test]
+    fn cell_means_add_up_to_the_power_of_the_forces() {
+        let motion = Motion {
+            creepage_x: 0.3,
+            creepage_y: -0.1,
+            spin_per_mm: 0.25,
+        };
+        for pole in [0.0, 0.6] {
+            let strips = strips_about(pole, -1.5, 1.5, 6).into_iter().enumerate();
+            let chord = |(strip, (y, dy)): (usize, (f64, f64))| {
+                let half = (1.0 - (y / 1.5).powi(2)).sqrt();
+                let (left, right) = (-half, half);
+                Chord {
+                    patch: 0,
+                    strip,
+                    y,
+                    dy,
+                    left,
+                    right,
+                }
+            };
+            let chords: Vec<Chord> = strips.map(chord).collect();
+            let mesh = Mesh::new(&chords, &Grading::about(pole, 7));
+            let traction = [1.0, 2.3].map(|seed| {
+                let of_cell = |i: usize| (seed * (1.0 + 3.7 * i as f64)).sin();
+                (0..mesh.cells()).map(of_cell).collect::<Vec<f64>>()
+            });
+            let rigid = rigid_powers(&mesh, &motion, &traction);
+            let known: f64 = rigid.iter().sum();
+            for single in [true, false] {
+                let mut power = rigid.clone();
+                let differences = match single {
+                    true => Differences::of::<f32>(&mesh, 0.28, &traction, &Unmonitored),
+                    false => Differences::of::<f64>(&mesh, 0.28, &traction, &Unmonitored),
+                };
+                differences
+                    .unwrap()
+                    .add_powers(&mesh, &traction, &mut power);
+                let moved: f64 = power.iter().zip(&rigid).map(|(a, b)| (a - b).abs()).sum();
+                let sum: f64 = power.iter().sum();
+                assert!((sum - known).abs() < 1e-13 * moved, "{pole}: {sum} {known}");
+                assert!(moved > known.abs(), "elastic slip counts: {moved}");
+            }
+        }
+    }
+
+    #[test]
+    fn powers_are_carried_backwards_and_their_sum_is_kept() {
+        let slips = [true, true, true, false, false];
+        let mut power = [0.5, -0.2, 0.4, 0.1, -0.3];
+        carry(&mut power, &slips, 0..5);
+        for (found, known) in power.iter().zip([0.5, 0.0, 0.0, 0.0, 0.0]) {
+            assert!((found - known).abs() < 1e-15, "{power:?}");
+        }
+        // A strip that sticks has its power at the trailing end, and takes a debt from ahead.
+        let mut power = [-0.5, 0.3, 0.4];
+        carry(&mut power, &[false; 3], 0..3);
+        assert!((power[0] - 0.2).abs() < 1e-15 && power[1..] == [0.0, 0.0]);
+        let mut power = [-0.5, 0.3, 0.4];
+        carry(&mut power, &[true; 3], 0..3);
+        assert!(power[0] == 0.0 && power[1] == 0.0 && (power[2] - 0.2).abs() < 1e-15);
+    }
+}
