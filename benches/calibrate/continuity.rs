@@ -26,7 +26,7 @@ fn estimates(case: &Value) -> Vec<(f64, u32)> {
     let (solution, _) = contact::solve(&problem, &Unmonitored).expect("an answer");
     let points = solution.patches[0].points.iter();
     let of = |point: &contact::solution::words::PointSolution| {
-        let mesh = point.solver.mesh;
+        let mesh = point.solver.mesh.expect("a mesh");
         (
             point.error_estimate.expect("an estimate").force_x_n,
             mesh.strips * mesh.cells,

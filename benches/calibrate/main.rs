@@ -136,7 +136,7 @@ fn tables(class: Class, truths: &Truths, each: bool) {
                 seconds,
             };
             if each || error - truth.uncertainty > estimate {
-                let mesh = solution.patches[0].points[0].solver.mesh;
+                let mesh = solution.patches[0].points[0].solver.mesh.expect("a mesh");
                 println!(
                     "  {} {number} at {target}: error {error:.5} ± {:.5}, estimate {estimate:.5}, {} x {}, {:.1} ms",
                     class.name(),

@@ -78,6 +78,6 @@ fn outcome(case: &Value, target: f64) -> Outcome {
             / bound,
         seconds,
         products: report.products,
-        cells: report.mesh.cells * report.mesh.strips,
+        cells: report.mesh.map_or(0, |mesh| mesh.cells * mesh.strips),
     }
 }

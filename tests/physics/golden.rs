@@ -189,7 +189,8 @@ fn numbers(case: &Value) -> Vec<f64> {
                 point.moment_z_n_mm / (bound * arm),
             ]);
             numbers.extend(point.error_estimate.map(|error| error.force_x_n / bound));
-            numbers.push(point.traction_max_mpa / (friction * patch.pressure_max_mpa));
+            let bound_max = friction * patch.pressure_max_mpa;
+            numbers.extend(point.traction_max_mpa.map(|largest| largest / bound_max));
         }
     }
     numbers.into_iter().map(rounded).collect()

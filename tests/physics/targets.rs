@@ -109,7 +109,10 @@ fn a_looser_target_costs_fewer_cells() {
     let cells = |target: f64| {
         let mut question = case.ellipse().case(1, 1);
         question["solver"] = json!({ "target_error": target });
-        let mesh = solve(&question).0.patches[0].points[0].solver.mesh;
+        let mesh = solve(&question).0.patches[0].points[0]
+            .solver
+            .mesh
+            .expect("a mesh");
         mesh.strips * mesh.cells
     };
     assert!(

@@ -17,7 +17,8 @@ use crate::contact::rolling::linear_theory;
 use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
-use crate::contact::rolling::refinement::level_solve::{MotionAnswer, MotionTask};
+use crate::contact::rolling::motion_answer::MotionAnswer;
+use crate::contact::rolling::refinement::level_solve::MotionTask;
 use crate::contact::rolling::refinement::levels::Levels;
 use crate::contact::rolling::refinement::refine;
 use crate::contact::rolling::refinement::resolution::Resolution;
@@ -394,7 +395,7 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
             Some((_, point)) => point,
             None => refine::solve(self.task, self.levels, asked, self.monitor)?,
         };
-        point.tangential.remarks.extend(inexact);
+        point.remarks.extend(inexact);
         point.work = self.work;
         point.saturated = self.saturated;
         point.seconds = (self.monitor.elapsed() - began).as_secs_f64();

@@ -6,6 +6,7 @@ pub mod linear_theory;
 pub mod mesh_plan;
 pub mod methods;
 pub mod motion;
+pub mod motion_answer;
 pub mod operator_store;
 pub mod own_blocks;
 pub mod refinement;

@@ -10,7 +10,7 @@ use crate::contact::post::local_power::PowerTask;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::motion::Motion;
-use crate::contact::rolling::refinement::level_solve::MotionAnswer;
+use crate::contact::rolling::motion_answer::{MotionAnswer, SolvedFields};
 use crate::contact::rolling::refinement::levels::Levels;
 use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
@@ -71,17 +71,20 @@ impl<'a> Assembly<'a> {
         point: &MotionAnswer,
         monitor: &dyn Monitor,
     ) -> Result<(), Stop> {
-        let (case, level) = (self.case, levels.get(point.level));
+        let case = self.case;
+        let fields = point.fields.as_ref();
+        let level = fields.map(|fields| levels.get(fields.level));
+        let on_level = level.as_deref().zip(fields);
         self.remarks.extend(remarks(case, self.total.len(), point));
         if self.remarks.len() > REMARKS_AT_ONCE {
             self.remarks = merged(std::mem::take(&mut self.remarks));
         }
         for (index, patch) in self.patches.iter().enumerate() {
-            self.points[index].push(point_solution(case, &level, patch, index, point));
+            self.points[index].push(point_solution(case, on_level, patch, index, point));
         }
         self.total.push(total(case, &self.patches, point));
-        if wants_fields(case) {
-            self.add_fields(&level, point, monitor)?;
+        if let Some((level, fields)) = on_level.filter(|_| wants_fields(case)) {
+            self.add_fields(level, point, fields, monitor)?;
         }
         Ok(())
     }
@@ -91,21 +94,22 @@ impl<'a> Assembly<'a> {
         &mut self,
         level: &StripMesh,
         point: &MotionAnswer,
+        found: &SolvedFields,
         monitor: &dyn Monitor,
     ) -> Result<(), Stop> {
         let case = self.case;
         let slip = match case.run.wants(Output::Slip) {
-            true => Some(self.slips(level, point, monitor)?),
+            true => Some(self.slips(level, point, found, monitor)?),
             false => None,
         };
         let patches = self.patches.len();
         self.fields
             .patches
             .resize_with(patches, PatchFields::default);
-        let known = self.levels.iter().rposition(|known| *known == point.level);
+        let known = self.levels.iter().rposition(|known| *known == found.level);
         let mesh = known.unwrap_or(self.levels.len());
         if known.is_none() {
-            self.levels.push(point.level);
+            self.levels.push(found.level);
         }
         for (index, fields) in self.fields.patches.iter_mut().enumerate() {
             if known.is_none() {
@@ -116,7 +120,7 @@ impl<'a> Assembly<'a> {
                 let slip: Option<&[Vec<f64>; 2]> = slip.as_ref();
                 slip.map(|slip| slip[k][cells.clone()].to_vec())
             });
-            let values = point_fields(case, level, cells, point);
+            let values = point_fields(case, level, cells, &found.tangential);
             fields.points.push(PointFields {
                 mesh,
                 slip_x,
@@ -132,13 +136,14 @@ impl<'a> Assembly<'a> {
         &self,
         level: &StripMesh,
         point: &MotionAnswer,
+        found: &SolvedFields,
         monitor: &dyn Monitor,
     ) -> Result<[Vec<f64>; 2], Stop> {
         let newest = self.points.iter().filter_map(|points| points.last());
         let totals: Vec<f64> = newest.map(|point| point.friction_power_n).collect();
         let task = PowerTask {
             level,
-            answer: &point.tangential,
+            answer: &found.tangential,
             motion: &point.motion,
             method: point.method,
             totals: &totals,
@@ -206,23 +211,19 @@ fn patch_solution(case: &CheckedCase, patch: &Patch, points: Vec<PointSolution>)
 
 fn point_solution(
     case: &CheckedCase,
-    level: &StripMesh,
+    on_level: Option<(&StripMesh, &SolvedFields)>,
     patch: &Patch,
     index: usize,
     point: &MotionAnswer,
 ) -> PointSolution {
     let motion = &point.motion;
     let found = point.resultants[index];
-    let cells = level.patch_cells(index);
-    let traction = &point.tangential.traction;
-    let largest = cells
-        .clone()
-        .map(|i| traction[0][i].hypot(traction[1][i]))
-        .fold(0.0, f64::max);
-    let areas = case
-        .run
-        .wants(Output::Zones)
-        .then(|| zone_areas(level, patch, cells, &point.tangential.slips));
+    let areas = on_level
+        .filter(|_| case.run.wants(Output::Zones))
+        .map(|(level, fields)| {
+            let cells = level.patch_cells(index);
+            zone_areas(level, patch, cells, &fields.tangential.slips)
+        });
     let power_x = motion.creepage_x * found.force_x;
     let power_y = motion.creepage_y * found.force_y;
     PointSolution {
@@ -237,24 +238,31 @@ fn point_solution(
         slip_area_mm2: areas.map(|a| a.slip_area),
         stick_cells: areas.map(|a| a.stick_cells),
         slip_cells: areas.map(|a| a.slip_cells),
-        traction_max_mpa: largest * level.scale.traction,
+        traction_max_mpa: on_level.map(|(level, fields)| traction_max(level, fields, index)),
         friction_power_n: power_x + power_y + motion.spin_per_mm * found.moment_z,
         friction_power_without_spin_n: power_x.abs() + power_y.abs(),
         solver: SolverReport {
             method: point.method.into(),
-            mesh: MeshReport {
+            mesh: on_level.map(|(level, _)| MeshReport {
                 strips: level.plan.size.strips,
                 cells: level.plan.size.cells,
-            },
+            }),
             iterations: point.work.iterations,
             products: point.work.products,
             residual: point.work.residual,
-            skipped: skipped(&point.tangential.skips),
+            skipped: skipped(&point.skips),
             seconds: point.seconds,
         },
         target_met: target_met(case, point),
         saturated: point.saturated,
     }
+}
+
+/// Largest tangential traction in the cells of a patch, in MPa.
+fn traction_max(level: &StripMesh, fields: &SolvedFields, patch: usize) -> f64 {
+    let [x, y] = &fields.tangential.traction;
+    let lengths = level.patch_cells(patch).map(|i| x[i].hypot(y[i]));
+    lengths.fold(0.0, f64::max) * level.scale.traction
 }
 
 /// What was skipped, as the client reads it.
@@ -375,7 +383,7 @@ fn remarks(
     index: usize,
     point: &MotionAnswer,
 ) -> impl Iterator<Item = RemarkEntry> {
-    let own = point.tangential.remarks.iter().cloned();
+    let own = point.remarks.iter().cloned();
     let missed = target_missed(case, point);
     let number = case.problem.part.before + index;
     own.chain(unreachable(case, index, point))

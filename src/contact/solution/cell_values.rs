@@ -2,7 +2,7 @@
 
 use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::words::solver::Output;
-use crate::contact::rolling::refinement::level_solve::MotionAnswer;
+use crate::contact::rolling::answer::LevelAnswer;
 use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::solution::words::{PatchCells, PointFields};
 use crate::contact::solution::zone::Zone;
@@ -35,9 +35,8 @@ pub(crate) fn point_fields(
     case: &CheckedCase,
     level: &StripMesh,
     cells: std::ops::Range<usize>,
-    point: &MotionAnswer,
+    answer: &LevelAnswer,
 ) -> PointFields {
-    let answer = &point.tangential;
     let scaled = |values: &[f64], factor: f64| {
         values[cells.clone()]
             .iter()

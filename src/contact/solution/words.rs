@@ -182,8 +182,10 @@ pub struct PointSolution {
     /// Number of cells that slip; absent unless zones were asked for.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub slip_cells: Option<u32>,
-    /// Largest tangential traction in MPa.
-    pub traction_max_mpa: f64,
+    /// Largest tangential traction in MPa; absent from methods that know resultants only.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub traction_max_mpa: Option<f64>,
     /// Tγ: dissipated power divided by rolling speed, ν_x F_x + ν_y F_y + φ M_z, in N (J/m).
     pub friction_power_n: f64,
     /// |ν_x F_x| + |ν_y F_y| in N, the form damage models use.
@@ -226,8 +228,10 @@ pub struct ErrorEstimate {
 pub struct SolverReport {
     /// The method that gave the numbers.
     pub method: MethodName,
-    /// The finest mesh: strips of this patch, cells along x in each.
-    pub mesh: MeshReport,
+    /// The finest mesh: strips of this patch, cells along x in each; absent from methods that need none.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub mesh: Option<MeshReport>,
     /// Newton iterations over all levels and rules.
     pub iterations: u32,
     /// Products of the influence matrix with a vector, over all levels and rules.

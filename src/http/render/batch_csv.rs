@@ -208,8 +208,8 @@ impl TableLine<'_> {
                 .map(|(patch, _)| of(patch))
                 .sum::<Option<f64>>()
         };
-        let largest = |of: fn(&(&PatchSolution, &PointSolution)) -> f64| {
-            self.parts().map(|part| of(&part)).reduce(f64::max)
+        let largest = |of: fn(&(&PatchSolution, &PointSolution)) -> Option<f64>| {
+            self.parts().filter_map(|part| of(&part)).reduce(f64::max)
         };
         let of_points = |of: fn(&PointSolution) -> Option<f64>| {
             self.parts()
@@ -220,7 +220,7 @@ impl TableLine<'_> {
             "normal_force_n" => of_patches(|patch| Some(patch.normal_force_n)),
             "area_mm2" => of_patches(|patch| Some(patch.area_mm2)),
             "friction_limit_n" => of_patches(|patch| patch.friction_limit_n),
-            "pressure_max_mpa" => largest(|(patch, _)| patch.pressure_max_mpa),
+            "pressure_max_mpa" => largest(|(patch, _)| Some(patch.pressure_max_mpa)),
             "traction_max_mpa" => largest(|(_, point)| point.traction_max_mpa),
             "friction_power_n" => of_points(|point| Some(point.friction_power_n)),
             "friction_power_without_spin_n" => {

@@ -161,7 +161,7 @@ impl Record {
         });
         each("stick_area", &|p| optional(p.stick_area_mm2));
         each("slip_area", &|p| optional(p.slip_area_mm2));
-        each("traction_max", &|p| number(p.traction_max_mpa));
+        each("traction_max", &|p| optional(p.traction_max_mpa));
         each("friction_power", &|p| number(p.friction_power_n));
         each("power_without_spin", &|p| {
             number(p.friction_power_without_spin_n)
@@ -169,7 +169,10 @@ impl Record {
         each("stick_cells", &|p| optional(p.stick_cells.map(f64::from)));
         each("slip_cells", &|p| optional(p.slip_cells.map(f64::from)));
         each("mesh", &|p| {
-            format!("{}x{}", p.solver.mesh.strips, p.solver.mesh.cells)
+            let mesh = p.solver.mesh;
+            mesh.map_or("-".to_owned(), |mesh| {
+                format!("{}x{}", mesh.strips, mesh.cells)
+            })
         });
         each("iterations", &|p| p.solver.iterations.to_string());
         each("products", &|p| p.solver.products.to_string());

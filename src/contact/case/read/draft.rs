@@ -18,6 +18,7 @@ use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::question::Case;
 use crate::contact::case::words::solver::{Output, Solver};
 use crate::contact::error::{CaseError, Fault};
+use crate::contact::rolling::methods::method::Method;
 
 /// Most characters of the name of a case.
 const NAME_LENGTH_MAX: usize = 200;
@@ -119,7 +120,9 @@ fn read(case: &mut Object) -> CaseDraft {
     let load = contact::read_load(case);
     let motion = motion::read(case);
     let solver = solver::read(case);
-    let outputs = solver::read_outputs(case);
+    let method = solver.as_ref().map(|solver| solver.method);
+    let without_fields = method.filter(|method| !Method::from(*method).has_fields());
+    let outputs = solver::read_outputs(case, without_fields);
     CaseDraft {
         name,
         labels,

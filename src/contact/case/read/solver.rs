@@ -100,10 +100,16 @@ pub(crate) fn read(case: &mut Object) -> Option<Solver> {
     })
 }
 
-/// Reads the member `outputs` of a case: sorted, each once; left out, resultants and zones.
-pub(crate) fn read_outputs(case: &mut Object) -> Option<Vec<Output>> {
+/// Reads the member `outputs` of a case: sorted, each once; left out, resultants and zones. A method `without_fields` computes
+/// resultants only, and every other output is refused.
+pub(crate) fn read_outputs(
+    case: &mut Object,
+    without_fields: Option<MethodName>,
+) -> Option<Vec<Output>> {
     let Some(value) = case.value("outputs") else {
-        return Some(vec![Output::Resultants, Output::Zones]);
+        let mut usual = vec![Output::Resultants, Output::Zones];
+        usual.retain(|output| without_fields.is_none() || !output.needs_fields());
+        return Some(usual);
     };
     let elements = value.as_array().filter(|elements| !elements.is_empty());
     let Some(elements) = elements else {
@@ -123,19 +129,31 @@ pub(crate) fn read_outputs(case: &mut Object) -> Option<Vec<Output>> {
         .iter()
         .enumerate()
         .map(|(k, element)| {
-            word(
-                element,
-                &join(&pointer, k),
-                &OUTPUTS,
-                &OUTPUTS_LATER,
-                faults,
-            )
+            let pointer = join(&pointer, k);
+            let output = word(element, &pointer, &OUTPUTS, &OUTPUTS_LATER, faults)?;
+            let Some(method) = without_fields.filter(|_| output.needs_fields()) else {
+                return Some(output);
+            };
+            let detail = format!(
+                "{} given; \"method\": \"{}\" computes only \"resultants\"",
+                shown(element),
+                method.name()
+            );
+            faults.add(pointer, detail);
+            None
         })
         .collect();
     let mut outputs: Vec<Output> = read.into_iter().collect::<Option<_>>()?;
     outputs.sort_unstable();
     outputs.dedup();
     Some(outputs)
+}
+
+impl Output {
+    /// Is it made from tractions, slips or zones, which only some methods compute?
+    fn needs_fields(self) -> bool {
+        self != Output::Resultants
+    }
 }
 
 fn mesh(block: &mut Object) -> Option<MeshSizeWords> {
@@ -147,4 +165,39 @@ fn mesh(block: &mut Object) -> Option<MeshSizeWords> {
         strips: strips?,
         cells: cells?,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::*;
+    use crate::contact::case::read::faults::Faults;
+    use crate::contact::error::Fault;
+
+    /// What is read of a case, by a method that computes resultants only.
+    fn read_without_fields(case: &Value) -> (Option<Vec<Output>>, Vec<Fault>) {
+        let mut faults = Faults::default();
+        let mut case = Object::open(case, String::new(), &mut faults).expect("an object");
+        let outputs = read_outputs(&mut case, Some(MethodName::Fastsim));
+        (outputs, faults.into_list())
+    }
+
+    #[test]
+    fn a_method_without_fields_refuses_outputs_that_need_them_one_by_one() {
+        let asked = json!({ "outputs": ["zones", "resultants", "slip"] });
+        let (outputs, faults) = read_without_fields(&asked);
+        assert_eq!(outputs, None);
+        let pointers: Vec<&str> = faults.iter().map(|fault| &*fault.pointer).collect();
+        assert_eq!(pointers, ["/outputs/0", "/outputs/2"]);
+        assert!(faults[0].detail.contains("\"zones\" given"), "{faults:?}");
+    }
+
+    #[test]
+    fn a_method_without_fields_is_asked_for_resultants_when_nothing_is_said() {
+        for case in [json!({}), json!({ "outputs": ["resultants"] })] {
+            let (outputs, faults) = read_without_fields(&case);
+            assert_eq!((outputs, faults), (Some(vec![Output::Resultants]), vec![]));
+        }
+    }
 }

@@ -22,6 +22,14 @@ pub enum TractionBound {
 }
 
 impl Method {
+    /// Does it solve for tractions and slips, rather than for resultants only?
+    #[must_use]
+    pub fn has_fields(self) -> bool {
+        match self {
+            Method::BoundaryElement | Method::LiuHsu | Method::Fastsim => true,
+        }
+    }
+
     /// The word of the field, as in errors and answers.
     #[must_use]
     pub fn name(self) -> &'static str {

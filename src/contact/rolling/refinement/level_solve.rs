@@ -11,6 +11,7 @@ use crate::contact::rolling::methods::liu_hsu::on_level;
 use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::methods::{fastsim, full_slip};
 use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::motion_answer::{MotionAnswer, SolvedFields};
 use crate::contact::rolling::refinement::constants::LEVEL_RATIO_MIN;
 use crate::contact::rolling::refinement::error_estimate;
 use crate::contact::rolling::refinement::error_estimate::{
@@ -38,16 +39,14 @@ pub struct MotionTask {
     pub motion: Motion,
 }
 
-/// The answer for one motion on the finest level it needed.
+/// The answer for one motion on one level.
 #[derive(Debug, Clone)]
-pub struct MotionAnswer {
+pub struct SolvedLevel {
     /// The motion it was solved for.
     pub motion: Motion,
-    /// A prescribed force could not be reached.
-    pub saturated: bool,
     /// Tractions, slips and zones.
     pub tangential: LevelAnswer,
-    /// The number of that level in the levels.
+    /// The number of the level in the levels.
     pub level: usize,
     /// Resultants of every patch about the origin of the case: the best known.
     pub resultants: Vec<Resultants>,
@@ -63,7 +62,7 @@ pub struct MotionAnswer {
     pub seconds: f64,
 }
 
-impl MotionAnswer {
+impl SolvedLevel {
     /// Estimated error of the sum over the patches.
     #[must_use]
     pub fn error(&self) -> Option<f64> {
@@ -71,11 +70,32 @@ impl MotionAnswer {
     }
 }
 
+impl From<SolvedLevel> for MotionAnswer {
+    fn from(solved: SolvedLevel) -> MotionAnswer {
+        let mut tangential = solved.tangential;
+        MotionAnswer {
+            motion: solved.motion,
+            saturated: false,
+            resultants: solved.resultants,
+            errors: solved.errors,
+            skips: std::mem::take(&mut tangential.skips),
+            remarks: std::mem::take(&mut tangential.remarks),
+            fields: Some(SolvedFields {
+                level: solved.level,
+                tangential,
+            }),
+            work: solved.work,
+            method: solved.method,
+            seconds: solved.seconds,
+        }
+    }
+}
+
 /// An answer with the indicators of its error.
 #[derive(Debug, Clone)]
 pub struct JudgedAnswer {
     /// The answer.
-    pub point: MotionAnswer,
+    pub point: SolvedLevel,
     /// The indicators of its level.
     pub indicators: Indicators,
 }
@@ -90,7 +110,7 @@ pub fn solve_level(
     levels: &mut Levels,
     asked: MotionTask,
     plan: MeshPlan,
-    coarser: Option<MotionAnswer>,
+    coarser: Option<SolvedLevel>,
     monitor: &dyn Monitor,
 ) -> Result<JudgedAnswer, SolveError> {
     let began = monitor.elapsed();
@@ -128,9 +148,8 @@ pub fn solve_level(
     work.add(tangential.work);
     let seconds =
         (monitor.elapsed() - began).as_secs_f64() + coarser.map_or(0.0, |point| point.seconds);
-    let point = MotionAnswer {
+    let point = SolvedLevel {
         motion: asked.motion,
-        saturated: false,
         tangential,
         level: number,
         resultants: summed.clone(),
@@ -147,7 +166,7 @@ pub fn solve_level(
 pub(crate) fn before<'a>(
     levels: &Levels,
     level: &StripMesh,
-    point: &'a MotionAnswer,
+    point: &'a SolvedLevel,
 ) -> Option<CoarserLevel<'a>> {
     let below = levels.get(point.level);
     let ratio = level.mesh.cells() as f64 / below.mesh.cells() as f64;

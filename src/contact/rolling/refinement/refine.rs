@@ -5,12 +5,13 @@ use crate::contact::mesh::size::MeshSize;
 use crate::contact::monitor::Monitor;
 use crate::contact::rolling::answer::Work;
 use crate::contact::rolling::mesh_plan::{MeshPlan, Regime};
+use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;
 use crate::contact::rolling::refinement::companions::Companion;
 use crate::contact::rolling::refinement::constants::{CELLS_FINE, EXTRAPOLATED, FINE_TARGET};
 use crate::contact::rolling::refinement::error_estimate::Indicators;
 use crate::contact::rolling::refinement::level_solve::{
-    JudgedAnswer, MotionAnswer, MotionTask, solve_level,
+    JudgedAnswer, MotionTask, SolvedLevel, solve_level,
 };
 use crate::contact::rolling::refinement::levels::Levels;
 use crate::contact::rolling::refinement::mesh_policy::MeshPolicy;
@@ -43,10 +44,14 @@ pub fn solve(
                 let below = Some(solved.point);
                 solved = solve_level(task, levels, asked, (*size).into(), below, monitor)?;
             }
-            Ok(solved.point)
+            Ok(solved.point.into())
         }
-        (None, Resolution::Mesh(size)) => on_mesh(task, levels, asked, size, monitor),
-        (None, Resolution::Target(target)) => to_target(task, levels, asked, target, monitor),
+        (None, Resolution::Mesh(size)) => {
+            on_mesh(task, levels, asked, size, monitor).map(MotionAnswer::from)
+        }
+        (None, Resolution::Target(target)) => {
+            to_target(task, levels, asked, target, monitor).map(MotionAnswer::from)
+        }
     }
 }
 
@@ -57,7 +62,7 @@ fn on_mesh(
     asked: MotionTask,
     size: MeshSize,
     monitor: &dyn Monitor,
-) -> Result<MotionAnswer, SolveError> {
+) -> Result<SolvedLevel, SolveError> {
     let cells = |size: MeshSize| u64::from(size.strips) * u64::from(size.cells);
     let mut coarser = None;
     let half = MeshSize {
@@ -99,7 +104,7 @@ pub fn on_levels(
     if let Some(solved) = &mut solved {
         judge(task, levels, asked, solved, None, monitor)?;
     }
-    Ok(solved.map(|solved| solved.point))
+    Ok(solved.map(|solved| solved.point.into()))
 }
 
 /// Solves a motion from the coarsest mesh, or where the last motion of a sweep ended, up to the first mesh that meets the target.
@@ -115,7 +120,7 @@ pub(crate) fn to_target(
     asked: MotionTask,
     target: f64,
     monitor: &dyn Monitor,
-) -> Result<MotionAnswer, SolveError> {
+) -> Result<SolvedLevel, SolveError> {
     let begun = match levels.begin.take() {
         Some(plan) => begin_on(task, levels, asked, plan, monitor)?,
         None => None,
@@ -248,7 +253,7 @@ fn begin_on(
 }
 
 /// What the tractions of a solved level look like.
-fn regime_of(levels: &Levels, asked: MotionTask, point: &MotionAnswer) -> Regime {
+fn regime_of(levels: &Levels, asked: MotionTask, point: &SolvedLevel) -> Regime {
     let spinning = asked.motion.spin_per_mm != 0.0;
     regime(&levels.get(point.level), &point.tangential, spinning)
 }

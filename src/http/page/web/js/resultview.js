@@ -287,11 +287,11 @@ function factsPanel(answer, patch, point) {
     ${patch.semi_axes_mm ? row('semi-axes', `${patch.semi_axes_mm.map((axis) => number(axis)).join(' × ')} mm`) : nothing}
     ${typeof patch.approach_mm === 'number' ? row('approach', `${number(1000 * patch.approach_mm)} μm`) : nothing}
     ${position ? row('contact angle, rolling radius', `${degrees(position.contact_angle_rad)}, ${number(position.rolling_radius_mm)} mm`) : nothing}
-    ${row('largest traction', `${number(point.traction_max_mpa)} MPa`)}
-    ${row('method', `${solver.method.replaceAll('_', ' ')}, ${solver.mesh.strips} × ${solver.mesh.cells} cells`)}
+    ${typeof point.traction_max_mpa === 'number' ? row('largest traction', `${number(point.traction_max_mpa)} MPa`) : nothing}
+    ${row('method', `${solver.method.replaceAll('_', ' ')}${solver.mesh ? `, ${solver.mesh.strips} × ${solver.mesh.cells} cells` : ''}`)}
     ${typeof solver.iterations === 'number' ? row('iterations', `${solver.iterations}, residual ${number(solver.residual, 2)}`) : nothing}
     ${row('time', `${seconds(solver.seconds)}${answer.cached ? ' (solved before)' : ''}`)}
-    ${row('target', point.target_met === true ? 'met' : point.target_met === false ? 'not met' : 'explicit mesh')}
+    ${row('target', point.target_met === true ? 'met' : point.target_met === false ? 'not met' : 'none')}
     ${row('version', answer.solver_version)}</dl></section>`;
 }
 

@@ -1,0 +1,51 @@
+//! The tangential answer for one motion: resultants, and the fields they come from where the method has any.
+
+use crate::contact::remark::list::Remark;
+use crate::contact::rolling::answer::{LevelAnswer, Work};
+use crate::contact::rolling::methods::method::Method;
+use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::refinement::error_estimate::RelativeErrors;
+use crate::contact::rolling::resultants::Resultants;
+use crate::contact::rolling::skip::Skip;
+
+/// The answer for one motion.
+#[derive(Debug, Clone)]
+pub struct MotionAnswer {
+    /// The motion it was solved for.
+    pub motion: Motion,
+    /// A prescribed force could not be reached.
+    pub saturated: bool,
+    /// Resultants of every patch about the origin of the case: the best known.
+    pub resultants: Vec<Resultants>,
+    /// Their estimated errors relative to μN: one per patch, then that of the sum.
+    pub errors: RelativeErrors,
+    /// Tractions, slips and zones; none from a method that knows resultants only ([`Method::has_fields`]).
+    pub fields: Option<SolvedFields>,
+    /// Work that was not needed.
+    pub skips: Vec<Skip>,
+    /// Remarks for the client.
+    pub remarks: Vec<Remark>,
+    /// Work over all levels.
+    pub work: Work,
+    /// The method that was used.
+    pub method: Method,
+    /// Wall time in s.
+    pub seconds: f64,
+}
+
+/// The fields of a motion on the finest level it needed.
+#[derive(Debug, Clone)]
+pub struct SolvedFields {
+    /// The number of that level in the levels.
+    pub level: usize,
+    /// Tractions, slips and zones on it.
+    pub tangential: LevelAnswer,
+}
+
+impl MotionAnswer {
+    /// Estimated error of the sum over the patches.
+    #[must_use]
+    pub fn error(&self) -> Option<f64> {
+        self.errors.last().copied().flatten()
+    }
+}
