@@ -109,7 +109,7 @@ pub fn count(region: Region, rule: Rule, mesh: (usize, &Grading), motions: &[[f6
         {
             t.fill(0.0);
             let outcome = solve_with(&stage, guess, &mut t, &Unmonitored).unwrap();
-            converges[k] = outcome.converged;
+            converges[k] = outcome.exit().converged();
             counts.note(k, outcome.last());
         }
         counts.guess_1 += usize::from(converges[0]);
@@ -123,7 +123,8 @@ pub fn count(region: Region, rule: Rule, mesh: (usize, &Grading), motions: &[[f6
         let shipped = paper
             || solve_by_upwind(&stage, &upwind, None, &mut t, &Unmonitored)
                 .unwrap()
-                .converged;
+                .exit()
+                .converged();
         counts.shipped += usize::from(shipped);
     }
     counts

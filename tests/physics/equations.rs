@@ -175,7 +175,7 @@ fn liu_hsu_has_the_same_digits_where_guess_1_converges() {
         let (t, outcome) = on_stage(&contact, value.rule(), value.motion, 1e-10, |stage, t| {
             solve_with(stage, InitialGuess::RigidSlip, t, &Unmonitored).unwrap()
         });
-        if !outcome.converged {
+        if !outcome.exit().converged() {
             continue;
         }
         converged += 1;

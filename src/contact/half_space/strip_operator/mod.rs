@@ -2,5 +2,6 @@
 
 pub mod assembly;
 pub mod kind;
+pub mod matrix;
 pub mod operator;
 pub mod product;

@@ -7,11 +7,10 @@
 //! The matrix depends on the mesh and Poisson's ratio only. Tractions are in any unit, displacement differences come
 //! out in (that unit / G) × (length unit of the mesh).
 
-use pulp::Arch;
-
 use crate::contact::half_space::strip_operator::assembly::OperatorAssembly;
 use crate::contact::half_space::strip_operator::kind::{LANES, Parity, Precision};
-use crate::contact::half_space::strip_operator::product::{Matrix, Product};
+use crate::contact::half_space::strip_operator::matrix::Matrix;
+use crate::contact::half_space::strip_operator::product::RowLayout;
 use crate::contact::mesh::strips::Mesh;
 use crate::contact::monitor::{Monitor, Stop};
 
@@ -107,10 +106,7 @@ impl StripOperator {
             row_length: blocks * stride,
             first_row: &first_row,
         };
-        let matrix = match precision {
-            Precision::Single => Matrix::Single(assembly.rows(monitor)?),
-            Precision::Double => Matrix::Double(assembly.rows(monitor)?),
-        };
+        let matrix = Matrix::of_rows(&assembly, precision, monitor)?;
         let layout = if folded {
             OperatorLayout::Folded
         } else {
@@ -273,40 +269,14 @@ impl StripOperator {
         out_y: &mut [f64],
         narrow: &mut [Vec<f32>; 2],
     ) {
-        let (tx, ty) = (&tx[..self.stride], &ty[..self.stride]);
-        let blocks = if self.is_folded() { 6 } else { 3 };
-        let (stride, arch) = (self.stride, Arch::new());
-        match &self.matrix {
-            Matrix::Single(matrix) => {
-                for (narrow, values) in narrow.iter_mut().zip([tx, ty]) {
-                    narrow.clear();
-                    narrow.extend(values.iter().map(|v| *v as f32));
-                }
-                let [tx, ty] = narrow;
-                arch.dispatch(Product {
-                    matrix,
-                    blocks,
-                    stride,
-                    roles,
-                    tx,
-                    ty,
-                    out_x,
-                    out_y,
-                });
-            }
-            Matrix::Double(matrix) => {
-                arch.dispatch(Product {
-                    matrix,
-                    blocks,
-                    stride,
-                    roles,
-                    tx,
-                    ty,
-                    out_x,
-                    out_y,
-                });
-            }
-        }
+        let layout = RowLayout {
+            blocks: if self.is_folded() { 6 } else { 3 },
+            stride: self.stride,
+            roles,
+        };
+        let tractions = [&tx[..self.stride], &ty[..self.stride]];
+        self.matrix
+            .multiply(layout, tractions, [out_x, out_y], narrow);
     }
 
     /// Splits the tractions into their two parities, applies each part, and puts the halves together again.

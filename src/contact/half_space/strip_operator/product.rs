@@ -2,38 +2,21 @@
 
 use pulp::{Simd, WithSimd};
 
-/// The stored numbers.
-#[derive(Debug, Clone)]
-pub(crate) enum Matrix {
-    Single(Vec<f32>),
-    Double(Vec<f64>),
-}
-
-impl Matrix {
-    pub(crate) fn bytes(&self) -> usize {
-        match self {
-            Matrix::Single(matrix) => size_of_val(&matrix[..]),
-            Matrix::Double(matrix) => size_of_val(&matrix[..]),
-        }
-    }
-
-    pub(crate) fn at(&self, place: usize) -> f64 {
-        match self {
-            Matrix::Single(matrix) => f64::from(matrix[place]),
-            Matrix::Double(matrix) => matrix[place],
-        }
-    }
-}
-
-/// A product with all rows: `out_x = xx tx + a ty`, `out_y = b tx + yy ty`, where `roles` names the blocks of a row
-/// that act as `xx, a, b, yy`.
-pub(crate) struct Product<'a, T> {
-    pub(crate) matrix: &'a [T],
+/// How the rows of a matrix are divided, and which part of a row acts as what.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RowLayout {
     /// Blocks of a row.
     pub(crate) blocks: usize,
     /// Length of a block.
     pub(crate) stride: usize,
+    /// The blocks that act as `xx, a, b, yy`.
     pub(crate) roles: [usize; 4],
+}
+
+/// A product with all rows: `out_x = xx tx + a ty`, `out_y = b tx + yy ty`.
+pub(crate) struct Product<'a, T> {
+    pub(crate) matrix: &'a [T],
+    pub(crate) layout: RowLayout,
     pub(crate) tx: &'a [T],
     pub(crate) ty: &'a [T],
     pub(crate) out_x: &'a mut [f64],
@@ -48,13 +31,17 @@ macro_rules! product {
 
             #[inline(always)]
             fn with_simd<S: Simd>(self, simd: S) {
+                let RowLayout {
+                    blocks,
+                    stride,
+                    roles,
+                } = self.layout;
                 let (tx, _) = S::$lanes(self.tx);
                 let ty = &S::$lanes(self.ty).0[..tx.len()];
-                let rows = self.matrix.chunks_exact(self.blocks * self.stride);
+                let rows = self.matrix.chunks_exact(blocks * stride);
                 for (row, (out_x, out_y)) in rows.zip(self.out_x.iter_mut().zip(self.out_y)) {
-                    let [xx, a, b, yy] = self.roles.map(|k| {
-                        &S::$lanes(&row[k * self.stride..(k + 1) * self.stride]).0[..tx.len()]
-                    });
+                    let [xx, a, b, yy] =
+                        roles.map(|k| &S::$lanes(&row[k * stride..(k + 1) * stride]).0[..tx.len()]);
                     let [mut s0, mut s1, mut s2, mut s3] = [simd.$zero(0.0); 4];
                     for i in 0..tx.len() {
                         s0 = simd.$multiply_add(xx[i], tx[i], s0);

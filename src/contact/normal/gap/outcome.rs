@@ -65,7 +65,7 @@ impl GapTask {
                 None => remark.into(),
             });
         }
-        if !outcome.settled && coarse.is_empty() {
+        if !outcome.exit.settled() && coarse.is_empty() {
             remarks.push(Remark::GapRough {}.into());
         }
         remarks.extend(self.remarks(&field, pressed.approach - outcome.least));

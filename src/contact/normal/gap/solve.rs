@@ -15,7 +15,7 @@ use crate::contact::normal::gap::constants::{
 use crate::contact::normal::gap::grid::{GridFineness, GridSide, PressureGrid};
 use crate::contact::normal::gap::search_box::{Reach, reach, reach_of_level};
 use crate::contact::normal::gap::task::GapTask;
-use crate::contact::normal::gap::tile::{GapOutcome, Tile};
+use crate::contact::normal::gap::tile::{GapOutcome, GridsExit, Tile};
 use crate::contact::normal::hertz::Pressing;
 
 impl GapTask {
@@ -92,7 +92,7 @@ impl GapTask {
         let mut grid = first(&reach);
         let mut solved: Option<(PressureGrid, Pressed)> = None;
         let (mut iterations, mut pressure_change) = (0, 0.0);
-        let mut end = NextStep::Rough { capped: false };
+        let (mut exit, mut capped) = (GridsExit::GridsUsedUp, false);
         for _ in 0..GRIDS_MAX {
             let pressed = self.press(&grid, solved.as_ref(), &reach, workspace, monitor)?;
             iterations += pressed.iterations;
@@ -111,8 +111,8 @@ impl GapTask {
             solved = Some((grid, pressed));
             match next {
                 NextStep::PressureGrid(next) => grid = next,
-                last => {
-                    end = last;
+                NextStep::End(reason, last_capped) => {
+                    (exit, capped) = (reason, last_capped);
                     break;
                 }
             }
@@ -121,7 +121,7 @@ impl GapTask {
             unreachable!("at least one grid is tried")
         };
         let whole = Tile { grid, pressed };
-        if end.capped()
+        if capped
             && let Some(found) =
                 self.solve_on_tiles(whole.clone(), reach.least, resolution, workspace, monitor)?
         {
@@ -134,7 +134,7 @@ impl GapTask {
         self.found(GapOutcome {
             tiles: vec![whole],
             iterations,
-            settled: matches!(end, NextStep::Settled { .. }),
+            exit,
             pressure_change,
             least: reach.least,
         })
@@ -197,18 +197,18 @@ impl GapTask {
         }
         let capped = wanted.capped;
         let Some((coarse, before)) = before.filter(|_| resolution.settles()) else {
-            return Ok(NextStep::Settled { capped });
+            return Ok(NextStep::End(GridsExit::Settled, capped));
         };
         let ratio = (coarse.step[0] / grid.step[0]).max(coarse.step[1] / grid.step[1]);
         if (pressed.approach - before.approach).abs() <= APPROACH_CHANGE * ratio * depth
             && (before.largest() / pressed.largest() - 1.0).abs() <= PRESSURE_CHANGE * ratio
         {
-            return Ok(NextStep::Settled { capped });
+            return Ok(NextStep::End(GridsExit::Settled, capped));
         }
         let cells = grid.cells.map(|n| (n as f64 * REFINEMENT) as usize);
         let finer = PressureGrid::new(wanted.window, cells, grid.mirrored);
         if (0..2).all(|k| finer.step[k] > COARSER_MAX * grid.step[k]) {
-            return Ok(NextStep::Rough { capped });
+            return Ok(NextStep::End(GridsExit::Rough, capped));
         }
         Ok(NextStep::PressureGrid(finer))
     }
@@ -217,23 +217,8 @@ impl GapTask {
 /// What follows a grid.
 enum NextStep {
     PressureGrid(PressureGrid),
-    /// The result no longer changes; `capped` if a patch would want more cells than a grid may have.
-    Settled {
-        capped: bool,
-    },
-    /// The result still changes, and no finer grid is allowed.
-    Rough {
-        capped: bool,
-    },
-}
-
-impl NextStep {
-    fn capped(&self) -> bool {
-        matches!(
-            self,
-            NextStep::Settled { capped: true } | NextStep::Rough { capped: true }
-        )
-    }
+    /// It is the last one, and whether a patch would want more cells than a grid may have.
+    End(GridsExit, bool),
 }
 
 impl GridFineness {

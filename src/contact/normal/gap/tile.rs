@@ -21,14 +21,34 @@ impl Tile {
     }
 }
 
+/// How the refinement of the grids of a gap ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum GridsExit {
+    /// Finer grids no longer change the result.
+    Settled,
+    /// The result still changes on the finest grid allowed.
+    Rough,
+    /// The patches need more grids, or more cells, than are allowed.
+    CellsUsedUp,
+    /// The number of grids that may be tried was used up.
+    GridsUsedUp,
+}
+
+impl GridsExit {
+    /// Is the result that of the gap, rather than of the grid?
+    pub(crate) fn settled(self) -> bool {
+        self == GridsExit::Settled
+    }
+}
+
 /// Pressures on the last grids.
 pub(crate) struct GapOutcome {
     /// The grids with their pressures: one, or one per patch.
     pub(crate) tiles: Vec<Tile>,
     /// Iterations over all grids.
     pub(crate) iterations: u32,
-    /// Finer grids no longer change the result.
-    pub(crate) settled: bool,
+    /// How the refinement of the grids ended.
+    pub(crate) exit: GridsExit,
     /// See [`NormalWork`](crate::contact::normal::answer::NormalWork).
     pub(crate) pressure_change: f64,
     /// The least gap in mm.

@@ -16,7 +16,7 @@ use crate::contact::normal::gap::constants::{
 };
 use crate::contact::normal::gap::grid::{GridFineness, PressureGrid, within};
 use crate::contact::normal::gap::task::GapTask;
-use crate::contact::normal::gap::tile::{GapOutcome, Tile};
+use crate::contact::normal::gap::tile::{GapOutcome, GridsExit, Tile};
 use crate::contact::normal::gap::tiles_influence::TilesInfluence;
 
 /// More grids than this are not coupled: such a gap is rough, not a few patches of different size.
@@ -61,7 +61,7 @@ impl GapTask {
         let mut found = GapOutcome {
             tiles: vec![whole],
             iterations: 0,
-            settled: false,
+            exit: GridsExit::GridsUsedUp,
             pressure_change: 0.0,
             least,
         };
@@ -91,13 +91,17 @@ impl GapTask {
             if !changed {
                 let missed = self.missed(&found.tiles, depth);
                 if missed.is_empty() {
-                    found.settled = !rough;
+                    found.exit = match rough {
+                        true => GridsExit::Rough,
+                        false => GridsExit::Settled,
+                    };
                     break;
                 }
                 next.extend(missed);
             }
             grids = merged(next);
             if grids.len() > TILES_MAX || cells(&grids) > CELLS_MAX {
+                found.exit = GridsExit::CellsUsedUp;
                 break;
             }
         }

@@ -32,6 +32,12 @@ pub enum ZonesExit {
 }
 
 impl ZonesExit {
+    /// Did the residual reach the tolerance?
+    #[must_use]
+    pub fn converged(self) -> bool {
+        self == ZonesExit::Converged
+    }
+
     /// A clause for messages.
     #[must_use]
     pub fn reason(self) -> &'static str {

@@ -49,7 +49,7 @@ pub fn solve(
         monitor,
     )?;
     let work = work(&outcome);
-    if !outcome.converged {
+    if !outcome.exit().converged() {
         return Err(LevelFailure::NotConverged {
             work,
             tolerance,

@@ -15,8 +15,6 @@ use crate::contact::rolling::vortex;
 /// The results of a solve besides the tractions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ZonesOutcome {
-    /// Whether the residual reached the tolerance.
-    pub converged: bool,
     /// Residual of the tractions returned, as in [`Convergence`].
     pub residual: f64,
     /// The runs of the outer iteration on the fine mesh, in order; the last one determines the outcome.
@@ -34,10 +32,16 @@ impl ZonesOutcome {
         &self.attempts[self.attempts.len() - 1]
     }
 
+    /// How the solve ended.
+    #[must_use]
+    pub fn exit(&self) -> ZonesExit {
+        self.last().exit
+    }
+
     /// Why the solve did not converge and what to do, as a clause for messages.
     #[must_use]
     pub fn advice(&self) -> String {
-        let reason = self.last().exit.reason();
+        let reason = self.exit().reason();
         format!("{reason}; use \"boundary_element\", which solves the same equations")
     }
 
@@ -92,7 +96,7 @@ pub fn solve_by_upwind(
     if !search.as_in_the_paper(coarse)? {
         let first = solve(upwind, None, t, monitor)?;
         search.attempts.extend(&first.attempts);
-        if first.converged {
+        if first.exit().converged() {
             search.start = search.task.compact(t);
         }
         search.attempt(InitialGuess::Continued)?;
@@ -188,11 +192,11 @@ impl<'a> ZonesSearch<'a> {
         let (mut attempt, division) = active_set::run(&self.task, guess, start, self.monitor)?;
         let residual = self.residual(&division.tractions);
         let exact = residual <= self.stage.law.tolerance;
-        if attempt.exit == ZonesExit::Converged && !exact {
+        if attempt.exit.converged() && !exact {
             attempt.exit = ZonesExit::Inexact;
         }
         self.attempts.push(attempt);
-        let converged = attempt.exit == ZonesExit::Converged;
+        let converged = attempt.exit.converged();
         if converged
             || self
                 .best
@@ -223,10 +227,6 @@ impl<'a> ZonesSearch<'a> {
         let residual = self.residual(&division.tractions);
         t.copy_from_slice(&self.task.padded(&division.tractions));
         ZonesOutcome {
-            converged: self
-                .attempts
-                .last()
-                .is_some_and(|a| a.exit == ZonesExit::Converged),
             residual,
             attempts: self.attempts,
             slip: self.workspace.slip().to_vec(),
