@@ -6,6 +6,8 @@
 //! area (power 5/2 on a line), with the mean inclination of the rail. In that frame the gap is taken along the normal, exactly: the
 //! wheel as surface of revolution, the rail as cylinder.
 
+use std::sync::{Arc, OnceLock};
+
 use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::grouping::{Grouping, Overlap};
 use crate::contact::geometry::local_gap::{Detail, LocalGap};
@@ -28,12 +30,14 @@ const WIDENINGS_MAX: usize = 5;
 const APART: f64 = 0.5;
 /// Largest lowering of a wheel in mm; more is no contact of wheel and rail.
 const LOWERING_MAX: f64 = 16.0;
+/// Clearance in mm below which the inclination of a line is kept: more than usual loads lower a wheel, and less than one line in three.
+const NEAR: f64 = 0.3;
 
 /// Rail and wheel above each other, line by line along x.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactLocus<'g> {
     pub(crate) geometry: &'g WheelRail,
-    pub(crate) lines: Vec<LocusPoint>,
+    pub(crate) lines: &'g [LocusPoint],
     /// Which lines share a gap, if that is decided for all heights.
     pub(crate) grouping: Option<Grouping>,
     /// Height of the wheel's centre in mm at which the bodies just touch.
@@ -47,14 +51,30 @@ pub(crate) struct LocusPoint {
     pub(crate) clearance: f64,
     pub(crate) rail: f64,
     pub(crate) wheel: f64,
+    /// Turn about x that lays the track's y along the rail's surface, where the clearance is small.
+    inclination: Option<f64>,
 }
 
-impl<'g> ContactLocus<'g> {
+/// The lines of a wheel on a rail and the height of first touch, once they were looked for; or why there are none. They follow from
+/// the rest of their geometry, so that they never make two geometries differ.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct LocusOnce(OnceLock<Arc<Result<Lines, String>>>);
+
+impl PartialEq for LocusOnce {
+    fn eq(&self, _: &LocusOnce) -> bool {
+        true
+    }
+}
+
+#[derive(Debug)]
+struct Lines {
+    lines: Vec<LocusPoint>,
+    touch: f64,
+}
+
+impl Lines {
     /// Places the wheel above the rail and finds the height of first touch.
-    ///
-    /// # Errors
-    /// A sentence, if no part of the wheel lies above the rail.
-    pub fn new(geometry: &'g WheelRail) -> Result<ContactLocus<'g>, String> {
+    fn of(geometry: &WheelRail) -> Result<Lines, String> {
         let [rail, wheel] = geometry.parameters(CURVE_STEP);
         let rail: Vec<_> = rail
             .into_iter()
@@ -71,7 +91,7 @@ impl<'g> ContactLocus<'g> {
         let first = rail.first.max(wheel.first);
         let last =
             (rail.first + rail.points.len() as i64).min(wheel.first + wheel.points.len() as i64);
-        let mut lines = Vec::new();
+        let mut lines = Vec::with_capacity(usize::try_from(last - first).unwrap_or(0));
         for k in first..last {
             let (below, above) = (
                 rail.points[(k - rail.first) as usize],
@@ -83,26 +103,52 @@ impl<'g> ContactLocus<'g> {
                     clearance: -depth - z,
                     rail,
                     wheel,
+                    inclination: None,
                 });
             }
         }
-        let least = lines
-            .iter()
-            .map(|line| line.clearance)
-            .fold(f64::INFINITY, f64::min);
         if lines.len() < 3 {
             return Err(
                 "no part of the wheel lies above the rail; check gauge, flange-back distance and position, lateral shift".to_owned(),
             );
         }
+        let clearances = lines.iter().map(|line| line.clearance);
+        let least = clearances.fold(f64::INFINITY, f64::min);
         for line in &mut lines {
             line.clearance -= least;
+            if line.clearance < NEAR {
+                line.inclination = Some(inclination(geometry, line.rail));
+            }
         }
+        Ok(Lines {
+            lines,
+            touch: -least,
+        })
+    }
+}
+
+/// Turn about x that lays the track's y along the rail's surface at a parameter of its curve.
+fn inclination(geometry: &WheelRail, rail: f64) -> f64 {
+    let [y, z] = geometry.rail_at(rail).slope;
+    (z / y).atan()
+}
+
+impl<'g> ContactLocus<'g> {
+    /// Places the wheel above the rail and finds the height of first touch; the second time for the same geometry they are known.
+    ///
+    /// # Errors
+    /// A sentence, if no part of the wheel lies above the rail.
+    pub fn new(geometry: &'g WheelRail) -> Result<ContactLocus<'g>, String> {
+        let found = geometry
+            .locus
+            .0
+            .get_or_init(|| Arc::new(Lines::of(geometry)));
+        let found = found.as_ref().as_ref().map_err(String::clone)?;
         Ok(ContactLocus {
             geometry,
-            lines,
+            lines: &found.lines,
             grouping: None,
-            touch: -least,
+            touch: found.touch,
         })
     }
 
@@ -144,37 +190,32 @@ impl<'g> ContactLocus<'g> {
     #[must_use]
     pub fn estimated_lowering(&self, force: f64) -> f64 {
         let (mut low, mut high) = (0.0_f64, 1e-3);
-        while self.estimated_force(high) < force && high < LOWERING_MAX {
+        while estimated_force(self.lines, self.rolling_radius(), high) < force
+            && high < LOWERING_MAX
+        {
             (low, high) = (high, 2.0 * high);
         }
+        let inside = |line: &&LocusPoint| line.clearance < 0.5 * high;
+        let near: Vec<LocusPoint> = self.lines.iter().filter(inside).copied().collect();
         // The estimate jumps where one more line overlaps: only its being more or less than the force can be relied on.
-        let [low, high] = bisect([low, high], 30, |lowering| {
-            self.estimated_force(lowering) < force
+        let [low, high] = bisect([low, high], 12, |lowering| {
+            estimated_force(&near, self.rolling_radius(), lowering) < force
         });
         0.5 * (low + high)
     }
 
-    fn estimated_force(&self, lowering: f64) -> f64 {
-        let inside = |line: &LocusPoint| line.clearance < 0.5 * lowering;
-        let runs = self.lines.chunk_by(|a, b| inside(a) == inside(b));
-        let length = |line: &LocusPoint| {
-            let radius = self.geometry.placement.rolling_radius;
-            2.0 * (2.0 * radius * (0.5 * lowering - line.clearance)).sqrt()
-        };
-        let carried = |run: &[LocusPoint]| {
-            let area: f64 = run.iter().map(|line| length(line) * STEP).sum();
-            4.0 / 3.0 * (area / std::f64::consts::PI).sqrt() * lowering
-        };
-        runs.filter(|run| inside(&run[0])).map(carried).sum()
+    fn rolling_radius(&self) -> f64 {
+        self.geometry.placement.rolling_radius
     }
 
     pub(crate) fn frame(&self, lines: &[LocusPoint], lowering: f64) -> Frame {
         let (mut weight, mut y, mut angle) = (0.0, 0.0, 0.0);
         for line in lines {
-            let own = (lowering - line.clearance).max(0.0).powf(2.5);
+            let depth = (lowering - line.clearance).max(0.0);
+            let own = depth * depth * depth.sqrt();
             weight += own;
             y += own * line.y;
-            angle += own * self.inclination(line.rail);
+            angle += own * self.inclination(line);
         }
         let y = y / weight;
         let k = lines
@@ -196,22 +237,24 @@ impl<'g> ContactLocus<'g> {
 
     /// Clearance on a line along the rail's normal, with the wheel lowered below first touch; in mm.
     pub(crate) fn clearance(&self, line: &LocusPoint, lowering: f64) -> f64 {
-        (line.clearance - lowering) * self.inclination(line.rail).cos()
+        (line.clearance - lowering) * self.inclination(line).cos()
     }
 
     /// Turn about x that lays the track's y along the rail's surface.
-    pub(crate) fn inclination(&self, rail: f64) -> f64 {
-        let [y, z] = self.geometry.rail_at(rail).tangent();
-        (z / y).atan()
+    pub(crate) fn inclination(&self, line: &LocusPoint) -> f64 {
+        line.inclination
+            .unwrap_or_else(|| inclination(self.geometry, line.rail))
     }
 
     fn gap(&self, overlap: Overlap, lowering: f64, detail: Detail) -> Result<LocalGap, String> {
         let lines = self.around(overlap.ends);
         let frame = self.frame(lines, lowering);
+        let plane = frame.plane();
+        let v_of = |line: &LocusPoint| plane.across(self.geometry.rail_at(line.rail).at)[0];
         let mut across = [f64::INFINITY, f64::NEG_INFINITY];
         let mut along = [0.0_f64; 2];
         for line in lines {
-            let v = frame.across(self.geometry, line.rail)[0];
+            let v = v_of(line);
             across = [across[0].min(v), across[1].max(v)];
             let overlap = (lowering - line.clearance).max(0.0);
             let half = (2.0 * self.geometry.meridian(line.wheel).radius * overlap).sqrt();
@@ -223,7 +266,7 @@ impl<'g> ContactLocus<'g> {
         }
         let limits = self
             .limits(overlap, lowering)
-            .map(|line| line.map(|line| frame.across(self.geometry, line.rail)[0]));
+            .map(|line| line.map(|line| v_of(&line)));
         let widen = |[low, high]: [f64; 2]| {
             let margin = MARGIN * (high - low) + MARGIN_MM;
             [low - margin, high + margin]
@@ -253,6 +296,20 @@ impl<'g> ContactLocus<'g> {
         }
         Ok(gap)
     }
+}
+
+/// Force over the contact modulus, in mm², that lines in the order of y carry at a lowering by [`ContactLocus::estimated_lowering`]. Lines
+/// that do not overlap may be missing.
+fn estimated_force(lines: &[LocusPoint], radius: f64, lowering: f64) -> f64 {
+    let inside = |line: &LocusPoint| line.clearance < 0.5 * lowering;
+    let runs = lines.chunk_by(|a, b| inside(a) == inside(b) && b.y - a.y < 1.5 * STEP);
+    let length =
+        |line: &LocusPoint| 2.0 * (2.0 * radius * (0.5 * lowering - line.clearance)).sqrt();
+    let carried = |run: &[LocusPoint]| {
+        let area: f64 = run.iter().map(|line| length(line) * STEP).sum();
+        4.0 / 3.0 * (area / std::f64::consts::PI).sqrt() * lowering
+    };
+    runs.filter(|run| inside(&run[0])).map(carried).sum()
 }
 
 /// The gap with its surfaces bent apart beyond the limits toward other gaps, `[lower, upper]` across in mm: what touches there

@@ -1,7 +1,5 @@
 //! The frame of a patch: its plane of contact in the axes of the track.
 
-use crate::contact::geometry::wheel_rail::WheelRail;
-
 /// The frame of a patch in track axes: z of the frame is the normal out of the rail.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame {
@@ -23,11 +21,26 @@ impl Frame {
         [[cos, sin], [-sin, cos]]
     }
 
-    /// Coordinates across and along the normal of a point of the rail's curve.
-    pub(crate) fn across(&self, geometry: &WheelRail, rail: f64) -> [f64; 2] {
-        let [y, z] = geometry.rail_at(rail).at;
-        let from = [y - self.origin[1], z - self.origin[2]];
-        self.axes()
-            .map(|axis| axis[0] * from[0] + axis[1] * from[1])
+    /// The plane of contact, for the coordinates of many points.
+    pub(crate) fn plane(&self) -> Plane {
+        Plane {
+            origin: [self.origin[1], self.origin[2]],
+            axes: self.axes(),
+        }
+    }
+}
+
+/// The plane of contact across the track: origin, tangent and normal as `[y, z]` in track axes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Plane {
+    origin: [f64; 2],
+    pub(crate) axes: [[f64; 2]; 2],
+}
+
+impl Plane {
+    /// Coordinates across and along the normal of a point `[y, z]` of the track.
+    pub(crate) fn across(&self, [y, z]: [f64; 2]) -> [f64; 2] {
+        let from = [y - self.origin[0], z - self.origin[1]];
+        self.axes.map(|axis| axis[0] * from[0] + axis[1] * from[1])
     }
 }

@@ -6,6 +6,7 @@
 use std::sync::Arc;
 
 use crate::contact::geometry::crossing;
+use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
 use crate::contact::geometry::profile_quality::samples::Points;
 use crate::contact::geometry::profile_quality::{noise, shape};
 use crate::contact::geometry::smoothing::Spline;
@@ -58,8 +59,7 @@ pub struct Reading {
 /// A cross-section as a curve, twice continuously differentiable in its chord length.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Profile {
-    y: Spline,
-    z: Spline,
+    curve: PlaneCurve,
     measured: Arc<MeasuredCurve>,
     /// Remarks on what was found and changed when it was read.
     pub remarks: Vec<Remark>,
@@ -76,33 +76,6 @@ struct MeasuredCurve {
     smoothing: f64,
     /// Step of which the given coordinates are multiples, in mm.
     rounding: Option<f64>,
-}
-
-/// The curve at one place: y to the field side, z up, in mm; derivatives to the parameter.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CurvePoint {
-    /// Position `[y, z]`.
-    pub at: [f64; 2],
-    /// First derivative, of length about 1.
-    pub slope: [f64; 2],
-    /// Second derivative.
-    pub bend: [f64; 2],
-}
-
-impl CurvePoint {
-    /// Unit tangent, from the track centre to the field side along the curve.
-    #[must_use]
-    pub fn tangent(&self) -> [f64; 2] {
-        let length = self.slope[0].hypot(self.slope[1]);
-        self.slope.map(|part| part / length)
-    }
-
-    /// Curvature in 1/mm, positive where the curve bends upward.
-    #[must_use]
-    pub fn curvature(&self) -> f64 {
-        let [y, z] = self.slope;
-        (y * self.bend[1] - z * self.bend[0]) / y.hypot(z).powi(3)
-    }
 }
 
 impl Profile {
@@ -169,8 +142,7 @@ impl Profile {
             Spline::new(&measured.along, &values, measured.smoothing)
         };
         Profile {
-            y: part(0),
-            z: part(1),
+            curve: PlaneCurve::new(&part(0), &part(1)),
             measured: Arc::new(measured),
             remarks,
         }
@@ -224,50 +196,28 @@ impl Profile {
         self.measured.rounding
     }
 
+    /// The curve, y to the field side, z up.
+    #[must_use]
+    pub fn curve(&self) -> &PlaneCurve {
+        &self.curve
+    }
+
     /// First and last parameter, in mm along the chords of the points.
     #[must_use]
     pub fn range(&self) -> [f64; 2] {
-        self.y.range()
+        self.curve.range()
     }
 
     /// The curve at a parameter; beyond the ends the tangent there.
     #[must_use]
     pub fn at(&self, s: f64) -> CurvePoint {
-        // Both have the same knots.
-        let i = self.y.interval(s);
-        let (y, z) = (self.y.at_in(i, s), self.z.at_in(i, s));
-        CurvePoint {
-            at: [y.value, z.value],
-            slope: [y.slope, z.slope],
-            bend: [y.bend, z.bend],
-        }
-    }
-
-    /// The curve turned by an angle in rad from y to z about its origin.
-    #[must_use]
-    pub fn turned(&self, angle: f64) -> Profile {
-        let (sin, cos) = angle.sin_cos();
-        let knots = self.y.knots();
-        let at: Vec<[f64; 2]> = knots.iter().map(|s| self.at(*s).at).collect();
-        let part = |f: &dyn Fn(&[f64; 2]) -> f64| {
-            Spline::new(knots, &at.iter().map(f).collect::<Vec<_>>(), 0.0)
-        };
-        Profile {
-            y: part(&|p| cos * p[0] - sin * p[1]),
-            z: part(&|p| sin * p[0] + cos * p[1]),
-            measured: Arc::clone(&self.measured),
-            remarks: self.remarks.clone(),
-        }
+        self.curve.at(s)
     }
 
     /// Parameters at most `step` apart over the whole curve, ends included.
     #[must_use]
     pub fn parameters(&self, step: f64) -> Vec<f64> {
-        let [first, last] = self.range();
-        let count = ((last - first) / step).ceil().max(1.0);
-        (0..=count as usize)
-            .map(|k| first + (last - first) * k as f64 / count)
-            .collect()
+        self.curve.parameters(step)
     }
 }
 

@@ -100,6 +100,15 @@ impl Spline {
         self.at_in(self.interval(s), s)
     }
 
+    /// Coefficients of the cubic between the knots i and i + 1, by powers of the distance from knot i.
+    #[must_use]
+    pub fn cubic(&self, i: usize) -> [f64; 4] {
+        let jet = self.at_in(i, self.knots[i]);
+        let step = self.knots[i + 1] - self.knots[i];
+        let bends = self.bends[i + 1] - self.bends[i];
+        [jet.value, jet.slope, 0.5 * jet.bend, bends / (6.0 * step)]
+    }
+
     /// The interval of knots that a place lies in, or the nearest one.
     #[must_use]
     pub fn interval(&self, s: f64) -> usize {

@@ -6,7 +6,9 @@
 //! radius `r − z` at the distance `d/2 − p + y` from the centre along the axle, with the flange-back distance d and the
 //! flange-back position p. Conventions of the Manchester contact benchmark (Shackleton and Iwnicki 2008).
 
-use crate::contact::geometry::profile::{CurvePoint, Profile};
+use crate::contact::geometry::contact_locus::LocusOnce;
+use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
+use crate::contact::geometry::profile::Profile;
 use crate::contact::remark::entry::RemarkEntry;
 
 /// Left or right rail, seen along rolling.
@@ -60,14 +62,17 @@ pub struct WheelRail {
     /// Their placement.
     pub placement: Placement,
     rail_given: Profile,
-    rail: Profile,
+    /// The rail in track axes.
+    rail: PlaneCurve,
     wheel: Profile,
-    /// Origin of the rail's profile: `y` to the field side from the middle of the track, `z`.
-    rail_origin: [f64; 2],
     axle: [f64; 3],
+    /// Length of the axle's part across the track.
+    across: f64,
     /// Unit vectors at right angles to the axle: nearly forward, and nearly down (without a part along x).
     forward: [f64; 3],
     down: [f64; 3],
+    /// Rail and wheel line by line, once they were looked for.
+    pub(crate) locus: LocusOnce,
 }
 
 /// A point of the wheel's meridian: position along the axle and radius, with their derivatives to the profile's parameter.
@@ -104,7 +109,7 @@ impl WheelRail {
     }
 
     fn placed(rail: Profile, wheel: Profile, placement: Placement) -> WheelRail {
-        let canted = rail.turned(placement.cant);
+        let canted = rail.curve().placed(placement.cant, [0.0; 2], 1.0);
         let places: Vec<[f64; 2]> = canted
             .parameters(0.05)
             .into_iter()
@@ -118,19 +123,23 @@ impl WheelRail {
         let (yaw, roll) = (placement.yaw, placement.roll);
         let axle = [-yaw.sin() * roll.cos(), yaw.cos() * roll.cos(), roll.sin()];
         let across = axle[1].hypot(axle[2]);
+        let origin = [0.5 * placement.gauge - gauge_point, -top];
         WheelRail {
             placement,
+            rail: rail
+                .curve()
+                .placed(placement.cant, origin, placement.side.sign()),
             rail_given: rail,
-            rail: canted,
             wheel,
-            rail_origin: [0.5 * placement.gauge - gauge_point, -top],
             axle,
+            across,
             forward: [
                 across,
                 -axle[0] * axle[1] / across,
                 -axle[0] * axle[2] / across,
             ],
             down: [0.0, axle[2] / across, -axle[1] / across],
+            locus: LocusOnce::default(),
         }
     }
 
@@ -171,17 +180,7 @@ impl WheelRail {
     /// The rail's curve in track axes `[y, z]`, with derivatives to the parameter.
     #[must_use]
     pub fn rail_at(&self, s: f64) -> CurvePoint {
-        let sign = self.placement.side.sign();
-        let place = self.rail.at(s);
-        let turn = |[y, z]: [f64; 2]| [sign * y, z];
-        CurvePoint {
-            at: turn([
-                place.at[0] + self.rail_origin[0],
-                place.at[1] + self.rail_origin[1],
-            ]),
-            slope: turn(place.slope),
-            bend: turn(place.bend),
-        }
+        self.rail.at(s)
     }
 
     /// The wheel's meridian at a parameter of its profile.
@@ -203,8 +202,7 @@ impl WheelRail {
     #[must_use]
     pub fn lowest(&self, s: f64) -> Option<[f64; 3]> {
         let circle = self.meridian(s);
-        let across = self.axle[1].hypot(self.axle[2]);
-        let sin = circle.radius_slope * self.axle[0] / (circle.along_slope * across);
+        let sin = circle.radius_slope * self.axle[0] / (circle.along_slope * self.across);
         if sin.is_nan() || sin.abs() >= 1.0 {
             return None;
         }

@@ -1,7 +1,6 @@
 //! Compares two readings of the same points: the spline in use with a smoother one, and with Akima's curve.
 
-use realfft::RealFftPlanner;
-
+use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
 use crate::contact::geometry::profile_quality::flattening::flattening;
 use crate::contact::geometry::profile_quality::noise::{MEDIAN_OF_NORMAL, median};
 use crate::contact::geometry::profile_quality::samples::Points;
@@ -48,10 +47,9 @@ pub fn roughness(points: Points, smoothing: f64, contact: [f64; 2], modulus: f64
     let count = ((window[1] - window[0]) / step).floor() as usize + 1;
     let places: Vec<f64> = (0..count).map(|k| window[0] + step * k as f64).collect();
     let used = HeightCurve::smoothed(part, smoothing);
-    let mut planner = RealFftPlanner::new();
-    let mut pressures = |other: &HeightCurve| {
+    let pressures = |other: &HeightCurve| {
         let heights: Vec<f64> = places.iter().map(|s| used.above(other, *s)).collect();
-        flattening(&heights, step, modulus, &mut planner)
+        flattening(&heights, step, modulus)
     };
     let over_contact = |pressures: &[f64]| {
         let (mut sum, mut count) = (0.0, 0.0_f64);
@@ -80,38 +78,35 @@ pub fn roughness(points: Points, smoothing: f64, contact: [f64; 2], modulus: f64
 
 /// A curve through or near points.
 enum HeightCurve {
-    Spline([Spline; 2]),
+    Spline(PlaneCurve),
     Akima(Akima),
 }
 
 impl HeightCurve {
     fn smoothed(points: Points, cut: f64) -> HeightCurve {
-        HeightCurve::Spline([0, 1].map(|part| {
+        let [y, z] = [0, 1].map(|part| {
             let values: Vec<f64> = points.at.iter().map(|at| at[part]).collect();
             Spline::new(points.along, &values, cut)
-        }))
+        });
+        HeightCurve::Spline(PlaneCurve::new(&y, &z))
     }
 
     fn at(&self, s: f64) -> [f64; 2] {
         match self {
-            HeightCurve::Spline([y, z]) => {
-                let i = y.interval(s);
-                [y.at_in(i, s).value, z.at_in(i, s).value]
-            }
+            HeightCurve::Spline(curve) => curve.at(s).at,
             HeightCurve::Akima(curve) => curve.at(s),
         }
     }
 
     /// Distance from this spline to another curve along its normal, positive if the spline is above.
     fn above(&self, other: &HeightCurve, s: f64) -> f64 {
-        let HeightCurve::Spline([y, z]) = self else {
+        let HeightCurve::Spline(curve) = self else {
             return 0.0;
         };
-        let i = y.interval(s);
-        let (y, z) = (y.at_in(i, s), z.at_in(i, s));
+        let CurvePoint { at, slope, .. } = curve.at(s);
         let [other_y, other_z] = other.at(s);
-        let length = y.slope.hypot(z.slope).max(f64::MIN_POSITIVE);
-        (y.slope * (z.value - other_z) - z.slope * (y.value - other_y)) / length
+        let length = slope[0].hypot(slope[1]).max(f64::MIN_POSITIVE);
+        (slope[0] * (at[1] - other_z) - slope[1] * (at[0] - other_y)) / length
     }
 }
 

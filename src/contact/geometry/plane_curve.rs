@@ -1,0 +1,185 @@
+//! A plane curve whose coordinates are cubics between common knots, prepared for many evaluations.
+
+use crate::contact::geometry::smoothing::Spline;
+
+/// A curve `[y, z]` in mm over a parameter in mm, twice continuously differentiable, straight beyond its ends.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlaneCurve {
+    knots: Vec<f64>,
+    /// Of every interval the coefficients `[y, z]` by powers of the distance from its first knot.
+    cubics: Vec<[[f64; 2]; 4]>,
+    /// For equal cells of the parameter the interval in which each begins, so that a place is found without a search.
+    cells: Vec<u32>,
+    cells_per_mm: f64,
+}
+
+/// The curve at one place: position in mm and derivatives to the parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CurvePoint {
+    /// Position `[y, z]`.
+    pub at: [f64; 2],
+    /// First derivative, of length about 1.
+    pub slope: [f64; 2],
+    /// Second derivative.
+    pub bend: [f64; 2],
+}
+
+impl CurvePoint {
+    /// Unit tangent, from the track centre to the field side along the curve.
+    #[must_use]
+    pub fn tangent(&self) -> [f64; 2] {
+        let length = self.slope[0].hypot(self.slope[1]);
+        self.slope.map(|part| part / length)
+    }
+
+    /// Curvature in 1/mm, positive where the curve bends upward.
+    #[must_use]
+    pub fn curvature(&self) -> f64 {
+        let [y, z] = self.slope;
+        (y * self.bend[1] - z * self.bend[0]) / y.hypot(z).powi(3)
+    }
+}
+
+impl PlaneCurve {
+    /// The curve of two splines with the same knots.
+    #[must_use]
+    pub fn new(y: &Spline, z: &Spline) -> PlaneCurve {
+        let knots = y.knots().to_vec();
+        let intervals = knots.len() - 1;
+        let cubics = (0..intervals)
+            .map(|i| {
+                let (y, z) = (y.cubic(i), z.cubic(i));
+                [0, 1, 2, 3].map(|power| [y[power], z[power]])
+            })
+            .collect();
+        // Two cells an interval: on evenly spaced knots hardly any place is more than one interval beyond that of its cell.
+        let count = 2 * intervals;
+        let length = knots[intervals] - knots[0];
+        let begins = |cell: usize| {
+            let place = knots[0] + length * cell as f64 / count as f64;
+            let after = knots.partition_point(|knot| *knot <= place);
+            (after.clamp(1, intervals) - 1) as u32
+        };
+        PlaneCurve {
+            cells: (0..count).map(begins).collect(),
+            cells_per_mm: count as f64 / length,
+            cubics,
+            knots,
+        }
+    }
+
+    /// First and last parameter.
+    #[must_use]
+    pub fn range(&self) -> [f64; 2] {
+        [self.knots[0], self.knots[self.knots.len() - 1]]
+    }
+
+    /// The curve at a parameter; beyond the ends the tangent there.
+    #[must_use]
+    #[inline]
+    pub fn at(&self, s: f64) -> CurvePoint {
+        let [first, last] = self.range();
+        let inside = s.clamp(first, last);
+        let i = self.interval(inside);
+        let d = inside - self.knots[i];
+        let [c0, c1, c2, c3] = self.cubics[i];
+        let mut point = CurvePoint {
+            at: [0, 1].map(|k| c0[k] + d * (c1[k] + d * (c2[k] + d * c3[k]))),
+            slope: [0, 1].map(|k| c1[k] + d * (2.0 * c2[k] + 3.0 * d * c3[k])),
+            bend: [0, 1].map(|k| 2.0 * c2[k] + 6.0 * d * c3[k]),
+        };
+        if inside != s {
+            point.at = [0, 1].map(|k| point.at[k] + point.slope[k] * (s - inside));
+            point.bend = [0.0; 2];
+        }
+        point
+    }
+
+    /// The interval of knots that a place within the range lies in.
+    #[inline]
+    fn interval(&self, s: f64) -> usize {
+        let cell = ((s - self.knots[0]) * self.cells_per_mm) as usize;
+        let mut i = self.cells[cell.min(self.cells.len() - 1)] as usize;
+        // Rounding may have put the place into the cell after its own.
+        while i > 0 && self.knots[i] > s {
+            i -= 1;
+        }
+        while i + 1 < self.cubics.len() && self.knots[i + 1] <= s {
+            i += 1;
+        }
+        i
+    }
+
+    /// The curve turned by an angle in rad from y to z about the origin, then moved by `[y, z]`, and mirrored in y where `sign` is −1.
+    #[must_use]
+    pub fn placed(&self, angle: f64, by: [f64; 2], sign: f64) -> PlaneCurve {
+        let (sin, cos) = angle.sin_cos();
+        let turned = |[y, z]: [f64; 2]| [cos * y - sin * z, sin * y + cos * z];
+        let placed = |[c0, c1, c2, c3]: [[f64; 2]; 4]| {
+            let [y, z] = turned(c0);
+            let powers = [[y + by[0], z + by[1]], turned(c1), turned(c2), turned(c3)];
+            powers.map(|[y, z]| [sign * y, z])
+        };
+        PlaneCurve {
+            cubics: self.cubics.iter().copied().map(placed).collect(),
+            ..self.clone()
+        }
+    }
+
+    /// Parameters at most `step` apart over the whole curve, ends included.
+    #[must_use]
+    pub fn parameters(&self, step: f64) -> Vec<f64> {
+        let [first, last] = self.range();
+        let count = ((last - first) / step).ceil().max(1.0);
+        (0..=count as usize)
+            .map(|k| first + (last - first) * k as f64 / count)
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Knots whose distances vary by a factor of 300.
+    fn uneven() -> [Spline; 2] {
+        let knots: Vec<f64> = (0..40)
+            .map(|k| f64::from(k) + if k % 7 == 3 { 0.997 } else { 0.0 })
+            .collect();
+        [f64::sin as fn(f64) -> f64, f64::cos].map(|f| {
+            let values: Vec<f64> = knots.iter().map(|s| f(0.3 * s)).collect();
+            Spline::new(&knots, &values, 0.0)
+        })
+    }
+
+    #[test]
+    fn the_curve_is_that_of_its_splines_everywhere_and_straight_beyond() {
+        let [y, z] = uneven();
+        let curve = PlaneCurve::new(&y, &z);
+        for k in -50..=460 {
+            let s = 0.1 * f64::from(k);
+            let point = curve.at(s);
+            for (part, spline) in [&y, &z].into_iter().enumerate() {
+                let jet = spline.at(s);
+                assert!((point.at[part] - jet.value).abs() < 1e-13, "{s}");
+                assert!((point.slope[part] - jet.slope).abs() < 1e-12, "{s}");
+                assert!((point.bend[part] - jet.bend).abs() < 1e-12, "{s}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_placed_curve_is_turned_moved_and_mirrored() {
+        let [y, z] = uneven();
+        let curve = PlaneCurve::new(&y, &z);
+        let placed = curve.placed(0.4, [3.0, -2.0], -1.0);
+        let (sin, cos) = 0.4_f64.sin_cos();
+        for s in [-1.0, 0.0, 3.3, 17.99, 39.0] {
+            let [y, z] = curve.at(s).at;
+            let expected = [-(cos * y - sin * z + 3.0), sin * y + cos * z - 2.0];
+            let found = placed.at(s).at;
+            assert!((found[0] - expected[0]).abs() < 1e-12);
+            assert!((found[1] - expected[1]).abs() < 1e-12);
+        }
+    }
+}
