@@ -123,7 +123,7 @@ pub fn table(data: &[u8]) {
     for line in lines {
         match table.take(&line.text) {
             Ok(None) => {}
-            Ok(Some(Ok((case, _)))) => check(&case),
+            Ok(Some(Ok(row))) => check(&row.case),
             Ok(Some(Err(reason))) => assert!(!reason.is_empty()),
             Err(_) => return,
         }

@@ -13,6 +13,7 @@ use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement
 use utoipa::openapi::{HeaderBuilder, ObjectBuilder, Required, ResponseBuilder};
 use utoipa_axum::router::OpenApiRouter;
 
+use crate::http::contract_forms;
 use crate::http::dto::problem::ProblemBody;
 use crate::http::examples::EXAMPLES;
 use crate::http::problem::catalogue::describe_also;
@@ -25,6 +26,7 @@ use crate::http::problem::kinds::ProblemKind;
         description = "Rolling-contact stress service: describe how two bodies touch, press and roll, and get tractions, stick and slip zones and forces.\n\nUnits are part of every name: mm, N, MPa; creepages are dimensionless, spin is in 1/mm. x is along rolling, y to the left, z up; forces and tractions act on the lower body. Times are RFC 3339 in UTC. Every failure is a problem (RFC 9457) with a `type` that explains itself.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
+    servers((url = "/", description = "The service that answers this document")),
     tags(
         (name = "jobs", description = "Submit cases and follow them"),
         (name = "batches", description = "Many cases at once"),
@@ -80,6 +82,7 @@ pub fn text(mut document: utoipa::openapi::OpenApi) -> String {
     }
     add_batches(&mut document);
     require_keys(&mut document);
+    contract_forms::complete(&mut document);
     let text = document.to_pretty_json();
     // Only a map with keys that are not strings cannot be written; the document has none.
     text.map(|text| text + "\n").unwrap_or_default()

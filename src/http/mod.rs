@@ -19,6 +19,7 @@
 //! 8. Whatever fails becomes a [`problem`] with a kind, a status and what to do.
 
 mod contract;
+mod contract_forms;
 mod dto;
 mod examples;
 pub mod extract;
@@ -49,7 +50,7 @@ use crate::http::extract::{accept, query};
 use crate::http::layers::metrics::Metrics;
 use crate::http::layers::{
     admission, catch_panic, compression, etag, final_newline, metrics, origin_guard, otel,
-    request_id, request_log, security_headers,
+    rate_limit, request_id, request_log, security_headers,
 };
 use crate::http::limits::holding_body;
 use crate::http::page::answers;
@@ -137,6 +138,10 @@ fn api(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> Router {
         .layer(from_fn_with_state(options.clone(), admission::limit_packed))
         .layer(CatchPanicLayer::custom(catch_panic::answer_panic))
         .layer(from_fn(holding_body::hold))
+        .layer(from_fn({
+            let per_second = options.requests_per_second;
+            move |request, next| rate_limit::tell_left(per_second, request, next)
+        }))
         .layer(from_fn(origin_guard::admit))
         .layer(from_fn(error::name_instance))
         .layer(from_fn(final_newline::end_line))

@@ -64,7 +64,27 @@ pub struct SubmitOptions {
     pub bypass_cache: bool,
 }
 
+/// Options that one case of a batch has for itself, in place of those of the batch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct CaseOptions {
+    /// In place of [`SubmitOptions::priority`].
+    pub priority: Option<Priority>,
+    /// In place of [`SubmitOptions::ends_within`], in s.
+    pub deadline_s: Option<u32>,
+}
+
 impl SubmitOptions {
+    /// The options of a case with some of its own.
+    #[must_use]
+    pub fn of_case(self, own: CaseOptions) -> SubmitOptions {
+        let within = |seconds: u32| Duration::from_secs(seconds.into());
+        SubmitOptions {
+            priority: own.priority.unwrap_or(self.priority),
+            ends_within: own.deadline_s.map(within).or(self.ends_within),
+            bypass_cache: self.bypass_cache,
+        }
+    }
+
     /// The digest of a submission for its idempotency key: of the case or cases, and of these options.
     pub(crate) fn digest(&self, asked: &[u8; 32]) -> [u8; 32] {
         let mut hasher = blake3::Hasher::new();

@@ -233,6 +233,33 @@ fn texts_are_limited_in_length() {
 }
 
 #[test]
+fn values_of_a_sweep_are_a_number_a_range_or_a_list() {
+    for (given, pointer, words) in [
+        (json!("0.1"), "", ["a number, ", "values"]),
+        (json!({ "values": [] }), "/values", ["array", "1 to"]),
+        (
+            json!({ "values": [0, "1"] }),
+            "/values/1",
+            ["\"1\"", "needed"],
+        ),
+        (
+            json!({ "values": [0], "points": 1 }),
+            "/points",
+            ["unknown", "values"],
+        ),
+    ] {
+        assert_fault(
+            &good_with(
+                "/motion",
+                json!({ "sweep": { "creepage_x": given, "spin_per_mm": 0.001 } }),
+            ),
+            &format!("/motion/sweep/creepage_x{pointer}"),
+            &words,
+        );
+    }
+}
+
+#[test]
 fn motions_are_refused_with_the_place_in_the_list() {
     assert_fault(
         &good_with(

@@ -19,18 +19,16 @@ fn words(list: &Value) -> Vec<String> {
 
 /// The words that a schema allows, sorted.
 fn enumerated(schema: &Value) -> Vec<String> {
+    if let Some(told) = schema["discriminator"]["mapping"].as_object() {
+        return told.keys().cloned().collect();
+    }
     let variants = schema["oneOf"]
         .as_array()
         .cloned()
         .unwrap_or_else(|| vec![schema.clone()]);
     let words = variants.iter().flat_map(|variant| {
-        let tag = if variant["properties"]["type"].is_object() {
-            &variant["properties"]["type"]
-        } else {
-            variant
-        };
-        let word = tag["const"].as_str().map(|word| vec![json!(word)]);
-        word.or_else(|| tag["enum"].as_array().cloned())
+        let word = variant["const"].as_str().map(|word| vec![json!(word)]);
+        word.or_else(|| variant["enum"].as_array().cloned())
             .unwrap_or_else(|| panic!("no words in {variant}"))
     });
     let mut words: Vec<String> = words

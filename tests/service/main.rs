@@ -6,6 +6,7 @@ mod api;
 mod batch_columns;
 mod batch_deletion;
 mod batch_memory;
+mod batch_options;
 mod batch_tables;
 mod batches;
 mod cache;

@@ -19,8 +19,14 @@ async fn a_key_that_asks_too_often_is_told_when_to_come_back() {
     let mut statuses = Vec::new();
     for _ in 0..6 {
         let answer = guarded.get(&guarded.north, "/v1/jobs").await;
+        let left = answer.header("ratelimit").expect("what is left");
+        assert_eq!(
+            answer.header("ratelimit-policy"),
+            Some("\"requests\";q=2;w=2")
+        );
         if answer.status == 429 {
             assert_problem(&answer, 429, "too-many-requests", "");
+            assert!(left.starts_with("\"requests\";r=0;t="), "{left}");
             let wait: u32 = answer.header("retry-after").unwrap().parse().unwrap();
             assert!((1..=2).contains(&wait), "{wait}");
         }

@@ -105,6 +105,7 @@ const ORDER: &[&str] = &[
     "http::extract::accept",
     "http::layers",
     "http::extract",
+    "http::contract_forms",
     "http::contract",
     "http::page",
     "http::state",

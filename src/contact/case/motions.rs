@@ -1,7 +1,7 @@
 //! Writes out the motions of a case: sweeps become lists.
 
 use crate::contact::case::limits::Limits;
-use crate::contact::case::words::motion::{AskedMotion, Combine, Motions, Range, Sweep};
+use crate::contact::case::words::motion::{AskedMotion, Combine, Motions, Range, Sweep, Swept};
 use crate::contact::error::Fault;
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 
@@ -126,19 +126,19 @@ fn list(motions: &Motions, limits: &Limits) -> Result<Vec<AskedMotion>, Fault> {
     })
 }
 
-fn ranges(sweep: &Sweep) -> [Option<Range>; 3] {
+fn components(sweep: &Sweep) -> [Option<&Swept>; 3] {
     [
-        sweep.force_x_n.or(sweep.creepage_x),
-        sweep.force_y_n.or(sweep.creepage_y),
-        sweep.spin_per_mm,
+        sweep.force_x_n.as_ref().or(sweep.creepage_x.as_ref()),
+        sweep.force_y_n.as_ref().or(sweep.creepage_y.as_ref()),
+        sweep.spin_per_mm.as_ref(),
     ]
 }
 
 fn sweep_length(sweep: &Sweep) -> u128 {
-    let points = ranges(sweep)
+    let points = components(sweep)
         .into_iter()
         .flatten()
-        .map(|range| u128::from(range.points));
+        .map(|swept| swept.points() as u128);
     match sweep.combine {
         Combine::Together => points.max().unwrap_or(0),
         Combine::Grid => points.product(),
@@ -146,8 +146,7 @@ fn sweep_length(sweep: &Sweep) -> u128 {
 }
 
 fn write_out(sweep: &Sweep) -> Vec<AskedMotion> {
-    let values =
-        ranges(sweep).map(|range| range.map_or_else(|| vec![0.0], |range| range_values(&range)));
+    let values = components(sweep).map(|swept| swept.map_or_else(|| vec![0.0], values));
     let [x, y, spin] = &values;
     let forced = [sweep.force_x_n.is_some(), sweep.force_y_n.is_some()];
     let motion = |i: usize, j: usize, k: usize| AskedMotion {
@@ -159,7 +158,7 @@ fn write_out(sweep: &Sweep) -> Vec<AskedMotion> {
     };
     match sweep.combine {
         Combine::Together => (0..sweep_length(sweep) as usize)
-            // A component that is left out has one value, which serves every point.
+            // One value, as of a component that is left out, serves every motion.
             .map(|n| {
                 motion(
                     n.min(x.len() - 1),
@@ -173,6 +172,14 @@ fn write_out(sweep: &Sweep) -> Vec<AskedMotion> {
             .flat_map(|(i, j)| (0..spin.len()).map(move |k| (i, j, k)))
             .map(|(i, j, k)| motion(i, j, k))
             .collect(),
+    }
+}
+
+fn values(swept: &Swept) -> Vec<f64> {
+    match swept {
+        Swept::Constant(value) => vec![*value],
+        Swept::Range(range) => range_values(range),
+        Swept::List(list) => list.values.clone(),
     }
 }
 
@@ -196,9 +203,10 @@ fn range_values(range: &Range) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::case::words::motion::ValueList;
 
-    fn range(from: f64, to: f64, points: u32) -> Option<Range> {
-        Some(Range { from, to, points })
+    fn range(from: f64, to: f64, points: u32) -> Option<Swept> {
+        Some(Swept::Range(Range { from, to, points }))
     }
 
     fn triple(motion: &Motion) -> [f64; 3] {
@@ -222,6 +230,25 @@ mod tests {
         assert_eq!(triple(&list[0]), [0.0, 0.0, 1.0]);
         assert_eq!(triple(&list[2]), [0.002, 0.0, 0.0]);
         assert_eq!(triple(&list[4]), [0.004, 0.0, -1.0]);
+    }
+
+    #[test]
+    fn a_number_serves_every_motion_and_listed_values_keep_their_order() {
+        let sweep = Sweep {
+            creepage_x: Some(Swept::List(ValueList {
+                values: vec![3.0, 1.0, 2.0],
+            })),
+            creepage_y: Some(Swept::Constant(7.0)),
+            spin_per_mm: range(4.0, 4.0, 1),
+            force_x_n: None,
+            force_y_n: None,
+            combine: Combine::Together,
+        };
+        let list = expand(&Motions::Sweep { sweep }, &Limits::default())
+            .unwrap()
+            .motions;
+        let triples: Vec<_> = list.iter().map(triple).collect();
+        assert_eq!(triples, [[3.0, 7.0, 4.0], [1.0, 7.0, 4.0], [2.0, 7.0, 4.0]]);
     }
 
     #[test]

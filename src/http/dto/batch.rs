@@ -10,6 +10,7 @@ use crate::http::dto::job::rfc3339;
 use crate::http::dto::problem::Fault;
 use crate::jobs::batch::model::Batch;
 use crate::jobs::model::State as JobState;
+use crate::jobs::submit_options::Priority;
 
 /// The cases of a batch.
 #[derive(ToSchema)]
@@ -18,7 +19,38 @@ use crate::jobs::model::State as JobState;
     dead_code,
     reason = "the form of a body that is cut into cases while it arrives"
 )]
-pub struct Cases(Vec<Case>);
+pub struct Cases(Vec<BatchElement>);
+
+/// A case, alone or with options of its own.
+#[derive(ToSchema)]
+#[serde(untagged)]
+#[expect(
+    dead_code,
+    reason = "the form of a body that is cut into cases while it arrives"
+)]
+pub enum BatchElement {
+    /// The case alone.
+    Case(Case),
+    /// The case with options in place of those of the batch.
+    WithOptions(CaseWithOptions),
+}
+
+/// A case with options in place of those of its batch.
+#[derive(ToSchema)]
+#[expect(
+    dead_code,
+    reason = "the form of a body that is cut into cases while it arrives"
+)]
+pub struct CaseWithOptions {
+    /// The case.
+    case: Case,
+    /// Which of the queued jobs of the tenant are solved first.
+    #[schema(nullable = false)]
+    priority: Option<Priority>,
+    /// Seconds from now within which the job must have ended.
+    #[schema(nullable = false, minimum = 1, maximum = 2_592_000)]
+    deadline_s: Option<u32>,
+}
 
 /// A batch that was accepted.
 #[derive(Debug, Serialize, ToSchema)]

@@ -8,7 +8,7 @@ use crate::http::extract::query::{query, reader, seconds};
 use crate::jobs::submit_options::{Priority, SubmitOptions};
 
 /// Longest deadline in s: 30 days.
-const DEADLINE_MAX_SECONDS: u32 = 30 * 24 * 3600;
+pub const DEADLINE_MAX_SECONDS: u32 = 30 * 24 * 3600;
 
 query! {
     /// Options of a submission.

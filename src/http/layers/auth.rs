@@ -7,7 +7,7 @@ use axum::http::{Method, header};
 use tracing::field::display;
 
 use crate::http::layers::origin_guard::Guard;
-use crate::http::layers::rate_limit::{RateKey, RateLimit};
+use crate::http::layers::rate_limit::{RateKey, RateLeft, RateLimit};
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
@@ -46,11 +46,12 @@ impl Access {
     pub async fn tenant(&self, parts: &Parts) -> Result<Option<Arc<str>>, ApiError> {
         let mut given = parts.headers.get_all(header::AUTHORIZATION).iter();
         let peer = parts.extensions.get::<Peer>().copied();
+        let left = parts.extensions.get::<RateLeft>();
         let text = match (given.next(), given.next()) {
             (None, _) if self.anonymous => {
                 self.guard.require_direct(parts)?;
                 if let Some(sender) = peer.and_then(RateKey::at) {
-                    self.rate.require_turn(sender, "this address")?;
+                    self.rate.require_turn(sender, "this address", left)?;
                 }
                 return Ok(None);
             }
@@ -77,7 +78,8 @@ impl Access {
         let span = tracing::Span::current();
         span.record("tenant", display(&key.tenant));
         span.record("key", display(&key.id));
-        self.rate.require_turn(RateKey::Key(key.id), "this key")?;
+        self.rate
+            .require_turn(RateKey::Key(key.id), "this key", left)?;
         if key.read_only && changes(parts) {
             return Err(ApiError::new(
                 ProblemKind::Forbidden,

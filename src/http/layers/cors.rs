@@ -41,7 +41,11 @@ pub fn allow_origins(router: Router, origins: Vec<HeaderValue>) -> Router {
             .expose_headers(known(&[
                 "etag",
                 "location",
+                "idempotency-replayed",
+                "link",
                 "preference-applied",
+                "ratelimit",
+                "ratelimit-policy",
                 "retry-after",
                 "x-request-id",
             ]))

@@ -6,7 +6,12 @@ use std::num::NonZeroU32;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use axum::extract::Request;
+use axum::http::{HeaderName, HeaderValue};
+use axum::middleware::Next;
+use axum::response::Response;
 use governor::clock::{Clock, DefaultClock};
+use governor::middleware::StateInformationMiddleware;
 use governor::state::keyed::HashMapStateStore;
 use governor::{Quota, RateLimiter};
 
@@ -44,11 +49,51 @@ impl RateKey {
     }
 }
 
+type Limiter =
+    RateLimiter<RateKey, HashMapStateStore<RateKey>, DefaultClock, StateInformationMiddleware>;
+
+/// What is left of the rate of the sender of a request; in its extensions, so that its answer can say so.
+#[derive(Debug, Clone, Default)]
+pub struct RateLeft(Arc<Mutex<Option<u32>>>);
+
+impl RateLeft {
+    fn note(&self, requests: u32) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(requests);
+    }
+}
+
+const POLICY: HeaderName = HeaderName::from_static("ratelimit-policy");
+const LEFT: HeaderName = HeaderName::from_static("ratelimit");
+
+/// Layer in which answers say how many requests the sender may still make, as the fields `RateLimit-Policy` and `RateLimit` of
+/// draft-ietf-httpapi-ratelimit-headers-10 do. Without a limit, or for senders that are not counted, they are absent.
+pub async fn tell_left(per_second: u32, mut request: Request, next: Next) -> Response {
+    let left = RateLeft::default();
+    request.extensions_mut().insert(left.clone());
+    let mut response = next.run(request).await;
+    let left = *left.0.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(left) = left {
+        let burst = per_second.saturating_mul(BURST_SECONDS);
+        // Until everything is there again.
+        let seconds = burst.saturating_sub(left).div_ceil(per_second.max(1));
+        let fields = [
+            (POLICY, format!("\"requests\";q={burst};w={BURST_SECONDS}")),
+            (LEFT, format!("\"requests\";r={left};t={seconds}")),
+        ];
+        for (name, text) in fields {
+            if let Ok(value) = HeaderValue::from_str(&text) {
+                response.headers_mut().insert(name, value);
+            }
+        }
+    }
+    response
+}
+
 /// How often senders may ask; clones share it.
 #[derive(Debug, Clone)]
 pub struct RateLimit {
     per_second: u32,
-    limiter: Option<Arc<RateLimiter<RateKey, HashMapStateStore<RateKey>, DefaultClock>>>,
+    limiter: Option<Arc<Limiter>>,
     forgotten: Arc<Mutex<Instant>>,
     failures: Arc<Mutex<HashMap<IpAddr, Failures>>>,
 }
@@ -67,9 +112,8 @@ impl RateLimit {
         let per_second = NonZeroU32::new(options.requests_per_second);
         let limiter = per_second.map(|rate| {
             let burst = rate.saturating_mul(BURST_SECONDS.try_into().unwrap_or(NonZeroU32::MIN));
-            Arc::new(RateLimiter::hashmap(
-                Quota::per_second(rate).allow_burst(burst),
-            ))
+            let limiter = RateLimiter::hashmap(Quota::per_second(rate).allow_burst(burst));
+            Arc::new(limiter.with_middleware::<StateInformationMiddleware>())
         });
         RateLimit {
             per_second: options.requests_per_second,
@@ -79,20 +123,31 @@ impl RateLimit {
         }
     }
 
-    /// Counts a request of a sender.
+    /// Counts a request of a sender, and notes in `left` how many more it may make.
     ///
     /// # Errors
     /// `too-many-requests`, with the seconds after which to try again.
-    pub fn require_turn(&self, sender: RateKey, who: &str) -> Result<(), ApiError> {
+    pub fn require_turn(
+        &self,
+        sender: RateKey,
+        who: &str,
+        left: Option<&RateLeft>,
+    ) -> Result<(), ApiError> {
         let Some(limiter) = &self.limiter else {
             return Ok(());
         };
         if limiter.len() > SENDERS_KEPT && self.may_forget() {
             limiter.retain_recent();
         }
-        let Err(early) = limiter.check_key(&sender) else {
-            return Ok(());
+        let note = |requests| left.inspect(|left| left.note(requests));
+        let early = match limiter.check_key(&sender) {
+            Ok(state) => {
+                note(state.remaining_burst_capacity());
+                return Ok(());
+            }
+            Err(early) => early,
         };
+        note(0);
         let wait = early.wait_time_from(DefaultClock::default().now());
         let seconds = u32::try_from(wait.as_secs_f64().ceil() as u64).unwrap_or(u32::MAX);
         Err(ApiError::new(

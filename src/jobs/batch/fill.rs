@@ -194,7 +194,7 @@ impl Jobs {
             source: None,
             idempotency: None,
             traceparent,
-            options,
+            options: options.of_case(staged.own),
         }
     }
 }

@@ -9,6 +9,8 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::jobs::submit_options::CaseOptions;
+
 /// What the job table needs to know of a case besides its text.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct StagedCase {
@@ -22,6 +24,7 @@ pub(crate) struct StagedCase {
     pub(crate) cost_us: u32,
     pub(crate) slice_us: u32,
     pub(crate) digest: String,
+    pub(crate) own: CaseOptions,
 }
 
 /// Staged cases, first in, first out.
@@ -108,6 +111,7 @@ mod tests {
             cost_us: 7,
             slice_us: 7,
             digest: "d".to_owned(),
+            own: CaseOptions::default(),
         };
         for index in 0..5 {
             staging

@@ -16,7 +16,7 @@ use crate::jobs::idempotency;
 use crate::jobs::model::created_at;
 use crate::jobs::store::submission::NewBatch;
 use crate::jobs::submit::{cost_us, outputs_text};
-use crate::jobs::submit_options::SubmitOptions;
+use crate::jobs::submit_options::{CaseOptions, SubmitOptions};
 
 /// Faulty cases whose faults are kept; further ones are only counted.
 const FAULTY_KEPT: usize = 1000;
@@ -34,6 +34,28 @@ pub struct FaultyCase {
     pub line: Option<u64>,
     /// Every fault of the case.
     pub faults: Vec<Fault>,
+}
+
+/// A case of a batch with what was said of it alone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BatchCase {
+    /// The case.
+    pub case: Value,
+    /// It stands in an object of this shape beside its options: `{"case": …, "priority": …}`.
+    pub wrapped: bool,
+    /// Its own options.
+    pub own: CaseOptions,
+}
+
+/// A row of a table: the case that it makes of the template, what it puts into it, and its own options.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BatchRow {
+    /// The case.
+    pub case: Value,
+    /// What the row puts into the template.
+    pub cells: Vec<Cell>,
+    /// Its own options.
+    pub own: CaseOptions,
 }
 
 /// A batch that is being received: checked cases wait in a file of the data folder. Dropping it gives everything back.
@@ -81,13 +103,22 @@ impl BatchUpload {
         &mut self,
         line: Option<u64>,
         text: &[u8],
-        case: Result<Value, String>,
+        case: Result<BatchCase, Vec<Fault>>,
     ) -> Result<(), JobsError> {
         self.count(text.len())?;
-        self.check(line, text, case, None)
+        let Some(BatchCase { case, wrapped, own }) = self.good(line, text, case) else {
+            return Ok(());
+        };
+        let prefix = if wrapped { "/case" } else { "" };
+        let kept = match wrapped {
+            true => serde_json::to_vec(&case),
+            false => Ok(text.to_owned()),
+        };
+        let kept = kept.map_err(|error| JobsError::Damaged(error.to_string()))?;
+        self.check(line, &case, prefix, (false, own), &kept)
     }
 
-    /// As [`BatchUpload::add`], of a row of a table: the case that it makes of the template, with what it puts into it.
+    /// As [`BatchUpload::add`], of a row of a table.
     ///
     /// # Errors
     /// As [`BatchUpload::add`].
@@ -95,55 +126,80 @@ impl BatchUpload {
         &mut self,
         line: Option<u64>,
         text: &[u8],
-        row: Result<(Value, Vec<Cell>), String>,
+        row: Result<BatchRow, Vec<Fault>>,
     ) -> Result<(), JobsError> {
         // Checked and solved as a case of this size, however little is kept of it.
         self.count(text.len() + self.template.as_ref().map_or(0, Bytes::len))?;
-        let (case, cells) = match row {
-            Ok((case, cells)) => (Ok(case), serde_json::to_vec(&cells)),
-            Err(reason) => (Err(reason), Ok(Vec::new())),
+        let Some(BatchRow { case, cells, own }) = self.good(line, text, row) else {
+            return Ok(());
         };
+        let cells = serde_json::to_vec(&cells);
         let cells = cells.map_err(|error| JobsError::Damaged(error.to_string()))?;
-        self.check(line, text, case, Some(cells))
+        self.check(line, &case, "", (true, own), &cells)
     }
 
-    fn check(
+    /// What the next case says; nothing if it cannot be read, which is noted.
+    fn good<T>(
         &mut self,
         line: Option<u64>,
         text: &[u8],
-        case: Result<Value, String>,
-        row: Option<Vec<u8>>,
-    ) -> Result<(), JobsError> {
+        read: Result<T, Vec<Fault>>,
+    ) -> Option<T> {
+        match read {
+            Ok(good) => Some(good),
+            Err(faults) => {
+                self.digest.update(text);
+                self.reject(line, faults);
+                None
+            }
+        }
+    }
+
+    /// Counts a faulty case and keeps its faults.
+    fn reject(&mut self, line: Option<u64>, faults: Vec<Fault>) {
         let index = self.cases;
         self.cases += 1;
-        let checked = match &case {
-            Ok(case) => {
-                self.digest.update(&idempotency::digest(case));
-                self.jobs.check(case).map_err(|error| error.0)
-            }
-            Err(reason) => {
-                self.digest.update(text);
-                Err(vec![Fault::new("", reason.clone())])
-            }
-        };
-        let checked = match checked {
+        self.rejected += 1;
+        if self.faulty.len() < FAULTY_KEPT {
+            self.faulty.push(FaultyCase {
+                index,
+                line,
+                faults,
+            });
+        }
+    }
+
+    /// Checks a case and keeps `kept` of it; pointers of its faults begin with `prefix`.
+    fn check(
+        &mut self,
+        line: Option<u64>,
+        case: &Value,
+        prefix: &str,
+        (row, own): (bool, CaseOptions),
+        kept: &[u8],
+    ) -> Result<(), JobsError> {
+        self.digest.update(&idempotency::digest(case));
+        if own != CaseOptions::default() {
+            let own = SubmitOptions::default().of_case(own);
+            self.digest.update(&own.digest(&[0; 32]));
+        }
+        let checked = match self.jobs.check(case) {
             Ok(checked) => checked,
-            Err(faults) => {
-                self.rejected += 1;
-                if self.faulty.len() < FAULTY_KEPT {
-                    self.faulty.push(FaultyCase {
-                        index,
-                        line,
-                        faults,
-                    });
+            Err(error) => {
+                let mut faults = error.0;
+                for fault in &mut faults {
+                    fault.pointer.insert_str(0, prefix);
                 }
+                self.reject(line, faults);
                 return Ok(());
             }
         };
+        let index = self.cases;
+        self.cases += 1;
         self.require_place()?;
         let staged = StagedCase {
             index,
-            row: row.is_some(),
+            row,
             method: checked.run.method.name().to_owned(),
             outputs: outputs_text(&checked.run.outputs),
             cost_us: cost_us(&checked),
@@ -151,11 +207,12 @@ impl BatchUpload {
             digest: checked.label.digest,
             name: checked.label.name,
             labels: checked.label.labels,
+            own,
         };
         let Some(staging) = &mut self.staging else {
             return Ok(());
         };
-        let written = staging.push(&staged, row.as_deref().unwrap_or(text));
+        let written = staging.push(&staged, kept);
         written.map_err(|source| self.jobs.staging_failed(source))
     }
 

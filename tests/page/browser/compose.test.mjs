@@ -127,6 +127,23 @@ test('two files dropped and one click lead from an empty service to the patch', 
   assert.equal(await page.locator('h1').textContent(), 'mine on mine');
 }));
 
+test('profiles are asked for without a fault, one after the other, and the case is called after their files', () => onPage('', async (page) => {
+  const { contact } = example('wheel-rail-flange');
+  await sound(page);
+  await page.getByRole('radio', { name: 'Profiles' }).check();
+  await page.getByText('Next: the file of the rail and the file of the wheel.').waitFor();
+  assert.equal(await page.locator('.fault').count(), 0);
+  assert.deepEqual([(await json(page)).name, (await json(page)).labels], [undefined, undefined]);
+  const choose = (body, name) => page.locator(`#field-contact-${body}`)
+    .setInputFiles({ name, mimeType: 'text/plain', buffer: Buffer.from(miniprof(contact[body].text)) });
+  await choose('rail', 'km 37.ban');
+  await page.getByText('Next: the file of the wheel.').waitFor();
+  await choose('wheel', 'axle 4.whl');
+  await sound(page);
+  assert.equal((await json(page)).name, 'axle 4 on km 37');
+  assert.match(await page.locator('.drop').first().innerText(), /km 37\.ban: miniprof/);
+}));
+
 test('gaps and pressures are taken from tables', () => onPage('', async (page) => {
   await sound(page);
   await page.getByRole('radio', { name: 'Gap curve' }).check();

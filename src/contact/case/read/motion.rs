@@ -4,7 +4,10 @@ use serde_json::Value;
 
 use crate::contact::case::read::faults::{Faults, Interval};
 use crate::contact::case::read::object::{Object, join, shown};
-use crate::contact::case::words::motion::{AskedMotion, Combine, Motions, Range, Sweep, Wheelset};
+use crate::contact::case::read::samples::{count_rest, numbers};
+use crate::contact::case::words::motion::{
+    AskedMotion, Combine, Motions, Range, Sweep, Swept, ValueList, Wheelset,
+};
 
 const CREEPAGE: Interval = Interval::closed(-1e6, 1e6, "");
 const SPIN: Interval = Interval::closed(-1e6, 1e6, "1/mm");
@@ -151,9 +154,9 @@ fn wheelset(block: &mut Object) -> Option<Wheelset> {
 }
 
 fn sweep(block: &mut Object) -> Option<Sweep> {
-    let mut read = [None; COMPONENTS.len()];
+    let mut read = [const { None }; COMPONENTS.len()];
     components(block, &["combine"], |block, k, name| {
-        read[k] = Some(range(block, k, name));
+        read[k] = Some(swept(block, k, name));
     })?;
     let combine = block.word(
         "combine",
@@ -163,39 +166,47 @@ fn sweep(block: &mut Object) -> Option<Sweep> {
     if block.has("combine") {
         combine?;
     }
-    // A faulty range has left its fault behind and ends the reading here.
-    let mut ranges = [None; COMPONENTS.len()];
-    for (range, read) in ranges.iter_mut().zip(read) {
-        *range = match read {
-            Some(None) => return None,
-            Some(range) => range,
-            None => None,
-        };
+    // A faulty component has left its fault behind and ends the reading here.
+    if read.contains(&Some(None)) {
+        return None;
     }
-    let [creepage_x, creepage_y, spin_per_mm, force_x_n, force_y_n] = ranges;
-    let combine = combine.unwrap_or_default();
-    if combine == Combine::Together {
-        let points: Vec<u32> = ranges
-            .iter()
-            .flatten()
-            .map(|range: &Range| range.points)
-            .collect();
-        if points.iter().any(|n| *n != points[0]) {
-            block.fault_here(format!(
-                "ranges with {} points given; ranges that run together need equally many (or use \"combine\": \"grid\")",
-                points.iter().map(u32::to_string).collect::<Vec<_>>().join(", ")
-            ));
-            return None;
-        }
-    }
-    Some(Sweep {
+    let [creepage_x, creepage_y, spin_per_mm, force_x_n, force_y_n] = read.map(Option::flatten);
+    let sweep = Sweep {
         creepage_x,
         creepage_y,
         spin_per_mm,
         force_x_n,
         force_y_n,
-        combine,
-    })
+        combine: combine.unwrap_or_default(),
+    };
+    if sweep.combine == Combine::Together {
+        let points: Vec<usize> = components_of(&sweep)
+            .into_iter()
+            .flatten()
+            .map(Swept::points)
+            .collect();
+        let mut varying = points.iter().filter(|points| **points > 1);
+        let first = varying.next();
+        if varying.any(|points| Some(points) != first) {
+            block.fault_here(format!(
+                "components with {} values given; those that vary together need equally many (or use \"combine\": \"grid\")",
+                points.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
+            ));
+            return None;
+        }
+    }
+    Some(sweep)
+}
+
+fn components_of(sweep: &Sweep) -> [Option<&Swept>; COMPONENTS.len()] {
+    [
+        &sweep.creepage_x,
+        &sweep.creepage_y,
+        &sweep.spin_per_mm,
+        &sweep.force_x_n,
+        &sweep.force_y_n,
+    ]
+    .map(Option::as_ref)
 }
 
 /// Visits the components that are written and refuses everything else; `None` if no motion is described.
@@ -230,6 +241,44 @@ fn components(
         return None;
     }
     (!both).then_some(())
+}
+
+/// A number, `{"from": …, "to": …, "points": …}` or `{"values": […]}`.
+fn swept(block: &mut Object, k: usize, name: &str) -> Option<Swept> {
+    let what = "a number, {\"from\": …, \"to\": …, \"points\": …} or {\"values\": […]}";
+    match block.value(name)? {
+        Value::Number(_) => block.number(name, interval(k)).map(Swept::Constant),
+        Value::Object(members) if members.contains_key("values") => {
+            list(block, k, name).map(Swept::List)
+        }
+        Value::Object(_) => range(block, k, name).map(Swept::Range),
+        other => {
+            block.fault(name, format!("{} given; {what} is needed", shown(other)));
+            None
+        }
+    }
+}
+
+fn list(block: &mut Object, k: usize, name: &str) -> Option<ValueList> {
+    let mut block = block.child(name)?;
+    block.only(&["values"], &[]);
+    let value = block.value("values")?;
+    let elements = value
+        .as_array()
+        .filter(|elements| (1..=POINTS_MAX as usize).contains(&elements.len()));
+    let Some(elements) = elements else {
+        let detail = format!(
+            "{} given; an array of 1 to {POINTS_MAX} numbers is needed",
+            shown(value)
+        );
+        block.fault("values", detail);
+        return None;
+    };
+    let pointer = block.pointer_to("values");
+    let (mut refused, allowed) = (0, interval(k));
+    let values = numbers(elements, &pointer, allowed, &mut refused, block.faults());
+    count_rest(&pointer, allowed, refused, block.faults());
+    Some(ValueList { values: values? })
 }
 
 fn range(block: &mut Object, k: usize, name: &str) -> Option<Range> {

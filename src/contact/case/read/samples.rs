@@ -172,7 +172,7 @@ pub(crate) fn samples(
 }
 
 /// Numbers of an array; faulty ones are counted in `refused`, and listed as long as they are few.
-fn numbers(
+pub(crate) fn numbers(
     elements: &[Value],
     pointer: &str,
     allowed: Interval,
@@ -195,7 +195,7 @@ fn numbers(
 }
 
 /// Says how many faulty numbers were not listed.
-fn count_rest(pointer: &str, allowed: Interval, refused: usize, faults: &mut Faults) {
+pub(crate) fn count_rest(pointer: &str, allowed: Interval, refused: usize, faults: &mut Faults) {
     if refused > GRID_FAULTS_MAX {
         faults.add(
             pointer,

@@ -24,18 +24,22 @@ pub struct MotionWords {
 pub struct AskedMotion {
     /// Longitudinal creepage, dimensionless; 0 when left out.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub creepage_x: Option<f64>,
     /// Lateral creepage, dimensionless; 0 when left out.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub creepage_y: Option<f64>,
     /// Spin in 1/mm.
     #[schema(required = false)]
     pub spin_per_mm: f64,
     /// Longitudinal force on the lower body in N, over all patches, at most μN. Excludes `creepage_x`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub force_x_n: Option<f64>,
     /// Lateral force on the lower body in N, over all patches, at most μN. Excludes `creepage_y`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub force_y_n: Option<f64>,
 }
 
@@ -47,7 +51,7 @@ pub enum Motions {
     One(AskedMotion),
     /// Several motions on the same patch, solved in order.
     Many(Vec<AskedMotion>),
-    /// Motions generated from ranges.
+    /// Motions generated from values of their components.
     Sweep {
         /// What varies, and what stays.
         sweep: Sweep,
@@ -88,44 +92,56 @@ pub struct Wheelset {
     pub roll_rate_rad_per_s: f64,
 }
 
-/// Ranges of the motion's components. A component left out is 0.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+/// Values of the motion's components. A component left out is 0.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Sweep {
     /// Longitudinal creepage.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
-    pub creepage_x: Option<Range>,
+    pub creepage_x: Option<Swept>,
     /// Lateral creepage.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
-    pub creepage_y: Option<Range>,
+    pub creepage_y: Option<Swept>,
     /// Spin in 1/mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
-    pub spin_per_mm: Option<Range>,
+    pub spin_per_mm: Option<Swept>,
     /// Longitudinal force on the lower body in N, in place of `creepage_x`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
-    pub force_x_n: Option<Range>,
+    pub force_x_n: Option<Swept>,
     /// Lateral force on the lower body in N, in place of `creepage_y`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
-    pub force_y_n: Option<Range>,
-    /// `together` (default): all ranges have the same number of points and run side by side; `grid`: every
+    pub force_y_n: Option<Swept>,
+    /// `together` (default): all components that vary have the same number of values and run side by side; `grid`: every
     /// combination, the last named component fastest, a force in the place of its creepage.
     #[schema(required = false)]
     pub combine: Combine,
 }
 
-/// How several ranges of a sweep are combined.
+/// How several components of a sweep are combined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Combine {
-    /// Side by side; all ranges have equally many points.
+    /// Side by side; all components that vary have equally many values.
     #[default]
     Together,
     /// Every combination.
     Grid,
+}
+
+/// The values of one component of a sweep.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum Swept {
+    /// The same value in every motion.
+    Constant(f64),
+    /// Equally spaced values.
+    Range(Range),
+    /// These values, in this order.
+    List(ValueList),
 }
 
 /// Equally spaced values, both ends included.
@@ -138,4 +154,24 @@ pub struct Range {
     /// Number of values, at least 1.
     #[schema(minimum = 1)]
     pub points: u32,
+}
+
+/// Values one by one.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct ValueList {
+    /// The values, at least one.
+    #[schema(min_items = 1)]
+    pub values: Vec<f64>,
+}
+
+impl Swept {
+    /// Number of values.
+    #[must_use]
+    pub fn points(&self) -> usize {
+        match self {
+            Swept::Constant(_) => 1,
+            Swept::Range(range) => range.points as usize,
+            Swept::List(list) => list.values.len(),
+        }
+    }
 }

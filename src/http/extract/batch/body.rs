@@ -10,6 +10,8 @@ use tokio::time::{Instant, timeout_at};
 use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
+use crate::contact::error::Fault;
+use crate::http::extract::batch::own_options;
 use crate::http::extract::batch::splitter::{Element, Layout, Splitter};
 use crate::http::extract::batch::table::TableBody;
 use crate::http::extract::json::{essence, read_json, read_strict, unreadable, weigh_case};
@@ -273,15 +275,17 @@ fn add(
         Form::Array => {
             let case = read_strict(&element.text)
                 .map_err(|error| ApiError::malformed_element(draft.cases, &error))?;
-            draft.add(element.line, &element.text, Ok(case))?;
+            draft.add(element.line, &element.text, own_options::read(case))?;
         }
         Form::Lines => {
             let case = read_strict(&element.text)
-                .map_err(|error| format!("the line is not JSON: {error}"));
+                .map_err(|error| vec![Fault::new("", format!("the line is not JSON: {error}"))])
+                .and_then(own_options::read);
             draft.add(element.line, &element.text, case)?;
         }
         Form::Table(table) => {
             if let Some(row) = table.take(&element.text)? {
+                let row = row.map_err(|detail| vec![Fault::new("", detail)]);
                 draft.add_row(element.line, &element.text, row)?;
             }
         }

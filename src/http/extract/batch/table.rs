@@ -1,17 +1,20 @@
 //! A table of cases: the first line names the columns, every other line fills a template case.
 //!
 //! A column is named by a JSON pointer into the case (`/load/normal_force_n`), by a short name (`normal_force_n`), or as
-//! `label:KEY` for a label. An empty field leaves what the template says.
+//! `label:KEY` for a label; `priority` and `deadline_s` are options of the line. An empty field leaves what the template says.
 
 use std::collections::HashSet;
 
 use axum::body::Bytes;
 use serde_json::Value;
 
+use crate::http::extract::batch::own_options;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::jobs::batch::template;
 use crate::jobs::batch::template::Cell;
+use crate::jobs::batch::upload::BatchRow;
+use crate::jobs::submit_options::CaseOptions;
 
 /// Short names of columns and what they stand for.
 const SHORT_NAMES: [(&str, &str); 13] = [
@@ -43,13 +46,13 @@ pub struct TableBody {
 }
 
 /// The case of a line with what it puts into the template, or why it stands for none.
-pub type Row = Result<(Value, Vec<Cell>), String>;
+pub type Row = Result<BatchRow, String>;
 
 #[derive(Debug, PartialEq, Eq)]
 struct TemplateColumn {
     /// As it stands in the header.
     title: String,
-    /// The members that lead to the value.
+    /// The members that lead to the value; none for an option of the line.
     path: Vec<String>,
     /// The value is text, whatever it looks like.
     text: bool,
@@ -102,7 +105,11 @@ fn read_header(line: &[u8]) -> Result<Vec<TemplateColumn>, String> {
     let mut columns = Vec::with_capacity(titles.len());
     for title in titles {
         let column = column(title.trim())?;
-        if !seen.insert(column.path.clone()) {
+        let place = match column.path.is_empty() {
+            true => vec![String::new(), column.title.clone()],
+            false => column.path.clone(),
+        };
+        if !seen.insert(place) {
             return Err(format!("the column `{}` is there twice", column.title));
         }
         columns.push(column);
@@ -112,7 +119,9 @@ fn read_header(line: &[u8]) -> Result<Vec<TemplateColumn>, String> {
 
 fn column(title: &str) -> Result<TemplateColumn, String> {
     let short = SHORT_NAMES.iter().find(|(name, _)| *name == title);
-    let path = if let Some((_, pointer)) = short {
+    let path = if own_options::NAMES.contains(&title) {
+        Vec::new()
+    } else if let Some((_, pointer)) = short {
         pointed(pointer)
     } else if let Some(key) = title.strip_prefix("label:").filter(|key| !key.is_empty()) {
         vec!["labels".to_owned(), key.to_owned()]
@@ -124,11 +133,11 @@ fn column(title: &str) -> Result<TemplateColumn, String> {
             .map(|(name, _)| format!("`{name}`"))
             .collect();
         return Err(format!(
-            "`{title}` names no column; allowed: {}, `label:KEY`, or a JSON pointer such as `/load/normal_force_n`; columns are parted by commas",
+            "`{title}` names no column; allowed: {}, `priority`, `deadline_s`, `label:KEY`, or a JSON pointer such as `/load/normal_force_n`; columns are parted by commas",
             names.join(", ")
         ));
     };
-    let text = path[0] == "labels" || path[0] == "name";
+    let text = matches!(path.first().map(String::as_str), Some("labels" | "name"));
     Ok(TemplateColumn {
         title: title.to_owned(),
         path,
@@ -154,6 +163,7 @@ fn fill(template: &Value, columns: &[TemplateColumn], line: &[u8]) -> Row {
         ));
     }
     let (mut cells, mut titles) = (Vec::new(), Vec::new());
+    let mut own = CaseOptions::default();
     for (column, field) in columns.iter().zip(&fields) {
         let field = field.trim();
         if field.is_empty() {
@@ -164,12 +174,17 @@ fn fill(template: &Value, columns: &[TemplateColumn], line: &[u8]) -> Row {
         } else {
             read_value(field)
         };
+        if column.path.is_empty() {
+            own_options::set(&mut own, &column.title, &value)
+                .map_err(|detail| format!("the column `{}`: {detail}", column.title))?;
+            continue;
+        }
         cells.push(Cell(column.path.clone(), value));
         titles.push(&column.title);
     }
     let case = template::fill(template, &cells)
         .map_err(|(number, reason)| format!("the column `{}` {reason}", titles[number]))?;
-    Ok((case, cells))
+    Ok(BatchRow { case, cells, own })
 }
 
 /// A number, `true`, `false` or `null` as JSON has them; everything else is text, and the case says whether it may be.
@@ -204,7 +219,7 @@ mod tests {
         let mut table = TableBody::new(template);
         assert!(table.take(header.as_bytes()).expect("a header").is_none());
         let row = table.take(line.as_bytes()).expect("a line");
-        row.expect("a case").map(|(case, _)| case)
+        row.expect("a case").map(|row| row.case)
     }
 
     #[test]
@@ -229,6 +244,7 @@ mod tests {
             ("name,a_mm", "x", "1 fields, the header has 2"),
             ("/solver/mesh", "3", "neither an object nor an array"),
             ("/contact/y_mm/2", "3", "array with 2 entries"),
+            ("priority", "soon", "allowed: high, normal, low"),
         ] {
             let fault = filled(header, line).unwrap_err();
             assert!(fault.contains(word), "{fault}");

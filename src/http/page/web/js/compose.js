@@ -13,6 +13,7 @@ import { fieldId } from './field.js';
 import { caseForm } from './form.js';
 import { bytes, count, number, seconds, withError } from './format.js';
 import { placed } from './placing.js';
+import { lacksSection } from './starts.js';
 
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./state.js').Compose} Compose */
@@ -85,14 +86,20 @@ function drawing({ understood }, document) {
   }
 }
 
+const BODIES = /** @type {const} */ (['rail', 'wheel']);
+
 /** @param {Compose} state */
 function verdict(state) {
-  const { unreadable, faults, refusal, checked } = state;
+  const { unreadable, faults, refusal, checked, document } = state;
   if (unreadable) return html`<p class="fault big">${unreadable}</p>`;
   if (refusal) return html`<p class="fault big">${refusal}</p>`;
+  const lacking = BODIES.filter((body) => document && lacksSection(document, body));
+  const wrong = faults.filter(({ pointer }) => !lacking.some((body) => pointer?.startsWith(`/contact/${body}/`)));
+  const wanted = lacking.length ? html`<p class="big">Next: ${lacking.map((body) => `the file of the ${body}`).join(' and ')}.</p>` : nothing;
+  if (lacking.length && !wrong.length) return wanted;
   if (faults.length) {
-    return html`<p class="fault big">${faults.length === 1 ? 'One fault' : `${faults.length} faults`}</p>
-      <ul class="faults">${faults.map((fault) => html`<li>
+    return html`${wanted}<p class="fault big">${wrong.length === 1 ? 'One fault' : `${wrong.length} faults`}</p>
+      <ul class="faults">${wrong.map((fault) => html`<li>
         <button class="link" @click=${() => lead(fault.pointer ?? '')}>${fault.pointer || 'case'}</button> ${fault.detail}</li>`)}</ul>`;
   }
   if (!checked) return html`<p class="quiet">Checking …</p>`;
@@ -105,8 +112,7 @@ function verdict(state) {
 /** How far the points of the profiles can be trusted. @param {CheckedCase} checked */
 function profileQuality({ quality }) {
   if (!quality) return nothing;
-  const bodies = /** @type {const} */ (['rail', 'wheel']);
-  return html`<dl class="quality">${bodies.map((body) => {
+  return html`<dl class="quality">${BODIES.map((body) => {
     const of = quality[body];
     if (!of) return nothing;
     const noise = typeof of.noise_um === 'number' ? `, noise ${number(of.noise_um, 2)} μm` : '';

@@ -3,7 +3,7 @@
 import { html, nothing } from '../vendor/lit-html.js';
 import { at, isObject, numberAt, put } from './document.js';
 import { change, editDocument } from './editing.js';
-import { withContact } from './starts.js';
+import { lacksSection, withContact } from './starts.js';
 import { faultAt, field, fieldId } from './field.js';
 import { number } from './format.js';
 import { parseGapCurve, parseGrid, profileKind } from './tables.js';
@@ -13,13 +13,15 @@ import { parseGapCurve, parseGrid, profileKind } from './tables.js';
 
 const FILES = '.ban,.whl,.prr,.prw,.txt,.csv,.dat';
 
+const DROP_HINT = html`<p class="hint">Or drop the measured files of a rail and a wheel anywhere here.</p>`;
+
 /** @param {App} app @param {string} type */
 export function contactFields(app, type) {
   switch (type) {
     case 'radii':
-      return html`<div class="pair">${field(app, '/contact/rolling_mm', 'Relative radius along', 'mm')}${field(app, '/contact/lateral_mm', 'across', 'mm')}</div>`;
+      return html`<div class="pair">${field(app, '/contact/rolling_mm', 'Relative radius along', 'mm')}${field(app, '/contact/lateral_mm', 'across', 'mm')}</div>${DROP_HINT}`;
     case 'ellipse':
-      return html`<div class="pair">${field(app, '/contact/a_mm', 'Semi-axis along', 'mm')}${field(app, '/contact/b_mm', 'across', 'mm')}</div>`;
+      return html`<div class="pair">${field(app, '/contact/a_mm', 'Semi-axis along', 'mm')}${field(app, '/contact/b_mm', 'across', 'mm')}</div>${DROP_HINT}`;
     case 'profiles':
       return profileFields(app);
     case 'gap_profile':
@@ -55,11 +57,19 @@ function profileFields(app) {
 
 /** @param {App} app @param {'rail' | 'wheel'} body */
 function sectionZone(app, body) {
-  const section = at(app.store.get().compose.document ?? {}, `/contact/${body}`);
+  const { document, files } = app.store.get().compose;
+  const section = at(document ?? {}, `/contact/${body}`);
+  const title = body === 'rail' ? 'Rail' : 'Wheel';
+  const take = (/** @type {File} */ file) => takeProfiles(app, [file], body);
+  if (!document || lacksSection(document, body)) {
+    return dropZone(title, '', `/contact/${body}`, app, take, 'drop or choose a file: MiniProf, Simpack or columns of y and z');
+  }
+  const file = files[body];
   const what = !isObject(section) ? ''
     : Array.isArray(section.points_mm) ? `${section.points_mm.length} points`
-    : typeof section.text === 'string' ? `${section.format}, ${section.text.split('\n').filter((line) => line.trim()).length} lines` : '';
-  return dropZone(body === 'rail' ? 'Rail' : 'Wheel', what, `/contact/${body}`, app, (file) => takeProfiles(app, [file], body));
+    : typeof section.text !== 'string' ? ''
+    : `${section.text === file?.text ? `${file.name}: ` : ''}${section.format}, ${section.text.split('\n').filter((line) => line.trim()).length} lines`;
+  return dropZone(title, what, `/contact/${body}`, app, take);
 }
 
 /** @param {App} app @param {string} pointer */
@@ -76,9 +86,10 @@ function pointsOf(app, pointer) {
  * @param {string} pointer
  * @param {App} app
  * @param {(file: File) => void} take
+ * @param {string} [wanted] What is wanted where nothing is there yet, which is then no fault.
  */
-function dropZone(title, what, pointer, app, take) {
-  const fault = faultAt(app, pointer);
+function dropZone(title, what, pointer, app, take, wanted) {
+  const fault = wanted ? undefined : faultAt(app, pointer);
   const over = (/** @type {DragEvent} */ event, /** @type {boolean} */ on) => {
     event.preventDefault();
     /** @type {HTMLElement} */ (event.currentTarget).classList.toggle('over', on);
@@ -97,7 +108,7 @@ function dropZone(title, what, pointer, app, take) {
   return html`<div class=${fault ? 'field bad' : 'field'}>
     <label class="drop" @dragover=${(/** @type {DragEvent} */ event) => over(event, true)}
       @dragleave=${(/** @type {DragEvent} */ event) => over(event, false)} @drop=${drop}>
-      <span>${title}</span><span class="quiet">${what || 'drop or choose a file'}</span>
+      <span>${title}</span><span class="quiet">${what || (wanted ?? 'drop or choose a file')}</span>
       <input type="file" class="visually-hidden" id=${fieldId(pointer)} accept=${FILES} @change=${chosen}></label>
     ${fault ? html`<p class="fault">${fault.detail}</p>` : nothing}</div>`;
 }
@@ -119,6 +130,12 @@ async function takeGrid(app, file, member) {
   editDocument(app, put(document, '/contact', { type, x_mm: grid.x_mm, y_mm: grid.y_mm, [member]: grid.values }));
 }
 
+/** What a case is called after its files. @param {import('./state.js').Compose['files']} files */
+function nameOf({ wheel, rail }) {
+  const names = [wheel, rail].map((file) => file?.name.replace(/\.[^.]*$/, ''));
+  return names.filter(Boolean).join(' on ');
+}
+
 /**
  * Takes files of cross-sections. The end of the name says which body it is; else it is the one dropped on, or the one that is missing.
  * @param {App} app
@@ -126,20 +143,21 @@ async function takeGrid(app, file, member) {
  * @param {'rail' | 'wheel'} [onto]
  */
 export async function takeProfiles(app, files, onto) {
-  const before = app.store.get().compose.document;
+  const { document: before, files: taken } = app.store.get().compose;
   const fresh = !before || at(before, '/contact/type') !== 'profiles';
   let document = fresh ? put(put(withContact(before, 'profiles'), '/labels', undefined), '/name', undefined) : before;
-  /** @type {Record<string, string>} */
-  const names = {};
+  const known = { ...taken };
   for (const file of files) {
     const { format, body } = profileKind(file.name);
     const missing = isObject(at(document, '/contact/rail')) && Object.keys(at(document, '/contact/rail') ?? {}).length ? 'wheel' : 'rail';
     const target = (format === 'columns' ? onto : undefined) ?? body ?? onto ?? missing;
-    document = put(document, `/contact/${target}`, { format, text: await file.text() });
-    names[target] = file.name.replace(/\.[^.]*$/, '');
+    const text = await file.text();
+    document = put(document, `/contact/${target}`, { format, text });
+    known[target] = { name: file.name, text };
     if (onto && target !== onto) app.say(`${file.name} is a ${target}, by its name.`);
   }
-  if (fresh) document = put(document, '/name', [names.wheel, names.rail].filter(Boolean).join(' on '));
-  app.compose({ example: '' });
+  const name = at(document, '/name');
+  if (name === undefined || name === nameOf(taken)) document = put(document, '/name', nameOf(known));
+  app.compose({ example: '', files: known });
   editDocument(app, document);
 }

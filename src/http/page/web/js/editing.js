@@ -66,7 +66,7 @@ export function change(app, pointer, value) {
 export function openExample(app, name) {
   const example = app.store.get().compose.examples.find((known) => known.name === name);
   if (!example) return;
-  app.compose({ example: name, typing: null });
+  app.compose({ example: name, files: {}, typing: null });
   editDocument(app, inOrder(/** @type {JsonObject} */ (/** @type {unknown} */ (example.case))));
 }
 

@@ -42,7 +42,8 @@ export const hasFields = ({ links }) => PARTS.some((part) => part in links);
  */
 export async function loadField(id, result, patch, point) {
   const { mesh } = result.patches[patch].points[point].solver;
-  const large = mesh.strips * mesh.cells > TEXT_CELLS_MAX;
+  // A method that knows resultants only has neither mesh nor fields.
+  const large = mesh !== undefined && mesh.strips * mesh.cells > TEXT_CELLS_MAX;
   const answer = await request(`/v1/jobs/${id}/fields?patch=${patch}&point=${point}&precision=single&format=${large ? 'npz' : 'json'}`);
   if (large) return fromArrays(await readNpz(await answer.arrayBuffer()));
   const { cells, outlines } = await answer.json();

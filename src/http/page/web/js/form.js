@@ -4,7 +4,7 @@ import { html, nothing } from '../vendor/lit-html.js';
 import { at, isObject, numberAt } from './document.js';
 import { change, editDocument } from './editing.js';
 import { contactFields } from './contactform.js';
-import { ALL_OUTPUTS, withContact } from './starts.js';
+import { ALL_OUTPUTS, withContact, withoutNameOf } from './starts.js';
 import { faultAt, field } from './field.js';
 
 /** @typedef {import('./state.js').App} App */
@@ -21,6 +21,14 @@ const COMPONENTS = /** @type {const} */ ([
   { key: 'spin_per_mm', label: 'Spin', unit: '1/m', factor: 0.001 },
 ]);
 
+/** Another kind of contact. @param {App} app @param {string} kind */
+function chooseContact(app, kind) {
+  const { document, example, examples } = app.store.get().compose;
+  const known = /** @type {JsonObject | undefined} */ (/** @type {unknown} */ (examples.find(({ name }) => name === example)?.case));
+  app.compose({ example: '' });
+  editDocument(app, withContact(withoutNameOf(document ?? {}, known), kind));
+}
+
 /** @param {App} app */
 export function caseForm(app) {
   const document = app.store.get().compose.document ?? {};
@@ -29,7 +37,7 @@ export function caseForm(app) {
   return html`
     <fieldset><legend>Contact</legend>
       <div class="segs" role="group" aria-label="Kind of contact">${CONTACTS.map(([kind, label]) => html`<label class="seg">
-        <input type="radio" name="contact" .checked=${kind === type} @change=${() => editDocument(app, withContact(document, kind))}>
+        <input type="radio" name="contact" .checked=${kind === type} @change=${() => chooseContact(app, kind)}>
         <span>${label}</span></label>`)}</div>
       ${contactFields(app, type)}
       ${fault ? html`<p class="fault">${fault.detail}</p>` : nothing}

@@ -66,6 +66,26 @@ export function withContact(document, type) {
   };
 }
 
+/** Are nothing but the empty braces of a cross-section there yet? @param {JsonObject} document @param {'rail' | 'wheel'} body */
+export function lacksSection({ contact }, body) {
+  if (!isObject(contact) || contact.type !== 'profiles') return false;
+  const section = contact[body];
+  return isObject(section) && Object.keys(section).length === 0;
+}
+
+/**
+ * A case without the name and the labels that it has from an example: they say nothing of another contact.
+ * @param {JsonObject} document
+ * @param {JsonObject | undefined} example
+ */
+export function withoutNameOf(document, example) {
+  const own = { ...document };
+  for (const member of ['name', 'labels']) {
+    if (example && JSON.stringify(own[member]) === JSON.stringify(example[member])) delete own[member];
+  }
+  return own;
+}
+
 const MEMBERS = ['name', 'labels', 'material', 'friction', 'contact', 'load', 'motion', 'solver', 'outputs'];
 
 /**

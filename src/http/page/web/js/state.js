@@ -29,6 +29,7 @@
  * @property {string} refusal Why it could not be checked, where that is no fault of the case.
  * @property {readonly import('./api.js').Schemas['ExampleCase'][]} examples Those of the service.
  * @property {string} example The one that is chosen; empty for none.
+ * @property {Partial<Record<'rail' | 'wheel', { name: string, text: string }>>} files The files that cross-sections were taken from.
  * @property {boolean} solving
  * @property {boolean} live Solve while typing, where it costs milliseconds.
  * @property {Preview | null} preview
@@ -63,7 +64,7 @@ export const initialState = () => ({
   toast: '',
   turn: 0,
   compose: {
-    document: null, text: '', unreadable: '', typing: null, checked: null, understood: null, faults: [], refusal: '', examples: [], example: '', solving: false,
+    document: null, text: '', unreadable: '', typing: null, checked: null, understood: null, faults: [], refusal: '', examples: [], example: '', files: {}, solving: false,
     live: true, preview: null,
   },
 });

@@ -1,0 +1,68 @@
+//! Cases of a batch with a priority and a deadline of their own.
+
+use serde_json::{Value, json};
+
+use crate::batches::{lines, send, small};
+use crate::errors::assert_problem;
+use crate::server::Server;
+
+const NDJSON: &str = "application/x-ndjson";
+
+/// Priority, and whether there is a deadline, of the jobs of a batch in the order of their cases.
+async fn options(server: &Server, batch: &Value) -> Vec<(String, bool)> {
+    let id = batch["id"].as_str().expect("an id");
+    let page = server.get(&format!("/v1/jobs?batch={id}")).await.json;
+    let jobs = page["jobs"].as_array().expect("jobs").iter().rev();
+    jobs.map(|job| {
+        let priority = job["priority"].as_str().expect("a priority");
+        (priority.to_owned(), job["deadline_at"].is_string())
+    })
+    .collect()
+}
+
+#[tokio::test]
+async fn a_case_of_a_batch_may_have_options_of_its_own_in_every_form_of_a_batch() {
+    let server = Server::idle().await;
+    let own = json!({ "case": small("b"), "priority": "high", "deadline_s": 600 });
+    let cases = [small("a"), own, json!({ "case": small("c") })];
+    let expected = [("low", false), ("high", true), ("low", false)]
+        .map(|(priority, deadline)| (priority.to_owned(), deadline));
+    for (content, body) in [
+        (NDJSON, lines(&cases)),
+        ("application/json", json!(cases).to_string()),
+    ] {
+        let batch = send(&server, "?priority=low", content, body).await;
+        assert_eq!(batch.status, 202, "{}", batch.text);
+        assert_eq!(options(&server, &batch.json).await, expected);
+    }
+    let template = server.post("/v1/jobs", &small("template")).await.json;
+    let template = template["id"].as_str().expect("an id");
+    let query = format!("?priority=low&template={template}");
+    let table = "name,priority,deadline_s\na,,\nb,high,600\nc,,\n".to_owned();
+    let batch = send(&server, &query, "text/csv", table).await;
+    assert_eq!(options(&server, &batch.json).await, expected);
+
+    // What is kept is the case alone.
+    let id = batch.json["id"].as_str().expect("an id");
+    let page = server.get(&format!("/v1/jobs?batch={id}")).await.json;
+    let job = page["jobs"][1]["id"].as_str().expect("an id");
+    let case = server.get(&format!("/v1/jobs/{job}/case")).await.json;
+    assert_eq!(case["name"], "b");
+    assert!(case.get("priority").is_none() && case.get("case").is_none());
+}
+
+#[tokio::test]
+async fn faults_of_options_and_of_their_cases_are_named_where_they_stand() {
+    let server = Server::idle().await;
+    let mut faulty = small("b");
+    faulty["friction"]["coefficient"] = json!(-1);
+    let cases = [
+        json!({ "case": small("a"), "priority": "soon" }),
+        json!({ "case": faulty }),
+    ];
+    let answer = send(&server, "", NDJSON, lines(&cases)).await;
+    assert_problem(&answer, 422, "faulty-batch", "");
+    let errors = answer.json["errors"].as_array().expect("faults");
+    let pointers: Vec<_> = errors.iter().map(|fault| &fault["pointer"]).collect();
+    assert_eq!(pointers, ["/0/priority", "/1/case/friction/coefficient"]);
+}
