@@ -9,7 +9,7 @@ use std::time::Instant;
 use bytes::Bytes;
 use railhead::jobs::State;
 use railhead::jobs::store::Store;
-use railhead::jobs::store::claim::{ClaimKind, ClaimRequest, ReleaseReason};
+use railhead::jobs::store::claim::{ClaimKind, ClaimRequest, Lease, ReleaseReason};
 use railhead::jobs::store::list::Filter;
 use railhead::jobs::store::sqlite::database::SqliteStore;
 use railhead::jobs::store::submission::{NewBatch, NewJob, QueueBounds};
@@ -42,10 +42,12 @@ pub async fn claims() -> Vec<Row> {
                 cost_us: 200_000,
                 each_slice_us: None,
                 workers,
-                lease_until: i64::MAX,
+                lease: Lease {
+                    now: 0,
+                    ms: i64::MAX,
+                },
                 now: i64::try_from(number).unwrap_or(0),
                 late_before: 0,
-                skip: &HashSet::new(),
             };
             let start = Instant::now();
             let claims = store.claim(&request).await.expect("a claim");

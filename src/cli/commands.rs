@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use crate::cli::case_args::CaseArgs;
+use crate::cli::database_args::{DatabaseArgs, DatabaseUrlArgs};
 use crate::cli::serve_args::ServeArgs;
 use crate::cli::values::address;
 
@@ -22,6 +23,12 @@ pub struct Cli {
 pub enum Command {
     /// Serve the HTTP API and solve what is submitted.
     Serve(ServeArgs),
+    /// Solve what is submitted to other nodes of the same database; takes the flags of `serve` and answers probes only.
+    Worker(ServeArgs),
+    /// Make the job table in a database that several nodes share; changes nothing if it is there.
+    Migrate(DatabaseUrlArgs),
+    /// Tell how the database is that several nodes share; exit code 1 if something is wrong.
+    Doctor(DatabaseUrlArgs),
     /// Solve one case without a server; the result goes to standard output.
     ///
     /// Exit code 0: solved; 1: no answer; 2: the case is faulty.
@@ -83,6 +90,8 @@ pub enum KeysAction {
             value_name = "FOLDER"
         )]
         data_dir: PathBuf,
+        #[command(flatten)]
+        database: DatabaseArgs,
     },
     /// List all keys without their secrets.
     List {
@@ -94,6 +103,8 @@ pub enum KeysAction {
             value_name = "FOLDER"
         )]
         data_dir: PathBuf,
+        #[command(flatten)]
+        database: DatabaseArgs,
     },
     /// Revoke a key; a running service refuses it within two seconds.
     Revoke {
@@ -108,6 +119,8 @@ pub enum KeysAction {
             value_name = "FOLDER"
         )]
         data_dir: PathBuf,
+        #[command(flatten)]
+        database: DatabaseArgs,
     },
 }
 
@@ -206,6 +219,7 @@ mod tests {
         };
         let cores = std::thread::available_parallelism().unwrap().get();
         assert_eq!(args.worker_count(), if cores > 1 { cores - 1 } else { 1 });
-        assert!(Cli::try_parse_from(["railhead", "serve", "--workers", "0"]).is_err());
+        let none = Cli::try_parse_from(["railhead", "serve", "--workers", "0"]);
+        assert!(matches!(none.unwrap().command, Command::Serve(args) if args.worker_count() == 0));
     }
 }

@@ -1,4 +1,4 @@
-//! `railhead keys`: creates, lists and revokes the API keys of a data folder, also while a service uses it.
+//! `railhead keys`: creates, lists and revokes the API keys of a data folder or of a database, also while services use it.
 
 use std::process::ExitCode;
 
@@ -19,14 +19,24 @@ pub(super) fn run(args: &KeysArgs) -> anyhow::Result<ExitCode> {
 }
 
 async fn act(args: &KeysArgs) -> anyhow::Result<ExitCode> {
-    let (KeysAction::Create { data_dir, .. }
-    | KeysAction::List { data_dir }
-    | KeysAction::Revoke { data_dir, .. }) = &args.action;
-    let creates = matches!(args.action, KeysAction::Create { .. });
-    if !creates && !Keyring::is_there(data_dir) {
-        bail!("{} is no data folder of a service", data_dir.display());
+    let (KeysAction::Create {
+        data_dir, database, ..
     }
-    let keys = Keyring::open(data_dir).await?;
+    | KeysAction::List { data_dir, database }
+    | KeysAction::Revoke {
+        data_dir, database, ..
+    }) = &args.action;
+    let creates = matches!(args.action, KeysAction::Create { .. });
+    let (keys, place) = match &database.database_url {
+        Some(url) => (Keyring::open_shared(url).await?, "the database".to_owned()),
+        None if !creates && !Keyring::is_there(data_dir) => {
+            bail!("{} is no data folder of a service", data_dir.display());
+        }
+        None => (
+            Keyring::open(data_dir).await?,
+            data_dir.display().to_string(),
+        ),
+    };
     let done = match &args.action {
         KeysAction::Create {
             tenant,
@@ -37,9 +47,7 @@ async fn act(args: &KeysArgs) -> anyhow::Result<ExitCode> {
             let (key, secret) = keys.create(tenant, name.clone(), *read_only).await?;
             print_error(&format!(
                 "key {} of tenant {} in {} follows; it is shown this one time",
-                key.id,
-                key.tenant,
-                data_dir.display()
+                key.id, key.tenant, place
             ));
             print(&secret)
         }

@@ -3,16 +3,18 @@
 //! | to find | look in |
 //! |---|---|
 //! | a command, and the flags of all but `serve` | [`commands`] |
-//! | a flag of `serve` | [`serve_args`], [`worker_args`], [`http_args`], [`case_args`] |
+//! | a flag of `serve` | [`serve_args`], [`worker_args`], [`http_args`], [`case_args`], [`database_args`] |
 //! | in which order a service starts and stops | [`serve`], [`stop`] |
 
 mod backup;
 mod case_args;
 mod commands;
 mod config;
+mod database_args;
 mod healthcheck;
 mod http_args;
 mod keys;
+mod migrate;
 mod output;
 mod serve;
 mod serve_args;
@@ -27,6 +29,7 @@ use clap::{CommandFactory, FromArgMatches};
 
 use crate::cli::commands::{Cli, Command};
 use crate::cli::output::{print, print_error, reasons};
+use crate::cli::serve::Role;
 use crate::http;
 
 /// Reads the command line, does what it says, and returns the exit code.
@@ -36,7 +39,10 @@ pub fn run() -> ExitCode {
     let given = command.get_matches_mut();
     let cli = Cli::from_arg_matches(&given).unwrap_or_else(|error| error.exit());
     let done = match cli.command {
-        Command::Serve(args) => serve::run(&args),
+        Command::Serve(args) => serve::run(&args, Role::Serve),
+        Command::Worker(args) => serve::run(&args, Role::Work),
+        Command::Migrate(args) => migrate::run(&args),
+        Command::Doctor(args) => migrate::doctor(&args),
         Command::Solve(args) => solve::run(&args),
         Command::Config(args) => match (
             command.find_subcommand("config"),

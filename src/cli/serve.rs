@@ -37,8 +37,38 @@ const START_AGAIN: u8 = 75;
 /// Most connections of the listener for probes.
 const PROBE_CONNECTIONS: usize = 64;
 
+/// What a process is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Role {
+    /// It answers requests, and solves if it has workers.
+    Serve,
+    /// It solves what other nodes accept, and answers probes.
+    Work,
+}
+
+impl Role {
+    /// Refuses settings that make no sense for it.
+    fn require(self, args: &ServeArgs) -> anyhow::Result<()> {
+        let shared = args.database.database_url.is_some();
+        match self {
+            Role::Work if !shared => {
+                bail!("`railhead worker` needs the --database-url of the nodes that accept jobs")
+            }
+            Role::Work if args.worker_count() == 0 => {
+                bail!("--workers 0 leaves `railhead worker` nothing to do")
+            }
+            Role::Serve if !shared && args.worker_count() == 0 => {
+                bail!(
+                    "--workers 0 needs a --database-url, where other nodes find the jobs to solve them"
+                )
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
 /// Serves until a signal says stop.
-pub(super) fn run(args: &ServeArgs) -> anyhow::Result<ExitCode> {
+pub(super) fn run(args: &ServeArgs, role: Role) -> anyhow::Result<ExitCode> {
     let log = telemetry::start(args.log.log_format, &args.log.log)?;
     for name in unknown_variables() {
         tracing::warn!(
@@ -52,7 +82,7 @@ pub(super) fn run(args: &ServeArgs) -> anyhow::Result<ExitCode> {
         .thread_name("railhead-async")
         .build()
         .context("the async runtime could not be started")?;
-    let served = runtime.block_on(serve(args));
+    let served = runtime.block_on(serve(args, role));
     // The data folder is closed; computations that still run are for clients that have been cut off.
     runtime.shutdown_background();
     // Writes the last log lines.
@@ -67,14 +97,15 @@ fn request_threads() -> usize {
 }
 
 /// Starts a service, waits until it is to stop, and stops it.
-async fn serve(args: &ServeArgs) -> anyhow::Result<ExitCode> {
+async fn serve(args: &ServeArgs, role: Role) -> anyhow::Result<ExitCode> {
+    role.require(args)?;
     let mut signals = Signals::listen()?;
     let traces = args.otlp_endpoint.as_ref().map(Traces::start).transpose()?;
     let jobs = open_jobs(args, traces.as_ref()).await?;
     let listener = bind(args.listen).await?;
     let address = listener.local_addr()?;
     let anonymous = args.anonymous.on(address);
-    if !anonymous && !jobs.any_key().await? {
+    if role == Role::Serve && !anonymous && !jobs.any_key().await? {
         jobs.shutdown(Duration::ZERO).await;
         bail!(
             "nobody could use a service on {address}: there is no API key, and requests without one are only answered \
@@ -85,8 +116,8 @@ async fn serve(args: &ServeArgs) -> anyhow::Result<ExitCode> {
     }
     jobs.start()?;
     let stop = CancellationToken::new();
-    let mut server = start_listening(args, &jobs, listener, anonymous, stop.clone()).await?;
-    if anonymous && !address.ip().is_loopback() {
+    let mut server = start_listening(args, role, &jobs, listener, anonymous, stop.clone()).await?;
+    if role == Role::Serve && anonymous && !address.ip().is_loopback() {
         tracing::warn!(%address, "whoever reaches this address may use the service without a key");
     }
     let workers = args.worker_count();
@@ -134,6 +165,7 @@ async fn open_jobs(args: &ServeArgs, traces: Option<&Traces>) -> anyhow::Result<
         retention: args.retention.0,
         tenant_queue_max: args.tenant_queue_max,
         tracer: traces.map(|traces| Tracer::new(traces.tracer())),
+        database: args.database.database(),
         ..Options::new(&args.data_dir)
     });
     let recipe = Engine::with_operators(args.case.operators());
@@ -148,6 +180,7 @@ async fn bind(address: SocketAddr) -> anyhow::Result<TcpListener> {
 /// Answers requests until `stop`. Probes with a port of their own are answered until the process ends.
 async fn start_listening(
     args: &ServeArgs,
+    role: Role,
     jobs: &Jobs,
     listener: TcpListener,
     anonymous: bool,
@@ -167,7 +200,10 @@ async fn start_listening(
         probes_anonymous,
         telemetry::dropped_lines,
     );
-    let router = http::allow_origins(router, origins);
+    let router = match role {
+        Role::Serve => http::allow_origins(router, origins),
+        Role::Work => probes.clone(),
+    };
     if let (Some(listener), Some(address)) = (probe_listener, probe_address) {
         tracing::info!(%address, "listening for probes");
         let few = HttpOptions {

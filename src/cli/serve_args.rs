@@ -8,6 +8,7 @@ use std::time::Duration;
 use clap::Args;
 
 use crate::cli::case_args::CaseArgs;
+use crate::cli::database_args::DatabaseArgs;
 use crate::cli::http_args::HttpArgs;
 use crate::cli::values::{Anonymous, Retention, address, origin, retention};
 use crate::cli::worker_args::WorkerArgs;
@@ -25,7 +26,8 @@ pub struct ServeArgs {
         value_parser = address
     )]
     pub listen: SocketAddr,
-    /// Folder of the job table and the results; created if it is not there. One process at a time.
+    /// Folder of the job table and the results; with a database only of batches that are being received. Created if it is
+    /// not there. One process at a time.
     #[arg(
         long,
         env = "RAILHEAD_DATA_DIR",
@@ -33,8 +35,11 @@ pub struct ServeArgs {
         value_name = "FOLDER"
     )]
     pub data_dir: PathBuf,
-    /// Number of jobs solved at the same time, each on a thread of its own [default: cores − 1, at least 1].
-    #[arg(long, env = "RAILHEAD_WORKERS", value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[command(flatten)]
+    pub database: DatabaseArgs,
+    /// Number of jobs solved at the same time, each on a thread of its own; 0, with a database: other nodes solve
+    /// [default: cores − 1, at least 1].
+    #[arg(long, env = "RAILHEAD_WORKERS", value_name = "N")]
     pub workers: Option<u16>,
     #[command(flatten)]
     pub case: CaseArgs,

@@ -15,6 +15,11 @@ pub struct WorkerArgs {
     #[arg(long, env = "RAILHEAD_TIME_LIMIT_S", default_value_t = 86_400, value_name = "SECONDS",
           value_parser = clap::value_parser!(u32).range(1..))]
     pub time_limit_s: u32,
+    /// Seconds after which the jobs of a worker that shows no sign of life are given to another; it shows one three times
+    /// as often.
+    #[arg(long, env = "RAILHEAD_LEASE_S", default_value_t = 30, value_name = "SECONDS",
+          value_parser = clap::value_parser!(u32).range(1..=3600))]
+    pub lease_s: u32,
     /// Solver seconds after which a solve waits while others have their turn, if there are any.
     #[arg(long, env = "RAILHEAD_SLICE_S", default_value = "2", value_name = "SECONDS", value_parser = positive)]
     pub slice_s: f64,
@@ -66,6 +71,7 @@ impl WorkerArgs {
     pub fn apply(&self, options: Options) -> Options {
         let bytes = |mb: u32| u64::from(mb) << 20;
         Options {
+            lease: Duration::from_secs(self.lease_s.into()),
             time_limit: Duration::from_secs(self.time_limit_s.into()),
             slice: Duration::from_secs_f64(self.slice_s),
             parked_max: self.parked_max.into(),

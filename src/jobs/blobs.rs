@@ -1,7 +1,8 @@
-//! Stored results: blobs outside the job table, in a folder of the data folder.
+//! Stored results: blobs outside the job table, in a folder of the data folder or in the object store that comes with a
+//! database.
 //!
-//! Keys are `results/{yyyy}/{mm}/{job}/{lease number}/{name}`, year and month those of the job's submission (UTC). The
-//! lease number in the key makes a late write of a worker that lost its lease harmless. Blobs are written, and
+//! Keys are `results/{yyyy}/{mm}/{job}/{lease token}/{name}`, year and month those of the job's submission (UTC). The
+//! lease token in the key makes a late write of a worker that lost its lease harmless. Blobs are written, and
 //! synced to the disk, before the job is called succeeded.
 
 use std::fs::Permissions;
@@ -34,7 +35,8 @@ const FIELDS: &str = "fields.bin";
 #[derive(Debug, Clone)]
 pub struct Blobs {
     objects: Arc<dyn ObjectStore>,
-    root: PathBuf,
+    /// The folder, if it is one.
+    root: Option<PathBuf>,
 }
 
 impl Blobs {
@@ -50,8 +52,17 @@ impl Blobs {
         let objects = LocalFileSystem::new_with_prefix(root)?.with_fsync(true);
         Ok(Blobs {
             objects: Arc::new(objects),
-            root: root.to_owned(),
+            root: Some(root.to_owned()),
         })
+    }
+
+    /// Keeps results in an object store.
+    #[must_use]
+    pub fn within(objects: Arc<dyn ObjectStore>) -> Blobs {
+        Blobs {
+            objects,
+            root: None,
+        }
     }
 
     /// Stores a result and returns its key; durable once it returns.
@@ -59,12 +70,12 @@ impl Blobs {
     /// # Errors
     /// The result could not be written.
     pub async fn put(&self, claim: &Claim, result: EncodedResult) -> Result<String, JobsError> {
-        let folder = job_folder(claim.id).join(claim.lease_number.to_string());
+        let folder = job_folder(claim.id).join(claim.lease_token.to_string());
         self.put_into(folder, result).await
     }
 
-    /// As [`Blobs::put`], of one slice of a sweep: `{lease number}-{number of the slice}` stands in place of the lease
-    /// number.
+    /// As [`Blobs::put`], of one slice of a sweep: `{lease token}-{number of the slice}` stands in place of the lease
+    /// token.
     ///
     /// # Errors
     /// The result could not be written.
@@ -74,7 +85,7 @@ impl Blobs {
         number: u32,
         result: EncodedResult,
     ) -> Result<String, JobsError> {
-        let folder = job_folder(claim.id).join(format!("{}-{number}", claim.lease_number));
+        let folder = job_folder(claim.id).join(format!("{}-{number}", claim.lease_token));
         self.put_into(folder, result).await
     }
 
@@ -246,7 +257,10 @@ impl Blobs {
     /// Removes an emptied local folder with what a killed process may have left half-written in it, which the blob
     /// store does not show, and the folder of its job once that is empty.
     async fn scrub(&self, folder: &Path) -> Result<(), JobsError> {
-        let path = self.root.join(folder.as_ref());
+        let Some(root) = &self.root else {
+            return Ok(());
+        };
+        let path = root.join(folder.as_ref());
         match tokio::fs::remove_dir_all(&path).await {
             Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
                 return Err(JobsError::DataDir { path, source });
@@ -262,7 +276,10 @@ impl Blobs {
 
     /// Keeps what was just written from everybody else on this machine.
     async fn make_private(&self, folder: &Path) -> Result<(), JobsError> {
-        let path = self.root.join(folder.as_ref());
+        let Some(root) = &self.root else {
+            return Ok(());
+        };
+        let path = root.join(folder.as_ref());
         let failed = |source| JobsError::DataDir {
             path: path.clone(),
             source,
@@ -301,11 +318,11 @@ fn job_folder(id: Uuid) -> Path {
 mod tests {
     use super::*;
 
-    fn claim(id: Uuid, lease_number: u64) -> Claim {
+    fn claim(id: Uuid, lease_token: u64) -> Claim {
         Claim {
             id,
             attempt: 1,
-            lease_number,
+            lease_token,
             method: "auto".to_owned(),
             traceparent: None,
             cache_key: None,

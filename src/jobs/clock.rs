@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::Instant;
 
 /// A wall clock, and beside it a steady clock, which is never set. Clones show the same times.
@@ -40,6 +41,16 @@ impl Clock {
         Clock {
             wall: Arc::new(now_ms),
             ..Clock::system()
+        }
+    }
+
+    /// The same clocks, the wall clock ahead by what `offset_ms` says at the time.
+    #[must_use]
+    pub fn ahead(self, offset_ms: Arc<AtomicI64>) -> Clock {
+        let wall = self.wall;
+        Clock {
+            wall: Arc::new(move || wall() + offset_ms.load(Ordering::Relaxed)),
+            ..self
         }
     }
 

@@ -117,6 +117,19 @@ pub enum JobsError {
          use a new data folder, or the version that wrote this one"
     )]
     OtherForm,
+    /// What names the database is no such name.
+    #[error(
+        "the database URL cannot be read ({0}); it looks like postgres://user:password@host:5432/database"
+    )]
+    BadDatabaseUrl(String),
+    /// A data folder with jobs in it cannot be used beside a database.
+    #[error("{} holds the jobs of a service without a database; use another --data-dir beside --database-url", .0.display())]
+    DataDirOfEmbedded(PathBuf),
+    /// There is no job table in the database.
+    #[error(
+        "there is no job table in the database yet: run `railhead migrate --database-url …` once"
+    )]
+    NotMigrated,
     /// Reading or writing a stored result failed.
     #[error("the stored results failed: {0}")]
     Blobs(#[from] object_store::Error),

@@ -14,6 +14,7 @@ use crate::jobs::error::JobsError;
 use crate::jobs::model::{Job, QueuePlace, State};
 use crate::jobs::options::Options;
 use crate::jobs::shared::Shared;
+use crate::jobs::store::cluster::Bell;
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::list::{BatchFilter, Filter, Page};
 use crate::jobs::store::retention::{Deleted, Usage};
@@ -98,7 +99,7 @@ impl Jobs {
             let seconds = ahead.cost_us as f64 * 1e-6;
             // Each of the tenants has as much solver time as this one, until its own queue is empty.
             #[expect(clippy::cast_precision_loss, reason = "rough")]
-            let share = ahead.tenants.max(1) as f64 / self.shared.options.workers.max(1) as f64;
+            let share = ahead.tenants.max(1) as f64 / self.shared.all_workers().max(1) as f64;
             job.queue = Some(QueuePlace {
                 position,
                 starts_in_s: seconds * share,
@@ -183,6 +184,8 @@ impl Jobs {
         } else if let Some(control) = self.shared.running.get(id) {
             // A worker that lists its attempt later reads the request from the store.
             control.stop(StopReason::Cancel);
+        } else {
+            self.shared.ring(Bell::Cancel(id));
         }
         Ok(self.dated(job))
     }

@@ -3,7 +3,7 @@
 use std::fs::{File, TryLockError};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, AtomicUsize};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicUsize};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::available_parallelism;
 use std::time::Duration;
@@ -12,6 +12,7 @@ use tokio::sync::{Notify, Semaphore, SetOnce, broadcast};
 use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
+use uuid::{ContextV7, Uuid};
 
 use crate::jobs::batch::unfinished::UnfinishedBatches;
 use crate::jobs::blobs::Blobs;
@@ -22,7 +23,7 @@ use crate::jobs::handle::Jobs;
 use crate::jobs::keys::key::ANONYMOUS;
 use crate::jobs::maintenance::disk_reserve::make_private_folder;
 use crate::jobs::maintenance::{
-    blob_collector, deadlines, disk_reserve, reaper, recovery, retention,
+    blob_collector, deadlines, disk_reserve, nodes, reaper, recovery, retention,
 };
 use crate::jobs::metrics::Metrics;
 use crate::jobs::open_store::{note_closed, open_for_service};
@@ -30,6 +31,7 @@ use crate::jobs::options::Options;
 use crate::jobs::quota::StagedBytes;
 use crate::jobs::recent_reads::RecentReads;
 use crate::jobs::shared::Shared;
+use crate::jobs::store::cluster::Node;
 use crate::jobs::worker::fair_turns::FairTurns;
 use crate::jobs::worker::pool::Worker;
 use crate::jobs::worker::running::RunningAttempts;
@@ -39,7 +41,8 @@ const STOPPED_WITHIN: Duration = Duration::from_secs(10);
 
 impl Jobs {
     /// Opens a data folder: locks it, makes the job table or asks for its form, and puts the `running` jobs of a dead
-    /// process back into the queue (or ends them, if their attempts are used up). Nothing is solved before
+    /// process back into the queue (or ends them, if their attempts are used up). With a database the folder is for
+    /// batches that are being received, and running jobs are those of other processes. Nothing is solved before
     /// [`Jobs::start`].
     ///
     /// # Errors
@@ -54,8 +57,16 @@ impl Jobs {
     /// As [`Jobs::open`].
     pub async fn open_with(options: Options, engine: Engine) -> Result<Jobs, JobsError> {
         let lock = lock(&options.data_dir)?;
-        let store = open_for_service(&options.data_dir).await?;
-        let blobs = Blobs::open(&options.data_dir)?;
+        let store = open_for_service(&options.data_dir, options.database.as_ref()).await?;
+        let blobs = match store.cluster() {
+            Some(cluster) => Blobs::within(cluster.objects()),
+            None => Blobs::open(&options.data_dir)?,
+        };
+        let clock_offset_ms = Arc::<AtomicI64>::default();
+        let options = Options {
+            clock: options.clock.clone().ahead(clock_offset_ms.clone()),
+            ..options
+        };
         let unfinished_batches = UnfinishedBatches {
             abandoned: store.unfinished_batches().await?.into_iter().collect(),
             ..UnfinishedBatches::default()
@@ -64,6 +75,13 @@ impl Jobs {
         let jobs = Jobs {
             tenant: ANONYMOUS.into(),
             shared: Arc::new(Shared {
+                node: Node {
+                    id: Uuid::now_v7(),
+                    workers: options.workers,
+                },
+                cluster_workers: AtomicUsize::new(0),
+                clock_offset_ms,
+                id_context: Mutex::new(ContextV7::new()),
                 options,
                 engine,
                 store,
@@ -92,6 +110,9 @@ impl Jobs {
                 lock: Mutex::new(Some(lock)),
             }),
         };
+        if let Some(cluster) = jobs.shared.store.cluster() {
+            jobs.shared.show_node(cluster).await?;
+        }
         match jobs.shared.recover().await {
             // What can be read is served; the rest is done once the disk takes data again.
             Err(error) if error.storage_fault().is_some() => {
@@ -111,7 +132,7 @@ impl Jobs {
     /// # Errors
     /// A solver thread could not be started.
     pub fn start(&self) -> Result<(), JobsError> {
-        for number in 0..self.shared.options.workers.max(1) {
+        for number in 0..self.shared.options.workers {
             let worker = self.worker(&format!("solver-{number}"))?;
             self.shared.tasks.spawn(worker.run());
         }
@@ -130,6 +151,7 @@ impl Jobs {
         self.shared
             .tasks
             .spawn(deadlines::watch_deadlines(self.shared.clone()));
+        nodes::start(&self.shared);
         Ok(())
     }
 
@@ -167,8 +189,14 @@ impl Jobs {
                 );
             }
         }
+        if let Some(cluster) = self.shared.store.cluster() {
+            // Who does not say so is forgotten a moment later.
+            let _ = timeout(STOPPED_WITHIN, cluster.leave(self.shared.node.id)).await;
+        }
         self.shared.store.close().await;
-        note_closed(&self.shared.options.data_dir);
+        if self.shared.options.database.is_none() {
+            note_closed(&self.shared.options.data_dir);
+        }
         drop(
             self.shared
                 .lock

@@ -7,7 +7,9 @@ use std::sync::Arc;
 
 use crate::jobs::error::JobsError;
 use crate::jobs::maintenance::disk_reserve;
+use crate::jobs::options::Database;
 use crate::jobs::store::Store;
+use crate::jobs::store::postgres::database::PostgresStore;
 use crate::jobs::store::sqlite::database::SqliteStore;
 
 /// The file that says that the job table was closed in good order.
@@ -19,11 +21,28 @@ pub fn table_file(data_dir: &Path) -> PathBuf {
     data_dir.join("jobs.db")
 }
 
-/// Opens the store of a data folder for the one service that runs its jobs. It is checked for damage unless it was closed in good order.
+/// Opens the store for a service: the database that it shares with others, or the one of its data folder, of which it is the
+/// only user. The latter is checked for damage unless it was closed in good order.
 ///
 /// # Errors
 /// It cannot be opened, is of another version, or is damaged.
-pub async fn open_for_service(data_dir: &Path) -> Result<Arc<dyn Store>, JobsError> {
+pub async fn open_for_service(
+    data_dir: &Path,
+    database: Option<&Database>,
+) -> Result<Arc<dyn Store>, JobsError> {
+    let Some(database) = database else {
+        return open_embedded(data_dir).await;
+    };
+    let table = table_file(data_dir);
+    if table.exists() {
+        return Err(JobsError::DataDirOfEmbedded(table));
+    }
+    Ok(Arc::new(
+        PostgresStore::open(&database.url, database.connections).await?,
+    ))
+}
+
+async fn open_embedded(data_dir: &Path) -> Result<Arc<dyn Store>, JobsError> {
     let table = table_file(data_dir);
     // After an end that closed the table there is nothing to be checked.
     let closed = std::fs::remove_file(data_dir.join(CLOSED)).is_ok();
@@ -47,6 +66,14 @@ pub async fn open_for_service(data_dir: &Path) -> Result<Arc<dyn Store>, JobsErr
 /// It cannot be opened, or is of another version.
 pub async fn open_beside(data_dir: &Path) -> Result<Arc<dyn Store>, JobsError> {
     Ok(Arc::new(SqliteStore::open(&table_file(data_dir)).await?))
+}
+
+/// Opens a database beside the services that use it.
+///
+/// # Errors
+/// It cannot be reached, has no job table, or one of another version.
+pub async fn open_shared(url: &str) -> Result<Arc<dyn Store>, JobsError> {
+    Ok(Arc::new(PostgresStore::open(url, 1).await?))
 }
 
 /// Notes that the store was closed in good order.

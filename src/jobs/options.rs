@@ -1,5 +1,6 @@
 //! How jobs are kept and worked on.
 
+use std::fmt;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -8,11 +9,29 @@ use crate::jobs::clock::Clock;
 use crate::jobs::quota::StagingBounds;
 use crate::jobs::trace::Tracer;
 
+/// A database that several processes share.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Database {
+    /// `postgres://user:password@host:port/database`.
+    pub url: String,
+    /// Most connections of this process, beside the one on which it listens.
+    pub connections: u32,
+}
+
+impl fmt::Debug for Database {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // The URL has a password in it.
+        write!(f, "Database({} connections)", self.connections)
+    }
+}
+
 /// How jobs are kept and worked on.
 #[derive(Debug, Clone)]
 pub struct Options {
     /// Folder of the job table and the results; created if it is not there.
     pub data_dir: PathBuf,
+    /// The database that keeps jobs and results, if several processes share them; otherwise they are in the data folder.
+    pub database: Option<Database>,
     /// Number of workers, each with a solver thread of its own.
     pub workers: usize,
     /// What one case may use.
@@ -61,6 +80,7 @@ impl Options {
     pub fn new(data_dir: impl Into<PathBuf>) -> Options {
         Options {
             data_dir: data_dir.into(),
+            database: None,
             workers: 1,
             limits: Limits::default(),
             lease: Duration::from_secs(30),

@@ -1,14 +1,14 @@
 //! What every handle and every worker shares.
 
 use std::fs::File;
-use std::sync::atomic::{AtomicBool, AtomicUsize};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use tokio::sync::{Notify, Semaphore, SetOnce, broadcast};
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
-use uuid::Uuid;
+use uuid::{ContextV7, Timestamp, Uuid};
 
 use crate::jobs::batch::model::Batch;
 use crate::jobs::batch::unfinished::UnfinishedBatches;
@@ -22,6 +22,8 @@ use crate::jobs::options::Options;
 use crate::jobs::quota::StagedBytes;
 use crate::jobs::recent_reads::RecentReads;
 use crate::jobs::store::Store;
+use crate::jobs::store::claim::Lease;
+use crate::jobs::store::cluster::{Bell, Node};
 use crate::jobs::worker::fair_turns::FairTurns;
 use crate::jobs::worker::running::RunningAttempts;
 
@@ -35,6 +37,12 @@ pub(crate) struct Shared {
     pub(crate) engine: Engine,
     pub(crate) store: Arc<dyn Store>,
     pub(crate) blobs: Blobs,
+    /// This process among those that share its store.
+    pub(crate) node: Node,
+    /// Workers of all nodes that share its store, as far as it is known.
+    pub(crate) cluster_workers: AtomicUsize,
+    /// How far the clock of the store is ahead of that of this machine.
+    pub(crate) clock_offset_ms: Arc<AtomicI64>,
     /// Wakes an idle worker; a hint only, workers also poll.
     pub(crate) wake: Notify,
     /// Announces ended jobs; a hint only, waiting callers also poll.
@@ -76,6 +84,8 @@ pub(crate) struct Shared {
     pub(crate) recovered: SetOnce<()>,
     /// Held as long as this process uses the data folder.
     pub(crate) lock: Mutex<Option<File>>,
+    /// Ids that are made with the clock of the store grow within a millisecond too.
+    pub(crate) id_context: Mutex<ContextV7>,
 }
 
 impl Shared {
@@ -99,13 +109,64 @@ impl Shared {
         self.leaps.look(&self.options.clock)
     }
 
+    /// A lease that begins now.
+    pub(crate) fn lease(&self) -> Lease {
+        Lease {
+            now: self.steady_ms(),
+            ms: self.lease_ms(),
+        }
+    }
+
     /// When a lease that begins now runs out.
     pub(crate) fn lease_until(&self) -> i64 {
         self.steady_ms().saturating_add(self.lease_ms())
     }
 
-    /// Tells waiting callers that a job has ended.
+    /// An id for a job that is submitted now.
+    pub(crate) fn new_id(&self) -> Uuid {
+        let offset = self.clock_offset_ms.load(Ordering::Relaxed);
+        if offset == 0 {
+            return Uuid::now_v7();
+        }
+        let now = self.now_ms().max(0);
+        let nanos = u32::try_from(now % 1000).unwrap_or(0) * 1_000_000;
+        let seconds = now.unsigned_abs() / 1000;
+        Uuid::new_v7(Timestamp::from_unix(&self.id_context, seconds, nanos))
+    }
+
+    /// Workers of all nodes.
+    pub(crate) fn all_workers(&self) -> usize {
+        let others = self.cluster_workers.load(Ordering::Relaxed);
+        self.options.workers.max(others)
+    }
+
+    /// Tells workers that there is something to be claimed.
+    pub(crate) fn wake_workers(&self) {
+        self.wake_here();
+        self.ring(Bell::Work);
+    }
+
+    /// The same, only those of this process.
+    pub(crate) fn wake_here(&self) {
+        self.wake.notify_waiters();
+        self.wake.notify_one();
+    }
+
+    /// Rings at all nodes, if there are others.
+    pub(crate) fn ring(&self, bell: Bell) {
+        if let Some(cluster) = self.store.cluster() {
+            cluster.ring(bell);
+        }
+    }
+
+    /// Tells waiting callers, those of other nodes too, that a job has ended.
     pub(crate) fn announce(&self, id: Uuid) {
+        self.announce_here(id);
+        self.ring(Bell::Ended(id));
+    }
+
+    /// The same, only those of this process.
+    pub(crate) fn announce_here(&self, id: Uuid) {
         // It is no error if no caller waits.
         let _ = self.ended.send(id);
     }

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use bytes::Bytes;
 use opentelemetry::KeyValue;
 use serde_json::Value;
-use uuid::Uuid;
 
 use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::words::solver::Output;
@@ -112,14 +111,14 @@ impl Jobs {
             tracing::info!(job = %id, method = new.method, "job answered from an earlier result");
             return Ok((job, false));
         }
-        self.shared.wake.notify_one();
+        self.shared.wake_workers();
         tracing::info!(job = %job.id, method = new.method, "job queued");
         Ok((job, replayed))
     }
 
     /// A checked case as a job about to be queued.
     fn new_job(&self, checked: CheckedCase, body: Bytes) -> NewJob {
-        let id = Uuid::now_v7();
+        let id = self.shared.new_id();
         NewJob {
             id,
             tenant: self.tenant.clone(),

@@ -20,7 +20,7 @@ pub struct Row {
     pub cache_key: Option<CacheKey>,
     pub batch: Option<Uuid>,
     pub attempt: u32,
-    pub lease_number: u64,
+    pub lease_token: u64,
     pub lease_until: i64,
     pub group_size: usize,
     pub solving: bool,
@@ -61,7 +61,7 @@ impl Row {
             cache_key: None,
             batch: None,
             attempt: 0,
-            lease_number: 0,
+            lease_token: 0,
             lease_until: 0,
             group_size: 1,
             solving: false,
@@ -85,10 +85,11 @@ impl Row {
         }
     }
 
-    pub fn claimed(&mut self, group_size: usize, lease_until: i64) {
+    pub fn claimed(&mut self, group_size: usize, lease_until: i64, lease_token: u64) {
         self.become_state(State::Running, 0);
         self.attempt += 1;
-        self.lease_number += 1;
+        assert_ne!(self.lease_token, lease_token, "no token comes twice");
+        self.lease_token = lease_token;
         self.lease_until = lease_until;
         self.group_size = group_size;
         self.solving = !self.suspect;
@@ -194,10 +195,10 @@ impl Model {
     }
 
     /// The row a claim still holds.
-    pub fn held(&mut self, id: Uuid, lease_number: u64) -> Option<&mut Row> {
+    pub fn held(&mut self, id: Uuid, lease_token: u64) -> Option<&mut Row> {
         self.rows
             .get_mut(&id)
-            .filter(|row| row.state == State::Running && row.lease_number == lease_number)
+            .filter(|row| row.state == State::Running && row.lease_token == lease_token)
     }
 
     /// A dead process leaves its jobs: those that were not solved alone count no attempt.

@@ -3,7 +3,7 @@
 //! A test takes the kind of store that it is to open; `conformance!` runs it with each. A new store is one more kind, and one
 //! more module in the macro.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -11,8 +11,9 @@ use bytes::Bytes;
 use railhead::contact::remark::entry::RemarkEntry;
 use railhead::contact::remark::list::Remark;
 use railhead::jobs::store::Store;
-use railhead::jobs::store::claim::{Claim, ClaimKind, ClaimRequest, ReleaseReason, Renewal};
+use railhead::jobs::store::claim::{Claim, ClaimKind, ClaimRequest, Lease, ReleaseReason, Renewal};
 use railhead::jobs::store::ending::{Ending, StoredResult};
+use railhead::jobs::store::postgres::database::PostgresStore;
 use railhead::jobs::store::submission::{Enqueued, NewBatch, NewJob, QueueBounds};
 use railhead::jobs::submit_options::SubmitOptions;
 use railhead::jobs::{Failure, FailureKind, Job, State};
@@ -25,6 +26,7 @@ pub const LEASE: i64 = 1_000;
 #[derive(Debug, Clone, Copy)]
 pub enum StoreKind {
     Sqlite,
+    Postgres,
 }
 
 /// Runs these tests with every store.
@@ -36,6 +38,14 @@ macro_rules! conformance {
                 super::$name(crate::store::StoreKind::Sqlite).await;
             })*
         }
+        mod postgres {
+            $(#[tokio::test]
+            async fn $name() {
+                if crate::postgres::server().is_some() {
+                    super::$name(crate::store::StoreKind::Postgres).await;
+                }
+            })*
+        }
     };
 }
 pub(crate) use conformance;
@@ -45,22 +55,29 @@ pub struct Table {
     pub store: Arc<dyn Store>,
     pub folder: TempDir,
     kind: StoreKind,
+    /// Of the database, if it is on a server.
+    pub url: Option<String>,
 }
 
 impl Table {
     pub async fn new(kind: StoreKind) -> Table {
         let folder = tempfile::tempdir().unwrap();
-        let store = open_store(kind, folder.path()).await;
+        let url = match kind {
+            StoreKind::Sqlite => None,
+            StoreKind::Postgres => crate::postgres::schema().await,
+        };
+        let store = open_store(kind, folder.path(), url.as_deref()).await;
         Table {
             store,
             folder,
             kind,
+            url,
         }
     }
 
     /// The same store opened once more, as another process would.
     pub async fn open_again(&self) -> Arc<dyn Store> {
-        open_store(self.kind, self.folder.path()).await
+        open_store(self.kind, self.folder.path(), self.url.as_deref()).await
     }
 
     pub async fn add(&self, new: NewJob) -> Job {
@@ -77,7 +94,10 @@ impl Table {
 
     /// Extends one lease.
     pub async fn renew(&self, claim: &Claim, progress: f64, now: i64) -> Renewal {
-        let renewals = self.store.renew(&[(claim, progress)], now + LEASE).await;
+        let renewals = self
+            .store
+            .renew(&[(claim, progress)], Lease { now, ms: LEASE })
+            .await;
         renewals.unwrap()[0]
     }
 
@@ -113,9 +133,15 @@ impl Table {
     }
 }
 
-async fn open_store(kind: StoreKind, folder: &Path) -> Arc<dyn Store> {
+async fn open_store(kind: StoreKind, folder: &Path, url: Option<&str>) -> Arc<dyn Store> {
     match kind {
         StoreKind::Sqlite => open_beside(folder).await,
+        StoreKind::Postgres => {
+            let store = PostgresStore::open(url.expect("a server"), 8)
+                .await
+                .unwrap();
+            Arc::new(store.with_given_clock())
+        }
     }
 }
 
@@ -138,10 +164,9 @@ pub async fn claim_up_to(store: &dyn Store, now: i64, lease_ms: i64, jobs: usize
             kind: ClaimKind::New,
             each_slice_us: None,
             workers: 1,
-            lease_until: now + lease_ms,
+            lease: Lease { now, ms: lease_ms },
             now,
             late_before: now,
-            skip: &HashSet::new(),
         };
         let claims = store.claim(&request).await.unwrap();
         if !claims.is_empty() {

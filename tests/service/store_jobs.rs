@@ -2,8 +2,7 @@
 
 use crate::store_keys::keyed;
 use bytes::Bytes;
-use railhead::jobs::store::claim::Reap;
-use railhead::jobs::store::claim::Renewal;
+use railhead::jobs::store::claim::{Lease, Reap, ReleaseReason, Renewal};
 use railhead::jobs::store::ending::Ending;
 use railhead::jobs::store::list::Filter;
 use railhead::jobs::store::retention::Deleted;
@@ -46,10 +45,7 @@ async fn jobs_are_claimed_oldest_first_and_each_once(kind: StoreKind) {
         ids.push(table.add(new_job()).await.id);
     }
     let first = table.claim(0).await.unwrap();
-    assert_eq!(
-        (first.id, first.attempt, first.lease_number),
-        (ids[0], 1, 1)
-    );
+    assert_eq!((first.id, first.attempt), (ids[0], 1));
 
     let claimers = (0..8).map(|_| {
         let store = table.store.clone();
@@ -115,7 +111,7 @@ async fn a_lease_ends_at_its_time_and_not_before(kind: StoreKind) {
     assert_eq!(
         table
             .store
-            .reap(Reap::Expired { lease_until: 1_099 }, 1_099, 5)
+            .reap(Reap::Expired { now: 1_099 }, 1_099, 5)
             .await
             .unwrap(),
         []
@@ -130,7 +126,7 @@ async fn a_lease_ends_at_its_time_and_not_before(kind: StoreKind) {
     assert_eq!(
         table
             .store
-            .reap(Reap::Expired { lease_until: 1_999 }, 1_999, 5)
+            .reap(Reap::Expired { now: 1_999 }, 1_999, 5)
             .await
             .unwrap(),
         []
@@ -138,7 +134,7 @@ async fn a_lease_ends_at_its_time_and_not_before(kind: StoreKind) {
     assert_eq!(
         table
             .store
-            .reap(Reap::Expired { lease_until: 2_000 }, 2_000, 5)
+            .reap(Reap::Expired { now: 2_000 }, 2_000, 5)
             .await
             .unwrap(),
         [(id, State::Queued)]
@@ -156,7 +152,7 @@ async fn a_worker_that_lost_its_lease_changes_nothing(kind: StoreKind) {
     let stale = table.claim(0).await.unwrap();
     table
         .store
-        .reap(Reap::Expired { lease_until: LEASE }, LEASE, 5)
+        .reap(Reap::Expired { now: LEASE }, LEASE, 5)
         .await
         .unwrap();
     let queued = table.store.job("anonymous", id).await.unwrap();
@@ -182,7 +178,8 @@ async fn an_attempt_handed_back_does_not_count_but_still_fences(kind: StoreKind)
     assert_eq!((queued.attempt, queued.started_at), (0, None));
 
     let second = table.claim(2).await.unwrap();
-    assert_eq!((second.attempt, second.lease_number), (1, 2));
+    assert_eq!(second.attempt, 1);
+    assert_ne!(second.lease_token, first.lease_token);
     assert_eq!(table.finish(&first, &success(), 3).await, None);
     assert!(table.finish(&second, &success(), 3).await.is_some());
 }
@@ -200,7 +197,7 @@ async fn a_job_that_loses_every_worker_fails_after_the_allowed_attempts(kind: St
         assert_eq!(
             table
                 .store
-                .reap(Reap::Expired { lease_until: LEASE }, 7_000, 3)
+                .reap(Reap::Expired { now: LEASE }, 7_000, 3)
                 .await
                 .unwrap(),
             [(id, expected)]
@@ -275,7 +272,7 @@ async fn a_cancelled_job_never_goes_back_to_the_queue(kind: StoreKind) {
     assert_eq!(
         table
             .store
-            .reap(Reap::Expired { lease_until: LEASE }, LEASE, 1)
+            .reap(Reap::Expired { now: LEASE }, LEASE, 1)
             .await
             .unwrap(),
         [(lost, State::Cancelled)]
@@ -370,7 +367,7 @@ async fn jobs_of_a_group_that_died_are_retried_alone_and_uncounted(kind: StoreKi
     assert_eq!(group.len(), 3);
     assert_eq!(
         store
-            .reap(Reap::Expired { lease_until: 10 }, 10, 1)
+            .reap(Reap::Expired { now: 10 }, 10, 1)
             .await
             .unwrap()
             .len(),
@@ -385,13 +382,10 @@ async fn jobs_of_a_group_that_died_are_retried_alone_and_uncounted(kind: StoreKi
         let alone = claim_up_to(store, 20, 10, 8).await;
         assert_eq!(alone.len(), 1);
         assert_eq!((alone[0].id, alone[0].attempt), (claim.id, 1));
-        assert_eq!((alone[0].lease_number, alone[0].suspect), (2, true));
+        assert!(alone[0].suspect && alone[0].lease_token != claim.lease_token);
     }
     // Alone, the one attempt that is allowed counts.
-    let ended = store
-        .reap(Reap::Expired { lease_until: 30 }, 30, 1)
-        .await
-        .unwrap();
+    let ended = store.reap(Reap::Expired { now: 30 }, 30, 1).await.unwrap();
     assert!(
         ended.iter().all(|(_, state)| state.name() == "failed"),
         "{ended:?}"
@@ -414,7 +408,25 @@ async fn an_end_that_is_written_again_because_its_answer_was_lost_keeps_its_resu
     assert_eq!(released, ["results/1"]);
 }
 
+async fn of_no_jobs_nothing_is_asked(kind: StoreKind) {
+    let table = Table::new(kind).await;
+    let store = &*table.store;
+    table.add(new_job()).await;
+    let claim = table.claim(0).await.unwrap();
+    assert!(store.claimed_cases(&[]).await.unwrap().is_empty());
+    let lease = Lease { now: 0, ms: LEASE };
+    assert!(store.renew(&[], lease).await.unwrap().is_empty());
+    assert!(store.finish(&[], 1).await.unwrap().is_empty());
+    let why = ReleaseReason::NotBegun;
+    assert!(store.release(&[], why, 1).await.unwrap().is_empty());
+    store.set_solving(&[], true).await.unwrap();
+    assert!(store.orphans(&[]).await.unwrap().is_empty());
+    assert!(store.cached(&[]).await.unwrap().is_empty());
+    assert!(table.finish(&claim, &success(), 1).await.is_some());
+}
+
 conformance! {
+    of_no_jobs_nothing_is_asked,
     an_end_that_is_written_again_because_its_answer_was_lost_keeps_its_result,
     jobs_of_a_group_that_died_are_retried_alone_and_uncounted,
     a_job_comes_back_as_it_was_queued,

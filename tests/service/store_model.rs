@@ -295,28 +295,48 @@ impl Pair {
     }
 }
 
+fn agrees(kind: StoreKind, steps: Vec<Move>) {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .unwrap();
+    runtime.block_on(async {
+        let table = Table::new(kind).await;
+        let mut pair = Pair {
+            store: table.store.clone(),
+            model: Model::default(),
+            ids: Vec::new(),
+            batches: Vec::new(),
+            groups: Vec::new(),
+            given: BTreeSet::new(),
+            // Later than the ids that will be made.
+            now: i64::try_from(Uuid::now_v7().as_u128() >> 80).unwrap() + 100_000,
+        };
+        for step in steps {
+            pair.make(step).await;
+            pair.compare().await;
+        }
+        table.store.close().await;
+    });
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
     #[test]
-    fn a_store_agrees_with_its_model(steps in prop::collection::vec(moves(), 1..80)) {
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
-        runtime.block_on(async {
-            let table = Table::new(StoreKind::Sqlite).await;
-            let mut pair = Pair {
-                store: table.store.clone(),
-                model: Model::default(),
-                ids: Vec::new(),
-                batches: Vec::new(),
-                groups: Vec::new(),
-                given: BTreeSet::new(),
-                // Later than the ids that will be made.
-                now: i64::try_from(Uuid::now_v7().as_u128() >> 80).unwrap() + 100_000,
-            };
-            for step in steps {
-                pair.make(step).await;
-                pair.compare().await;
-            }
-        });
+    fn the_embedded_store_agrees_with_its_model(steps in prop::collection::vec(moves(), 1..80)) {
+        agrees(StoreKind::Sqlite, steps);
+    }
+}
+
+proptest! {
+    // The statements are those of the embedded store; each case takes the tenth part of a second on a server.
+    #![proptest_config(ProptestConfig::with_cases(16))]
+
+    #[test]
+    fn the_shared_store_agrees_with_its_model(steps in prop::collection::vec(moves(), 1..80)) {
+        if crate::postgres::server().is_some() {
+            agrees(StoreKind::Postgres, steps);
+        }
     }
 }

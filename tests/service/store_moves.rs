@@ -7,7 +7,9 @@ use std::time::Duration;
 use bytes::Bytes;
 use railhead::jobs::codec::result::EncodedResult;
 use railhead::jobs::store::Store;
-use railhead::jobs::store::claim::{Claim, ClaimKind, ClaimRequest, Reap, ReleaseReason, Renewal};
+use railhead::jobs::store::claim::{
+    Claim, ClaimKind, ClaimRequest, Lease, Reap, ReleaseReason, Renewal,
+};
 use railhead::jobs::store::ending::{Ending, NewSlice, SliceRecord, StoredResult};
 use railhead::jobs::store::retention::{Deleted, Moment, RetentionRule};
 use railhead::jobs::store::submission::{Enqueued, NewJob, QueueBounds};
@@ -95,7 +97,6 @@ impl Pair {
     }
 
     pub async fn claim(&mut self, tenant: &'static str, jobs: usize, begun: bool) {
-        let skip: HashSet<Uuid> = self.model.filling().into_iter().collect();
         let request = ClaimRequest {
             worker: "w",
             tenant,
@@ -108,10 +109,12 @@ impl Pair {
             cost_us: 1_000_000,
             each_slice_us: None,
             workers: 1,
-            lease_until: self.now + LEASE,
+            lease: Lease {
+                now: self.now,
+                ms: LEASE,
+            },
             now: self.now,
             late_before: self.now,
-            skip: &skip,
         };
         let claims = self.store.claim(&request).await.unwrap();
         let expected = self.model.choose(tenant, jobs, begun, self.now);
@@ -119,14 +122,9 @@ impl Pair {
         assert_eq!(ids, expected);
         for claim in &claims {
             let row = self.model.rows.get_mut(&claim.id).unwrap();
-            row.claimed(claims.len(), self.now + LEASE);
-            let said = (
-                claim.attempt,
-                claim.lease_number,
-                claim.suspect,
-                claim.slices as usize,
-            );
-            let known = (row.attempt, row.lease_number, row.suspect, row.slices.len());
+            row.claimed(claims.len(), self.now + LEASE, claim.lease_token);
+            let said = (claim.attempt, claim.suspect, claim.slices as usize);
+            let known = (row.attempt, row.suspect, row.slices.len());
             assert_eq!(said, known);
         }
         if !claims.is_empty() {
@@ -138,9 +136,7 @@ impl Pair {
         let (which, expected) = match dead {
             true => (Reap::Dead, self.model.reap_dead(self.now)),
             false => (
-                Reap::Expired {
-                    lease_until: self.now,
-                },
+                Reap::Expired { now: self.now },
                 self.model.reap_expired(self.now),
             ),
         };
@@ -197,8 +193,12 @@ impl Pair {
 
     pub async fn renew(&mut self, claim: &Claim) {
         let until = self.now + LEASE;
-        let renewals = self.store.renew(&[(claim, 0.5)], until).await.unwrap();
-        let held = self.model.held(claim.id, claim.lease_number);
+        let lease = Lease {
+            now: self.now,
+            ms: LEASE,
+        };
+        let renewals = self.store.renew(&[(claim, 0.5)], lease).await.unwrap();
+        let held = self.model.held(claim.id, claim.lease_token);
         let expected = held.map_or(Renewal::Lost, |row| {
             row.lease_until = until;
             Renewal::Held {
@@ -211,15 +211,15 @@ impl Pair {
     pub async fn set_solving(&mut self, claim: &Claim, solving: bool) {
         let claims = std::slice::from_ref(claim);
         self.store.set_solving(claims, solving).await.unwrap();
-        if let Some(row) = self.model.held(claim.id, claim.lease_number) {
+        if let Some(row) = self.model.held(claim.id, claim.lease_token) {
             (row.group_size, row.solving) = (1, solving);
         }
     }
 
     pub async fn add_slice(&mut self, claim: &Claim) {
-        let row = self.model.held(claim.id, claim.lease_number);
+        let row = self.model.held(claim.id, claim.lease_token);
         let number = row.as_ref().map_or(0, |row| row.slices.len());
-        let key = format!("{}/{}-{number}", claim.id, claim.lease_number);
+        let key = format!("{}/{}-{number}", claim.id, claim.lease_token);
         let slice = NewSlice {
             note: SliceRecord {
                 number: u32::try_from(number).unwrap(),
@@ -242,7 +242,7 @@ impl Pair {
 
     /// A new large result, or a small one.
     pub fn success(&mut self, claim: &Claim, large: bool) -> (Ending, Option<String>) {
-        let key = large.then(|| format!("{}/{}", claim.id, claim.lease_number));
+        let key = large.then(|| format!("{}/{}", claim.id, claim.lease_token));
         self.given.extend(key.clone());
         let small = || {
             StoredResult::Inline(EncodedResult {
@@ -274,7 +274,7 @@ impl Pair {
         };
         let ends = [(claim.clone(), ending.clone())];
         let ended = self.store.finish(&ends, self.now).await.unwrap();
-        let row = self.model.held(claim.id, claim.lease_number);
+        let row = self.model.held(claim.id, claim.lease_token);
         assert_eq!(ended.contains(&claim.id), row.is_some());
         if let Some(row) = row {
             row.become_state(ending.state(), self.now);
@@ -296,13 +296,13 @@ impl Pair {
         );
         let ended = self.store.finish(&ends, self.now).await.unwrap();
         let mut expected = HashSet::new();
-        if let Some(row) = self.model.held(group[0].id, group[0].lease_number) {
+        if let Some(row) = self.model.held(group[0].id, group[0].lease_token) {
             row.become_state(State::Succeeded, self.now);
             row.blob = blob;
             expected.insert(group[0].id);
         }
         for claim in &group[1..] {
-            let held = self.model.held(claim.id, claim.lease_number).is_some();
+            let held = self.model.held(claim.id, claim.lease_token).is_some();
             if held && self.model.share(claim.id, group[0].id, self.now) {
                 self.model.rows.get_mut(&claim.id).unwrap().attempt -= 1;
                 expected.insert(claim.id);
@@ -315,7 +315,7 @@ impl Pair {
         let claims = std::slice::from_ref(claim);
         let why = ReleaseReason::NotBegun;
         let released = self.store.release(claims, why, self.now).await.unwrap();
-        let held = self.model.held(claim.id, claim.lease_number);
+        let held = self.model.held(claim.id, claim.lease_token);
         let expected = held.map(|row| {
             row.released(self.now);
             (claim.id, row.state)

@@ -1,13 +1,12 @@
 //! Does the job table keep the slices of a sweep for as long as the sweep is not whole?
 
-use std::collections::HashSet;
 use std::time::Duration;
 
 use bytes::Bytes;
 use railhead::jobs::codec::result::EncodedResult;
 use railhead::jobs::store::Store;
 use railhead::jobs::store::claim::Reap;
-use railhead::jobs::store::claim::{Claim, ClaimKind, ClaimRequest, ReleaseReason};
+use railhead::jobs::store::claim::{Claim, ClaimKind, ClaimRequest, Lease, ReleaseReason};
 use railhead::jobs::store::ending::SliceRecord;
 use railhead::jobs::store::ending::{Ending, NewSlice, StoredResult};
 use railhead::jobs::store::retention::Moment;
@@ -28,10 +27,9 @@ async fn claim_begun(store: &dyn Store, now: i64) -> Option<Claim> {
         cost_us: 1_000_000,
         each_slice_us: None,
         workers: 1,
-        lease_until: now + 1000,
+        lease: Lease { now, ms: 1000 },
         now,
         late_before: now,
-        skip: &HashSet::new(),
     };
     store.claim(&request).await.unwrap().pop()
 }
@@ -160,6 +158,15 @@ async fn the_end_releases_slices(kind: StoreKind, end: &str) {
     assert!(store.slices(id).await.unwrap().is_empty(), "{end}");
     assert_eq!(store.released_blobs(&[], 9).await.unwrap(), ["a"], "{end}");
     match kind {
+        StoreKind::Postgres => {
+            let url = table.url.as_deref().unwrap();
+            let pool = sqlx::PgPool::connect(url).await.unwrap();
+            let blobs: i64 = sqlx::query_scalar("SELECT COUNT(*) FROM blobs")
+                .fetch_one(&pool)
+                .await
+                .unwrap();
+            assert_eq!(blobs, i64::from(end == "succeeded"), "{end}");
+        }
         StoreKind::Sqlite => {
             let blobs: i64 = sqlx::query_scalar("SELECT COUNT(*) FROM blobs")
                 .fetch_one(&other_connection(&table).await)

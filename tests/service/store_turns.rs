@@ -1,7 +1,7 @@
 //! In which order are jobs claimed, and what is held against them when their process dies?
 
 use railhead::jobs::State;
-use railhead::jobs::store::claim::{ClaimKind, ClaimRequest, Reap, ReleaseReason};
+use railhead::jobs::store::claim::{ClaimKind, ClaimRequest, Lease, Reap, ReleaseReason};
 use railhead::jobs::store::submission::{NewJob, QueueBounds};
 use railhead::jobs::submit_options::{Priority, SubmitOptions};
 
@@ -103,10 +103,9 @@ async fn a_job_that_was_longer_than_thought_is_known_as_long(kind: StoreKind) {
         kind: ClaimKind::New,
         each_slice_us,
         workers: 1,
-        lease_until: 1000,
+        lease: Lease { now: 0, ms: 1000 },
         now: 2,
         late_before: 2,
-        skip: Box::leak(Box::default()),
     };
     assert!(
         store

@@ -71,7 +71,12 @@ impl Service {
     /// Starts `railhead serve` on a data folder and returns when it listens.
     pub fn start(data_dir: &Path, flags: &[&str]) -> Service {
         let mut program = railhead();
-        Service::spawn(&mut program, data_dir, flags)
+        Service::spawn(&mut program, "serve", data_dir, flags)
+    }
+
+    /// Starts `railhead worker` and returns when it can be asked how it is.
+    pub fn start_worker(data_dir: &Path, flags: &[&str]) -> Service {
+        Service::spawn(&mut railhead(), "worker", data_dir, flags)
     }
 
     /// The same, by a program that is given the real one and its flags.
@@ -80,12 +85,12 @@ impl Service {
             program.env_remove(name);
         }
         program.arg(env!("CARGO_BIN_EXE_railhead"));
-        Service::spawn(program, data_dir, flags)
+        Service::spawn(program, "serve", data_dir, flags)
     }
 
-    fn spawn(program: &mut Command, data_dir: &Path, flags: &[&str]) -> Service {
+    fn spawn(program: &mut Command, role: &str, data_dir: &Path, flags: &[&str]) -> Service {
         let mut child = program
-            .args(["serve", "--log-format", "json"])
+            .args([role, "--log-format", "json"])
             .env("RAILHEAD_LISTEN", "127.0.0.1:0")
             .arg("--data-dir")
             .arg(data_dir)

@@ -5,6 +5,7 @@ use uuid::Uuid;
 use crate::jobs::batch::model::Batch;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
+use crate::jobs::store::cluster::Bell;
 use crate::jobs::worker::attempt_control::StopReason;
 
 /// Jobs removed in one transaction.
@@ -45,6 +46,8 @@ impl Jobs {
                     self.shared.announce(*job);
                 } else if let Some(control) = self.shared.running.get(*job) {
                     control.stop(StopReason::Cancel);
+                } else {
+                    self.shared.ring(Bell::Cancel(*job));
                 }
             }
             if changed.len() < CANCELLED_AT_ONCE as usize {

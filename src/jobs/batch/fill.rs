@@ -5,7 +5,6 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use opentelemetry::KeyValue;
-use uuid::Uuid;
 
 use crate::jobs::batch::model::Batch;
 use crate::jobs::batch::staging::StagedCase;
@@ -68,7 +67,6 @@ impl Jobs {
                 Some(begun) => begun,
                 None => {
                     draft.in_table = true;
-                    self.shared.unfinished_batches().filling.insert(id);
                     let bounds = self.queue_bounds();
                     let begun = self.shared.store.begin_batch(&new, &living, bounds).await;
                     self.observe_write(begun)?
@@ -95,9 +93,7 @@ impl Jobs {
                     draft.settle();
                     // Opens the batch to the workers.
                     drop(draft);
-                    for _ in 0..jobs.shared.options.workers {
-                        jobs.shared.wake.notify_one();
-                    }
+                    jobs.shared.wake_workers();
                 }
                 Err(_) => jobs.give_up(draft).await,
             }
@@ -177,7 +173,7 @@ impl Jobs {
         options: SubmitOptions,
         traceparent: Option<Arc<str>>,
     ) -> NewJob {
-        let id = Uuid::now_v7();
+        let id = self.shared.new_id();
         NewJob {
             id,
             tenant: self.tenant.clone(),

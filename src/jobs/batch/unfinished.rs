@@ -9,21 +9,13 @@ use uuid::Uuid;
 pub(crate) struct UnfinishedBatches {
     /// Being received or filled by this process.
     pub(crate) living: HashSet<Uuid>,
-    /// Those of them whose jobs are being queued: no worker takes one before all are there.
-    pub(crate) filling: HashSet<Uuid>,
     /// Given up: their jobs are neither solved nor shown, and are removed as soon as the disk allows it.
     pub(crate) abandoned: HashSet<Uuid>,
 }
 
 impl UnfinishedBatches {
-    /// Batches whose jobs no worker may take.
-    pub(crate) fn closed_to_workers(&self) -> HashSet<Uuid> {
-        self.filling.union(&self.abandoned).copied().collect()
-    }
-
     /// This process neither receives nor fills this batch any more.
     pub(crate) fn forget(&mut self, id: Uuid) {
         self.living.remove(&id);
-        self.filling.remove(&id);
     }
 }

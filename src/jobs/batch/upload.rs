@@ -307,7 +307,7 @@ impl Jobs {
         }
         let staging = Staging::new(&self.shared.options.data_dir);
         let staging = staging.map_err(|source| self.staging_failed(source))?;
-        let id = Uuid::now_v7();
+        let id = self.shared.new_id();
         self.shared.unfinished_batches().living.insert(id);
         Ok(BatchUpload {
             jobs: self.clone(),

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::jobs::clock::Clock;
 use crate::jobs::error::JobsError;
 use crate::jobs::keys::key::{Key, MARK, is_tenant};
-use crate::jobs::open_store::{open_beside, table_file};
+use crate::jobs::open_store::{open_beside, open_shared, table_file};
 use crate::jobs::store::Store;
 
 /// The keys of a data folder, also beside a running service.
@@ -26,6 +26,15 @@ impl Keyring {
             source,
         })?;
         let store = open_beside(data_dir).await?;
+        Ok(Keyring { store })
+    }
+
+    /// Opens the keys in a database.
+    ///
+    /// # Errors
+    /// It cannot be reached, has no job table, or one of another version.
+    pub async fn open_shared(url: &str) -> Result<Keyring, JobsError> {
+        let store = open_shared(url).await?;
         Ok(Keyring { store })
     }
 

@@ -3,6 +3,7 @@
 pub mod blob_collector;
 pub mod deadlines;
 pub mod disk_reserve;
+pub mod nodes;
 pub mod reaper;
 pub mod recovery;
 pub mod retention;

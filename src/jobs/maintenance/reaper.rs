@@ -35,7 +35,7 @@ pub(crate) async fn reap_expired(shared: Arc<Shared>) {
             continue;
         }
         let reaped = shared.store.reap(
-            Reap::Expired { lease_until: now },
+            Reap::Expired { now },
             shared.now_ms(),
             shared.options.attempts_max,
         );
@@ -47,7 +47,7 @@ pub(crate) async fn reap_expired(shared: Arc<Shared>) {
                         count_taken(&shared, state);
                         shared.announce(id);
                     } else {
-                        shared.wake.notify_one();
+                        shared.wake_workers();
                     }
                 }
             }

@@ -49,6 +49,11 @@ impl Shared {
         if self.recovered.get().is_some() {
             return Ok(());
         }
+        if self.store.cluster().is_some() {
+            // What runs is of other processes, as long as their leases last.
+            let _ = self.recovered.set(());
+            return Ok(());
+        }
         let attempts_max = self.options.attempts_max;
         let taken = self
             .store

@@ -1,7 +1,5 @@
 //! How workers take jobs, keep them and give them back.
 
-use std::collections::HashSet;
-
 use uuid::Uuid;
 
 use crate::jobs::store::submission::CacheKey;
@@ -13,8 +11,8 @@ pub struct Claim {
     pub id: Uuid,
     /// Attempts counted so far, this one included.
     pub attempt: u32,
-    /// The fencing token: number of claims ever made of this job.
-    pub lease_number: u64,
+    /// The fencing token: random, the same for all jobs that were claimed together.
+    pub lease_token: u64,
     /// The method asked for.
     pub method: String,
     /// W3C trace context of its submission, if its trace is collected.
@@ -25,6 +23,16 @@ pub struct Claim {
     pub suspect: bool,
     /// Slices that are solved and stored.
     pub slices: u32,
+}
+
+/// How long a job is a worker's from now on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Lease {
+    /// The present by the steady clock of this process, in ms. A store that several processes share has a clock of its own
+    /// and takes that one.
+    pub now: i64,
+    /// Length in ms.
+    pub ms: i64,
 }
 
 /// Which of the queued jobs a worker asks for.
@@ -53,14 +61,12 @@ pub struct ClaimRequest<'a> {
     pub each_slice_us: Option<u64>,
     /// Workers among which the queue is shared.
     pub workers: usize,
-    /// End of the lease, by the clock of this process.
-    pub lease_until: i64,
+    /// The lease that begins.
+    pub lease: Lease,
     /// The present, epoch milliseconds.
     pub now: i64,
     /// Jobs with a deadline before this time are left to whoever ends them.
     pub late_before: i64,
-    /// Batches whose jobs are left alone.
-    pub skip: &'a HashSet<Uuid>,
 }
 
 /// Why jobs go back to the queue; none of these counts as an attempt.
@@ -92,10 +98,10 @@ pub enum Renewal {
 /// Which running jobs are taken from their workers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reap {
-    /// Those whose lease ended at or before this time.
+    /// Those whose lease has run out.
     Expired {
-        /// By the clock that leases are measured with.
-        lease_until: i64,
+        /// The present, as [`Lease::now`].
+        now: i64,
     },
     /// All of them: the one process that runs jobs of this table has died.
     Dead,

@@ -7,9 +7,9 @@
 //!   does not exist.
 //! - The present is an argument (epoch milliseconds), so that tests need no clock. Leases are measured with a clock of
 //!   their own, which nobody sets.
-//! - A write after a claim names the fencing token of the claim ([`Claim::lease_number`]). Once the job has been given away
-//!   or has ended the write changes nothing and says so. The token only grows, also when an attempt is released
-//!   uncounted.
+//! - A write after a claim names the fencing token of the claim ([`Claim::lease_token`]). Once the job has been given away
+//!   or has ended the write changes nothing and says so. Tokens are random: a database that was set back in time gives none
+//!   out twice.
 //! - States change only as [`State::may_become`] allows.
 //! - Work on many rows comes in portions with a limit, so that other writers are not held up.
 //! - Errors are [`StoreError`], sorted by what the caller can do.
@@ -17,10 +17,13 @@
 //! `tests/service/store*.rs` hold every store to this.
 
 pub mod claim;
+pub mod cluster;
 pub mod ending;
 pub mod error;
 pub mod list;
+pub mod postgres;
 pub mod retention;
+mod sql_errors;
 pub mod sqlite;
 pub mod submission;
 
@@ -34,7 +37,10 @@ use uuid::Uuid;
 use crate::jobs::batch::model::{Batch, BatchItem};
 use crate::jobs::keys::key::Key;
 use crate::jobs::model::{Failure, Job, State};
-use crate::jobs::store::claim::{Claim, ClaimRequest, QueueAhead, Reap, ReleaseReason, Renewal};
+use crate::jobs::store::claim::{
+    Claim, ClaimRequest, Lease, QueueAhead, Reap, ReleaseReason, Renewal,
+};
+use crate::jobs::store::cluster::Cluster;
 use crate::jobs::store::ending::{Ending, NewSlice, ResultRef, SliceRecord, StoredResult};
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::list::{BatchFilter, Change, Filter, Page};
@@ -56,6 +62,9 @@ pub trait Store: KeyStore + Send + Sync + Debug {
 
     /// What a tenant has; the bytes that its unfinished batches stand for are not known here.
     async fn usage(&self, tenant: &str) -> Result<Usage, StoreError>;
+
+    /// What the store can do beside, if several processes may use it at once.
+    fn cluster(&self) -> Option<&dyn Cluster>;
 
     /// Closes every connection. Later calls fail.
     async fn close(&self);
@@ -215,7 +224,7 @@ pub trait Store: KeyStore + Send + Sync + Debug {
     async fn queued_tenants(&self) -> Result<Vec<Arc<str>>, StoreError>;
 
     /// Claims the first queued job of a tenant, by priority and then by age, together with those behind it that are small
-    /// enough, in their order. A suspect comes alone. No two claims of a job have the same token.
+    /// enough, in their order. A suspect comes alone, and no job of a batch that is not acknowledged.
     async fn claim(&self, request: &ClaimRequest<'_>) -> Result<Vec<Claim>, StoreError>;
 
     /// The cases of claimed jobs, each with whether its client has cancelled it.
@@ -228,7 +237,7 @@ pub trait Store: KeyStore + Send + Sync + Debug {
     async fn renew(
         &self,
         claims: &[(&Claim, f64)],
-        lease_until: i64,
+        lease: Lease,
     ) -> Result<Vec<Renewal>, StoreError>;
 
     /// Notes that claimed jobs are being solved, or that they wait for their turn; each stands for itself from now on.

@@ -258,7 +258,7 @@ mod tests {
         let claim = || Claim {
             id: Uuid::now_v7(),
             attempt: 1,
-            lease_number: 1,
+            lease_token: 1,
             method: "auto".to_owned(),
             traceparent: None,
             cache_key: None,

@@ -67,7 +67,6 @@ impl Worker {
         let options = &shared.options;
         let full = shared.turns.parked().0 >= options.parked_max;
         let slice_us = u64::try_from(options.slice.as_micros()).unwrap_or(u64::MAX);
-        let skip = shared.unfinished_batches().closed_to_workers();
         let request = ClaimRequest {
             worker: &self.name,
             tenant,
@@ -76,11 +75,10 @@ impl Worker {
             cost_us: GROUP_COST_US,
             // With no gate free, only what should be done, or come to its next cut, within a slice.
             each_slice_us: full.then_some(slice_us),
-            workers: options.workers,
-            lease_until: shared.lease_until(),
+            workers: shared.all_workers(),
+            lease: shared.lease(),
             now: shared.now_ms(),
             late_before: shared.now_ms().saturating_sub(shared.clock_step().ms),
-            skip: &skip,
         };
         let mut claims = shared.store.claim(&request).await?;
         if !options.cache {

@@ -34,8 +34,7 @@ async fn beat(shared: Arc<Shared>, kept: Arc<HeldLeases>) {
                 .iter()
                 .map(|(claim, control)| (claim, control.progress()))
                 .collect();
-            let renewed = shared.store.renew(&beats, now.saturating_add(lease_ms));
-            match renewed.await {
+            match shared.store.renew(&beats, shared.lease()).await {
                 Ok(renewals) => {
                     seen = ticks;
                     until = now.saturating_add(lease_ms);

@@ -278,7 +278,7 @@ impl Worker {
         step.lost.extend(lost.filter(|id| !kept.contains(id)));
         let ids: Vec<_> = claims.iter().map(|claim| claim.id).collect();
         attempt.done(&ids);
-        shared.wake.notify_one();
+        shared.wake_workers();
         Ok(())
     }
 }

@@ -35,6 +35,11 @@ impl RunningAttempts {
         self.lock().get(&id).cloned()
     }
 
+    /// The jobs of all attempts.
+    pub(crate) fn ids(&self) -> Vec<Uuid> {
+        self.lock().keys().copied().collect()
+    }
+
     fn lock(&self) -> MutexGuard<'_, HashMap<Uuid, Arc<AttemptControl>>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

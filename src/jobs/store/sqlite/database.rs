@@ -3,7 +3,7 @@
 //! There is one writing connection, because SQLite's busy handler has no queue: of several writers one starves. The queue of
 //! the pool is fair. `synchronous=FULL`, because a job that was acknowledged must survive a power cut. Every
 //! transaction that writes begins with `BEGIN IMMEDIATE`: a deferred one that reads first fails at once when it
-//! turns into a writer. The statements keep to what PostgreSQL understands too.
+//! turns into a writer.
 
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
@@ -17,8 +17,8 @@ use sqlx::{Connection, SqliteConnection};
 
 use crate::jobs::error::JobsError;
 use crate::jobs::store::error::StoreError;
-use crate::jobs::store::sqlite::group_commit::GroupCommit;
 use crate::jobs::store::sqlite::schema::{make_or_require, mark, require};
+use crate::jobs::store::sqlite::sql::group_commit::GroupCommit;
 
 /// The write-ahead log is cut to this size when it was larger for a while.
 const LOG_BYTES: &str = "67108864";

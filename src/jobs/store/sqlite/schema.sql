@@ -23,7 +23,7 @@ CREATE TABLE jobs (
     started_at       INTEGER,
     ended_at         INTEGER,
     attempt          INTEGER NOT NULL DEFAULT 0, -- attempts that count against the limit
-    lease_number     INTEGER NOT NULL DEFAULT 0, -- claims ever made: the fencing token, never lowered
+    lease_token      INTEGER,                    -- of the last claim: the fence, random
     lease_until      INTEGER,                    -- by the clock of the process that runs the job
     worker           TEXT,
     group_size       INTEGER NOT NULL DEFAULT 1, -- jobs claimed together with this one
@@ -135,6 +135,7 @@ CREATE TABLE batches (
     rejected   INTEGER NOT NULL DEFAULT 0, -- faulty cases that were left out
     reserved   INTEGER NOT NULL DEFAULT 0, -- places in the queue that are kept for jobs still to come
     complete   INTEGER NOT NULL DEFAULT 0, -- 0: still being staged or filled, and not acknowledged
+    dropped    INTEGER NOT NULL DEFAULT 0, -- 1: given up, and being removed
     name       TEXT,
     labels     TEXT    NOT NULL DEFAULT '{}', -- JSON object
     ended_at   INTEGER                     -- when the last of its jobs that have ended did so

@@ -1,0 +1,38 @@
+//! `railhead migrate` and `railhead doctor`: what an operator does to the database of several nodes.
+
+use std::process::ExitCode;
+
+use anyhow::Context;
+
+use crate::cli::database_args::DatabaseUrlArgs;
+use crate::cli::output::print;
+use crate::jobs::store::postgres::doctor::examine;
+use crate::jobs::store::postgres::schema::{Migrated, migrate};
+
+/// Makes the job table, if it is not there.
+pub(super) fn run(args: &DatabaseUrlArgs) -> anyhow::Result<ExitCode> {
+    let made = runtime()?.block_on(migrate(&args.database_url))?;
+    print(match made {
+        Migrated::Made => "the job table was made",
+        Migrated::WasThere => "the job table is there, in the version of this program",
+    })
+}
+
+/// Tells how the database is, one line per question; exit code 1 if something is wrong.
+pub(super) fn doctor(args: &DatabaseUrlArgs) -> anyhow::Result<ExitCode> {
+    let findings = runtime()?.block_on(examine(&args.database_url))?;
+    let lines = findings.iter().map(|finding| {
+        let mark = if finding.wrong { "WRONG" } else { "ok" };
+        format!("{mark}\t{}\t{}", finding.about, finding.says)
+    });
+    print(&lines.collect::<Vec<_>>().join("\n"))?;
+    let wrong = findings.iter().any(|finding| finding.wrong);
+    Ok(ExitCode::from(u8::from(wrong)))
+}
+
+fn runtime() -> anyhow::Result<tokio::runtime::Runtime> {
+    tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .context("the async runtime could not be started")
+}

@@ -1,0 +1,183 @@
+//! What a node does because others use its store too: it shows itself, listens to the bells of the others, keeps the batches
+//! that it is filling, and looks for what the bells did not tell.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use tokio::time::{MissedTickBehavior, interval, sleep};
+use uuid::Uuid;
+
+use crate::jobs::shared::Shared;
+use crate::jobs::store::cluster::{Bell, Cluster, ClusterView};
+use crate::jobs::store::error::StoreError;
+use crate::jobs::worker::attempt_control::StopReason;
+
+/// Time between two signs of life; the store counts a node as dead after four.
+const BEAT_EVERY: Duration = Duration::from_secs(5);
+
+/// Time between two looks for running jobs that are to be cancelled.
+const CANCEL_EVERY: Duration = Duration::from_millis(500);
+
+/// Time between two rounds in which counts are brought into a short form.
+const FOLD_EVERY: Duration = Duration::from_secs(2);
+
+/// Pause after a connection for bells has failed.
+const LISTEN_AGAIN: Duration = Duration::from_secs(1);
+
+/// Longest round trip that tells the time of the store, in ms.
+const MEASURED_WITHIN: i64 = 500;
+
+/// Smaller differences of the clocks are left alone, in ms.
+const OFFSET_MIN: i64 = 250;
+
+/// A clock that is off by so much is worth a line in the log, in ms.
+const OFFSET_TOLD: i64 = 1000;
+
+/// Starts all of this, if the store is one that several processes use.
+pub(crate) fn start(shared: &Arc<Shared>) {
+    if shared.store.cluster().is_none() {
+        return;
+    }
+    let tasks = &shared.tasks;
+    tasks.spawn(beat(shared.clone()));
+    tasks.spawn(watch_cancellations(shared.clone()));
+    tasks.spawn(fold(shared.clone()));
+    tasks.spawn(listen(shared.clone()));
+}
+
+impl Shared {
+    /// Shows this node to the others and sets its clock by that of the store.
+    pub(crate) async fn show_node(&self, cluster: &dyn Cluster) -> Result<ClusterView, StoreError> {
+        self.set_clock(cluster).await?;
+        let view = cluster.beat(&self.node).await?;
+        self.cluster_workers.store(view.workers, Ordering::Relaxed);
+        Ok(view)
+    }
+
+    /// How far the clock of the store is ahead. An answer that took long says little, and a small difference is one of the
+    /// measurement.
+    async fn set_clock(&self, cluster: &dyn Cluster) -> Result<(), StoreError> {
+        let asked = self.steady_ms();
+        let there = cluster.now().await?;
+        let taken = self.steady_ms() - asked;
+        if taken > MEASURED_WITHIN {
+            return Ok(());
+        }
+        let here = jiff::Timestamp::now().as_millisecond() - taken / 2;
+        let offset = match there - here {
+            small if small.abs() < OFFSET_MIN => 0,
+            offset => offset,
+        };
+        let before = self.clock_offset_ms.swap(offset, Ordering::Relaxed);
+        if (offset - before).abs() >= OFFSET_TOLD {
+            tracing::warn!(
+                offset_ms = offset,
+                "the clock of this machine differs from that of the database, which is used"
+            );
+        }
+        Ok(())
+    }
+
+    /// Does what a bell asks for.
+    fn hear(&self, bell: Bell) {
+        match bell {
+            Bell::Work => self.wake_here(),
+            Bell::Ended(id) => self.announce_here(id),
+            Bell::Cancel(id) => self.stop_here(id),
+        }
+    }
+
+    fn stop_here(&self, id: Uuid) {
+        if let Some(control) = self.running.get(id) {
+            control.stop(StopReason::Cancel);
+        }
+    }
+}
+
+async fn beat(shared: Arc<Shared>) {
+    let mut beat = interval(BEAT_EVERY);
+    beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let draining = shared.draining.clone();
+    while draining.run_until_cancelled(beat.tick()).await.is_some() {
+        let Some(cluster) = shared.store.cluster() else {
+            return;
+        };
+        if let Err(error) = shared.show_node(cluster).await {
+            tracing::warn!(%error, "this node could not show itself");
+            continue;
+        }
+        if let Err(error) = keep_batches(&shared, cluster).await {
+            tracing::warn!(%error, "batches that are being filled could not be kept");
+        }
+    }
+}
+
+/// Keeps the batches that this node fills, and takes up those that nobody fills any more, to remove them.
+async fn keep_batches(shared: &Shared, cluster: &dyn Cluster) -> Result<(), StoreError> {
+    let living: Vec<Uuid> = {
+        let batches = shared.unfinished_batches();
+        batches.living.iter().copied().collect()
+    };
+    if !living.is_empty() {
+        cluster.keep_batches(&living).await?;
+    }
+    let left = shared.store.unfinished_batches().await?;
+    let mut batches = shared.unfinished_batches();
+    let left = left.into_iter().filter(|id| !living.contains(id));
+    batches.abandoned.extend(left);
+    Ok(())
+}
+
+async fn watch_cancellations(shared: Arc<Shared>) {
+    let mut beat = interval(CANCEL_EVERY);
+    beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    loop {
+        // Also while the node drains: its running jobs have a grace period.
+        if shared
+            .stopping
+            .run_until_cancelled(beat.tick())
+            .await
+            .is_none()
+            || shared.draining.is_cancelled() && shared.running.ids().is_empty()
+        {
+            return;
+        }
+        let running = shared.running.ids();
+        let Some(cluster) = shared.store.cluster().filter(|_| !running.is_empty()) else {
+            continue;
+        };
+        match cluster.cancel_requests(&running).await {
+            Ok(ids) => ids.into_iter().for_each(|id| shared.stop_here(id)),
+            Err(error) => tracing::debug!(%error, "cancellations could not be looked for"),
+        }
+    }
+}
+
+async fn fold(shared: Arc<Shared>) {
+    let mut beat = interval(FOLD_EVERY);
+    beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let draining = shared.draining.clone();
+    while draining.run_until_cancelled(beat.tick()).await.is_some() {
+        let Some(cluster) = shared.store.cluster() else {
+            return;
+        };
+        if let Err(error) = cluster.fold_counts().await {
+            tracing::debug!(%error, "counts could not be added up");
+        }
+    }
+}
+
+async fn listen(shared: Arc<Shared>) {
+    let draining = shared.draining.clone();
+    let hear = |bell| shared.hear(bell);
+    let listening = async {
+        while let Some(cluster) = shared.store.cluster() {
+            if let Err(error) = cluster.listen(&hear).await {
+                tracing::warn!(%error, "the bells of other nodes cannot be heard; they are polled");
+            }
+            sleep(LISTEN_AGAIN).await;
+        }
+    };
+    draining.run_until_cancelled(listening).await;
+}

@@ -1,0 +1,71 @@
+//! What a store promises beside [`Store`](crate::jobs::store::Store) if several processes may use it at once.
+
+use std::fmt::Debug;
+use std::sync::Arc;
+
+use async_trait::async_trait;
+use object_store::ObjectStore;
+use uuid::Uuid;
+
+use crate::jobs::store::error::StoreError;
+
+/// A hint to other processes that something happened. Whoever misses one finds out a little later by looking.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bell {
+    /// There is something to be claimed.
+    Work,
+    /// This job has ended.
+    Ended(Uuid),
+    /// This job is to be cancelled; its worker does so.
+    Cancel(Uuid),
+}
+
+/// A node as it shows itself to the others.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Node {
+    /// Random, new with every start.
+    pub id: Uuid,
+    /// Jobs that it solves at the same time.
+    pub workers: usize,
+}
+
+/// What a node learns when it shows itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ClusterView {
+    /// Nodes that have shown themselves lately.
+    pub nodes: usize,
+    /// Their workers.
+    pub workers: usize,
+}
+
+/// Calls of a store that several processes use at once.
+#[async_trait]
+pub trait Cluster: Send + Sync + Debug {
+    /// The clock of the store, epoch milliseconds.
+    async fn now(&self) -> Result<i64, StoreError>;
+
+    /// Shows that a node lives, and tells how many do.
+    async fn beat(&self, node: &Node) -> Result<ClusterView, StoreError>;
+
+    /// The node is no more.
+    async fn leave(&self, node: Uuid) -> Result<(), StoreError>;
+
+    /// Those of these running jobs that are to be cancelled.
+    async fn cancel_requests(&self, running: &[Uuid]) -> Result<Vec<Uuid>, StoreError>;
+
+    /// Shows that these batches are still received or filled. A batch of which nobody has shown that for a minute is
+    /// [unfinished](crate::jobs::store::Store::unfinished_batches).
+    async fn keep_batches(&self, batches: &[Uuid]) -> Result<(), StoreError>;
+
+    /// Brings what the database counts into a short form.
+    async fn fold_counts(&self) -> Result<(), StoreError>;
+
+    /// Where large results are kept.
+    fn objects(&self) -> Arc<dyn ObjectStore>;
+
+    /// Rings soon, together with what else is to be rung. Never waits.
+    fn ring(&self, bell: Bell);
+
+    /// Listens to the bells of all nodes until the connection fails.
+    async fn listen(&self, heard: &(dyn Fn(Bell) + Send + Sync)) -> Result<(), StoreError>;
+}

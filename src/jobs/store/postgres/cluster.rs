@@ -1,0 +1,109 @@
+//! Calls by which nodes learn of each other.
+
+use std::sync::Arc;
+
+use async_trait::async_trait;
+use object_store::ObjectStore;
+use uuid::Uuid;
+
+use crate::jobs::store::cluster::{Bell, Cluster, ClusterView, Node};
+use crate::jobs::store::error::StoreError;
+use crate::jobs::store::postgres::bell;
+use crate::jobs::store::postgres::database::PostgresStore;
+use crate::jobs::store::postgres::engine::fold_counts;
+use crate::jobs::store::postgres::objects::PgObjects;
+use crate::jobs::store::postgres::sql::rows::{count, read_id, read_small};
+
+const NOW: &str = "SELECT CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint)";
+
+/// A node that was not seen for so long is not counted, in ms.
+const DEAD_AFTER: i64 = 20_000;
+
+/// A node that was not seen for so long is forgotten, in ms.
+const FORGOTTEN_AFTER: i64 = 600_000;
+
+/// How long a batch is kept for whoever fills it, from each sign of life on, in ms; as in the schema.
+const FILLED_WITHIN: i64 = 60_000;
+
+#[async_trait]
+impl Cluster for PostgresStore {
+    async fn now(&self) -> Result<i64, StoreError> {
+        Ok(sqlx::query_scalar(NOW).fetch_one(&self.writer).await?)
+    }
+
+    async fn beat(&self, node: &Node) -> Result<ClusterView, StoreError> {
+        let now = self.now().await?;
+        sqlx::query(
+            "INSERT INTO nodes (id, version, workers, seen_at) VALUES ($1, $2, $3, $4) \
+             ON CONFLICT (id) DO UPDATE SET workers = $3, seen_at = $4",
+        )
+        .bind(node.id.to_string())
+        .bind(env!("CARGO_PKG_VERSION"))
+        .bind(count(node.workers))
+        .bind(now)
+        .execute(&self.writer)
+        .await?;
+        sqlx::query("DELETE FROM nodes WHERE seen_at < $1")
+            .bind(now - FORGOTTEN_AFTER)
+            .execute(&self.writer)
+            .await?;
+        let living = sqlx::query(
+            "SELECT COUNT(*) AS nodes, CAST(COALESCE(SUM(workers), 0) AS bigint) AS workers FROM nodes WHERE seen_at > $1",
+        )
+        .bind(now - DEAD_AFTER)
+        .fetch_one(&self.writer)
+        .await?;
+        Ok(ClusterView {
+            nodes: read_small(&living, "nodes")?,
+            workers: read_small(&living, "workers")?,
+        })
+    }
+
+    async fn leave(&self, node: Uuid) -> Result<(), StoreError> {
+        sqlx::query("DELETE FROM nodes WHERE id = $1")
+            .bind(node.to_string())
+            .execute(&self.writer)
+            .await?;
+        Ok(())
+    }
+
+    async fn cancel_requests(&self, running: &[Uuid]) -> Result<Vec<Uuid>, StoreError> {
+        let ids: Vec<String> = running.iter().map(Uuid::to_string).collect();
+        let rows = sqlx::query(
+            "SELECT id FROM jobs WHERE id = ANY($1) AND state = 'running' AND cancel_requested = 1",
+        )
+        .bind(ids)
+        .fetch_all(&self.readers)
+        .await?;
+        rows.iter().map(read_id).collect()
+    }
+
+    async fn keep_batches(&self, batches: &[Uuid]) -> Result<(), StoreError> {
+        let ids: Vec<String> = batches.iter().map(Uuid::to_string).collect();
+        sqlx::query(
+            "UPDATE batches SET filled_until = CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint) + $2 \
+             WHERE id = ANY($1) AND complete = 0 AND dropped = 0",
+        )
+        .bind(ids)
+        .bind(FILLED_WITHIN)
+        .execute(&self.writer)
+        .await?;
+        Ok(())
+    }
+
+    async fn fold_counts(&self) -> Result<(), StoreError> {
+        fold_counts(&self.writer).await
+    }
+
+    fn objects(&self) -> Arc<dyn ObjectStore> {
+        Arc::new(PgObjects::new(self.writer.clone()))
+    }
+
+    fn ring(&self, bell: Bell) {
+        self.bell.ring(bell);
+    }
+
+    async fn listen(&self, heard: &(dyn Fn(Bell) + Send + Sync)) -> Result<(), StoreError> {
+        bell::listen(self, heard).await
+    }
+}

@@ -1,0 +1,106 @@
+//! Connections to PostgreSQL.
+
+use std::str::FromStr;
+use std::time::Duration;
+
+use sqlx::postgres::{PgConnectOptions, PgPool, PgPoolOptions};
+
+use crate::jobs::error::JobsError;
+use crate::jobs::store::error::StoreError;
+use crate::jobs::store::postgres::bell::BellRinger;
+use crate::jobs::store::postgres::schema::require;
+use crate::jobs::store::postgres::sql::group_commit::GroupCommit;
+
+/// How long a call waits for a connection.
+const CONNECT_WITHIN: Duration = Duration::from_secs(5);
+
+/// Prepared statements kept by a connection. Statements on several rows have a text for each number of rows.
+const STATEMENTS_KEPT: usize = 300;
+
+/// Settings of every session. A node that was cut off inside a transaction keeps its rows locked, and others pass them by,
+/// until the server ends the session.
+const SESSION: [(&str, &str); 6] = [
+    ("statement_timeout", "20s"),
+    ("lock_timeout", "5s"),
+    ("idle_in_transaction_session_timeout", "5s"),
+    ("tcp_keepalives_idle", "10"),
+    ("tcp_keepalives_interval", "5"),
+    ("tcp_keepalives_count", "3"),
+];
+
+/// The job table that several processes share.
+#[derive(Debug, Clone)]
+pub struct PostgresStore {
+    pub(crate) options: PgConnectOptions,
+    pub(crate) writer: PgPool,
+    pub(crate) readers: PgPool,
+    pub(crate) group_commit: GroupCommit,
+    pub(crate) bell: BellRinger,
+    /// Leases are judged by the times that are given, not by the clock of the database.
+    pub(crate) given_clock: bool,
+}
+
+impl PostgresStore {
+    /// Opens the database, whose tables must be there, with at most so many connections beside two for wake-ups.
+    ///
+    /// # Errors
+    /// [`JobsError::BadDatabaseUrl`], [`JobsError::OtherForm`], [`JobsError::NotMigrated`], or it cannot be reached.
+    pub async fn open(url: &str, connections: u32) -> Result<PostgresStore, JobsError> {
+        let (options, writer) = connect(url, connections).await?;
+        require(&writer).await?;
+        let store = PostgresStore {
+            group_commit: GroupCommit::start(writer.clone()),
+            bell: BellRinger::start(writer.clone()),
+            readers: writer.clone(),
+            options,
+            writer,
+            given_clock: false,
+        };
+        Ok(store)
+    }
+
+    /// The same with leases that are judged by the times that are given, so that tests need no clock.
+    #[must_use]
+    pub fn with_given_clock(self) -> PostgresStore {
+        PostgresStore {
+            given_clock: true,
+            ..self
+        }
+    }
+
+    /// Closes every connection.
+    pub async fn close(&self) {
+        self.writer.close().await;
+    }
+
+    /// A round trip; with `write` it writes a value that nobody reads.
+    pub(crate) async fn ready(&self, write: bool) -> Result<(), StoreError> {
+        let statement = match write {
+            true => "UPDATE deployment SET touched = touched + 1",
+            false => "SELECT 1 FROM deployment",
+        };
+        sqlx::query(statement).execute(&self.writer).await?;
+        Ok(())
+    }
+}
+
+/// Connects to a database, whatever is in it.
+///
+/// # Errors
+/// [`JobsError::BadDatabaseUrl`], or it cannot be reached.
+pub(crate) async fn connect(
+    url: &str,
+    connections: u32,
+) -> Result<(PgConnectOptions, PgPool), JobsError> {
+    let options = PgConnectOptions::from_str(url)
+        .map_err(|error| JobsError::BadDatabaseUrl(error.to_string()))?
+        .application_name("railhead")
+        .statement_cache_capacity(STATEMENTS_KEPT)
+        .options(SESSION);
+    let pool = PgPoolOptions::new()
+        .max_connections(connections)
+        .acquire_timeout(CONNECT_WITHIN)
+        .connect_with(options.clone())
+        .await?;
+    Ok((options, pool))
+}

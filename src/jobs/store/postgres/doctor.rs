@@ -1,0 +1,127 @@
+//! How is the database? What an operator wants to know before and while nodes use it.
+
+use sqlx::postgres::PgPool;
+
+use crate::jobs::error::JobsError;
+use crate::jobs::store::postgres::database::connect;
+use crate::jobs::store::postgres::schema::require;
+
+/// Oldest version of the server that is supported, as it tells it itself.
+const VERSION_MIN: i64 = 150_000;
+
+/// A clock that differs by more is wrong, in ms.
+const OFFSET_MAX: i64 = 5_000;
+
+/// A transaction that is open for longer keeps dead rows from being removed, in s.
+const TRANSACTION_MAX: i64 = 300;
+
+/// More dead rows of the job table than this slow claims down.
+const DEAD_ROWS_MAX: i64 = 200_000;
+
+/// The answer to one question.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Finding {
+    /// What was asked.
+    pub about: &'static str,
+    /// What there is.
+    pub says: String,
+    /// It is not as it should be.
+    pub wrong: bool,
+}
+
+/// A number that is asked for, and from which value on it is wrong.
+struct Question {
+    about: &'static str,
+    statement: &'static str,
+    wrong: fn(i64) -> bool,
+}
+
+const NUMBERS: [Question; 9] = [
+    Question {
+        about: "server version",
+        statement: "SELECT CAST(current_setting('server_version_num') AS bigint)",
+        wrong: |version| version < VERSION_MIN,
+    },
+    Question {
+        about: "server takes no data (1: it is a standby)",
+        statement: "SELECT CASE WHEN pg_is_in_recovery() THEN 1::bigint ELSE 0 END",
+        wrong: |standby| standby > 0,
+    },
+    Question {
+        about: "commits are on the disk when they are answered (0: they may be lost)",
+        statement: "SELECT CASE WHEN current_setting('synchronous_commit') = 'off' OR current_setting('fsync') = 'off' THEN 0::bigint ELSE 1 END",
+        wrong: |durable| durable == 0,
+    },
+    Question {
+        about: "nodes seen within 20 s",
+        statement: "SELECT COUNT(*) FROM nodes WHERE seen_at > CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint) - 20000",
+        wrong: |_| false,
+    },
+    Question {
+        about: "queued jobs",
+        statement: "SELECT CAST(COALESCE(SUM(number), 0) AS bigint) FROM job_counts WHERE state = 'queued'",
+        wrong: |_| false,
+    },
+    Question {
+        about: "running jobs whose lease ran out more than 2 min ago",
+        statement: "SELECT COUNT(*) FROM jobs WHERE state = 'running' AND lease_until < CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint) - 120000",
+        wrong: |stuck| stuck > 0,
+    },
+    Question {
+        about: "seconds for which the oldest transaction is open",
+        statement: "SELECT CAST(COALESCE(MAX(extract(epoch FROM clock_timestamp() - xact_start)), 0) AS bigint) FROM pg_stat_activity WHERE pid <> pg_backend_pid() AND backend_type = 'client backend'",
+        wrong: |seconds| seconds > TRANSACTION_MAX,
+    },
+    Question {
+        about: "dead rows of the job table",
+        statement: "SELECT CAST(COALESCE(MAX(n_dead_tup), 0) AS bigint) FROM pg_stat_user_tables WHERE relid = to_regclass('jobs')",
+        wrong: |rows| rows > DEAD_ROWS_MAX,
+    },
+    Question {
+        about: "indices that are not valid",
+        statement: "SELECT COUNT(*) FROM pg_index JOIN pg_class ON pg_class.oid = indexrelid WHERE NOT indisvalid AND relnamespace = CAST(current_schema() AS regnamespace)",
+        wrong: |invalid| invalid > 0,
+    },
+];
+
+/// Looks at a database with a job table; changes nothing.
+///
+/// # Errors
+/// [`JobsError::NotMigrated`], [`JobsError::OtherForm`], or it cannot be reached.
+pub async fn examine(url: &str) -> Result<Vec<Finding>, JobsError> {
+    let (_, pool) = connect(url, 1).await?;
+    let findings = ask(&pool).await;
+    pool.close().await;
+    findings
+}
+
+async fn ask(pool: &PgPool) -> Result<Vec<Finding>, JobsError> {
+    require(pool).await?;
+    let mut findings = vec![clock(pool).await?];
+    for question in NUMBERS {
+        let number: i64 = sqlx::query_scalar(question.statement)
+            .fetch_one(pool)
+            .await?;
+        findings.push(Finding {
+            about: question.about,
+            says: number.to_string(),
+            wrong: (question.wrong)(number),
+        });
+    }
+    Ok(findings)
+}
+
+async fn clock(pool: &PgPool) -> Result<Finding, JobsError> {
+    let here = || jiff::Timestamp::now().as_millisecond();
+    let asked = here();
+    let there: i64 =
+        sqlx::query_scalar("SELECT CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint)")
+            .fetch_one(pool)
+            .await?;
+    let offset = there - i64::midpoint(asked, here());
+    Ok(Finding {
+        about: "ms by which the clock of the database is ahead of that of this machine",
+        says: offset.to_string(),
+        wrong: offset.abs() > OFFSET_MAX,
+    })
+}

@@ -1,0 +1,176 @@
+//! PostgreSQL as the shared statements see it.
+
+use std::time::Duration;
+
+use sqlx::Transaction;
+use sqlx::postgres::{PgConnection, PgPool, PgRow, Postgres};
+use tokio::time::timeout;
+use uuid::Uuid;
+
+use crate::jobs::store::cluster::Cluster;
+use crate::jobs::store::error::StoreError;
+use crate::jobs::store::postgres::database::PostgresStore;
+
+pub(crate) type Db = Postgres;
+pub(crate) type DbConnection = PgConnection;
+pub(crate) type DbPool = PgPool;
+pub(crate) type DbRow = PgRow;
+pub(crate) type SqlStore = PostgresStore;
+
+/// What stands before and behind the present by which leases are judged, a value or NULL.
+pub(crate) const LEASE_NOW: (&str, &str) = (
+    "COALESCE(",
+    ", CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint))",
+);
+
+/// Locks of this service are told from those of others in the same database by this number ("rhjb"); the second number says
+/// what is locked.
+const LOCKS: i32 = 0x7268_6a62;
+const ADMISSION: i32 = 1;
+const FOLD: i32 = 2;
+const SCHEMA: i32 = 3;
+
+/// How often a call that gave way to another one is made again before its error counts.
+const REPEATED: u32 = 4;
+
+/// How long a call may take; the server ends its statements before.
+const ANSWERED_WITHIN: Duration = Duration::from_secs(30);
+
+/// Begins a transaction.
+pub(crate) async fn begin(pool: &DbPool) -> Result<Transaction<'static, Db>, StoreError> {
+    Ok(pool.begin().await?)
+}
+
+/// From here to the end of the transaction nobody else takes places in the queue or uses an idempotency key. What the one
+/// before did is seen by the next statement.
+pub(crate) async fn admit_alone(connection: &mut DbConnection) -> Result<(), StoreError> {
+    sqlx::query("SELECT pg_advisory_xact_lock($1, $2)")
+        .bind(LOCKS)
+        .bind(ADMISSION)
+        .execute(connection)
+        .await?;
+    Ok(())
+}
+
+/// Ids for new blobs. They are given here, not by the insertion: rows of one statement may come back in any order.
+pub(crate) async fn new_blob_ids(
+    connection: &mut DbConnection,
+    number: usize,
+) -> Result<Vec<i64>, StoreError> {
+    let ids = sqlx::query_scalar(
+        "SELECT nextval('blob_ids') FROM generate_series(1, CAST($1 AS bigint))",
+    )
+    .bind(i64::try_from(number).unwrap_or(i64::MAX))
+    .fetch_all(connection)
+    .await?;
+    Ok(ids)
+}
+
+/// Keeps jobs from being removed until the end of the transaction: another job is about to refer to their results.
+pub(crate) async fn keep_jobs(
+    connection: &mut DbConnection,
+    ids: &[Uuid],
+) -> Result<(), StoreError> {
+    let ids: Vec<String> = ids.iter().map(Uuid::to_string).collect();
+    sqlx::query("SELECT id FROM jobs WHERE id = ANY($1) ORDER BY id FOR KEY SHARE")
+        .bind(ids)
+        .fetch_all(connection)
+        .await?;
+    Ok(())
+}
+
+/// Keeps others from counting the references to blobs until the end of the transaction. Of two who drop the last two
+/// references at the same time, the later sees that the other one is gone.
+pub(crate) async fn lock_blobs(
+    connection: &mut DbConnection,
+    ids: &[i64],
+) -> Result<(), StoreError> {
+    sqlx::query("SELECT id FROM blobs WHERE id = ANY($1) ORDER BY id FOR UPDATE")
+        .bind(ids)
+        .fetch_all(connection)
+        .await?;
+    Ok(())
+}
+
+impl PostgresStore {
+    /// The present by which leases are judged: none, so that the database's clock is asked; in tests the one that is given.
+    pub(crate) fn lease_now(&self, now: i64) -> Option<i64> {
+        self.given_clock.then_some(now)
+    }
+
+    /// Any number of processes use it.
+    pub(crate) fn as_cluster(&self) -> Option<&dyn Cluster> {
+        Some(self)
+    }
+
+    /// Size of the database.
+    pub(crate) async fn database_bytes(&self) -> Result<u64, StoreError> {
+        let bytes: i64 = sqlx::query_scalar("SELECT pg_database_size(current_database())")
+            .fetch_one(&self.readers)
+            .await?;
+        Ok(u64::try_from(bytes).unwrap_or(0))
+    }
+
+    /// The server gives space back by itself.
+    pub(crate) async fn compact(&self, _: i64, _: u32) -> Result<bool, StoreError> {
+        Ok(false)
+    }
+}
+
+/// Adds the differences of the counts up, so that few rows are read; somebody else may be at it.
+pub(crate) async fn fold_counts(pool: &DbPool) -> Result<(), StoreError> {
+    let mut transaction = pool.begin().await?;
+    let free: bool = sqlx::query_scalar("SELECT pg_try_advisory_xact_lock($1, $2)")
+        .bind(LOCKS)
+        .bind(FOLD)
+        .fetch_one(&mut *transaction)
+        .await?;
+    if free {
+        sqlx::query(
+            "WITH gone AS (DELETE FROM job_counts RETURNING state, tenant, number) \
+             INSERT INTO job_counts (state, tenant, number) \
+             SELECT state, tenant, CAST(SUM(number) AS bigint) FROM gone GROUP BY state, tenant HAVING SUM(number) <> 0",
+        )
+        .execute(&mut *transaction)
+        .await?;
+    }
+    transaction.commit().await?;
+    Ok(())
+}
+
+/// From here to the end of the transaction nobody else makes tables.
+pub(crate) async fn lock_schema(connection: &mut DbConnection) -> Result<(), StoreError> {
+    sqlx::query("SELECT pg_advisory_xact_lock($1, $2)")
+        .bind(LOCKS)
+        .bind(SCHEMA)
+        .execute(connection)
+        .await?;
+    Ok(())
+}
+
+/// Makes a call, and makes it again if it was the one that had to give way to another transaction, or if a row that it was about
+/// to remove was referred to meanwhile: in both cases nothing of it was done.
+pub(crate) async fn again<T, F: Future<Output = Result<T, StoreError>>>(
+    call: impl Fn() -> F,
+) -> Result<T, StoreError> {
+    for _ in 0..REPEATED {
+        match timeout(ANSWERED_WITHIN, call()).await {
+            Err(_) => return Err(StoreError::timed_out()),
+            Ok(Err(error)) if gave_way(&error) => tracing::debug!(%error, "made again"),
+            Ok(answer) => return answer,
+        }
+    }
+    call().await
+}
+
+fn gave_way(error: &StoreError) -> bool {
+    const SERIALIZATION: &str = "40001";
+    const DEADLOCK: &str = "40P01";
+    const FOREIGN_KEY: &str = "23503";
+    let StoreError::Failed(cause) = error else {
+        return false;
+    };
+    let cause = cause.downcast_ref::<sqlx::Error>();
+    let code = cause.and_then(|cause| cause.as_database_error()?.code());
+    code.is_some_and(|code| [SERIALIZATION, DEADLOCK, FOREIGN_KEY].contains(&&*code))
+}

@@ -1,0 +1,251 @@
+//! Large results in the database itself: objects in pieces, read by range as from any other object store.
+
+use std::fmt;
+use std::ops::Range;
+
+use async_trait::async_trait;
+use bytes::Bytes;
+use futures_util::stream::{self, BoxStream};
+use futures_util::{StreamExt, TryStreamExt};
+use object_store::path::Path;
+use object_store::{
+    Attributes, CopyOptions, Error, GetOptions, GetResult, GetResultPayload, ListResult,
+    MultipartUpload, ObjectMeta, ObjectStore, PutMultipartOptions, PutOptions, PutPayload,
+    PutResult, Result,
+};
+use sqlx::postgres::PgPool;
+
+/// Bytes of a piece.
+const PIECE: u64 = 1 << 20;
+
+/// What this store is called in errors.
+const NAME: &str = "PostgreSQL";
+
+/// Objects in a table of the database.
+#[derive(Debug, Clone)]
+pub struct PgObjects {
+    pool: PgPool,
+}
+
+impl PgObjects {
+    /// The objects of a database.
+    pub(crate) fn new(pool: PgPool) -> PgObjects {
+        PgObjects { pool }
+    }
+
+    async fn meta(&self, location: &Path) -> Result<ObjectMeta> {
+        let size: Option<i64> =
+            sqlx::query_scalar("SELECT size FROM objects WHERE path = $1 AND number = 0")
+                .bind(location.as_ref())
+                .fetch_optional(&self.pool)
+                .await
+                .map_err(failed)?;
+        match size {
+            Some(size) => Ok(meta(location.clone(), size)),
+            None => Err(missing(location)),
+        }
+    }
+
+    /// The part of a range that one piece has.
+    async fn piece(&self, location: &Path, number: u64, range: &Range<u64>) -> Result<Bytes> {
+        let start = number * PIECE;
+        let body: Option<Vec<u8>> =
+            sqlx::query_scalar("SELECT body FROM objects WHERE path = $1 AND number = $2")
+                .bind(location.as_ref())
+                .bind(number.cast_signed())
+                .fetch_optional(&self.pool)
+                .await
+                .map_err(failed)?;
+        // Somebody may have removed it meanwhile.
+        let body = Bytes::from(body.ok_or_else(|| missing(location))?);
+        let place = |at: u64| usize::try_from(at.saturating_sub(start)).unwrap_or(usize::MAX);
+        let (from, to) = (place(range.start), place(range.end).min(body.len()));
+        Ok(body.slice(from.min(to)..to))
+    }
+}
+
+impl fmt::Display for PgObjects {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(NAME)
+    }
+}
+
+#[async_trait]
+impl ObjectStore for PgObjects {
+    async fn put_opts(
+        &self,
+        location: &Path,
+        payload: PutPayload,
+        _: PutOptions,
+    ) -> Result<PutResult> {
+        let body = Bytes::from(payload);
+        let size = i64::try_from(body.len()).unwrap_or(i64::MAX);
+        let mut pieces: Vec<&[u8]> = body.chunks(1 << 20).collect();
+        if pieces.is_empty() {
+            pieces.push(&[]);
+        }
+        let mut transaction = self.pool.begin().await.map_err(failed)?;
+        sqlx::query("DELETE FROM objects WHERE path = $1")
+            .bind(location.as_ref())
+            .execute(&mut *transaction)
+            .await
+            .map_err(failed)?;
+        for (number, piece) in (0_i64..).zip(pieces) {
+            sqlx::query("INSERT INTO objects (path, number, size, body) VALUES ($1, $2, $3, $4)")
+                .bind(location.as_ref())
+                .bind(number)
+                .bind(size)
+                .bind(piece)
+                .execute(&mut *transaction)
+                .await
+                .map_err(failed)?;
+        }
+        transaction.commit().await.map_err(failed)?;
+        Ok(PutResult {
+            e_tag: None,
+            version: None,
+            extensions: Default::default(),
+        })
+    }
+
+    async fn put_multipart_opts(
+        &self,
+        _: &Path,
+        _: PutMultipartOptions,
+    ) -> Result<Box<dyn MultipartUpload>> {
+        Err(not_done("put_multipart"))
+    }
+
+    async fn get_opts(&self, location: &Path, options: GetOptions) -> Result<GetResult> {
+        let meta = self.meta(location).await?;
+        let range = match &options.range {
+            Some(range) => range.as_range(meta.size).map_err(failed)?,
+            None => 0..meta.size,
+        };
+        let numbers = match options.head || range.is_empty() {
+            true => 0..0,
+            false => range.start / PIECE..range.end.div_ceil(PIECE),
+        };
+        let (objects, location, part) = (self.clone(), location.clone(), range.clone());
+        let pieces = stream::iter(numbers)
+            .then(move |number| {
+                let (objects, location, part) = (objects.clone(), location.clone(), part.clone());
+                async move { objects.piece(&location, number, &part).await }
+            })
+            .boxed();
+        Ok(GetResult {
+            payload: GetResultPayload::Stream(pieces),
+            meta,
+            range,
+            attributes: Attributes::default(),
+            extensions: Default::default(),
+        })
+    }
+
+    fn delete_stream(
+        &self,
+        locations: BoxStream<'static, Result<Path>>,
+    ) -> BoxStream<'static, Result<Path>> {
+        let pool = self.pool.clone();
+        locations
+            .and_then(move |location| {
+                let pool = pool.clone();
+                async move {
+                    let gone = sqlx::query("DELETE FROM objects WHERE path = $1")
+                        .bind(location.as_ref())
+                        .execute(&pool)
+                        .await
+                        .map_err(failed)?;
+                    match gone.rows_affected() {
+                        0 => Err(missing(&location)),
+                        _ => Ok(location),
+                    }
+                }
+            })
+            .boxed()
+    }
+
+    fn list(&self, prefix: Option<&Path>) -> BoxStream<'static, Result<ObjectMeta>> {
+        let (pool, (from, to)) = (self.pool.clone(), bounds(prefix));
+        let listed = async move {
+            let rows: Vec<(String, i64)> = sqlx::query_as(
+                "SELECT path, size FROM objects WHERE path >= $1 AND path < $2 AND number = 0 ORDER BY path",
+            )
+            .bind(from)
+            .bind(to)
+            .fetch_all(&pool)
+            .await
+            .map_err(failed)?;
+            let metas = rows
+                .into_iter()
+                .map(|(path, size)| Ok(meta(Path::from(path), size)));
+            Ok::<_, Error>(stream::iter(metas))
+        };
+        stream::once(listed).try_flatten().boxed()
+    }
+
+    /// Only the folders are told, which is what results are looked for by.
+    async fn list_with_delimiter(&self, prefix: Option<&Path>) -> Result<ListResult> {
+        let (from, to) = bounds(prefix);
+        let names: Vec<String> = sqlx::query_scalar(
+            "SELECT DISTINCT split_part(substr(path, length($1) + 1), '/', 1) FROM objects \
+             WHERE path >= $1 AND path < $2 AND number = 0 AND strpos(substr(path, length($1) + 1), '/') > 0 ORDER BY 1",
+        )
+        .bind(&from)
+        .bind(to)
+        .fetch_all(&self.pool)
+        .await
+        .map_err(failed)?;
+        let folders = names.iter().map(|name| Path::from(format!("{from}{name}")));
+        Ok(ListResult {
+            common_prefixes: folders.collect(),
+            objects: Vec::new(),
+            extensions: Default::default(),
+        })
+    }
+
+    async fn copy_opts(&self, _: &Path, _: &Path, _: CopyOptions) -> Result<()> {
+        Err(not_done("copy"))
+    }
+}
+
+/// Paths below a folder are those from the first text on and before the second.
+fn bounds(prefix: Option<&Path>) -> (String, String) {
+    match prefix.map(Path::as_ref).filter(|prefix| !prefix.is_empty()) {
+        // The character after the slash.
+        Some(prefix) => (format!("{prefix}/"), format!("{prefix}0")),
+        None => (String::new(), "\u{10ffff}".to_owned()),
+    }
+}
+
+fn meta(location: Path, size: i64) -> ObjectMeta {
+    ObjectMeta {
+        location,
+        // Nobody asks for it.
+        last_modified: Default::default(),
+        size: size.unsigned_abs(),
+        e_tag: None,
+        version: None,
+    }
+}
+
+fn failed(error: impl std::error::Error + Send + Sync + 'static) -> Error {
+    Error::Generic {
+        store: NAME,
+        source: Box::new(error),
+    }
+}
+
+fn missing(location: &Path) -> Error {
+    Error::NotFound {
+        path: location.to_string(),
+        source: "there is no such object".into(),
+    }
+}
+
+fn not_done(operation: &str) -> Error {
+    Error::NotImplemented {
+        operation: operation.to_owned(),
+        implementer: NAME.to_owned(),
+    }
+}

@@ -1,0 +1,163 @@
+//! Lists of batches, newest first, with the numbers of their jobs.
+
+use super::engine::{Db, DbRow, SqlStore};
+use super::rows::{from_json, push_list, read_count, read_id, read_small, read_state};
+use sqlx::{QueryBuilder, Row};
+use std::collections::{BTreeMap, HashMap};
+
+use uuid::Uuid;
+
+use crate::jobs::batch::model::Batch;
+use crate::jobs::model::State;
+use crate::jobs::store::error::StoreError;
+use crate::jobs::store::list::{BatchFilter, Page, Total, first_id_at};
+
+/// Most batches that are looked at for one page, and how far they are counted.
+const LOOKED_AT: i64 = 10_000;
+
+/// The columns a [`Batch`] is read from.
+const COLUMNS: &str = "id, tenant, created_at, count, rejected, name, labels, ended_at";
+
+impl SqlStore {
+    /// One page of the batches of a tenant, newest first.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub(crate) async fn batches(
+        &self,
+        tenant: &str,
+        filter: &BatchFilter,
+        after: Option<Uuid>,
+        limit: u32,
+    ) -> Result<Page<Batch>, StoreError> {
+        let mut query = page_query(tenant, filter, after);
+        query.push(" LIMIT ").push_bind(i64::from(limit) + 1);
+        let mut rows = query.build().fetch_all(&self.readers).await?;
+        let more = rows.len() > limit as usize;
+        rows.truncate(limit as usize);
+        let batches = self.with_counts(&rows).await?;
+        let last = batches.last().filter(|_| more);
+        let total = self.count_batches(tenant, filter).await?;
+        Ok(Page {
+            next_cursor: last.map(|batch| filter.cursor_after(batch.id)),
+            total,
+            entries: batches,
+        })
+    }
+
+    /// An acknowledged batch with its counts.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub(crate) async fn batch(&self, tenant: &str, id: Uuid) -> Result<Option<Batch>, StoreError> {
+        let mut query = QueryBuilder::<Db>::new("SELECT ");
+        query
+            .push(COLUMNS)
+            .push(" FROM batches WHERE complete = 1 AND id = ");
+        query
+            .push_bind(id.to_string())
+            .push(" AND tenant = ")
+            .push_bind(tenant);
+        let rows = query.build().fetch_all(&self.readers).await?;
+        Ok(self.with_counts(&rows).await?.pop())
+    }
+
+    async fn count_batches(&self, tenant: &str, filter: &BatchFilter) -> Result<Total, StoreError> {
+        let mut query = QueryBuilder::<Db>::new("SELECT COUNT(*) AS number FROM (");
+        push_page(&mut query, "id", tenant, filter, None);
+        query.push(" LIMIT ").push_bind(LOOKED_AT);
+        query.push(") AS counted");
+        let row = query.build().fetch_one(&self.readers).await?;
+        let number = read_count(&row, "number")?;
+        Ok(match number < LOOKED_AT.unsigned_abs() {
+            true => Total::Exactly(number),
+            false => Total::AtLeast(number),
+        })
+    }
+
+    async fn with_counts(&self, rows: &[DbRow]) -> Result<Vec<Batch>, StoreError> {
+        if rows.is_empty() {
+            return Ok(Vec::new());
+        }
+        let ids = rows.iter().map(read_id).collect::<Result<Vec<_>, _>>()?;
+        let mut query = QueryBuilder::<Db>::new(
+            "SELECT batch_id AS id, state, COUNT(*) AS jobs FROM jobs WHERE batch_id IN (",
+        );
+        push_list(&mut query, &ids);
+        query.push(") GROUP BY batch_id, state");
+        let mut states: HashMap<Uuid, BTreeMap<State, u64>> = HashMap::new();
+        for row in &query.build().fetch_all(&self.readers).await? {
+            let of_batch = states.entry(read_id(row)?).or_default();
+            of_batch.insert(read_state(row)?, read_count(row, "jobs")?);
+        }
+        let read = |(row, id): (&DbRow, Uuid)| {
+            let counted = states.get(&id);
+            let number = |state| counted.and_then(|states| states.get(&state)).copied();
+            Ok(Batch {
+                id,
+                tenant: row.try_get("tenant")?,
+                created_at: row.try_get("created_at")?,
+                count: read_small(row, "count")?,
+                rejected: read_small(row, "rejected")?,
+                name: row.try_get("name")?,
+                labels: from_json(row.try_get("labels")?)?,
+                last_ended_at: row.try_get("ended_at")?,
+                states: State::ALL
+                    .into_iter()
+                    .map(|state| (state, number(state).unwrap_or(0)))
+                    .collect(),
+            })
+        };
+        rows.iter().zip(ids).map(read).collect()
+    }
+}
+
+pub(crate) fn page_query(
+    tenant: &str,
+    filter: &BatchFilter,
+    after: Option<Uuid>,
+) -> QueryBuilder<Db> {
+    let mut query = QueryBuilder::new("");
+    push_page(&mut query, COLUMNS, tenant, filter, after);
+    query
+}
+
+/// Batches are few beside jobs: those of the tenant are walked from the newest.
+fn push_page(
+    query: &mut QueryBuilder<Db>,
+    columns: &str,
+    tenant: &str,
+    filter: &BatchFilter,
+    after: Option<Uuid>,
+) {
+    query.push("SELECT ").push(columns);
+    query.push(" FROM batches WHERE complete = 1 AND tenant = ");
+    query.push_bind(tenant.to_owned());
+    if let Some(time) = filter.created_after {
+        query
+            .push(" AND id >= ")
+            .push_bind(first_id_at(time).to_string());
+    }
+    let before = filter.created_before.map(first_id_at);
+    if let Some(before) = [before, after].into_iter().flatten().min() {
+        query.push(" AND id < ").push_bind(before.to_string());
+    }
+    if let Some(name) = &filter.name {
+        query.push(concat!(
+            " AND ",
+            place_in!(),
+            "(lower(COALESCE(name, '')), "
+        ));
+        query.push_bind(name.to_ascii_lowercase()).push(") > 0");
+    }
+    for (key, value) in &filter.labels {
+        query.push(concat!(
+            " AND EXISTS (SELECT 1 FROM ",
+            pairs_of_labels!(),
+            " AS label WHERE label.key = "
+        ));
+        query.push_bind(key.clone()).push(" AND label.value = ");
+        query.push_bind(value.clone()).push(")");
+    }
+    query.push(" ORDER BY id DESC");
+}

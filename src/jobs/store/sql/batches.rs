@@ -1,0 +1,396 @@
+//! Batches in the embedded job table: filled piece by piece, acknowledged once they are complete.
+//!
+//! No worker claims a job of a batch while it is being filled ([`skip`](crate::jobs::store::claim::ClaimRequest::skip)). A batch that a dead process left incomplete was never
+//! acknowledged and is removed with its jobs.
+
+use super::blob_refs::{drop_slices_of_ended, release_blobs};
+use super::engine::{self, DbConnection, SqlStore};
+use super::insert::insert_jobs;
+use super::quota::Places;
+use super::rows::{
+    count, job_columns, read_blob_ids, read_count, read_flag, read_id, read_job, read_small,
+    read_state, to_json,
+};
+use sqlx::Row;
+use std::collections::HashSet;
+use std::sync::Arc;
+
+use futures_util::TryStreamExt;
+use uuid::Uuid;
+
+use crate::jobs::batch::model::{BatchItem, ItemResult};
+use crate::jobs::model::{State, created_at};
+use crate::jobs::store::error::StoreError;
+use crate::jobs::store::submission::{BatchBegun, NewBatch, NewJob, QueueBounds, Refusal};
+
+const CANCEL: &str = concat!(
+    "WITH open AS MATERIALIZED (SELECT id FROM jobs \
+     WHERE batch_id = (SELECT id FROM batches WHERE id = $2 AND tenant = $4) \
+     AND ended_at IS NULL AND cancel_requested = 0 ORDER BY id LIMIT $3",
+    for_update!(),
+    ") \
+     UPDATE jobs SET state = CASE WHEN state = 'queued' THEN 'cancelled' ELSE state END, \
+     ended_at = CASE WHEN state = 'queued' THEN $1 ELSE NULL END, \
+     cancel_requested = 1, version = version + 1, updated_at = $1 \
+     WHERE id IN (SELECT id FROM open) RETURNING id, state, slices"
+);
+
+impl SqlStore {
+    /// Reserves places in the queue for a batch that is being staged, at most `most`, beside those that it has; returns how
+    /// many.
+    ///
+    /// # Errors
+    /// The database failed; nothing was stored.
+    pub(crate) async fn reserve(
+        &self,
+        id: Uuid,
+        tenant: &str,
+        most: u32,
+        bounds: QueueBounds,
+    ) -> Result<Result<u32, Refusal>, StoreError> {
+        let mut transaction = engine::begin(&self.writer).await?;
+        engine::admit_alone(&mut transaction).await?;
+        let mut places = Places::new(&mut transaction, bounds);
+        let places = match places.take(tenant, u64::from(most)).await? {
+            Ok(places) => u32::try_from(places).unwrap_or(most),
+            Err(refusal) => return Ok(Err(refusal)),
+        };
+        sqlx::query(
+            "INSERT INTO batches (id, tenant, created_at, reserved) VALUES ($1, $2, $3, $4) \
+             ON CONFLICT (id) DO UPDATE SET reserved = batches.reserved + $4",
+        )
+        .bind(id.to_string())
+        .bind(tenant)
+        .bind(created_at(id))
+        .bind(i64::from(places))
+        .execute(&mut *transaction)
+        .await?;
+        transaction.commit().await?;
+        Ok(Ok(places))
+    }
+
+    /// What the idempotency key of a batch stands for, if it was used by another batch. `living` are the batches that are
+    /// being filled; what is left of others is no hindrance.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub(crate) async fn batch_by_key(
+        &self,
+        new: &NewBatch,
+        living: &HashSet<Uuid>,
+    ) -> Result<Option<BatchBegun>, StoreError> {
+        let mut connection = self.readers.acquire().await?;
+        by_key(&mut connection, new, living).await
+    }
+
+    /// Begins to fill a batch, or finds the one its idempotency key stands for. Afterwards exactly the places of its jobs
+    /// are reserved.
+    ///
+    /// # Errors
+    /// The database failed; nothing was stored.
+    pub(crate) async fn begin_batch(
+        &self,
+        new: &NewBatch,
+        living: &HashSet<Uuid>,
+        bounds: QueueBounds,
+    ) -> Result<BatchBegun, StoreError> {
+        let mut transaction = engine::begin(&self.writer).await?;
+        engine::admit_alone(&mut transaction).await?;
+        if let Some(begun) = by_key(&mut transaction, new, living).await? {
+            return Ok(begun);
+        }
+        let reserved = sqlx::query("SELECT reserved FROM batches WHERE id = $1")
+            .bind(new.id.to_string())
+            .fetch_optional(&mut *transaction)
+            .await?;
+        let reserved = match &reserved {
+            Some(row) => read_count(row, "reserved")?,
+            None => 0,
+        };
+        let lacking = u64::from(new.count).saturating_sub(reserved);
+        let mut places = Places::new(&mut transaction, bounds);
+        match places.take(&new.tenant, lacking).await? {
+            Ok(taken) if taken == lacking => {}
+            Ok(_) => return Ok(BatchBegun::Refused(places.refusal_of(&new.tenant))),
+            Err(refusal) => return Ok(BatchBegun::Refused(refusal)),
+        }
+        sqlx::query(
+            "INSERT INTO batches (id, tenant, created_at, count, rejected, reserved, name, labels) \
+             VALUES ($1, $2, $3, $4, $5, $4, $6, $7) \
+             ON CONFLICT (id) DO UPDATE SET count = $4, rejected = $5, reserved = $4, name = $6, labels = $7",
+        )
+        .bind(new.id.to_string())
+        .bind(&*new.tenant)
+        .bind(new.created_at)
+        .bind(i64::from(new.count))
+        .bind(i64::from(new.rejected))
+        .bind(&new.name)
+        .bind(to_json(&new.labels)?)
+        .execute(&mut *transaction)
+        .await?;
+        if let Some(template) = &new.template {
+            sqlx::query("INSERT INTO batch_templates (batch_id, body) VALUES ($1, $2)")
+                .bind(new.id.to_string())
+                .bind(template.as_ref())
+                .execute(&mut *transaction)
+                .await?;
+        }
+        if let Some((key, digest)) = &new.idempotency {
+            // A key that is still there belongs to what was left of a batch that failed.
+            sqlx::query(
+                "INSERT INTO batch_keys (of_tenant, key, digest, batch_id) VALUES ($1, $2, $3, $4) \
+                 ON CONFLICT (of_tenant, key) DO UPDATE SET digest = $3, batch_id = $4",
+            )
+            .bind(&*new.tenant)
+            .bind(key)
+            .bind(digest.as_slice())
+            .bind(new.id.to_string())
+            .execute(&mut *transaction)
+            .await?;
+        }
+        transaction.commit().await?;
+        Ok(BatchBegun::Created)
+    }
+
+    /// Queues jobs of a batch with their places in it, all or none, on the places reserved for them. Returns those that
+    /// ended at once with the result of their source.
+    ///
+    /// # Errors
+    /// The database failed; nothing was stored.
+    pub(crate) async fn fill_batch(
+        &self,
+        batch: Uuid,
+        jobs: &[(u32, NewJob)],
+    ) -> Result<Vec<Uuid>, StoreError> {
+        let jobs: Vec<_> = jobs
+            .iter()
+            .map(|(index, job)| (Some(*index), job))
+            .collect();
+        let mut transaction = engine::begin(&self.writer).await?;
+        let filled = sqlx::query(concat!(
+            "UPDATE batches SET reserved = ",
+            greatest!(),
+            "(reserved - $1, 0) WHERE id = $2 AND dropped = 0"
+        ))
+        .bind(count(jobs.len()))
+        .bind(batch.to_string())
+        .execute(&mut *transaction)
+        .await?;
+        require_batch(batch, filled.rows_affected())?;
+        let ended = insert_jobs(&mut transaction, Some(batch), &jobs).await?;
+        transaction.commit().await?;
+        Ok(ended)
+    }
+
+    /// Marks a batch as complete. Durable once it returns.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub(crate) async fn complete_batch(&self, id: Uuid) -> Result<(), StoreError> {
+        let complete = sqlx::query(
+            "UPDATE batches SET complete = 1, reserved = 0 WHERE id = $1 AND dropped = 0",
+        )
+        .bind(id.to_string())
+        .execute(&self.writer)
+        .await?;
+        require_batch(id, complete.rows_affected())
+    }
+
+    /// Removes at most `limit` jobs of a batch that could not be completed, and the batch after its last job; `true` once
+    /// nothing is left. Its reservation and its key go first.
+    ///
+    /// # Errors
+    /// The database failed; nothing changed.
+    pub(crate) async fn drop_batch(&self, id: Uuid, limit: u32) -> Result<bool, StoreError> {
+        let mut transaction = engine::begin(&self.writer).await?;
+        for statement in [
+            "UPDATE batches SET reserved = 0, dropped = 1 WHERE id = $1 AND complete = 0 AND dropped = 0",
+            "DELETE FROM batch_keys WHERE batch_id = $1 \
+             AND EXISTS (SELECT 1 FROM batches WHERE id = $1 AND complete = 0)",
+        ] {
+            sqlx::query(statement)
+                .bind(id.to_string())
+                .execute(&mut *transaction)
+                .await?;
+        }
+        let gone = sqlx::query(
+            "DELETE FROM jobs WHERE id IN (SELECT id FROM jobs WHERE batch_id = $1 ORDER BY id LIMIT $2) \
+             AND EXISTS (SELECT 1 FROM batches WHERE id = $1 AND complete = 0) RETURNING blob_id",
+        )
+        .bind(id.to_string())
+        .bind(i64::from(limit))
+        .fetch_all(&mut *transaction)
+        .await?;
+        release_blobs(&mut transaction, read_blob_ids(&gone)?).await?;
+        let last = gone.len() < limit as usize;
+        if last {
+            sqlx::query("DELETE FROM batches WHERE id = $1 AND complete = 0")
+                .bind(id.to_string())
+                .execute(&mut *transaction)
+                .await?;
+        }
+        transaction.commit().await?;
+        Ok(last)
+    }
+
+    /// The batches that are not complete.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub(crate) async fn unfinished_batches(&self) -> Result<Vec<Uuid>, StoreError> {
+        let rows = sqlx::query(concat!(
+            "SELECT id FROM batches WHERE complete = 0 AND ",
+            being_filled!(),
+            " = 0"
+        ))
+        .fetch_all(&self.readers)
+        .await?;
+        rows.iter().map(read_id).collect()
+    }
+
+    /// Cancels the queued ones among the next `limit` jobs of a batch that were not cancelled yet, and asks the workers of
+    /// the running ones to stop; returns both with their states.
+    ///
+    /// # Errors
+    /// The database failed; nothing changed.
+    pub(crate) async fn cancel_batch(
+        &self,
+        tenant: &str,
+        id: Uuid,
+        limit: u32,
+        now: i64,
+    ) -> Result<Vec<(Uuid, State)>, StoreError> {
+        let mut transaction = engine::begin(&self.writer).await?;
+        let rows = sqlx::query(CANCEL)
+            .bind(now)
+            .bind(id.to_string())
+            .bind(i64::from(limit))
+            .bind(tenant)
+            .fetch_all(&mut *transaction)
+            .await?;
+        drop_slices_of_ended(&mut transaction, &rows).await?;
+        transaction.commit().await?;
+        rows.iter()
+            .map(|row| Ok((read_id(row)?, read_state(row)?)))
+            .collect()
+    }
+
+    /// Removes up to `limit` ended jobs of a batch, and the batch with its last job; `true` once no ended job is left.
+    pub(crate) async fn delete_batch(
+        &self,
+        tenant: &str,
+        id: Uuid,
+        limit: u32,
+    ) -> Result<bool, StoreError> {
+        let mut transaction = engine::begin(&self.writer).await?;
+        let gone = sqlx::query(
+            "DELETE FROM jobs WHERE id IN (SELECT id FROM jobs \
+             WHERE batch_id = (SELECT id FROM batches WHERE id = $1 AND tenant = $3) AND \
+             state IN ('succeeded', 'failed', 'cancelled') ORDER BY id LIMIT $2) RETURNING blob_id",
+        )
+        .bind(id.to_string())
+        .bind(i64::from(limit))
+        .bind(tenant)
+        .fetch_all(&mut *transaction)
+        .await?;
+        release_blobs(&mut transaction, read_blob_ids(&gone)?).await?;
+        let last = gone.len() < limit as usize;
+        if last {
+            sqlx::query(
+                "DELETE FROM batches WHERE id = $1 AND tenant = $2 AND complete = 1 \
+                 AND NOT EXISTS (SELECT 1 FROM jobs WHERE batch_id = $1)",
+            )
+            .bind(id.to_string())
+            .bind(tenant)
+            .execute(&mut *transaction)
+            .await?;
+        }
+        transaction.commit().await?;
+        Ok(last)
+    }
+
+    /// The next jobs of a batch in the order they were sent, with the solutions that lie in the database; reads no further once
+    /// these are `bytes` together.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub(crate) async fn batch_items(
+        &self,
+        tenant: &str,
+        id: Uuid,
+        after: Option<Uuid>,
+        limit: u32,
+        bytes: usize,
+    ) -> Result<Vec<BatchItem>, StoreError> {
+        let mut rows = sqlx::query(concat!(
+            "SELECT ",
+            job_columns!(),
+            ", batch_index, outputs, blob_key, solution FROM jobs \
+             LEFT JOIN (SELECT id AS blob, key AS blob_key, solution FROM blobs) AS stored ON blob = blob_id \
+             WHERE batch_id = (SELECT id FROM batches WHERE id = $1 AND tenant = $4) AND id > $2 ORDER BY id LIMIT $3"
+        ))
+        .bind(id.to_string())
+        .bind(after.map_or_else(String::new, |id| id.to_string()))
+        .bind(i64::from(limit))
+        .bind(tenant)
+        .fetch(&self.readers);
+        let mut items = Vec::new();
+        let mut read = 0;
+        while read < bytes
+            && let Some(row) = rows.try_next().await?
+        {
+            let solution: Option<Vec<u8>> = row.try_get("solution")?;
+            read += solution.as_ref().map_or(0, Vec::len);
+            let key: Option<String> = row.try_get("blob_key")?;
+            let inline = solution.map(|solution| ItemResult::Solution(solution.into()));
+            items.push(BatchItem {
+                index: read_small(&row, "batch_index")?,
+                job: read_job(&row)?,
+                outputs: row.try_get("outputs")?,
+                result: key.map(ItemResult::Stored).or(inline),
+            });
+        }
+        Ok(items)
+    }
+}
+
+/// What was given up is not filled any more.
+fn require_batch(id: Uuid, found: u64) -> Result<(), StoreError> {
+    match found {
+        0 => Err(StoreError::Failed(Arc::new(std::io::Error::other(
+            format!("batch {id} was given up"),
+        )))),
+        _ => Ok(()),
+    }
+}
+
+async fn by_key(
+    connection: &mut DbConnection,
+    new: &NewBatch,
+    living: &HashSet<Uuid>,
+) -> Result<Option<BatchBegun>, StoreError> {
+    let Some((key, digest)) = &new.idempotency else {
+        return Ok(None);
+    };
+    let row = sqlx::query(concat!(
+        "SELECT digest, id, complete, ",
+        being_filled!(),
+        " AS filled FROM batch_keys JOIN batches ON batches.id = batch_keys.batch_id \
+         WHERE of_tenant = $1 AND key = $2"
+    ))
+    .bind(&*new.tenant)
+    .bind(key)
+    .fetch_optional(connection)
+    .await?;
+    let Some(row) = row else { return Ok(None) };
+    let stored: Vec<u8> = row.try_get("digest")?;
+    let (id, complete) = (read_id(&row)?, read_flag(&row, "complete")?);
+    let filled = read_flag(&row, "filled")? || living.contains(&id);
+    Ok(match (stored == digest, complete) {
+        // It is not filled any more, and it was never acknowledged.
+        (_, false) if !filled => None,
+        (false, _) => Some(BatchBegun::Conflict),
+        (true, true) => Some(BatchBegun::Existing(id)),
+        (true, false) => Some(BatchBegun::Unfinished),
+    })
+}

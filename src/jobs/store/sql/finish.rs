@@ -1,0 +1,177 @@
+//! Ends of claimed jobs in the embedded job table: one transaction, and so one write to the disk, for all of them.
+
+use super::blob_refs::{drop_slices_of_ended, insert_blobs, release_blobs};
+use super::cached::{Pair, SOURCE, end_pairs};
+use super::engine::{self, Db, DbConnection, SqlStore};
+use super::rows::{fence, read_cache_key, read_id, read_move, to_json};
+use crate::jobs::store::submission::CacheKey;
+use sqlx::{QueryBuilder, Row};
+use std::collections::HashMap;
+use std::collections::HashSet;
+
+use uuid::Uuid;
+
+use crate::jobs::model::State;
+use crate::jobs::store::claim::Claim;
+use crate::jobs::store::ending::{Ending, StoredResult};
+use crate::jobs::store::error::StoreError;
+
+impl SqlStore {
+    /// Ends jobs, all in one transaction. Returns those that ended; the others' leases were lost and nothing of them
+    /// changed.
+    ///
+    /// # Errors
+    /// The database failed; nothing changed.
+    pub(crate) async fn finish(
+        &self,
+        ends: &[(Claim, Ending)],
+        now: i64,
+    ) -> Result<HashSet<Uuid>, StoreError> {
+        if ends.is_empty() {
+            return Ok(HashSet::new());
+        }
+        let pairs: Vec<Pair> = ends
+            .iter()
+            .filter_map(|(claim, ending)| match ending {
+                Ending::Cached { source } => Some(Pair {
+                    job: claim.id,
+                    source: *source,
+                    at: now,
+                    lease_token: Some(fence(claim)),
+                }),
+                _ => None,
+            })
+            .collect();
+        let rows = ends
+            .iter()
+            .filter(|(_, ending)| !matches!(ending, Ending::Cached { .. }))
+            .map(|(claim, ending)| Ok((claim, EndRow::of(ending)?)))
+            .collect::<Result<Vec<_>, StoreError>>()?;
+        let mut transaction = engine::begin(&self.writer).await?;
+        let mut ended = end_solved(&mut transaction, &rows, now).await?;
+        ended.extend(end_pairs(&mut transaction, &pairs).await?);
+        transaction.commit().await?;
+        Ok(ended)
+    }
+}
+
+impl SqlStore {
+    /// For each of these keys that a succeeded job carries, one such job.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub(crate) async fn cached(
+        &self,
+        keys: &[CacheKey],
+    ) -> Result<HashMap<CacheKey, Uuid>, StoreError> {
+        if keys.is_empty() {
+            return Ok(HashMap::new());
+        }
+        let mut query = QueryBuilder::<Db>::new("WITH asked (cache_key) AS (");
+        query.push_values(keys, |mut row, key| {
+            row.push_bind(key.as_slice());
+        });
+        query.push(") SELECT cache_key, ").push(SOURCE);
+        query.push(" AS id FROM asked");
+        let rows = query.build().fetch_all(&self.readers).await?;
+        let mut sources = HashMap::new();
+        for row in &rows {
+            if row.try_get::<Option<&str>, _>("id")?.is_some()
+                && let Some(key) = read_cache_key(row)?
+            {
+                sources.insert(key, read_id(row)?);
+            }
+        }
+        Ok(sources)
+    }
+}
+
+/// Ends jobs with what their solves gave, as long as their leases are held; returns them.
+async fn end_solved(
+    connection: &mut DbConnection,
+    rows: &[(&Claim, EndRow<'_>)],
+    now: i64,
+) -> Result<HashSet<Uuid>, StoreError> {
+    if rows.is_empty() {
+        return Ok(HashSet::new());
+    }
+    let results: Vec<_> = rows.iter().filter_map(|(_, end)| end.result).collect();
+    let mut blobs = insert_blobs(connection, &results).await?.into_iter();
+    let mut update = QueryBuilder::<Db>::new(
+        "WITH done (id, lease_token, state, remarks, failure, blob, patches) AS (",
+    );
+    let mut inserted = Vec::with_capacity(results.len());
+    update.push_values(rows, |mut row, (claim, end)| {
+        let blob = end.result.and_then(|_| blobs.next());
+        inserted.extend(blob);
+        row.push_bind(claim.id.to_string())
+            .push_bind(fence(claim))
+            .push_bind(end.state.name())
+            .push_bind(&end.remarks)
+            .push_bind(&end.failure)
+            .push_bind(blob)
+            .push_bind(i64::from(end.field_patches));
+    });
+    update.push(") UPDATE jobs SET state = done.state, ended_at = ");
+    update.push_bind(now);
+    update.push(", updated_at = ").push_bind(now);
+    update.push(
+        ", remarks = done.remarks, failure = done.failure, blob_id = done.blob, \
+         field_patches = done.patches, \
+         progress = CASE WHEN done.state = 'succeeded' THEN 1.0 ELSE progress END, \
+         lease_until = NULL, worker = NULL, solving = 0, version = version + 1 \
+         FROM done WHERE jobs.id = done.id AND jobs.lease_token = done.lease_token \
+         AND jobs.state = 'running' RETURNING jobs.id AS id, jobs.state AS state, slices",
+    );
+    let ended = update.build().fetch_all(&mut *connection).await?;
+    drop_slices_of_ended(connection, &ended).await?;
+    let ended = ended
+        .iter()
+        .map(|row| Ok(read_move(row, State::Running)?.0))
+        .collect::<Result<HashSet<_>, StoreError>>()?;
+    if ended.len() < rows.len() {
+        // The results of those whose lease was lost have no owner.
+        release_blobs(connection, inserted).await?;
+    }
+    Ok(ended)
+}
+
+/// The end of a job in the form the database takes.
+pub(crate) struct EndRow<'a> {
+    pub(crate) state: State,
+    pub(crate) remarks: String,
+    pub(crate) failure: Option<String>,
+    pub(crate) field_patches: u32,
+    pub(crate) result: Option<&'a StoredResult>,
+}
+
+impl EndRow<'_> {
+    pub(crate) fn of(ending: &Ending) -> Result<EndRow<'_>, StoreError> {
+        let mut row = EndRow {
+            state: State::Cancelled,
+            remarks: "[]".to_owned(),
+            failure: None,
+            field_patches: 0,
+            result: None,
+        };
+        match ending {
+            Ending::Succeeded {
+                remarks,
+                result,
+                field_patches,
+            } => {
+                row.state = State::Succeeded;
+                row.remarks = to_json(remarks)?;
+                row.field_patches = *field_patches;
+                row.result = Some(result);
+            }
+            Ending::Failed(failure) => {
+                row.state = State::Failed;
+                row.failure = Some(to_json(failure)?);
+            }
+            // The latter is written elsewhere.
+            Ending::Cancelled | Ending::Cached { .. } => {}
+        }
+        Ok(row)
+    }
+}

@@ -1,0 +1,146 @@
+//! Rows of the job table as the words of this room, and back.
+
+use super::engine::{Db, DbRow};
+use crate::jobs::store::claim::Claim;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use sqlx::{QueryBuilder, Row};
+use uuid::Uuid;
+
+use crate::jobs::model::{Job, State};
+use crate::jobs::store::error::StoreError;
+use crate::jobs::store::submission::CacheKey;
+use crate::jobs::submit_options::Priority;
+
+/// The columns a [`Job`] is read from.
+macro_rules! job_columns {
+    () => {
+        "id, tenant, state, name, labels, batch_id, created_at, updated_at, started_at, ended_at, attempt, progress, remarks, failure, cached, version, rank, deadline"
+    };
+}
+pub(crate) use job_columns;
+
+/// Reads a row that has the columns of `job_columns`.
+pub(crate) fn read_job(row: &DbRow) -> Result<Job, StoreError> {
+    let failure: Option<String> = row.try_get("failure")?;
+    let batch: Option<String> = row.try_get("batch_id")?;
+    Ok(Job {
+        id: read_id(row)?,
+        tenant: row.try_get("tenant")?,
+        state: read_state(row)?,
+        name: row.try_get("name")?,
+        labels: from_json(row.try_get("labels")?)?,
+        batch_id: batch
+            .as_deref()
+            .map(Uuid::try_parse)
+            .transpose()
+            .map_err(|error| StoreError::Corrupt(format!("batch id: {error}")))?,
+        priority: Priority::from_rank(read_small(row, "rank")?)
+            .ok_or_else(|| StoreError::Corrupt("a rank is none of 0 to 2".to_owned()))?,
+        created_at: row.try_get("created_at")?,
+        updated_at: row.try_get("updated_at")?,
+        started_at: row.try_get("started_at")?,
+        ended_at: row.try_get("ended_at")?,
+        deadline: row.try_get("deadline")?,
+        expires_at: None,
+        attempt: read_small(row, "attempt")?,
+        progress: row.try_get("progress")?,
+        remarks: from_json(row.try_get("remarks")?)?,
+        failure: failure.as_deref().map(from_json).transpose()?,
+        cached: read_flag(row, "cached")?,
+        version: read_count(row, "version")?,
+        queue: None,
+    })
+}
+
+pub(crate) fn read_id(row: &DbRow) -> Result<Uuid, StoreError> {
+    let text: &str = row.try_get("id")?;
+    Uuid::try_parse(text).map_err(|error| StoreError::Corrupt(format!("job id {text:?}: {error}")))
+}
+
+/// The key of identical cases, if the row has one.
+pub(crate) fn read_cache_key(row: &DbRow) -> Result<Option<CacheKey>, StoreError> {
+    let key: Option<Vec<u8>> = row.try_get("cache_key")?;
+    key.map(CacheKey::try_from)
+        .transpose()
+        .map_err(|_| StoreError::Corrupt("a reuse key has a wrong length".to_owned()))
+}
+
+/// The blob a row refers to.
+pub(crate) fn read_blob_id(row: &DbRow) -> Result<Option<i64>, StoreError> {
+    Ok(row.try_get("blob_id")?)
+}
+
+/// The blobs that rows refer to.
+pub(crate) fn read_blob_ids(rows: &[DbRow]) -> Result<Vec<i64>, StoreError> {
+    let ids = rows
+        .iter()
+        .map(read_blob_id)
+        .collect::<Result<Vec<_>, _>>()?;
+    Ok(ids.into_iter().flatten().collect())
+}
+
+pub(crate) fn read_state(row: &DbRow) -> Result<State, StoreError> {
+    let name: &str = row.try_get("state")?;
+    State::from_name(name).ok_or_else(|| StoreError::Corrupt(format!("job state {name:?}")))
+}
+
+/// The id of a row and its state, into which a job that was in `from` has moved.
+pub(crate) fn read_move(row: &DbRow, from: State) -> Result<(Uuid, State), StoreError> {
+    let to = read_state(row)?;
+    debug_assert!(from.may_become(to), "{from:?} became {to:?}");
+    Ok((read_id(row)?, to))
+}
+
+pub(crate) fn read_count(row: &DbRow, column: &str) -> Result<u64, StoreError> {
+    let count: i64 = row.try_get(column)?;
+    u64::try_from(count).map_err(|_| StoreError::Corrupt(format!("{column} is {count}")))
+}
+
+/// A number that is never large.
+pub(crate) fn read_small<T: TryFrom<i64>>(row: &DbRow, column: &str) -> Result<T, StoreError> {
+    let count: i64 = row.try_get(column)?;
+    T::try_from(count).map_err(|_| StoreError::Corrupt(format!("{column} is {count}")))
+}
+
+/// A column that is 0 or 1.
+pub(crate) fn read_flag(row: &DbRow, column: &str) -> Result<bool, StoreError> {
+    Ok(row.try_get::<i64, _>(column)? != 0)
+}
+
+pub(crate) fn to_json<T: Serialize>(value: &T) -> Result<String, StoreError> {
+    serde_json::to_string(value).map_err(|error| StoreError::Corrupt(error.to_string()))
+}
+
+pub(crate) fn from_json<T: DeserializeOwned>(text: &str) -> Result<T, StoreError> {
+    serde_json::from_str(text).map_err(|error| StoreError::Corrupt(format!("{text:.80}: {error}")))
+}
+
+/// Ids as the list of an `IN`, without the brackets.
+pub(crate) fn push_list(query: &mut QueryBuilder<Db>, ids: &[Uuid]) {
+    if ids.is_empty() {
+        // Some databases know no empty list; nothing is equal to this.
+        query.push("NULL");
+    }
+    let mut list = query.separated(", ");
+    for id in ids {
+        list.push_bind(id.to_string());
+    }
+}
+
+/// A count in the form the database takes.
+pub(crate) fn count(number: impl TryInto<i64>) -> i64 {
+    number.try_into().unwrap_or(i64::MAX)
+}
+
+/// The lease token in the form the database takes.
+pub(crate) fn fence(claim: &Claim) -> i64 {
+    count(claim.lease_token)
+}
+
+/// One job.
+pub(crate) const GET: &str = concat!(
+    "SELECT ",
+    job_columns!(),
+    " FROM jobs WHERE id = $1 AND tenant = $2"
+);

@@ -1,0 +1,129 @@
+//! Solved slices of jobs that are not solved whole.
+
+use super::blob_refs::{insert_blobs, release_blobs};
+use super::engine::{self, SqlStore};
+use super::rows::{fence, read_blob_ids, read_count, read_small};
+use sqlx::Row;
+use std::time::Duration;
+
+use uuid::Uuid;
+
+use crate::jobs::store::claim::Claim;
+use crate::jobs::store::ending::{NewSlice, SliceRecord, StoredResult};
+use crate::jobs::store::error::StoreError;
+
+pub(crate) const NOTES: &str =
+    "SELECT number, motions, digest, spent_us FROM job_slices WHERE job_id = $1 ORDER BY number";
+
+pub(crate) const RESULTS: &str = "SELECT key, bytes, solution, fields FROM job_slices JOIN blobs ON blobs.id = blob_id \
+     WHERE job_id = $1 ORDER BY number";
+
+/// Attempts are counted from the last slice that was stored: who gets on is not what processes die of.
+const ADD: &str = "UPDATE jobs SET slices = $3 + 1, done = $4, progress = $4, cost_us = $5, attempt = 1, \
+     version = version + 1 WHERE id = $1 AND lease_token = $2 AND state = 'running'";
+
+impl SqlStore {
+    /// Stores a solved slice of a claimed job in place of what there was from its number on; the same call again changes
+    /// nothing. Returns whether the lease was still held; otherwise nothing changed.
+    ///
+    /// # Errors
+    /// The database failed; nothing changed.
+    pub(crate) async fn add_slice(
+        &self,
+        claim: &Claim,
+        slice: &NewSlice,
+    ) -> Result<bool, StoreError> {
+        let id = claim.id.to_string();
+        let note = &slice.note;
+        let spent_us = i64::try_from(note.spent.as_micros()).unwrap_or(i64::MAX);
+        let mut transaction = engine::begin(&self.writer).await?;
+        let added = sqlx::query(ADD)
+            .bind(&id)
+            .bind(fence(claim))
+            .bind(i64::from(note.number))
+            .bind(slice.done)
+            .bind(i64::try_from(slice.rest_us).unwrap_or(i64::MAX))
+            .execute(&mut *transaction)
+            .await?;
+        if added.rows_affected() == 0 {
+            return Ok(false);
+        }
+        let there = sqlx::query(
+            "SELECT 1 FROM job_slices WHERE job_id = $1 AND number = $2 AND digest = $3 AND spent_us = $4",
+        )
+        .bind(&id)
+        .bind(i64::from(note.number))
+        .bind(&note.digest)
+        .bind(spent_us)
+        .fetch_optional(&mut *transaction)
+        .await?;
+        if there.is_none() {
+            let replaced = sqlx::query(
+                "DELETE FROM job_slices WHERE job_id = $1 AND number >= $2 RETURNING blob_id",
+            )
+            .bind(&id)
+            .bind(i64::from(note.number))
+            .fetch_all(&mut *transaction)
+            .await?;
+            release_blobs(&mut transaction, read_blob_ids(&replaced)?).await?;
+            let blobs = insert_blobs(&mut transaction, &[&slice.result]).await?;
+            sqlx::query(
+                "INSERT INTO job_slices (job_id, number, motions, digest, spent_us, blob_id) \
+                 VALUES ($1, $2, $3, $4, $5, $6)",
+            )
+            .bind(&id)
+            .bind(i64::from(note.number))
+            .bind(i64::from(note.motions))
+            .bind(&note.digest)
+            .bind(spent_us)
+            .bind(blobs.first())
+            .execute(&mut *transaction)
+            .await?;
+        }
+        transaction.commit().await?;
+        Ok(true)
+    }
+
+    /// What is known of the stored slices of a job, in their order.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub(crate) async fn slices(&self, id: Uuid) -> Result<Vec<SliceRecord>, StoreError> {
+        let rows = sqlx::query(NOTES)
+            .bind(id.to_string())
+            .fetch_all(&self.readers)
+            .await?;
+        rows.iter()
+            .map(|row| {
+                Ok(SliceRecord {
+                    number: read_small(row, "number")?,
+                    motions: read_small(row, "motions")?,
+                    digest: row.try_get("digest")?,
+                    spent: Duration::from_micros(read_count(row, "spent_us")?),
+                })
+            })
+            .collect()
+    }
+
+    /// Where the parts of the answer of a job are kept, in their order.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub(crate) async fn slice_results(&self, id: Uuid) -> Result<Vec<StoredResult>, StoreError> {
+        let rows = sqlx::query(RESULTS)
+            .bind(id.to_string())
+            .fetch_all(&self.readers)
+            .await?;
+        rows.iter()
+            .map(|row| {
+                if let Some(key) = row.try_get::<Option<String>, _>("key")? {
+                    return Ok(StoredResult::Blob(key, read_count(row, "bytes")?));
+                }
+                Ok(StoredResult::inline(
+                    row.try_get("solution")?,
+                    row.try_get("fields")?,
+                ))
+            })
+            .collect()
+    }
+}

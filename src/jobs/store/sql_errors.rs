@@ -1,0 +1,116 @@
+//! Errors of databases as those of a store.
+
+use std::io::ErrorKind;
+use std::sync::Arc;
+
+use sqlx::postgres::PgDatabaseError;
+
+use crate::jobs::error::JobsError;
+use crate::jobs::storage_fault::of_io;
+use crate::jobs::store::error::{StorageFault, StoreError};
+
+impl From<sqlx::Error> for StoreError {
+    fn from(error: sqlx::Error) -> Self {
+        let fault = match &error {
+            sqlx::Error::Database(cause) => {
+                let shared = cause.try_downcast_ref::<PgDatabaseError>().is_some();
+                let read = if shared { of_state } else { of_code };
+                cause.code().and_then(|code| read(&code))
+            }
+            sqlx::Error::PoolTimedOut | sqlx::Error::PoolClosed => Some(StorageFault::Unwritable),
+            sqlx::Error::Io(source) => of_io(source).or_else(|| of_connection(source)),
+            _ => None,
+        };
+        match fault {
+            Some(fault) => StoreError::Away(fault, Arc::new(error)),
+            None => StoreError::Failed(Arc::new(error)),
+        }
+    }
+}
+
+impl From<sqlx::Error> for JobsError {
+    fn from(error: sqlx::Error) -> Self {
+        StoreError::from(error).into()
+    }
+}
+
+/// The server is away, or the way to it.
+fn of_connection(error: &std::io::Error) -> Option<StorageFault> {
+    match error.kind() {
+        ErrorKind::ConnectionRefused
+        | ErrorKind::ConnectionReset
+        | ErrorKind::ConnectionAborted
+        | ErrorKind::NotConnected
+        | ErrorKind::BrokenPipe
+        | ErrorKind::UnexpectedEof
+        | ErrorKind::TimedOut
+        | ErrorKind::HostUnreachable
+        | ErrorKind::NetworkUnreachable => Some(StorageFault::Unwritable),
+        _ => None,
+    }
+}
+
+/// The state that PostgreSQL gives with an error; its first two characters are the class.
+fn of_state(state: &str) -> Option<StorageFault> {
+    const DISK_FULL: &str = "53100";
+    // Cancelled by `statement_timeout`, or waited for a lock in vain.
+    const TOO_SLOW: [&str; 2] = ["57014", "55P03"];
+    // Read-only as after a failover; a session that was ended because it held a transaction open.
+    const ENDED: [&str; 2] = ["25006", "25P03"];
+    match state {
+        DISK_FULL => Some(StorageFault::Full),
+        _ if TOO_SLOW.contains(&state) || ENDED.contains(&state) => Some(StorageFault::Unwritable),
+        // Connection, resources, operator, system.
+        _ if ["08", "53", "57", "58"].contains(&state.get(..2)?) => Some(StorageFault::Unwritable),
+        _ => None,
+    }
+}
+
+/// The low byte of a code of SQLite is its kind.
+fn of_code(code: &str) -> Option<StorageFault> {
+    const BUSY: u32 = 5;
+    const LOCKED: u32 = 6;
+    const READONLY: u32 = 8;
+    const IOERR: u32 = 10;
+    const FULL: u32 = 13;
+    const CORRUPT: u32 = 11;
+    const CANTOPEN: u32 = 14;
+    const NOTADB: u32 = 26;
+    match code.parse::<u32>().ok()? & 0xff {
+        FULL => Some(StorageFault::Full),
+        BUSY | LOCKED | READONLY | IOERR | CORRUPT | CANTOPEN | NOTADB => {
+            Some(StorageFault::Unwritable)
+        }
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_server_that_stops_is_away_and_a_full_one_is_full() {
+        let away = Some(StorageFault::Unwritable);
+        for state in ["57P01", "57P03", "08006", "25006", "53300", "55P03"] {
+            assert_eq!(of_state(state), away, "{state}");
+        }
+        assert_eq!(of_state("53100"), Some(StorageFault::Full));
+        // A key that is there already, a deadlock.
+        assert_eq!(of_state("23505"), None);
+        assert_eq!(of_state("40P01"), None);
+    }
+
+    #[test]
+    fn extended_codes_are_recognised() {
+        assert_eq!(of_code("13"), Some(StorageFault::Full));
+        // SQLITE_IOERR_WRITE, SQLITE_READONLY_DBMOVED.
+        assert_eq!(of_code("778"), Some(StorageFault::Unwritable));
+        assert_eq!(of_code("1032"), Some(StorageFault::Unwritable));
+        // SQLITE_CORRUPT_INDEX, SQLITE_NOTADB.
+        assert_eq!(of_code("779"), Some(StorageFault::Unwritable));
+        assert_eq!(of_code("26"), Some(StorageFault::Unwritable));
+        // SQLITE_CONSTRAINT_PRIMARYKEY.
+        assert_eq!(of_code("1555"), None);
+    }
+}

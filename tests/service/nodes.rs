@@ -1,0 +1,259 @@
+//! Several nodes on one database, as real processes: does each job end once, and is it seen everywhere, whoever dies?
+
+use std::collections::BTreeSet;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use reqwest::Method;
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+use crate::postgres;
+use crate::support::{Service, case, endless_case, long_case, pause, railhead};
+
+/// Ends of a guard: something hangs.
+const WITHIN: Duration = Duration::from_secs(90);
+
+/// Nodes on one database. Each has a folder of its own.
+struct Nodes {
+    url: String,
+    folders: Vec<TempDir>,
+}
+
+impl Nodes {
+    /// An empty database with the job table in it.
+    async fn new() -> Option<Nodes> {
+        let url = postgres::database().await?;
+        let made = railhead_with(&url, &["migrate"]);
+        assert!(made.contains("was made"), "{made}");
+        Some(Nodes {
+            url,
+            folders: Vec::new(),
+        })
+    }
+
+    fn start(&mut self, worker: bool, flags: &[&str]) -> Service {
+        let folder = tempfile::tempdir().unwrap();
+        let mut all = vec!["--database-url", &self.url, "--lease-s", "2"];
+        all.extend(["--cache", "false"]);
+        all.extend(flags);
+        let service = match worker {
+            true => Service::start_worker(folder.path(), &all),
+            false => Service::start(folder.path(), &all),
+        };
+        self.folders.push(folder);
+        service
+    }
+
+    fn api(&mut self) -> Service {
+        self.start(false, &["--workers", "0"])
+    }
+
+    fn worker(&mut self) -> Service {
+        self.start(true, &["--workers", "1"])
+    }
+}
+
+/// What the program says about a database.
+fn railhead_with(url: &str, words: &[&str]) -> String {
+    let done = railhead()
+        .args(words)
+        .env("RAILHEAD_DATABASE_URL", url)
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&done.stdout).into_owned();
+    let error = String::from_utf8_lossy(&done.stderr).into_owned();
+    format!("{said}{error}")
+}
+
+async fn in_state(service: &Service, state: &str) -> Vec<Value> {
+    let list = service
+        .get(&format!("/v1/jobs?limit=1000&state={state}"))
+        .await;
+    list["jobs"].as_array().unwrap().clone()
+}
+
+async fn until(what: &str, mut done: impl AsyncFnMut() -> bool) {
+    let since = Instant::now();
+    while !done().await {
+        assert!(since.elapsed() < WITHIN, "{what}");
+        pause().await;
+    }
+}
+
+fn has_log(service: &Service, text: &str) -> bool {
+    service.log_text().contains(text)
+}
+
+#[tokio::test]
+async fn each_job_ends_once_and_is_read_everywhere_although_a_worker_and_an_api_node_are_killed() {
+    let Some(mut nodes) = Nodes::new().await else {
+        return;
+    };
+    let (first, second) = (nodes.api(), nodes.api());
+    let (doomed, survivor) = (nodes.worker(), nodes.worker());
+    let mut ids = BTreeSet::new();
+    for number in 0..24 {
+        let api = if number % 2 == 0 { &first } else { &second };
+        let motions = if number % 6 == 0 { 40 } else { 2 };
+        let case = long_case(&format!("case {number}"), motions);
+        ids.insert(api.submit(&case).await);
+    }
+    // A batch is taken by one node and solved by all.
+    let lines: Vec<String> = (0..60)
+        .map(|n| case(&format!("line {n}")).to_string())
+        .collect();
+    let answer = second
+        .request(Method::POST, "/v1/batches")
+        .header("Content-Type", "application/x-ndjson")
+        .header("Idempotency-Key", "one-batch")
+        .body(lines.join("\n"))
+        .send()
+        .await
+        .unwrap();
+    assert_eq!(answer.status(), 202);
+    let batch: Value = answer.json().await.unwrap();
+    let batch = format!("/v1/batches/{}", batch["id"].as_str().unwrap());
+
+    until("both workers solve", async || {
+        in_state(&second, "running").await.len() > 1
+            && !in_state(&second, "succeeded").await.is_empty()
+    })
+    .await;
+    doomed.kill();
+    first.kill();
+    let third = nodes.api();
+    until("all jobs end", async || {
+        let open =
+            in_state(&second, "queued").await.len() + in_state(&second, "running").await.len();
+        open == 0
+    })
+    .await;
+
+    for id in &ids {
+        let mut results = Vec::new();
+        for api in [&second, &third] {
+            let job = api.get(&format!("/v1/jobs/{id}")).await;
+            assert_eq!(job["state"], "succeeded", "{job}");
+            results.push(api.get(&format!("/v1/jobs/{id}/result")).await);
+        }
+        assert_eq!(results[0], results[1]);
+        assert!(results[0]["patches"].is_array(), "job {id}");
+    }
+    for api in [&second, &third] {
+        let batch = api.get(&batch).await;
+        assert_eq!(batch["states"]["succeeded"], 60, "{batch}");
+    }
+    // The key of the batch is known to all.
+    let again = second
+        .request(Method::POST, "/v1/batches")
+        .header("Content-Type", "application/x-ndjson")
+        .header("Idempotency-Key", "one-batch")
+        .body(lines.join("\n"))
+        .send()
+        .await
+        .unwrap();
+    assert_eq!(again.headers()["Idempotency-Replayed"], "true");
+    let again: Value = again.json().await.unwrap();
+    assert!(batch.ends_with(again["id"].as_str().unwrap()));
+    assert_eq!(in_state(&third, "succeeded").await.len(), ids.len() + 60);
+    assert!(!has_log(&survivor, "panicked"));
+    let said = railhead_with(&nodes.url, &["doctor"]);
+    assert!(said.contains("ok\tnodes seen within 20 s"), "{said}");
+}
+
+#[tokio::test]
+async fn a_job_is_cancelled_waited_for_and_streamed_at_a_node_that_does_not_solve_it() {
+    let Some(mut nodes) = Nodes::new().await else {
+        return;
+    };
+    let (one, other) = (nodes.api(), nodes.api());
+    let worker = nodes.worker();
+    let endless = one.submit(&endless_case("endless")).await;
+    one.until(&endless, "running").await;
+    // Somebody waits at one node for the end that is asked for at the other.
+    let asked = Instant::now();
+    let waiting = one
+        .request(Method::GET, &format!("/v1/jobs/{endless}"))
+        .header("Prefer", "wait=30")
+        .send();
+    let cancel = other
+        .request(Method::POST, &format!("/v1/jobs/{endless}/cancel"))
+        .send();
+    let (waited, cancelled) = tokio::join!(waiting, cancel);
+    assert_eq!(cancelled.unwrap().status(), 202);
+    let waited: Value = waited.unwrap().json().await.unwrap();
+    assert_eq!(waited["state"], "cancelled", "{waited}");
+    assert!(
+        asked.elapsed() < Duration::from_secs(20),
+        "not by the lease"
+    );
+
+    // A key that is made by the command opens every node.
+    let secret = railhead_with(&nodes.url, &["keys", "create", "--tenant", "depot"]);
+    let secret = secret.lines().next().unwrap().to_owned();
+    let answer = other
+        .request(Method::GET, "/v1/me")
+        .bearer_auth(&secret)
+        .send()
+        .await
+        .unwrap();
+    let me: Value = answer.json().await.unwrap();
+    assert_eq!(me["tenant"], "depot", "{me}");
+
+    // An orderly end hands a running job back without counting the attempt.
+    let endless = one.submit(&endless_case("endless")).await;
+    one.until(&endless, "running").await;
+    worker.signal("TERM");
+    assert!(worker.wait().success());
+    let job = one.until(&endless, "queued").await;
+    assert_eq!(job["attempt"], 0, "{job}");
+}
+
+#[tokio::test]
+async fn a_node_says_what_is_wrong_with_its_database() {
+    let Some(url) = postgres::database().await else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let serve = |words: &[&str]| {
+        let mut command: Command = railhead();
+        command.args(words).arg("--data-dir").arg(folder.path());
+        let done = command.args(["--listen", "127.0.0.1:0"]).output().unwrap();
+        assert!(!done.status.success());
+        String::from_utf8_lossy(&done.stderr).into_owned()
+    };
+    let said = serve(&["serve", "--database-url", &url]);
+    assert!(said.contains("railhead migrate"), "{said}");
+    let said = serve(&["serve", "--workers", "0"]);
+    assert!(said.contains("--database-url"), "{said}");
+    let said = serve(&["worker"]);
+    assert!(said.contains("--database-url"), "{said}");
+    let said = serve(&["serve", "--database-url", "nonsense"]);
+    assert!(said.contains("postgres://"), "{said}");
+    std::fs::write(folder.path().join("jobs.db"), "").unwrap();
+    let said = serve(&["serve", "--database-url", &url]);
+    assert!(said.contains("--data-dir"), "{said}");
+    // Several may make the tables at once; one of them does.
+    let makers: Vec<_> = (0..4)
+        .map(|_| {
+            let mut command = railhead();
+            command.arg("migrate").env("RAILHEAD_DATABASE_URL", &url);
+            command.stdout(std::process::Stdio::piped());
+            command.spawn().unwrap()
+        })
+        .collect();
+    let made = makers.into_iter().map(|maker| {
+        let done = maker.wait_with_output().unwrap();
+        assert!(done.status.success());
+        String::from_utf8_lossy(&done.stdout).contains("was made")
+    });
+    assert_eq!(made.filter(|made| *made).count(), 1);
+    let configured = railhead()
+        .args(["config", "--database-url", "postgres://u:hush@h/d"])
+        .output()
+        .unwrap();
+    let configured = String::from_utf8_lossy(&configured.stdout).into_owned();
+    assert!(!configured.contains("hush"), "{configured}");
+    assert_eq!(json!(configured.contains("database-url")), json!(true));
+}
