@@ -4,7 +4,7 @@
 //! prints a table. The parts: `mixed` (64 clients for a minute), `soak` (20 000 small jobs, one by one, removed after a
 //! while; `jobs=N` for another number), `batch` (20 000 cases in one request), `crowds` (silent connections, followers, large bodies,
 //! unread answers), `claims` (1 and 64 workers), `lists` (filters that match nothing among 200 000 jobs), `mixed-lengths` (a long sweep
-//! and short jobs on one worker); all of them without a name. The driver runs on one thread of the same
+//! and short jobs on one worker), `shared` (claims and ends on the PostgreSQL that `RAILHEAD_TEST_POSTGRES` names); all of them without a name. The driver runs on one thread of the same
 //! machine. A broken promise (a wrong answer, a lost or doubled job) ends it with a panic; missed goals are printed.
 
 #[path = "../machine.rs"]
@@ -17,6 +17,7 @@ mod crowds;
 mod lengths;
 mod mixed;
 mod service;
+mod shared;
 mod soak;
 mod table;
 
@@ -59,6 +60,7 @@ fn main() {
             "claims",
             "lists",
             "mixed-lengths",
+            "shared",
         ];
         !arguments
             .iter()
@@ -96,5 +98,8 @@ fn main() {
     }
     if wanted("mixed-lengths") {
         print(runtime.block_on(lengths::run()));
+    }
+    if wanted("shared") {
+        print(runtime.block_on(shared::ends()));
     }
 }

@@ -24,7 +24,7 @@ const CLAIMS: usize = 200;
 const LISTED: usize = 200_000;
 const LISTS: usize = 50;
 const CHUNK: usize = 1000;
-const TENANT: &str = "anonymous";
+pub const TENANT: &str = "anonymous";
 
 /// A claim with 1 and with 64 workers in turn, of the same queue.
 pub async fn claims() -> Vec<Row> {
@@ -159,13 +159,13 @@ fn times(seconds: &[f64]) -> String {
     format!("{:.2}, {:.2} ms", 1e3 * median, 1e3 * p99)
 }
 
-/// Queues so many small jobs with one label as a batch.
 async fn open(folder: &Path) -> Arc<dyn Store> {
     let store = SqliteStore::open(&folder.join("jobs.db")).await;
     Arc::new(store.expect("a table"))
 }
 
-async fn fill(store: &dyn Store, jobs: usize) -> Uuid {
+/// Queues so many small jobs with one label as a batch.
+pub async fn fill(store: &dyn Store, jobs: usize) -> Uuid {
     let batch = NewBatch {
         id: Uuid::now_v7(),
         tenant: TENANT.into(),

@@ -85,6 +85,26 @@ fn has_log(service: &Service, text: &str) -> bool {
     service.log_text().contains(text)
 }
 
+/// The path of a batch of 60 cases with a key, and whether it was there.
+async fn send_batch(service: &Service) -> (String, bool) {
+    let lines: Vec<String> = (0..60)
+        .map(|n| case(&format!("line {n}")).to_string())
+        .collect();
+    let answer = service
+        .request(Method::POST, "/v1/batches")
+        .header("Content-Type", "application/x-ndjson")
+        .header("Idempotency-Key", "one-batch")
+        .body(lines.join("\n"))
+        .send()
+        .await
+        .unwrap();
+    assert!(answer.status().is_success(), "{}", answer.status());
+    let replayed = answer.headers().contains_key("Idempotency-Replayed");
+    let batch: Value = answer.json().await.unwrap();
+    let path = format!("/v1/batches/{}", batch["id"].as_str().unwrap());
+    (path, replayed)
+}
+
 #[tokio::test]
 async fn each_job_ends_once_and_is_read_everywhere_although_a_worker_and_an_api_node_are_killed() {
     let Some(mut nodes) = Nodes::new().await else {
@@ -100,20 +120,8 @@ async fn each_job_ends_once_and_is_read_everywhere_although_a_worker_and_an_api_
         ids.insert(api.submit(&case).await);
     }
     // A batch is taken by one node and solved by all.
-    let lines: Vec<String> = (0..60)
-        .map(|n| case(&format!("line {n}")).to_string())
-        .collect();
-    let answer = second
-        .request(Method::POST, "/v1/batches")
-        .header("Content-Type", "application/x-ndjson")
-        .header("Idempotency-Key", "one-batch")
-        .body(lines.join("\n"))
-        .send()
-        .await
-        .unwrap();
-    assert_eq!(answer.status(), 202);
-    let batch: Value = answer.json().await.unwrap();
-    let batch = format!("/v1/batches/{}", batch["id"].as_str().unwrap());
+    let (batch, replayed) = send_batch(&second).await;
+    assert!(!replayed);
 
     until("both workers solve", async || {
         in_state(&second, "running").await.len() > 1
@@ -145,17 +153,7 @@ async fn each_job_ends_once_and_is_read_everywhere_although_a_worker_and_an_api_
         assert_eq!(batch["states"]["succeeded"], 60, "{batch}");
     }
     // The key of the batch is known to all.
-    let again = second
-        .request(Method::POST, "/v1/batches")
-        .header("Content-Type", "application/x-ndjson")
-        .header("Idempotency-Key", "one-batch")
-        .body(lines.join("\n"))
-        .send()
-        .await
-        .unwrap();
-    assert_eq!(again.headers()["Idempotency-Replayed"], "true");
-    let again: Value = again.json().await.unwrap();
-    assert!(batch.ends_with(again["id"].as_str().unwrap()));
+    assert_eq!(send_batch(&third).await, (batch, true));
     assert_eq!(in_state(&third, "succeeded").await.len(), ids.len() + 60);
     assert!(!has_log(&survivor, "panicked"));
     let said = railhead_with(&nodes.url, &["doctor"]);

@@ -1,0 +1,166 @@
+//! Does a store keep its promises to several that ask at the same moment, through connections of their own?
+
+use std::collections::HashSet;
+use std::sync::Arc;
+
+use railhead::jobs::store::Store;
+use railhead::jobs::store::submission::{BatchBegun, Enqueued, NewJob, QueueBounds};
+use uuid::Uuid;
+
+use crate::store::{
+    LEASE, StoreKind, Table, claim_up_to, conformance, finish_one, new_batch, new_job, success,
+};
+
+/// The same store twice, as two processes have it.
+async fn two(kind: StoreKind) -> (Table, [Arc<dyn Store>; 2]) {
+    let table = Table::new(kind).await;
+    let other = table.open_again().await;
+    let stores = [table.store.clone(), other];
+    (table, stores)
+}
+
+/// Submits jobs at the same moment, to one store and the other in turn.
+async fn submit(
+    stores: &[Arc<dyn Store>; 2],
+    jobs: Vec<NewJob>,
+    bounds: QueueBounds,
+) -> Vec<Enqueued> {
+    let submitted = jobs.into_iter().enumerate().map(|(number, job)| {
+        let store = stores[number % 2].clone();
+        tokio::spawn(async move { store.enqueue(&job, bounds).await.unwrap() })
+    });
+    let submitted: Vec<_> = submitted.collect();
+    let mut answers = Vec::new();
+    for answer in submitted {
+        answers.push(answer.await.unwrap());
+    }
+    answers
+}
+
+async fn one_key_makes_one_job_whoever_asks_at_the_same_moment(kind: StoreKind) {
+    let (_table, stores) = two(kind).await;
+    let keyed = || NewJob {
+        idempotency: Some(("k".to_owned(), [7; 32])),
+        ..new_job()
+    };
+    let jobs = (0..32).map(|_| keyed()).collect();
+    let answers = submit(&stores, jobs, QueueBounds::NONE).await;
+    let mut ids = HashSet::new();
+    let mut created = 0;
+    for answer in answers {
+        match answer {
+            Enqueued::Created(job) => {
+                created += 1;
+                ids.insert(job.id);
+            }
+            Enqueued::Existing(job) => drop(ids.insert(job.id)),
+            other => panic!("{other:?}"),
+        }
+    }
+    assert_eq!((created, ids.len()), (1, 1));
+}
+
+async fn a_quota_is_exact_whoever_submits_at_the_same_moment(kind: StoreKind) {
+    let (_table, stores) = two(kind).await;
+    let bounds = QueueBounds {
+        all: 1000,
+        tenant: 20,
+    };
+    // A batch holds some of the places already.
+    let reserved = stores[0]
+        .reserve(Uuid::now_v7(), "anonymous", 5, bounds)
+        .await;
+    assert_eq!(reserved.unwrap(), Ok(5));
+    let jobs = (0..40).map(|_| new_job()).collect();
+    let answers = submit(&stores, jobs, bounds).await;
+    let created = answers
+        .iter()
+        .filter(|answer| matches!(answer, Enqueued::Created(_)));
+    assert_eq!(created.count(), 15);
+}
+
+async fn one_key_makes_one_batch_and_is_known_once_it_is_acknowledged(kind: StoreKind) {
+    let (_table, stores) = two(kind).await;
+    let keyed = || {
+        let mut batch = new_batch("anonymous", 1);
+        batch.idempotency = Some(("k".to_owned(), [7; 32]));
+        batch
+    };
+    let (first, second) = (keyed(), keyed());
+    let living = HashSet::from([first.id]);
+    let begun = stores[0]
+        .begin_batch(&first, &living, QueueBounds::NONE)
+        .await;
+    assert_eq!(begun.unwrap(), BatchBegun::Created);
+    let begun = stores[1]
+        .begin_batch(&second, &living, QueueBounds::NONE)
+        .await;
+    assert_eq!(begun.unwrap(), BatchBegun::Unfinished);
+    // No job of it is claimed before all are there.
+    stores[0]
+        .fill_batch(first.id, &[(0, new_job())])
+        .await
+        .unwrap();
+    assert!(claim_up_to(&*stores[1], 0, LEASE, 9).await.is_empty());
+    stores[0].complete_batch(first.id).await.unwrap();
+    let known = stores[1].batch_by_key(&second, &HashSet::new()).await;
+    assert_eq!(known.unwrap(), Some(BatchBegun::Existing(first.id)));
+    assert_eq!(claim_up_to(&*stores[1], 0, LEASE, 9).await.len(), 1);
+}
+
+async fn what_was_given_up_is_neither_filled_nor_acknowledged(kind: StoreKind) {
+    let (_table, stores) = two(kind).await;
+    let batch = new_batch("anonymous", 3);
+    let none = HashSet::new();
+    let begun = stores[0]
+        .begin_batch(&batch, &none, QueueBounds::NONE)
+        .await;
+    assert_eq!(begun.unwrap(), BatchBegun::Created);
+    let jobs = [(0, new_job()), (1, new_job())];
+    stores[0].fill_batch(batch.id, &jobs).await.unwrap();
+    // Somebody else takes it for abandoned and has begun to remove it.
+    assert!(!stores[1].drop_batch(batch.id, 1).await.unwrap());
+    let late = [(2, new_job())];
+    assert!(stores[0].fill_batch(batch.id, &late).await.is_err());
+    assert!(stores[0].complete_batch(batch.id).await.is_err());
+    assert!(stores[1].drop_batch(batch.id, 9).await.unwrap());
+}
+
+async fn each_job_is_claimed_and_ended_once_by_many(kind: StoreKind) {
+    let (_table, stores) = two(kind).await;
+    for _ in 0..60 {
+        stores[0]
+            .enqueue(&new_job(), QueueBounds::NONE)
+            .await
+            .unwrap();
+    }
+    let workers = (0..6).map(|number| {
+        let store = stores[number % 2].clone();
+        tokio::spawn(async move {
+            let mut ended = Vec::new();
+            // Others may hold what is left for a moment.
+            while store.stats().await.unwrap().jobs[&railhead::jobs::State::Queued] > 0 {
+                for claim in claim_up_to(&*store, 0, LEASE, 4).await {
+                    let job = finish_one(&*store, &claim, &success(), 1).await;
+                    ended.push(job.expect("the lease is held").id);
+                }
+            }
+            ended
+        })
+    });
+    let workers: Vec<_> = workers.collect();
+    let mut ended = Vec::new();
+    for worker in workers {
+        ended.extend(worker.await.unwrap());
+    }
+    let distinct: HashSet<_> = ended.iter().collect();
+    assert_eq!((ended.len(), distinct.len()), (60, 60));
+}
+
+conformance! {
+    one_key_makes_one_job_whoever_asks_at_the_same_moment,
+    a_quota_is_exact_whoever_submits_at_the_same_moment,
+    one_key_makes_one_batch_and_is_known_once_it_is_acknowledged,
+    what_was_given_up_is_neither_filled_nor_acknowledged,
+    each_job_is_claimed_and_ended_once_by_many,
+}
