@@ -180,7 +180,9 @@ fn type_names(sources: &Sources) -> Findings {
             let first = words.find(|word| !["pub", "crate", "super", "in", ""].contains(word));
             let declares = matches!(first, Some("struct" | "enum" | "trait" | "type"));
             let indented = line.starts_with(' ');
-            if let (true, false, Some(name)) = (declares, indented, words.next()) {
+            // What the types of each database are called for the shared statements.
+            let engine = first == Some("type") && module.ends_with("::engine");
+            if let (true, false, Some(name)) = (declares && !engine, indented, words.next()) {
                 let key = (room.clone(), name.to_owned());
                 places.entry(key).or_default().push(module.clone());
             }

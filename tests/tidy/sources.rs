@@ -104,6 +104,11 @@ fn paths(tree: &str) -> Vec<String> {
 /// Which modules each module uses: the longest module that a path of a `use crate::` statement begins with.
 pub fn uses(modules: &BTreeMap<String, String>) -> BTreeMap<String, BTreeSet<String>> {
     let target = |path: String| {
+        // The shared statements are compiled below each database.
+        let path = ["sqlite", "postgres"].iter().fold(path, |path, database| {
+            let copy = format!("jobs::store::{database}::sql::");
+            path.replace(&copy, "jobs::store::sql::")
+        });
         let mut module = path.as_str();
         while !modules.contains_key(module) {
             module = module.rsplit_once("::").map_or("", |(before, _)| before);

@@ -3,13 +3,12 @@
 
 use std::time::Duration;
 
-use sqlx::postgres::{PgListener, PgPool};
+use sqlx::postgres::{PgConnectOptions, PgListener, PgPool};
 use tokio::sync::mpsc;
 use uuid::Uuid;
 
 use crate::jobs::store::cluster::Bell;
 use crate::jobs::store::error::StoreError;
-use crate::jobs::store::postgres::database::PostgresStore;
 
 /// The channel of all nodes.
 const CHANNEL: &str = "railhead";
@@ -86,12 +85,12 @@ fn read(word: &str) -> Option<Bell> {
 
 /// Passes on what all nodes ring, until the connection fails.
 pub(crate) async fn listen(
-    store: &PostgresStore,
+    options: PgConnectOptions,
     heard: &(dyn Fn(Bell) + Send + Sync),
 ) -> Result<(), StoreError> {
     let pool = sqlx::postgres::PgPoolOptions::new()
         .max_connections(1)
-        .connect_with(store.options.clone())
+        .connect_with(options)
         .await?;
     let mut listener = PgListener::connect_with(&pool).await?;
     listener.listen(CHANNEL).await?;

@@ -104,6 +104,6 @@ impl Cluster for PostgresStore {
     }
 
     async fn listen(&self, heard: &(dyn Fn(Bell) + Send + Sync)) -> Result<(), StoreError> {
-        bell::listen(self, heard).await
+        bell::listen(self.options.clone(), heard).await
     }
 }

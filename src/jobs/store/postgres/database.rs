@@ -1,32 +1,13 @@
-//! Connections to PostgreSQL.
+//! The job table in PostgreSQL, opened.
 
-use std::str::FromStr;
-use std::time::Duration;
-
-use sqlx::postgres::{PgConnectOptions, PgPool, PgPoolOptions};
+use sqlx::postgres::{PgConnectOptions, PgPool};
 
 use crate::jobs::error::JobsError;
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::postgres::bell::BellRinger;
+use crate::jobs::store::postgres::connection::connect;
 use crate::jobs::store::postgres::schema::require;
 use crate::jobs::store::postgres::sql::group_commit::GroupCommit;
-
-/// How long a call waits for a connection.
-const CONNECT_WITHIN: Duration = Duration::from_secs(5);
-
-/// Prepared statements kept by a connection. Statements on several rows have a text for each number of rows.
-const STATEMENTS_KEPT: usize = 300;
-
-/// Settings of every session. A node that was cut off inside a transaction keeps its rows locked, and others pass them by,
-/// until the server ends the session.
-const SESSION: [(&str, &str); 6] = [
-    ("statement_timeout", "20s"),
-    ("lock_timeout", "5s"),
-    ("idle_in_transaction_session_timeout", "5s"),
-    ("tcp_keepalives_idle", "10"),
-    ("tcp_keepalives_interval", "5"),
-    ("tcp_keepalives_count", "3"),
-];
 
 /// The job table that several processes share.
 #[derive(Debug, Clone)]
@@ -82,25 +63,4 @@ impl PostgresStore {
         sqlx::query(statement).execute(&self.writer).await?;
         Ok(())
     }
-}
-
-/// Connects to a database, whatever is in it.
-///
-/// # Errors
-/// [`JobsError::BadDatabaseUrl`], or it cannot be reached.
-pub(crate) async fn connect(
-    url: &str,
-    connections: u32,
-) -> Result<(PgConnectOptions, PgPool), JobsError> {
-    let options = PgConnectOptions::from_str(url)
-        .map_err(|error| JobsError::BadDatabaseUrl(error.to_string()))?
-        .application_name("railhead")
-        .statement_cache_capacity(STATEMENTS_KEPT)
-        .options(SESSION);
-    let pool = PgPoolOptions::new()
-        .max_connections(connections)
-        .acquire_timeout(CONNECT_WITHIN)
-        .connect_with(options.clone())
-        .await?;
-    Ok((options, pool))
 }

@@ -3,7 +3,7 @@
 use sqlx::postgres::PgPool;
 
 use crate::jobs::error::JobsError;
-use crate::jobs::store::postgres::database::connect;
+use crate::jobs::store::postgres::connection::connect;
 use crate::jobs::store::postgres::schema::require;
 
 /// Oldest version of the server that is supported, as it tells it itself.

@@ -9,6 +9,7 @@ use uuid::Uuid;
 
 use crate::jobs::store::cluster::Cluster;
 use crate::jobs::store::error::StoreError;
+use crate::jobs::store::postgres::connection::{ADMISSION, FOLD, LOCKS, lock};
 use crate::jobs::store::postgres::database::PostgresStore;
 
 pub(crate) type Db = Postgres;
@@ -22,13 +23,6 @@ pub(crate) const LEASE_NOW: (&str, &str) = (
     "COALESCE(",
     ", CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint))",
 );
-
-/// Locks of this service are told from those of others in the same database by this number ("rhjb"); the second number says
-/// what is locked.
-const LOCKS: i32 = 0x7268_6a62;
-const ADMISSION: i32 = 1;
-const FOLD: i32 = 2;
-const SCHEMA: i32 = 3;
 
 /// How often a call that gave way to another one is made again before its error counts.
 const REPEATED: u32 = 4;
@@ -44,12 +38,7 @@ pub(crate) async fn begin(pool: &DbPool) -> Result<Transaction<'static, Db>, Sto
 /// From here to the end of the transaction nobody else takes places in the queue or uses an idempotency key. What the one
 /// before did is seen by the next statement.
 pub(crate) async fn admit_alone(connection: &mut DbConnection) -> Result<(), StoreError> {
-    sqlx::query("SELECT pg_advisory_xact_lock($1, $2)")
-        .bind(LOCKS)
-        .bind(ADMISSION)
-        .execute(connection)
-        .await?;
-    Ok(())
+    lock(connection, ADMISSION).await
 }
 
 /// Ids for new blobs. They are given here, not by the insertion: rows of one statement may come back in any order.
@@ -135,16 +124,6 @@ pub(crate) async fn fold_counts(pool: &DbPool) -> Result<(), StoreError> {
         .await?;
     }
     transaction.commit().await?;
-    Ok(())
-}
-
-/// From here to the end of the transaction nobody else makes tables.
-pub(crate) async fn lock_schema(connection: &mut DbConnection) -> Result<(), StoreError> {
-    sqlx::query("SELECT pg_advisory_xact_lock($1, $2)")
-        .bind(LOCKS)
-        .bind(SCHEMA)
-        .execute(connection)
-        .await?;
     Ok(())
 }
 

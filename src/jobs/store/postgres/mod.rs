@@ -9,6 +9,7 @@ mod tokens;
 
 pub mod bell;
 pub mod cluster;
+pub mod connection;
 pub mod database;
 pub mod doctor;
 pub mod engine;

@@ -3,8 +3,7 @@
 use sqlx::postgres::PgPool;
 
 use crate::jobs::error::JobsError;
-use crate::jobs::store::postgres::database::connect;
-use crate::jobs::store::postgres::engine::lock_schema;
+use crate::jobs::store::postgres::connection::{self, connect, lock};
 
 /// The statements that make an empty schema a job table.
 const SCHEMA: &str = include_str!("schema.sql");
@@ -35,7 +34,7 @@ pub async fn migrate(url: &str) -> Result<Migrated, JobsError> {
 async fn make(pool: &PgPool) -> Result<Migrated, JobsError> {
     let mut transaction = pool.begin().await?;
     // Ends with the transaction: a lock of the session would not pass a pooler.
-    lock_schema(&mut transaction).await?;
+    lock(&mut transaction, connection::SCHEMA).await?;
     if is_there(&mut transaction).await? {
         drop(transaction);
         require(pool).await?;

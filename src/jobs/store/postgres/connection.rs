@@ -1,0 +1,64 @@
+//! Connections to PostgreSQL, and the locks that nodes take there.
+
+use std::str::FromStr;
+use std::time::Duration;
+
+use sqlx::postgres::{PgConnectOptions, PgConnection, PgPool, PgPoolOptions};
+
+use crate::jobs::error::JobsError;
+use crate::jobs::store::error::StoreError;
+
+/// How long a call waits for a connection.
+const CONNECT_WITHIN: Duration = Duration::from_secs(5);
+
+/// Prepared statements kept by a connection. Statements on several rows have a text for each number of rows.
+const STATEMENTS_KEPT: usize = 300;
+
+/// Settings of every session. A node that was cut off inside a transaction keeps its rows locked, and others pass them by,
+/// until the server ends the session.
+const SESSION: [(&str, &str); 6] = [
+    ("statement_timeout", "20s"),
+    ("lock_timeout", "5s"),
+    ("idle_in_transaction_session_timeout", "5s"),
+    ("tcp_keepalives_idle", "10"),
+    ("tcp_keepalives_interval", "5"),
+    ("tcp_keepalives_count", "3"),
+];
+
+/// Locks of this service are told from those of others in the same database by this number ("rhjb"); the second number says
+/// what is locked.
+pub(crate) const LOCKS: i32 = 0x7268_6a62;
+pub(crate) const ADMISSION: i32 = 1;
+pub(crate) const FOLD: i32 = 2;
+pub(crate) const SCHEMA: i32 = 3;
+
+/// Connects to a database, whatever is in it.
+///
+/// # Errors
+/// [`JobsError::BadDatabaseUrl`], or it cannot be reached.
+pub(crate) async fn connect(
+    url: &str,
+    connections: u32,
+) -> Result<(PgConnectOptions, PgPool), JobsError> {
+    let options = PgConnectOptions::from_str(url)
+        .map_err(|error| JobsError::BadDatabaseUrl(error.to_string()))?
+        .application_name("railhead")
+        .statement_cache_capacity(STATEMENTS_KEPT)
+        .options(SESSION);
+    let pool = PgPoolOptions::new()
+        .max_connections(connections)
+        .acquire_timeout(CONNECT_WITHIN)
+        .connect_with(options.clone())
+        .await?;
+    Ok((options, pool))
+}
+
+/// From here to the end of the transaction nobody else has this lock.
+pub(crate) async fn lock(connection: &mut PgConnection, what: i32) -> Result<(), StoreError> {
+    sqlx::query("SELECT pg_advisory_xact_lock($1, $2)")
+        .bind(LOCKS)
+        .bind(what)
+        .execute(connection)
+        .await?;
+    Ok(())
+}
