@@ -62,6 +62,7 @@ mod store_keys;
 mod store_lists;
 mod store_model;
 mod store_moves;
+mod store_objects;
 mod store_races;
 mod store_searches;
 mod store_slices;

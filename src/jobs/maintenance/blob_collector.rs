@@ -42,6 +42,10 @@ impl Shared {
 /// Removes results that no job refers to and that are not on their way to one: what a process left behind that was
 /// killed between the two. Runs once, beside everything else.
 pub(crate) async fn sweep_orphans(shared: Arc<Shared>) {
+    if shared.store.cluster().is_some() {
+        // There may be very many, and other nodes: the database looks for them itself, once in a while.
+        return;
+    }
     let draining = &shared.draining;
     match draining.run_until_cancelled(sweep(&shared)).await {
         Some(Ok(0)) | None => {}

@@ -22,6 +22,9 @@ const CANCEL_EVERY: Duration = Duration::from_millis(500);
 /// Time between two rounds in which counts are brought into a short form.
 const FOLD_EVERY: Duration = Duration::from_secs(2);
 
+/// Time between two sweeps of results that no job refers to.
+const SWEEP_EVERY: Duration = Duration::from_secs(3600);
+
 /// Pause after a connection for bells has failed.
 const LISTEN_AGAIN: Duration = Duration::from_secs(1);
 
@@ -43,6 +46,7 @@ pub(crate) fn start(shared: &Arc<Shared>) {
     tasks.spawn(beat(shared.clone()));
     tasks.spawn(watch_cancellations(shared.clone()));
     tasks.spawn(fold(shared.clone()));
+    tasks.spawn(sweep(shared.clone()));
     tasks.spawn(listen(shared.clone()));
 }
 
@@ -164,6 +168,24 @@ async fn fold(shared: Arc<Shared>) {
         };
         if let Err(error) = cluster.fold_counts().await {
             tracing::debug!(%error, "counts could not be added up");
+        }
+    }
+}
+
+async fn sweep(shared: Arc<Shared>) {
+    let mut beat = interval(SWEEP_EVERY);
+    beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    // The first one comes at once; a start has other things to do.
+    beat.reset();
+    let draining = shared.draining.clone();
+    while draining.run_until_cancelled(beat.tick()).await.is_some() {
+        let Some(cluster) = shared.store.cluster() else {
+            return;
+        };
+        match cluster.sweep_objects().await {
+            Ok(0) => {}
+            Ok(removed) => tracing::info!(removed, "results without a job removed"),
+            Err(error) => tracing::warn!(%error, "results without a job could not be swept"),
         }
     }
 }

@@ -57,6 +57,10 @@ pub trait Cluster: Send + Sync + Debug {
     /// [unfinished](crate::jobs::store::Store::unfinished_batches).
     async fn keep_batches(&self, batches: &[Uuid]) -> Result<(), StoreError>;
 
+    /// Removes large results that were written long ago and that no job refers to: what a node left that was killed between the
+    /// two. Returns their number.
+    async fn sweep_objects(&self) -> Result<u64, StoreError>;
+
     /// Brings what the database counts into a short form.
     async fn fold_counts(&self) -> Result<(), StoreError>;
 

@@ -25,6 +25,13 @@ const FORGOTTEN_AFTER: i64 = 600_000;
 /// How long a batch is kept for whoever fills it, from each sign of life on, in ms; as in the schema.
 const FILLED_WITHIN: i64 = 60_000;
 
+/// A result that no job refers to after so long has lost its job, in ms: results are written just before their jobs end.
+const SWEPT_AFTER: i64 = 24 * 3600 * 1000;
+
+/// The key of a result is the folder of its objects.
+const SWEEP: &str = "DELETE FROM objects WHERE made_at < CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint) - $1 \
+     AND NOT EXISTS (SELECT 1 FROM blobs WHERE blobs.key = regexp_replace(objects.path, '/[^/]+$', ''))";
+
 #[async_trait]
 impl Cluster for PostgresStore {
     async fn now(&self) -> Result<i64, StoreError> {
@@ -89,6 +96,11 @@ impl Cluster for PostgresStore {
         .execute(&self.writer)
         .await?;
         Ok(())
+    }
+
+    async fn sweep_objects(&self) -> Result<u64, StoreError> {
+        let swept = sqlx::query(SWEEP).bind(SWEPT_AFTER).execute(&self.writer);
+        Ok(swept.await?.rows_affected())
     }
 
     async fn fold_counts(&self) -> Result<(), StoreError> {

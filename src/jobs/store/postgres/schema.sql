@@ -165,10 +165,11 @@ CREATE TRIGGER jobs_move AFTER UPDATE ON jobs REFERENCING OLD TABLE AS before NE
 
 -- Large results, in pieces of 1 MiB.
 CREATE TABLE objects (
-    path   text   COLLATE "C" NOT NULL,
-    number bigint NOT NULL, -- of the piece, from 0
-    size   bigint NOT NULL, -- of the whole object
-    body   bytea  NOT NULL,
+    path    text   COLLATE "C" NOT NULL,
+    number  bigint NOT NULL, -- of the piece, from 0
+    size    bigint NOT NULL, -- of the whole object
+    body    bytea  NOT NULL,
+    made_at bigint NOT NULL DEFAULT CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint),
     PRIMARY KEY (path, number)
 );
 ALTER TABLE objects ALTER body SET STORAGE EXTERNAL;

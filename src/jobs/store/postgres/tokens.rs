@@ -21,6 +21,13 @@ macro_rules! bare {
     };
 }
 
+/// A column whose order is not used: the planner would walk all jobs from the oldest to find the first that is queued.
+macro_rules! unordered {
+    ($column:literal) => {
+        concat!($column, " || ''")
+    };
+}
+
 /// The larger of two values.
 macro_rules! greatest {
     () => {

@@ -51,10 +51,13 @@ impl SqlStore {
         for row in &rows {
             jobs.insert(read_state(row)?, read_count(row, "jobs")?);
         }
-        let oldest_queued_at =
-            sqlx::query_scalar("SELECT MIN(created_at) FROM jobs WHERE id = (SELECT MIN(id) FROM jobs WHERE state = 'queued')")
-                .fetch_one(&self.readers)
-                .await?;
+        let oldest_queued_at = sqlx::query_scalar(concat!(
+            "SELECT MIN(created_at) FROM jobs WHERE id = (SELECT MIN(",
+            unordered!("id"),
+            ") FROM jobs WHERE state = 'queued')"
+        ))
+        .fetch_one(&self.readers)
+        .await?;
         let result_bytes: i64 = sqlx::query_scalar(RESULT_BYTES)
             .fetch_one(&self.readers)
             .await?;

@@ -22,6 +22,13 @@ macro_rules! bare {
     };
 }
 
+/// A column as it is.
+macro_rules! unordered {
+    ($column:literal) => {
+        $column
+    };
+}
+
 /// The larger of two values.
 macro_rules! greatest {
     () => {
