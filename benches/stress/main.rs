@@ -1,11 +1,12 @@
 //! Stability: thousands of cases from all over the allowed ground, every answer held against the laws of contact.
 //!
 //! `cargo bench --bench stress [-- cases seed]` prints the table and writes it to `docs/stability.md`; it ends with an error if a
-//! case crashes, hangs or breaks a law. `-- --only` with `times`, `creep-map`, `sweep-with-zones` or `damaged-profile` prints one
+//! case crashes, hangs or breaks a law. `-- --only` with `times`, `after`, `creep-map`, `sweep-with-zones` or `damaged-profile` prints one
 //! section, `-- --case 1511` one case as JSON.
 
 extern crate railhead_contact as railhead;
 
+mod after;
 mod condition;
 mod contacts;
 mod damaged;
@@ -64,11 +65,14 @@ fn main() -> ExitCode {
     if let Some(at) = arguments.iter().position(|argument| argument == "--only") {
         let section = match arguments.get(at + 1).map(String::as_str) {
             Some("times") => times::table(CASES / 2, SEED + 1),
+            Some("after") => after::table(),
             Some("creep-map") => sweeps::creep_maps(),
             Some("sweep-with-zones") => sweeps::with_zones(),
             Some("damaged-profile") => damaged_table::tables(SEED),
             _ => {
-                eprintln!("--only takes times, creep-map, sweep-with-zones or damaged-profile");
+                eprintln!(
+                    "--only takes times, after, creep-map, sweep-with-zones or damaged-profile"
+                );
                 return ExitCode::FAILURE;
             }
         };

@@ -14,6 +14,7 @@ use serde_json::{Map, Value, json};
 use crate::cli::commands::SolveArgs;
 use crate::cli::output::{print, print_error};
 use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::post::subsurface::states::points;
 use crate::contact::solution::words::{Fields, PatchCells, PatchFields, PointFields, Solution};
 use crate::contact::{check, solve_with};
 
@@ -121,10 +122,14 @@ fn point_json(values: &PointFields) -> Value {
         ("traction_y_mpa", &values.traction_y_mpa),
         ("slip_x", &values.slip_x),
         ("slip_y", &values.slip_y),
+        ("temperature_c", &values.temperature_c),
     ] {
         if let Some(array) = array {
             members.insert(name.to_owned(), json!(array));
         }
+    }
+    if let Some(stored) = &values.subsurface {
+        members.insert("subsurface".to_owned(), json!(points(stored)));
     }
     Value::Object(members)
 }

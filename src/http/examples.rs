@@ -1,7 +1,7 @@
 //! Cases to begin with: those of `api/examples`, which the contract shows and `/v1/examples` answers.
 
 /// Name, summary and text of each.
-pub const EXAMPLES: [(&str, &str, &str); 12] = [
+pub const EXAMPLES: [(&str, &str, &str); 13] = [
     (
         "hertz-steel",
         "A wheel on a rail by its radii, with both creepages and spin",
@@ -36,6 +36,11 @@ pub const EXAMPLES: [(&str, &str, &str); 12] = [
         "wheel-rail-flange",
         "A wheel on a rail by their cross-sections, touching at the gauge corner and at the flange",
         include_str!("../../api/examples/wheel-rail-flange.case.json"),
+    ),
+    (
+        "maintenance",
+        "What one wheel does to a rail: stresses below the worst point, wear and fatigue, temperatures",
+        include_str!("../../api/examples/maintenance.case.json"),
     ),
     (
         "pressure-grid",

@@ -61,8 +61,8 @@ use crate::http::routes::service::{
     examples as service_examples, health, methods, problems, remarks,
 };
 use crate::http::routes::{
-    batch_list, batch_results, batches, cases, events, fields, job_list, jobs, me, plots,
-    point_fields, resultants, results, tenant_events, zones,
+    batch_list, batch_results, batches, cases, damage, events, fields, job_list, jobs, me, plots,
+    point_fields, resultants, results, subsurface, tenant_events, zones,
 };
 use crate::http::server::drain_body;
 use crate::http::state::AppState;
@@ -200,6 +200,9 @@ fn resources() -> OpenApiRouter<AppState> {
         .routes(routes!(fields::tractions))
         .routes(routes!(fields::pressure))
         .routes(routes!(fields::slip))
+        .routes(routes!(fields::temperature))
+        .routes(routes!(subsurface::subsurface))
+        .routes(routes!(damage::damage))
         .routes(routes!(plots::svg))
         .routes(routes!(plots::png))
         .route_layer(from_fn(etag::immutable));

@@ -252,6 +252,52 @@ def gap_grids():
             }, converged))
     write_lines("gap_grids.json", out)
 
+def subsurface():
+    """Stresses in the upper body: every fifth point from a depth of 0.01 semi-axes on whose uncertainty is small."""
+    records = []
+    for record in json.loads((SOURCE / "reference/extended/subsurface.json").read_text()):
+        given = record["input"]
+        geometry = given["geometry"]
+        largest = record["converged"]["pmax_MPa"]["value"]
+        points = [p for p in record["points"] if p[10] <= 0.003 * largest][::5]
+        records.append({
+            "id": record["id"],
+            "semi_axes_mm": [given["hertz"]["a"], given["hertz"]["b"]] if "hertz" in given else None,
+            "gap": None if "hertz" in given else {"rolling_mm": geometry["Rx"], "segments": geometry["segments"]},
+            "normal_force_n": given["load"]["FN"],
+            "friction": given["mu"] if given["problem"] == "steady_rolling" else 0.0,
+            "shear_modulus_mpa": given["material"]["G"],
+            "poisson_ratio": given["material"]["nu"],
+            "motion": [given["creepage"][k] for k in ("xi", "eta", "phi")],
+            "pressure_max_mpa": largest,
+            "points": points,
+        })
+    write_lines("subsurface.json", records)
+
+
+def temperature():
+    records = []
+    for record in json.loads((SOURCE / "reference/extended/temperature.json").read_text()):
+        given, thermal = record["input"], record["input"]["thermal"]
+        found = record["quadrature"]["converged"]["Tmax"]
+        records.append({
+            "id": record["id"],
+            "semi_axes_mm": [given["hertz"]["a"], given["hertz"]["b"]],
+            "normal_force_n": given["load"]["FN"],
+            "friction": given["mu"],
+            "shear_modulus_mpa": given["material"]["G"],
+            "poisson_ratio": given["material"]["nu"],
+            "motion": [given["creepage"][k] for k in ("xi", "eta", "phi")],
+            "speed_mm_per_s": given["V_mm_per_s"],
+            "conductivity_w_per_mk": 1000 * thermal["lambda_W_per_mmC"],
+            "density_kg_per_m3": 1e9 * thermal["density_kg_per_mm3"],
+            "specific_heat_j_per_kgk": thermal["heatcp_J_per_kgC"],
+            "bulk_upper_c": thermal["body1"]["T"],
+            "bulk_lower_c": thermal["body2"]["T"],
+            "max_c": {"value": found["value"], "unc": found["unc"]},
+        })
+    write_lines("temperature.json", records)
+
 
 for name in CLASSES:
     records = json.loads((SOURCE / f"reference/{name}.json").read_text())
@@ -261,3 +307,5 @@ kalker()
 kernels()
 gap_profiles()
 gap_grids()
+subsurface()
+temperature()

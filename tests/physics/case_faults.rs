@@ -193,9 +193,9 @@ fn what_is_not_offered_yet_is_named_with_what_is() {
         ],
     );
     assert_fault(
-        &good_with("/outputs/1", json!("damage")),
+        &good_with("/outputs/1", json!("stresses")),
         "/outputs/1",
-        &["not offered by this version"],
+        &["\"stresses\" given", "subsurface"],
     );
 }
 

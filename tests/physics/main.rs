@@ -32,6 +32,7 @@ mod kalker_table;
 mod laws;
 mod liu_hsu;
 mod liu_hsu_newton;
+mod maintenance;
 mod memory;
 mod paper_figures;
 #[path = "../../benches/calibrate/population.rs"]
@@ -68,6 +69,7 @@ mod regions;
 mod robustness;
 mod skips;
 mod stress;
+mod subsurface;
 mod sweeps;
 mod targets;
 #[path = "../../benches/calibrate/truth.rs"]

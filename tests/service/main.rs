@@ -32,6 +32,7 @@ mod guides;
 mod held_solver;
 mod keys;
 mod leases;
+mod maintenance;
 mod malformed;
 mod manners;
 #[cfg(target_os = "linux")]

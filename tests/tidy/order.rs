@@ -20,6 +20,8 @@ const ORDER: &[&str] = &[
     "contact::case::words",
     "contact::solution::zone",
     "contact::solution::profile_quality",
+    "contact::solution::maintenance",
+    "contact::solution::damage",
     "contact::solution::words",
     "contact::solution::understanding",
     "contact::post",

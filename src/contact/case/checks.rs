@@ -1,5 +1,6 @@
 //! The checks of a case: each part is checked independently, and all faults are reported together.
 
+use crate::contact::case::after_tasks::AfterWords;
 use crate::contact::case::limits::Limits;
 use crate::contact::case::motions::ExpandedMotions;
 use crate::contact::case::resolution::resolution;
@@ -28,6 +29,7 @@ pub(crate) struct PartialCase<'a> {
     pub(crate) motion: Option<&'a Motions>,
     pub(crate) solver: Option<&'a Solver>,
     pub(crate) outputs: &'a [Output],
+    pub(crate) after: AfterWords<'a>,
 }
 
 /// Faults of the parts of a case that can be checked although others are faulty.
@@ -74,6 +76,7 @@ impl CheckedParts {
             let force = normal_force(task.as_ref().map(|(task, _)| task), given.load);
             let limit = given.friction.zip(force).map(|(mu, force)| mu * force);
             faults.extend(expanded.faults(motion, limit, of_profiles));
+            faults.extend(given.after.faults(motion, expanded, limits));
         }
         if let Some(solver) = given.solver {
             let size = SizeInput {
@@ -84,10 +87,8 @@ impl CheckedParts {
                     .as_ref()
                     .map_or_else(|| vec![1.0], |(task, _)| size::segments(task)),
                 motions: motions.as_ref().map_or(1, |m| m.motions.len()),
-                fields: given
-                    .outputs
-                    .iter()
-                    .any(|output| *output != Output::Resultants),
+                fields: given.outputs.iter().any(|output| output.is_per_cell()),
+                stress_points: given.after.stress_points(),
                 ellipse: task
                     .as_ref()
                     .and_then(|(task, _)| size::length_over_width(task)),

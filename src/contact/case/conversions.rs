@@ -2,7 +2,7 @@
 
 use crate::contact::case::words::contact::{FormatName, SideName};
 use crate::contact::case::words::motion::MotionWords;
-use crate::contact::case::words::solver::{MeshSizeWords, MethodName, TractionBoundName};
+use crate::contact::case::words::solver::{MeshSizeWords, MethodName, Output, TractionBoundName};
 use crate::contact::geometry::formats::format::Format;
 use crate::contact::geometry::wheel_rail::Side;
 use crate::contact::mesh::size::MeshSize;
@@ -53,6 +53,21 @@ impl From<MeshSizeWords> for MeshSize {
         MeshSize {
             strips: words.strips,
             cells: words.cells,
+        }
+    }
+}
+
+impl Output {
+    /// Has it a value per cell?
+    #[must_use]
+    pub fn is_per_cell(self) -> bool {
+        match self {
+            Output::Resultants | Output::Subsurface | Output::Damage => false,
+            Output::Zones
+            | Output::Tractions
+            | Output::Pressure
+            | Output::Slip
+            | Output::Temperature => true,
         }
     }
 }

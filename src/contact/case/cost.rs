@@ -2,7 +2,7 @@
 
 use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::size::{SizeInput, length_over_width, segments};
-use crate::contact::case::words::solver::Output;
+use crate::contact::post::subsurface::task::SubsurfaceTask;
 
 impl CheckedCase {
     /// Estimated cost of solving this: the operator of the finest mesh and what stands beside it, the matrices of the dense method,
@@ -17,13 +17,14 @@ impl CheckedCase {
 
     /// What decides how much memory this takes.
     pub(crate) fn size_input(&self) -> SizeInput {
-        let fields = |output: &Output| *output != Output::Resultants;
+        let places = |task: &SubsurfaceTask| task.places.count();
         SizeInput {
             method: self.run.method,
             resolution: self.run.resolution,
             segments: segments(&self.problem.task),
             motions: self.problem.motions.len(),
-            fields: self.run.outputs.iter().any(fields),
+            fields: self.run.outputs.iter().any(|output| output.is_per_cell()),
+            stress_points: self.run.after.subsurface.as_ref().map_or(0, places),
             ellipse: length_over_width(&self.problem.task),
         }
     }

@@ -19,6 +19,7 @@ pub(crate) fn digest(
     elasticity: &Elasticity,
     motions: &[Motion],
     forces: &[PrescribedForces],
+    speeds: &[Option<f64>],
 ) -> String {
     let target_error = match resolution(&case.solver) {
         Resolution::Target(target) => Some(target),
@@ -51,6 +52,13 @@ pub(crate) fn digest(
         mesh: case.solver.mesh,
         time_limit_s: case.solver.time_limit_s,
         outputs: &case.outputs,
+        subsurface: case.subsurface.as_ref(),
+        // Pairs with the same combined constants may have bodies of their own.
+        bodies: case.subsurface.as_ref().map(|_| &case.material),
+        damage: case.damage.as_ref(),
+        thermal: case.thermal.as_ref(),
+        // Nothing else depends on them.
+        speeds: (case.damage.is_some() || case.thermal.is_some()).then_some(speeds),
     };
     let mut hasher = blake3::Hasher::new();
     // Writing into a hasher cannot fail, and the structure has no map with keys that are not texts.

@@ -1,5 +1,7 @@
 //! The question: the words a client writes, how they are read, and what they become once checked.
 
+pub mod after_tasks;
+pub mod after_time;
 pub mod checks;
 pub mod contact_task;
 pub mod conversions;
@@ -19,5 +21,6 @@ pub mod read;
 pub mod resolution;
 pub mod size;
 pub mod solve_time;
+pub mod subsurface;
 pub mod understood;
 pub mod words;

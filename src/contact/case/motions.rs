@@ -12,6 +12,7 @@ const STILL: AskedMotion = AskedMotion {
     spin_per_mm: 0.0,
     force_x_n: None,
     force_y_n: None,
+    speed_mm_per_s: None,
 };
 
 /// The motions of a case in order, never empty.
@@ -21,6 +22,8 @@ pub(crate) struct ExpandedMotions {
     pub(crate) motions: Vec<Motion>,
     /// What is prescribed instead, motion by motion.
     pub(crate) forces: Vec<PrescribedForces>,
+    /// Rolling speeds in mm/s, where they are given.
+    pub(crate) speeds: Vec<Option<f64>>,
 }
 
 /// The motions and prescribed forces of a case.
@@ -37,6 +40,7 @@ pub(crate) fn expand(motions: &Motions, limits: &Limits) -> Result<ExpandedMotio
     Ok(ExpandedMotions {
         motions: list.iter().map(motion).collect(),
         forces: list.iter().map(|m| [m.force_x_n, m.force_y_n]).collect(),
+        speeds: list.iter().map(|m| m.speed_mm_per_s).collect(),
     })
 }
 
@@ -73,6 +77,16 @@ impl ExpandedMotions {
             }
         }
         faults
+    }
+}
+
+impl ExpandedMotions {
+    /// The fault of the first motion without a rolling speed, where one is needed for `what`.
+    pub(crate) fn speed_fault(&self, given: &Motions, what: &str) -> Option<Fault> {
+        let first = self.speeds.iter().position(Option::is_none)?;
+        let pointer = pointer(given, first, "speed_mm_per_s");
+        let detail = format!("missing; {what} needs the rolling speed in mm/s");
+        Some(Fault::new(pointer, detail))
     }
 }
 
@@ -122,7 +136,10 @@ fn list(motions: &Motions, limits: &Limits) -> Result<Vec<AskedMotion>, Fault> {
         Motions::Many(list) => list.clone(),
         Motions::Sweep { sweep } => write_out(sweep),
         // Every patch gets its own creepages when it is found.
-        Motions::Wheelset { .. } => vec![STILL],
+        Motions::Wheelset { wheelset } => vec![AskedMotion {
+            speed_mm_per_s: Some(wheelset.speed_mm_per_s),
+            ..STILL
+        }],
     })
 }
 
@@ -155,6 +172,7 @@ fn write_out(sweep: &Sweep) -> Vec<AskedMotion> {
         spin_per_mm: spin[k],
         force_x_n: forced[0].then_some(x[i]),
         force_y_n: forced[1].then_some(y[j]),
+        speed_mm_per_s: sweep.speed_mm_per_s,
     };
     match sweep.combine {
         Combine::Together => (0..sweep_length(sweep) as usize)
@@ -221,6 +239,7 @@ mod tests {
             spin_per_mm: range(1.0, -1.0, 5),
             force_x_n: None,
             force_y_n: None,
+            speed_mm_per_s: None,
             combine: Combine::Together,
         };
         let list = expand(&Motions::Sweep { sweep }, &Limits::default())
@@ -242,6 +261,7 @@ mod tests {
             spin_per_mm: range(4.0, 4.0, 1),
             force_x_n: None,
             force_y_n: None,
+            speed_mm_per_s: None,
             combine: Combine::Together,
         };
         let list = expand(&Motions::Sweep { sweep }, &Limits::default())
@@ -259,6 +279,7 @@ mod tests {
             spin_per_mm: range(7.0, 9.0, 3),
             force_x_n: None,
             force_y_n: None,
+            speed_mm_per_s: None,
             combine: Combine::Grid,
         };
         let list = expand(&Motions::Sweep { sweep }, &Limits::default())
@@ -291,6 +312,7 @@ mod tests {
                 spin_per_mm: None,
                 force_x_n: None,
                 force_y_n: None,
+                speed_mm_per_s: None,
                 combine: Combine::Grid,
             },
         };
@@ -313,6 +335,7 @@ mod tests {
             spin_per_mm: None,
             force_x_n: range(-50.0, 50.0, 3),
             force_y_n: None,
+            speed_mm_per_s: None,
             combine: Combine::Grid,
         };
         let found = expand(&Motions::Sweep { sweep }, &Limits::default()).unwrap();

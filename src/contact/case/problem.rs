@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::time::Duration;
 
+use crate::contact::case::after_tasks::AfterTasks;
 use crate::contact::case::checks::{CheckedParts, PartialCase, missing_load, unusual_friction};
 use crate::contact::case::digest::digest;
 use crate::contact::case::limits::Limits;
@@ -66,6 +67,8 @@ pub struct Problem {
     pub wheelset: Option<WheelsetMotion>,
     /// Forces prescribed instead of creepages, motion by motion.
     pub forces: Vec<PrescribedForces>,
+    /// Rolling speeds in mm/s, motion by motion, where they are given.
+    pub speeds: Vec<Option<f64>>,
     checked: Checked,
 }
 
@@ -90,6 +93,8 @@ pub struct Run {
     pub memory_bytes: u64,
     /// What to compute, sorted, without repetition.
     pub outputs: Vec<Output>,
+    /// What is computed from the solved motions.
+    pub after: AfterTasks,
 }
 
 /// What a case is called; the answer does not depend on it.
@@ -119,6 +124,7 @@ impl CheckedCase {
             motion: Some(&case.motion),
             solver: Some(&case.solver),
             outputs: &case.outputs,
+            after: case.after_words(),
         };
         let (parts, mut faults) = CheckedParts::check(given, limits);
         if faults.is_empty() && parts.task.is_none() {
@@ -135,7 +141,11 @@ impl CheckedCase {
         let of_material = elasticity.remark().map(|r| r.at_pointer("/material"));
         let of_friction = unusual_friction(case.friction.coefficient);
         let of_case = of_material.into_iter().chain(of_friction);
-        let ExpandedMotions { motions, forces } = motions;
+        let ExpandedMotions {
+            motions,
+            forces,
+            speeds,
+        } = motions;
         // Creepages that are searched are looked at when they are found.
         let given: &[Motion] = match forces.iter().all(|forces| *forces == [None; 2]) {
             true => &motions,
@@ -143,7 +153,7 @@ impl CheckedCase {
         };
         let implausible = plausibility::of_case(&case.contact, &task.patches(), given);
         let remarks = merged(of_case.chain(remarks).chain(implausible));
-        let digest = digest(case, &elasticity, &motions, &forces);
+        let digest = digest(case, &elasticity, &motions, &forces, &speeds);
         let problem = Problem {
             elasticity,
             friction: FrictionLaw::Constant(case.friction.coefficient),
@@ -154,6 +164,7 @@ impl CheckedCase {
             },
             motions,
             forces,
+            speeds,
             wheelset: profiles::wheelset(&case.motion),
             checked: Checked,
         };
@@ -203,6 +214,7 @@ fn run(case: &Case, limits: &Limits) -> Run {
         time_limit: case.solver.time_limit_s.map(Duration::from_secs_f64),
         memory_bytes: limits.memory_bytes,
         outputs: case.outputs.clone(),
+        after: AfterTasks::new(case),
     }
 }
 
@@ -213,6 +225,7 @@ impl Problem {
         Problem {
             motions: chosen.iter().map(|k| self.motions[*k]).collect(),
             forces: chosen.iter().map(|k| self.forces[*k]).collect(),
+            speeds: chosen.iter().map(|k| self.speeds[*k]).collect(),
             ..self.clone()
         }
     }
@@ -238,6 +251,7 @@ impl Run {
                 mesh @ Resolution::Mesh(_) => mesh,
             },
             outputs: vec![Output::Resultants],
+            after: AfterTasks::default(),
             ..self.clone()
         }
     }

@@ -33,6 +33,8 @@ const LEVEL_BYTES_PER_CELL: f64 = 200.0;
 const LEVELS_PER_MOTION: f64 = 4.0;
 /// Bytes of a motion in the answer, for each patch, and of its text.
 const MOTION_BYTES: f64 = 2000.0;
+/// Bytes of a stress in the answer and in its stored form.
+const STRESS_BYTES: f64 = 150.0;
 /// Bytes per cell and motion of fields, in the answer and in their stored form.
 const FIELDS_BYTES_PER_CELL: f64 = 160.0;
 
@@ -46,6 +48,8 @@ pub(crate) struct SizeInput {
     pub(crate) motions: usize,
     /// Values per cell are kept motion by motion.
     pub(crate) fields: bool,
+    /// Points of every motion at which stresses below the surface are answered.
+    pub(crate) stress_points: usize,
     /// Length over width of an ellipse; nothing for other regions.
     pub(crate) ellipse: Option<f64>,
 }
@@ -117,7 +121,7 @@ impl SizeInput {
         operator
             + solve
             + cells * (8.0 * VECTORS_PER_CELL + levels * LEVEL_BYTES_PER_CELL)
-            + motions * patches * MOTION_BYTES
+            + motions * patches * (MOTION_BYTES + STRESS_BYTES * self.stress_points as f64)
             + fields
     }
 

@@ -130,9 +130,11 @@ impl CheckedCase {
             }
             (method, _) => self.on_one_mesh(method, patches.len()),
         };
+        let motions = self.problem.motions.len() as f64;
+        let after = motions * self.after_seconds(patches.len());
         SolveTime {
             normal,
-            whole: normal + tangential,
+            whole: normal + tangential + after,
         }
     }
 

@@ -43,7 +43,16 @@ impl PowerTask<'_> {
     }
 }
 
-/// Slip of every cell over the rolling speed, along x and across: along the traction, and as large as its power asks for.
+/// Power and slip of every cell, over the rolling speed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CellPower {
+    /// Friction power in N.
+    pub power: Vec<f64>,
+    /// Slip along x and across.
+    pub slip: [Vec<f64>; 2],
+}
+
+/// Power of every cell, and its slip: along the traction, and as large as the power asks for.
 ///
 /// A cell that sticks hands its power to the cell behind it, where the material goes, and so does one whose power is negative. The last
 /// cell of a strip keeps what reaches it: if it sticks on the whole it slips at its trailing end. Cells without traction have the slip
@@ -51,12 +60,13 @@ impl PowerTask<'_> {
 ///
 /// # Errors
 /// The monitor is asked once per strip and may stop the work.
-pub fn slips(task: &PowerTask, monitor: &dyn Monitor) -> Result<[Vec<f64>; 2], Stop> {
+pub fn cell_power(task: &PowerTask, monitor: &dyn Monitor) -> Result<CellPower, Stop> {
     let (level, answer) = (task.level, task.answer);
     let unit = level.scale.slip();
     let mut slip = [0, 1].map(|k| answer.slip[k].iter().map(|s| s * unit).collect::<Vec<_>>());
     if matches!(answer.exit, LevelExit::NoMotion | LevelExit::NoFriction) {
-        return Ok(slip);
+        let power = vec![0.0; level.area.len()];
+        return Ok(CellPower { power, slip });
     }
     let power = powers(task, monitor)?;
     for (i, power) in power.iter().enumerate() {
@@ -69,7 +79,7 @@ pub fn slips(task: &PowerTask, monitor: &dyn Monitor) -> Result<[Vec<f64>; 2], S
             }
         }
     }
-    Ok(slip)
+    Ok(CellPower { power, slip })
 }
 
 /// Power of every cell over the rolling speed, in N.

@@ -5,8 +5,6 @@ use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::words::solver::Output;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::patch::Patch;
-use crate::contact::post::local_power;
-use crate::contact::post::local_power::PowerTask;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::motion::Motion;
@@ -17,6 +15,8 @@ use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::skip::Skip;
 use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::solution::cell_values::{patch_cells, point_fields};
+use crate::contact::solution::maintain;
+use crate::contact::solution::maintain::SolvedMotion;
 use crate::contact::solution::words::{
     CombinedMaterial, ErrorEstimate, Fields, MeshReport, NormalisedMotion, Origin, PatchFields,
     PatchSolution, PointFields, PointSolution, Solution, SolverReport, Total,
@@ -64,7 +64,7 @@ impl<'a> Assembly<'a> {
     /// Adds the next motion.
     ///
     /// # Errors
-    /// The monitor may stop the work on values per cell.
+    /// The monitor may stop the work on what follows from it.
     pub fn add(
         &mut self,
         levels: &Levels,
@@ -75,33 +75,41 @@ impl<'a> Assembly<'a> {
         let fields = point.fields.as_ref();
         let level = fields.map(|fields| levels.get(fields.level));
         let on_level = level.as_deref().zip(fields);
-        self.remarks.extend(remarks(case, self.total.len(), point));
+        let index = self.total.len();
+        self.remarks.extend(remarks(case, index, point));
         if self.remarks.len() > REMARKS_AT_ONCE {
             self.remarks = merged(std::mem::take(&mut self.remarks));
         }
-        for (index, patch) in self.patches.iter().enumerate() {
-            self.points[index].push(point_solution(case, on_level, patch, index, point));
+        let patches = self.patches.iter().enumerate();
+        let mut points: Vec<PointSolution> = patches
+            .map(|(k, patch)| point_solution(case, on_level, patch, k, point))
+            .collect();
+        let speed = case.problem.speeds[index];
+        maintain::add_damage(case, &self.patches, speed, &mut points);
+        if let Some((level, fields)) = on_level {
+            let solved = SolvedMotion {
+                footprint: &self.pressed.footprint,
+                level,
+                answer: &fields.tangential,
+                motion: &point.motion,
+                method: point.method,
+                speed,
+            };
+            let kept = maintain::add_rest(case, solved, &mut points, monitor)?;
+            if wants_fields(case) {
+                self.add_fields(level, fields, kept);
+            }
         }
         self.total.push(total(case, &self.patches, point));
-        if let Some((level, fields)) = on_level.filter(|_| wants_fields(case)) {
-            self.add_fields(level, point, fields, monitor)?;
+        for (all, point) in self.points.iter_mut().zip(points) {
+            all.push(point);
         }
         Ok(())
     }
 
     /// Values per cell of the next motion; motions that were solved on one level share its cells.
-    fn add_fields(
-        &mut self,
-        level: &StripMesh,
-        point: &MotionAnswer,
-        found: &SolvedFields,
-        monitor: &dyn Monitor,
-    ) -> Result<(), Stop> {
+    fn add_fields(&mut self, level: &StripMesh, found: &SolvedFields, kept: Vec<PointFields>) {
         let case = self.case;
-        let slip = match case.run.wants(Output::Slip) {
-            true => Some(self.slips(level, point, found, monitor)?),
-            false => None,
-        };
         let patches = self.patches.len();
         self.fields
             .patches
@@ -111,44 +119,22 @@ impl<'a> Assembly<'a> {
         if known.is_none() {
             self.levels.push(found.level);
         }
-        for (index, fields) in self.fields.patches.iter_mut().enumerate() {
+        let patches = self.fields.patches.iter_mut().zip(kept).enumerate();
+        for (index, (fields, kept)) in patches {
             if known.is_none() {
                 fields.meshes.push(patch_cells(case, level, index));
             }
             let cells = level.patch_cells(index);
-            let [slip_x, slip_y] = [0, 1].map(|k| {
-                let slip: Option<&[Vec<f64>; 2]> = slip.as_ref();
-                slip.map(|slip| slip[k][cells.clone()].to_vec())
-            });
             let values = point_fields(case, level, cells, &found.tangential);
             fields.points.push(PointFields {
                 mesh,
-                slip_x,
-                slip_y,
+                slip_x: kept.slip_x,
+                slip_y: kept.slip_y,
+                temperature_c: kept.temperature_c,
+                subsurface: kept.subsurface,
                 ..values
             });
         }
-        Ok(())
-    }
-
-    /// Slip of every cell over the rolling speed, such that its power adds up to that of the patch.
-    fn slips(
-        &self,
-        level: &StripMesh,
-        point: &MotionAnswer,
-        found: &SolvedFields,
-        monitor: &dyn Monitor,
-    ) -> Result<[Vec<f64>; 2], Stop> {
-        let newest = self.points.iter().filter_map(|points| points.last());
-        let totals: Vec<f64> = newest.map(|point| point.friction_power_n).collect();
-        let task = PowerTask {
-            level,
-            answer: &found.tangential,
-            motion: &point.motion,
-            method: point.method,
-            totals: &totals,
-        };
-        local_power::slips(&task, monitor)
     }
 
     /// The answer.
@@ -183,15 +169,22 @@ impl<'a> Assembly<'a> {
             solver_version: env!("CARGO_PKG_VERSION").to_owned(),
             case_digest: case.label.digest.clone(),
             asked: Some(case.label.asked.clone()),
+            damage_parameters: case
+                .run
+                .after
+                .damage
+                .as_ref()
+                .map(|task| Box::new(task.used())),
         };
         (solution, self.fields)
     }
 }
 
-/// Whether any output with values per cell is requested.
+/// Whether any output is requested that is kept beside the solution.
 #[must_use]
 pub fn wants_fields(case: &CheckedCase) -> bool {
-    case.run.outputs.iter().any(|o| *o != Output::Resultants)
+    let kept = |output: &Output| output.is_per_cell() || *output == Output::Subsurface;
+    case.run.outputs.iter().any(kept)
 }
 
 fn patch_solution(case: &CheckedCase, patch: &Patch, points: Vec<PointSolution>) -> PatchSolution {
@@ -255,6 +248,9 @@ fn point_solution(
         },
         target_met: target_met(case, point),
         saturated: point.saturated,
+        subsurface: None,
+        damage: None,
+        temperature: None,
     }
 }
 

@@ -61,6 +61,8 @@ fn first_in_point(point: &PointFields) -> Option<String> {
         ("traction_y_mpa", point.traction_y_mpa.as_ref()),
         ("slip_x", point.slip_x.as_ref()),
         ("slip_y", point.slip_y.as_ref()),
+        ("temperature_c", point.temperature_c.as_ref()),
+        ("subsurface", point.subsurface.as_ref()),
     ])
 }
 

@@ -2,8 +2,11 @@
 
 pub mod assemble;
 pub mod cell_values;
+pub mod damage;
 pub mod finish;
 pub mod finite;
+pub mod maintain;
+pub mod maintenance;
 pub mod profile_quality;
 pub mod track_axes;
 pub mod understanding;

@@ -10,6 +10,8 @@ use crate::contact::case::words::contact::Load;
 use crate::contact::case::words::motion::MotionWords;
 use crate::contact::case::words::solver::MethodName;
 use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::solution::damage::{Damage, DamageFiguresUsed};
+use crate::contact::solution::maintenance::{SubsurfaceSummary, TemperatureSummary};
 use crate::contact::solution::profile_quality::{PatchQuality, ProfileUncertainty};
 use crate::contact::solution::zone::Zone;
 
@@ -43,6 +45,10 @@ pub struct Solution {
     #[serde(skip_serializing_if = "Option::is_none", default)]
     #[schema(nullable = false)]
     pub asked: Option<Asked>,
+    /// The figures that damage was computed with; only with the output `damage`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub damage_parameters: Option<Box<DamageFiguresUsed>>,
 }
 
 /// What of a case is needed to read its answer.
@@ -197,6 +203,18 @@ pub struct PointSolution {
     pub target_met: Option<bool>,
     /// A prescribed force could not be reached.
     pub saturated: bool,
+    /// Stresses below the surface in short; only with the output `subsurface`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub subsurface: Option<SubsurfaceSummary>,
+    /// Damage of one pass; only with the output `damage`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub damage: Option<Box<Damage>>,
+    /// Temperatures in short; only with the output `temperature`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub temperature: Option<TemperatureSummary>,
 }
 
 /// Creepages and spin made dimensionless with c = √(A/π) of the patch (√(ab) for an ellipse).
@@ -331,4 +349,8 @@ pub struct PointFields {
     pub slip_x: Option<Vec<f64>>,
     /// Slip across, divided by rolling speed.
     pub slip_y: Option<Vec<f64>>,
+    /// Temperature of both surfaces at the middle of the cell in °C.
+    pub temperature_c: Option<Vec<f64>>,
+    /// Stresses at the requested points, as [`stored`](crate::contact::post::subsurface::states::stored).
+    pub subsurface: Option<Vec<f64>>,
 }

@@ -69,6 +69,9 @@ pub struct Cells {
     /// Slip across, divided by rolling speed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slip_y: Option<Vec<f64>>,
+    /// Temperature of both surfaces in °C.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub temperature_c: Option<Vec<f64>>,
 }
 
 /// Values on a regular grid over the bounding box of the patch: `values[iy][ix]` at `(x_mm[ix], y_mm[iy])`, null
@@ -103,6 +106,9 @@ pub struct GriddedField {
     /// Slip across, divided by rolling speed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slip_y: Option<Vec<Vec<Option<f64>>>>,
+    /// Temperature of both surfaces in °C.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub temperature_c: Option<Vec<Vec<Option<f64>>>>,
 }
 
 /// The cells with the values of these outputs.
@@ -125,6 +131,9 @@ pub fn per_cell(fields: PatchCells, point: PointFields, outputs: &[Output]) -> C
     }
     if wanted(Output::Slip) {
         (cells.slip_x, cells.slip_y) = (point.slip_x, point.slip_y);
+    }
+    if wanted(Output::Temperature) {
+        cells.temperature_c = point.temperature_c;
     }
     if wanted(Output::Zones) {
         cells.zone = point.zone;
@@ -159,6 +168,7 @@ pub fn gridded(
         sample(Output::Slip, &point.slip_x),
         sample(Output::Slip, &point.slip_y),
     );
+    let temperature_c = sample(Output::Temperature, &point.temperature_c);
     if let Some(zone) = point
         .zone
         .as_ref()
@@ -174,6 +184,7 @@ pub fn gridded(
         pressure_mpa,
         slip_x,
         slip_y,
+        temperature_c,
         ..answer
     }
 }

@@ -40,7 +40,8 @@ impl JobResult {
         let mut links = BTreeMap::from([("resultants".to_owned(), format!("{own}/resultants"))]);
         for name in outputs.iter().map(AsRef::as_ref) {
             links.insert(name.to_owned(), format!("{own}/{name}"));
-            if name != name_of(Output::Resultants) {
+            let small = [Output::Resultants, Output::Subsurface, Output::Damage].map(name_of);
+            if !small.contains(&name) {
                 links.insert("fields".to_owned(), format!("{own}/fields"));
             }
         }
@@ -58,5 +59,8 @@ pub fn name_of(output: Output) -> &'static str {
         Output::Tractions => "tractions",
         Output::Pressure => "pressure",
         Output::Slip => "slip",
+        Output::Subsurface => "subsurface",
+        Output::Damage => "damage",
+        Output::Temperature => "temperature",
     }
 }

@@ -20,7 +20,7 @@ const LAST: [&str; 6] = [
 ];
 
 /// What else can be named, besides labels.
-const MORE: [&str; 17] = [
+const MORE: [&str; 22] = [
     "patch",
     "cached",
     "friction_coefficient",
@@ -38,6 +38,11 @@ const MORE: [&str; 17] = [
     "semi_axis_x_mm",
     "semi_axis_y_mm",
     "wheel_lowering_mm",
+    "usfd_depth_nm",
+    "archard_depth_nm",
+    "wlrm_damage",
+    "von_mises_max_mpa",
+    "temperature_max_c",
 ];
 
 /// Before the key of a label.
@@ -232,6 +237,11 @@ impl TableLine<'_> {
             }
             "friction_coefficient" => Some(self.solution.asked.as_ref()?.friction_coefficient),
             "wheel_lowering_mm" => self.solution.wheel_lowering_mm,
+            "usfd_depth_nm" | "archard_depth_nm" | "wlrm_damage" | "von_mises_max_mpa"
+            | "temperature_max_c" => {
+                let worst = self.parts().map(|(_, point)| maintenance(point, name));
+                worst.reduce(|a, b| Some(a?.max(b?))).flatten()
+            }
             _ => self.force(name).or_else(|| self.place(name)),
         }
     }
@@ -278,6 +288,19 @@ impl TableLine<'_> {
             "force_track_z_n" => Some(point.force_y_n * sin - patch.normal_force_n * cos),
             _ => None,
         }
+    }
+}
+
+/// Damage, stress and temperature of one patch.
+fn maintenance(point: &PointSolution, name: &str) -> Option<f64> {
+    let damage = point.damage.as_deref();
+    match name {
+        "usfd_depth_nm" => Some(damage?.usfd_wear?.depth_nm.value),
+        "archard_depth_nm" => Some(damage?.archard_wear?.depth_nm.value),
+        "wlrm_damage" => Some(damage?.wlrm?.damage_per_pass.value),
+        "von_mises_max_mpa" => Some(point.subsurface?.worst?.von_mises_mpa),
+        "temperature_max_c" => Some(point.temperature?.max_c),
+        _ => None,
     }
 }
 

@@ -7,5 +7,6 @@ pub mod npz;
 pub mod picture;
 pub mod pieces;
 pub mod resultants;
+pub mod stresses;
 pub mod table;
 pub mod vtk;

@@ -117,6 +117,7 @@ impl From<Cells> for Table {
             ("traction_y_mpa", cells.traction_y_mpa),
             ("slip_x", cells.slip_x),
             ("slip_y", cells.slip_y),
+            ("temperature_c", cells.temperature_c),
         ];
         Table {
             rows: Rows::Cells {
@@ -145,6 +146,7 @@ impl From<GriddedField> for Table {
             ("traction_y_mpa", flat(field.traction_y_mpa)),
             ("slip_x", flat(field.slip_x)),
             ("slip_y", flat(field.slip_y)),
+            ("temperature_c", flat(field.temperature_c)),
         ];
         Table {
             rows: Rows::Grid {

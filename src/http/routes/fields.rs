@@ -1,4 +1,4 @@
-//! `/v1/jobs/{id}/tractions`, `/pressure` and `/slip`: values per cell, or on a regular grid.
+//! `/v1/jobs/{id}/tractions`, `/pressure`, `/slip` and `/temperature`: values per cell, or on a regular grid.
 
 use axum::body::Body;
 use axum::http::{HeaderValue, header};
@@ -277,6 +277,28 @@ pub async fn pressure(request: PartRequest) -> Result<Response, ApiError> {
 )]
 pub async fn slip(request: PartRequest) -> Result<Response, ApiError> {
     answer(&request, Output::Slip).await
+}
+
+/// Temperature of both surfaces in the contact of a succeeded job; both bodies have the same there.
+///
+/// CSV, NPZ and VTK have the same names as the JSON; see `docs/formats.md`.
+#[utoipa::path(
+    get,
+    path = "/v1/jobs/{id}/temperature",
+    tag = "results",
+    operation_id = "get_temperature",
+    params(("id" = String, Path, description = "Id of the job", format = "uuid"), FieldQuery),
+    responses((status = 200, description = "Temperature at the middle of every cell, in °C", content(
+        (Field = "application/json"),
+        (String = "text/csv"),
+        (File = "application/x-npz"),
+        (File = "application/x-vtk"),
+        (String = "image/svg+xml"),
+        (File = "image/png")
+    )), FieldProblems)
+)]
+pub async fn temperature(request: PartRequest) -> Result<Response, ApiError> {
+    answer(&request, Output::Temperature).await
 }
 
 async fn answer(request: &PartRequest, output: Output) -> Result<Response, ApiError> {

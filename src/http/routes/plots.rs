@@ -31,6 +31,7 @@ query! {
             "traction" => Some(Output::Tractions),
             "pressure" => Some(Output::Pressure),
             "slip" => Some(Output::Slip),
+            "temperature" => Some(Output::Temperature),
             "zones" => Some(Output::Zones),
             _ => None,
         });

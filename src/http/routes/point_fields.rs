@@ -18,10 +18,11 @@ use crate::jobs::Jobs;
 use crate::jobs::error::JobsError;
 
 /// The parts that have a value per cell.
-const PARTS: [Output; 4] = [
+const PARTS: [Output; 5] = [
     Output::Pressure,
     Output::Tractions,
     Output::Slip,
+    Output::Temperature,
     Output::Zones,
 ];
 
@@ -36,7 +37,7 @@ query! {
         /// The patch, counted from 0; 0 when left out
         patch: usize as u32 = index();
         /// Parts that the case has among its `outputs`, with commas between; all of them when left out
-        #[param(pattern = "^(pressure|tractions|slip|zones)(,(pressure|tractions|slip|zones))*$", example = "pressure,tractions")]
+        #[param(pattern = "^(pressure|tractions|slip|temperature|zones)(,(pressure|tractions|slip|temperature|zones))*$", example = "pressure,tractions")]
         parts: Vec<Output> as String = parts();
         /// `NXxNY`: resample on a regular grid over the bounding box of the patch, 2 to 1000 samples along each axis, and
         /// 250 000 in all where the operator says nothing else

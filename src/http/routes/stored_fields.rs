@@ -49,7 +49,9 @@ pub fn has(cells: &PatchCells, values: &PointFields, output: Output) -> bool {
         Output::Pressure => cells.pressure_mpa.is_some(),
         Output::Slip => values.slip_x.is_some() && values.slip_y.is_some(),
         Output::Zones => values.zone.is_some(),
-        Output::Resultants => true,
+        Output::Temperature => values.temperature_c.is_some(),
+        Output::Subsurface => values.subsurface.is_some(),
+        Output::Resultants | Output::Damage => true,
     }
 }
 

@@ -45,6 +45,8 @@ pub fn encode(fields: &Fields) -> Result<Vec<u8>> {
             blocks.push_f64(at, "traction_y_mpa", values.traction_y_mpa.as_ref())?;
             blocks.push_f64(at, "slip_x", values.slip_x.as_ref())?;
             blocks.push_f64(at, "slip_y", values.slip_y.as_ref())?;
+            blocks.push_f64(at, "temperature_c", values.temperature_c.as_ref())?;
+            blocks.push_f64(at, "subsurface", values.subsurface.as_ref())?;
         }
     }
     let header = serde_json::to_vec(&Header {

@@ -9,7 +9,7 @@
 //! ```
 //!
 //! A block is a zstd frame with checksum; inside are `count` little-endian values of its kind (`f64`, `u32` or `u8`),
-//! in the cell order of [`PatchCells`]. Blocks stand patch by patch, in each patch first the cells of every mesh
+//! in the cell order of [`PatchCells`]; `subsurface` has nine for every requested point: x, y, depth and the stress. Blocks stand patch by patch, in each patch first the cells of every mesh
 //! (`point` is null), then motion by motion, so that one patch is one range of bytes. An array that was not computed
 //! has no block. Zones are `u8`: 0 stick, 1 slip.
 
@@ -226,6 +226,8 @@ impl Block {
             "traction_y_mpa" => point.traction_y_mpa = Some(read_f64(values)),
             "slip_x" => point.slip_x = Some(read_f64(values)),
             "slip_y" => point.slip_y = Some(read_f64(values)),
+            "temperature_c" => point.temperature_c = Some(read_f64(values)),
+            "subsurface" => point.subsurface = Some(read_f64(values)),
             other => return Err(format!("unknown block {other}")),
         }
         Ok(())
@@ -305,7 +307,9 @@ mod tests {
                         traction_x_mpa,
                         traction_y_mpa,
                         slip_x,
-                        slip_y,
+                        slip_y: slip_y.clone(),
+                        temperature_c: slip_y.clone(),
+                        subsurface: slip_y,
                     },
                 );
             (
@@ -340,7 +344,7 @@ mod tests {
                 o(&p.traction_x_mpa),
                 o(&p.traction_y_mpa),
                 o(&p.slip_x),
-                o(&p.slip_y),
+                [o(&p.slip_y), o(&p.temperature_c), o(&p.subsurface)],
             )
         });
         let points = points.collect::<Vec<_>>();

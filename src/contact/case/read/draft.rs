@@ -7,16 +7,20 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
+use crate::contact::case::after_tasks::AfterWords;
 use crate::contact::case::checks::{PartialCase, faults_of};
 use crate::contact::case::limits::Limits;
 use crate::contact::case::read::faults::{Faults, Interval};
 use crate::contact::case::read::object::{Object, has_controls, join, shown};
-use crate::contact::case::read::{contact, material, motion, solver};
+use crate::contact::case::read::{contact, damage, material, motion, solver, subsurface, thermal};
 use crate::contact::case::words::contact::{Contact, Load};
+use crate::contact::case::words::damage::DamageWords;
 use crate::contact::case::words::material::{Friction, Material};
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::question::Case;
 use crate::contact::case::words::solver::{Output, Solver};
+use crate::contact::case::words::subsurface::SubsurfaceWords;
+use crate::contact::case::words::thermal::ThermalWords;
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::rolling::methods::method::Method;
 
@@ -46,6 +50,10 @@ pub(crate) struct CaseDraft {
     motion: Option<Motions>,
     solver: Option<Solver>,
     outputs: Option<Vec<Output>>,
+    /// Of these the inner `None` means that the case does not want them.
+    subsurface: Option<Option<SubsurfaceWords>>,
+    damage: Option<Option<DamageWords>>,
+    thermal: Option<Option<ThermalWords>>,
 }
 
 impl Case {
@@ -84,6 +92,11 @@ impl CaseDraft {
             motion: self.motion.as_ref(),
             solver: self.solver.as_ref(),
             outputs: self.outputs.as_deref().unwrap_or_default(),
+            after: AfterWords {
+                subsurface: self.subsurface.as_ref().and_then(Option::as_ref),
+                damage: self.damage.as_ref().and_then(Option::as_ref),
+                thermal: self.thermal.as_ref().and_then(Option::as_ref),
+            },
         };
         faults_of(given, limits)
     }
@@ -100,6 +113,9 @@ impl CaseDraft {
             motion: self.motion?,
             solver: self.solver?,
             outputs: self.outputs?,
+            subsurface: self.subsurface?,
+            damage: self.damage?,
+            thermal: self.thermal?,
         })
     }
 }
@@ -107,8 +123,18 @@ impl CaseDraft {
 fn read(case: &mut Object) -> CaseDraft {
     case.only(
         &[
-            "name", "labels", "material", "friction", "contact", "load", "motion", "solver",
+            "name",
+            "labels",
+            "material",
+            "friction",
+            "contact",
+            "load",
+            "motion",
+            "solver",
             "outputs",
+            "subsurface",
+            "damage",
+            "thermal",
         ],
         &[],
     );
@@ -123,6 +149,9 @@ fn read(case: &mut Object) -> CaseDraft {
     let method = solver.as_ref().map(|solver| solver.method);
     let without_fields = method.filter(|method| !Method::from(*method).has_fields());
     let outputs = solver::read_outputs(case, without_fields);
+    let subsurface = subsurface::read(case, outputs.as_deref());
+    let damage = damage::read(case, outputs.as_deref(), without_fields.is_some());
+    let thermal = thermal::read(case, outputs.as_deref());
     CaseDraft {
         name,
         labels,
@@ -133,6 +162,9 @@ fn read(case: &mut Object) -> CaseDraft {
         motion,
         solver,
         outputs,
+        subsurface,
+        damage,
+        thermal,
     }
 }
 

@@ -1,6 +1,7 @@
 //! From JSON text to a case, with every fault of the text.
 
 pub mod contact;
+pub mod damage;
 pub mod draft;
 pub mod faults;
 pub mod material;
@@ -9,3 +10,5 @@ pub mod object;
 pub mod profiles;
 pub mod samples;
 pub mod solver;
+pub mod subsurface;
+pub mod thermal;

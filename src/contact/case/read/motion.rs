@@ -26,6 +26,8 @@ const COMPONENTS: [&str; 5] = [
     "force_x_n",
     "force_y_n",
 ];
+/// The member beside them.
+const SPEED_NAME: &str = "speed_mm_per_s";
 /// Place of the spin in [`COMPONENTS`].
 const SPIN_AT: usize = 2;
 /// Place of the first force.
@@ -83,9 +85,10 @@ pub(crate) fn read(case: &mut Object) -> Option<Motions> {
 fn motion(value: &Value, pointer: String, faults: &mut Faults) -> Option<AskedMotion> {
     let mut block = Object::open(value, pointer, faults)?;
     let mut read = [None; COMPONENTS.len()];
-    components(&mut block, &[], |block, k, name| {
+    components(&mut block, &[SPEED_NAME], |block, k, name| {
         read[k] = Some(block.number(name, interval(k)));
     })?;
+    let speed_mm_per_s = speed(&mut block)?;
     // A faulty number has left its fault behind and ends the reading here.
     if read.contains(&Some(None)) {
         return None;
@@ -98,7 +101,16 @@ fn motion(value: &Value, pointer: String, faults: &mut Faults) -> Option<AskedMo
         spin_per_mm: spin.unwrap_or(0.0),
         force_x_n,
         force_y_n,
+        speed_mm_per_s,
     })
+}
+
+/// The rolling speed, which may be left out; the outer `None` says that it is faulty.
+fn speed(block: &mut Object) -> Option<Option<f64>> {
+    match block.has(SPEED_NAME) {
+        true => block.number(SPEED_NAME, SPEED).map(Some),
+        false => Some(None),
+    }
 }
 
 fn wheelset(block: &mut Object) -> Option<Wheelset> {
@@ -155,9 +167,10 @@ fn wheelset(block: &mut Object) -> Option<Wheelset> {
 
 fn sweep(block: &mut Object) -> Option<Sweep> {
     let mut read = [const { None }; COMPONENTS.len()];
-    components(block, &["combine"], |block, k, name| {
+    components(block, &["combine", SPEED_NAME], |block, k, name| {
         read[k] = Some(swept(block, k, name));
     })?;
+    let speed_mm_per_s = speed(block)?;
     let combine = block.word(
         "combine",
         &[("together", Combine::Together), ("grid", Combine::Grid)],
@@ -177,6 +190,7 @@ fn sweep(block: &mut Object) -> Option<Sweep> {
         spin_per_mm,
         force_x_n,
         force_y_n,
+        speed_mm_per_s,
         combine: combine.unwrap_or_default(),
     };
     if sweep.combine == Combine::Together {

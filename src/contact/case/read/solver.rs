@@ -22,14 +22,16 @@ const TRACTION_BOUNDS: [(&str, TractionBoundName); 2] = [
     ("elliptic", TractionBoundName::Elliptic),
     ("parabolic", TractionBoundName::Parabolic),
 ];
-const OUTPUTS: [(&str, Output); 5] = [
+const OUTPUTS: [(&str, Output); 8] = [
     ("resultants", Output::Resultants),
     ("zones", Output::Zones),
     ("tractions", Output::Tractions),
     ("pressure", Output::Pressure),
     ("slip", Output::Slip),
+    ("subsurface", Output::Subsurface),
+    ("damage", Output::Damage),
+    ("temperature", Output::Temperature),
 ];
-const OUTPUTS_LATER: [&str; 2] = ["subsurface", "damage"];
 
 /// Reads the member `solver` of a case; left out, it is `auto` with the default target.
 pub(crate) fn read(case: &mut Object) -> Option<Solver> {
@@ -130,12 +132,12 @@ pub(crate) fn read_outputs(
         .enumerate()
         .map(|(k, element)| {
             let pointer = join(&pointer, k);
-            let output = word(element, &pointer, &OUTPUTS, &OUTPUTS_LATER, faults)?;
+            let output = word(element, &pointer, &OUTPUTS, &[], faults)?;
             let Some(method) = without_fields.filter(|_| output.needs_fields()) else {
                 return Some(output);
             };
             let detail = format!(
-                "{} given; \"method\": \"{}\" computes only \"resultants\"",
+                "{} given; \"method\": \"{}\" computes only \"resultants\" and \"damage\"",
                 shown(element),
                 method.name()
             );
@@ -152,7 +154,7 @@ pub(crate) fn read_outputs(
 impl Output {
     /// Is it made from tractions, slips or zones, which only some methods compute?
     fn needs_fields(self) -> bool {
-        self != Output::Resultants
+        !matches!(self, Output::Resultants | Output::Damage)
     }
 }
 

@@ -3,8 +3,12 @@
 use serde::Serialize;
 
 use crate::contact::case::words::contact::{Contact, Load};
+use crate::contact::case::words::damage::DamageWords;
+use crate::contact::case::words::material::Material;
 use crate::contact::case::words::motion::{MotionWords, Wheelset};
 use crate::contact::case::words::solver::{MeshSizeWords, MethodName, Output, TractionBoundName};
+use crate::contact::case::words::subsurface::SubsurfaceWords;
+use crate::contact::case::words::thermal::ThermalWords;
 use crate::contact::rolling::motion::PrescribedForces;
 
 /// Everything that determines the answer, in a fixed order; name and labels do not.
@@ -28,4 +32,14 @@ pub(crate) struct Canonical<'a> {
     pub(crate) mesh: Option<MeshSizeWords>,
     pub(crate) time_limit_s: Option<f64>,
     pub(crate) outputs: &'a [Output],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) subsurface: Option<&'a SubsurfaceWords>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) bodies: Option<&'a Material>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) damage: Option<&'a DamageWords>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) thermal: Option<&'a ThermalWords>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) speeds: Option<&'a [Option<f64>]>,
 }

@@ -2,7 +2,10 @@
 
 pub mod canonical;
 pub mod contact;
+pub mod damage;
 pub mod material;
 pub mod motion;
 pub mod question;
 pub mod solver;
+pub mod subsurface;
+pub mod thermal;

@@ -41,6 +41,10 @@ pub struct AskedMotion {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub force_y_n: Option<f64>,
+    /// Rolling speed in mm/s; only temperatures and Archard's wear depend on it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    pub speed_mm_per_s: Option<f64>,
 }
 
 /// One motion, a list of motions on the same patch, or a sweep.
@@ -115,6 +119,10 @@ pub struct Sweep {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub force_y_n: Option<Swept>,
+    /// Rolling speed in mm/s, the same for all motions; only temperatures and Archard's wear depend on it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    pub speed_mm_per_s: Option<f64>,
     /// `together` (default): all components that vary have the same number of values and run side by side; `grid`: every
     /// combination, the last named component fastest, a force in the place of its creepage.
     #[schema(required = false)]

@@ -9,9 +9,12 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::contact::case::words::contact::{Contact, Load};
+use crate::contact::case::words::damage::DamageWords;
 use crate::contact::case::words::material::{Friction, Material};
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::solver::{Output, Solver};
+use crate::contact::case::words::subsurface::SubsurfaceWords;
+use crate::contact::case::words::thermal::ThermalWords;
 
 /// One contact case: two bodies, how they are pressed together and how they roll.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -42,4 +45,16 @@ pub struct Case {
     /// What to compute; `["resultants", "zones"]` when left out.
     #[schema(required = false)]
     pub outputs: Vec<Output>,
+    /// Where stresses below the surface are computed; for the output `subsurface`, which finds the worst point without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub subsurface: Option<SubsurfaceWords>,
+    /// Which damage models are evaluated; for the output `damage`, which takes those with confirmed figures without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub damage: Option<DamageWords>,
+    /// What the bodies do with heat; for the output `temperature`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub thermal: Option<ThermalWords>,
 }

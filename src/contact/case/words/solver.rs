@@ -84,4 +84,10 @@ pub enum Output {
     Pressure,
     /// Slip per cell.
     Slip,
+    /// Stresses below the surface, at the points of `subsurface`.
+    Subsurface,
+    /// Wear and fatigue by the models of `damage`.
+    Damage,
+    /// Temperature of both surfaces per cell, with the constants of `thermal`.
+    Temperature,
 }

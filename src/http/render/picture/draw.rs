@@ -76,7 +76,7 @@ pub fn draw(scene: &Scene, width: u32) -> String {
     ground.borders(&mut svg, &frame);
     let arrows = match scene.shown {
         Output::Slip => (&scene.values.slip_x, &scene.values.slip_y),
-        Output::Pressure => (&None, &None),
+        Output::Pressure | Output::Temperature => (&None, &None),
         _ => (&scene.values.traction_x_mpa, &scene.values.traction_y_mpa),
     };
     let drawn = match arrows {

@@ -68,7 +68,13 @@ pub fn heat(scene: &Scene) -> Option<Heat> {
             unit: "",
             edge: AtBorder::Continues,
         }),
-        Output::Zones | Output::Resultants => None,
+        Output::Temperature => Some(Heat {
+            values: values.temperature_c.clone().unwrap_or_default(),
+            label: "temperature",
+            unit: "°C",
+            edge: AtBorder::Continues,
+        }),
+        Output::Zones | Output::Resultants | Output::Subsurface | Output::Damage => None,
     }
 }
 

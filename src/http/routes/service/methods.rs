@@ -129,6 +129,9 @@ pub async fn methods(
             Output::Tractions,
             Output::Pressure,
             Output::Slip,
+            Output::Subsurface,
+            Output::Damage,
+            Output::Temperature,
         ]
         .map(describe_output)
         .into(),
@@ -178,6 +181,18 @@ fn describe_output(output: Output) -> OutputCapability {
         Output::Tractions => (false, "Tangential tractions per cell."),
         Output::Pressure => (false, "Pressure per cell."),
         Output::Slip => (false, "Relative slip per cell, divided by rolling speed."),
+        Output::Subsurface => (
+            false,
+            "Stresses below the surface at the points of `subsurface`, and the worst point of every patch.",
+        ),
+        Output::Damage => (
+            false,
+            "Friction power, wear and fatigue of one pass by the models of `damage`.",
+        ),
+        Output::Temperature => (
+            false,
+            "Temperature of both surfaces per cell; needs `thermal` and `speed_mm_per_s` in the motion.",
+        ),
     };
     OutputCapability {
         name: output,

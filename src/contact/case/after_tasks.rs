@@ -1,0 +1,118 @@
+//! What a case asks for beyond its contact: stresses below the surface, damage, temperatures.
+
+use crate::contact::case::limits::Limits;
+use crate::contact::case::motions::ExpandedMotions;
+use crate::contact::case::subsurface;
+use crate::contact::case::words::damage::{DamageModel, DamageWords};
+use crate::contact::case::words::motion::Motions;
+use crate::contact::case::words::question::Case;
+use crate::contact::case::words::solver::Output;
+use crate::contact::case::words::subsurface::SubsurfaceWords;
+use crate::contact::case::words::thermal::{ThermalBodyWords, ThermalWords};
+use crate::contact::error::Fault;
+use crate::contact::post::damage::figures::DamageTask;
+use crate::contact::post::heat::{ThermalBody, ThermalTask};
+use crate::contact::post::subsurface::task::SubsurfaceTask;
+
+/// What is computed from solved motions; nothing where a case does not ask for it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct AfterTasks {
+    /// Stresses below the surface.
+    pub subsurface: Option<SubsurfaceTask>,
+    /// Damage.
+    pub damage: Option<DamageTask>,
+    /// Temperatures.
+    pub thermal: Option<ThermalTask>,
+}
+
+impl Case {
+    /// The words of what it asks for.
+    pub(crate) fn after_words(&self) -> AfterWords<'_> {
+        AfterWords {
+            subsurface: self.subsurface.as_ref(),
+            damage: self.damage.as_ref(),
+            thermal: self.thermal.as_ref(),
+        }
+    }
+}
+
+impl AfterTasks {
+    /// What a case asks for.
+    pub(crate) fn new(case: &Case) -> AfterTasks {
+        let subsurface = case.subsurface.as_ref();
+        AfterTasks {
+            subsurface: subsurface.map(|words| subsurface::task(words, &case.material)),
+            damage: case.damage.as_ref().map(DamageTask::new),
+            thermal: case.thermal.map(ThermalTask::from),
+        }
+    }
+
+    /// Is the power of every cell needed?
+    #[must_use]
+    pub fn needs_power(&self, outputs: &[Output]) -> bool {
+        let across = self.damage.as_ref().is_some_and(|task| task.across);
+        across || self.thermal.is_some() || outputs.contains(&Output::Slip)
+    }
+}
+
+/// The words of what a case asks for, as far as they could be read.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct AfterWords<'a> {
+    pub(crate) subsurface: Option<&'a SubsurfaceWords>,
+    pub(crate) damage: Option<&'a DamageWords>,
+    pub(crate) thermal: Option<&'a ThermalWords>,
+}
+
+impl AfterWords<'_> {
+    /// Points of every motion at which stresses are answered.
+    pub(crate) fn stress_points(&self) -> usize {
+        self.subsurface.map_or(0, subsurface::count)
+    }
+
+    /// Faults beside the motions, which were written as `given`.
+    pub(crate) fn faults(
+        &self,
+        given: &Motions,
+        motions: &ExpandedMotions,
+        limits: &Limits,
+    ) -> Vec<Fault> {
+        let mut faults = Vec::new();
+        if let Some(words) = self.subsurface {
+            faults.extend(subsurface::fault(words, motions.motions.len(), limits));
+        }
+        let archard = self
+            .damage
+            .is_some_and(|damage| damage.models.contains(&DamageModel::ArchardWear));
+        let needed = match (self.thermal, archard) {
+            (Some(_), _) => Some("temperature"),
+            (None, true) => Some("archard_wear"),
+            (None, false) => None,
+        };
+        faults.extend(needed.and_then(|what| motions.speed_fault(given, what)));
+        faults
+    }
+}
+
+impl From<ThermalWords> for ThermalTask {
+    fn from(words: ThermalWords) -> ThermalTask {
+        let (lower, upper) = match words {
+            ThermalWords::Same(both) => (both, both),
+            ThermalWords::Pair { lower, upper } => (lower, upper),
+        };
+        ThermalTask {
+            lower: lower.into(),
+            upper: upper.into(),
+        }
+    }
+}
+
+impl From<ThermalBodyWords> for ThermalBody {
+    fn from(words: ThermalBodyWords) -> ThermalBody {
+        ThermalBody {
+            conductivity: words.conductivity_w_per_mk,
+            density: words.density_kg_per_m3,
+            specific_heat: words.specific_heat_j_per_kgk,
+            bulk: words.bulk_c,
+        }
+    }
+}

@@ -1,0 +1,39 @@
+//! How long what follows from solved motions will take.
+
+use crate::contact::case::problem::CheckedCase;
+use crate::contact::post::subsurface::task::StressPlaces;
+
+/// Time in s for a stress below the surface; for the worst point of a patch; for the power of all cells of a usual mesh; for the rest. Of
+/// `cargo bench --bench stress -- --only after`, medians over 18 ellipses; a fine mesh takes several times as long.
+const STRESS_SECONDS: f64 = 1e-4;
+const WORST_SECONDS: f64 = 0.11;
+const POWER_SECONDS: f64 = 6e-5;
+const DAMAGE_SECONDS: f64 = 3e-6;
+
+impl CheckedCase {
+    /// Estimated time in s for what follows from one solved motion, for so many patches.
+    pub(crate) fn after_seconds(&self, patches: usize) -> f64 {
+        let after = &self.run.after;
+        let patches = patches as f64;
+        let mut seconds = 0.0;
+        if let Some(task) = &after.subsurface {
+            let (count, below_worst) = match &task.places {
+                StressPlaces::Points(points) => (points.len() as f64, false),
+                StressPlaces::BelowWorst(depths) => (patches * depths.len() as f64, true),
+            };
+            let searched = if task.worst || below_worst {
+                patches
+            } else {
+                0.0
+            };
+            seconds += STRESS_SECONDS * count + WORST_SECONDS * searched;
+        }
+        if after.needs_power(&self.run.outputs) {
+            seconds += POWER_SECONDS * patches;
+        }
+        if after.damage.is_some() {
+            seconds += DAMAGE_SECONDS * patches;
+        }
+        seconds
+    }
+}

@@ -1,0 +1,223 @@
+//! Reads `damage`: models, figures, and whether wear is wanted strip by strip.
+
+use serde_json::Value;
+
+use crate::contact::case::read::faults::Interval;
+use crate::contact::case::read::object::{Object, join, number, shown, word};
+use crate::contact::case::read::subsurface::{flag, optional};
+use crate::contact::case::words::damage::{
+    ArchardFigures, DamageModel, DamageParameterWords, DamageSetName, DamageWords,
+    OwnDamageFigures, UsfdFigures, WlrmFigures,
+};
+use crate::contact::case::words::solver::Output;
+
+const MODELS: [(&str, DamageModel); 6] = [
+    ("t_gamma", DamageModel::TGamma),
+    ("usfd_wear", DamageModel::UsfdWear),
+    ("archard_wear", DamageModel::ArchardWear),
+    ("wlrm", DamageModel::Wlrm),
+    ("surface_fatigue_index", DamageModel::SurfaceFatigueIndex),
+    ("shakedown", DamageModel::Shakedown),
+];
+/// Evaluated where none is named: those whose figures are confirmed.
+const DEFAULT_MODELS: [DamageModel; 2] = [DamageModel::TGamma, DamageModel::UsfdWear];
+const SETS: [(&str, DamageSetName); 1] = [("900a-r8t-1", DamageSetName::Rail900aWheelR8t)];
+const DENSITY: Interval = Interval::positive(1e5, "kg/m³");
+const STRESS: Interval = Interval::positive(1e6, "MPa");
+const FIGURE: Interval = Interval::positive(1e12, "");
+
+/// Reads the member `damage` of a case, which belongs to the output of that name; left out, it has the default models.
+///
+/// The outer `None` says that a fault was found. A method without fields gives no wear across.
+pub(crate) fn read(
+    case: &mut Object,
+    outputs: Option<&[Output]>,
+    without_fields: bool,
+) -> Option<Option<DamageWords>> {
+    let wanted = outputs.is_none_or(|outputs| outputs.contains(&Output::Damage));
+    if !case.has("damage") {
+        return Some(wanted.then(|| DamageWords {
+            models: DEFAULT_MODELS.to_vec(),
+            parameters: None,
+            across: false,
+        }));
+    }
+    if !wanted {
+        let detail = "given without \"damage\" among the outputs; add it there or leave this out";
+        case.fault("damage", detail);
+        return None;
+    }
+    let mut block = case.child("damage")?;
+    block.only(&["models", "parameters", "across"], &[]);
+    let models = optional(&mut block, "models", models);
+    let parameters = optional(&mut block, "parameters", parameters);
+    let across = optional(&mut block, "across", flag);
+    if without_fields && across == Some(Some(true)) {
+        let detail =
+            "true given; the method has no values per cell that wear across the patch is made from";
+        block.fault("across", detail);
+        return None;
+    }
+    Some(Some(DamageWords {
+        models: models?.unwrap_or_else(|| DEFAULT_MODELS.to_vec()),
+        parameters: parameters?,
+        across: across?.unwrap_or(false),
+    }))
+}
+
+fn models(block: &mut Object, name: &str) -> Option<Vec<DamageModel>> {
+    let value = block.value(name)?;
+    let elements = value.as_array().filter(|elements| !elements.is_empty());
+    let Some(elements) = elements else {
+        let words = MODELS.map(|(word, _)| word).join(", ");
+        let detail = format!(
+            "{} given; an array with at least one of {words} is needed",
+            shown(value)
+        );
+        block.fault(name, detail);
+        return None;
+    };
+    let pointer = block.pointer_to(name);
+    let faults = block.faults();
+    let one = |(k, element)| word(element, &join(&pointer, k), &MODELS, &[], faults);
+    let read: Vec<Option<DamageModel>> = elements.iter().enumerate().map(one).collect();
+    let mut models: Vec<DamageModel> = read.into_iter().collect::<Option<_>>()?;
+    models.sort_unstable();
+    models.dedup();
+    Some(models)
+}
+
+fn parameters(block: &mut Object, name: &str) -> Option<DamageParameterWords> {
+    if matches!(block.value(name)?, Value::Object(_)) {
+        return own(&mut block.child(name)?).map(|own| DamageParameterWords::Own(Box::new(own)));
+    }
+    block
+        .word(name, &SETS, &[])
+        .map(DamageParameterWords::Named)
+}
+
+fn own(block: &mut Object) -> Option<OwnDamageFigures> {
+    let names = [
+        "density_kg_per_m3",
+        "shear_yield_mpa",
+        "hardness_mpa",
+        "usfd",
+        "archard",
+        "wlrm",
+    ];
+    block.only(&names, &[]);
+    let density = optional(block, "density_kg_per_m3", |block, name| {
+        block.number(name, DENSITY)
+    });
+    let shear_yield = optional(block, "shear_yield_mpa", |block, name| {
+        block.number(name, STRESS)
+    });
+    let hardness = optional(block, "hardness_mpa", |block, name| {
+        block.number(name, STRESS)
+    });
+    let usfd = optional(block, "usfd", |block, name| usfd(&mut block.child(name)?));
+    let archard = optional(block, "archard", |block, name| {
+        archard(&mut block.child(name)?)
+    });
+    let wlrm = optional(block, "wlrm", |block, name| wlrm(&mut block.child(name)?));
+    Some(OwnDamageFigures {
+        density_kg_per_m3: density?,
+        shear_yield_mpa: shear_yield?,
+        hardness_mpa: hardness?,
+        usfd: usfd?,
+        archard: archard?,
+        wlrm: wlrm?,
+    })
+}
+
+fn usfd(block: &mut Object) -> Option<UsfdFigures> {
+    let names = [
+        "mild_slope",
+        "mild_until",
+        "severe_until",
+        "catastrophic_slope",
+    ];
+    block.only(&names, &[]);
+    let [slope, mild, severe, steep] = names.map(|name| block.required_number(name, FIGURE));
+    let figures = UsfdFigures {
+        mild_slope: slope?,
+        mild_until: mild?,
+        severe_until: severe?,
+        catastrophic_slope: steep?,
+    };
+    in_order(
+        block,
+        "severe_until",
+        [figures.mild_until, figures.severe_until],
+    )?;
+    Some(figures)
+}
+
+fn archard(block: &mut Object) -> Option<ArchardFigures> {
+    let names = [
+        "mild",
+        "severe",
+        "seizure",
+        "speeds_mm_per_s",
+        "seizure_pressure",
+    ];
+    block.only(&names, &[]);
+    let pairs = [0, 1, 2, 3].map(|k| pair(block, names[k]));
+    let seizure_pressure = block.required_number(names[4], FIGURE);
+    let [mild, severe, seizure, speeds_mm_per_s] = pairs;
+    Some(ArchardFigures {
+        mild: mild?,
+        severe: severe?,
+        seizure: seizure?,
+        speeds_mm_per_s: speeds_mm_per_s?,
+        seizure_pressure: seizure_pressure?,
+    })
+}
+
+fn wlrm(block: &mut Object) -> Option<WlrmFigures> {
+    let names = ["threshold_n", "peak_at_n", "zero_at_n", "peak"];
+    block.only(&names, &[]);
+    let [threshold, peak_at, zero_at, peak] = names.map(|name| block.required_number(name, FIGURE));
+    let figures = WlrmFigures {
+        threshold_n: threshold?,
+        peak_at_n: peak_at?,
+        zero_at_n: zero_at?,
+        peak: peak?,
+    };
+    in_order(block, "peak_at_n", [figures.threshold_n, figures.peak_at_n])?;
+    in_order(block, "zero_at_n", [figures.peak_at_n, figures.zero_at_n])?;
+    Some(figures)
+}
+
+/// `[low, high]`, both more than 0, in order.
+fn pair(block: &mut Object, name: &str) -> Option<[f64; 2]> {
+    let value = block.required(name, "[low, high]")?;
+    let pointer = block.pointer_to(name);
+    let Some([low, high]) = value.as_array().map(Vec::as_slice) else {
+        block.fault(
+            name,
+            format!("{} given; [low, high] is needed", shown(value)),
+        );
+        return None;
+    };
+    let faults = block.faults();
+    let low = number(low, &join(&pointer, 0), FIGURE, faults);
+    let high = number(high, &join(&pointer, 1), FIGURE, faults);
+    let (low, high) = (low?, high?);
+    if low > high {
+        block.fault(
+            name,
+            format!("[{low}, {high}] given; the first may not be larger"),
+        );
+        return None;
+    }
+    Some([low, high])
+}
+
+fn in_order(block: &mut Object, name: &str, [before, after]: [f64; 2]) -> Option<()> {
+    if before < after {
+        return Some(());
+    }
+    block.fault(name, format!("{after} given; more than {before} is needed"));
+    None
+}

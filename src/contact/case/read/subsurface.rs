@@ -1,0 +1,215 @@
+//! Reads `subsurface`: where stresses are asked for.
+
+use serde_json::Value;
+
+use crate::contact::case::read::faults::Interval;
+use crate::contact::case::read::object::{Object, join, number, shown};
+use crate::contact::case::words::solver::Output;
+use crate::contact::case::words::subsurface::{
+    BodyName, DepthLineAt, FoundPlace, GridAxis, StressGrid, SubsurfaceWords,
+};
+
+const COORDINATE: Interval = Interval::closed(-1e6, 1e6, "mm");
+const DEPTH: Interval = Interval::closed(0.0, 1e6, "mm");
+/// Most points of one list or axis, before the limit of the service.
+const COUNT_MAX: u32 = 1_000_000;
+const PLACES: [&str; 3] = ["points_mm", "along_depth_at_mm", "plane"];
+
+/// Reads the member `subsurface` of a case, which belongs to the output of that name; left out, it asks for the worst point.
+///
+/// The outer `None` says that a fault was found.
+pub(crate) fn read(
+    case: &mut Object,
+    outputs: Option<&[Output]>,
+) -> Option<Option<SubsurfaceWords>> {
+    let wanted = outputs.is_none_or(|outputs| outputs.contains(&Output::Subsurface));
+    if !case.has("subsurface") {
+        return Some(wanted.then_some(SubsurfaceWords {
+            points_mm: None,
+            along_depth_at_mm: None,
+            depths_mm: None,
+            plane: None,
+            body: BodyName::Lower,
+            worst: true,
+        }));
+    }
+    if !wanted {
+        let detail =
+            "given without \"subsurface\" among the outputs; add it there or leave this out";
+        case.fault("subsurface", detail);
+        return None;
+    }
+    words(&mut case.child("subsurface")?).map(Some)
+}
+
+fn words(block: &mut Object) -> Option<SubsurfaceWords> {
+    let names = [
+        "points_mm",
+        "along_depth_at_mm",
+        "depths_mm",
+        "plane",
+        "body",
+        "worst",
+    ];
+    block.only(&names, &[]);
+    let given: Vec<&str> = PLACES.into_iter().filter(|name| block.has(name)).collect();
+    if let [first, second, ..] = given[..] {
+        let detail = format!("given together with {first}; at most one of the two is allowed");
+        block.fault(second, detail);
+        return None;
+    }
+    let points_mm = optional(block, "points_mm", points);
+    let along_depth_at_mm = optional(block, "along_depth_at_mm", line_at);
+    let depths_mm = optional(block, "depths_mm", |block, name| list(block, name, DEPTH));
+    let plane = optional(block, "plane", |block, name| grid(&mut block.child(name)?));
+    let bodies = [("lower", BodyName::Lower), ("upper", BodyName::Upper)];
+    let body = optional(block, "body", |block, name| block.word(name, &bodies, &[]));
+    let worst = optional(block, "worst", flag);
+    match (block.has("along_depth_at_mm"), block.has("depths_mm")) {
+        (true, false) => {
+            block.required("depths_mm", "an array of depths in mm")?;
+        }
+        (false, true) => {
+            let detail = "given without along_depth_at_mm; the depths belong to its line";
+            block.fault("depths_mm", detail);
+            return None;
+        }
+        _ => {}
+    }
+    Some(SubsurfaceWords {
+        points_mm: points_mm?,
+        along_depth_at_mm: along_depth_at_mm?,
+        depths_mm: depths_mm?,
+        plane: plane?,
+        body: body?.unwrap_or_default(),
+        worst: worst?.unwrap_or(true),
+    })
+}
+
+fn grid(block: &mut Object) -> Option<StressGrid> {
+    block.only(&["x_mm", "y_mm", "depths_mm"], &[]);
+    let x_mm = axis(block, "x_mm", COORDINATE);
+    let y_mm = axis(block, "y_mm", COORDINATE);
+    let depths_mm = axis(block, "depths_mm", DEPTH);
+    Some(StressGrid {
+        x_mm: x_mm?,
+        y_mm: y_mm?,
+        depths_mm: depths_mm?,
+    })
+}
+
+/// A member that may be left out; the outer `None` says that it is faulty.
+pub(crate) fn optional<T>(
+    block: &mut Object,
+    name: &str,
+    read: impl FnOnce(&mut Object, &str) -> Option<T>,
+) -> Option<Option<T>> {
+    if !block.has(name) {
+        return Some(None);
+    }
+    read(block, name).map(Some)
+}
+
+/// `true` or `false`.
+pub(crate) fn flag(block: &mut Object, name: &str) -> Option<bool> {
+    let value = block.value(name)?;
+    let flag = value.as_bool();
+    if flag.is_none() {
+        block.fault(
+            name,
+            format!("{} given; true or false is needed", shown(value)),
+        );
+    }
+    flag
+}
+
+fn points(block: &mut Object, name: &str) -> Option<Vec<[f64; 3]>> {
+    let what = "an array of points [x, y, depth] in mm";
+    let value = block.value(name)?;
+    let elements = value.as_array().filter(|elements| !elements.is_empty());
+    let Some(elements) = elements else {
+        block.fault(name, format!("{} given; {what} is needed", shown(value)));
+        return None;
+    };
+    let pointer = block.pointer_to(name);
+    let faults = block.faults();
+    let mut read = Vec::with_capacity(elements.len());
+    for (k, element) in elements.iter().enumerate() {
+        let pointer = join(&pointer, k);
+        let Some([x, y, depth]) = element.as_array().map(Vec::as_slice) else {
+            faults.add(
+                pointer,
+                format!(
+                    "{} given; three numbers [x, y, depth] in mm are needed",
+                    shown(element)
+                ),
+            );
+            continue;
+        };
+        let x = number(x, &join(&pointer, 0), COORDINATE, faults);
+        let y = number(y, &join(&pointer, 1), COORDINATE, faults);
+        let depth = number(depth, &join(&pointer, 2), DEPTH, faults);
+        if let (Some(x), Some(y), Some(depth)) = (x, y, depth) {
+            read.push([x, y, depth]);
+        }
+    }
+    (read.len() == elements.len()).then_some(read)
+}
+
+fn line_at(block: &mut Object, name: &str) -> Option<DepthLineAt> {
+    let value = block.value(name)?;
+    if value.as_str() == Some("worst") {
+        return Some(DepthLineAt::Found(FoundPlace::Worst));
+    }
+    let pointer = block.pointer_to(name);
+    if let Some([x, y]) = value.as_array().map(Vec::as_slice) {
+        let faults = block.faults();
+        let x = number(x, &join(&pointer, 0), COORDINATE, faults);
+        let y = number(y, &join(&pointer, 1), COORDINATE, faults);
+        return Some(DepthLineAt::Place([x?, y?]));
+    }
+    let detail = format!(
+        "{} given; [x, y] in mm or \"worst\" is needed",
+        shown(value)
+    );
+    block.fault(name, detail);
+    None
+}
+
+fn list(block: &mut Object, name: &str, allowed: Interval) -> Option<Vec<f64>> {
+    let value = block.value(name)?;
+    let elements = value.as_array().filter(|elements| !elements.is_empty());
+    let Some(elements) = elements else {
+        let detail = format!(
+            "{} given; an array of numbers in mm is needed",
+            shown(value)
+        );
+        block.fault(name, detail);
+        return None;
+    };
+    let pointer = block.pointer_to(name);
+    let faults = block.faults();
+    let one = |(k, value)| number(value, &join(&pointer, k), allowed, faults);
+    let read: Vec<Option<f64>> = elements.iter().enumerate().map(one).collect();
+    read.into_iter().collect()
+}
+
+fn axis(block: &mut Object, name: &str, allowed: Interval) -> Option<GridAxis> {
+    let what = "a number, an array of numbers or {\"from\", \"to\", \"points\"}";
+    match block.required(name, what)? {
+        Value::Array(_) => list(block, name, allowed).map(GridAxis::List),
+        Value::Object(_) => {
+            let mut block = block.child(name)?;
+            block.only(&["from", "to", "points"], &[]);
+            let from = block.required_number("from", allowed);
+            let to = block.required_number("to", allowed);
+            let points = block.required_count("points", 2, COUNT_MAX);
+            Some(GridAxis::Spaced {
+                from: from?,
+                to: to?,
+                points: points?,
+            })
+        }
+        _ => block.number(name, allowed).map(GridAxis::One),
+    }
+}

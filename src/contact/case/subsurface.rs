@@ -1,0 +1,104 @@
+//! From words to task: where stresses below the surface are computed, and in which body.
+
+use crate::contact::case::limits::Limits;
+use crate::contact::case::words::material::Material;
+use crate::contact::case::words::subsurface::{
+    BodyName, DepthLineAt, FoundPlace, GridAxis, StressGrid, SubsurfaceWords,
+};
+use crate::contact::error::Fault;
+use crate::contact::post::subsurface::task::{LoadedBody, StressPlaces, SubsurfaceTask};
+
+/// Number of points of every motion.
+pub(crate) fn count(words: &SubsurfaceWords) -> usize {
+    let grid = |grid: &StressGrid| {
+        let sides = [&grid.x_mm, &grid.y_mm, &grid.depths_mm];
+        let counts = sides.map(|axis| axis.count());
+        counts.into_iter().fold(1, usize::saturating_mul)
+    };
+    let points = words.points_mm.as_ref().map(Vec::len);
+    let depths = words.depths_mm.as_ref().map(Vec::len);
+    let grid = words.plane.as_ref().map(grid);
+    points.or(depths).or(grid).unwrap_or(0)
+}
+
+/// The fault of a case with more stresses than the limits allow.
+pub(crate) fn fault(words: &SubsurfaceWords, motions: usize, limits: &Limits) -> Option<Fault> {
+    let count = count(words).saturating_mul(motions);
+    (count > limits.samples_max).then(|| {
+        Fault::new(
+            "/subsurface",
+            format!(
+                "{count} points over all motions given; at most {} are allowed in one case",
+                limits.samples_max
+            ),
+        )
+    })
+}
+
+/// The task of a checked case.
+pub(crate) fn task(words: &SubsurfaceWords, material: &Material) -> SubsurfaceTask {
+    let (lower, upper) = match material {
+        Material::Same(both) => (both, both),
+        Material::Pair { lower, upper } => (lower, upper),
+    };
+    let (body, elastic) = match words.body {
+        BodyName::Lower => (LoadedBody::Lower, lower),
+        BodyName::Upper => (LoadedBody::Upper, upper),
+    };
+    SubsurfaceTask {
+        places: places(words),
+        body,
+        poisson_ratio: elastic.poisson_ratio,
+        worst: words.worst,
+    }
+}
+
+fn places(words: &SubsurfaceWords) -> StressPlaces {
+    let depths = words.depths_mm.as_deref().unwrap_or_default();
+    if let Some(points) = &words.points_mm {
+        return StressPlaces::Points(points.clone());
+    }
+    if let Some(grid) = &words.plane {
+        let [xs, ys] = [&grid.x_mm, &grid.y_mm].map(|axis| axis.values());
+        let mut points = Vec::with_capacity(count(words));
+        for depth in grid.depths_mm.values() {
+            for y in &ys {
+                points.extend(xs.iter().map(|x| [*x, *y, depth]));
+            }
+        }
+        return StressPlaces::Points(points);
+    }
+    match words.along_depth_at_mm {
+        Some(DepthLineAt::Place([x, y])) => {
+            StressPlaces::Points(depths.iter().map(|depth| [x, y, *depth]).collect())
+        }
+        Some(DepthLineAt::Found(FoundPlace::Worst)) => StressPlaces::BelowWorst(depths.to_vec()),
+        None => StressPlaces::Points(Vec::new()),
+    }
+}
+
+impl GridAxis {
+    /// Number of coordinates.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        match self {
+            GridAxis::One(_) => 1,
+            GridAxis::List(list) => list.len(),
+            GridAxis::Spaced { points, .. } => *points as usize,
+        }
+    }
+
+    /// The coordinates.
+    #[must_use]
+    pub fn values(&self) -> Vec<f64> {
+        match self {
+            GridAxis::One(value) => vec![*value],
+            GridAxis::List(list) => list.clone(),
+            GridAxis::Spaced { from, to, points } => {
+                let last = f64::from(points.saturating_sub(1).max(1));
+                let at = |k: u32| from + (to - from) * (f64::from(k) / last);
+                (0..*points).map(at).collect()
+            }
+        }
+    }
+}

@@ -1,0 +1,189 @@
+//! What a solved contact does to the surfaces, as the client reads it.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::contact::case::words::damage::{
+    ArchardFigures, DamageModel, DamageSetName, UsfdFigures, WlrmFigures,
+};
+
+/// A number with the interval that the errors of its inputs leave; without an estimate of these there is none.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Ranged {
+    /// The number.
+    pub value: f64,
+    /// Least value.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub low: Option<f64>,
+    /// Largest value.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub high: Option<f64>,
+}
+
+/// Damage of one pass over one patch: what the case asked for. Depths are of the body that is passed once.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = DamageAnswer)]
+pub struct Damage {
+    /// Friction power over rolling speed.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub t_gamma: Option<TGamma>,
+    /// Wear by the power per area.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub usfd_wear: Option<UsfdWear>,
+    /// Wear by Archard's law.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub archard_wear: Option<ArchardWear>,
+    /// Rolling contact fatigue by the Whole Life Rail Model.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub wlrm: Option<RailFatigue>,
+    /// Surface fatigue index.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub surface_fatigue_index: Option<SurfaceFatigue>,
+    /// Place on the shakedown map.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub shakedown: Option<ShakedownPlace>,
+    /// Wear strip by strip.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub across: Option<WearAcross>,
+}
+
+/// Friction power over rolling speed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct TGamma {
+    /// ν_x F_x + ν_y F_y + φ M_z in N.
+    pub with_spin_n: Ranged,
+    /// |ν_x F_x| + |ν_y F_y| in N.
+    pub without_spin_n: Ranged,
+    /// With spin, over the area, in N/mm².
+    pub over_area_n_per_mm2: Ranged,
+}
+
+/// A regime of wear.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum WearRegime {
+    /// Mild.
+    Mild,
+    /// Severe.
+    Severe,
+    /// Catastrophic, of the wear map.
+    Catastrophic,
+    /// Seizure, of Archard's coefficients.
+    Seizure,
+}
+
+/// Wear by the power per area.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct UsfdWear {
+    /// Regime of the map.
+    pub regime: WearRegime,
+    /// Rate in µg per m rolled and mm² of contact.
+    pub rate_ug_per_m_mm2: Ranged,
+    /// Mass per m rolled, in µg.
+    pub mass_ug_per_m: Ranged,
+    /// Depth of one pass in nm, the mean over the width of the patch.
+    pub depth_nm: Ranged,
+}
+
+/// Wear by Archard's law.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ArchardWear {
+    /// Regime of the coefficients at the mean sliding speed and the mean pressure.
+    pub regime: WearRegime,
+    /// Mean sliding speed in mm/s: Tγ over the friction limit, times the rolling speed.
+    pub sliding_speed_mm_per_s: f64,
+    /// Coefficient K.
+    pub coefficient: Ranged,
+    /// Volume per m rolled, in mm³.
+    pub volume_mm3_per_m: Ranged,
+    /// Depth of one pass in nm, the mean over the width of the patch.
+    pub depth_nm: Ranged,
+}
+
+/// Rolling contact fatigue by the Whole Life Rail Model.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct RailFatigue {
+    /// Tγ that the damage is taken at: without spin, in N.
+    pub t_gamma_n: Ranged,
+    /// Damage of one pass: 1 is a visible crack, below 0 wear removes cracks.
+    pub damage_per_pass: Ranged,
+}
+
+/// Surface fatigue index.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct SurfaceFatigue {
+    /// Tangential over normal force.
+    pub utilisation: Ranged,
+    /// Utilisation less 2 A k/(3 N), with the area A, the yield in shear k and the normal force N: above 0 the surface ratchets.
+    pub index: Ranged,
+    /// Largest traction less the yield in shear, in MPa: above 0 the surface ratchets there. Absent from methods without tractions.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub traction_excess_mpa: Option<f64>,
+}
+
+/// Place on the shakedown map.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ShakedownPlace {
+    /// Tangential over normal force.
+    pub utilisation: Ranged,
+    /// Largest pressure over yield in shear.
+    pub load_factor: f64,
+    /// Load factor at the limit of shakedown: the subsurface limit, or 1 over the utilisation where that is less.
+    pub limit: f64,
+    /// Load factor over the limit: above 1 plastic strain goes on with every pass.
+    pub over_limit: Ranged,
+    /// Whether it is above 1.
+    pub ratchets: bool,
+}
+
+/// Wear strip by strip, from smaller to larger y.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+pub struct WearAcross {
+    /// Middle of the strip in mm.
+    pub y_mm: Vec<f64>,
+    /// Width of the strip in mm.
+    pub dy_mm: Vec<f64>,
+    /// Friction power over rolling speed per width, in N/mm; its sum over the strips, times their widths, is Tγ with spin.
+    pub t_gamma_n_per_mm: Vec<f64>,
+    /// Depth of one pass by the wear map, in nm.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub usfd_depth_nm: Option<Vec<f64>>,
+    /// Depth of one pass by Archard's law, in nm.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub archard_depth_nm: Option<Vec<f64>>,
+}
+
+/// The figures that damage was computed with.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct DamageFiguresUsed {
+    /// The named set; figures under one name never change.
+    pub set: DamageSetName,
+    /// Density in kg/m³.
+    pub density_kg_per_m3: f64,
+    /// Yield in shear in MPa.
+    pub shear_yield_mpa: f64,
+    /// Hardness in MPa.
+    pub hardness_mpa: f64,
+    /// The wear map.
+    pub usfd: UsfdFigures,
+    /// The map of Archard's coefficients.
+    pub archard: ArchardFigures,
+    /// The damage function.
+    pub wlrm: WlrmFigures,
+    /// Models that were evaluated with figures from memory, neither confirmed nor the client's.
+    pub unconfirmed: Vec<DamageModel>,
+    /// Where the figures of the set are from.
+    pub sources: Vec<String>,
+}

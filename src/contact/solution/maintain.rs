@@ -1,0 +1,327 @@
+//! What follows from a solved motion for maintenance: stresses below the surface, temperatures, wear across the patch.
+
+use std::ops::ControlFlow;
+
+use crate::contact::case::problem::CheckedCase;
+use crate::contact::case::words::solver::Output;
+use crate::contact::case::words::subsurface::BodyName;
+use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::normal::footprint::Footprint;
+use crate::contact::normal::patch::Patch;
+use crate::contact::post::damage::across::{CellWear, across};
+use crate::contact::post::damage::evaluate::{DamagedPatch, damage};
+use crate::contact::post::damage::figures::DamageTask;
+use crate::contact::post::heat::{ThermalTask, heating};
+use crate::contact::post::local_power::{CellPower, PowerTask, cell_power};
+use crate::contact::post::subsurface::states::{STORED, in_patch_axes, point, stored};
+use crate::contact::post::subsurface::surface_load::{LoadResolution, SurfaceLoad};
+use crate::contact::post::subsurface::task::{LoadedBody, StressPlaces, SubsurfaceTask};
+use crate::contact::post::subsurface::worst::worst_place;
+use crate::contact::rolling::answer::LevelAnswer;
+use crate::contact::rolling::methods::method::Method;
+use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::strip_mesh::StripMesh;
+use crate::contact::solution::damage::WearAcross;
+use crate::contact::solution::maintenance::{SubsurfaceSummary, TemperatureSummary};
+use crate::contact::solution::words::{PointFields, PointSolution};
+
+/// Stresses are answered from this part of the half-width of the smaller patch on: nearer to the surface the steps of the traction from cell
+/// to cell would show, whose stresses grow without bound.
+const LEAST_DEPTH: f64 = 0.01;
+/// Points between two looks at the monitor.
+const POINTS_UNASKED: usize = 16;
+
+/// A motion solved on a level.
+#[derive(Clone, Copy)]
+pub(crate) struct SolvedMotion<'a> {
+    pub(crate) footprint: &'a Footprint,
+    pub(crate) level: &'a StripMesh,
+    pub(crate) answer: &'a LevelAnswer,
+    pub(crate) motion: &'a Motion,
+    pub(crate) method: Method,
+    /// Rolling speed in mm/s, where it is known.
+    pub(crate) speed: Option<f64>,
+}
+
+/// Damage of every patch, from its resultants.
+pub(crate) fn add_damage(
+    case: &CheckedCase,
+    patches: &[Patch],
+    speed: Option<f64>,
+    points: &mut [PointSolution],
+) {
+    let Some(task) = &case.run.after.damage else {
+        return;
+    };
+    for (patch, point) in patches.iter().zip(points) {
+        let limit = case.problem.friction.limit(patch);
+        let of = DamagedPatch {
+            patch,
+            point,
+            limit,
+            speed,
+        };
+        point.damage = Some(Box::new(damage(task, of)));
+    }
+}
+
+/// What follows from the cells of a motion: summaries into its points; the values that are kept of every patch are returned.
+pub(crate) fn add_rest(
+    case: &CheckedCase,
+    solved: SolvedMotion,
+    points: &mut [PointSolution],
+    monitor: &dyn Monitor,
+) -> Result<Vec<PointFields>, Stop> {
+    let run = &case.run;
+    let mut kept = vec![PointFields::default(); points.len()];
+    if run.after.needs_power(&run.outputs) {
+        let totals: Vec<f64> = points.iter().map(|p| p.friction_power_n).collect();
+        let task = PowerTask {
+            level: solved.level,
+            answer: solved.answer,
+            motion: solved.motion,
+            method: solved.method,
+            totals: &totals,
+        };
+        let power = cell_power(&task, monitor)?;
+        if run.wants(Output::Slip) {
+            for (k, kept) in kept.iter_mut().enumerate() {
+                let cells = solved.level.patch_cells(k);
+                let [x, y] = [0, 1].map(|c| power.slip[c][cells.clone()].to_vec());
+                (kept.slip_x, kept.slip_y) = (Some(x), Some(y));
+            }
+        }
+        if let Some(task) = run.after.damage.as_ref().filter(|task| task.across) {
+            let found = wear_across(task, solved, &power);
+            for (point, found) in points.iter_mut().zip(found) {
+                if let Some(damage) = &mut point.damage {
+                    damage.across = Some(found);
+                }
+            }
+        }
+        if let Some(task) = &run.after.thermal {
+            let found = temperatures(task, solved, &power);
+            for ((point, kept), found) in points.iter_mut().zip(&mut kept).zip(found) {
+                point.temperature = Some(found.summary);
+                kept.temperature_c = Some(found.cells);
+            }
+        }
+    }
+    if let Some(task) = &run.after.subsurface {
+        let found = subsurface(task, solved, monitor)?;
+        for ((point, kept), found) in points.iter_mut().zip(&mut kept).zip(found) {
+            point.subsurface = Some(found.summary);
+            kept.subsurface = Some(found.points);
+        }
+    }
+    Ok(kept)
+}
+
+/// Stresses below one patch.
+struct PatchStresses {
+    summary: SubsurfaceSummary,
+    /// The requested points as they are stored.
+    points: Vec<f64>,
+}
+
+fn least_depth(patch: &Patch) -> f64 {
+    let [x_min, x_max, y_min, y_max] = patch.extent;
+    LEAST_DEPTH * 0.5 * (x_max - x_min).min(y_max - y_min)
+}
+
+/// Stresses below every patch. Patches of one frame load the same body: each point feels all of them.
+fn subsurface(
+    task: &SubsurfaceTask,
+    of: SolvedMotion,
+    monitor: &dyn Monitor,
+) -> Result<Vec<PatchStresses>, Stop> {
+    // The lower body's normal is up, the upper's down, and tractions on it are the reactions.
+    let sign = match task.body {
+        LoadedBody::Lower => 1.0,
+        LoadedBody::Upper => -1.0,
+    };
+    let load = SurfaceLoad::new(of.level, of.footprint, of.answer, sign, task.poisson_ratio);
+    let patches = of.footprint.patches();
+    let least = patches
+        .iter()
+        .map(least_depth)
+        .fold(f64::INFINITY, f64::min);
+    let stress = |at: [f64; 3]| {
+        let stress = load.stress(at, LoadResolution::FINE);
+        in_patch_axes(stress, task.body)
+    };
+    let evaluate = |places: &[[f64; 3]]| {
+        let mut values = Vec::with_capacity(places.len() * STORED);
+        for (k, [x, y, depth]) in places.iter().enumerate() {
+            if k % POINTS_UNASKED == 0
+                && let ControlFlow::Break(stop) = monitor.tick(0.0)
+            {
+                return Err(stop);
+            }
+            let at = [*x, *y, depth.max(least)];
+            values.extend(stored(at, stress(at)));
+        }
+        Ok(values)
+    };
+    let shared = match &task.places {
+        StressPlaces::Points(points) => evaluate(points)?,
+        StressPlaces::BelowWorst(_) => Vec::new(),
+    };
+    let below_worst = matches!(task.places, StressPlaces::BelowWorst(_));
+    let mut found = Vec::with_capacity(patches.len());
+    for (k, patch) in patches.iter().enumerate() {
+        if let ControlFlow::Break(stop) = monitor.tick(0.0) {
+            return Err(stop);
+        }
+        let worst = (task.worst || below_worst)
+            .then(|| worst_place(&load, of.footprint, k, least_depth(patch)))
+            .flatten();
+        let points = match (&task.places, worst) {
+            (StressPlaces::BelowWorst(depths), Some([x, y, _])) => {
+                let line: Vec<[f64; 3]> = depths.iter().map(|depth| [x, y, *depth]).collect();
+                evaluate(&line)?
+            }
+            _ => shared.clone(),
+        };
+        let summary = SubsurfaceSummary {
+            body: match task.body {
+                LoadedBody::Lower => BodyName::Lower,
+                LoadedBody::Upper => BodyName::Upper,
+            },
+            least_depth_mm: least,
+            worst: worst.map(|at| point(at, stress(at))),
+        };
+        found.push(PatchStresses { summary, points });
+    }
+    Ok(found)
+}
+
+/// Temperatures in one patch.
+struct PatchTemperatures {
+    summary: TemperatureSummary,
+    /// Of both surfaces at the middle of every cell, in °C.
+    cells: Vec<f64>,
+}
+
+/// Temperatures of every patch; each strip is heated by all its segments in the patch.
+fn temperatures(task: &ThermalTask, of: SolvedMotion, power: &CellPower) -> Vec<PatchTemperatures> {
+    let speed = of.speed.unwrap_or(0.0);
+    let unit = if speed > 0.0 {
+        task.rise_of(speed)
+    } else {
+        0.0
+    };
+    let base = task.without_heat();
+    let patches = of.footprint.patches().iter().enumerate();
+    let of_patch = |(k, patch): (usize, &Patch)| {
+        let mut cells = Vec::with_capacity(of.level.patch_cells(k).len());
+        let mut hottest: Vec<(f64, [f64; 2])> = Vec::new();
+        for line in heated_lines(of.level, power, k) {
+            let rises = heating(&line.edges, &line.heat, &line.points);
+            let places = line.points.iter().zip(&rises);
+            let top = places.max_by(|a, b| a.1.total_cmp(b.1));
+            hottest.extend(top.map(|(x, rise)| (unit * speed * rise, [*x, line.y])));
+            let own = rises[..line.cells].iter();
+            cells.extend(own.map(|rise| base + unit * speed * rise));
+        }
+        let (rise_max_k, at_mm) = peak(&hottest);
+        let half_length = 0.5 * (patch.extent[1] - patch.extent[0]);
+        let peclets = [task.lower, task.upper].map(|body| body.peclet(speed, half_length));
+        let summary = TemperatureSummary {
+            max_c: base + rise_max_k,
+            rise_max_k,
+            at_mm,
+            without_friction_c: base,
+            heat_share_lower: task.share_of_lower(),
+            peclet: peclets[0].min(peclets[1]),
+        };
+        PatchTemperatures { summary, cells }
+    };
+    patches.map(of_patch).collect()
+}
+
+/// The largest of what the lines have, each at its place: on a parabola through the largest and its neighbours.
+fn peak(lines: &[(f64, [f64; 2])]) -> (f64, [f64; 2]) {
+    let top = (0..lines.len()).max_by(|a, b| lines[*a].0.total_cmp(&lines[*b].0));
+    let Some(top) = top else {
+        return (0.0, [0.0; 2]);
+    };
+    let (value, [x, y]) = lines[top];
+    let beside = top.checked_sub(1).and_then(|k| lines.get(k));
+    let (Some((before, [_, low])), Some((after, [_, high]))) = (beside, lines.get(top + 1)) else {
+        return (value, [x, y]);
+    };
+    // Slopes of the two sides; the parabola is v + s d + c d² with d from the middle line.
+    let (down, up) = ((value - before) / (y - low), (after - value) / (high - y));
+    let curve = (up - down) / (high - low);
+    if curve >= 0.0 {
+        return (value, [x, y]);
+    }
+    let slope = down + curve * (y - low);
+    let step = (-0.5 * slope / curve).clamp(low - y, high - y);
+    (value + step * (slope + curve * step), [x, y + step])
+}
+
+/// A strip as heat sees it: cells with their heat over the rolling speed, gaps between segments without.
+struct HeatedLine {
+    y: f64,
+    edges: Vec<f64>,
+    /// N/mm².
+    heat: Vec<f64>,
+    /// Where temperatures are looked at: first the middles of the cells, then their edges.
+    points: Vec<f64>,
+    cells: usize,
+}
+
+fn heated_lines(level: &StripMesh, power: &CellPower, patch: usize) -> Vec<HeatedLine> {
+    let mesh = &level.mesh;
+    let mut lines: Vec<(usize, HeatedLine)> = Vec::new();
+    for segment in mesh.segments.iter().filter(|s| s.chord.patch == patch) {
+        let chord = &segment.chord;
+        if lines.last().is_none_or(|(strip, _)| *strip != chord.strip) {
+            let line = HeatedLine {
+                y: chord.y,
+                edges: vec![mesh.left[segment.cells.start]],
+                heat: Vec::new(),
+                points: Vec::new(),
+                cells: 0,
+            };
+            lines.push((chord.strip, line));
+        }
+        let Some((_, line)) = lines.last_mut() else {
+            continue;
+        };
+        let last = line.edges[line.edges.len() - 1];
+        if mesh.left[segment.cells.start] > last {
+            line.edges.push(mesh.left[segment.cells.start]);
+            line.heat.push(0.0);
+        }
+        for i in segment.cells.clone() {
+            line.edges.push(mesh.right[i]);
+            line.heat.push(power.power[i] / level.area[i]);
+            line.points.push(0.5 * (mesh.left[i] + mesh.right[i]));
+            line.cells += 1;
+        }
+    }
+    let mut lines: Vec<HeatedLine> = lines.into_iter().map(|(_, line)| line).collect();
+    for line in &mut lines {
+        line.points.extend_from_slice(&line.edges);
+    }
+    lines
+}
+
+/// Wear strip by strip of every patch.
+fn wear_across(task: &DamageTask, of: SolvedMotion, power: &CellPower) -> Vec<WearAcross> {
+    let slip: Vec<f64> = (0..power.power.len())
+        .map(|i| power.slip[0][i].hypot(power.slip[1][i]))
+        .collect();
+    let cells = CellWear {
+        level: of.level,
+        power: &power.power,
+        slip: &slip,
+        speed: of.speed,
+    };
+    (0..of.footprint.patches().len())
+        .map(|patch| across(task, cells, patch))
+        .collect()
+}
