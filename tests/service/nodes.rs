@@ -227,6 +227,9 @@ async fn a_node_says_what_is_wrong_with_its_database() {
     assert!(said.contains("--database-url"), "{said}");
     let said = serve(&["worker"]);
     assert!(said.contains("--database-url"), "{said}");
+    let nowhere = "postgres://u:hush@127.0.0.1:1/d";
+    let said = serve(&["serve", "--database-url", nowhere]);
+    assert!(said.contains("refused") && !said.contains("hush"), "{said}");
     let said = serve(&["serve", "--database-url", "nonsense"]);
     assert!(said.contains("postgres://"), "{said}");
     std::fs::write(folder.path().join("jobs.db"), "").unwrap();

@@ -3,7 +3,9 @@
 use std::str::FromStr;
 use std::time::Duration;
 
+use sqlx::Connection;
 use sqlx::postgres::{PgConnectOptions, PgConnection, PgPool, PgPoolOptions};
+use tokio::time::timeout;
 
 use crate::jobs::error::JobsError;
 use crate::jobs::store::error::StoreError;
@@ -45,6 +47,9 @@ pub(crate) async fn connect(
         .application_name("railhead")
         .statement_cache_capacity(STATEMENTS_KEPT)
         .options(SESSION);
+    // A pool tries again until its time is over, and then no longer knows why.
+    let first = timeout(CONNECT_WITHIN, PgConnection::connect_with(&options)).await;
+    first.map_err(|_| StoreError::timed_out())??.close().await?;
     let pool = PgPoolOptions::new()
         .max_connections(connections)
         .acquire_timeout(CONNECT_WITHIN)

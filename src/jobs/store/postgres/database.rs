@@ -1,5 +1,7 @@
 //! The job table in PostgreSQL, opened.
 
+use std::fmt;
+
 use sqlx::postgres::{PgConnectOptions, PgPool};
 
 use crate::jobs::error::JobsError;
@@ -10,7 +12,7 @@ use crate::jobs::store::postgres::schema::require;
 use crate::jobs::store::postgres::sql::group_commit::GroupCommit;
 
 /// The job table that several processes share.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct PostgresStore {
     pub(crate) options: PgConnectOptions,
     pub(crate) writer: PgPool,
@@ -19,6 +21,13 @@ pub struct PostgresStore {
     pub(crate) bell: BellRinger,
     /// Leases are judged by the times that are given, not by the clock of the database.
     pub(crate) given_clock: bool,
+}
+
+impl fmt::Debug for PostgresStore {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // The options have a password in them.
+        write!(f, "PostgresStore({})", self.options.get_host())
+    }
 }
 
 impl PostgresStore {

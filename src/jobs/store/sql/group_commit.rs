@@ -74,7 +74,7 @@ async fn store_some(writer: &DbPool, group: Vec<Submission>) {
     let Some(bounds) = group.first().map(|waiting| waiting.bounds) else {
         return;
     };
-    let stored = store_together(writer, &jobs, bounds).await;
+    let stored = engine::again(|| store_together(writer, &jobs, bounds)).await;
     let alone = group.len() == 1;
     match stored {
         Ok(answers) => {
@@ -91,7 +91,8 @@ async fn store_some(writer: &DbPool, group: Vec<Submission>) {
         }
         Err(_) => {
             for waiting in group {
-                let stored = store_together(writer, &[&waiting.new], bounds).await;
+                let one = [&waiting.new];
+                let stored = engine::again(|| store_together(writer, &one, bounds)).await;
                 let answer = stored.and_then(|mut answers| answers.pop().ok_or_else(lost));
                 let _ = waiting.reply.send(answer);
             }
