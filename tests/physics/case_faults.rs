@@ -277,7 +277,7 @@ fn motions_are_refused_with_the_place_in_the_list() {
     assert_fault(
         &good_with("/motion", json!([{ "creepage_x": 1 }, {}])),
         "/motion/1",
-        &["zeros"],
+        &["the value 0"],
     );
     assert_fault(
         &good_with(

@@ -1,8 +1,8 @@
-//! How long a case will take, estimated before it is queued: what its patches will look like, what tractions its motions will have,
-//! and how such motions grow with the target.
+//! How long a case will take, estimated before it is queued: from the patches it will have, the tractions of its motions, and the growth
+//! of their time as the target falls.
 //!
-//! The figures are medians of random contacts. A single case spreads about them by a factor of 2, because a mesh has either met its
-//! target or not, and the next one costs several times as much; `cargo bench --bench stress -- --only times` prints estimates beside
+//! The figures are medians of random contacts. Single cases differ from them by a factor of about 2: either a mesh meets its target or
+//! the next one is needed, which costs several times as much. `cargo bench --bench stress -- --only times` prints estimates beside
 //! times, class by class.
 //!
 //! All numbers of this file were read off 2500 cases of that bench under a seed of their own, and off the random contacts of
@@ -28,11 +28,11 @@ const SWEEP_SHARE_SPIN: f64 = 1.0;
 const SWEEP_SPIN_POWER: f64 = 0.5;
 /// How many times longer motions take where a given pressure jumps.
 const JUMP_TIMES: f64 = 4.0;
-/// How much longer products in double precision take.
+/// Time of a product in double precision over that in single precision.
 const DOUBLE_TIMES: f64 = 2.5;
-/// Solves on one mesh that the search for a prescribed force takes beside the last, on average.
+/// Solves on an explicit mesh that the search for a prescribed force needs before the last one, on average.
 const TRIALS: f64 = 3.0;
-/// What every solve takes at least, in s.
+/// Least time of a solve, in s.
 const SECONDS_MIN: f64 = 5e-5;
 /// Explicit meshes with so many cells have matrices that no cache holds.
 const MESH_CELLS_SLOW: f64 = 1600.0;
@@ -43,17 +43,18 @@ const FIELDS_SECONDS_PER_CELL: f64 = 3e-7;
 
 /// Time in s to find region and pressure of a gap on one grid, for every cell of it.
 const GAP_CELL: f64 = 0.8e-6;
-/// The same in s where one grid cannot resolve all patches: of two patches with a grid each; of up to `PATCHES_FEW`, which take 0.01
-/// to 3 s; and of more, which stay on one grid.
+/// Time in s to find region and pressure where one grid cannot resolve all patches: two patches with a grid each; up to `PATCHES_FEW`
+/// patches (single cases take 0.01 to 3 s); and more patches, which stay on one grid.
 const GAP_TWO: f64 = 0.026;
 const GAP_FEW: f64 = 0.07;
 const GAP_MANY: f64 = 0.027;
 const PATCHES_FEW: usize = 6;
-/// Of a patch that a coarse grid shows as one and that falls apart on finer ones.
+/// The same in s for a patch that is one on a coarse grid and falls apart on finer ones.
 const GAP_ROUGH: f64 = 0.3;
-/// Cells along an axis that a grid has at most.
+/// Most cells of a grid along an axis.
 const GRID_CELLS_MAX: f64 = 200.0;
-/// From so many turns across the contact on, a line whose teeth are not pressed flat is rough.
+/// A line is rough if it turns at least this often across the contact and its teeth, of at least this height in units of the overlap, are
+/// not pressed flat.
 const TURNS_ROUGH: f64 = 12.0;
 const TEETH_ROUGH: f64 = 4e-3;
 /// Time in s to bring a wheel to rest on its rail once, with two grids for every height.
@@ -84,7 +85,8 @@ fn guesses(task: &NormalTask, target: Option<f64>) -> (Vec<PatchGuess>, f64) {
     }
 }
 
-/// Of a gap: as a coarse grid shows it, or, where its samples are rougher than that grid can show, as they suggest.
+/// The patches of a gap, and the time to find them: from a solution on a coarse grid, or from the samples where these are rougher than
+/// that grid can show.
 fn gap_guesses(task: &GapTask, target: Option<f64>) -> (Vec<PatchGuess>, f64) {
     let outlook = task.outlook();
     let by_samples = || vec![PatchGuess::of_gap(task, &outlook); outlook.summits];
@@ -200,7 +202,7 @@ impl CheckedCase {
     }
 }
 
-/// Many patches have more cells than any target asks for, and need more steps.
+/// Time in s of a motion on many patches, which together need more cells than any target asks for, and more steps.
 fn crowd_seconds(patches: usize) -> f64 {
     let cells = patches as f64 * PATCH_CELLS_MIN;
     if cells > f64::from(CELLS_MAX) / 4.0 {

@@ -14,9 +14,10 @@ const TOGETHER: f64 = 8.0;
 const TOGETHER_ANGLE: f64 = 0.5;
 
 /// An overlap is cut where it is thinner than this fraction of the lobes on both sides. By Hertz's law two bodies touch where they
-/// overlap by more than half of the deepest overlap, so that a lobe may be cut where it is thin. Sensitivity not measured.
+/// overlap by more than half of the deepest overlap, so that a lobe may be cut where it is thin. 0.25 and 0.5 change none
+/// of 60 states of the worn pair of `cargo bench --bench worn`.
 const VALLEY: f64 = 0.35;
-/// A cut overlap ends, for its gap, where it is thinner than this fraction of its depth. Sensitivity not measured.
+/// A cut overlap ends, for its gap, where it is thinner than this fraction of its depth. 0.3 and 0.55 change none of the same states.
 const THIN: f64 = 0.4;
 
 /// Lowering in mm at which overlaps are divided among gaps; others are this one times a power of [`GROUPED_RATIO`]. Loads that lower the wheel by 0.05 to
@@ -24,7 +25,8 @@ const THIN: f64 = 0.4;
 const GROUPED_AT: f64 = 0.1;
 /// Ratio of neighbouring lowerings at which overlaps are divided anew.
 const GROUPED_RATIO: f64 = 4.0;
-/// Groups merge where the overlap between them is deeper than this fraction of the lobes on both sides. Sensitivity not measured.
+/// Groups merge where the overlap between them is deeper than this fraction of the lobes on both sides. 0.4 and 0.8 change none of
+/// the same states.
 const MERGED: f64 = 0.6;
 
 impl ContactLocus<'_> {

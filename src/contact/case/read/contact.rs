@@ -132,7 +132,7 @@ pub(crate) fn read_load(case: &mut Object) -> Option<Load> {
         let value = shown(value);
         block.fault(
             LOADS[0],
-            format!("{value} given; a vertical force belongs to the contact type profiles, give a normal_force_n"),
+            format!("{value} given for another contact than \"type\": \"profiles\"; give normal_force_n instead"),
         );
         return None;
     }

@@ -215,7 +215,9 @@ fn labels(case: &mut Object) -> BTreeMap<String, String> {
         } else if has_controls(key) || key.contains(':') {
             case.faults().add(
                 join(&pointer, key),
-                format!("the key {key:?} given; a key has neither colons nor control characters"),
+                format!(
+                    "the key {key:?} given; colons and control characters are not allowed in keys"
+                ),
             );
         }
         match value.as_str() {

@@ -37,7 +37,7 @@ fn elastic(block: &mut Object) -> Option<Elastic> {
         (false, false) => {
             block.fault(
                 "shear_modulus_mpa",
-                format!("missing; {MODULUS} is needed here or as young_modulus_mpa"),
+                format!("missing; {MODULUS} is needed, or young_modulus_mpa instead"),
             );
             return None;
         }

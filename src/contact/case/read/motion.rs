@@ -56,7 +56,7 @@ pub(crate) fn read(case: &mut Object) -> Option<Motions> {
             if !of_profiles {
                 block.fault(
                     "wheelset",
-                    "given without profiles; the motion of a wheelset belongs to the contact type profiles, give creepages",
+                    "given for another contact than \"type\": \"profiles\"; give creepages instead",
                 );
                 return None;
             }
@@ -147,7 +147,7 @@ fn wheelset(block: &mut Object) -> Option<Wheelset> {
         [false, false] => {
             block.fault(
                 SPINS[0],
-                format!("missing; {RATE} is needed here, or a {}", SPINS[1]),
+                format!("missing; {RATE} is needed, or {} instead", SPINS[1]),
             );
             return None;
         }
@@ -203,7 +203,7 @@ fn sweep(block: &mut Object) -> Option<Sweep> {
         let first = varying.next();
         if varying.any(|points| Some(points) != first) {
             block.fault_here(format!(
-                "components with {} values given; those that vary together need equally many (or use \"combine\": \"grid\")",
+                "components with {} values given; components combined \"together\" need the same number of values, which \"combine\": \"grid\" does not",
                 points.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
             ));
             return None;
@@ -249,7 +249,7 @@ fn components(
     }
     if !COMPONENTS.iter().any(|name| block.has(name)) {
         block.fault_here(format!(
-            "no motion given; at least one of {} is needed (write out zeros)",
+            "no motion given; at least one of {} is needed, with the value 0 if nothing moves",
             COMPONENTS.join(", ")
         ));
         return None;

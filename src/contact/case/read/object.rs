@@ -177,8 +177,7 @@ impl<'v, 'f> Object<'v, 'f> {
         None
     }
 
-    /// A word out of a table that may be left out; `later` lists words that the contract knows but this version
-    /// does not offer.
+    /// A word from a table; it may be left out. `later` lists words that a later version may offer, which get a fault that says so.
     pub(crate) fn word<T: Copy>(
         &mut self,
         name: &str,
@@ -216,7 +215,7 @@ pub(crate) fn number(
     }
 }
 
-/// A word out of a table, see [`Object::word`].
+/// A word from a table, see [`Object::word`].
 pub(crate) fn word<T: Copy>(
     value: &Value,
     pointer: &str,

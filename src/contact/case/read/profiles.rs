@@ -108,7 +108,7 @@ fn section(contact: &mut Object, name: &str) -> Option<CrossSection> {
             if block.has("format") {
                 block.fault(
                     "format",
-                    "given together with points_mm; it belongs to the text of a file",
+                    "given together with points_mm; a format is only for the text of a file",
                 );
                 return None;
             }
@@ -124,7 +124,7 @@ fn section(contact: &mut Object, name: &str) -> Option<CrossSection> {
         (false, false) => {
             block.fault(
                 "points_mm",
-                "missing; an array of points [y, z] in mm is needed here, or the text of a file as text with its format",
+                "missing; an array of points [y, z] in mm is needed, or text and format of a file instead",
             );
             return None;
         }
@@ -213,7 +213,7 @@ fn points(block: &mut Object) -> Option<Vec<[f64; 2]>> {
         block.faults().add(
             pointer,
             format!(
-                "{} more points here are not allowed; a pair [y, z] is needed, each {COORDINATE}",
+                "{} more points are refused like those before; each has to be a pair [y, z], both {COORDINATE}",
                 refused - POINT_FAULTS_MAX
             ),
         );

@@ -43,7 +43,7 @@ pub(crate) fn axis(block: &mut Object, name: &str) -> Option<Vec<f64>> {
         block.faults().add(
             join(&pointer, i),
             format!(
-                "{} given after {}; coordinates have to increase strictly, here by more than {least:e} mm",
+                "{} given after {}; coordinates have to increase strictly, each by more than {least:e} mm",
                 axis[i],
                 axis[i - 1]
             ),
@@ -200,7 +200,7 @@ pub(crate) fn count_rest(pointer: &str, allowed: Interval, refused: usize, fault
         faults.add(
             pointer,
             format!(
-                "{} more values here are not allowed; {allowed} is needed",
+                "{} more values are refused like those before; {allowed} is needed",
                 refused - GRID_FAULTS_MAX
             ),
         );

@@ -68,7 +68,7 @@ pub(crate) fn read(case: &mut Object) -> Option<Solver> {
     if traction_bound.is_some() && another {
         block.fault(
             "traction_bound",
-            "given for a method that has no choice of bounds; only \"method\": \"fastsim\" has it",
+            "given for a method without a choice of bounds; only \"method\": \"fastsim\" has one",
         );
     }
     let time_limit_s = block.number("time_limit_s", TIME_LIMIT);

@@ -11,7 +11,8 @@ use crate::contact::numerics::flood_fill::groups;
 
 /// Most cells along either axis.
 const CELLS_MAX: usize = 200;
-/// A box that turned out too small grows by this fraction of its length. Numeric choice, sensitivity not measured.
+/// A box that turned out too small grows by this fraction of its length. 0.12 and 0.5 give the same
+/// results with as many iterations on the 100 gaps of `cargo bench --bench calibrate gap`, whose boxes are large enough.
 const GROWTH: f64 = 0.25;
 
 /// Cells of a box; cell (i, j) is stored at `j * cells[0] + i`.

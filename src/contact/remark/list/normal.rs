@@ -7,12 +7,12 @@ macro_rules! normal_remarks {
             $($further),*;
             $($before)*
 
-            /// Pressure and region still change with the grid of the normal problem.
+            /// Pressure and region still change when the grid of the normal problem is refined.
             GapRough {}
             code: "gap-rough",
             severity: Warning,
-            advice: "Smooth the gap, or give it on a finer grid if it is as rough as that.",
-            detail: "the gap is rough: pressure and region still change with the grid of the normal problem".to_owned(),
+            advice: "Smooth the gap; if the surfaces are really as rough as this, give it on a finer grid.",
+            detail: "the gap is rough: pressure and region still change when the grid of the normal problem is refined".to_owned(),
 
             /// A patch that carries a noticeable part of the load has few cells in the normal problem.
             PatchCoarse {
@@ -23,7 +23,7 @@ macro_rules! normal_remarks {
             }
             code: "patch-coarse",
             severity: Warning,
-            advice: "Take the width and the pressure of this patch as uncertain by some per cent; solve it in a case of its own if it matters.",
+            advice: "Take the width and the pressure of this patch as uncertain by some per cent; if it matters, solve it in a case of its own.",
             detail: format!(
                 "the patch carries {:.1} % of the load and has only {cells_across:.0} cells across: its width and its pressure are uncertain by \
                  some per cent",
@@ -34,7 +34,7 @@ macro_rules! normal_remarks {
             PressureCutAtEdge {}
             code: "pressure-cut-at-edge",
             severity: Warning,
-            advice: "Give the pressure as far out as it is more than 0, and one row of zeros around it.",
+            advice: "Give the pressure over the whole region where it is more than 0, with one row of zeros around it.",
             detail: "the pressure does not fall to 0 at the edge of the grid; the contact is taken to end within the next spacing".to_owned(),
 
             /// A patch of a given pressure has few samples.
@@ -51,8 +51,8 @@ macro_rules! normal_remarks {
                 "the patch has only {samples_x} by {samples_y} samples of pressure; its force and its edge are uncertain by some per cent"
             ),
 
-            /// The given pressure jumps from one sample to the next as at no edge of a contact: strips and cells do not follow it, and
-            /// errors may be larger than estimated.
+            /// The given pressure jumps from one sample to the next, more than it would at the edge of a contact. Strips and cells do not follow
+            /// the jump, and errors may be larger than estimated.
             PressureJumps {
                 /// Where, halfway between the two samples; the largest jump.
                 x_mm: f64 = 1.5,
@@ -68,7 +68,7 @@ macro_rules! normal_remarks {
                 "the pressure jumps by {share_of_largest:.2} of its largest value between samples at ({x_mm:.4}, {y_mm:.4}) mm, which strips and cells do not follow"
             ),
 
-            /// The contact is long against the rolling radius: the bodies are nearly conformal.
+            /// The contact is long compared with the rolling radius: the bodies are nearly conformal.
             NearlyConformal {
                 /// Length of the contact along rolling.
                 length_mm: f64 = 14.2,
@@ -77,10 +77,10 @@ macro_rules! normal_remarks {
             }
             code: "nearly-conformal",
             severity: Warning,
-            advice: "Half-spaces do not describe such bodies: take the answer as a rough one.",
+            advice: "Half-spaces do not describe such bodies: take the answer as approximate.",
             detail: format!(
-                "the contact is {length_mm:.3} mm long, against a rolling radius of {rolling_radius_mm} mm: the bodies are nearly \
-                 conformal, which half-spaces do not describe"
+                "the contact is {length_mm:.3} mm long, compared with a rolling radius of {rolling_radius_mm} mm: the bodies are nearly \
+                 conformal, and half-spaces do not describe them"
             ),
 
             /// The bodies overlap so deeply that strains are too large for linear elasticity.
@@ -94,11 +94,11 @@ macro_rules! normal_remarks {
             severity: Warning,
             advice: "Check units and load. If they are right, the bodies yield and pressures are lower than the answer says.",
             detail: format!(
-                "the bodies overlap by {overlap_mm:.3e} mm, against a half width of {half_width_mm:.3e} mm of the contact: strains are too \
+                "the bodies overlap by {overlap_mm:.3e} mm, compared with a half width of {half_width_mm:.3e} mm of the contact: strains are too \
                  large for linear elasticity"
             ),
 
-            /// The patch is large against the radii of the bodies, which half-spaces do not describe.
+            /// The patch is large compared with the radii of the bodies, so that half-spaces do not describe them.
             PatchLarge {
                 /// `rolling` or `lateral`.
                 direction: &'static str = "rolling",
@@ -109,12 +109,12 @@ macro_rules! normal_remarks {
             }
             code: "patch-large",
             severity: Warning,
-            advice: "Check the unit of the load and the radii: contacts of half-spaces are smaller than a third of the radius.",
+            advice: "Check the units of load and radii: bodies are like half-spaces only if the half width is below a third of the radius.",
             detail: format!(
-                "the patch has a half width of {half_width_mm:.3e} mm along {direction}, against a radius of {radius_mm} mm"
+                "the patch has a half width of {half_width_mm:.3e} mm in the {direction} direction, compared with a radius of {radius_mm} mm"
             ),
 
-            /// The largest pressure is beyond what steel bears by far.
+            /// The largest pressure is far beyond what steel bears.
             PressureImplausible {
                 /// Largest pressure.
                 pressure_max_mpa: f64 = 8100.0,

@@ -7,15 +7,15 @@ macro_rules! profile_remarks {
             $($further),*;
             $($before)*
 
-            /// The shape of a profile says that its z is positive up; it was mirrored.
+            /// The shape of a profile shows that its z is positive upward; z was mirrored.
             ProfileZMirrored {
                 /// Whose.
                 profile: &'static str = "rail",
             }
             code: "profile-z-mirrored",
             severity: Info,
-            advice: "State `mirror_z` to say so yourself.",
-            detail: format!("{profile}: z was found to be positive up and has been mirrored"),
+            advice: "Give `mirror_z` to decide this yourself.",
+            detail: format!("{profile}: z was recognised as positive upward and has been mirrored"),
 
             /// The flange of a wheel was found at positive y; y was mirrored.
             ProfileYMirrored {
@@ -24,8 +24,8 @@ macro_rules! profile_remarks {
             }
             code: "profile-y-mirrored",
             severity: Info,
-            advice: "State `mirror_y` to say so yourself.",
-            detail: format!("{profile}: the flange was found at positive y, so that y has been mirrored"),
+            advice: "Give `mirror_y` to decide this yourself.",
+            detail: format!("{profile}: the flange was found at positive y, so y has been mirrored"),
 
             /// Points of a profile that lie nearly at the same place were merged.
             ProfilePointsMerged {
@@ -39,7 +39,7 @@ macro_rules! profile_remarks {
             code: "profile-points-merged",
             severity: Info,
             advice: "Nothing: files that repeat points at the joints of arcs are common.",
-            detail: format!("{profile}: {count} points nearer than {nearer_than_mm} mm to another one were merged"),
+            detail: format!("{profile}: {count} points less than {nearer_than_mm} mm from another one were merged with it"),
 
             /// Points of a profile that ran back between their neighbours were dropped.
             ProfilePointsDropped {
@@ -64,7 +64,7 @@ macro_rules! profile_remarks {
             }
             code: "profile-end-dropped",
             severity: Info,
-            advice: "Nothing if the profile ends there; else check the file.",
+            advice: "Nothing if the profile ends there; otherwise check the file.",
             detail: format!("{profile}: {count} stray points at an end, {distance_mm:.1} mm from the next one, were dropped"),
 
             /// A profile has the shape of the other body.
@@ -76,7 +76,7 @@ macro_rules! profile_remarks {
             }
             code: "profile-of-other-body",
             severity: Warning,
-            advice: "Check that rail and wheel were not exchanged. Where both look like the other the case is refused.",
+            advice: "Check that rail and wheel were not exchanged. If each looks like the other, the case is refused.",
             detail: format!("the profile given as {profile} looks like {like}; were rail and wheel exchanged?"),
 
             /// The smoothing of a profile was chosen from its noise and the pressure, as the case asked for.
@@ -102,7 +102,7 @@ macro_rules! profile_remarks {
             severity: Warning,
             advice: "Send points that lie nearer to each other, 0.25 mm at gauge corner and flange, or give `smoothing_mm` as a number.",
             detail: format!(
-                "{profile}: points {spacing_mm:.1} mm apart do not tell noise from shape, so that no smoothing could be chosen; none is in use"
+                "{profile}: with points {spacing_mm:.1} mm apart noise cannot be told from shape, so no smoothing was chosen and none is used"
             ),
 
             /// One point of a profile near the contact is off the curve of its neighbours.
@@ -120,7 +120,7 @@ macro_rules! profile_remarks {
             }
             code: "profile-outlier",
             severity: Warning,
-            advice: "Remove or correct the point; smoothing spreads it.",
+            advice: "Remove or correct the point; smoothing only spreads its error.",
             detail: format!(
                 "the {profile}'s point at y = {at_y_mm:.2} mm is {distance_um:.1} µm off the curve of its neighbours, worth {waviness_mpa:.0} MPa: \
                  remove or correct it"
@@ -141,9 +141,9 @@ macro_rules! profile_remarks {
             }
             code: "profile-step",
             severity: Warning,
-            advice: "Measure this part again, or join the pieces better: no smoothing heals a step, and forces are off as well.",
+            advice: "Measure this part again, or join the pieces better: smoothing does not remove a step, and forces are wrong as well.",
             detail: format!(
-                "the {profile}'s points jump by {:.1} µm at y = {at_y_mm:.2} mm, worth {waviness_mpa:.0} MPa: no smoothing heals a step, measure \
+                "the {profile}'s points jump by {:.1} µm at y = {at_y_mm:.2} mm, worth {waviness_mpa:.0} MPa: smoothing does not remove a step, measure \
                  this part again", height_um.abs()
             ),
 
@@ -172,7 +172,7 @@ macro_rules! profile_remarks {
                 smoothing_mm.map_or_else(String::new, |length| format!(", or give smoothing_mm: {length}"))
             ),
 
-            /// Noise of the points of a profile, of the measurement or of rounding, is worth a good part of the pressure.
+            /// Noise of the points of a profile, from the measurement or from rounding, changes the pressure by a good part.
             ProfileNoise {
                 /// Whose.
                 profile: &'static str = "rail",
@@ -202,7 +202,7 @@ macro_rules! profile_remarks {
                 smoothing_mm.map_or_else(String::new, |length| format!(": give smoothing_mm: {length}"))
             ),
 
-            /// Waves of a profile that are neither noise nor a single fault are worth a good part of the pressure.
+            /// Waves of a profile that are neither noise nor a single fault change the pressure by a good part.
             ProfileWaves {
                 /// Whose.
                 profile: &'static str = "wheel",
@@ -217,13 +217,13 @@ macro_rules! profile_remarks {
             }
             code: "profile-waves",
             severity: Warning,
-            advice: "Where they come from the measurement, smooth them with a `smoothing_mm` of about their length; real waves are part of the answer.",
+            advice: "If they come from the measurement, remove them with a `smoothing_mm` of about their length; waves that are really there belong to the answer.",
             detail: format!(
-                "waves on the {profile} shorter than {shorter_than_mm:.1} mm (y {:.1} to {:.1} mm) are worth {waviness_mpa:.0} MPa: smooth them with \
-                 smoothing_mm where they come from the measurement", y_mm[0], y_mm[1]
+                "waves on the {profile} shorter than {shorter_than_mm:.1} mm (y {:.1} to {:.1} mm) are worth {waviness_mpa:.0} MPa: if they come \
+                 from the measurement, remove them with smoothing_mm", y_mm[0], y_mm[1]
             ),
 
-            /// The points of a profile under the contact are so far apart that the curve between them is open.
+            /// The points of a profile under the contact are so far apart that the curve between them is uncertain.
             ProfileSpacing {
                 /// Whose.
                 profile: &'static str = "rail",
@@ -241,7 +241,7 @@ macro_rules! profile_remarks {
             advice: "Send points 0.5 mm apart on the tread, 0.25 mm at gauge corner and flange.",
             detail: format!(
                 "the {profile}'s points are {spacing_mm:.1} mm apart where it touches (y {:.1} to {:.1} mm), {spacing_over_width:.2} times the width of the \
-                 patch; the curve between them is open by {ambiguity_mpa:.0} MPa: send more points there", y_mm[0], y_mm[1]
+                 patch; the curve between them is uncertain by {ambiguity_mpa:.0} MPa of pressure: send more points there", y_mm[0], y_mm[1]
             ),
 
             /// A profile has a stretch without points near the contact over which the bodies may touch as well.

@@ -39,35 +39,35 @@ macro_rules! wheel_remarks {
                  a longer profile", y_mm[0], y_mm[1]
             ),
 
-            /// The target is smaller than what the measurement of the profiles leaves open: a finer solve says nothing more.
+            /// The target is smaller than the uncertainty that the measurement of the profiles leaves: a finer solve adds nothing.
             TargetBelowProfileUncertainty {
                 /// The target, relative to μN.
                 target: f64 = 1e-3,
-                /// What the profiles leave open of the forces, relative to μN.
+                /// Uncertainty of the forces that the profiles leave, relative to μN.
                 uncertainty: f64 = 0.02,
             }
             code: "target-below-profile-uncertainty",
             severity: Info,
-            advice: "Better points help, a smaller target does not.",
+            advice: "A better measurement reduces the uncertainty; a smaller target does not.",
             detail: format!(
-                "the profiles leave {:.1} % of μN open, more than the target of {:.1} %", 100.0 * uncertainty, 100.0 * target
+                "the profiles leave forces uncertain by {:.1} % of μN, more than the target of {:.1} %", 100.0 * uncertainty, 100.0 * target
             ),
 
-            /// A patch reaches the line on the rail at which the contact was divided between two planes of contact. It ends there by that division, not
-            /// as a contact does: if its largest pressure lies on that line, it grows with the fineness of the grid.
+            /// A patch reaches the line on the rail at which the contact was divided between two planes of contact. Its edge there comes from that division and
+            /// is not the edge of a contact: if the largest pressure lies on that line, it grows as the grid is refined.
             PatchCut {
                 /// y of the line on the cross-section of the rail.
                 rail_y_mm: f64 = -18.4,
             }
             code: "patch-cut",
             severity: Warning,
-            advice: "Do not use pressures near that line, nor the largest one if `gap-rough` stands beside this. Two patches have grown into one that bends; under less load they are two.",
+            advice: "Do not use pressures near that line, nor the largest pressure if the answer has `gap-rough` as well. Under this load two patches have grown into one that bends; under a smaller load they are two.",
             detail: format!(
                 "the patch reaches the line y = {rail_y_mm:.2} mm on the rail, where the contact is divided between two planes: its edge and its \
-                 pressure there are those of the division"
+                 pressure there come from that division"
             ),
 
-            /// The rail turns over the contact by so much that a plane of contact and half-spaces describe it roughly.
+            /// The rail turns so much over the contact that a plane of contact and half-spaces describe it only roughly.
             ContactTurns {
                 /// Change of the rail's inclination over the patch.
                 turn_rad: f64 = 0.5,
@@ -76,7 +76,7 @@ macro_rules! wheel_remarks {
             severity: Warning,
             advice: "Take pressures and the direction of forces as approximate: conformal contact is not modelled.",
             detail: format!(
-                "the rail turns by {turn_rad:.2} rad over the contact, which a plane of contact and half-spaces describe roughly"
+                "the rail turns by {turn_rad:.2} rad over the contact, which a plane of contact and half-spaces describe only roughly"
             ),
 
             /// The force jumps at the height of the wheel that carries the load, where patches merge; forces were scaled to the load.
@@ -91,7 +91,7 @@ macro_rules! wheel_remarks {
                 "the force jumps at this height of the wheel, where patches merge; forces were scaled by {factor:.4}"
             ),
 
-            /// Patches lie in gaps of their own, where they do not press on each other's half-space, and that could matter.
+            /// Patches were solved in separate gaps, without the deflection that one causes at the other, which could matter.
             PatchesUncoupled {
                 /// By how much the force of a patch would change, relative to the load.
                 share: f64 = 0.012,
@@ -100,9 +100,9 @@ macro_rules! wheel_remarks {
             }
             code: "patches-uncoupled",
             severity: Warning,
-            advice: "Expect that a part of the load moves from one patch to the other; this is not part of the error estimate.",
+            advice: "Expect that this part of the load is on the wrong patch; the error estimate does not include it.",
             detail: format!(
-                "patches {distance_mm:.1} mm apart are solved as if each were alone; pressing on each other they would exchange {:.1} % of the load",
+                "patches {distance_mm:.1} mm apart were solved as if each were alone; with the deflection that one causes at the other, {:.1} % of the load would move between them",
                 100.0 * share
             ),
 
@@ -111,8 +111,8 @@ macro_rules! wheel_remarks {
             code: "normal-forces-alone-balance",
             severity: Warning,
             advice: "Ask for the motions in cases of their own if friction is to carry its share of the load.",
-            detail: "normal forces alone balance the vertical force, because several motions share their patches; the total of a motion has its \
-                     friction on top".to_owned(),
+            detail: "normal forces alone balance the vertical force, because several motions share their patches; the totals of a motion \
+                     include its friction, so that they differ from the load".to_owned(),
         }
     };
 }

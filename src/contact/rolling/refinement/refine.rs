@@ -19,9 +19,10 @@ use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::rolling::regime::regime;
 use crate::contact::rolling::task::RollingTask;
 
-/// Explicit meshes of at least so many cells are started from a coarser mesh. Sensitivity not measured.
+/// Explicit meshes of at least so many cells are started from a coarser mesh. On 24 ellipses of `benches/calibrate` with meshes of 720 to
+/// 2464 cells, 500 and 2000 take 5 to 10 % more time, and no such start 24 % more.
 const CELLS_NESTED: u64 = 1000;
-/// Fewest strips, and cells in one, of that coarser mesh.
+/// Fewest strips, and cells in one, of that coarser mesh. 4 and 16 take as many products on these ellipses, to 1 %.
 const SIDE_HALVED: u32 = 8;
 
 /// Solves a motion, from the coarsest level up to the first that meets the target, each started from

@@ -12,7 +12,8 @@ const STRAIGHT: f64 = 1e-6;
 /// of equal steps.
 const STEP_MAX: f64 = 1.5;
 /// Longest step, relative to the motion, over which the last tractions serve as a start unchanged. On 12 sweeps of 9 motions on ellipses
-/// of `benches/calibrate`, 0.12 takes 6 % more products and 0.5 takes 6 % fewer.
+/// of `benches/calibrate`, 0.12 takes 6 % more products and 0.5 takes 6 % fewer; on 40 straight sweeps, where starts are extrapolated, 0.5
+/// changes products by less than 0.3 %.
 const NEAR: f64 = 0.25;
 
 /// First iterates of both rules, dimensionless, one value per cell.
