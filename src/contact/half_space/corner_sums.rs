@@ -118,8 +118,11 @@ fn corner(p: f32, q: f32, z: f32, nu: f32, weights: [f32; 3]) -> [f32; 6] {
     let r = (pp + qq + zz).sqrt();
     let over_r = 1.0 / r;
     let r_z = 1.0 / (r + z);
-    let q_r = if q >= 0.0 { q + r } else { (pp + zz) / (r - q) };
-    let p_r = if p >= 0.0 { p + r } else { (qq + zz) / (r - p) };
+    // Both forms of q + r and p + r are computed, so that a choice and no branch is left.
+    let (q_far, p_far) = (q.abs() + r, p.abs() + r);
+    let (q_near, p_near) = ((pp + zz) / q_far, (qq + zz) / p_far);
+    let q_r = if q >= 0.0 { q_far } else { q_near };
+    let p_r = if p >= 0.0 { p_far } else { p_near };
     let (ln_q, ln_p, ln_z) = (Number::ln(q_r), Number::ln(p_r), Number::ln(r + z));
     let theta = atan(p * q / (z * r));
     let ahead = p * q * (pp + qq) * r_z;
@@ -150,18 +153,15 @@ fn corner(p: f32, q: f32, z: f32, nu: f32, weights: [f32; 3]) -> [f32; 6] {
 #[inline(always)]
 fn atan(x: f32) -> f32 {
     let size = x.abs();
-    let steep = size > 1.0;
-    let t = if steep { 1.0 / size } else { size };
+    let (steep, inverse) = (size > 1.0, 1.0 / size);
+    let t = if steep { inverse } else { size };
     let tt = t * t;
     let mut series = 0.0_f32;
     for coefficient in ATAN.into_iter().rev() {
         series = series.mul_add(tt, coefficient);
     }
-    let angle = if steep {
-        FRAC_PI_2 - t * series
-    } else {
-        t * series
-    };
+    let small = t * series;
+    let angle = if steep { FRAC_PI_2 - small } else { small };
     angle.copysign(x)
 }
 
