@@ -6,11 +6,12 @@
 //! area (power 5/2 on a line), with the mean inclination of the rail. In that frame the gap is taken along the normal, exactly: the
 //! wheel as surface of revolution, the rail as cylinder.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::grouping::{Grouping, Overlap};
 use crate::contact::geometry::local_gap::{Detail, LocalGap};
+use crate::contact::geometry::locus_lines::{LocusLines, LocusPoint};
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::numerics::bisection::bisect;
 
@@ -44,87 +45,56 @@ pub struct ContactLocus<'g> {
     pub touch: f64,
 }
 
-/// One line along x: its y, the upper edge of the rail, and the clearance above first touch.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct LocusPoint {
-    pub(crate) y: f64,
-    pub(crate) clearance: f64,
-    pub(crate) rail: f64,
-    pub(crate) wheel: f64,
-    /// Turn about x that lays the track's y along the rail's surface, where the clearance is small.
-    inclination: Option<f64>,
-}
-
-/// The lines of a wheel on a rail and the height of first touch, once they were looked for; or why there are none. They follow from
-/// the rest of their geometry, so that they never make two geometries differ.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct LocusOnce(OnceLock<Arc<Result<Lines, String>>>);
-
-impl PartialEq for LocusOnce {
-    fn eq(&self, _: &LocusOnce) -> bool {
-        true
-    }
-}
-
-#[derive(Debug)]
-struct Lines {
-    lines: Vec<LocusPoint>,
-    touch: f64,
-}
-
-impl Lines {
-    /// Places the wheel above the rail and finds the height of first touch.
-    fn of(geometry: &WheelRail) -> Result<Lines, String> {
-        let [rail, wheel] = geometry.parameters(CURVE_STEP);
-        let rail: Vec<_> = rail
-            .into_iter()
-            .map(|s| {
-                let [y, z] = geometry.rail_at(s).at;
-                Some([y, z, s])
-            })
-            .collect();
-        let wheel: Vec<_> = wheel
-            .into_iter()
-            .map(|s| geometry.lowest(s).map(|[_, y, z]| [y, -z, s]))
-            .collect();
-        let (rail, wheel) = (envelope(&rail), envelope(&wheel));
-        let first = rail.first.max(wheel.first);
-        let last =
-            (rail.first + rail.points.len() as i64).min(wheel.first + wheel.points.len() as i64);
-        let mut lines = Vec::with_capacity(usize::try_from(last - first).unwrap_or(0));
-        for k in first..last {
-            let (below, above) = (
-                rail.points[(k - rail.first) as usize],
-                wheel.points[(k - wheel.first) as usize],
-            );
-            if let (Some([z, rail]), Some([depth, wheel])) = (below, above) {
-                lines.push(LocusPoint {
-                    y: k as f64 * STEP,
-                    clearance: -depth - z,
-                    rail,
-                    wheel,
-                    inclination: None,
-                });
-            }
-        }
-        if lines.len() < 3 {
-            return Err(
-                "no part of the wheel lies above the rail; check gauge, flange-back distance and position, lateral shift".to_owned(),
-            );
-        }
-        let clearances = lines.iter().map(|line| line.clearance);
-        let least = clearances.fold(f64::INFINITY, f64::min);
-        for line in &mut lines {
-            line.clearance -= least;
-            if line.clearance < NEAR {
-                line.inclination = Some(inclination(geometry, line.rail));
-            }
-        }
-        Ok(Lines {
-            lines,
-            touch: -least,
+/// Places the wheel above the rail and finds the height of first touch.
+fn lines_of(geometry: &WheelRail) -> Result<LocusLines, String> {
+    let [rail, wheel] = geometry.parameters(CURVE_STEP);
+    let rail: Vec<_> = rail
+        .into_iter()
+        .map(|s| {
+            let [y, z] = geometry.rail_at(s).at;
+            Some([y, z, s])
         })
+        .collect();
+    let wheel: Vec<_> = wheel
+        .into_iter()
+        .map(|s| geometry.lowest(s).map(|[_, y, z]| [y, -z, s]))
+        .collect();
+    let (rail, wheel) = (envelope(&rail), envelope(&wheel));
+    let first = rail.first.max(wheel.first);
+    let last = (rail.first + rail.points.len() as i64).min(wheel.first + wheel.points.len() as i64);
+    let mut lines = Vec::with_capacity(usize::try_from(last - first).unwrap_or(0));
+    for k in first..last {
+        let (below, above) = (
+            rail.points[(k - rail.first) as usize],
+            wheel.points[(k - wheel.first) as usize],
+        );
+        if let (Some([z, rail]), Some([depth, wheel])) = (below, above) {
+            lines.push(LocusPoint {
+                y: k as f64 * STEP,
+                clearance: -depth - z,
+                rail,
+                wheel,
+                inclination: None,
+            });
+        }
     }
+    if lines.len() < 3 {
+        return Err(
+            "no part of the wheel lies above the rail; check gauge, flange-back distance and position, lateral shift".to_owned(),
+        );
+    }
+    let clearances = lines.iter().map(|line| line.clearance);
+    let least = clearances.fold(f64::INFINITY, f64::min);
+    for line in &mut lines {
+        line.clearance -= least;
+        if line.clearance < NEAR {
+            line.inclination = Some(inclination(geometry, line.rail));
+        }
+    }
+    Ok(LocusLines {
+        lines,
+        touch: -least,
+    })
 }
 
 /// Turn about x that lays the track's y along the rail's surface at a parameter of its curve.
@@ -142,7 +112,7 @@ impl<'g> ContactLocus<'g> {
         let found = geometry
             .locus
             .0
-            .get_or_init(|| Arc::new(Lines::of(geometry)));
+            .get_or_init(|| Arc::new(lines_of(geometry)));
         let found = found.as_ref().as_ref().map_err(String::clone)?;
         Ok(ContactLocus {
             geometry,

@@ -6,6 +6,7 @@ pub mod formats;
 pub mod frame;
 pub mod grouping;
 pub mod local_gap;
+pub mod locus_lines;
 pub mod overlaps;
 pub mod plane_curve;
 pub mod profile;

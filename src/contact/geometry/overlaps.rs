@@ -4,8 +4,9 @@
 //! jumps while a height is sought, this is decided once, for a lowering near the one that is expected ([`ContactLocus::grouped_near`]), and
 //! holds for every height.
 
-use crate::contact::geometry::contact_locus::{ContactLocus, LocusPoint, STEP};
+use crate::contact::geometry::contact_locus::{ContactLocus, STEP};
 use crate::contact::geometry::grouping::{Grouping, Overlap};
+use crate::contact::geometry::locus_lines::LocusPoint;
 
 /// Overlaps nearer to each other than this along the rail, in mm, share one gap, because they influence each other. CONTACT, too,
 /// separates patches that are 8 mm or 30° apart.

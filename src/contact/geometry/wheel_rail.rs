@@ -6,7 +6,7 @@
 //! radius `r − z` at the distance `d/2 − p + y` from the centre along the axle, with the flange-back distance d and the
 //! flange-back position p. Conventions of the Manchester contact benchmark (Shackleton and Iwnicki 2008).
 
-use crate::contact::geometry::contact_locus::LocusOnce;
+use crate::contact::geometry::locus_lines::LocusOnce;
 use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
 use crate::contact::geometry::profile::Profile;
 use crate::contact::remark::entry::RemarkEntry;

@@ -1,0 +1,32 @@
+//! The lines along x at which a wheel and a rail are above each other, kept with their geometry.
+
+use std::sync::{Arc, OnceLock};
+
+/// One line along x: its y, the upper edge of the rail, and the clearance above first touch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct LocusPoint {
+    pub(crate) y: f64,
+    pub(crate) clearance: f64,
+    pub(crate) rail: f64,
+    pub(crate) wheel: f64,
+    /// Turn about x that lays the track's y along the rail's surface, where the clearance is small.
+    pub(crate) inclination: Option<f64>,
+}
+
+/// The lines and the height of first touch in mm.
+#[derive(Debug)]
+pub(crate) struct LocusLines {
+    pub(crate) lines: Vec<LocusPoint>,
+    pub(crate) touch: f64,
+}
+
+/// The lines of a wheel on a rail and the height of first touch, once they were looked for; or why there are none. They follow from
+/// the rest of their geometry, so that they never make two geometries differ.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct LocusOnce(pub(crate) OnceLock<Arc<Result<LocusLines, String>>>);
+
+impl PartialEq for LocusOnce {
+    fn eq(&self, _: &LocusOnce) -> bool {
+        true
+    }
+}
