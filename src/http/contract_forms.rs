@@ -10,7 +10,7 @@ use utoipa::openapi::{Discriminator, OpenApi, Ref, RefOr, Schema};
 const REQUESTS: [&str; 2] = ["Case", "CaseWithOptions"];
 
 /// Names for the forms of a choice that have none, in their order.
-const FORMS: [(&str, &[&str]); 4] = [
+const FORMS: [(&str, &[&str]); 6] = [
     (
         "Contact",
         &[
@@ -25,6 +25,8 @@ const FORMS: [(&str, &[&str]); 4] = [
     ("Motions", &["SweepMotions", "WheelsetMotion"]),
     ("Material", &["TwoMaterials"]),
     ("Field", &["CellField"]),
+    ("GridAxis", &["AxisRange"]),
+    ("Thermal", &["ThermalOfTwo"]),
 ];
 
 /// Choices whose forms are told apart by a word in this member.
@@ -68,12 +70,8 @@ pub fn complete(document: &mut OpenApi) {
         tell_by(components, name, member);
     }
     for name in reached(components) {
-        if let Some(RefOr::T(Schema::Object(object))) = components.schemas.get_mut(&name)
-            && !object.properties.is_empty()
-            && object.additional_properties.is_none()
-        {
-            let none = AdditionalProperties::FreeForm(false);
-            object.additional_properties = Some(Box::new(none));
+        if let Some(schema) = components.schemas.get_mut(&name) {
+            close(schema);
         }
     }
     for (name, least, most) in MEMBERS {
@@ -105,12 +103,37 @@ fn forms<'a>(components: &'a mut Components, name: &str) -> Option<&'a mut Vec<R
     }
 }
 
+/// Says that a schema has no members but its own, nor has what is written inside it.
+fn close(schema: &mut RefOr<Schema>) {
+    match schema {
+        RefOr::T(Schema::Object(object)) => {
+            if !object.properties.is_empty() && object.additional_properties.is_none() {
+                let none = AdditionalProperties::FreeForm(false);
+                object.additional_properties = Some(Box::new(none));
+            }
+            object.properties.values_mut().for_each(close);
+        }
+        RefOr::T(Schema::OneOf(choice)) => choice.items.iter_mut().for_each(close),
+        RefOr::T(Schema::Array(array)) => {
+            if let ArrayItems::RefOrSchema(items) = &mut array.items {
+                close(items);
+            }
+        }
+        RefOr::T(_) | RefOr::Ref(_) => {}
+    }
+}
+
 /// Makes schemas of the forms of choices, which lead to them.
 fn name_forms(components: &mut Components) {
     for (choice, names) in FORMS {
         let mut names = names.iter();
         let mut named = BTreeMap::new();
-        for form in forms(components, choice).into_iter().flatten() {
+        let Some(forms) = forms(components, choice) else {
+            continue;
+        };
+        // Some clients take the first form that lacks nothing, whatever else is there.
+        forms.sort_by_key(|form| !requires(form));
+        for form in forms {
             if matches!(form, RefOr::T(Schema::Object(object)) if !object.properties.is_empty())
                 && let Some(name) = names.next()
             {
@@ -120,6 +143,11 @@ fn name_forms(components: &mut Components) {
         }
         components.schemas.extend(named);
     }
+}
+
+/// Does this form have members that must be there?
+fn requires(form: &RefOr<Schema>) -> bool {
+    matches!(form, RefOr::T(Schema::Object(object)) if !object.required.is_empty())
 }
 
 /// Says which word of a member stands for which form of a choice.
@@ -191,7 +219,8 @@ fn fix_length(schema: &mut Schema, length: usize) {
         RefOr::T(number @ Schema::Object(_)) => {
             array.prefix_items = vec![number.clone(); length];
             array.min_items = Some(length);
-            array.items = ArrayItems::False;
+            // `items: false` would say the same; some makers of clients cannot read it.
+            array.max_items = Some(length);
         }
         _ => {}
     }

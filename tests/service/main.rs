@@ -13,6 +13,7 @@ mod cache;
 mod caching;
 mod check_case;
 mod cli;
+mod clients;
 mod contract;
 mod cost;
 mod crash;

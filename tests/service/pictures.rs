@@ -307,3 +307,90 @@ async fn small_pictures_are_small_files() {
 fn form_limit((_, form, width, bytes, most): &(&str, &str, u32, usize, usize)) -> bool {
     bytes > most && (*width == 120 || *form == "svg")
 }
+
+#[tokio::test]
+async fn a_creep_curve_has_a_bar_for_every_estimated_error() {
+    let server = Server::start().await;
+    let path = path_of(&server.solve(&example("sweep.case.json")).await);
+    let svg = server.get(&format!("{path}/plot.svg?view=curve")).await;
+    assert_eq!(svg.status, 200, "{}", svg.text);
+    Tree::from_str(&svg.text, &Options::default()).expect("well-formed SVG");
+    for word in ["creepage x", "force in N", "force y (across)", "μN"] {
+        assert!(svg.text.contains(word), "the curve lacks `{word}`");
+    }
+    let png = server
+        .get(&format!("{path}/plot.png?view=curve&width=640"))
+        .await;
+    assert_eq!(Pixmap::decode_png(&png.bytes).expect("a PNG").width(), 640);
+
+    // A bar is as long as twice the error in the scale of the curve.
+    let result = server.get(&format!("{path}/resultants")).await.json;
+    let total = result["total"].as_array().expect("motions");
+    let force = |k: usize| total[k]["force_x_n"].as_f64().expect("a force");
+    let error = |k: usize| {
+        total[k]["error_estimate"]["force_x_n"]
+            .as_f64()
+            .expect("an error")
+    };
+    let paths: Vec<&str> = svg
+        .text
+        .lines()
+        .filter(|line| line.contains("#0b5a9e"))
+        .collect();
+    let numbers = |text: &str| -> Vec<f64> {
+        let parts = text.split(|c: char| !(c.is_ascii_digit() || c == '.' || c == '-'));
+        parts.filter_map(|part| part.parse().ok()).collect()
+    };
+    let data = |line: &str| line.split('"').nth(1).expect("a path").to_owned();
+    let line = numbers(&data(paths[0]));
+    let last = total.len() - 1;
+    let scale = (line[2 * last + 1] - line[1]).abs() / (force(last) - force(0)).abs();
+    let bars = data(paths[1]);
+    let bar = numbers(bars.split('M').nth(1).expect("a bar"));
+    let length = (bar[1] - bar[2]).abs();
+    let expected = 2.0 * error(0) * scale;
+    assert!((length - expected).abs() < 0.03, "{length} for {expected}");
+
+    let single = path_of(&server.solve(&example("spin.case.json")).await);
+    let refused = server.get(&format!("{single}/plot.svg?view=curve")).await;
+    assert_problem(&refused, 400, "bad-query", "several");
+}
+
+#[tokio::test]
+async fn sections_and_patches_on_the_profiles_are_drawn_where_there_are_any() {
+    let server = Server::start().await;
+    let case = asked("wheel-rail-flange.case.json", &everything());
+    let job = server.solve(&case).await;
+    let path = path_of(&job);
+    let patches = job["result"]["patches"].as_array().expect("patches").len();
+    let standing = server.get(&format!("{path}/plot.svg?view=profiles")).await;
+    assert_eq!(standing.status, 200, "{}", standing.text);
+    Tree::from_str(&standing.text, &Options::default()).expect("well-formed SVG");
+    let tags = standing.text.matches("<circle").count();
+    let combs = standing.text.matches("fill-opacity=\"0.75\"").count();
+    assert_eq!((tags, combs), (patches, patches));
+    assert!(standing.text.contains("y to the left in mm"));
+
+    let section = server
+        .get(&format!("{path}/plot.svg?view=section&patch=1"))
+        .await;
+    assert_eq!(section.status, 200, "{}", section.text);
+    Tree::from_str(&section.text, &Options::default()).expect("well-formed SVG");
+    for word in [
+        "along rolling at y =",
+        "across at x =",
+        "bound of friction",
+        "patch 1 of 0 to 1",
+    ] {
+        assert!(section.text.contains(word), "the section lacks `{word}`");
+    }
+    let hertz = path_of(&server.solve(&asked("spin.case.json", &everything())).await);
+    for (query, word) in [
+        ("view=profiles", "of the type `profiles`"),
+        ("view=section&field=slip", "leave it out"),
+        ("view=section&width=60", "200 or more"),
+    ] {
+        let refused = server.get(&format!("{hertz}/plot.svg?{query}")).await;
+        assert_problem(&refused, 400, "bad-query", word);
+    }
+}

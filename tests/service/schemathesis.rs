@@ -9,40 +9,49 @@ use crate::support::{Service, skip};
 /// The version that the settings are written for.
 const VERSION: &str = "4.32.5";
 
-/// `st` of that version: `RAILHEAD_TEST_SCHEMATHESIS`, the one on the path, or in continuous integration one installed for this.
-fn schemathesis() -> Option<PathBuf> {
+/// A program of a Python package in this version: the one that the variable names, the one on the path, or in continuous integration
+/// one installed for this.
+pub fn python_program(name: &str, package: &str, version: &str, variable: &str) -> Option<PathBuf> {
     let fits = |program: &Path| {
         let output = Command::new(program).arg("--version").output();
-        output.is_ok_and(|output| String::from_utf8_lossy(&output.stdout).contains(VERSION))
+        output.is_ok_and(|output| String::from_utf8_lossy(&output.stdout).contains(version))
     };
-    let named = std::env::var_os("RAILHEAD_TEST_SCHEMATHESIS");
-    let program = named.map_or_else(|| PathBuf::from("st"), PathBuf::from);
+    let named = std::env::var_os(variable);
+    let program = named.map_or_else(|| PathBuf::from(name), PathBuf::from);
     if fits(&program) {
         return Some(program);
     }
     if std::env::var_os("CI").is_some() {
-        let place = Path::new(env!("CARGO_TARGET_TMPDIR")).join("schemathesis-venv");
-        let run = |program: &Path, arguments: &[&str]| {
-            let output = Command::new(program).args(arguments).output();
-            let output = output.unwrap_or_else(|error| panic!("{}: {error}", program.display()));
-            let told = String::from_utf8_lossy(&output.stderr).into_owned();
-            assert!(output.status.success(), "{}: {told}", program.display());
-        };
+        let place = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{package}-venv"));
         run(
             Path::new("python3"),
             &["-m", "venv", &place.to_string_lossy()],
         );
-        let package = format!("schemathesis=={VERSION}");
+        let package = format!("{package}=={version}");
         let install = ["-m", "pip", "install", "--quiet", &package];
         run(&place.join("bin/python"), &install);
-        let own = place.join("bin/st");
+        let own = place.join("bin").join(name);
         assert!(fits(&own), "{}", own.display());
         return Some(own);
     }
     skip(&format!(
-        "the contract is not fuzzed; `pip install schemathesis=={VERSION}`, or name its `st` in RAILHEAD_TEST_SCHEMATHESIS"
+        "`{name}` is not there: `pip install {package}=={version}`, or name it in {variable}"
     ));
     None
+}
+
+/// Runs a program that has to succeed; what it prints.
+pub fn run(program: &Path, arguments: &[&str]) -> String {
+    let output = Command::new(program).args(arguments).output();
+    let output = output.unwrap_or_else(|error| panic!("{}: {error}", program.display()));
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{}: {told}", program.display());
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+fn schemathesis() -> Option<PathBuf> {
+    let variable = "RAILHEAD_TEST_SCHEMATHESIS";
+    python_program("st", "schemathesis", VERSION, variable)
 }
 
 #[tokio::test]

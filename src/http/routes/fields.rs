@@ -19,7 +19,8 @@ use crate::http::render::pieces::{csv_body, json_body};
 use crate::http::render::table::{File, Precision, Table};
 use crate::http::render::{npz, vtk};
 use crate::http::routes::part_request::PartRequest;
-use crate::http::routes::plots::{PlotOptions, WIDTH_DEFAULT, picture};
+use crate::http::routes::plot_words::{PlotOptions, View};
+use crate::http::routes::plots::{WIDTH_DEFAULT, picture};
 use crate::http::routes::stored_fields::{FieldProblems, stored};
 
 /// Most samples along one axis of a regular grid.
@@ -170,6 +171,7 @@ impl Selection {
             ));
         }
         let wish = PlotOptions {
+            view: View::Patch,
             shown,
             patch: self.patch,
             point: self.point,

@@ -14,6 +14,8 @@ pub mod jobs;
 pub mod me;
 pub mod next_page;
 pub mod part_request;
+pub mod plot_views;
+pub mod plot_words;
 pub mod plots;
 pub mod point_fields;
 pub mod prefer_wait;

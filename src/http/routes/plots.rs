@@ -4,7 +4,6 @@ use axum::http::{HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
 
 use crate::contact::case::words::solver::Output;
-use crate::contact::solution::words::PointSolution;
 use crate::http::extract::accept::Format;
 use crate::http::extract::query::{Parameters, count, index, query, reader, require_index};
 use crate::http::limits::holding_body::hold_while_sent;
@@ -14,17 +13,26 @@ use crate::http::render::picture::raster;
 use crate::http::render::picture::scene::Scene;
 use crate::http::render::table::File;
 use crate::http::routes::part_request::PartRequest;
+use crate::http::routes::plot_views::{Drawing, drawing};
+use crate::http::routes::plot_words::{PlotOptions, View, counted, remarks};
 use crate::http::routes::stored_fields::{FieldProblems, stored};
 
 /// Width of a picture in pixels when nothing is said.
 pub const WIDTH_DEFAULT: u32 = 800;
+/// Least width of the views other than `patch`: what is written on narrower ones cannot be read.
+const VIEW_WIDTH_MIN: u32 = 200;
 /// Limits of the width in pixels.
 const WIDTH: [u32; 2] = [48, 2400];
 
 query! {
     /// The parameters of a picture.
     PlotQuery(() => ()) {
-        /// `traction` (when left out), `pressure`, `slip` or `zones`; the case has to ask for that output. The border of the stick
+        /// `patch` (when left out): one patch from above; `section`: traction and friction's bound along and across, through the largest traction
+        /// of a patch; `curve`: the forces over the motions, with their errors; `profiles`: every patch on wheel and rail, with its pressure if
+        /// the case asks for it
+        #[param(inline, example = "curve")]
+        view: View as View = reader(View::ALL.map(View::name).join(", "), View::from_name);
+        /// Of the view `patch`: `traction` (when left out), `pressure`, `slip` or `zones`; the case has to ask for that output. The border of the stick
         /// zone is drawn if it asks for `zones` too
         #[param(example = "traction")]
         field: Output as String = reader("`traction`, `pressure`, `slip` or `zones`", |text| match text {
@@ -42,26 +50,11 @@ query! {
         /// Width in pixels; 800 when left out. The height follows from the patch. Below 200 the patch is drawn alone, for lists
         #[param(minimum = 48, maximum = 2400)]
         width: u32 as u32 = count(WIDTH[0], WIDTH[1]);
-        /// `low,high`: the values at both ends of the scale, in the unit of the field, so that several pictures share one; from 0 to the
+        /// Of the view `patch`, `low,high`: the values at both ends of the scale, in the unit of the field, so that several pictures share one; from 0 to the
         /// largest value of the picture when left out. Zones have none
         #[param(example = "0,400")]
         range: [f64; 2] as String = reader("`low,high`: two numbers, the second above the first", range);
     }
-}
-
-/// What a picture shows, and how wide it is.
-#[derive(Debug, Clone, Copy)]
-pub struct PlotOptions {
-    /// The field.
-    pub shown: Output,
-    /// Number of the patch.
-    pub patch: usize,
-    /// Number of the motion.
-    pub point: usize,
-    /// Width in pixels.
-    pub width: u32,
-    /// Both ends of the scale, if they are given.
-    pub range: Option<[f64; 2]>,
 }
 
 /// Two finite numbers with a finite way from the first up to the second.
@@ -84,7 +77,23 @@ impl PlotOptions {
                 "zones have no scale; leave `range` out",
             ));
         }
+        let view = query.view.unwrap_or(View::Patch);
+        if view != View::Patch {
+            let others = [
+                ("field", query.field.is_some()),
+                ("range", query.range.is_some()),
+            ];
+            if let Some((name, _)) = others.into_iter().find(|(_, given)| *given) {
+                let detail = format!("only the view `patch` has a `{name}`; leave it out");
+                return Err(ApiError::bad_parameter(name, detail));
+            }
+            if query.width.is_some_and(|width| width < VIEW_WIDTH_MIN) {
+                let detail = format!("{VIEW_WIDTH_MIN} or more is needed for a view with numbers");
+                return Err(ApiError::bad_parameter("width", detail));
+            }
+        }
         Ok(PlotOptions {
+            view,
             shown,
             range: query.range,
             patch: query.patch.unwrap_or(0),
@@ -94,9 +103,9 @@ impl PlotOptions {
     }
 }
 
-/// A picture of a patch as SVG.
+/// A picture of a patch, or of another view of the result, as SVG.
 ///
-/// A smooth heat map inside the border of the patch with a scale, the border of the stick zone, arrows along the traction or the slip, axes in mm with the same
+/// A patch: a smooth heat map inside the border of the patch with a scale, the border of the stick zone, arrows along the traction or the slip, axes in mm with the same
 /// scale, and the rolling direction. Readable without colour.
 #[utoipa::path(
     get,
@@ -142,25 +151,13 @@ pub async fn picture(
     let rendering = request.rendering(0).await?;
     let (jobs, id) = (&request.jobs, request.id);
     let job = jobs.get(id).await?;
-    let solution = jobs.solution(id).await?;
-    let patches = solution.patches.len();
-    require_index("patch", Some(wish.patch), patches)?;
-    let points = &solution.patches[wish.patch].points;
-    require_index("point", Some(wish.point), points.len())?;
-    let (fields, values) = stored(jobs, id, wish.patch, wish.point, wish.shown).await?;
-    let normal = solution.patches[wish.patch].normal_force_n;
-    let counted = counted(wish, patches, points.len());
-    let remarks = remarks(&points[wish.point], normal, &counted);
-    let scene = Scene {
-        title: job.name.unwrap_or_else(|| format!("job {id}")),
-        remarks,
-        shown: wish.shown,
-        range: wish.range,
-        fields,
-        values,
+    let title = job.name.unwrap_or_else(|| format!("job {id}"));
+    let drawing = match wish.view {
+        View::Patch => of_patch(request, title, wish).await?,
+        _ => drawing(request, title, wish).await?,
     };
     let draw = move || {
-        let svg = draw(&scene, wish.width);
+        let svg = drawing(wish.width)?;
         match format {
             Format::Png => {
                 raster::png(&svg, wish.width).map_err(|error| ApiError::internal(&error))
@@ -178,89 +175,28 @@ pub async fn picture(
     Ok(hold_while_sent(response, share))
 }
 
-/// Which patch and motion this is, where there are several.
-fn counted(wish: PlotOptions, patches: usize, points: usize) -> String {
-    let mut text = String::new();
-    if patches > 1 {
-        text += &format!(", patch {} of 0 to {}", wish.patch, patches - 1);
-    }
-    if points > 1 {
-        text += &format!(", point {} of 0 to {}", wish.point, points - 1);
-    }
-    text
-}
-
-/// Motion and forces in two lines.
-fn remarks(point: &PointSolution, normal: f64, counted: &str) -> Vec<String> {
-    let motion = point.motion;
-    // What rounding leaves of a force that is nothing.
-    let force = |value: f64| {
-        let lost = value.abs() < 1e-9 * normal;
-        short(if lost { 0.0 } else { value })
+/// What draws one patch from above.
+async fn of_patch(
+    request: &PartRequest,
+    title: String,
+    wish: PlotOptions,
+) -> Result<Drawing, ApiError> {
+    let (jobs, id) = (&request.jobs, request.id);
+    let solution = jobs.solution(id).await?;
+    let patches = solution.patches.len();
+    require_index("patch", Some(wish.patch), patches)?;
+    let points = &solution.patches[wish.patch].points;
+    require_index("point", Some(wish.point), points.len())?;
+    let (fields, values) = stored(jobs, id, wish.patch, wish.point, wish.shown).await?;
+    let normal = solution.patches[wish.patch].normal_force_n;
+    let counted = counted(wish, patches, points.len());
+    let scene = Scene {
+        title,
+        remarks: remarks(&points[wish.point], normal, &counted),
+        shown: wish.shown,
+        range: wish.range,
+        fields,
+        values,
     };
-    vec![
-        format!(
-            "creepage x {}, y {}, spin {} 1/mm{counted}",
-            short(motion.creepage_x),
-            short(motion.creepage_y),
-            short(motion.spin_per_mm),
-        ),
-        format!(
-            "normal force {} N; on the lower body: force x {} N, y {} N, moment {} N·mm",
-            short(normal),
-            force(point.force_x_n),
-            force(point.force_y_n),
-            force(point.moment_z_n_mm)
-        ),
-    ]
-}
-
-/// A number with four digits that count.
-fn short(value: f64) -> String {
-    let size = value.abs();
-    let text = if size == 0.0 {
-        "0".to_owned()
-    } else if (1e-3..1e4).contains(&size) {
-        let digits = (3.0 - size.log10().floor()).clamp(0.0, 6.0);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "from 0 to 6"
-        )]
-        let text = format!("{value:.*}", digits as usize);
-        if text.contains('.') {
-            text.trim_end_matches('0').trim_end_matches('.').to_owned()
-        } else {
-            text
-        }
-    } else if (1e4..1e9).contains(&size) {
-        format!("{value:.0}")
-    } else {
-        let text = format!("{value:.3e}");
-        let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));
-        let digits = digits.trim_end_matches('0').trim_end_matches('.');
-        format!("{digits}e{exponent}")
-    };
-    text.replace('-', "−")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_are_short() {
-        for (value, text) in [
-            (0.0, "0"),
-            (0.001, "0.001"),
-            (-0.0004, "−4e−4"),
-            (1.25e-12, "1.25e−12"),
-            (100_000.0, "100000"),
-            (1234.56, "1235"),
-            (12.3456, "12.35"),
-            (-3.0, "−3"),
-        ] {
-            assert_eq!(short(value), text);
-        }
-    }
+    Ok(Box::new(move |width| Ok(draw(&scene, width))))
 }

@@ -2,14 +2,12 @@
 
 use crate::contact::case::words::solver::Output;
 use crate::http::render::picture::bar::colour_bar;
+use crate::http::render::picture::chart::open;
 use crate::http::render::picture::frame::{Frame, WIDTH};
 use crate::http::render::picture::layers;
 use crate::http::render::picture::map::Ground;
 use crate::http::render::picture::scene::{Scene, heat};
-use crate::http::render::picture::svg::{Anchor, FONTS, Svg, escape, px, shorten};
-
-/// Characters of a title that fit.
-const TITLE_MAX: usize = 74;
+use crate::http::render::picture::svg::{Svg, escape, px};
 
 /// Pictures narrower than this show the patch alone: nothing written on them could be read.
 const ALONE_BELOW: u32 = 200;
@@ -32,38 +30,7 @@ pub fn draw(scene: &Scene, width: u32) -> String {
         TOLERANCE * (WIDTH / f64::from(width)).max(1.0),
     );
     let frame = Frame::around(ground.extent());
-    let height = frame.height();
-    let shown_height = f64::from(width) * height / WIDTH;
-    let mut svg = Svg::default();
-    svg.raw(&format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{}\" viewBox=\"0 0 {WIDTH} {}\" font-family=\"{FONTS}\" role=\"img\">\n",
-        px(shown_height),
-        px(height),
-    ));
-    svg.raw(&format!("<title>{}</title>\n", escape(&scene.title)));
-    svg.raw(&format!(
-        "<desc>{}</desc>\n",
-        escape(&scene.remarks.join("; "))
-    ));
-    svg.element("rect", "width=\"100%\" height=\"100%\" fill=\"#fff\"");
-    let title = shorten(&scene.title, TITLE_MAX);
-    svg.text(
-        (frame.area[0], 28.0),
-        17.0,
-        Anchor::Start,
-        "fill=\"#111\"",
-        &title,
-    );
-    for (line, remark) in scene.remarks.iter().enumerate() {
-        let y = if line == 0 { 48.0 } else { 65.0 };
-        svg.text(
-            (frame.area[0], y),
-            12.0,
-            Anchor::Start,
-            "fill=\"#444\"",
-            remark,
-        );
-    }
+    let mut svg = open(&scene.title, &scene.remarks, width, frame.height());
     layers::grid(&mut svg, &frame);
     match heat(scene) {
         Some(heat) => {

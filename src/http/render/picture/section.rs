@@ -1,0 +1,285 @@
+//! Draws the sections of a patch through its largest traction: how large the traction is, and how much friction would carry.
+
+use crate::contact::solution::words::{PatchCells, PointFields};
+use crate::contact::solution::zone::Zone;
+use crate::http::render::picture::chart::{Chart, open};
+use crate::http::render::picture::frame::WIDTH;
+use crate::http::render::picture::svg::{Anchor, Svg, polyline, px};
+
+/// Height of the picture in its own units.
+const HEIGHT: f64 = 460.0;
+/// Room to the left of the first panel, between both, and to the right.
+const GAPS: [f64; 3] = [78.0, 62.0, 24.0];
+/// Steps between two cells: values go like a square root near the border.
+const STEPS: u32 = 8;
+const TRACTION: &str = "stroke=\"#0b5a9e\" stroke-width=\"1.9\"";
+const BOUND: &str = "stroke=\"#555\" stroke-dasharray=\"5 4\"";
+const STICK: &str = "fill=\"#d4e5f3\"";
+
+/// Sections of a patch.
+#[derive(Debug, Clone)]
+pub struct Sections {
+    /// First line, a text of the client.
+    pub title: String,
+    /// Smaller lines below, two at most.
+    pub remarks: Vec<String>,
+    /// The cells.
+    pub cells: PatchCells,
+    /// The values of one motion.
+    pub values: PointFields,
+    /// Coefficient of friction, where it is one number.
+    pub friction: Option<f64>,
+}
+
+/// One section: places along it with the traction and the bound, its sticking parts, and what it is called.
+struct SectionLine {
+    /// Place, |t|, μp if it is known.
+    points: Vec<[f64; 3]>,
+    sticks: Vec<[f64; 2]>,
+    name: String,
+    x_name: &'static str,
+}
+
+/// Draws sections as SVG, `width` pixels wide.
+#[must_use]
+pub fn draw(sections: &Sections, width: u32) -> String {
+    let both = [along(sections), across(sections)];
+    let values = both.iter().flat_map(|section| &section.points);
+    let largest = values
+        .map(|[_, traction, bound]| traction.max(if bound.is_nan() { 0.0 } else { *bound }))
+        .fold(0.0, f64::max);
+    let top = if largest > 0.0 { 1.08 * largest } else { 1.0 };
+    let room = WIDTH - GAPS.iter().sum::<f64>();
+    let lengths = both.each_ref().map(|section| {
+        let ends = [section.points.first(), section.points.last()];
+        ends[1].map_or(1.0, |end| end[0]) - ends[0].map_or(0.0, |end| end[0])
+    });
+    // Millimetres are as long in one as in the other, within limits.
+    let share = (lengths[0] / (lengths[0] + lengths[1])).clamp(0.3, 0.7);
+    let mut svg = open(&sections.title, &sections.remarks, width, HEIGHT);
+    let mut left = GAPS[0];
+    for (section, share) in both.iter().zip([share, 1.0 - share]) {
+        let ends = [section.points.first(), section.points.last()];
+        let [from, to] = ends.map(|end| end.map_or(0.0, |end| end[0]));
+        let chart = Chart {
+            area: [left, 112.0, share * room, HEIGHT - 210.0],
+            x: if from < to {
+                [from, to]
+            } else {
+                [from - 1.0, from + 1.0]
+            },
+            y: [0.0, top],
+        };
+        draw_section(&mut svg, &chart, section);
+        left += share * room + GAPS[1];
+    }
+    legend(&mut svg, sections.friction.is_some());
+    svg.raw("</svg>\n");
+    svg.finish()
+}
+
+fn draw_section(svg: &mut Svg, chart: &Chart, section: &SectionLine) {
+    let [_, top, _, height] = chart.area;
+    for [from, to] in &section.sticks {
+        let [x0, x1] = [from, to].map(|x| chart.at(*x, 0.0).0);
+        let place = [x0, top, x1 - x0, height].map(px);
+        let [x, y, width, height] = place;
+        svg.element(
+            "rect",
+            &format!("x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" {STICK}"),
+        );
+    }
+    chart.grid(svg);
+    let line = |column: usize| {
+        let known = section
+            .points
+            .iter()
+            .filter(|point| !point[column].is_nan());
+        polyline(known.map(|point| chart.at(point[0], point[column])), false)
+    };
+    svg.path(&line(2), &format!("fill=\"none\" {BOUND}"));
+    svg.path(&line(1), &format!("fill=\"none\" {TRACTION}"));
+    chart.axes(svg, [section.x_name, "MPa"]);
+    let (x, y) = (chart.area[0] + chart.area[2], top - 8.0);
+    svg.text((x, y), 12.0, Anchor::End, "fill=\"#444\"", &section.name);
+}
+
+fn legend(svg: &mut Svg, bounded: bool) {
+    let y = HEIGHT - 26.0;
+    svg.path(
+        &format!("M78 {}h30", px(y - 4.0)),
+        &format!("fill=\"none\" {TRACTION}"),
+    );
+    svg.text((115.0, y), 12.0, Anchor::Start, "", "traction |t|");
+    if bounded {
+        svg.path(
+            &format!("M230 {}h30", px(y - 4.0)),
+            &format!("fill=\"none\" {BOUND}"),
+        );
+        svg.text((267.0, y), 12.0, Anchor::Start, "", "bound of friction μp");
+    }
+    let place = format!(
+        "x=\"430\" y=\"{}\" width=\"22\" height=\"12\"",
+        px(y - 10.0)
+    );
+    svg.element("rect", &format!("{place} {STICK} stroke=\"#333\""));
+    svg.text((459.0, y), 12.0, Anchor::Start, "", "stick");
+}
+
+impl Sections {
+    fn traction(&self, cell: usize) -> f64 {
+        let part = |part: &Option<Vec<f64>>| part.as_ref().map_or(0.0, |values| values[cell]);
+        part(&self.values.traction_x_mpa).hypot(part(&self.values.traction_y_mpa))
+    }
+
+    /// NaN where it is not known.
+    fn bound(&self, cell: usize) -> f64 {
+        let pressure = self.cells.pressure_mpa.as_ref().map(|values| values[cell]);
+        pressure
+            .zip(self.friction)
+            .map_or(f64::NAN, |(pressure, friction)| friction * pressure)
+    }
+
+    fn sticks(&self, cell: usize) -> bool {
+        let zones = self.values.zone.as_ref();
+        zones.is_some_and(|zones| zones[cell] == Zone::Stick)
+    }
+
+    /// The cell with the largest traction.
+    fn peak(&self) -> usize {
+        let cells = 0..self.cells.x_mm.len();
+        cells
+            .max_by(|a, b| self.traction(*a).total_cmp(&self.traction(*b)))
+            .unwrap_or(0)
+    }
+}
+
+/// Along rolling: the strip of the largest traction.
+fn along(of: &Sections) -> SectionLine {
+    let (cells, peak) = (&of.cells, of.peak());
+    let strip = cells.strip.get(peak).copied();
+    let mut own: Vec<usize> = (0..cells.x_mm.len())
+        .filter(|cell| Some(cells.strip[*cell]) == strip)
+        .collect();
+    own.sort_by(|a, b| cells.x_mm[*a].total_cmp(&cells.x_mm[*b]));
+    let spans = own.iter().map(|cell| {
+        let (x, half) = (cells.x_mm[*cell], 0.5 * cells.dx_mm[*cell]);
+        (*cell, [x - half, x + half])
+    });
+    let y = cells.y_mm.get(peak).copied().unwrap_or(0.0);
+    section(
+        of,
+        spans.collect(),
+        format!("along rolling at y = {} mm", short(y)),
+        "x in mm",
+    )
+}
+
+/// Across: of every strip the cell that lies at the x of the largest traction.
+fn across(of: &Sections) -> SectionLine {
+    let (cells, peak) = (&of.cells, of.peak());
+    let at = cells.x_mm.get(peak).copied().unwrap_or(0.0);
+    let mut own: Vec<usize> = (0..cells.x_mm.len())
+        .filter(|cell| (cells.x_mm[*cell] - at).abs() <= 0.5 * cells.dx_mm[*cell])
+        .collect();
+    own.sort_by(|a, b| cells.y_mm[*a].total_cmp(&cells.y_mm[*b]));
+    own.dedup_by_key(|cell| cells.strip[*cell]);
+    let spans = own.iter().map(|cell| {
+        let (y, half) = (cells.y_mm[*cell], 0.5 * cells.dy_mm[*cell]);
+        (*cell, [y - half, y + half])
+    });
+    section(
+        of,
+        spans.collect(),
+        format!("across at x = {} mm", short(at)),
+        "y in mm",
+    )
+}
+
+/// The section through these cells, each with its span. Between the middles of cells the square runs straight, and to nothing at the
+/// border, as it does for Hertz's pressure there.
+fn section(
+    of: &Sections,
+    spans: Vec<(usize, [f64; 2])>,
+    name: String,
+    x_name: &'static str,
+) -> SectionLine {
+    let sticks = spans.iter().filter(|(cell, _)| of.sticks(*cell));
+    let sticks = sticks.map(|(_, span)| *span).collect();
+    let middle = |(cell, [from, to]): &(usize, [f64; 2])| {
+        [0.5 * (from + to), of.traction(*cell), of.bound(*cell)]
+    };
+    let end = |place: f64, beside: &[f64; 3]| [place, 0.0, 0.0 * beside[2]];
+    let middles: Vec<[f64; 3]> = spans.iter().map(middle).collect();
+    let mut knots = Vec::new();
+    if let (Some(first), Some(last)) = (spans.first(), spans.last()) {
+        knots.push(end(first.1[0], &middles[0]));
+        knots.extend(&middles);
+        knots.push(end(last.1[1], &middles[middles.len() - 1]));
+    }
+    let mut points: Vec<[f64; 3]> = knots.first().copied().into_iter().collect();
+    for pair in knots.windows(2) {
+        for step in 1..=STEPS {
+            let share = f64::from(step) / f64::from(STEPS);
+            let straight = |k: usize| pair[0][k] * (1.0 - share) + pair[1][k] * share;
+            let rooted = |k: usize| {
+                let square = pair[0][k].powi(2) * (1.0 - share) + pair[1][k].powi(2) * share;
+                square.sqrt()
+            };
+            points.push([straight(0), rooted(1), rooted(2)]);
+        }
+    }
+    SectionLine {
+        points,
+        sticks,
+        name,
+        x_name,
+    }
+}
+
+fn short(value: f64) -> String {
+    format!("{value:.2}").replace('-', "−")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_section_of_a_hertzian_pressure_is_round_and_ends_at_nothing() {
+        let cells = 16;
+        let width = 2.0 / f64::from(cells);
+        let x: Vec<f64> = (0..cells)
+            .map(|k| (f64::from(k) + 0.5) * width - 1.0)
+            .collect();
+        let pressure: Vec<f64> = x.iter().map(|x| (1.0 - x * x).sqrt()).collect();
+        let of = Sections {
+            title: String::new(),
+            remarks: Vec::new(),
+            cells: PatchCells {
+                dx_mm: vec![width; x.len()],
+                y_mm: vec![0.0; x.len()],
+                dy_mm: vec![0.1; x.len()],
+                strip: vec![0; x.len()],
+                pressure_mpa: Some(pressure.clone()),
+                x_mm: x,
+            },
+            values: PointFields {
+                traction_x_mpa: Some(pressure),
+                traction_y_mpa: Some(vec![0.0; 16]),
+                ..PointFields::default()
+            },
+            friction: Some(1.0),
+        };
+        let section = along(&of);
+        for [x, traction, bound] in &section.points {
+            let exact = (1.0 - x * x).max(0.0).sqrt();
+            assert!(
+                (traction - exact).abs() < 0.1 && (traction - bound).abs() < 1e-12,
+                "{x}"
+            );
+        }
+        assert_eq!(section.points.first().map(|point| point[1]), Some(0.0));
+        assert!(draw(&of, 800).ends_with("</svg>\n"));
+    }
+}
