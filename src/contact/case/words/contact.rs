@@ -62,7 +62,7 @@ pub enum Contact {
         /// Cross-section of the wheel.
         #[schema(inline = false)]
         wheel: Box<CrossSection>,
-        /// Which wheel of the wheelset, seen along rolling.
+        /// The side of the wheel in its wheelset, seen in the rolling direction.
         side: SideName,
         /// Radius of the wheel where z of its cross-section is 0, in mm.
         #[schema(exclusive_minimum = 0.0)]
@@ -92,8 +92,8 @@ pub enum Contact {
         /// Roll of the wheelset in rad, positive from y to z; 0 when left out.
         #[schema(required = false)]
         roll_rad: f64,
-        /// Solve also where the points of a profile are so coarse or rough under the contact that an answer would mislead, or where rail and
-        /// wheel seem exchanged; otherwise the job fails and says where. `false` when left out.
+        /// Solve even if the points of a profile are so coarse or rough under the contact that an answer would mislead, or if rail and wheel
+        /// seem exchanged. When `false` or left out, the job fails in these cases and says where the fault is.
         #[serde(skip_serializing_if = "is_false")]
         #[schema(required = false)]
         accept_rough_profiles: bool,
@@ -117,21 +117,21 @@ pub struct CrossSection {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub format: Option<FormatName>,
-    /// What the file says; its text, never a path.
+    /// The content of the file, not its path.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub text: Option<String>,
-    /// y of the points is positive to the track centre. Left out, the file tells; then a wheel's flange, and a rail is as
-    /// above.
+    /// `true` if y of the points is positive toward the track centre. When left out, the file decides; if it does not say, the place of the
+    /// flange decides for a wheel, and y of a rail is taken as positive to the field side.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub mirror_y: Option<bool>,
-    /// z of the points is positive up. Left out, the file tells, then the shape.
+    /// `true` if z of the points is positive upward. When left out, the file decides; if it does not say, the shape does.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub mirror_z: Option<bool>,
-    /// Waves shorter than about this along the cross-section are smoothed away, in mm; 0 (none) when left out. `auto`: what suits the noise of
-    /// the points and the pressure, 2 to 8 mm or none; the answer says what was used.
+    /// Waves along the cross-section that are shorter than about this are smoothed away, in mm; 0 (no smoothing) when left out. `auto` chooses
+    /// 0, or 2 to 8 mm, by the noise of the points and the pressure; the answer says what was used.
     #[schema(required = false)]
     pub smoothing_mm: Smoothing,
 }
@@ -142,7 +142,7 @@ pub struct CrossSection {
 pub enum Smoothing {
     /// By a cut wavelength in mm; 0 for none.
     Length(f64),
-    /// By what suits the noise and the pressure.
+    /// By a wavelength that the service chooses.
     ByNoise(SmoothingWord),
 }
 
@@ -180,22 +180,22 @@ pub struct Load {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub vertical_force_n: Option<f64>,
-    /// Approach of distant points in mm. For `radii` and `ellipse` it counts from first touch and is more than 0; for gaps it
-    /// counts from gap = 0 of the given data and is more than the least gap; for `profiles` the wheel is lowered by it, vertically
-    /// from first touch.
+    /// Approach of distant points in mm. For `radii` and `ellipse` it is measured from first touch and is more than 0. For gaps it is
+    /// measured from gap = 0 of the data and is more than the least gap. For `profiles` it is the vertical distance by which the wheel is
+    /// lowered from first touch.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub approach_mm: Option<f64>,
 }
 
-/// Left or right rail, seen along rolling.
+/// Left or right rail, seen in the rolling direction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = Side)]
 pub enum SideName {
-    /// y of the track is positive there.
+    /// The rail at positive y of the track.
     Left,
-    /// y of the track is negative there.
+    /// The rail at negative y of the track.
     Right,
 }
 

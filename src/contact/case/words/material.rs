@@ -1,4 +1,4 @@
-//! What the bodies are made of, and how they rub.
+//! Elastic constants of the bodies, and friction between them.
 
 use serde::Serialize;
 use utoipa::ToSchema;

@@ -18,8 +18,8 @@ pub struct MotionWords {
     pub spin_per_mm: f64,
 }
 
-/// A motion as a case asks for it: creepages and spin, where a tangential force may stand in place of its creepage. The creepage that
-/// gives the force is found and reported with the answer.
+/// A motion as a case gives it: creepages and spin. A tangential force may be given in place of a creepage; the creepage that gives this
+/// force is then found and reported in the answer.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct AskedMotion {
     /// Longitudinal creepage, dimensionless; 0 when left out.
@@ -51,13 +51,13 @@ pub struct AskedMotion {
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[serde(untagged)]
 pub enum Motions {
-    /// One motion; components left out are 0, but at least one is written.
+    /// One motion; components left out are 0, but at least one has to be given.
     One(AskedMotion),
     /// Several motions on the same patch, solved in order.
     Many(Vec<AskedMotion>),
     /// Motions generated from values of their components.
     Sweep {
-        /// What varies, and what stays.
+        /// The values of its components.
         sweep: Sweep,
     },
     /// The motion of the wheelset, from which every patch gets its own creepages; for `profiles` only.
@@ -123,8 +123,8 @@ pub struct Sweep {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub speed_mm_per_s: Option<f64>,
-    /// `together` (default): all components that vary have the same number of values and run side by side; `grid`: every
-    /// combination, the last named component fastest, a force in the place of its creepage.
+    /// `together` (default): all components that vary have the same number of values, and motion n has value n of each; `grid`: every
+    /// combination of values. There the last component in this list varies fastest; a force counts at the place of its creepage.
     #[schema(required = false)]
     pub combine: Combine,
 }
@@ -133,7 +133,7 @@ pub struct Sweep {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Combine {
-    /// Side by side; all components that vary have equally many values.
+    /// Motion n has value n of every component; all components that vary have the same number of values.
     #[default]
     Together,
     /// Every combination.

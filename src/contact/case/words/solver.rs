@@ -11,8 +11,8 @@ pub struct Solver {
     pub method: MethodName,
     /// Allowed error of the resultants relative to μN (moment: μN√(A/π)), 1e-4 to 0.5. Excludes `mesh`.
     ///
-    /// Most cases reach 0.001, few 1e-4: one that ends above its target has `target_met: false` and the remark `target-missed`.
-    /// 0.005 when left out, but for `fastsim`, whose stated error no target changes: without one it has no `target_met`.
+    /// Most cases reach 0.001, few 1e-4. One that ends above its target has `target_met: false` and the remark `target-missed`. 0.005 when
+    /// left out, except for `fastsim`: its stated error is fixed, so that it has no target, and no `target_met`, unless one is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, minimum = 0.0001, maximum = 0.5)]
     pub target_error: Option<f64>,
@@ -20,7 +20,7 @@ pub struct Solver {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub mesh: Option<MeshSizeWords>,
-    /// How much traction `fastsim` lets friction carry where; `elliptic` when left out. For no other method.
+    /// The bound of the tractions in `fastsim`; `elliptic` when left out. Not allowed for other methods.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub traction_bound: Option<TractionBoundName>,
@@ -70,7 +70,7 @@ pub struct MeshSizeWords {
     pub cells: u32,
 }
 
-/// What a case may ask for; nothing else is computed.
+/// What a case may ask for. What is not asked for is not part of the answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Output {
