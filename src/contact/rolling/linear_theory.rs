@@ -1,6 +1,7 @@
 //! Kalker's coefficients of linear theory: how much force a creepage makes before anything slips.
 //!
-//! `F_x = G c² C11 ν_x`, `F_y = G c² C22 ν_y + G c³ C23 φ` with `c = √(ab)` (Kalker 1990, §2.2.3). The values are this
+//! `F_x = G c² C11 ν_x`, `F_y = G c² C22 ν_y + G c³ C23 φ` and `M_z = −G c³ C23 ν_y + G c⁴ C33 φ` with `c = √(ab)` (Kalker 1990,
+//! §2.2.3). The values are this
 //! program's own: its fast solver at vanishing creepage on two meshes, extrapolated; `tests/physics/kalker_table.rs` computes
 //! them anew and compares. They agree with Kalker's printed table to its rounding, about 1 % where the ellipse is slender.
 
@@ -26,10 +27,7 @@ pub fn ratio(row: usize) -> f64 {
 #[must_use]
 pub fn coefficients(a_over_b: f64, poisson_ratio: f64) -> [f64; 3] {
     let inside = a_over_b.clamp(ratio(0), ratio(RATIOS - 1));
-    let place = 2.0 * inside.log2() + 0.5 * (RATIOS - 1) as f64;
-    let first = (place.floor() as usize).clamp(1, RATIOS - 3) - 1;
-    let along = lagrange::weights(&[0.0, 1.0, 2.0, 3.0], place - first as f64);
-    let across = lagrange::weights(&POISSON_RATIOS, poisson_ratio);
+    let (first, along, across) = places(inside, poisson_ratio);
     let mut found = [0, 1, 2].map(|k| {
         let row = |r: usize| -> f64 {
             let entries = TABLE[first + r][k].iter().zip(across);
@@ -47,6 +45,25 @@ pub fn coefficients(a_over_b: f64, poisson_ratio: f64) -> [f64; 3] {
         }
     }
     found
+}
+
+/// C33 for a/b from 1/32 to 32, the nearer of these beyond, and Poisson's ratio 0 to 0.5; interpolated like [`coefficients`].
+#[must_use]
+pub fn spin_coefficient(a_over_b: f64, poisson_ratio: f64) -> f64 {
+    let (first, along, across) = places(a_over_b.clamp(ratio(0), ratio(RATIOS - 1)), poisson_ratio);
+    let row = |r: usize| -> f64 {
+        let entries = SPIN[first + r].iter().zip(across);
+        entries.map(|(c, weight)| weight * c.ln()).sum()
+    };
+    (0..4).map(|r| along[r] * row(r)).sum::<f64>().exp()
+}
+
+/// The first of four rows, their weights, and those of the columns.
+fn places(inside: f64, poisson_ratio: f64) -> (usize, [f64; 4], [f64; 5]) {
+    let place = 2.0 * inside.log2() + 0.5 * (RATIOS - 1) as f64;
+    let first = (place.floor() as usize).clamp(1, RATIOS - 3) - 1;
+    let along = lagrange::weights(&[0.0, 1.0, 2.0, 3.0], place - first as f64);
+    (first, along, lagrange::weights(&POISSON_RATIOS, poisson_ratio))
 }
 
 /// `[C11, C22, C23]` of very slender ellipses (Kalker 1967; Kalker 1990, table E3).
@@ -181,4 +198,29 @@ const TABLE: [[[f64; 5]; 3]; RATIOS] = [
         [24.67944, 27.25237, 30.42446, 34.43267, 39.65772],
         [48.94854, 53.95409, 60.10133, 67.83137, 77.84653],
     ],
+];
+
+/// `[C33]` at [`POISSON_RATIOS`], one entry for each a/b; from two meshes, as the others.
+const SPIN: [[f64; 5]; RATIOS] = [
+    [19.89006, 22.67151, 26.35056, 31.44515, 38.96354],
+    [14.14085, 16.08910, 18.65496, 22.18722, 27.35622],
+    [10.09413, 11.45181, 13.22851, 15.65418, 19.16307],
+    [7.24678, 8.18398, 9.40030, 11.04224, 13.38020],
+    [5.25072, 5.88900, 6.70856, 7.79891, 9.32077],
+    [3.85548, 4.28097, 4.82007, 5.52477, 6.48509],
+    [2.88318, 3.15691, 3.49829, 3.93571, 4.51593],
+    [2.20844, 2.37397, 2.57695, 2.83159, 3.16025],
+    [1.74210, 1.82992, 1.93592, 2.06632, 2.23051],
+    [1.42094, 1.45264, 1.49079, 1.53744, 1.59560],
+    [1.20161, 1.19187, 1.18165, 1.17102, 1.16012],
+    [1.05289, 1.01194, 0.96658, 0.91611, 0.85963],
+    [0.95320, 0.88812, 0.81645, 0.73735, 0.64995],
+    [0.88603, 0.80230, 0.71071, 0.61069, 0.50203],
+    [0.84300, 0.74393, 0.63616, 0.51961, 0.39524],
+    [0.81556, 0.70392, 0.58289, 0.45308, 0.31705],
+    [0.79579, 0.67458, 0.54335, 0.40343, 0.25926],
+    [0.78475, 0.65501, 0.51463, 0.36571, 0.21494],
+    [0.77394, 0.63829, 0.49137, 0.33608, 0.18126],
+    [0.77385, 0.63070, 0.47567, 0.31269, 0.15317],
+    [0.76621, 0.61943, 0.46032, 0.29338, 0.13241],
 ];

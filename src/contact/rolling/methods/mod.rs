@@ -5,3 +5,4 @@ pub mod fastsim;
 pub mod full_slip;
 pub mod liu_hsu;
 pub mod method;
+pub mod table;

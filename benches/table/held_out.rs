@@ -1,0 +1,81 @@
+//! Motions that the table was not made from.
+
+use std::f64::consts::FRAC_PI_2;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+use cpu_time::ProcessTime;
+use railhead::contact::rolling::linear_theory::coefficients;
+use railhead::contact::rolling::methods::table::coordinates::{Shape, spin_factor};
+use railhead::contact::rolling::methods::table::grid::size;
+use railhead::contact::rolling::operator_store::OperatorStore;
+
+use crate::random::Random;
+use crate::solver::{Contact, read, solve, write};
+
+/// Contacts; of each so many motions.
+pub const CONTACTS: usize = 400;
+pub const MOTIONS: usize = 15;
+const TARGET: f64 = 0.002;
+const THREADS: usize = 2;
+
+/// A contact and its motions: ln a/b and ν uniform, directions uniform on the sphere of (u_x, u_y, u_s) with x, z of any sign, σ
+/// uniform from 0.02 to 0.97.
+pub fn contact(number: usize) -> (Contact, Vec<[f64; 3]>) {
+    let random = &mut Random(0x7AB1_E000 + number as u64);
+    let contact = Contact {
+        ratio: random.decades(0.1, 10.0),
+        poisson: random.between(0.0, 0.5),
+    };
+    let [c11, c22, _] = coefficients(contact.ratio, contact.poisson);
+    let h = spin_factor(contact.ratio.sqrt(), [c11, c22]);
+    let mut motions: Vec<[f64; 3]> = (0..MOTIONS)
+        .map(|_| {
+            let (height, turn) = (random.between(-1.0, 1.0), random.between(0.0, 4.0 * FRAC_PI_2));
+            let flat = (1.0 - height * height).sqrt();
+            let r = size(random.between(0.02, 0.97));
+            [
+                r * flat * turn.cos() / c11,
+                r * flat * turn.sin() / c22,
+                r * height / h,
+            ]
+        })
+        .collect();
+    // Neighbours in size follow each other: no more than a matter of time.
+    motions.sort_by(|a, b| {
+        let size = |m: &[f64; 3]| Shape::new(contact.ratio.sqrt(), [c11, c22]).size(*m, [c11, c22]);
+        size(a).total_cmp(&size(b))
+    });
+    (contact, motions)
+}
+
+/// The file of a contact.
+pub fn name(number: usize) -> String {
+    format!("motions-{number:04}.bin")
+}
+
+/// Solves the contacts that are missing.
+pub fn solve_all() {
+    let missing: Vec<usize> = (0..CONTACTS).filter(|k| read(&name(*k)).is_none()).collect();
+    let (next, began) = (AtomicUsize::new(0), Instant::now());
+    std::thread::scope(|scope| {
+        for _ in 0..THREADS {
+            scope.spawn(|| {
+                while let Some(number) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let (contact, motions) = contact(*number);
+                    // Each alone: nothing is carried from one to the next but operators.
+                    let operators = Arc::new(OperatorStore::new(600 << 20));
+                    let answers = solve(&operators, contact, &motions, TARGET);
+                    write(&name(*number), answers.as_flattened());
+                    println!(
+                        "contact {number} of {}: {:.0} s in all, {:.0} s on the clock",
+                        missing.len(),
+                        ProcessTime::now().as_duration().as_secs_f64(),
+                        began.elapsed().as_secs_f64()
+                    );
+                }
+            });
+        }
+    });
+}

@@ -1,0 +1,110 @@
+//! The errors of the table at motions that it was not made from.
+
+use railhead::contact::rolling::linear_theory::coefficients;
+use railhead::contact::rolling::methods::table::coordinates::{Shape, spin_factor};
+use railhead::contact::rolling::methods::table::evaluate::CreepTable;
+
+use crate::held_out::{CONTACTS, contact, name};
+use crate::solver::read;
+
+/// One held-out motion.
+pub struct Judged {
+    pub ratio: f64,
+    pub poisson: f64,
+    pub size: f64,
+    pub angles: [f64; 2],
+    pub errors: [f64; 4],
+    pub truth: f64,
+    pub contact: usize,
+}
+
+impl Judged {
+    pub fn largest(&self) -> f64 {
+        self.errors[..3].iter().copied().fold(0.0, f64::max)
+    }
+}
+
+/// All that are solved.
+pub fn all(table: &CreepTable) -> Vec<Judged> {
+    let mut all = Vec::new();
+    for number in 0..CONTACTS {
+        let Some(answers) = read(&name(number)) else { continue };
+        let (of, motions) = contact(number);
+        let ellipse = table.ellipse(of.ratio, of.poisson);
+        let [c11, c22, _] = coefficients(of.ratio, of.poisson);
+        let [q11, q22, _] = coefficients(of.ratio, 0.25);
+        let shape = Shape::new(of.ratio.sqrt(), [q11, q22]);
+        for (motion, answer) in motions.iter().zip(answers.chunks_exact(5)) {
+            let found = ellipse.creep(*motion);
+            let [x, y, z] = *motion;
+            let sign = if z < 0.0 { -1.0 } else { 1.0 };
+            let h = spin_factor(of.ratio.sqrt(), [c11, c22]);
+            all.push(Judged {
+                ratio: of.ratio,
+                poisson: of.poisson,
+                size: (c11 * x).hypot(c22 * y).hypot(h * z),
+                angles: shape.angles([x.abs(), sign * y, sign * z]),
+                errors: [
+                    (found.force[0] - answer[0]).abs(),
+                    (found.force[1] - answer[1]).abs(),
+                    (found.force[2] - answer[2]).abs(),
+                    (found.stick - answer[3]).abs(),
+                ],
+                truth: answer[4],
+                contact: number,
+            });
+        }
+    }
+    all
+}
+
+fn row(name: &str, part: &[&Judged]) {
+    let quantiles = |of: &dyn Fn(&Judged) -> f64| {
+        let mut values: Vec<f64> = part.iter().map(|j| of(j)).collect();
+        values.sort_by(f64::total_cmp);
+        let at = |q: f64| values.get((q * values.len() as f64) as usize).or(values.last()).copied().unwrap_or(f64::NAN);
+        format!("{:.4}/{:.4}/{:.4}/{:.4}", at(0.5), at(0.9), at(0.99), at(1.0))
+    };
+    let within = |limit: f64| {
+        100.0 * part.iter().filter(|j| j.largest() <= limit).count() as f64 / part.len().max(1) as f64
+    };
+    println!(
+        "| {name} | {} | {} | {} | {} | {} | {:.2} | {:.2} | {} | {} |",
+        part.len(),
+        quantiles(&|j| j.errors[0]),
+        quantiles(&|j| j.errors[1]),
+        quantiles(&|j| j.errors[2]),
+        quantiles(&Judged::largest),
+        within(0.004),
+        within(0.01),
+        quantiles(&|j| j.errors[3]),
+        quantiles(&|j| j.truth),
+    );
+}
+
+/// Prints the table of errors by region.
+pub fn print(all: &[Judged]) {
+    println!("| region | motions | F_x 50/90/99 %/max | F_y | M_z | largest | <= 0.004 % | <= 0.01 % | stick | truth's estimate |");
+    println!("|---|---|---|---|---|---|---|---|---|---|");
+    type Test = fn(&Judged) -> bool;
+    let regions: [(&str, Test); 9] = [
+        ("all", |_| true),
+        ("a/b 0.3 to 3", |j| (0.3..3.0).contains(&j.ratio)),
+        ("a/b < 0.3", |j| j.ratio < 0.3),
+        ("a/b > 3", |j| j.ratio > 3.0),
+        ("a/b > 5.6", |j| j.ratio > 5.6),
+        ("nu 0.2 to 0.35", |j| (0.2..0.35).contains(&j.poisson)),
+        ("r < 1", |j| j.size < 1.0),
+        ("r 1 to 4", |j| (1.0..4.0).contains(&j.size)),
+        ("r > 4", |j| j.size > 4.0),
+    ];
+    for (name, test) in regions {
+        let part: Vec<&Judged> = all.iter().filter(|j| test(j)).collect();
+        row(name, &part);
+    }
+    let mut worst: Vec<&Judged> = all.iter().collect();
+    worst.sort_by(|a, b| b.largest().total_cmp(&a.largest()));
+    for j in worst.iter().take(12) {
+        println!("contact {} a/b {:.3} nu {:.3} r {:.3} angles {:.3} {:.3}: {:.4} {:.4} {:.4}, stick {:.4}, truth {:.4}", j.contact, j.ratio, j.poisson, j.size, j.angles[0], j.angles[1], j.errors[0], j.errors[1], j.errors[2], j.errors[3], j.truth);
+    }
+}

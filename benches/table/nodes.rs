@@ -1,0 +1,145 @@
+//! The nodes of the table, solved column by column: all poles and sizes of one direction, a/b and ν.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+use cpu_time::{ProcessTime, ThreadTime};
+use railhead::contact::rolling::linear_theory::coefficients;
+use railhead::contact::rolling::methods::table::coordinates::Shape;
+use railhead::contact::rolling::methods::table::grid::{
+    DIRECTIONS, POISSON_RATIOS, POLES, RATIOS, SIZE_STEPS, SIZES, direction, pole, ratio, size,
+};
+use railhead::contact::rolling::operator_store::OperatorStore;
+
+use crate::solver::{Answer, Contact, read, solve, write};
+
+/// Sizes that stand for 0 and for infinity.
+const LEAST: f64 = 1e-3;
+const MOST: f64 = 1e5;
+/// Threads.
+const THREADS: usize = 2;
+
+/// Target of a node: slender ellipses cost most and vary most.
+fn target(ratio_node: usize) -> f64 {
+    let scale = std::env::var("RAILHEAD_TABLE_SCALE").map_or(1.0, |s| s.parse().expect("a number"));
+    scale
+        * match ratio_node {
+            7 => 0.003,
+            8 => 0.005,
+            _ => 0.002,
+        }
+}
+
+/// The size r of a node.
+fn size_of(node: usize) -> f64 {
+    match SIZES[node] {
+        0 => LEAST,
+        last if f64::from(last) == SIZE_STEPS => MOST,
+        step => size(f64::from(step) / SIZE_STEPS),
+    }
+}
+
+/// One column: answers `[pole][size]` of a direction.
+fn column(node: [usize; 2], chi: usize, target: f64) -> Vec<Answer> {
+    let contact = Contact {
+        ratio: ratio(node[0]),
+        poisson: POISSON_RATIOS[node[1]],
+    };
+    let pair = |nu: f64| {
+        let [c11, c22, _] = coefficients(contact.ratio, nu);
+        [c11, c22]
+    };
+    let (c, shape) = (pair(contact.poisson), Shape::new(contact.ratio.sqrt(), pair(0.25)));
+    let operators = Arc::new(OperatorStore::new(600 << 20));
+    let mut answers = vec![[f64::NAN; 5]; POLES * SIZES.len()];
+    // Spin alone has no direction, and without spin ±χ mirror each other: those nodes are solved once.
+    let first = usize::from(chi < DIRECTIONS / 2);
+    let last = POLES - usize::from(chi != DIRECTIONS / 2);
+    for k in 0..SIZES.len() {
+        let poles = first..last;
+        let creepages: Vec<[f64; 3]> = poles
+            .clone()
+            .map(|p| shape.creepage_of_size(size_of(k), pole(p), direction(chi), c))
+            .map(|[x, y, z]| if chi == 0 || chi == DIRECTIONS - 1 { [0.0, y, z] } else { [x, y, z] })
+            .collect();
+        let target = if k == 0 || k == SIZES.len() - 1 { 0.5 * target.min(0.004) } else { target };
+        let solved = solve(&operators, contact, &creepages, target);
+        for (p, answer) in poles.zip(solved) {
+            answers[p * SIZES.len() + k] = answer;
+        }
+    }
+    answers
+}
+
+fn name([ratio, poisson]: [usize; 2], chi: usize) -> String {
+    format!("nodes-{ratio}-{poisson}-{chi:02}.bin")
+}
+
+/// A column that is solved.
+pub fn column_of(node: [usize; 2], chi: usize) -> Option<Vec<Answer>> {
+    let numbers = read(&name(node, chi))?;
+    Some(numbers.as_chunks::<5>().0.to_vec())
+}
+
+/// Solves the columns that are missing; with `even` those of every other direction alone.
+pub fn solve_all(even: bool) {
+    let mut missing = Vec::new();
+    for odd in [false, true] {
+        for ratio in [4, 6, 2, 5, 3, 7, 1, 8, 0] {
+            for poisson in [1, 0, 2] {
+                for chi in (0..DIRECTIONS).filter(|chi| (chi % 2 == 1) == odd && !(odd && even)) {
+                    if read(&name([ratio, poisson], chi)).is_none() {
+                        missing.push(([ratio, poisson], chi));
+                    }
+                }
+            }
+        }
+    }
+    let (next, began) = (AtomicUsize::new(0), Instant::now());
+    std::thread::scope(|scope| {
+        for _ in 0..THREADS {
+            scope.spawn(|| {
+                while let Some((node, chi)) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let busy = ThreadTime::now();
+                    let answers = column(*node, *chi, target(node[0]));
+                    write(&name(*node, *chi), answers.as_flattened());
+                    println!(
+                        "{} of {}: a/b {:.3}, nu {}, chi {chi}: {:.1} s; {:.0} s in all, {:.0} s on the clock",
+                        next.load(Ordering::Relaxed),
+                        missing.len(),
+                        ratio(node[0]),
+                        POISSON_RATIOS[node[1]],
+                        busy.elapsed().as_secs_f64(),
+                        ProcessTime::now().as_duration().as_secs_f64(),
+                        began.elapsed().as_secs_f64()
+                    );
+                }
+            });
+        }
+    });
+}
+
+/// Solves one column and prints time and differences to the same column at a fourth of the target.
+pub fn trial(ratio_node: usize, poisson: usize, chi: usize, target: f64) {
+    let timed = |target| {
+        let began = ThreadTime::now();
+        let answers = column([ratio_node, poisson], chi, target);
+        (answers, began.elapsed().as_secs_f64())
+    };
+    let (coarse, seconds) = timed(target);
+    let (fine, more) = timed(0.25 * target);
+    let mut errors: Vec<f64> = Vec::new();
+    for (a, b) in coarse.iter().zip(&fine) {
+        if !a[0].is_nan() {
+            errors.push((0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max));
+        }
+    }
+    errors.sort_by(f64::total_cmp);
+    let at = |part: f64| errors[(part * (errors.len() - 1) as f64) as usize];
+    println!(
+        "a/b {:.3} nu {} chi {chi} at {target}: {} solves, {seconds:.2} s ({:.2} ms each), at {}: {more:.2} s; differences {:.5} {:.5} {:.5} {:.5}",
+        ratio(ratio_node), POISSON_RATIOS[poisson], errors.len(), 1e3 * seconds / errors.len() as f64, 0.25 * target,
+        at(0.5), at(0.9), at(0.99), at(1.0)
+    );
+}

@@ -1,0 +1,97 @@
+//! Dimensionless creepages solved with the boundary-element method.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use railhead::contact;
+use railhead::contact::case::limits::Limits;
+use railhead::contact::monitor::Unmonitored;
+use railhead::contact::rolling::operator_store::OperatorStore;
+use serde_json::json;
+
+/// c = √(ab) in mm, G in MPa, and μN/(G c²): small, so that the largest creepages are still possible ones.
+const LENGTH: f64 = 5.0;
+const MODULUS: f64 = 80_000.0;
+const CREEPAGE: f64 = 1e-6;
+const FRICTION: f64 = 0.001;
+
+/// An ellipse and its material.
+#[derive(Clone, Copy)]
+pub struct Contact {
+    pub ratio: f64,
+    pub poisson: f64,
+}
+
+/// F_x/(μN), F_y/(μN), M_z/(μNc), the share of the patch that sticks, the estimated error.
+pub type Answer = [f64; 5];
+
+/// Solves creepages (x, y, z) one after the other, as one sweep.
+pub fn solve(
+    operators: &Arc<OperatorStore>,
+    contact: Contact,
+    creepages: &[[f64; 3]],
+    target: f64,
+) -> Vec<Answer> {
+    let root = contact.ratio.sqrt();
+    let limit = CREEPAGE * MODULUS * LENGTH * LENGTH;
+    let motion = |[x, y, z]: &[f64; 3]| {
+        json!({ "creepage_x": CREEPAGE * x, "creepage_y": CREEPAGE * y, "spin_per_mm": CREEPAGE * z / LENGTH })
+    };
+    let motions: Vec<_> = creepages.iter().map(motion).collect();
+    let case = json!({
+        "material": { "shear_modulus_mpa": MODULUS, "poisson_ratio": contact.poisson },
+        "friction": { "coefficient": FRICTION },
+        "contact": { "type": "ellipse", "a_mm": LENGTH * root, "b_mm": LENGTH / root },
+        "load": { "normal_force_n": limit / FRICTION },
+        "motion": motions,
+        "solver": { "method": "boundary_element", "target_error": target },
+    });
+    let checked = contact::check(&case, &Limits::default()).expect("a sound case");
+    let solution = match contact::solve_with(operators, &checked, &Unmonitored) {
+        Ok((solution, _)) => solution,
+        Err(error) if creepages.len() == 1 && target > 0.02 => {
+            println!("no answer: {case}: {error}");
+            return vec![[f64::NAN; 5]];
+        }
+        // The motion that has no answer stops its sweep: each by itself, and that one less exactly.
+        Err(_) => {
+            let coarser = if creepages.len() == 1 { 2.0 * target } else { target };
+            let each = creepages.iter();
+            return each.flat_map(|one| solve(operators, contact, &[*one], coarser)).collect();
+        }
+    };
+    let patch = &solution.patches[0];
+    let answers = patch.points.iter().map(|point| {
+        [
+            point.force_x_n / limit,
+            point.force_y_n / limit,
+            point.moment_z_n_mm / (limit * LENGTH),
+            point.stick_area_mm2.expect("zones") / patch.area_mm2,
+            point.error_estimate.map_or(f64::INFINITY, |e| e.force_x_n / limit),
+        ]
+    });
+    answers.collect()
+}
+
+/// The folder of what takes long to compute.
+pub fn folder() -> PathBuf {
+    let folder = std::env::var("RAILHEAD_TABLE_FOLDER").unwrap_or_else(|_| "target/table".into());
+    let folder = PathBuf::from(folder);
+    std::fs::create_dir_all(&folder).expect("a folder");
+    folder
+}
+
+/// Numbers in a file, or nothing.
+pub fn read(name: &str) -> Option<Vec<f64>> {
+    let bytes = std::fs::read(folder().join(name)).ok()?;
+    let numbers = bytes.chunks_exact(8);
+    Some(numbers.map(|b| f64::from_le_bytes(b.try_into().expect("eight bytes"))).collect())
+}
+
+/// Writes numbers to a file, whole or not at all.
+pub fn write(name: &str, numbers: &[f64]) {
+    let bytes: Vec<u8> = numbers.iter().flat_map(|n| n.to_le_bytes()).collect();
+    let half = folder().join(format!("{name}.part"));
+    std::fs::write(&half, bytes).expect("a file");
+    std::fs::rename(half, folder().join(name)).expect("a file");
+}

@@ -1,0 +1,334 @@
+//! The table as a function: creep forces, the share that sticks, and derivatives, of one ellipse and any creepage.
+
+use pulp::Arch;
+
+use crate::contact::rolling::methods::table::axis::{Axis, Weights};
+use crate::contact::rolling::methods::table::coordinates::{Shape, spin_factor};
+use crate::contact::rolling::methods::table::grid::{
+    DIRECTIONS, POISSON_RATIOS, POLES, RATIOS, SIZE_HALF, SIZE_STEPS, SIZES, ln_ratio_max,
+};
+use crate::contact::rolling::methods::table::shape_coefficients::{
+    ShapeCoefficients, poisson_weights,
+};
+use crate::contact::rolling::methods::table::spline::{
+    DIRECTION_COEFFICIENTS, OUTPUTS, POLE_COEFFICIENTS, ROW, coefficients,
+};
+
+/// Numbers of one size: Poisson's ratios, functions.
+const SIZE_ROW: usize = POISSON_RATIOS.len() * OUTPUTS;
+/// Numbers of the four sizes around a creepage.
+const NEAR: usize = 4 * SIZE_ROW;
+/// The size at which everything slips without spin: f(r) = 1 from here on (Vermeulen and Johnson 1964).
+const SIZE_FULL: f64 = 3.0;
+
+/// The table, ready to be evaluated.
+#[derive(Debug)]
+pub struct CreepTable {
+    /// `[a/b][pole][direction][size][ν][function]`, in units of `unit`.
+    spline: Vec<i16>,
+    unit: [f32; OUTPUTS],
+    ratio: Axis,
+    pole: Axis,
+    direction: Axis,
+    size: Axis,
+    shapes: ShapeCoefficients,
+}
+
+/// Creep forces of an ellipse.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Creep {
+    /// F_x/(μN), F_y/(μN), M_z/(μN√(ab)).
+    pub force: [f64; 3],
+    /// Share of the patch that sticks, 0 to 1.
+    pub stick: f64,
+}
+
+/// The table for one ellipse and material.
+#[derive(Debug, Clone, Copy)]
+pub struct EllipseTable<'a> {
+    table: &'a CreepTable,
+    shape: Shape,
+    /// C11, C22, C23, C33.
+    kalker: [f64; 4],
+    /// C11, C22 and h: the creepage in these units has the length r.
+    scale: [f64; 3],
+    ratio: Weights,
+    poisson: [f64; 3],
+}
+
+/// Sums of the spline at a place: the functions and their derivatives by σ, θ and χ.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    value: [f64; OUTPUTS],
+    by_size: [f64; OUTPUTS],
+    by_pole: [f64; OUTPUTS],
+    by_direction: [f64; OUTPUTS],
+}
+
+/// f(r), which forces grow with, and its derivative.
+#[must_use]
+#[inline(always)]
+pub fn growth(size: f64) -> [f64; 2] {
+    let rest = (1.0 - size / SIZE_FULL).max(0.0);
+    [1.0 - rest * rest * rest, 3.0 / SIZE_FULL * rest * rest]
+}
+
+/// The part of linear theory that is left out of the table, and its derivative by σ.
+#[must_use]
+#[inline(always)]
+pub fn linear_part(sigma: f64) -> [f64; 2] {
+    let rest = 1.0 - sigma;
+    [rest * rest, -2.0 * rest]
+}
+
+/// Forces of linear theory with `[C11, C22, C23, C33]` for a creepage.
+#[must_use]
+#[inline(always)]
+pub fn linear([c11, c22, c23, c33]: [f64; 4], [x, y, z]: [f64; 3]) -> [f64; 3] {
+    [c11 * x, c22 * y + c23 * z, c33 * z - c23 * y]
+}
+
+impl CreepTable {
+    /// The table with these values at its nodes, `[a/b][pole][direction][size][ν][function]`: for forces and moment `F/f(r)` without
+    /// the part of linear theory, for the share that sticks itself.
+    #[must_use]
+    pub fn new(values: &[f32]) -> CreepTable {
+        let exact = coefficients(values);
+        let mut largest = [f32::MIN_POSITIVE; OUTPUTS];
+        for (k, value) in exact.iter().enumerate() {
+            let largest = &mut largest[k % OUTPUTS];
+            *largest = largest.max(value.abs());
+        }
+        let unit = largest.map(|largest| largest / f32::from(i16::MAX));
+        let number = |(k, value): (usize, &f32)| (value / unit[k % OUTPUTS]).round() as i16;
+        let ratios: [u8; RATIOS] = std::array::from_fn(|k| k as u8);
+        let ratio_step = 2.0 * ln_ratio_max() / (RATIOS - 1) as f64;
+        let quarter = std::f64::consts::FRAC_PI_2;
+        CreepTable {
+            spline: exact.iter().enumerate().map(number).collect(),
+            unit,
+            ratio: Axis::free(-ln_ratio_max(), ratio_step, &ratios),
+            pole: Axis::mirrored(0.0..quarter, POLES),
+            direction: Axis::mirrored(-quarter..quarter, DIRECTIONS),
+            size: Axis::free(0.0, 1.0 / SIZE_STEPS, &SIZES),
+            shapes: ShapeCoefficients::new(),
+        }
+    }
+
+    /// The table for semi-axes of the ratio a/b, 0.1 to 10, and Poisson's ratio 0 to 0.5; beyond, the nearest of these.
+    #[must_use]
+    #[inline(always)]
+    pub fn ellipse(&self, ratio: f64, poisson_ratio: f64) -> EllipseTable<'_> {
+        let ln_ratio = ratio.ln();
+        let (kalker, quarter) = self.shapes.at(ln_ratio, &poisson_weights(poisson_ratio));
+        let root = ratio.sqrt();
+        let nu = 4.0 * poisson_ratio;
+        EllipseTable {
+            table: self,
+            shape: Shape::new(root, quarter),
+            scale: [kalker[0], kalker[1], spin_factor(root, [kalker[0], kalker[1]])],
+            kalker,
+            ratio: self.ratio.at(ln_ratio),
+            poisson: [
+                0.5 * (1.0 - nu) * (2.0 - nu),
+                nu * (2.0 - nu),
+                0.5 * nu * (nu - 1.0),
+            ],
+        }
+    }
+}
+
+impl EllipseTable<'_> {
+    /// `[C11, C22, C23, C33]` of the ellipse.
+    #[must_use]
+    pub fn kalker(&self) -> [f64; 4] {
+        self.kalker
+    }
+
+    /// Creep forces of the dimensionless creepages `G c²/(μN) (ν_x, ν_y, c φ)` with c = √(ab).
+    #[must_use]
+    #[inline(always)]
+    pub fn creep(&self, creepage: [f64; 3]) -> Creep {
+        let Quarter { inside, signs } = Quarter::of(creepage);
+        let size = self.size(inside);
+        if size == 0.0 {
+            return Creep { force: [0.0; 3], stick: 1.0 };
+        }
+        let [theta, chi] = self.shape.angles(inside);
+        let sigma = size / (size + SIZE_HALF);
+        let sums = self.sums::<false>(sigma, theta, chi);
+        let linear = linear(self.kalker, inside);
+        let [growth, _] = growth(size);
+        let part = linear_part(sigma)[0] / size;
+        Creep {
+            force: [0, 1, 2].map(|k| signs[k] * growth * (sums.value[k] + part * linear[k])),
+            stick: sums.value[3].clamp(0.0, 1.0),
+        }
+    }
+
+    /// The same with the derivatives of the three by the creepages: `[force][creepage]`.
+    #[must_use]
+    pub fn with_slopes(&self, creepage: [f64; 3]) -> (Creep, [[f64; 3]; 3]) {
+        let Quarter { inside, signs } = Quarter::of(creepage);
+        let [c11, c22, c23, c33] = self.kalker;
+        let stiffness = [[c11, 0.0, 0.0], [0.0, c22, c23], [0.0, -c23, c33]];
+        let size = self.size(inside);
+        if size == 0.0 {
+            return (self.creep(creepage), stiffness);
+        }
+        let ([theta, chi], angles) = self.shape.angles_with_slopes(inside);
+        let sigma = size / (size + SIZE_HALF);
+        let sums = self.sums::<true>(sigma, theta, chi);
+        let linear = linear(self.kalker, inside);
+        let [growth, faster] = growth(size);
+        let [part, less] = linear_part(sigma);
+        let by_size = SIZE_HALF / ((size + SIZE_HALF) * (size + SIZE_HALF));
+        let size_by = [0, 1, 2].map(|j| self.scale[j] * self.scale[j] * inside[j] / size);
+        // The signs of the creepages are those of their forces, the moment's that of the spin.
+        let turned = [signs[0], signs[1], signs[2]];
+        let slope = |k: usize, j: usize| {
+            let whole = sums.value[k] + part * linear[k] / size;
+            let inner = sums.by_size[k] * by_size * size_by[j]
+                + sums.by_pole[k] * angles[0][j]
+                + sums.by_direction[k] * angles[1][j]
+                + less * by_size * size_by[j] * linear[k] / size
+                + part * (stiffness[k][j] - linear[k] * size_by[j] / size) / size;
+            turned[k] * turned[j] * (faster * size_by[j] * whole + growth * inner)
+        };
+        let slopes = [0, 1, 2].map(|k| [0, 1, 2].map(|j| slope(k, j)));
+        (self.creep(creepage), slopes)
+    }
+
+    #[inline(always)]
+    fn size(&self, creepage: [f64; 3]) -> f64 {
+        let u = [0, 1, 2].map(|k| self.scale[k] * creepage[k]);
+        (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]).sqrt()
+    }
+
+    /// The sums of the spline, derivatives only if asked for.
+    #[inline(always)]
+    fn sums<const SLOPES: bool>(&self, sigma: f64, theta: f64, chi: f64) -> Sums {
+        let table = self.table;
+        let (pole, direction) = (table.pole.at(theta), table.direction.at(chi));
+        let size = table.size.at(sigma);
+        let near = Near {
+            spline: &table.spline,
+            ratio: self.ratio,
+            pole,
+            direction,
+            size: size.first,
+        };
+        let mut sums = Sums::default();
+        let mut combine = |rows: &[f32; NEAR], weights: &[f64; 4], to: fn(&mut Sums) -> &mut [f64; OUTPUTS]| {
+            let to = to(&mut sums);
+            for (rows, weight) in rows.chunks_exact(SIZE_ROW).zip(weights) {
+                for (rows, poisson) in rows.chunks_exact(OUTPUTS).zip(self.poisson) {
+                    for k in 0..OUTPUTS {
+                        to[k] += weight * poisson * f64::from(rows[k]);
+                    }
+                }
+            }
+            for k in 0..OUTPUTS {
+                to[k] *= f64::from(table.unit[k]);
+            }
+        };
+        let arch = Arch::new();
+        if SLOPES {
+            let [value, by_pole, by_direction] = arch.dispatch(|| near.with_slopes());
+            combine(&value, &size.value, |s| &mut s.value);
+            combine(&value, &size.slope, |s| &mut s.by_size);
+            combine(&by_pole, &size.value, |s| &mut s.by_pole);
+            combine(&by_direction, &size.value, |s| &mut s.by_direction);
+        } else {
+            let value = arch.dispatch(|| near.value());
+            combine(&value, &size.value, |s| &mut s.value);
+        }
+        sums
+    }
+}
+
+/// A creepage mirrored to x, z ≥ 0, and the signs that its forces get back.
+struct Quarter {
+    inside: [f64; 3],
+    signs: [f64; 3],
+}
+
+impl Quarter {
+    #[inline(always)]
+    fn of([x, y, z]: [f64; 3]) -> Quarter {
+        let spin = if z < 0.0 { -1.0 } else { 1.0 };
+        let along = if x < 0.0 { -1.0 } else { 1.0 };
+        Quarter {
+            inside: [along * x, spin * y, spin * z],
+            signs: [along, spin, spin],
+        }
+    }
+}
+
+/// The coefficients around a place.
+#[derive(Clone, Copy)]
+struct Near<'a> {
+    spline: &'a [i16],
+    ratio: Weights,
+    pole: Weights,
+    direction: Weights,
+    size: usize,
+}
+
+impl Near<'_> {
+    /// The rows of one a/b and pole, at the four directions.
+    #[inline(always)]
+    fn row(&self, i: usize, j: usize, k: usize) -> &[i16; NEAR] {
+        let pole = (self.ratio.first + i) * POLE_COEFFICIENTS + self.pole.first + j;
+        let place = pole * DIRECTION_COEFFICIENTS + self.direction.first + k;
+        let start = place * ROW + self.size * SIZE_ROW;
+        match self.spline[start..start + NEAR].try_into() {
+            Ok(row) => row,
+            Err(_) => unreachable!("a slice of that length"),
+        }
+    }
+
+    #[inline(always)]
+    fn value(&self) -> [f32; NEAR] {
+        let mut sum = [0.0_f32; NEAR];
+        for i in 0..4 {
+            for j in 0..4 {
+                let outer = self.ratio.value[i] * self.pole.value[j];
+                for k in 0..4 {
+                    let weight = (outer * self.direction.value[k]) as f32;
+                    let row = self.row(i, j, k);
+                    for n in 0..NEAR {
+                        sum[n] += weight * f32::from(row[n]);
+                    }
+                }
+            }
+        }
+        sum
+    }
+
+    /// The value, and the derivatives by pole and direction.
+    #[inline(always)]
+    fn with_slopes(&self) -> [[f32; NEAR]; 3] {
+        let mut sums = [[0.0_f32; NEAR]; 3];
+        for i in 0..4 {
+            for j in 0..4 {
+                let outer = self.ratio.value[i] * self.pole.value[j];
+                let sloped = self.ratio.value[i] * self.pole.slope[j];
+                for k in 0..4 {
+                    let weights = [
+                        (outer * self.direction.value[k]) as f32,
+                        (sloped * self.direction.value[k]) as f32,
+                        (outer * self.direction.slope[k]) as f32,
+                    ];
+                    let row = self.row(i, j, k);
+                    for (sum, weight) in sums.iter_mut().zip(weights) {
+                        for n in 0..NEAR {
+                            sum[n] += weight * f32::from(row[n]);
+                        }
+                    }
+                }
+            }
+        }
+        sums
+    }
+}
