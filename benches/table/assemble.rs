@@ -32,7 +32,9 @@ fn columns(node: [usize; 2]) -> Option<Vec<Vec<Answer>>> {
         }
         // Without spin along rolling there is neither lateral force nor moment.
         if chi == DIRECTIONS / 2 {
-            columns[chi][..sizes].iter_mut().for_each(|answer| [answer[1], answer[2]] = [0.0; 2]);
+            columns[chi][..sizes]
+                .iter_mut()
+                .for_each(|answer| [answer[1], answer[2]] = [0.0; 2]);
         }
     }
     Some(columns)
@@ -56,7 +58,8 @@ pub fn values() -> Vec<f32> {
                 for p in 0..POLES {
                     for (k, step) in SIZES.into_iter().enumerate() {
                         let answer = columns[chi][p * SIZES.len() + k];
-                        let direction = shape.creepage_of_size(1.0, pole(p), direction(chi), [c11, c22]);
+                        let direction =
+                            shape.creepage_of_size(1.0, pole(p), direction(chi), [c11, c22]);
                         let at = (((node_ratio * POLES + p) * DIRECTIONS + chi) * SIZES.len() + k)
                             * POISSON_RATIOS.len()
                             + node_nu;
@@ -77,7 +80,11 @@ fn stored(step: u8, answer: Answer, kalker: [f64; 4], direction: [f64; 3]) -> [f
     if step == 0 {
         return [0.0, 0.0, 0.0, 1.0];
     }
-    let growth = if sigma < 1.0 { growth(size(sigma))[0] } else { 1.0 };
+    let growth = if sigma < 1.0 {
+        growth(size(sigma))[0]
+    } else {
+        1.0
+    };
     let linear = linear(kalker, direction);
     let part = |k: usize| (answer[k] / growth - linear_part(sigma)[0] * linear[k]) as f32;
     [part(0), part(1), part(2), stick]

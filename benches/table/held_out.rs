@@ -8,8 +8,10 @@ use std::time::Instant;
 use cpu_time::ProcessTime;
 use railhead::contact::rolling::linear_theory::coefficients;
 use railhead::contact::rolling::methods::table::coordinates::{Shape, spin_factor};
+use railhead::contact::rolling::methods::table::evaluate::CreepTable;
 use railhead::contact::rolling::methods::table::grid::size;
 use railhead::contact::rolling::operator_store::OperatorStore;
+use serde_json::{Value, json};
 
 use crate::random::Random;
 use crate::solver::{Contact, read, solve, write};
@@ -17,7 +19,7 @@ use crate::solver::{Contact, read, solve, write};
 /// Contacts; of each so many motions.
 pub const CONTACTS: usize = 400;
 pub const MOTIONS: usize = 15;
-const TARGET: f64 = 0.002;
+pub const TARGET: f64 = 0.002;
 const THREADS: usize = 2;
 
 /// A contact and its motions: ln a/b and ν uniform, directions uniform on the sphere of (u_x, u_y, u_s) with x, z of any sign, σ
@@ -32,7 +34,10 @@ pub fn contact(number: usize) -> (Contact, Vec<[f64; 3]>) {
     let h = spin_factor(contact.ratio.sqrt(), [c11, c22]);
     let mut motions: Vec<[f64; 3]> = (0..MOTIONS)
         .map(|_| {
-            let (height, turn) = (random.between(-1.0, 1.0), random.between(0.0, 4.0 * FRAC_PI_2));
+            let (height, turn) = (
+                random.between(-1.0, 1.0),
+                random.between(0.0, 4.0 * FRAC_PI_2),
+            );
             let flat = (1.0 - height * height).sqrt();
             let r = size(random.between(0.02, 0.97));
             [
@@ -57,7 +62,9 @@ pub fn name(number: usize) -> String {
 
 /// Solves the contacts that are missing.
 pub fn solve_all() {
-    let missing: Vec<usize> = (0..CONTACTS).filter(|k| read(&name(*k)).is_none()).collect();
+    let missing: Vec<usize> = (0..CONTACTS)
+        .filter(|k| read(&name(*k)).is_none())
+        .collect();
     let (next, began) = (AtomicUsize::new(0), Instant::now());
     std::thread::scope(|scope| {
         for _ in 0..THREADS {
@@ -78,4 +85,51 @@ pub fn solve_all() {
             });
         }
     });
+}
+
+/// A small part of what was held out, and not used for bounds, for the tests.
+pub fn sample() -> String {
+    let contacts = (0..24).map(|k| 16 * k + 1).filter_map(|number| {
+        let (contact, motions) = contact(number);
+        let answers = read(&name(number))?;
+        let short = |value: &f64| format!("{value:.7e}").parse::<f64>().expect("a number");
+        let pair = |(motion, answer): (&[f64; 3], &[f64])| {
+            json!([motion, answer.iter().map(short).collect::<Vec<f64>>()])
+        };
+        let motions: Vec<Value> = motions.iter().zip(answers.chunks_exact(5)).map(pair).collect();
+        let line = json!({ "a_over_b": contact.ratio, "poisson_ratio": contact.poisson, "motions": motions });
+        Some(line.to_string())
+    });
+    format!("[\n{}\n]\n", contacts.collect::<Vec<String>>().join(",\n"))
+}
+
+/// Solves random motions anew and prints how far the table is from them.
+pub fn recompute(count: usize, table: &CreepTable) {
+    let mut errors = Vec::new();
+    for number in 0..count.div_ceil(MOTIONS) {
+        // Contacts that no other set has.
+        let (contact, motions) = contact(CONTACTS + number);
+        let operators = Arc::new(OperatorStore::default());
+        let ellipse = table.ellipse(contact.ratio, contact.poisson);
+        for (motion, answer) in motions
+            .iter()
+            .zip(solve(&operators, contact, &motions, TARGET))
+        {
+            let found = ellipse.creep(*motion);
+            errors.push(
+                (0..3)
+                    .map(|k| (found.force[k] - answer[k]).abs())
+                    .fold(0.0, f64::max),
+            );
+        }
+    }
+    errors.sort_by(f64::total_cmp);
+    let at = |part: f64| errors[(part * (errors.len() - 1) as f64) as usize];
+    println!(
+        "{} motions solved anew: {:.4} in the median, {:.4} at 99 %, {:.4} at most",
+        errors.len(),
+        at(0.5),
+        at(0.99),
+        at(1.0)
+    );
 }

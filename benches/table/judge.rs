@@ -4,6 +4,8 @@ use railhead::contact::rolling::linear_theory::coefficients;
 use railhead::contact::rolling::methods::table::coordinates::{Shape, spin_factor};
 use railhead::contact::rolling::methods::table::evaluate::CreepTable;
 
+use railhead::contact::rolling::methods::table::grid::{cell, sigma};
+
 use crate::held_out::{CONTACTS, contact, name};
 use crate::solver::read;
 
@@ -16,6 +18,8 @@ pub struct Judged {
     pub errors: [f64; 4],
     pub truth: f64,
     pub contact: usize,
+    pub cell: usize,
+    pub bound: f64,
 }
 
 impl Judged {
@@ -28,7 +32,9 @@ impl Judged {
 pub fn all(table: &CreepTable) -> Vec<Judged> {
     let mut all = Vec::new();
     for number in 0..CONTACTS {
-        let Some(answers) = read(&name(number)) else { continue };
+        let Some(answers) = read(&name(number)) else {
+            continue;
+        };
         let (of, motions) = contact(number);
         let ellipse = table.ellipse(of.ratio, of.poisson);
         let [c11, c22, _] = coefficients(of.ratio, of.poisson);
@@ -39,11 +45,14 @@ pub fn all(table: &CreepTable) -> Vec<Judged> {
             let [x, y, z] = *motion;
             let sign = if z < 0.0 { -1.0 } else { 1.0 };
             let h = spin_factor(of.ratio.sqrt(), [c11, c22]);
+            let size = (c11 * x).hypot(c22 * y).hypot(h * z);
+            let angles = shape.angles([x.abs(), sign * y, sign * z]);
             all.push(Judged {
                 ratio: of.ratio,
                 poisson: of.poisson,
-                size: (c11 * x).hypot(c22 * y).hypot(h * z),
-                angles: shape.angles([x.abs(), sign * y, sign * z]),
+                size,
+                angles,
+                cell: cell(of.ratio.ln(), sigma(size), angles[0], angles[1]),
                 errors: [
                     (found.force[0] - answer[0]).abs(),
                     (found.force[1] - answer[1]).abs(),
@@ -51,6 +60,7 @@ pub fn all(table: &CreepTable) -> Vec<Judged> {
                     (found.stick - answer[3]).abs(),
                 ],
                 truth: answer[4],
+                bound: found.bound,
                 contact: number,
             });
         }
@@ -62,11 +72,24 @@ fn row(name: &str, part: &[&Judged]) {
     let quantiles = |of: &dyn Fn(&Judged) -> f64| {
         let mut values: Vec<f64> = part.iter().map(|j| of(j)).collect();
         values.sort_by(f64::total_cmp);
-        let at = |q: f64| values.get((q * values.len() as f64) as usize).or(values.last()).copied().unwrap_or(f64::NAN);
-        format!("{:.4}/{:.4}/{:.4}/{:.4}", at(0.5), at(0.9), at(0.99), at(1.0))
+        let at = |q: f64| {
+            values
+                .get((q * values.len() as f64) as usize)
+                .or(values.last())
+                .copied()
+                .unwrap_or(f64::NAN)
+        };
+        format!(
+            "{:.4}/{:.4}/{:.4}/{:.4}",
+            at(0.5),
+            at(0.9),
+            at(0.99),
+            at(1.0)
+        )
     };
     let within = |limit: f64| {
-        100.0 * part.iter().filter(|j| j.largest() <= limit).count() as f64 / part.len().max(1) as f64
+        100.0 * part.iter().filter(|j| j.largest() <= limit).count() as f64
+            / part.len().max(1) as f64
     };
     println!(
         "| {name} | {} | {} | {} | {} | {} | {:.2} | {:.2} | {} | {} |",
@@ -84,7 +107,9 @@ fn row(name: &str, part: &[&Judged]) {
 
 /// Prints the table of errors by region.
 pub fn print(all: &[Judged]) {
-    println!("| region | motions | F_x 50/90/99 %/max | F_y | M_z | largest | <= 0.004 % | <= 0.01 % | stick | truth's estimate |");
+    println!(
+        "| region | motions | F_x 50/90/99 %/max | F_y | M_z | largest | <= 0.004 % | <= 0.01 % | stick | truth's estimate |"
+    );
     println!("|---|---|---|---|---|---|---|---|---|---|");
     type Test = fn(&Judged) -> bool;
     let regions: [(&str, Test); 9] = [
@@ -105,6 +130,88 @@ pub fn print(all: &[Judged]) {
     let mut worst: Vec<&Judged> = all.iter().collect();
     worst.sort_by(|a, b| b.largest().total_cmp(&a.largest()));
     for j in worst.iter().take(12) {
-        println!("contact {} a/b {:.3} nu {:.3} r {:.3} angles {:.3} {:.3}: {:.4} {:.4} {:.4}, stick {:.4}, truth {:.4}", j.contact, j.ratio, j.poisson, j.size, j.angles[0], j.angles[1], j.errors[0], j.errors[1], j.errors[2], j.errors[3], j.truth);
+        println!(
+            "contact {} a/b {:.3} nu {:.3} r {:.3} angles {:.3} {:.3}: {:.4} {:.4} {:.4}, stick {:.4}, truth {:.4}",
+            j.contact,
+            j.ratio,
+            j.poisson,
+            j.size,
+            j.angles[0],
+            j.angles[1],
+            j.errors[0],
+            j.errors[1],
+            j.errors[2],
+            j.errors[3],
+            j.truth
+        );
     }
+}
+
+/// Prints how the bounds of the table hold on the contacts that played no part in fitting them.
+pub fn print_bounds(all: &[Judged]) {
+    let others: Vec<&Judged> = all.iter().filter(|j| j.contact % 2 == 1).collect();
+    let held = others.iter().filter(|j| j.largest() <= j.bound).count();
+    let sizes = sorted(others.iter().map(|j| j.bound));
+    let times = sorted(others.iter().map(|j| j.bound / j.largest()));
+    println!(
+        "bounds on {} motions: hold for {:.2} %, {:.4} in the median, {:.4} at 90 %, {:.4} at 99 %; {:.1} times the error in the median",
+        others.len(),
+        100.0 * held as f64 / others.len() as f64,
+        at(&sizes, 0.5),
+        at(&sizes, 0.9),
+        at(&sizes, 0.99),
+        at(&times, 0.5)
+    );
+}
+
+/// Bounds `factor × max(indicator, floor)^power`.
+#[derive(Debug, Clone, Copy)]
+pub struct Law {
+    pub floor: f64,
+    pub power: f64,
+    pub factor: f64,
+}
+
+impl Law {
+    pub fn of(&self, indicator: f32) -> f64 {
+        self.factor * f64::from(indicator).max(self.floor).powf(self.power)
+    }
+
+    /// The factor with which the bound holds for this part of the motions.
+    pub fn fitted(
+        floor: f64,
+        power: f64,
+        part: f64,
+        motions: &[&Judged],
+        indicators: &[f32],
+    ) -> Law {
+        let unit = Law {
+            floor,
+            power,
+            factor: 1.0,
+        };
+        let needed = sorted(
+            motions
+                .iter()
+                .map(|j| j.largest() / unit.of(indicators[j.cell])),
+        );
+        Law {
+            factor: at(&needed, part),
+            ..unit
+        }
+    }
+}
+
+fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values
+}
+
+fn at(values: &[f64], part: f64) -> f64 {
+    let last = values.len().saturating_sub(1);
+    values
+        .get((part * last as f64).ceil() as usize)
+        .copied()
+        .unwrap_or(f64::NAN)
 }

@@ -7,11 +7,13 @@ use std::time::Instant;
 use cpu_time::{ProcessTime, ThreadTime};
 use railhead::contact::rolling::linear_theory::coefficients;
 use railhead::contact::rolling::methods::table::coordinates::Shape;
+use railhead::contact::rolling::methods::table::evaluate::CreepTable;
 use railhead::contact::rolling::methods::table::grid::{
     DIRECTIONS, POISSON_RATIOS, POLES, RATIOS, SIZE_STEPS, SIZES, direction, pole, ratio, size,
 };
 use railhead::contact::rolling::operator_store::OperatorStore;
 
+use crate::random::Random;
 use crate::solver::{Answer, Contact, read, solve, write};
 
 /// Sizes that stand for 0 and for infinity.
@@ -20,15 +22,13 @@ const MOST: f64 = 1e5;
 /// Threads.
 const THREADS: usize = 2;
 
-/// Target of a node: slender ellipses cost most and vary most.
-fn target(ratio_node: usize) -> f64 {
-    let scale = std::env::var("RAILHEAD_TABLE_SCALE").map_or(1.0, |s| s.parse().expect("a number"));
-    scale
-        * match ratio_node {
-            7 => 0.003,
-            8 => 0.005,
-            _ => 0.002,
-        }
+/// Target of the nodes of an a/b: long ellipses cost most, those of a/b 10 at ν = 1/2 a hundred times as much as a circle.
+pub fn target(ratio: usize) -> f64 {
+    match ratio {
+        8 => 0.0125,
+        7 => 0.0075,
+        _ => 0.005,
+    }
 }
 
 /// The size r of a node.
@@ -50,7 +50,10 @@ fn column(node: [usize; 2], chi: usize, target: f64) -> Vec<Answer> {
         let [c11, c22, _] = coefficients(contact.ratio, nu);
         [c11, c22]
     };
-    let (c, shape) = (pair(contact.poisson), Shape::new(contact.ratio.sqrt(), pair(0.25)));
+    let (c, shape) = (
+        pair(contact.poisson),
+        Shape::new(contact.ratio.sqrt(), pair(0.25)),
+    );
     let operators = Arc::new(OperatorStore::new(600 << 20));
     let mut answers = vec![[f64::NAN; 5]; POLES * SIZES.len()];
     // Spin alone has no direction, and without spin ±χ mirror each other: those nodes are solved once.
@@ -61,9 +64,19 @@ fn column(node: [usize; 2], chi: usize, target: f64) -> Vec<Answer> {
         let creepages: Vec<[f64; 3]> = poles
             .clone()
             .map(|p| shape.creepage_of_size(size_of(k), pole(p), direction(chi), c))
-            .map(|[x, y, z]| if chi == 0 || chi == DIRECTIONS - 1 { [0.0, y, z] } else { [x, y, z] })
+            .map(|[x, y, z]| {
+                if chi == 0 || chi == DIRECTIONS - 1 {
+                    [0.0, y, z]
+                } else {
+                    [x, y, z]
+                }
+            })
             .collect();
-        let target = if k == 0 || k == SIZES.len() - 1 { 0.5 * target.min(0.004) } else { target };
+        let target = if k == 0 || k == SIZES.len() - 1 {
+            0.5 * target.min(0.004)
+        } else {
+            target
+        };
         let solved = solve(&operators, contact, &creepages, target);
         for (p, answer) in poles.zip(solved) {
             answers[p * SIZES.len() + k] = answer;
@@ -82,13 +95,13 @@ pub fn column_of(node: [usize; 2], chi: usize) -> Option<Vec<Answer>> {
     Some(numbers.as_chunks::<5>().0.to_vec())
 }
 
-/// Solves the columns that are missing; with `even` those of every other direction alone.
-pub fn solve_all(even: bool) {
+/// Solves the columns that are missing: first those of every other direction, of round ellipses before long ones.
+pub fn solve_all() {
     let mut missing = Vec::new();
     for odd in [false, true] {
         for ratio in [4, 6, 2, 5, 3, 7, 1, 8, 0] {
             for poisson in [1, 0, 2] {
-                for chi in (0..DIRECTIONS).filter(|chi| (chi % 2 == 1) == odd && !(odd && even)) {
+                for chi in (0..DIRECTIONS).filter(|chi| (chi % 2 == 1) == odd) {
                     if read(&name([ratio, poisson], chi)).is_none() {
                         missing.push(([ratio, poisson], chi));
                     }
@@ -120,26 +133,45 @@ pub fn solve_all(even: bool) {
     });
 }
 
-/// Solves one column and prints time and differences to the same column at a fourth of the target.
-pub fn trial(ratio_node: usize, poisson: usize, chi: usize, target: f64) {
-    let timed = |target| {
-        let began = ThreadTime::now();
-        let answers = column([ratio_node, poisson], chi, target);
-        (answers, began.elapsed().as_secs_f64())
-    };
-    let (coarse, seconds) = timed(target);
-    let (fine, more) = timed(0.25 * target);
-    let mut errors: Vec<f64> = Vec::new();
-    for (a, b) in coarse.iter().zip(&fine) {
-        if !a[0].is_nan() {
-            errors.push((0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max));
-        }
+/// Solves random nodes anew, each alone, and prints how far the table is from them.
+pub fn recompute(count: usize, table: &CreepTable) {
+    let random = &mut Random(0x7AB1_E001);
+    let mut errors = Vec::new();
+    for _ in 0..count {
+        let node = [random.below(RATIOS), random.below(POISSON_RATIOS.len())];
+        let (chi, p, k) = (
+            random.below(DIRECTIONS),
+            random.below(POLES),
+            1 + random.below(SIZES.len() - 2),
+        );
+        let contact = Contact {
+            ratio: ratio(node[0]),
+            poisson: POISSON_RATIOS[node[1]],
+        };
+        let pair = |nu: f64| {
+            let [c11, c22, _] = coefficients(contact.ratio, nu);
+            [c11, c22]
+        };
+        let shape = Shape::new(contact.ratio.sqrt(), pair(0.25));
+        let creepage =
+            shape.creepage_of_size(size_of(k), pole(p), direction(chi), pair(contact.poisson));
+        let operators = Arc::new(OperatorStore::default());
+        let answer = solve(&operators, contact, &[creepage], target(node[0]))[0];
+        let found = table
+            .ellipse(contact.ratio, contact.poisson)
+            .creep(creepage);
+        errors.push(
+            (0..3)
+                .map(|k| (found.force[k] - answer[k]).abs())
+                .fold(0.0, f64::max),
+        );
     }
     errors.sort_by(f64::total_cmp);
     let at = |part: f64| errors[(part * (errors.len() - 1) as f64) as usize];
     println!(
-        "a/b {:.3} nu {} chi {chi} at {target}: {} solves, {seconds:.2} s ({:.2} ms each), at {}: {more:.2} s; differences {:.5} {:.5} {:.5} {:.5}",
-        ratio(ratio_node), POISSON_RATIOS[poisson], errors.len(), 1e3 * seconds / errors.len() as f64, 0.25 * target,
-        at(0.5), at(0.9), at(0.99), at(1.0)
+        "{count} nodes solved anew: {:.4} in the median, {:.4} at 99 %, {:.4} at most",
+        at(0.5),
+        at(0.99),
+        at(1.0)
     );
 }

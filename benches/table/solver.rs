@@ -34,9 +34,7 @@ pub fn solve(
 ) -> Vec<Answer> {
     let root = contact.ratio.sqrt();
     let limit = CREEPAGE * MODULUS * LENGTH * LENGTH;
-    let motion = |[x, y, z]: &[f64; 3]| {
-        json!({ "creepage_x": CREEPAGE * x, "creepage_y": CREEPAGE * y, "spin_per_mm": CREEPAGE * z / LENGTH })
-    };
+    let motion = |[x, y, z]: &[f64; 3]| json!({ "creepage_x": CREEPAGE * x, "creepage_y": CREEPAGE * y, "spin_per_mm": CREEPAGE * z / LENGTH });
     let motions: Vec<_> = creepages.iter().map(motion).collect();
     let case = json!({
         "material": { "shear_modulus_mpa": MODULUS, "poisson_ratio": contact.poisson },
@@ -55,9 +53,15 @@ pub fn solve(
         }
         // The motion that has no answer stops its sweep: each by itself, and that one less exactly.
         Err(_) => {
-            let coarser = if creepages.len() == 1 { 2.0 * target } else { target };
+            let coarser = if creepages.len() == 1 {
+                2.0 * target
+            } else {
+                target
+            };
             let each = creepages.iter();
-            return each.flat_map(|one| solve(operators, contact, &[*one], coarser)).collect();
+            return each
+                .flat_map(|one| solve(operators, contact, &[*one], coarser))
+                .collect();
         }
     };
     let patch = &solution.patches[0];
@@ -67,7 +71,9 @@ pub fn solve(
             point.force_y_n / limit,
             point.moment_z_n_mm / (limit * LENGTH),
             point.stick_area_mm2.expect("zones") / patch.area_mm2,
-            point.error_estimate.map_or(f64::INFINITY, |e| e.force_x_n / limit),
+            point
+                .error_estimate
+                .map_or(f64::INFINITY, |e| e.force_x_n / limit),
         ]
     });
     answers.collect()
@@ -85,7 +91,11 @@ pub fn folder() -> PathBuf {
 pub fn read(name: &str) -> Option<Vec<f64>> {
     let bytes = std::fs::read(folder().join(name)).ok()?;
     let numbers = bytes.chunks_exact(8);
-    Some(numbers.map(|b| f64::from_le_bytes(b.try_into().expect("eight bytes"))).collect())
+    Some(
+        numbers
+            .map(|b| f64::from_le_bytes(b.try_into().expect("eight bytes")))
+            .collect(),
+    )
 }
 
 /// Writes numbers to a file, whole or not at all.

@@ -100,6 +100,14 @@ pub struct HttpArgs {
     #[arg(long, env = "RAILHEAD_GRID_MAX_SAMPLES", default_value_t = 250_000, value_name = "N",
           value_parser = clap::value_parser!(u32).range(4..=1_000_000))]
     pub grid_max_samples: u32,
+    /// Body of `POST /v1/evaluate` in MiB; beyond: 413.
+    #[arg(long, env = "RAILHEAD_EVALUATE_MAX_MIB", default_value_t = 64, value_name = "MIB",
+          value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub evaluate_max_mib: u32,
+    /// Rows of one such body; beyond: 422.
+    #[arg(long, env = "RAILHEAD_EVALUATE_MAX_ROWS", default_value_t = 1_000_000, value_name = "N",
+          value_parser = clap::value_parser!(u32).range(1..))]
+    pub evaluate_max_rows: u32,
     /// Names of the service, separated by commas, by which it may be asked without a key; addresses and `localhost` always
     /// may. Others are refused, as a web page could make its own name lead here.
     #[arg(
@@ -139,6 +147,8 @@ impl HttpArgs {
             renderings: self.renderings.map_or(default.renderings, usize::from),
             renderings_waiting_max: count(self.renderings_waiting_max),
             grid_max_samples: count(self.grid_max_samples),
+            evaluate_max_bytes: bytes(self.evaluate_max_mib),
+            evaluate_max_rows: count(self.evaluate_max_rows),
             allowed_hosts: self.allowed_host.as_slice().into(),
             page_dir: self.page_dir.as_deref().map(Into::into),
             ..default

@@ -135,6 +135,12 @@ pub enum SolveError {
         /// What is wrong with it, and what to do.
         reason: String,
     },
+    /// The method does not cover the contact.
+    #[error("{reason}")]
+    NotCovered {
+        /// Why, and which method does.
+        reason: String,
+    },
     /// The caller stopped the solve.
     #[error("the solve was cancelled")]
     Cancelled,

@@ -8,6 +8,7 @@ pub mod case;
 pub mod conventions;
 pub mod coupling;
 pub mod error;
+pub mod evaluate;
 pub mod friction;
 pub mod geometry;
 pub mod half_space;

@@ -61,8 +61,8 @@ use crate::http::routes::service::{
     examples as service_examples, health, methods, problems, remarks,
 };
 use crate::http::routes::{
-    batch_list, batch_results, batches, cases, damage, events, fields, job_list, jobs, me, plots,
-    point_fields, resultants, results, subsurface, tenant_events, zones,
+    batch_list, batch_results, batches, cases, damage, evaluate, events, fields, job_list, jobs,
+    me, plots, point_fields, resultants, results, subsurface, tenant_events, zones,
 };
 use crate::http::server::drain_body;
 use crate::http::state::AppState;
@@ -218,6 +218,7 @@ fn resources() -> OpenApiRouter<AppState> {
         .route_layer(from_fn(query::refuse_parameters));
     v1.merge(parts)
         .routes(routes!(batch_results::results))
+        .routes(routes!(evaluate::evaluate))
         .merge(events)
         .merge(probes())
         .merge(contract)

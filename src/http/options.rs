@@ -47,6 +47,10 @@ pub struct HttpOptions {
     pub batch_max_bytes: u64,
     /// Most cases of a batch.
     pub batch_max_cases: u32,
+    /// Largest body of rows in bytes.
+    pub evaluate_max_bytes: usize,
+    /// Most rows of a body.
+    pub evaluate_max_rows: usize,
     /// Requests without a key are answered, as those of a tenant of their own.
     pub anonymous: bool,
     /// The same for those that came through a proxy.
@@ -86,6 +90,8 @@ impl Default for HttpOptions {
             grid_max_samples: 250_000,
             batch_max_bytes: 1 << 30,
             batch_max_cases: 200_000,
+            evaluate_max_bytes: 64 << 20,
+            evaluate_max_rows: 1_000_000,
             anonymous: true,
             anonymous_proxied: false,
             allowed_hosts: Arc::default(),

@@ -229,6 +229,7 @@ impl Failure {
             }),
             SolveError::Unmeshable { .. }
             | SolveError::NormalProblem { .. }
+            | SolveError::NotCovered { .. }
             | SolveError::NotFinite { .. } => {
                 Some(Failure::new(FailureKind::Unsolvable, error.to_string()))
             }

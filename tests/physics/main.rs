@@ -71,6 +71,7 @@ mod skips;
 mod stress;
 mod subsurface;
 mod sweeps;
+mod table;
 mod targets;
 #[path = "../../benches/calibrate/truth.rs"]
 mod truth;

@@ -103,6 +103,7 @@ fn every_route_of_the_outline_is_in_the_contract() {
         "GET /v1/batches/{id}/results",
         "POST /v1/batches/{id}/cancel",
         "POST /v1/cases/check",
+        "POST /v1/evaluate",
         "GET /v1/methods",
         "GET /v1/remarks",
         "GET /healthz",

@@ -22,6 +22,7 @@ mod damage;
 mod dashboard;
 mod documents;
 mod errors;
+mod evaluate;
 mod events;
 mod faults;
 mod forces;

@@ -8,13 +8,14 @@ use crate::contact::case::size::SizeInput;
 use crate::contact::case::words::contact::{Contact, Load};
 use crate::contact::case::words::material::Material;
 use crate::contact::case::words::motion::Motions;
-use crate::contact::case::words::solver::{Output, Solver};
+use crate::contact::case::words::solver::{MethodName, Output, Solver};
 use crate::contact::case::{contact_task, motions, profiles, size};
 use crate::contact::error::Fault;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
+use crate::contact::rolling::methods::table::solve as table;
 
 /// Friction coefficient above which the answer carries a remark.
 const FRICTION_USUAL_MAX: f64 = 1.0;
@@ -95,6 +96,15 @@ impl CheckedParts {
             };
             faults.extend(size.faults(limits));
         }
+        if given
+            .solver
+            .is_some_and(|solver| solver.method == MethodName::Table)
+        {
+            faults.extend(not_in_table(
+                elasticity.as_ref(),
+                task.as_ref().map(|(task, _)| task),
+            ));
+        }
         let parts = CheckedParts {
             elasticity,
             task,
@@ -102,6 +112,17 @@ impl CheckedParts {
         };
         (parts, faults)
     }
+}
+
+/// Faults of a case that the table does not cover, as far as that is known before patches are found.
+fn not_in_table(elasticity: Option<&Elasticity>, task: Option<&NormalTask>) -> Vec<Fault> {
+    let unlike = elasticity.and_then(table::unlike);
+    let ratio = task.and_then(size::length_over_width);
+    let outside = ratio.and_then(table::outside);
+    let faults = [("/material", unlike), ("/contact", outside)].into_iter();
+    faults
+        .filter_map(|(pointer, detail)| Some(Fault::new(pointer, detail?)))
+        .collect()
 }
 
 pub(crate) fn unusual_friction(coefficient: f64) -> Option<RemarkEntry> {

@@ -62,7 +62,7 @@ impl Output {
     #[must_use]
     pub fn is_per_cell(self) -> bool {
         match self {
-            Output::Resultants | Output::Subsurface | Output::Damage => false,
+            Output::Resultants | Output::Subsurface | Output::Damage | Output::Gradients => false,
             Output::Zones
             | Output::Tractions
             | Output::Pressure
@@ -89,6 +89,7 @@ impl From<MethodName> for Method {
             MethodName::Auto | MethodName::BoundaryElement => Method::BoundaryElement,
             MethodName::LiuHsu => Method::LiuHsu,
             MethodName::Fastsim => Method::Fastsim,
+            MethodName::Table => Method::Table,
         }
     }
 }
@@ -99,6 +100,7 @@ impl From<Method> for MethodName {
             Method::BoundaryElement => MethodName::BoundaryElement,
             Method::LiuHsu => MethodName::LiuHsu,
             Method::Fastsim => MethodName::Fastsim,
+            Method::Table => MethodName::Table,
         }
     }
 }

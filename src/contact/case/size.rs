@@ -91,7 +91,7 @@ impl SizeInput {
         let (cells, segments) = self.finest();
         let motions = self.motions as f64;
         let operator = match self.method {
-            Method::Fastsim => 0.0,
+            Method::Fastsim | Method::Table => 0.0,
             Method::BoundaryElement | Method::LiuHsu => {
                 let kind = OperatorKind {
                     poisson_ratio: 0.0,
@@ -108,7 +108,7 @@ impl SizeInput {
             // Factored blocks of two unknowns per cell.
             Method::BoundaryElement => 32.0 * cells * cells / segments.max(1.0),
             Method::LiuHsu => (2.0 * cells).powi(2) * 8.0 * LIU_HSU_MATRICES,
-            Method::Fastsim => 0.0,
+            Method::Fastsim | Method::Table => 0.0,
         };
         let levels = (LEVELS_PER_MOTION * motions).min(LEVELS_KEPT as f64);
         let patches = self.segments.len() as f64;
@@ -165,6 +165,9 @@ impl SizeInput {
 
     /// Cells and segments of the finest mesh over all patches.
     fn finest(&self) -> (f64, f64) {
+        if self.method == Method::Table {
+            return (0.0, 0.0);
+        }
         let per_strip: f64 = self.segments.iter().sum();
         let fixed = MeshPolicy::fixed_sizes(self.resolution, self.method);
         let size = match (self.resolution, fixed.as_deref().and_then(<[_]>::last)) {

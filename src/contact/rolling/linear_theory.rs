@@ -63,7 +63,11 @@ fn places(inside: f64, poisson_ratio: f64) -> (usize, [f64; 4], [f64; 5]) {
     let place = 2.0 * inside.log2() + 0.5 * (RATIOS - 1) as f64;
     let first = (place.floor() as usize).clamp(1, RATIOS - 3) - 1;
     let along = lagrange::weights(&[0.0, 1.0, 2.0, 3.0], place - first as f64);
-    (first, along, lagrange::weights(&POISSON_RATIOS, poisson_ratio))
+    (
+        first,
+        along,
+        lagrange::weights(&POISSON_RATIOS, poisson_ratio),
+    )
 }
 
 /// `[C11, C22, C23]` of very slender ellipses (Kalker 1967; Kalker 1990, table E3).

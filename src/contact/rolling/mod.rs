@@ -3,6 +3,7 @@
 pub mod answer;
 pub mod force_control;
 pub mod linear_theory;
+pub mod load_ellipse;
 pub mod mesh_plan;
 pub mod methods;
 pub mod motion;

@@ -21,6 +21,8 @@ pub struct MotionAnswer {
     pub errors: RelativeErrors,
     /// Tractions, slips and zones; none from a method that knows resultants only ([`Method::has_fields`]).
     pub fields: Option<SolvedFields>,
+    /// What a table knows beside resultants, for every patch; nothing from other methods.
+    pub table: Option<Vec<TableAnswer>>,
     /// Work that was not needed.
     pub skips: Vec<Skip>,
     /// Remarks for the client.
@@ -31,6 +33,15 @@ pub struct MotionAnswer {
     pub method: Method,
     /// Wall time in s.
     pub seconds: f64,
+}
+
+/// What a table knows of a patch beside its resultants.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TableAnswer {
+    /// Share of the patch that sticks, 0 to 1.
+    pub stick: f64,
+    /// Derivatives of F_x, F_y and M_z about the origin of the case by ν_x, ν_y and φ (per mm): `[resultant][creepage]` in N and mm.
+    pub gradients: [[f64; 3]; 3],
 }
 
 /// The fields of a motion on the finest level it needed.

@@ -18,8 +18,8 @@ use crate::contact::solution::cell_values::{patch_cells, point_fields};
 use crate::contact::solution::maintain;
 use crate::contact::solution::maintain::SolvedMotion;
 use crate::contact::solution::words::{
-    CombinedMaterial, ErrorEstimate, Fields, MeshReport, NormalisedMotion, Origin, PatchFields,
-    PatchSolution, PointFields, PointSolution, Solution, SolverReport, Total,
+    CombinedMaterial, ErrorEstimate, Fields, Gradients, MeshReport, NormalisedMotion, Origin,
+    PatchFields, PatchSolution, PointFields, PointSolution, Solution, SolverReport, Total,
 };
 
 /// Remarks collected before repetitions are merged.
@@ -217,6 +217,8 @@ fn point_solution(
             let cells = level.patch_cells(index);
             zone_areas(level, patch, cells, &fields.tangential.slips)
         });
+    let table = point.table.as_ref().map(|table| table[index]);
+    let by_table = |share: fn(f64) -> f64| table.map(|table| share(table.stick) * patch.area);
     let power_x = motion.creepage_x * found.force_x;
     let power_y = motion.creepage_y * found.force_y;
     PointSolution {
@@ -227,8 +229,22 @@ fn point_solution(
         moment_z_n_mm: found.moment_z,
         profile_uncertainty: None,
         error_estimate: point.errors[index].map(|e| absolute(case, std::slice::from_ref(patch), e)),
-        stick_area_mm2: areas.map(|a| a.stick_area),
-        slip_area_mm2: areas.map(|a| a.slip_area),
+        stick_area_mm2: areas
+            .map(|a| a.stick_area)
+            .or_else(|| by_table(|stick| stick)),
+        slip_area_mm2: areas
+            .map(|a| a.slip_area)
+            .or_else(|| by_table(|stick| 1.0 - stick)),
+        gradients: table
+            .filter(|_| case.run.wants(Output::Gradients))
+            .map(|table| {
+                let [force_x_n, force_y_n, moment_z_n_mm] = table.gradients;
+                Gradients {
+                    force_x_n,
+                    force_y_n,
+                    moment_z_n_mm,
+                }
+            }),
         stick_cells: areas.map(|a| a.stick_cells),
         slip_cells: areas.map(|a| a.slip_cells),
         traction_max_mpa: on_level.map(|(level, fields)| traction_max(level, fields, index)),

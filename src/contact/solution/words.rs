@@ -176,12 +176,17 @@ pub struct PointSolution {
     /// What the measurement of the profiles leaves open; only for `profiles`.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub profile_uncertainty: Option<ProfileUncertainty>,
-    /// Area that sticks in mm²; absent unless zones were asked for.
+    /// Area that sticks in mm²; absent unless zones were asked for. The method `table` always gives it, right to some hundredths of the
+    /// area.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub stick_area_mm2: Option<f64>,
-    /// Area that slips in mm²; absent unless zones were asked for.
+    /// Area that slips in mm²; absent unless zones were asked for, but for `table`.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub slip_area_mm2: Option<f64>,
+    /// Derivatives of the three resultants by the creepages and the spin; absent unless asked for.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub gradients: Option<Gradients>,
     /// Number of cells that stick; absent unless zones were asked for.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub stick_cells: Option<u32>,
@@ -239,6 +244,17 @@ pub struct ErrorEstimate {
     pub force_y_n: f64,
     /// Of `moment_z_n_mm`, in N·mm.
     pub moment_z_n_mm: f64,
+}
+
+/// Derivatives of the resultants of a patch, each by `[creepage_x, creepage_y, spin_per_mm]`: the creep coefficients.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+pub struct Gradients {
+    /// Of `force_x_n`, in N, N and N·mm.
+    pub force_x_n: [f64; 3],
+    /// Of `force_y_n`, in N, N and N·mm.
+    pub force_y_n: [f64; 3],
+    /// Of `moment_z_n_mm`, in N·mm, N·mm and N·mm².
+    pub moment_z_n_mm: [f64; 3],
 }
 
 /// How a point was computed.

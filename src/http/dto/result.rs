@@ -38,7 +38,9 @@ impl JobResult {
     pub fn links(id: Uuid, outputs: &[impl AsRef<str>]) -> BTreeMap<String, String> {
         let own = format!("/v1/jobs/{id}");
         let mut links = BTreeMap::from([("resultants".to_owned(), format!("{own}/resultants"))]);
-        for name in outputs.iter().map(AsRef::as_ref) {
+        // Derivatives stand beside the resultants.
+        let own_parts = outputs.iter().map(AsRef::as_ref);
+        for name in own_parts.filter(|name| *name != name_of(Output::Gradients)) {
             links.insert(name.to_owned(), format!("{own}/{name}"));
             let small = [Output::Resultants, Output::Subsurface, Output::Damage].map(name_of);
             if !small.contains(&name) {
@@ -62,5 +64,6 @@ pub fn name_of(output: Output) -> &'static str {
         Output::Subsurface => "subsurface",
         Output::Damage => "damage",
         Output::Temperature => "temperature",
+        Output::Gradients => "gradients",
     }
 }

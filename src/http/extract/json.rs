@@ -249,7 +249,7 @@ pub fn unreadable(error: &(dyn std::error::Error + 'static)) -> ApiError {
 }
 
 /// A JSON value in which no object names a member twice; `Value` itself would keep the last one silently.
-struct Strict(Value);
+pub struct Strict(pub Value);
 
 impl<'de> Deserialize<'de> for Strict {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {

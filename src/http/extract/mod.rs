@@ -8,4 +8,5 @@ pub mod json;
 pub mod json_weight;
 pub mod labels;
 pub mod query;
+pub mod rows;
 pub mod submit_options;

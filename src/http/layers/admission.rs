@@ -78,10 +78,10 @@ pub async fn limit_packed(
             return refusal;
         }
     }
-    let most = if request.uri().path() == "/v1/batches" {
-        options.batch_max_bytes
-    } else {
-        options.body_max_bytes as u64
+    let most = match request.uri().path() {
+        "/v1/batches" => options.batch_max_bytes,
+        "/v1/evaluate" => options.evaluate_max_bytes as u64,
+        _ => options.body_max_bytes as u64,
     };
     let declared = request.headers().get(header::CONTENT_LENGTH);
     let declared = declared.and_then(|value| value.to_str().ok()?.parse::<u64>().ok());

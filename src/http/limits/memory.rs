@@ -104,6 +104,14 @@ impl Memory {
         take(&self.parsed, tenant, bytes, "cases that are read").await
     }
 
+    /// Memory for rows: their text, columns and answer.
+    ///
+    /// # Errors
+    /// As [`Memory::body`].
+    pub async fn rows(&self, tenant: &str, bytes: usize) -> Result<Option<Share>, ApiError> {
+        take(&self.answers, tenant, bytes, ANSWERS).await
+    }
+
     /// A turn to check a case of this size in memory.
     ///
     /// # Errors

@@ -7,6 +7,7 @@ pub mod npz;
 pub mod picture;
 pub mod pieces;
 pub mod resultants;
+pub mod rows;
 pub mod stresses;
 pub mod table;
 pub mod vtk;

@@ -6,6 +6,7 @@ pub mod batch_results;
 pub mod batches;
 pub mod cases;
 pub mod damage;
+pub mod evaluate;
 pub mod event_stream;
 pub mod events;
 pub mod fields;

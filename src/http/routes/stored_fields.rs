@@ -51,7 +51,7 @@ pub fn has(cells: &PatchCells, values: &PointFields, output: Output) -> bool {
         Output::Zones => values.zone.is_some(),
         Output::Temperature => values.temperature_c.is_some(),
         Output::Subsurface => values.subsurface.is_some(),
-        Output::Resultants | Output::Damage => true,
+        Output::Resultants | Output::Damage | Output::Gradients => true,
     }
 }
 

@@ -12,17 +12,18 @@ const TIME_LIMIT: Interval = Interval::positive(86_400.0, "s");
 /// Most strips, and cells in one, of an explicit mesh.
 const MESH_SIDE_MAX: u32 = 1000;
 
-const METHODS: [(&str, MethodName); 4] = [
+const METHODS: [(&str, MethodName); 5] = [
     ("auto", MethodName::Auto),
     ("boundary_element", MethodName::BoundaryElement),
     ("liu_hsu", MethodName::LiuHsu),
     ("fastsim", MethodName::Fastsim),
+    ("table", MethodName::Table),
 ];
 const TRACTION_BOUNDS: [(&str, TractionBoundName); 2] = [
     ("elliptic", TractionBoundName::Elliptic),
     ("parabolic", TractionBoundName::Parabolic),
 ];
-const OUTPUTS: [(&str, Output); 8] = [
+const OUTPUTS: [(&str, Output); 9] = [
     ("resultants", Output::Resultants),
     ("zones", Output::Zones),
     ("tractions", Output::Tractions),
@@ -31,6 +32,7 @@ const OUTPUTS: [(&str, Output); 8] = [
     ("subsurface", Output::Subsurface),
     ("damage", Output::Damage),
     ("temperature", Output::Temperature),
+    ("gradients", Output::Gradients),
 ];
 
 /// Reads the member `solver` of a case; left out, it is `auto` with the default target.
@@ -72,6 +74,9 @@ pub(crate) fn read(case: &mut Object) -> Option<Solver> {
         );
     }
     let time_limit_s = block.number("time_limit_s", TIME_LIMIT);
+    if mesh.is_some() && method == Some(MethodName::Table) {
+        block.fault("mesh", "given for \"method\": \"table\", which has no mesh");
+    }
     if block.has("target_error") && block.has("mesh") {
         block.fault(
             "mesh",
@@ -133,14 +138,18 @@ pub(crate) fn read_outputs(
         .map(|(k, element)| {
             let pointer = join(&pointer, k);
             let output = word(element, &pointer, &OUTPUTS, &[], faults)?;
-            let Some(method) = without_fields.filter(|_| output.needs_fields()) else {
-                return Some(output);
+            let detail = match without_fields {
+                Some(method) if output.needs_fields() => format!(
+                    "{} given; \"method\": \"{}\" computes only \"resultants\", \"gradients\" and \"damage\"",
+                    shown(element),
+                    method.name()
+                ),
+                None if output == Output::Gradients => format!(
+                    "{} given; only \"method\": \"table\" computes them",
+                    shown(element)
+                ),
+                _ => return Some(output),
             };
-            let detail = format!(
-                "{} given; \"method\": \"{}\" computes only \"resultants\" and \"damage\"",
-                shown(element),
-                method.name()
-            );
             faults.add(pointer, detail);
             None
         })
@@ -149,13 +158,6 @@ pub(crate) fn read_outputs(
     outputs.sort_unstable();
     outputs.dedup();
     Some(outputs)
-}
-
-impl Output {
-    /// Is it made from tractions, slips or zones, which only some methods compute?
-    fn needs_fields(self) -> bool {
-        !matches!(self, Output::Resultants | Output::Damage)
-    }
 }
 
 fn mesh(block: &mut Object) -> Option<MeshSizeWords> {
@@ -181,7 +183,7 @@ mod tests {
     fn read_without_fields(case: &Value) -> (Option<Vec<Output>>, Vec<Fault>) {
         let mut faults = Faults::default();
         let mut case = Object::open(case, String::new(), &mut faults).expect("an object");
-        let outputs = read_outputs(&mut case, Some(MethodName::Fastsim));
+        let outputs = read_outputs(&mut case, Some(MethodName::Table));
         (outputs, faults.into_list())
     }
 

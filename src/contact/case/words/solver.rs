@@ -44,6 +44,9 @@ pub enum MethodName {
     LiuHsu,
     /// Kalker's simplified theory: a draft in microseconds.
     Fastsim,
+    /// Interpolated in a table that `boundary_element` made: resultants of elliptic patches in less than a microsecond, with a bound of
+    /// their error. Other patches by the ellipse that carries their load the same way.
+    Table,
 }
 
 /// Where `fastsim` lets tractions slip.
@@ -90,4 +93,17 @@ pub enum Output {
     Damage,
     /// Temperature of both surfaces per cell, with the constants of `thermal`.
     Temperature,
+    /// Derivatives of forces and moment by creepages and spin, the creep coefficients; with `table` only.
+    Gradients,
+}
+
+impl Output {
+    /// Is it made from tractions, slips or zones, which only some methods compute?
+    #[must_use]
+    pub fn needs_fields(self) -> bool {
+        !matches!(
+            self,
+            Output::Resultants | Output::Gradients | Output::Damage
+        )
+    }
 }

@@ -7,14 +7,20 @@
 
 use std::f64::consts::PI;
 
+use crate::contact::error::SolveError;
+use crate::contact::friction::law::FrictionLaw;
+use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::mesh::size::MeshSize;
 use crate::contact::mesh::strips::Segment;
+use crate::contact::normal::footprint::Footprint;
+use crate::contact::normal::hertz::{Ellipse, Pressing};
 use crate::contact::normal::patch::Patch;
 use crate::contact::rolling::answer::{LevelAnswer, LevelExit, Work};
 use crate::contact::rolling::linear_theory;
 use crate::contact::rolling::methods::full_slip;
-use crate::contact::rolling::methods::method::TractionBound;
+use crate::contact::rolling::methods::method::{Method, TractionBound};
 use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::rolling::task::RollingTask;
 
@@ -78,6 +84,105 @@ pub fn solve(task: &RollingTask, level: &StripMesh, motion: &Motion) -> LevelAns
         }
     }
     answer
+}
+
+/// The mesh of an ellipse for many ellipses and motions: that of the circle, since all ellipses are its images.
+#[derive(Debug)]
+pub struct EllipseMesh {
+    level: StripMesh,
+    bound: Vec<f64>,
+}
+
+/// Dimensionless creepages and forces of a level per those relative to μN: the largest pressure of an ellipse is 3N/(2πab).
+const PER_LIMIT: f64 = 2.0 * PI / 3.0;
+
+impl EllipseMesh {
+    /// A mesh of so many strips and cells.
+    ///
+    /// # Errors
+    /// It has no strip.
+    pub fn new(size: MeshSize, bound: TractionBound) -> Result<EllipseMesh, SolveError> {
+        let circle = Ellipse::of_semi_axes(1.0, 1.0, Pressing::Force(1.0), 1.0);
+        let footprint = Footprint::hertz(circle);
+        let task = RollingTask {
+            footprint: &footprint,
+            elasticity: &Elasticity {
+                shear_modulus: 1.0,
+                poisson_ratio: 0.0,
+                difference: 0.0,
+            },
+            friction: FrictionLaw::Constant(1.0),
+            motions: &[],
+            forces: &[],
+            first_motion: 0,
+            single_motion: true,
+            method: Method::Fastsim,
+            traction_bound: bound,
+            resolution: Resolution::Mesh(size),
+        };
+        let level = StripMesh::new(&task, size)?;
+        let mut bounds = level.bound.clone();
+        if bound == TractionBound::Parabolic {
+            make_parabolic(&level, 0, &mut bounds);
+        }
+        Ok(EllipseMesh {
+            level,
+            bound: bounds,
+        })
+    }
+
+    /// `[F_x/(μN), F_y/(μN), M_z/(μN√(ab))]` and the share that sticks, of the dimensionless creepages `G c²/(μN) (ν_x, ν_y, c φ)`.
+    #[must_use]
+    pub fn creep(&self, a_over_b: f64, poisson_ratio: f64, creepage: [f64; 3]) -> ([f64; 3], f64) {
+        if creepage == [0.0; 3] {
+            return ([0.0; 3], 1.0);
+        }
+        let [creepage_x, creepage_y, spin_per_mm] = creepage.map(|part| PER_LIMIT * part);
+        let motion = Motion {
+            creepage_x,
+            creepage_y,
+            spin_per_mm,
+        };
+        let (a, b) = (a_over_b.sqrt(), 1.0 / a_over_b.sqrt());
+        let ellipse = EquivalentEllipse {
+            centre: [0.0; 2],
+            a,
+            b,
+        };
+        let brush = SimplifiedTheory::new(&ellipse, poisson_ratio, &motion);
+        let mesh = &self.level.normalised;
+        let (mut force, mut stick, mut whole) = ([0.0; 3], 0.0, 0.0);
+        for (segment, arm) in mesh.segments.iter().zip(&mesh.arm) {
+            let arm = 0.5 * b * (segment.chord.y + arm);
+            let across = brush.growth[0] - brush.turning * b * segment.chord.y;
+            let mut ahead = a * segment.chord.right;
+            let mut traction = [0.0; 2];
+            for i in segment.cells.clone().rev() {
+                let here = a * mesh.node[i];
+                let (step, halfway) = (ahead - here, 0.5 * (ahead + here));
+                traction = [
+                    traction[0] + step * across,
+                    traction[1] + step * (brush.growth[1] + brush.turning * halfway),
+                ];
+                let length = (traction[0] * traction[0] + traction[1] * traction[1]).sqrt();
+                let area = self.level.area[i];
+                whole += area;
+                if length > self.bound[i] {
+                    let share = self.bound[i] / length;
+                    traction = traction.map(|t| share * t);
+                } else {
+                    stick += area;
+                }
+                let [x, y] = traction.map(|t| area * t);
+                let middle = 0.5 * a * (mesh.left[i] + mesh.right[i]);
+                force[0] += x;
+                force[1] += y;
+                force[2] += middle * y - arm * x;
+                ahead = here;
+            }
+        }
+        (force.map(|part| part / PER_LIMIT), stick / whole)
+    }
 }
 
 /// Replaces the bound of a patch by its square, scaled to the same load: a paraboloid instead of Hertz's ellipsoid.

@@ -9,6 +9,8 @@ pub enum Method {
     LiuHsu,
     /// Kalker's simplified theory.
     Fastsim,
+    /// The table of creep forces of elliptic patches.
+    Table,
 }
 
 /// Where `fastsim` lets tractions slip.
@@ -27,6 +29,7 @@ impl Method {
     pub fn has_fields(self) -> bool {
         match self {
             Method::BoundaryElement | Method::LiuHsu | Method::Fastsim => true,
+            Method::Table => false,
         }
     }
 
@@ -37,6 +40,7 @@ impl Method {
             Method::BoundaryElement => "boundary_element",
             Method::LiuHsu => "liu_hsu",
             Method::Fastsim => "fastsim",
+            Method::Table => "table",
         }
     }
 }

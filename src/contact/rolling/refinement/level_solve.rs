@@ -84,6 +84,7 @@ impl From<SolvedLevel> for MotionAnswer {
                 level: solved.level,
                 tangential,
             }),
+            table: None,
             work: solved.work,
             method: solved.method,
             seconds: solved.seconds,

@@ -1,8 +1,10 @@
 //! The meshes of a footprint that exist: made once, shared by all motions, the least recently used dropped.
 
+use std::cell::OnceCell;
 use std::sync::Arc;
 
 use crate::contact::error::SolveError;
+use crate::contact::rolling::load_ellipse::LoadEllipse;
 use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use crate::contact::rolling::operator_store::{CaseOperators, OperatorStore};
@@ -34,6 +36,8 @@ pub struct Levels<'a> {
     pub policy: MeshPolicy,
     /// Buffers of the iterations on all levels.
     pub workspace: NewtonWorkspace,
+    /// The ellipses that stand for the patches, where a method has asked for them.
+    ellipses: OnceCell<Vec<LoadEllipse>>,
 }
 
 impl<'a> Levels<'a> {
@@ -50,7 +54,16 @@ impl<'a> Levels<'a> {
             begin: None,
             policy: MeshPolicy::new(task.footprint),
             workspace: NewtonWorkspace::default(),
+            ellipses: OnceCell::new(),
         }
+    }
+
+    /// The ellipses that stand for the patches.
+    pub fn ellipses(&self) -> &[LoadEllipse] {
+        let footprint = self.task.footprint;
+        let all = 0..footprint.patches().len();
+        self.ellipses
+            .get_or_init(|| all.map(|patch| LoadEllipse::of(footprint, patch)).collect())
     }
 
     /// The number of the level of this plan; it is made if it is not there.

@@ -59,7 +59,8 @@ impl MeshPolicy {
             (Resolution::Mesh(size), Method::LiuHsu | Method::Fastsim) => Some(vec![size]),
             (Resolution::Target(_), Method::LiuHsu) => Some(vec![size(6, 12), size(12, 24)]),
             (Resolution::Target(_), Method::Fastsim) => Some(vec![fastsim::MESH]),
-            (_, Method::BoundaryElement) => None,
+            // The table has no mesh; nothing asks it for one.
+            (_, Method::BoundaryElement | Method::Table) => None,
         }
     }
 

@@ -5,6 +5,8 @@ use crate::contact::mesh::size::MeshSize;
 use crate::contact::monitor::Monitor;
 use crate::contact::rolling::answer::Work;
 use crate::contact::rolling::mesh_plan::{MeshPlan, Regime};
+use crate::contact::rolling::methods::method::Method;
+use crate::contact::rolling::methods::table::solve as table;
 use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;
 use crate::contact::rolling::refinement::companions::Companion;
@@ -36,8 +38,11 @@ pub fn solve(
     asked: MotionTask,
     monitor: &dyn Monitor,
 ) -> Result<MotionAnswer, SolveError> {
-    let sizes = MeshPolicy::fixed_sizes(task.resolution, task.method);
     levels.path.clear();
+    if task.method == Method::Table {
+        return table::solve(task, levels.ellipses(), &asked.motion, monitor);
+    }
+    let sizes = MeshPolicy::fixed_sizes(task.resolution, task.method);
     match (sizes, task.resolution) {
         (Some(sizes), _) => {
             let mut solved = solve_level(task, levels, asked, sizes[0].into(), None, monitor)?;

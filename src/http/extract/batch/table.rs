@@ -117,6 +117,17 @@ fn read_header(line: &[u8]) -> Result<Vec<TemplateColumn>, String> {
     Ok(columns)
 }
 
+/// The JSON pointers that a header names columns by.
+///
+/// # Errors
+/// A column that is not known, or is there twice.
+pub fn column_pointers(header: &[u8]) -> Result<Vec<String>, String> {
+    let header = header.strip_prefix(b"\xef\xbb\xbf").unwrap_or(header);
+    let escaped = |part: &String| format!("/{}", part.replace('~', "~0").replace('/', "~1"));
+    let pointer = |column: TemplateColumn| column.path.iter().map(escaped).collect();
+    Ok(read_header(header)?.into_iter().map(pointer).collect())
+}
+
 fn column(title: &str) -> Result<TemplateColumn, String> {
     let short = SHORT_NAMES.iter().find(|(name, _)| *name == title);
     let path = if own_options::NAMES.contains(&title) {

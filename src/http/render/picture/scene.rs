@@ -74,7 +74,11 @@ pub fn heat(scene: &Scene) -> Option<Heat> {
             unit: "°C",
             edge: AtBorder::Continues,
         }),
-        Output::Zones | Output::Resultants | Output::Subsurface | Output::Damage => None,
+        Output::Zones
+        | Output::Resultants
+        | Output::Subsurface
+        | Output::Damage
+        | Output::Gradients => None,
     }
 }
 

@@ -119,6 +119,7 @@ pub async fn methods(
             MethodName::BoundaryElement,
             MethodName::LiuHsu,
             MethodName::Fastsim,
+            MethodName::Table,
         ]
         .map(describe_method)
         .into(),
@@ -132,6 +133,7 @@ pub async fn methods(
             Output::Subsurface,
             Output::Damage,
             Output::Temperature,
+            Output::Gradients,
         ]
         .map(describe_output)
         .into(),
@@ -166,6 +168,10 @@ fn describe_method(method: MethodName) -> MethodCapability {
         MethodName::Fastsim => {
             "Kalker's simplified theory: a draft in microseconds, with a stated error instead of an estimated one."
         }
+        MethodName::Table => {
+            "Resultants and their derivatives interpolated in a table that `boundary_element` made, in about a microsecond, with a \
+             bound of the error: elliptic patches with a/b from 0.1 to 10, others by the ellipse that carries their load the same way."
+        }
     };
     MethodCapability {
         name: method,
@@ -192,6 +198,10 @@ fn describe_output(output: Output) -> OutputCapability {
         Output::Temperature => (
             false,
             "Temperature of both surfaces per cell; needs `thermal` and `speed_mm_per_s` in the motion.",
+        ),
+        Output::Gradients => (
+            false,
+            "Derivatives of forces and moment by creepages and spin; with `table` only.",
         ),
     };
     OutputCapability {

@@ -88,6 +88,14 @@ impl Axis {
         axis
     }
 
+    /// The bin of a place; beyond the ends the last one.
+    #[must_use]
+    #[inline(always)]
+    pub fn bin(&self, place: f64) -> usize {
+        let along = (place - self.low) * self.bins_per_unit;
+        (along.max(0.0) as usize).min(self.first.len() - 1)
+    }
+
     /// The weights at a place; beyond the ends those of the end.
     #[must_use]
     #[inline(always)]
@@ -101,8 +109,18 @@ impl Axis {
         let slope = |p: &[f64; 4]| self.bins_per_unit * (p[1] + t * (2.0 * p[2] + t * 3.0 * p[3]));
         Weights {
             first: self.first[bin],
-            value: [value(&piece[0]), value(&piece[1]), value(&piece[2]), value(&piece[3])],
-            slope: [slope(&piece[0]), slope(&piece[1]), slope(&piece[2]), slope(&piece[3])],
+            value: [
+                value(&piece[0]),
+                value(&piece[1]),
+                value(&piece[2]),
+                value(&piece[3]),
+            ],
+            slope: [
+                slope(&piece[0]),
+                slope(&piece[1]),
+                slope(&piece[2]),
+                slope(&piece[3]),
+            ],
         }
     }
 }
@@ -158,7 +176,11 @@ fn knots(places: &[u8]) -> Vec<f64> {
     let at = |k: usize| f64::from(places[k]);
     let last = places.len() - 1;
     let inner = (2..last - 1).map(at);
-    [at(0); 4].into_iter().chain(inner).chain([at(last); 4]).collect()
+    [at(0); 4]
+        .into_iter()
+        .chain(inner)
+        .chain([at(last); 4])
+        .collect()
 }
 
 /// The `k`-th cubic B-spline at `x`, by the piece between knots `interval` and the next (de Boor 1978).
@@ -168,11 +190,24 @@ fn basis(knots: &[f64], k: usize, interval: usize, x: f64) -> f64 {
             return if k == interval { 1.0 } else { 0.0 };
         }
         let share = |from: f64, to: f64, rise: f64, below: f64| {
-            if to > from { rise / (to - from) * below } else { 0.0 }
+            if to > from {
+                rise / (to - from) * below
+            } else {
+                0.0
+            }
         };
         let (left, right) = (knots[k], knots[k + degree + 1]);
-        share(left, knots[k + degree], x - left, part(knots, k, degree - 1, interval, x))
-            + share(knots[k + 1], right, right - x, part(knots, k + 1, degree - 1, interval, x))
+        share(
+            left,
+            knots[k + degree],
+            x - left,
+            part(knots, k, degree - 1, interval, x),
+        ) + share(
+            knots[k + 1],
+            right,
+            right - x,
+            part(knots, k + 1, degree - 1, interval, x),
+        )
     }
     part(knots, k, 3, interval, x)
 }
@@ -203,7 +238,10 @@ fn inverse(mut matrix: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
         for (other, target) in matrix.iter_mut().enumerate() {
             if other != k {
                 let factor = target[k];
-                target.iter_mut().zip(&row).for_each(|(t, r)| *t -= factor * r);
+                target
+                    .iter_mut()
+                    .zip(&row)
+                    .for_each(|(t, r)| *t -= factor * r);
             }
         }
     }
@@ -229,7 +267,12 @@ mod tests {
     #[test]
     fn cubics_are_met_everywhere_on_uneven_nodes() {
         let places = [0, 2, 4, 6, 8, 10, 11, 12, 13, 14, 16, 20, 24];
-        let cubic = |x: f64| [0.3 - x + 0.2 * x * x - 0.01 * x * x * x, -1.0 + 0.4 * x - 0.03 * x * x];
+        let cubic = |x: f64| {
+            [
+                0.3 - x + 0.2 * x * x - 0.01 * x * x * x,
+                -1.0 + 0.4 * x - 0.03 * x * x,
+            ]
+        };
         let axis = Axis::free(0.0, 1.0, &places);
         let nodes = places.map(|p| cubic(f64::from(p))[0]);
         let coefficients = times(&free_coefficients(&places), &nodes);
@@ -255,7 +298,11 @@ mod tests {
                 assert!((value(&axis, &coefficients, x)[0] - wave(x)).abs() < 2e-5);
             }
             let at_end = value(&axis, &coefficients, 0.0);
-            let zero = if ends[0] == Mirror::Even { at_end[1] } else { at_end[0] };
+            let zero = if ends[0] == Mirror::Even {
+                at_end[1]
+            } else {
+                at_end[0]
+            };
             assert!(zero.abs() < 1e-14, "{zero}");
         }
     }

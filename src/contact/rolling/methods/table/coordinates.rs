@@ -84,7 +84,10 @@ impl Shape {
     /// for it.
     #[must_use]
     pub fn angles_with_slopes(&self, creepage: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
-        let mut u = self.stretched(creepage);
+        let whole = self.stretched(creepage);
+        let share = 1.0 / whole[0].abs().max(whole[1].abs()).max(whole[2].abs());
+        let mut u = whole.map(|u| share * u);
+        let scale = self.scale.map(|scale| share * scale);
         let [alpha, beta, m] = self.squares;
         let least = BESIDE_SPIN * u[2];
         let flat = u[0].hypot(u[1]);
@@ -101,7 +104,8 @@ impl Shape {
         let t = root * root;
         let (da, db) = (1.0 / (m + alpha * t), 1.0 / (m + beta * t));
         let sum = p * da + q * db;
-        let slope = (1.0 + 2.0 * t) * sum - t * (1.0 + t) * (p * alpha * da * da + q * beta * db * db);
+        let slope =
+            (1.0 + 2.0 * t) * sum - t * (1.0 + t) * (p * alpha * da * da + q * beta * db * db);
         // θ = atan √t; t by the squares of u, divided by 2 √t (1 + t).
         let theta = [
             -root * u[0] * da / slope,
@@ -112,8 +116,8 @@ impl Shape {
         let [cos, sin] = [u[0] * da.sqrt(), u[1] * db.sqrt()];
         let turn = cos * sin * (alpha * da - beta * db) / sum * root * (1.0 + t);
         let own = [-sin * da.sqrt() / sum, cos * db.sqrt() / sum, 0.0];
-        let chi = [0, 1, 2].map(|k| (own[k] + turn * theta[k]) * self.scale[k]);
-        (angles, [[0, 1, 2].map(|k| theta[k] * self.scale[k]), chi])
+        let chi = [0, 1, 2].map(|k| (own[k] + turn * theta[k]) * scale[k]);
+        (angles, [[0, 1, 2].map(|k| theta[k] * scale[k]), chi])
     }
 
     fn stretched(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
@@ -122,6 +126,9 @@ impl Shape {
 
     #[inline(always)]
     fn angles_of(&self, u: [f64; 3]) -> [f64; 2] {
+        // Squares of creepages far from 1 would leave the range of numbers.
+        let share = 1.0 / u[0].abs().max(u[1].abs()).max(u[2].abs());
+        let u = u.map(|u| share * u);
         let [p, q, s] = u.map(|u| u * u);
         let [alpha, beta, m] = self.squares;
         if p + q <= f64::MIN_POSITIVE {
@@ -135,7 +142,8 @@ impl Shape {
             let (da, db) = (1.0 / (m + alpha * t), 1.0 / (m + beta * t));
             let sum = p * da + q * db;
             let value = t * (1.0 + t) * sum - s;
-            let slope = (1.0 + 2.0 * t) * sum - t * (1.0 + t) * (p * alpha * da * da + q * beta * db * db);
+            let slope =
+                (1.0 + 2.0 * t) * sum - t * (1.0 + t) * (p * alpha * da * da + q * beta * db * db);
             t = (t - value / slope).max(0.0);
         }
         let theta = t.sqrt().atan();
@@ -158,10 +166,12 @@ mod tests {
             let shape = Shape::new(ratio.sqrt(), [c11, c22]);
             for i in 0..=60 {
                 for j in 0..=40 {
-                    let theta = 1.5707 * f64::from(i) / 60.0;
-                    let chi = 3.14159 * (f64::from(j) / 40.0 - 0.5);
+                    let theta = 0.9999 * FRAC_PI_2 * f64::from(i) / 60.0;
+                    let chi = 2.0 * FRAC_PI_2 * (f64::from(j) / 40.0 - 0.5);
                     let found = shape.angles(shape.creepage(theta, chi));
-                    worst = worst.max((found[0] - theta).abs()).max((found[1] - chi).abs());
+                    worst = worst
+                        .max((found[0] - theta).abs())
+                        .max((found[1] - chi).abs());
                 }
             }
         }

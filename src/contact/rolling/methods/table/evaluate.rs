@@ -5,7 +5,8 @@ use pulp::Arch;
 use crate::contact::rolling::methods::table::axis::{Axis, Weights};
 use crate::contact::rolling::methods::table::coordinates::{Shape, spin_factor};
 use crate::contact::rolling::methods::table::grid::{
-    DIRECTIONS, POISSON_RATIOS, POLES, RATIOS, SIZE_HALF, SIZE_STEPS, SIZES, ln_ratio_max,
+    DIRECTIONS, POISSON_RATIOS, POLES, RATIOS, SIZE_HALF, SIZE_STEPS, SIZES, cell, ln_ratio_max,
+    sigma,
 };
 use crate::contact::rolling::methods::table::shape_coefficients::{
     ShapeCoefficients, poisson_weights,
@@ -21,6 +22,9 @@ const NEAR: usize = 4 * SIZE_ROW;
 /// The size at which everything slips without spin: f(r) = 1 from here on (Vermeulen and Johnson 1964).
 const SIZE_FULL: f64 = 3.0;
 
+/// Derivatives by creepages below this part of the spin, by size, are differences. From 0.02 to 0.1 they change by less than 0.01 of C.
+const BESIDE_SPIN: f64 = 0.05;
+
 /// The table, ready to be evaluated.
 #[derive(Debug)]
 pub struct CreepTable {
@@ -32,6 +36,8 @@ pub struct CreepTable {
     direction: Axis,
     size: Axis,
     shapes: ShapeCoefficients,
+    /// Of every cell between nodes.
+    bounds: Vec<f32>,
 }
 
 /// Creep forces of an ellipse.
@@ -41,6 +47,8 @@ pub struct Creep {
     pub force: [f64; 3],
     /// Share of the patch that sticks, 0 to 1.
     pub stick: f64,
+    /// What the three are off by at most, in 99 of 100 motions that were held out.
+    pub bound: f64,
 }
 
 /// The table for one ellipse and material.
@@ -52,6 +60,7 @@ pub struct EllipseTable<'a> {
     kalker: [f64; 4],
     /// C11, C22 and h: the creepage in these units has the length r.
     scale: [f64; 3],
+    ln_ratio: f64,
     ratio: Weights,
     poisson: [f64; 3],
 }
@@ -90,9 +99,9 @@ pub fn linear([c11, c22, c23, c33]: [f64; 4], [x, y, z]: [f64; 3]) -> [f64; 3] {
 
 impl CreepTable {
     /// The table with these values at its nodes, `[a/b][pole][direction][size][ν][function]`: for forces and moment `F/f(r)` without
-    /// the part of linear theory, for the share that sticks itself.
+    /// the part of linear theory, for the share that sticks itself; and the bounds of errors of the cells between them.
     #[must_use]
-    pub fn new(values: &[f32]) -> CreepTable {
+    pub fn new(values: &[f32], bounds: &[f32]) -> CreepTable {
         let exact = coefficients(values);
         let mut largest = [f32::MIN_POSITIVE; OUTPUTS];
         for (k, value) in exact.iter().enumerate() {
@@ -112,6 +121,7 @@ impl CreepTable {
             direction: Axis::mirrored(-quarter..quarter, DIRECTIONS),
             size: Axis::free(0.0, 1.0 / SIZE_STEPS, &SIZES),
             shapes: ShapeCoefficients::new(),
+            bounds: bounds.to_vec(),
         }
     }
 
@@ -126,8 +136,13 @@ impl CreepTable {
         EllipseTable {
             table: self,
             shape: Shape::new(root, quarter),
-            scale: [kalker[0], kalker[1], spin_factor(root, [kalker[0], kalker[1]])],
+            scale: [
+                kalker[0],
+                kalker[1],
+                spin_factor(root, [kalker[0], kalker[1]]),
+            ],
             kalker,
+            ln_ratio,
             ratio: self.ratio.at(ln_ratio),
             poisson: [
                 0.5 * (1.0 - nu) * (2.0 - nu),
@@ -152,17 +167,26 @@ impl EllipseTable<'_> {
         let Quarter { inside, signs } = Quarter::of(creepage);
         let size = self.size(inside);
         if size == 0.0 {
-            return Creep { force: [0.0; 3], stick: 1.0 };
+            return Creep {
+                force: [0.0; 3],
+                stick: 1.0,
+                bound: 0.0,
+            };
         }
         let [theta, chi] = self.shape.angles(inside);
-        let sigma = size / (size + SIZE_HALF);
+        let sigma = sigma(size);
         let sums = self.sums::<false>(sigma, theta, chi);
         let linear = linear(self.kalker, inside);
         let [growth, _] = growth(size);
         let part = linear_part(sigma)[0] / size;
+        // What vanishes by symmetry is 0, not the rounding of the spline.
+        let [x, y, z] = inside.map(|part| part != 0.0);
+        let there = [x, y || z, y || z];
+        let force = |k: usize| signs[k] * growth * (sums.value[k] + part * linear[k]);
         Creep {
-            force: [0, 1, 2].map(|k| signs[k] * growth * (sums.value[k] + part * linear[k])),
+            force: [0, 1, 2].map(|k| if there[k] { force(k) } else { 0.0 }),
             stick: sums.value[3].clamp(0.0, 1.0),
+            bound: f64::from(self.table.bounds[cell(self.ln_ratio, sigma, theta, chi)]),
         }
     }
 
@@ -177,7 +201,7 @@ impl EllipseTable<'_> {
             return (self.creep(creepage), stiffness);
         }
         let ([theta, chi], angles) = self.shape.angles_with_slopes(inside);
-        let sigma = size / (size + SIZE_HALF);
+        let sigma = sigma(size);
         let sums = self.sums::<true>(sigma, theta, chi);
         let linear = linear(self.kalker, inside);
         let [growth, faster] = growth(size);
@@ -195,14 +219,40 @@ impl EllipseTable<'_> {
                 + part * (stiffness[k][j] - linear[k] * size_by[j] / size) / size;
             turned[k] * turned[j] * (faster * size_by[j] * whole + growth * inner)
         };
-        let slopes = [0, 1, 2].map(|k| [0, 1, 2].map(|j| slope(k, j)));
+        let mut slopes = [0, 1, 2].map(|k| [0, 1, 2].map(|j| slope(k, j)));
+        let flat = (self.scale[0] * inside[0]).hypot(self.scale[1] * inside[1]);
+        let spin = self.scale[2] * inside[2];
+        if flat < BESIDE_SPIN * spin {
+            self.difference(creepage, BESIDE_SPIN * spin, &mut slopes);
+        }
         (self.creep(creepage), slopes)
+    }
+
+    /// Derivatives by the creepages near spin alone, where the direction turns within no distance: differences over steps of this size.
+    fn difference(&self, creepage: [f64; 3], size: f64, slopes: &mut [[f64; 3]; 3]) {
+        for j in 0..2 {
+            let step = size / self.scale[j];
+            let moved = |by: f64| {
+                let mut moved = creepage;
+                moved[j] += by;
+                self.creep(moved).force
+            };
+            let (back, ahead) = (moved(-step), moved(step));
+            for k in 0..3 {
+                slopes[k][j] = (ahead[k] - back[k]) / (2.0 * step);
+            }
+        }
     }
 
     #[inline(always)]
     fn size(&self, creepage: [f64; 3]) -> f64 {
-        let u = [0, 1, 2].map(|k| self.scale[k] * creepage[k]);
-        (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]).sqrt()
+        let u = [0, 1, 2].map(|k| (self.scale[k] * creepage[k]).abs());
+        let largest = u[0].max(u[1]).max(u[2]);
+        if largest == 0.0 {
+            return 0.0;
+        }
+        let [x, y, z] = u.map(|u| u / largest);
+        largest * (x * x + y * y + z * z).sqrt()
     }
 
     /// The sums of the spline, derivatives only if asked for.
@@ -218,30 +268,38 @@ impl EllipseTable<'_> {
             direction,
             size: size.first,
         };
-        let mut sums = Sums::default();
-        let mut combine = |rows: &[f32; NEAR], weights: &[f64; 4], to: fn(&mut Sums) -> &mut [f64; OUTPUTS]| {
-            let to = to(&mut sums);
-            for (rows, weight) in rows.chunks_exact(SIZE_ROW).zip(weights) {
-                for (rows, poisson) in rows.chunks_exact(OUTPUTS).zip(self.poisson) {
-                    for k in 0..OUTPUTS {
-                        to[k] += weight * poisson * f64::from(rows[k]);
-                    }
-                }
-            }
-            for k in 0..OUTPUTS {
-                to[k] *= f64::from(table.unit[k]);
-            }
-        };
+        let combined = |rows: &[f32; NEAR], weights: &[f64; 4]| self.combined(rows, weights);
         let arch = Arch::new();
         if SLOPES {
             let [value, by_pole, by_direction] = arch.dispatch(|| near.with_slopes());
-            combine(&value, &size.value, |s| &mut s.value);
-            combine(&value, &size.slope, |s| &mut s.by_size);
-            combine(&by_pole, &size.value, |s| &mut s.by_pole);
-            combine(&by_direction, &size.value, |s| &mut s.by_direction);
+            Sums {
+                value: combined(&value, &size.value),
+                by_size: combined(&value, &size.slope),
+                by_pole: combined(&by_pole, &size.value),
+                by_direction: combined(&by_direction, &size.value),
+            }
         } else {
             let value = arch.dispatch(|| near.value());
-            combine(&value, &size.value, |s| &mut s.value);
+            Sums {
+                value: combined(&value, &size.value),
+                ..Sums::default()
+            }
+        }
+    }
+
+    /// Sums over sizes and Poisson's ratios.
+    #[inline(always)]
+    fn combined(&self, rows: &[f32; NEAR], weights: &[f64; 4]) -> [f64; OUTPUTS] {
+        let mut sums = [0.0; OUTPUTS];
+        for (rows, weight) in rows.chunks_exact(SIZE_ROW).zip(weights) {
+            for (rows, poisson) in rows.chunks_exact(OUTPUTS).zip(self.poisson) {
+                for (sum, value) in sums.iter_mut().zip(rows) {
+                    *sum += weight * poisson * f64::from(*value);
+                }
+            }
+        }
+        for (sum, unit) in sums.iter_mut().zip(self.table.unit) {
+            *sum *= f64::from(unit);
         }
         sums
     }
@@ -256,10 +314,15 @@ struct Quarter {
 impl Quarter {
     #[inline(always)]
     fn of([x, y, z]: [f64; 3]) -> Quarter {
-        let spin = if z < 0.0 { -1.0 } else { 1.0 };
+        // Without spin both signs mean the same; one of them is chosen, so that reversed creepages meet at the same place.
+        let spin = if z < 0.0 || (z == 0.0 && y < 0.0) {
+            -1.0
+        } else {
+            1.0
+        };
         let along = if x < 0.0 { -1.0 } else { 1.0 };
         Quarter {
-            inside: [along * x, spin * y, spin * z],
+            inside: [x.abs(), spin * y, z.abs()],
             signs: [along, spin, spin],
         }
     }

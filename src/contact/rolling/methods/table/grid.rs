@@ -46,11 +46,42 @@ pub fn direction(node: usize) -> f64 {
 /// σ = r/(r + 3/2) of a size r, 0 to 1.
 #[must_use]
 pub fn sigma(size: f64) -> f64 {
-    size / (size + SIZE_HALF)
+    // Of any size, also one that is 0 or beyond all numbers.
+    1.0 / (1.0 + SIZE_HALF / size)
 }
 
 /// The size r of a σ below 1.
 #[must_use]
 pub fn size(sigma: f64) -> f64 {
     SIZE_HALF * sigma / (1.0 - sigma)
+}
+
+/// Cells between nodes: in a/b, pole, direction and size.
+pub const CELLS: usize = (RATIOS - 1) * (POLES - 1) * (DIRECTIONS - 1) * (SIZES.len() - 1);
+
+/// The last node at or before each of the 24ths of σ.
+const SIZE_CELL: [u8; SIZE_STEPS as usize] = {
+    let mut cells = [0; SIZE_STEPS as usize];
+    let mut node = 0;
+    let mut step = 0;
+    while step < cells.len() {
+        if SIZES[node + 1] as usize <= step {
+            node += 1;
+        }
+        cells[step] = node as u8;
+        step += 1;
+    }
+    cells
+};
+
+/// The number of the cell that holds a place, `[a/b][pole][direction][size]`; beyond the ends the last one.
+#[must_use]
+#[inline(always)]
+pub fn cell(ln_ratio: f64, sigma: f64, theta: f64, chi: f64) -> usize {
+    let bin = |part: f64, bins: usize| ((part * bins as f64).max(0.0) as usize).min(bins - 1);
+    let ratio = bin(0.5 * (ln_ratio / LN_10 + 1.0), RATIOS - 1);
+    let pole = bin(theta / FRAC_PI_2, POLES - 1);
+    let direction = bin(chi / PI + 0.5, DIRECTIONS - 1);
+    let size = usize::from(SIZE_CELL[bin(sigma, SIZE_CELL.len())]);
+    ((ratio * (POLES - 1) + pole) * (DIRECTIONS - 1) + direction) * (SIZES.len() - 1) + size
 }

@@ -3,6 +3,8 @@
 pub mod axis;
 pub mod coordinates;
 pub mod evaluate;
+pub mod file;
 pub mod grid;
 pub mod shape_coefficients;
+pub mod solve;
 pub mod spline;

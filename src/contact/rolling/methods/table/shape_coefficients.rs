@@ -1,15 +1,13 @@
 //! Kalker's coefficients as splines in ln(a/b), for many ellipses in little time.
 
-use crate::contact::rolling::linear_theory::{
-    POISSON_RATIOS, coefficients, spin_coefficient,
-};
+use crate::contact::rolling::linear_theory::{POISSON_RATIOS, coefficients, spin_coefficient};
 use crate::contact::rolling::methods::table::axis::{Axis, free_coefficients};
 use crate::contact::rolling::methods::table::grid::ln_ratio_max;
 
 /// Nodes in ln(a/b): closer than those of the tables in `linear_theory`, so that its interpolation is met to 1e-5.
 const NODES: u8 = 57;
 
-/// C11, C22, C23 and C33 at the Poisson's ratios of [`POISSON_RATIOS`], as splines.
+/// Logarithms of C11, C22, C23 and C33 at the Poisson's ratios of [`POISSON_RATIOS`], as splines.
 #[derive(Debug, Clone)]
 pub struct ShapeCoefficients {
     axis: Axis,
@@ -30,7 +28,7 @@ impl ShapeCoefficients {
             .map(|ratio| {
                 POISSON_RATIOS.map(|nu| {
                     let [c11, c22, c23] = coefficients(ratio, nu);
-                    [c11, c22, c23, spin_coefficient(ratio, nu)]
+                    [c11, c22, c23, spin_coefficient(ratio, nu)].map(f64::ln)
                 })
             })
             .collect();
@@ -68,7 +66,8 @@ impl ShapeCoefficients {
                 *value += weight * part;
             }
         }
-        (of_material, [sums[2][0], sums[2][1]])
+        let quarter = [sums[2][0].exp(), sums[2][1].exp()];
+        (of_material.map(f64::exp), quarter)
     }
 }
 

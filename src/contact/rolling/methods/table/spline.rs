@@ -63,7 +63,9 @@ fn transformed(matrix: &[Vec<f64>], before: usize, from: &[f32], inner: usize) -
         for (row, to) in matrix.iter().zip(to.chunks_exact_mut(inner)) {
             for (weight, from) in row.iter().zip(from.chunks_exact(inner)) {
                 let weight = *weight as f32;
-                to.iter_mut().zip(from).for_each(|(to, from)| *to += weight * from);
+                to.iter_mut()
+                    .zip(from)
+                    .for_each(|(to, from)| *to += weight * from);
             }
         }
     }
@@ -83,7 +85,9 @@ fn over_poles(from: &[f32]) -> Vec<f32> {
                 let [same, other] = &matrices[k];
                 let pairs = same[pole].iter().zip(&other[pole]);
                 // Half the sum and half the difference of the two weights act on χ and on −χ.
-                pairs.map(|(e, o)| [0.5 * (e + o) as f32, 0.5 * (e - o) as f32]).collect()
+                pairs
+                    .map(|(e, o)| [0.5 * (e + o) as f32, 0.5 * (e - o) as f32])
+                    .collect()
             });
             for (node, from) in from.chunks_exact(block).enumerate() {
                 for chi in 0..DIRECTIONS {
@@ -109,7 +113,8 @@ fn over_directions(from: &[f32]) -> Vec<f32> {
     for (from, to) in blocks.zip(to.chunks_exact_mut(DIRECTION_COEFFICIENTS * ROW)) {
         for (chi, to) in to.chunks_exact_mut(ROW).enumerate() {
             for (node, from) in from.chunks_exact(ROW).enumerate() {
-                let weights: [f32; OUTPUTS] = std::array::from_fn(|k| matrices[k][chi][node] as f32);
+                let weights: [f32; OUTPUTS] =
+                    std::array::from_fn(|k| matrices[k][chi][node] as f32);
                 for (i, (to, from)) in to.iter_mut().zip(from).enumerate() {
                     *to += weights[i % OUTPUTS] * from;
                 }

@@ -1,0 +1,422 @@
+//! Evaluates rows: Hertz's ellipse and the creep forces of each, by the table or by the simplified theory.
+
+use serde_json::Value;
+
+use crate::contact::case::problem::CheckedCase;
+use crate::contact::case::words::solver::{MethodName, Output};
+use crate::contact::error::{CaseError, Fault, FaultCode, SolveError};
+use crate::contact::evaluate::answer::{RowStatus, RowsAnswer};
+use crate::contact::evaluate::variable::{Row, Variable};
+use crate::contact::normal::hertz::HertzShape;
+use crate::contact::normal::normal_task::NormalTask;
+use crate::contact::rolling::methods::fastsim::{self, EllipseMesh};
+use crate::contact::rolling::methods::table::evaluate::{Creep, EllipseTable};
+use crate::contact::rolling::methods::table::file::table;
+use crate::contact::rolling::methods::table::solve::{RATIO_MAX, RATIO_MIN};
+use crate::contact::rolling::refinement::resolution::Resolution;
+
+/// Faults of rows that are listed.
+const FAULTS_MAX: usize = 20;
+
+/// A column: where it stands in the case, and a number for each row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    /// JSON pointer into the case.
+    pub pointer: String,
+    /// The numbers.
+    pub values: Vec<f64>,
+}
+
+/// Rows that can be evaluated.
+#[derive(Debug)]
+pub struct Rows {
+    rows: usize,
+    fixed: Row,
+    varied: Vec<(Variable, Vec<f64>)>,
+    /// Shear modulus and Poisson's ratio where the bodies have their own.
+    pair: Option<[f64; 2]>,
+    young: bool,
+    radii: bool,
+    method: RowMethod,
+    target: Option<f64>,
+    gradients: bool,
+}
+
+#[derive(Debug)]
+enum RowMethod {
+    /// The table; if `auto` chose it, rows above the target are left to the solver.
+    Table {
+        auto: bool,
+    },
+    Fastsim(Box<EllipseMesh>, f64),
+}
+
+impl Rows {
+    /// The rows of a case: `case` holds the first of them, and `checked` is what it was checked to be.
+    ///
+    /// # Errors
+    /// Every fault of the case or of the columns that is of this kind of question; of single numbers the first 20. A fault of a number
+    /// points into `columns` of the request.
+    pub fn new(
+        case: &Value,
+        checked: &CheckedCase,
+        columns: Vec<Column>,
+    ) -> Result<Rows, CaseError> {
+        let mut faults = faults_of_case(case, checked);
+        let rows = columns.first().map_or(1, |column| column.values.len());
+        let mut varied = Vec::new();
+        for column in columns {
+            match faults_of_column(&column, rows, case) {
+                Ok(variable) => varied.push((variable, column.values)),
+                Err(more) => faults.extend(more),
+            }
+        }
+        if !faults.is_empty() {
+            faults.truncate(FAULTS_MAX);
+            return Err(CaseError(faults));
+        }
+        let mut fixed = [f64::NAN; 12];
+        for variable in Variable::all() {
+            let number = case.pointer(variable.pointer()).and_then(Value::as_f64);
+            fixed[variable as usize] = number.unwrap_or(f64::NAN);
+        }
+        let method = method_of(checked).map_err(|error| {
+            CaseError(vec![Fault::new("/template/solver/mesh", error.to_string())])
+        })?;
+        let elasticity = &checked.problem.elasticity;
+        let given = |variable: Variable| case.pointer(variable.pointer()).is_some();
+        Ok(Rows {
+            rows,
+            fixed,
+            varied,
+            pair: (!given(Variable::PoissonRatio))
+                .then_some([elasticity.shear_modulus, elasticity.poisson_ratio]),
+            young: given(Variable::YoungModulus),
+            radii: given(Variable::Rolling),
+            method,
+            target: match checked.run.resolution {
+                Resolution::Target(target) => Some(target),
+                Resolution::Mesh(_) => None,
+            },
+            gradients: checked.run.wants(Output::Gradients),
+        })
+    }
+
+    /// The answers.
+    #[must_use]
+    pub fn evaluate(&self) -> RowsAnswer {
+        let column = || Vec::with_capacity(self.rows);
+        let mut answer = RowsAnswer {
+            force_x_n: column(),
+            force_y_n: column(),
+            moment_z_n_mm: column(),
+            error_estimate: column(),
+            friction_power_n: column(),
+            stick_share: column(),
+            gradients: self.gradients.then(|| std::array::from_fn(|_| column())),
+            status: Vec::with_capacity(self.rows),
+        };
+        let mut state = Shapes::default();
+        for number in 0..self.rows {
+            let mut row = self.fixed;
+            for (variable, values) in &self.varied {
+                row[*variable as usize] = values[number];
+            }
+            self.answer_row(&row, &mut state, &mut answer);
+        }
+        answer
+    }
+
+    fn answer_row(&self, row: &Row, shapes: &mut Shapes, answer: &mut RowsAnswer) {
+        let at = |variable: Variable| row[variable as usize];
+        let [modulus, poisson] = self.pair.unwrap_or_else(|| {
+            let poisson = at(Variable::PoissonRatio);
+            let modulus = match self.young {
+                true => at(Variable::YoungModulus) / (2.0 * (1.0 + poisson)),
+                false => at(Variable::ShearModulus),
+            };
+            [modulus, poisson]
+        });
+        let force = at(Variable::NormalForce);
+        let [a, b] = match self.radii {
+            true => {
+                let radii = [at(Variable::Rolling), at(Variable::Lateral)];
+                shapes
+                    .hertz(radii)
+                    .semi_axes(force, modulus / (1.0 - poisson))
+            }
+            false => [at(Variable::SemiAxisA), at(Variable::SemiAxisB)],
+        };
+        let limit = at(Variable::Friction) * force;
+        let motion = [
+            at(Variable::CreepageX),
+            at(Variable::CreepageY),
+            at(Variable::Spin),
+        ];
+        let c = (a * b).sqrt();
+        if limit == 0.0 {
+            let still = motion == [0.0; 3];
+            let stick = if still { 1.0 } else { 0.0 };
+            let nothing = Creep {
+                force: [0.0; 3],
+                stick,
+                bound: 0.0,
+            };
+            return push(
+                answer,
+                motion,
+                [limit, c],
+                nothing,
+                [[0.0; 3]; 3],
+                RowStatus::Ok,
+            );
+        }
+        let unit = modulus * c * c / limit;
+        let creepage = [unit * motion[0], unit * motion[1], unit * c * motion[2]];
+        let none = Creep {
+            force: [f64::NAN; 3],
+            stick: f64::NAN,
+            bound: f64::NAN,
+        };
+        let (creep, slopes, status) = match &self.method {
+            RowMethod::Fastsim(mesh, class) => {
+                let (force, stick) = mesh.creep(a / b, poisson, creepage);
+                (
+                    Creep {
+                        force,
+                        stick,
+                        bound: *class,
+                    },
+                    [[f64::NAN; 3]; 3],
+                    RowStatus::Ok,
+                )
+            }
+            RowMethod::Table { .. } if !(RATIO_MIN..=RATIO_MAX).contains(&(a / b)) => {
+                (none, [[f64::NAN; 3]; 3], RowStatus::NotCovered)
+            }
+            RowMethod::Table { .. } => {
+                let ellipse = shapes.table(a / b, poisson);
+                let (creep, slopes) = match self.gradients {
+                    true => ellipse.with_slopes(creepage),
+                    false => (ellipse.creep(creepage), [[0.0; 3]; 3]),
+                };
+                (creep, slopes, RowStatus::Ok)
+            }
+        };
+        let missed = self.target.is_some_and(|target| creep.bound > target);
+        match (&self.method, missed) {
+            (RowMethod::Table { auto: true }, true) => {
+                push(
+                    answer,
+                    motion,
+                    [limit, c],
+                    none,
+                    [[f64::NAN; 3]; 3],
+                    RowStatus::NeedsSolver,
+                );
+            }
+            (_, true) => push(
+                answer,
+                motion,
+                [limit, c],
+                creep,
+                slopes_in_n(slopes, limit * unit, c),
+                RowStatus::TargetMissed,
+            ),
+            (_, false) => push(
+                answer,
+                motion,
+                [limit, c],
+                creep,
+                slopes_in_n(slopes, limit * unit, c),
+                status,
+            ),
+        }
+    }
+}
+
+/// Derivatives in N and mm; `unit` is μN times the factor of creepages.
+fn slopes_in_n(slopes: [[f64; 3]; 3], unit: f64, c: f64) -> [[f64; 3]; 3] {
+    let mut scaled = slopes;
+    for (k, row) in scaled.iter_mut().enumerate() {
+        for (j, slope) in row.iter_mut().enumerate() {
+            *slope *= unit * if k == 2 { c } else { 1.0 } * if j == 2 { c } else { 1.0 };
+        }
+    }
+    scaled
+}
+
+fn push(
+    answer: &mut RowsAnswer,
+    motion: [f64; 3],
+    [limit, c]: [f64; 2],
+    creep: Creep,
+    slopes: [[f64; 3]; 3],
+    status: RowStatus,
+) {
+    let force = [
+        limit * creep.force[0],
+        limit * creep.force[1],
+        limit * c * creep.force[2],
+    ];
+    answer.force_x_n.push(force[0]);
+    answer.force_y_n.push(force[1]);
+    answer.moment_z_n_mm.push(force[2]);
+    answer.error_estimate.push(limit * creep.bound);
+    answer
+        .friction_power_n
+        .push(motion[0] * force[0] + motion[1] * force[1] + motion[2] * force[2]);
+    answer.stick_share.push(creep.stick);
+    if let Some(gradients) = &mut answer.gradients {
+        for (column, slope) in gradients.iter_mut().zip(slopes.as_flattened()) {
+            column.push(*slope);
+        }
+    }
+    answer.status.push(status);
+}
+
+/// What neighbouring rows often share.
+#[derive(Debug, Default)]
+struct Shapes {
+    hertz: Option<([f64; 2], HertzShape)>,
+    table: Option<([f64; 2], EllipseTable<'static>)>,
+}
+
+impl Shapes {
+    fn hertz(&mut self, radii: [f64; 2]) -> HertzShape {
+        match self.hertz {
+            Some((known, shape)) if known == radii => shape,
+            _ => {
+                let shape = HertzShape::of_radii(radii[0], radii[1]);
+                self.hertz = Some((radii, shape));
+                shape
+            }
+        }
+    }
+
+    fn table(&mut self, ratio: f64, poisson: f64) -> EllipseTable<'static> {
+        match self.table {
+            Some((known, ellipse)) if known == [ratio, poisson] => ellipse,
+            _ => {
+                let ellipse = table().ellipse(ratio, poisson);
+                self.table = Some(([ratio, poisson], ellipse));
+                ellipse
+            }
+        }
+    }
+}
+
+fn method_of(checked: &CheckedCase) -> Result<RowMethod, SolveError> {
+    Ok(match (checked.run.method_asked, checked.run.resolution) {
+        (MethodName::Fastsim, resolution) => {
+            let size = match resolution {
+                Resolution::Mesh(size) => size,
+                Resolution::Target(_) => fastsim::MESH,
+            };
+            let bound = checked.run.traction_bound;
+            let class = fastsim::error_class(bound, size);
+            RowMethod::Fastsim(Box::new(EllipseMesh::new(size, bound)?), class)
+        }
+        (method, _) => RowMethod::Table {
+            auto: method == MethodName::Auto,
+        },
+    })
+}
+
+/// What rows cannot be asked about.
+fn faults_of_case(case: &Value, checked: &CheckedCase) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    let mut refuse = |wrong: bool, pointer: &str, detail: &str| {
+        if wrong {
+            faults.push(Fault::new(format!("/template{pointer}"), detail));
+        }
+    };
+    let method = checked.run.method_asked;
+    let fast = matches!(
+        method,
+        MethodName::Auto | MethodName::Table | MethodName::Fastsim
+    );
+    if !matches!(checked.problem.task, NormalTask::Hertz(_)) {
+        refuse(
+            true,
+            "/contact/type",
+            "rows are of `radii` or `ellipse`; other contacts need a job",
+        );
+    }
+    refuse(
+        !fast,
+        "/solver/method",
+        "rows are evaluated by `table`, `fastsim` or `auto`; other methods need a job",
+    );
+    let mesh = matches!(checked.run.resolution, Resolution::Mesh(_));
+    refuse(
+        mesh && method == MethodName::Auto,
+        "/solver/mesh",
+        "given, but `auto` takes the table for rows, which has no mesh",
+    );
+    refuse(
+        checked.problem.elasticity.difference != 0.0 && method != MethodName::Fastsim,
+        "/material",
+        "bodies of unlike material (K other than 0), which the table does not cover",
+    );
+    let asked = checked
+        .problem
+        .forces
+        .iter()
+        .any(|forces| *forces != [None; 2]);
+    refuse(
+        checked.problem.motions.len() != 1 || asked,
+        "/motion",
+        "rows have one motion each, given by creepages; sweeps and prescribed forces need a job",
+    );
+    let by_force = case.pointer(Variable::NormalForce.pointer()).is_some();
+    refuse(!by_force, "/load", "rows are loaded by `normal_force_n`");
+    faults
+}
+
+/// The variable of a column, or what is wrong with it.
+fn faults_of_column(column: &Column, rows: usize, case: &Value) -> Result<Variable, Vec<Fault>> {
+    let escaped = column.pointer.replace('~', "~0").replace('/', "~1");
+    let here = format!("/columns/{escaped}");
+    let Some(variable) = Variable::at(&column.pointer) else {
+        let known: Vec<&str> = Variable::all().map(Variable::pointer).collect();
+        let detail = format!(
+            "`{}` cannot differ from row to row; allowed: {}",
+            column.pointer,
+            known.join(", ")
+        );
+        return Err(vec![Fault::new(here, detail)]);
+    };
+    if column.values.len() != rows {
+        let detail = format!(
+            "{} values given, the first column has {rows}; all columns need as many",
+            column.values.len()
+        );
+        return Err(vec![Fault::new(here, detail)]);
+    }
+    if case.pointer("/material/lower").is_some() && column.pointer.starts_with("/material") {
+        let detail =
+            "given, but the template names the materials of both bodies; rows vary a common one";
+        return Err(vec![Fault::new(here, detail)]);
+    }
+    let allowed = variable.allowed();
+    let wrong = column
+        .values
+        .iter()
+        .enumerate()
+        .filter(|(_, value)| !allowed.contains(**value));
+    let faults: Vec<Fault> = wrong
+        .take(FAULTS_MAX)
+        .map(|(row, value)| Fault {
+            figures: Box::new(allowed.figures(FaultCode::OutOfRange, Some(&Value::from(*value)))),
+            ..Fault::new(
+                format!("{here}/{row}"),
+                format!("{value} given; {allowed} is needed"),
+            )
+        })
+        .collect();
+    match faults.is_empty() {
+        true => Ok(variable),
+        false => Err(faults),
+    }
+}

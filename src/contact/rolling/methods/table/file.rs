@@ -1,0 +1,142 @@
+//! The file of the table: a line of JSON that says what it is, then values at the nodes and bounds of errors.
+//!
+//! `table.bin` is made by `cargo bench --bench table -- generate` and is part of the program. After the line come two bytes for every
+//! value at a node, low byte first, `[a/b][pole][direction][size][ν][function]` in units that the line gives, and one byte for every
+//! cell between nodes, `[a/b][pole][direction][size]`.
+
+use std::sync::LazyLock;
+
+use serde_json::{Value, json};
+
+use crate::contact::rolling::methods::table::evaluate::CreepTable;
+use crate::contact::rolling::methods::table::grid::{
+    CELLS, DIRECTIONS, POISSON_RATIOS, POLES, RATIOS, SIZES,
+};
+use crate::contact::rolling::methods::table::spline::{OUTPUTS, VALUES};
+
+/// Format of the file.
+pub const FORMAT: u64 = 1;
+/// The file that is part of the program.
+const BYTES: &[u8] = include_bytes!("table.bin");
+
+/// The table of the program.
+static TABLE: LazyLock<CreepTable> = LazyLock::new(|| {
+    let file = match TableFile::read(BYTES) {
+        Ok(file) => file,
+        Err(reason) => unreachable!("the table of this program: {reason}"),
+    };
+    file.table()
+});
+
+/// The table of the program; it is made ready when it is asked for the first time, which takes some hundredths of a second.
+#[must_use]
+pub fn table() -> &'static CreepTable {
+    &TABLE
+}
+
+/// The contents of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TableFile {
+    /// Digest of what follows the first line, hexadecimal.
+    pub digest: String,
+    /// The first line.
+    pub head: Value,
+    /// Values at the nodes.
+    pub values: Vec<f32>,
+    /// Bounds of errors of the cells.
+    pub bounds: Vec<f32>,
+}
+
+impl TableFile {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn read(bytes: &[u8]) -> Result<TableFile, String> {
+        let end = bytes.iter().position(|byte| *byte == b'\n');
+        let end = end.ok_or("no first line")?;
+        let head: Value = serde_json::from_slice(&bytes[..end]).map_err(|e| e.to_string())?;
+        if head["format"] != json!(FORMAT) || head["nodes"] != nodes() {
+            return Err(format!("another format or other nodes: {head}"));
+        }
+        let number = |pointer: &str| head.pointer(pointer).and_then(Value::as_f64);
+        let (values, bounds) = bytes[end + 1..]
+            .split_at_checked(2 * VALUES)
+            .ok_or("too short")?;
+        if bounds.len() != CELLS {
+            return Err("too short or too long".to_owned());
+        }
+        let mut units = [0.0_f32; OUTPUTS];
+        for (k, unit) in units.iter_mut().enumerate() {
+            *unit = number(&format!("/units/{k}")).ok_or("no unit")? as f32;
+        }
+        let bound_unit = number("/bound_unit").ok_or("no unit of bounds")? as f32;
+        let (pairs, _) = values.as_chunks::<2>();
+        let whole = pairs
+            .iter()
+            .map(|pair| f32::from(i16::from_le_bytes(*pair)));
+        Ok(TableFile {
+            digest: head["digest"].as_str().unwrap_or_default().to_owned(),
+            values: whole
+                .enumerate()
+                .map(|(k, v)| v * units[k % OUTPUTS])
+                .collect(),
+            bounds: bounds
+                .iter()
+                .map(|byte| bound_unit * f32::from(*byte))
+                .collect(),
+            head,
+        })
+    }
+
+    /// The bytes of a file with these values and bounds; `about` says how they were made.
+    #[must_use]
+    pub fn write(about: &Value, values: &[f32], bounds: &[f32]) -> Vec<u8> {
+        let mut units = [f32::MIN_POSITIVE; OUTPUTS];
+        for (k, value) in values.iter().enumerate() {
+            units[k % OUTPUTS] = units[k % OUTPUTS].max(value.abs() / f32::from(i16::MAX));
+        }
+        let largest = bounds.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
+        let bound_unit = largest / f32::from(u8::MAX);
+        let numbers = values
+            .iter()
+            .enumerate()
+            .map(|(k, v)| (v / units[k % OUTPUTS]).round() as i16);
+        let mut body: Vec<u8> = numbers.flat_map(i16::to_le_bytes).collect();
+        // No bound is rounded down.
+        body.extend(
+            bounds
+                .iter()
+                .map(|bound| (bound / bound_unit).ceil().min(255.0) as u8),
+        );
+        let head = json!({
+            "format": FORMAT,
+            "digest": blake3::hash(&body).to_hex().to_string(),
+            "nodes": nodes(),
+            "units": units,
+            "bound_unit": bound_unit,
+            "about": about,
+        });
+        let mut bytes = head.to_string().into_bytes();
+        bytes.push(b'\n');
+        bytes.extend(body);
+        bytes
+    }
+
+    /// The table of these values.
+    #[must_use]
+    pub fn table(&self) -> CreepTable {
+        CreepTable::new(&self.values, &self.bounds)
+    }
+}
+
+/// The nodes in words.
+fn nodes() -> Value {
+    json!({
+        "a_over_b": RATIOS,
+        "poles": POLES,
+        "directions": DIRECTIONS,
+        "sizes_in_24ths": SIZES,
+        "poisson_ratios": POISSON_RATIOS,
+    })
+}

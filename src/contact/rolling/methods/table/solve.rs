@@ -1,0 +1,182 @@
+//! The table as a method: resultants of the patches of a footprint for one motion.
+
+use std::ops::ControlFlow;
+
+use crate::contact::error::SolveError;
+use crate::contact::half_space::elasticity::Elasticity;
+use crate::contact::monitor::Monitor;
+use crate::contact::rolling::answer::Work;
+use crate::contact::rolling::load_ellipse::LoadEllipse;
+use crate::contact::rolling::methods::method::Method;
+use crate::contact::rolling::methods::table::evaluate::Creep;
+use crate::contact::rolling::methods::table::file::table;
+use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::motion_answer::{MotionAnswer, TableAnswer};
+use crate::contact::rolling::resultants::Resultants;
+use crate::contact::rolling::task::RollingTask;
+
+/// a/b that the table covers.
+pub const RATIO_MIN: f64 = 0.1;
+/// The largest one.
+pub const RATIO_MAX: f64 = 10.0;
+/// Largest share of misplaced load of a patch that an ellipse may stand for: above it errors reach 0.08 μN.
+const MISPLACED_MAX: f64 = 0.1;
+/// Error of the ellipse that stands for another shape, relative to μN: `0.3 D + 0.006` holds for 27 patches with D up to 0.9.
+const PER_MISPLACED: f64 = 0.3;
+/// Its part that does not depend on D.
+const ANY_SHAPE: f64 = 0.006;
+/// What is added where patches turn each other's tractions elastically, which the table leaves out.
+const NEIGHBOURS: f64 = 0.01;
+
+/// Solves a motion; `ellipses` stand for the patches.
+///
+/// # Errors
+/// The table does not cover a patch.
+pub fn solve(
+    task: &RollingTask,
+    ellipses: &[LoadEllipse],
+    motion: &Motion,
+    monitor: &dyn Monitor,
+) -> Result<MotionAnswer, SolveError> {
+    let began = monitor.elapsed();
+    if let ControlFlow::Break(stop) = monitor.tick(0.0) {
+        return Err(stop.into());
+    }
+    let patches = task.footprint.patches();
+    let mut found = Vec::with_capacity(patches.len());
+    let (mut of_all, mut limits) = (0.0, 0.0);
+    let mut errors = Vec::with_capacity(patches.len() + 1);
+    for (number, (patch, ellipse)) in patches.iter().zip(ellipses).enumerate() {
+        covers(number, ellipse)?;
+        let limit = task.friction.limit(patch);
+        let answer = on_ellipse(task.elasticity, ellipse, limit, motion);
+        let mut error = answer.error;
+        if ellipse.misplaced > 0.0 {
+            error += PER_MISPLACED * ellipse.misplaced + ANY_SHAPE;
+        }
+        if patches.len() > 1 {
+            error += NEIGHBOURS;
+        }
+        errors.push(Some(if limit > 0.0 { error } else { 0.0 }));
+        of_all += error * limit;
+        limits += limit;
+        found.push(answer);
+    }
+    errors.push(Some(if limits > 0.0 { of_all / limits } else { 0.0 }));
+    Ok(MotionAnswer {
+        motion: *motion,
+        saturated: false,
+        resultants: found.iter().map(|answer| answer.resultants).collect(),
+        errors,
+        fields: None,
+        table: Some(found.iter().map(|answer| answer.more).collect()),
+        skips: Vec::new(),
+        remarks: Vec::new(),
+        work: Work::default(),
+        method: Method::Table,
+        seconds: (monitor.elapsed() - began).as_secs_f64(),
+    })
+}
+
+/// Why the table has no answer for a pair of materials, if it has none.
+#[must_use]
+pub fn unlike(elasticity: &Elasticity) -> Option<String> {
+    (elasticity.difference != 0.0).then(|| {
+        format!(
+            "bodies with the difference parameter K = {:.3e}; \"method\": \"table\" covers K = 0, use boundary_element",
+            elasticity.difference
+        )
+    })
+}
+
+/// Why the table has no answer for an ellipse with this ratio of semi-axes, if it has none.
+#[must_use]
+pub fn outside(ratio: f64) -> Option<String> {
+    (!(RATIO_MIN..=RATIO_MAX).contains(&ratio)).then(|| {
+        format!(
+            "an ellipse with a/b = {ratio:.4}; \"method\": \"table\" covers {RATIO_MIN} to {RATIO_MAX}, use boundary_element or fastsim"
+        )
+    })
+}
+
+fn covers(number: usize, ellipse: &LoadEllipse) -> Result<(), SolveError> {
+    let misplaced = ellipse.misplaced;
+    let reason = if misplaced > MISPLACED_MAX {
+        Some(format!(
+            "{:.0} % of the load of patch {number} is elsewhere than on the best ellipse; at most {:.0} % may be, use boundary_element",
+            100.0 * misplaced,
+            100.0 * MISPLACED_MAX
+        ))
+    } else {
+        outside(ellipse.ratio()).map(|reason| format!("patch {number} is {reason}"))
+    };
+    reason.map_or(Ok(()), |reason| Err(SolveError::NotCovered { reason }))
+}
+
+fn still(motion: &Motion) -> bool {
+    motion.creepage_x == 0.0 && motion.creepage_y == 0.0 && motion.spin_per_mm == 0.0
+}
+
+/// What the table says of one patch.
+struct PatchAnswer {
+    resultants: Resultants,
+    error: f64,
+    more: TableAnswer,
+}
+
+/// Forces in N on a patch that an ellipse stands for, about the origin of the case; `limit` is μN in N.
+fn on_ellipse(
+    elasticity: &Elasticity,
+    ellipse: &LoadEllipse,
+    limit: f64,
+    motion: &Motion,
+) -> PatchAnswer {
+    if limit <= 0.0 {
+        return PatchAnswer {
+            resultants: Resultants::default(),
+            error: 0.0,
+            more: TableAnswer {
+                stick: if still(motion) { 1.0 } else { 0.0 },
+                gradients: [[0.0; 3]; 3],
+            },
+        };
+    }
+    let c = ellipse.length();
+    let [x, y] = ellipse.centre;
+    let unit = elasticity.shear_modulus * c * c / limit;
+    let spin = motion.spin_per_mm;
+    let creepage = [
+        unit * (motion.creepage_x - spin * y),
+        unit * (motion.creepage_y + spin * x),
+        unit * c * spin,
+    ];
+    let here = table().ellipse(ellipse.ratio(), elasticity.poisson_ratio);
+    let (
+        Creep {
+            force,
+            stick,
+            bound,
+        },
+        slopes,
+    ) = here.with_slopes(creepage);
+    // By ν_x, ν_y and φ about the origin; then the moment about the origin.
+    let by_origin = slopes.map(|[x_slope, y_slope, z_slope]| {
+        [x_slope, y_slope, c * z_slope - y * x_slope + x * y_slope]
+            .map(|slope| limit * unit * slope)
+    });
+    let [fx, fy, m] = by_origin;
+    let moment = [0, 1, 2].map(|j| c * m[j] + x * fy[j] - y * fx[j]);
+    let [force_x, force_y] = [force[0], force[1]].map(|part| limit * part);
+    PatchAnswer {
+        resultants: Resultants {
+            force_x,
+            force_y,
+            moment_z: limit * c * force[2] + x * force_y - y * force_x,
+        },
+        error: bound,
+        more: TableAnswer {
+            stick,
+            gradients: [fx, fy, moment],
+        },
+    }
+}

@@ -1,0 +1,277 @@
+//! Reads rows: a template case and columns of numbers, as JSON or CSV, straight into columns.
+
+use std::fmt;
+
+use axum::body::{Body, Bytes};
+use axum::extract::Request;
+use axum::http::header;
+use http_body_util::{BodyExt, Limited};
+use serde::de::{Deserialize, DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visitor};
+use serde_json::Value;
+
+use crate::contact::evaluate::rows::Column;
+use crate::http::extract::batch::table::column_pointers;
+use crate::http::extract::json::{Strict, unreadable};
+use crate::http::layers::admission::too_long;
+use crate::http::options::HttpOptions;
+use crate::http::problem::error::ApiError;
+use crate::http::problem::kinds::ProblemKind;
+
+/// The bytes that a request's body may have, or has as far as it says.
+#[must_use]
+pub fn declared_bytes(request: &Request, options: &HttpOptions) -> usize {
+    let length = request.headers().get(header::CONTENT_LENGTH);
+    let length = length.and_then(|value| value.to_str().ok()?.parse().ok());
+    let packed = request.headers().contains_key(header::CONTENT_ENCODING);
+    length
+        .filter(|_| !packed)
+        .unwrap_or(options.evaluate_max_bytes)
+}
+
+/// The whole body.
+///
+/// # Errors
+/// It is too large, too slow, or breaks off.
+pub async fn read_body(request: Request, options: &HttpOptions) -> Result<Bytes, ApiError> {
+    let max_bytes = options.evaluate_max_bytes;
+    let body: Limited<Body> = Limited::new(request.into_body(), max_bytes);
+    match tokio::time::timeout(options.body_timeout, body.collect()).await {
+        Ok(Ok(read)) => Ok(read.to_bytes()),
+        Ok(Err(error)) if too_long(error.as_ref()) => Err(ApiError::new(
+            ProblemKind::BodyTooLarge,
+            format!(
+                "the rows are larger than the {max_bytes} bytes that are allowed (`--evaluate-max-mib`)"
+            ),
+        )),
+        Ok(Err(error)) => Err(unreadable(error.as_ref())),
+        Err(_) => Err(ApiError::new(
+            ProblemKind::BodyTimeout,
+            format!(
+                "the body did not arrive within {} s",
+                options.body_timeout.as_secs_f64()
+            ),
+        )),
+    }
+}
+
+/// A template and columns from JSON, `{"template": …, "columns": {"<JSON pointer>": […], …}}`.
+///
+/// # Errors
+/// `malformed-json` with its position, and with column and row where the fault is in a column.
+pub fn read_json(text: &[u8]) -> Result<(Value, Vec<Column>), ApiError> {
+    let read: RowsBody =
+        serde_json::from_slice(text).map_err(|error| ApiError::malformed(&error))?;
+    Ok((read.template, read.columns))
+}
+
+/// Columns from CSV, whose first line names them as a table of a batch does.
+///
+/// # Errors
+/// `faulty-table` with line and column.
+pub fn read_csv(text: &[u8]) -> Result<Vec<Column>, ApiError> {
+    let faulty = |detail: String| ApiError::new(ProblemKind::FaultyTable, detail);
+    let end = text
+        .iter()
+        .position(|byte| *byte == b'\n')
+        .unwrap_or(text.len());
+    let (head, lines) = text.split_at(end);
+    let pointers = column_pointers(head).map_err(|detail| faulty(format!("line 1: {detail}")))?;
+    let mut columns: Vec<Column> = pointers
+        .into_iter()
+        .map(|pointer| Column {
+            pointer,
+            values: Vec::new(),
+        })
+        .collect();
+    let mut reader = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .from_reader(lines);
+    let mut record = csv::ByteRecord::new();
+    loop {
+        let more = reader.read_byte_record(&mut record);
+        if !more.map_err(|error| faulty(format!("the table cannot be read: {error}")))? {
+            return Ok(columns);
+        }
+        // Lines are counted from the header.
+        let line = || record.position().map_or(0, csv::Position::line) + 1;
+        if record.len() != columns.len() {
+            let detail = format!(
+                "line {} has {} fields, the header has {}",
+                line(),
+                record.len(),
+                columns.len()
+            );
+            return Err(faulty(detail));
+        }
+        for (field, column) in record.iter().zip(&mut columns) {
+            let text = std::str::from_utf8(field).unwrap_or("?").trim();
+            match text.parse::<f64>() {
+                Ok(number) if number.is_finite() => column.values.push(number),
+                _ => {
+                    let detail = format!(
+                        "line {}, column `{}`: `{text}` is no number",
+                        line(),
+                        column.pointer
+                    );
+                    return Err(faulty(detail));
+                }
+            }
+        }
+    }
+}
+
+/// The JSON body of rows.
+struct RowsBody {
+    template: Value,
+    columns: Vec<Column>,
+}
+
+impl<'de> Deserialize<'de> for RowsBody {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(BodyVisitor)
+    }
+}
+
+struct BodyVisitor;
+
+impl<'de> Visitor<'de> for BodyVisitor {
+    type Value = RowsBody;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        formatter.write_str("an object with `template` and `columns`")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut members: A) -> Result<RowsBody, A::Error> {
+        let (mut template, mut columns) = (None, None);
+        while let Some(name) = members.next_key::<String>()? {
+            let twice = match name.as_str() {
+                "template" => {
+                    let Strict(value) = members.next_value()?;
+                    template.replace(value).is_some()
+                }
+                "columns" => columns
+                    .replace(members.next_value::<Columns>()?.0)
+                    .is_some(),
+                _ => {
+                    let known = "allowed: `template`, `columns`";
+                    return Err(A::Error::custom(format_args!(
+                        "`{name}` is not known here; {known}"
+                    )));
+                }
+            };
+            if twice {
+                return Err(A::Error::custom(format_args!(
+                    "the member `{name}` is written twice"
+                )));
+            }
+        }
+        Ok(RowsBody {
+            template: template.ok_or_else(|| A::Error::missing_field("template"))?,
+            columns: columns.ok_or_else(|| A::Error::missing_field("columns"))?,
+        })
+    }
+}
+
+struct Columns(Vec<Column>);
+
+impl<'de> Deserialize<'de> for Columns {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(ColumnsVisitor).map(Columns)
+    }
+}
+
+struct ColumnsVisitor;
+
+impl<'de> Visitor<'de> for ColumnsVisitor {
+    type Value = Vec<Column>;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        formatter.write_str("an object of columns, each named by a JSON pointer into the case")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut members: A) -> Result<Vec<Column>, A::Error> {
+        let mut columns: Vec<Column> = Vec::new();
+        while let Some(pointer) = members.next_key::<String>()? {
+            if columns.iter().any(|known| known.pointer == pointer) {
+                return Err(A::Error::custom(format_args!(
+                    "the column `{pointer}` is written twice"
+                )));
+            }
+            let values = members.next_value_seed(Numbers(&pointer))?;
+            columns.push(Column { pointer, values });
+        }
+        Ok(columns)
+    }
+}
+
+/// Reads the numbers of a column.
+struct Numbers<'a>(&'a str);
+
+impl<'de> DeserializeSeed<'de> for Numbers<'_> {
+    type Value = Vec<f64>;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Vec<f64>, D::Error> {
+        deserializer.deserialize_seq(self)
+    }
+}
+
+impl<'de> Visitor<'de> for Numbers<'_> {
+    type Value = Vec<f64>;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        write!(formatter, "an array of numbers in the column `{}`", self.0)
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Vec<f64>, A::Error> {
+        let mut numbers = Vec::new();
+        loop {
+            match items.next_element::<f64>() {
+                Ok(Some(number)) => numbers.push(number),
+                Ok(None) => return Ok(numbers),
+                Err(error) => {
+                    let (column, row) = (self.0, numbers.len());
+                    return Err(A::Error::custom(format_args!(
+                        "column `{column}`, row {row}: {error}"
+                    )));
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn json_and_csv_of_the_same_rows_are_the_same_columns() {
+        let json = br#"{"columns":{"/motion/creepage_x":[0.1,-2e-3],"/load/normal_force_n":[8e4,9]},"template":{"a":1}}"#;
+        let (template, columns) = read_json(json).unwrap();
+        assert_eq!(template, serde_json::json!({ "a": 1 }));
+        let csv = "\u{feff}creepage_x, /load/normal_force_n\r\n0.1,80000\r\n-2e-3, 9 \r\n";
+        assert_eq!(read_csv(csv.as_bytes()).unwrap(), columns);
+    }
+
+    #[test]
+    fn faults_name_row_and_column() {
+        let text = |error: ApiError| format!("{error:?}");
+        let null = br#"{"template":{},"columns":{"/motion/creepage_x":[0.1,null]}}"#;
+        let fault = text(read_json(null).unwrap_err());
+        assert!(
+            fault.contains("/motion/creepage_x") && fault.contains("row 1"),
+            "{fault}"
+        );
+        for (csv, words) in [
+            ("creepage_x\n0.1\nx\n", ["line 3", "creepage_x"]),
+            ("creepage_x\n0.1\nnan\n", ["line 3", "nan"]),
+            ("creepage_x,spin_per_mm\n0.1\n", ["line 2", "2"]),
+            ("speed\n1\n", ["line 1", "speed"]),
+        ] {
+            let fault = text(read_csv(csv.as_bytes()).unwrap_err());
+            assert!(
+                words.iter().all(|word| fault.contains(word)),
+                "{csv:?}: {fault}"
+            );
+        }
+    }
+}

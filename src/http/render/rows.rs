@@ -1,0 +1,160 @@
+//! Answers to rows as JSON columns and as CSV, piece by piece as the client takes them.
+
+use std::convert::Infallible;
+use std::fmt::Write;
+use std::ops::Range;
+use std::sync::Arc;
+
+use axum::body::Body;
+
+use crate::contact::evaluate::answer::RowsAnswer;
+use crate::http::render::pieces::body;
+
+/// Rows written at once.
+const ROWS: usize = 1024;
+
+/// Part of the JSON text.
+enum Part {
+    Text(String),
+    /// Numbers of the column at this place.
+    Numbers(usize, Range<usize>),
+    Status(Range<usize>),
+}
+
+/// `{"rows": …, "columns": {"force_x_n": […], …, "status": […]}}`; null where a row has no number.
+pub fn json_body(answer: RowsAnswer) -> Body {
+    let rows = answer.status.len();
+    let mut parts = vec![Part::Text(format!("{{\"rows\":{rows},\"columns\":{{"))];
+    for (place, (name, _)) in answer.columns().iter().enumerate() {
+        let before = if place == 0 { "" } else { "]," };
+        parts.push(Part::Text(format!("{before}\"{name}\":[")));
+        parts.extend(ranges(rows).map(|range| Part::Numbers(place, range)));
+    }
+    parts.push(Part::Text("],\"status\":[".to_owned()));
+    parts.extend(ranges(rows).map(Part::Status));
+    parts.push(Part::Text("]}}".to_owned()));
+    body(parts.into_iter().map(move |part| {
+        let text = match part {
+            Part::Text(text) => text,
+            Part::Numbers(place, range) => numbers(answer.columns()[place].1, range),
+            Part::Status(range) => statuses(&answer, range),
+        };
+        Ok::<_, Infallible>(text.into_bytes())
+    }))
+}
+
+/// A line with the names of the columns, then one for each row; empty where a row has no number.
+pub fn csv_body(answer: RowsAnswer) -> Body {
+    let answer = Arc::new(answer);
+    let names: Vec<&str> = answer.columns().iter().map(|(name, _)| *name).collect();
+    let head = format!("{},status\n", names.join(",")).into_bytes();
+    let lines = ranges(answer.status.len()).map(move |range| {
+        let columns = answer.columns();
+        let mut text = String::with_capacity(24 * columns.len() * range.len());
+        for row in range {
+            for (_, column) in &columns {
+                write_number(&mut text, column[row], "");
+                text.push(',');
+            }
+            text.push_str(answer.status[row].name());
+            text.push('\n');
+        }
+        text.into_bytes()
+    });
+    body(std::iter::once(head).chain(lines).map(Ok::<_, Infallible>))
+}
+
+fn ranges(count: usize) -> impl Iterator<Item = Range<usize>> {
+    let starts = (0..count).step_by(ROWS);
+    starts.map(move |start| start..(start + ROWS).min(count))
+}
+
+fn numbers(column: &[f64], range: Range<usize>) -> String {
+    let mut text = String::with_capacity(24 * range.len());
+    for row in range {
+        if row > 0 {
+            text.push(',');
+        }
+        write_number(&mut text, column[row], "null");
+    }
+    text
+}
+
+fn statuses(answer: &RowsAnswer, range: Range<usize>) -> String {
+    let mut text = String::with_capacity(16 * range.len());
+    for row in range {
+        let comma = if row > 0 { "," } else { "" };
+        // Writing to a string does not fail.
+        let _ = write!(text, "{comma}\"{}\"", answer.status[row].name());
+    }
+    text
+}
+
+/// The shortest digits that are read as the same number.
+fn write_number(text: &mut String, number: f64, none: &str) {
+    if number.is_finite() {
+        let _ = write!(text, "{number:?}");
+    } else {
+        text.push_str(none);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use http_body_util::BodyExt;
+    use serde_json::{Value, json};
+
+    use super::*;
+    use crate::contact::evaluate::answer::RowStatus;
+
+    fn answer(rows: usize) -> RowsAnswer {
+        let column = |scale: f64| (0..rows).map(|k| scale * k as f64).collect();
+        let mut answer = RowsAnswer {
+            force_x_n: column(0.1),
+            force_y_n: column(-1e-9),
+            moment_z_n_mm: column(1e12),
+            error_estimate: column(3.0),
+            friction_power_n: column(0.0),
+            stick_share: column(1.0),
+            gradients: None,
+            status: vec![RowStatus::Ok; rows],
+        };
+        answer.stick_share[1] = f64::NAN;
+        answer.status[1] = RowStatus::NotCovered;
+        answer
+    }
+
+    async fn text(body: Body) -> String {
+        let bytes = body.collect().await.unwrap().to_bytes();
+        String::from_utf8(bytes.to_vec()).unwrap()
+    }
+
+    #[tokio::test]
+    async fn columns_are_json_and_csv_of_the_same_numbers() {
+        let rows = 2 * ROWS + 7;
+        let given = answer(rows);
+        let read: Value = serde_json::from_str(&text(json_body(given.clone())).await).unwrap();
+        assert_eq!(read["rows"], json!(rows));
+        assert_eq!(read["columns"]["stick_share"][1], Value::Null);
+        assert_eq!(read["columns"]["status"][1], json!("not_covered"));
+        let csv = text(csv_body(given.clone())).await;
+        let lines: Vec<&str> = csv.lines().collect();
+        assert_eq!(lines.len(), rows + 1);
+        for row in [0, 1, ROWS, rows - 1] {
+            let fields: Vec<&str> = lines[row + 1].split(',').collect();
+            let names: Vec<&str> = lines[0].split(',').collect();
+            for (name, field) in names.iter().zip(fields) {
+                let known = &read["columns"][*name][row];
+                match known {
+                    Value::Null => assert_eq!(field, ""),
+                    Value::String(word) => assert_eq!(field, word),
+                    number => assert_eq!(field.parse::<f64>().ok(), number.as_f64()),
+                }
+            }
+            assert_eq!(
+                read["columns"]["force_x_n"][row],
+                json!(given.force_x_n[row])
+            );
+        }
+    }
+}

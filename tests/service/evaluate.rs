@@ -1,0 +1,171 @@
+//! Rows of numbers answered at once.
+
+use reqwest::Method;
+use serde_json::{Value, json};
+
+use crate::batches::small;
+use crate::errors::assert_problem;
+use crate::server::{Server, Setup};
+
+fn template(method: &str) -> Value {
+    json!({
+        "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
+        "friction": { "coefficient": 0.3 },
+        "contact": { "type": "radii", "rolling_mm": 460, "lateral_mm": 300 },
+        "load": {},
+        "motion": { "creepage_y": 0.0, "spin_per_mm": 0.0004 },
+        "solver": { "method": method },
+    })
+}
+
+fn columns() -> Value {
+    json!({
+        "/load/normal_force_n": [100_000, 50_000, 100_000],
+        "/motion/creepage_x": [0.001, -0.002, 0.0],
+    })
+}
+
+async fn evaluate(server: &Server, template: Value, columns: Value) -> crate::server::Answer {
+    let body = json!({ "template": template, "columns": columns });
+    server.post("/v1/evaluate", &body).await
+}
+
+#[tokio::test]
+async fn rows_are_answered_without_a_job() {
+    let server = Server::idle().await;
+    let answer = evaluate(&server, template("auto"), columns()).await;
+    assert_eq!(answer.status, 200, "{}", answer.text);
+    assert_eq!(answer.json["rows"], 3);
+    let column = |name: &str, row: usize| answer.json["columns"][name][row].as_f64();
+    let force = |row| column("force_x_n", row).expect("a force");
+    assert!(
+        force(0) > 1e4 && force(1) < -1e4 && force(2).abs() < 1.0,
+        "{}",
+        answer.text
+    );
+    for row in 0..3 {
+        assert!(column("error_estimate", row).expect("a bound") < 0.02 * 30_000.0);
+        assert!(column("friction_power_n", row).expect("a power") >= 0.0);
+        let stick = column("stick_share", row).expect("a share");
+        assert!((0.0..=1.0).contains(&stick));
+        assert_eq!(answer.json["columns"]["status"][row], "ok");
+    }
+    assert_eq!(server.get("/v1/jobs").await.json["jobs"], json!([]));
+    let mut by_table = template("table");
+    by_table["outputs"] = json!(["resultants", "gradients"]);
+    let answer = evaluate(&server, by_table, columns()).await;
+    let slope = &answer.json["columns"]["force_x_n_by_creepage_x"][2];
+    assert!(
+        slope.as_f64().is_some_and(|slope| slope > 1e6),
+        "{}",
+        answer.text
+    );
+}
+
+#[tokio::test]
+async fn a_table_of_rows_is_answered_as_csv_with_a_line_for_each() {
+    let server = Server::idle().await;
+    let mut case = small("template");
+    case["solver"] = json!({ "method": "table" });
+    let path = server.submit(&case).await;
+    let id = path.rsplit('/').next().expect("an id").to_owned();
+    let table = "normal_force_n,creepage_x,creepage_y,spin_per_mm\r\n80000,0.001,0,0\r\n9e4,0,0.0005,-2e-4\r\n";
+    let post = |query: String, text: &'static str| {
+        let path = format!("/v1/evaluate{query}");
+        let server = &server;
+        async move {
+            let shape = |request: reqwest::RequestBuilder| {
+                request.header("content-type", "text/csv").body(text)
+            };
+            server.send(Method::POST, &path, shape).await
+        }
+    };
+    let answer = post(format!("?template={id}&format=csv"), table).await;
+    assert_eq!(answer.status, 200, "{}", answer.text);
+    let lines: Vec<&str> = answer.text.lines().collect();
+    assert_eq!(lines.len(), 3, "{}", answer.text);
+    assert!(lines[0].starts_with("force_x_n,force_y_n,moment_z_n_mm,error_estimate,"));
+    let answer = post(format!("?template={id}"), "creepage_x\n0.1\nten\n").await;
+    assert_problem(&answer, 422, "faulty-table", "line 3");
+    assert!(
+        answer.text.contains("/motion/creepage_x"),
+        "{}",
+        answer.text
+    );
+    assert_problem(
+        &post(String::new(), table).await,
+        400,
+        "bad-query",
+        "template",
+    );
+}
+
+#[tokio::test]
+async fn faults_of_rows_name_row_and_column_and_limits_hold() {
+    let mut setup = Setup::new();
+    setup.http.evaluate_max_rows = 3;
+    setup.http.evaluate_max_bytes = 4096;
+    let server = setup.start().await;
+    let pointers = |answer: &crate::server::Answer| -> Vec<String> {
+        let errors = answer.json["errors"]
+            .as_array()
+            .cloned()
+            .unwrap_or_default();
+        errors
+            .iter()
+            .map(|error| error["pointer"].as_str().unwrap_or("").to_owned())
+            .collect()
+    };
+    for (columns, pointer) in [
+        (
+            json!({ "/load/normal_force_n": [1e5, -5], "/motion/creepage_x": [0, 0] }),
+            "/columns/~1load~1normal_force_n/1",
+        ),
+        (
+            json!({ "/load/normal_force_n": [0, 1e5], "/motion/creepage_x": [0, 0] }),
+            "/columns/~1load~1normal_force_n/0",
+        ),
+        (
+            json!({ "/load/normal_force_n": [1e5, 1e5], "/motion/creepage_x": [0] }),
+            "/columns/~1motion~1creepage_x",
+        ),
+        (
+            json!({ "/load/normal_force_n": [], "/motion/creepage_x": [] }),
+            "/columns",
+        ),
+        (
+            json!({ "/load/normal_force_n": [1, 1, 1, 1], "/motion/creepage_x": [1, 1, 1, 1] }),
+            "/columns",
+        ),
+    ] {
+        let answer = evaluate(&server, template("table"), columns).await;
+        assert_problem(&answer, 422, "faulty-case", "");
+        assert_eq!(pointers(&answer), [pointer], "{}", answer.text);
+    }
+    let mut slow = template("boundary_element");
+    slow["contact"] = json!({ "type": "ellipse", "a_mm": 5, "b_mm": 4 });
+    let answer = evaluate(&server, slow, columns()).await;
+    assert_eq!(
+        pointers(&answer),
+        ["/template/solver/method"],
+        "{}",
+        answer.text
+    );
+    let text =
+        json!({ "template": template("table"), "columns": { "/motion/creepage_x": [0, "a"] } });
+    let answer = server.post("/v1/evaluate", &text).await;
+    assert_problem(&answer, 400, "malformed-json", "row 1");
+    assert!(
+        answer.text.contains("/motion/creepage_x"),
+        "{}",
+        answer.text
+    );
+    let many: Vec<f64> = vec![0.001; 2000];
+    let answer = evaluate(
+        &server,
+        template("table"),
+        json!({ "/motion/creepage_x": many }),
+    )
+    .await;
+    assert_problem(&answer, 413, "body-too-large", "evaluate-max-mib");
+}
