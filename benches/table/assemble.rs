@@ -54,10 +54,10 @@ pub fn values() -> Vec<f32> {
             let shape = Shape::new(root, [q11, q22]);
             let [c11, c22, c23] = coefficients(ratio, nu);
             let kalker = [c11, c22, c23, spin_coefficient(ratio, nu)];
-            for chi in 0..DIRECTIONS {
+            for (chi, column) in columns.iter().enumerate() {
                 for p in 0..POLES {
                     for (k, step) in SIZES.into_iter().enumerate() {
-                        let answer = columns[chi][p * SIZES.len() + k];
+                        let answer = column[p * SIZES.len() + k];
                         let direction =
                             shape.creepage_of_size(1.0, pole(p), direction(chi), [c11, c22]);
                         let at = (((node_ratio * POLES + p) * DIRECTIONS + chi) * SIZES.len() + k)

@@ -14,7 +14,7 @@ const NODES: [usize; 4] = [RATIOS, POLES, DIRECTIONS, SIZES.len()];
 /// tried too, alone and in sums: bounds from them are 5 to 100 % larger for the same share of motions.
 pub fn indicators(values: &[f32]) -> Vec<f32> {
     let mut of_nodes = vec![0.0_f32; NODES.iter().product()];
-    for at in 0..of_nodes.len() {
+    for (at, largest) in of_nodes.iter_mut().enumerate() {
         let node = split(at, NODES);
         let sigma = f64::from(SIZES[node[3]]) / SIZE_STEPS;
         let grown = if sigma < 1.0 {
@@ -28,7 +28,7 @@ pub fn indicators(values: &[f32]) -> Vec<f32> {
                     let at = join([node[0], node[1], node[2], size], NODES);
                     f64::from(values[(at * POISSON_RATIOS.len() + nu) * OUTPUTS + k])
                 };
-                of_nodes[at] = of_nodes[at].max((grown * beside(&value, node[3])) as f32);
+                *largest = largest.max((grown * beside(&value, node[3])) as f32);
             }
         }
     }

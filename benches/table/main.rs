@@ -13,6 +13,7 @@ mod held_out;
 mod judge;
 mod nodes;
 #[path = "../stress/random.rs"]
+#[allow(dead_code, reason = "other benches use more of it")]
 mod random;
 mod solver;
 mod speed;

@@ -91,7 +91,10 @@ fn powers(task: &PowerTask, monitor: &dyn Monitor) -> Result<Vec<f64>, Stop> {
             own if task.is_in_every_patch(&own) => own,
             _ => cell_mean_powers(task, monitor)?,
         },
-        Method::BoundaryElement | Method::LiuHsu => cell_mean_powers(task, monitor)?,
+        // The table has no cells to ask about.
+        Method::BoundaryElement | Method::LiuHsu | Method::Table => {
+            cell_mean_powers(task, monitor)?
+        }
     };
     for segment in &level.mesh.segments {
         carry(&mut power, &answer.slips, segment.cells.clone());
