@@ -7,7 +7,7 @@ use utoipa::openapi::schema::{AdditionalProperties, ArrayItems, Components};
 use utoipa::openapi::{Discriminator, OpenApi, Ref, RefOr, Schema};
 
 /// Schemas that requests are made of; what they lead to belongs to them.
-const REQUESTS: [&str; 2] = ["Case", "CaseWithOptions"];
+const REQUESTS: [&str; 3] = ["Case", "CaseWithOptions", "EvaluateRequest"];
 
 /// Names for the forms of a choice that have none, in their order.
 const FORMS: [(&str, &[&str]); 6] = [
@@ -40,11 +40,14 @@ const MEMBERS: [(&str, usize, Option<usize>); 3] = [
 ];
 
 /// Members that are lists of so many numbers, or lists of those.
-const TUPLES: [(&str, &str, usize); 19] = [
+const TUPLES: [(&str, &str, usize); 22] = [
     ("CrossSection", "points_mm", 2),
     ("FirstTouch", "rail_mm", 2),
     ("FirstTouch", "track_mm", 3),
     ("FirstTouch", "wheel_mm", 2),
+    ("Gradients", "force_x_n", 3),
+    ("Gradients", "force_y_n", 3),
+    ("Gradients", "moment_z_n_mm", 3),
     ("KnownPatch", "extent_mm", 4),
     ("KnownPatch", "semi_axes_mm", 2),
     ("Outlines", "patch", 2),

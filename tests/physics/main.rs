@@ -72,6 +72,7 @@ mod stress;
 mod subsurface;
 mod sweeps;
 mod table;
+mod table_rows;
 mod targets;
 #[path = "../../benches/calibrate/truth.rs"]
 mod truth;

@@ -14,7 +14,7 @@ fn template(method: &str) -> Value {
         "contact": { "type": "radii", "rolling_mm": 460, "lateral_mm": 300 },
         "load": {},
         "motion": { "creepage_y": 0.0, "spin_per_mm": 0.0004 },
-        "solver": { "method": method },
+        "solver": { "method": method, "target_error": 0.02 },
     })
 }
 

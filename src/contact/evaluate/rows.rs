@@ -129,131 +129,146 @@ impl Rows {
 
     fn answer_row(&self, row: &Row, shapes: &mut Shapes, answer: &mut RowsAnswer) {
         let at = |variable: Variable| row[variable as usize];
-        let [modulus, poisson] = self.pair.unwrap_or_else(|| {
-            let poisson = at(Variable::PoissonRatio);
-            let modulus = match self.young {
-                true => at(Variable::YoungModulus) / (2.0 * (1.0 + poisson)),
-                false => at(Variable::ShearModulus),
-            };
-            [modulus, poisson]
-        });
+        let [modulus, poisson] = self.material(row);
         let force = at(Variable::NormalForce);
-        let [a, b] = match self.radii {
-            true => {
-                let radii = [at(Variable::Rolling), at(Variable::Lateral)];
-                shapes
-                    .hertz(radii)
-                    .semi_axes(force, modulus / (1.0 - poisson))
-            }
-            false => [at(Variable::SemiAxisA), at(Variable::SemiAxisB)],
+        let [a, b] = if self.radii {
+            let radii = [at(Variable::Rolling), at(Variable::Lateral)];
+            let shape = shapes.hertz(radii);
+            shape.semi_axes(force, modulus / (1.0 - poisson))
+        } else {
+            [at(Variable::SemiAxisA), at(Variable::SemiAxisB)]
         };
-        let limit = at(Variable::Friction) * force;
+        let patch = RowPatch {
+            limit: at(Variable::Friction) * force,
+            c: (a * b).sqrt(),
+            ratio: a / b,
+            modulus,
+            poisson,
+        };
         let motion = [
             at(Variable::CreepageX),
             at(Variable::CreepageY),
             at(Variable::Spin),
         ];
-        let c = (a * b).sqrt();
-        if limit == 0.0 {
-            let still = motion == [0.0; 3];
-            let stick = if still { 1.0 } else { 0.0 };
-            let nothing = Creep {
-                force: [0.0; 3],
-                stick,
-                bound: 0.0,
-            };
-            return push(
-                answer,
-                motion,
-                [limit, c],
-                nothing,
-                [[0.0; 3]; 3],
-                RowStatus::Ok,
-            );
-        }
-        let unit = modulus * c * c / limit;
-        let creepage = [unit * motion[0], unit * motion[1], unit * c * motion[2]];
-        let none = Creep {
-            force: [f64::NAN; 3],
-            stick: f64::NAN,
-            bound: f64::NAN,
-        };
-        let (creep, slopes, status) = match &self.method {
-            RowMethod::Fastsim(mesh, class) => {
-                let (force, stick) = mesh.creep(a / b, poisson, creepage);
-                (
-                    Creep {
-                        force,
-                        stick,
-                        bound: *class,
-                    },
-                    [[f64::NAN; 3]; 3],
-                    RowStatus::Ok,
-                )
+        let mut found = self.creep(&patch, motion, shapes);
+        let missed = self.target.is_some_and(|target| found.creep.bound > target);
+        if missed {
+            found.status = RowStatus::TargetMissed;
+            if matches!(self.method, RowMethod::Table { auto: true }) {
+                found = RowCreep::none(RowStatus::NeedsSolver);
             }
-            RowMethod::Table { .. } if !(RATIO_MIN..=RATIO_MAX).contains(&(a / b)) => {
-                (none, [[f64::NAN; 3]; 3], RowStatus::NotCovered)
+        }
+        push(answer, &patch, motion, &found);
+    }
+
+    /// Shear modulus and Poisson's ratio of a row.
+    fn material(&self, row: &Row) -> [f64; 2] {
+        let at = |variable: Variable| row[variable as usize];
+        self.pair.unwrap_or_else(|| {
+            let poisson = at(Variable::PoissonRatio);
+            let modulus = if self.young {
+                at(Variable::YoungModulus) / (2.0 * (1.0 + poisson))
+            } else {
+                at(Variable::ShearModulus)
+            };
+            [modulus, poisson]
+        })
+    }
+
+    /// What the method says of a patch.
+    fn creep(&self, patch: &RowPatch, motion: [f64; 3], shapes: &mut Shapes) -> RowCreep {
+        if patch.limit == 0.0 {
+            let still = motion == [0.0; 3];
+            return RowCreep::ok(Creep {
+                force: [0.0; 3],
+                stick: if still { 1.0 } else { 0.0 },
+                bound: 0.0,
+            });
+        }
+        let unit = patch.unit();
+        let creepage = [
+            unit * motion[0],
+            unit * motion[1],
+            unit * patch.c * motion[2],
+        ];
+        match &self.method {
+            RowMethod::Fastsim(mesh, class) => {
+                let (force, stick) = mesh.creep(patch.ratio, patch.poisson, creepage);
+                RowCreep::ok(Creep {
+                    force,
+                    stick,
+                    bound: *class,
+                })
+            }
+            RowMethod::Table { .. } if !(RATIO_MIN..=RATIO_MAX).contains(&patch.ratio) => {
+                RowCreep::none(RowStatus::NotCovered)
             }
             RowMethod::Table { .. } => {
-                let ellipse = shapes.table(a / b, poisson);
-                let (creep, slopes) = match self.gradients {
-                    true => ellipse.with_slopes(creepage),
-                    false => (ellipse.creep(creepage), [[0.0; 3]; 3]),
-                };
-                (creep, slopes, RowStatus::Ok)
+                let ellipse = shapes.table(patch.ratio, patch.poisson);
+                if !self.gradients {
+                    return RowCreep::ok(ellipse.creep(creepage));
+                }
+                let (creep, slopes) = ellipse.with_slopes(creepage);
+                RowCreep {
+                    slopes,
+                    ..RowCreep::ok(creep)
+                }
             }
-        };
-        let missed = self.target.is_some_and(|target| creep.bound > target);
-        match (&self.method, missed) {
-            (RowMethod::Table { auto: true }, true) => {
-                push(
-                    answer,
-                    motion,
-                    [limit, c],
-                    none,
-                    [[f64::NAN; 3]; 3],
-                    RowStatus::NeedsSolver,
-                );
-            }
-            (_, true) => push(
-                answer,
-                motion,
-                [limit, c],
-                creep,
-                slopes_in_n(slopes, limit * unit, c),
-                RowStatus::TargetMissed,
-            ),
-            (_, false) => push(
-                answer,
-                motion,
-                [limit, c],
-                creep,
-                slopes_in_n(slopes, limit * unit, c),
-                status,
-            ),
         }
     }
 }
 
-/// Derivatives in N and mm; `unit` is μN times the factor of creepages.
-fn slopes_in_n(slopes: [[f64; 3]; 3], unit: f64, c: f64) -> [[f64; 3]; 3] {
-    let mut scaled = slopes;
-    for (k, row) in scaled.iter_mut().enumerate() {
-        for (j, slope) in row.iter_mut().enumerate() {
-            *slope *= unit * if k == 2 { c } else { 1.0 } * if j == 2 { c } else { 1.0 };
-        }
-    }
-    scaled
+/// The patch of a row.
+struct RowPatch {
+    /// μN in N.
+    limit: f64,
+    /// √(ab) in mm.
+    c: f64,
+    /// a/b.
+    ratio: f64,
+    modulus: f64,
+    poisson: f64,
 }
 
-fn push(
-    answer: &mut RowsAnswer,
-    motion: [f64; 3],
-    [limit, c]: [f64; 2],
+impl RowPatch {
+    /// The factor that makes creepages dimensionless.
+    fn unit(&self) -> f64 {
+        self.modulus * self.c * self.c / self.limit
+    }
+}
+
+/// What a row is answered with, relative to μN.
+struct RowCreep {
     creep: Creep,
     slopes: [[f64; 3]; 3],
     status: RowStatus,
-) {
+}
+
+impl RowCreep {
+    fn ok(creep: Creep) -> RowCreep {
+        RowCreep {
+            creep,
+            slopes: [[0.0; 3]; 3],
+            status: RowStatus::Ok,
+        }
+    }
+
+    fn none(status: RowStatus) -> RowCreep {
+        RowCreep {
+            creep: Creep {
+                force: [f64::NAN; 3],
+                stick: f64::NAN,
+                bound: f64::NAN,
+            },
+            slopes: [[f64::NAN; 3]; 3],
+            status,
+        }
+    }
+}
+
+fn push(answer: &mut RowsAnswer, patch: &RowPatch, motion: [f64; 3], found: &RowCreep) {
+    let (limit, c) = (patch.limit, patch.c);
+    let creep = &found.creep;
     let force = [
         limit * creep.force[0],
         limit * creep.force[1],
@@ -263,16 +278,24 @@ fn push(
     answer.force_y_n.push(force[1]);
     answer.moment_z_n_mm.push(force[2]);
     answer.error_estimate.push(limit * creep.bound);
-    answer
-        .friction_power_n
-        .push(motion[0] * force[0] + motion[1] * force[1] + motion[2] * force[2]);
+    let power = motion[0] * force[0] + motion[1] * force[1] + motion[2] * force[2];
+    answer.friction_power_n.push(power);
     answer.stick_share.push(creep.stick);
-    if let Some(gradients) = &mut answer.gradients {
-        for (column, slope) in gradients.iter_mut().zip(slopes.as_flattened()) {
-            column.push(*slope);
-        }
+    answer.status.push(found.status);
+    let Some(gradients) = &mut answer.gradients else {
+        return;
+    };
+    // Without friction there are neither forces nor derivatives.
+    let unit = if limit > 0.0 {
+        limit * patch.unit()
+    } else {
+        0.0
+    };
+    for (place, column) in gradients.iter_mut().enumerate() {
+        let (force, creepage) = (place / 3, place % 3);
+        let arm = |k: usize| if k == 2 { c } else { 1.0 };
+        column.push(found.slopes[force][creepage] * unit * arm(force) * arm(creepage));
     }
-    answer.status.push(status);
 }
 
 /// What neighbouring rows often share.

@@ -92,8 +92,8 @@ pub fn read_csv(text: &[u8]) -> Result<Vec<Column>, ApiError> {
         if !more.map_err(|error| faulty(format!("the table cannot be read: {error}")))? {
             return Ok(columns);
         }
-        // Lines are counted from the header.
-        let line = || record.position().map_or(0, csv::Position::line) + 1;
+        // What is left begins with the end of the header, so that lines are counted from it.
+        let line = || record.position().map_or(0, csv::Position::line);
         if record.len() != columns.len() {
             let detail = format!(
                 "line {} has {} fields, the header has {}",

@@ -1,0 +1,118 @@
+//! Rows of numbers: they are answered as jobs are, and say what they cannot be answered with.
+
+use railhead::contact::error::Fault;
+use railhead::contact::evaluate::answer::{RowStatus, RowsAnswer};
+use railhead::contact::evaluate::rows::{Column, Rows};
+use railhead::contact::{self, case::limits::Limits};
+use serde_json::{Value, json};
+
+use crate::gap_samples::steel;
+use crate::reference::solve;
+
+/// Rows of a template with columns.
+fn rows(
+    method: &str,
+    contact: Value,
+    columns: &[(&str, Vec<f64>)],
+) -> (Value, Result<RowsAnswer, Vec<Fault>>) {
+    let mut case = steel(
+        contact,
+        json!({ "normal_force_n": 8e4 }),
+        [1e-3, -5e-4, 2e-4],
+    );
+    case["solver"] = json!({ "method": method });
+    case["outputs"] = json!(["resultants"]);
+    for (pointer, values) in columns {
+        if let Some(place) = case.pointer_mut(pointer) {
+            *place = json!(values[0]);
+        }
+    }
+    let checked = contact::check(&case, &Limits::default()).expect("a sound case");
+    let columns = columns.iter().map(|(pointer, values)| Column {
+        pointer: (*pointer).to_owned(),
+        values: values.clone(),
+    });
+    let rows = Rows::new(&case, &checked, columns.collect());
+    (
+        case,
+        rows.map(|rows| rows.evaluate()).map_err(|error| error.0),
+    )
+}
+
+#[test]
+fn rows_are_answered_as_jobs_of_the_same_method_are() {
+    let columns = [
+        ("/load/normal_force_n", vec![8e4, 3e4, 1.2e5, 8e4]),
+        ("/contact/lateral_mm", vec![300.0, 90.0, 900.0, 300.0]),
+        ("/motion/creepage_x", vec![0.0, 1e-3, -2e-3, 0.0]),
+        ("/motion/spin_per_mm", vec![3e-4, -1e-3, 1e-5, 0.0]),
+        ("/friction/coefficient", vec![0.3, 0.1, 0.5, 0.0]),
+    ];
+    let contact = json!({ "type": "radii", "rolling_mm": 460.0, "lateral_mm": 300.0 });
+    for method in ["table", "fastsim"] {
+        let (case, answer) = rows(method, contact.clone(), &columns);
+        let answer = answer.expect("sound rows");
+        for row in 0..4 {
+            let mut single = case.clone();
+            for (pointer, values) in &columns {
+                *single.pointer_mut(pointer).expect("a number") = json!(values[row]);
+            }
+            let (solution, _) = solve(&single);
+            let (patch, point) = (&solution.patches[0], &solution.patches[0].points[0]);
+            let limit = patch.friction_limit_n.expect("a limit").max(1e-9);
+            let c = (patch.area_mm2 / std::f64::consts::PI).sqrt();
+            // Chords of a job's mesh are fitted to the a/b of its patch, those of rows are all of the circle.
+            let within = if method == "table" { 1e-6 } else { 2e-3 };
+            let near = |found: f64, known: f64, unit: f64| (found - known).abs() <= within * unit;
+            assert!(
+                near(answer.force_x_n[row], point.force_x_n, limit),
+                "{method} {row}: {answer:?} {point:?}"
+            );
+            assert!(
+                near(answer.force_y_n[row], point.force_y_n, limit),
+                "{method} {row}: {answer:?} {point:?}"
+            );
+            assert!(
+                near(answer.moment_z_n_mm[row], point.moment_z_n_mm, limit * c),
+                "{method} {row}"
+            );
+            assert!(
+                near(answer.friction_power_n[row], point.friction_power_n, limit),
+                "{method} {row}"
+            );
+            let stated = point.error_estimate.expect("a bound").force_x_n;
+            assert!(
+                near(answer.error_estimate[row], stated, limit),
+                "{method} {row}"
+            );
+            let known = [RowStatus::Ok, RowStatus::TargetMissed]
+                [usize::from(point.target_met == Some(false))];
+            assert_eq!(answer.status[row], known, "{method} {row}");
+        }
+    }
+}
+
+#[test]
+fn rows_outside_the_table_or_above_the_target_say_so_and_faults_name_row_and_column() {
+    let contact = json!({ "type": "ellipse", "a_mm": 5.0, "b_mm": 5.0 });
+    let columns = [("/contact/a_mm", vec![5.0, 60.0, 45.0])];
+    let (_, answer) = rows("auto", contact.clone(), &columns);
+    let answer = answer.expect("sound rows");
+    assert_eq!(answer.status[..2], [RowStatus::Ok, RowStatus::NotCovered]);
+    assert!(answer.force_x_n[0].is_finite() && answer.force_x_n[1].is_nan());
+    let columns = [
+        ("/load/normal_force_n", vec![8e4, -1.0, 8e4]),
+        ("/motion/creepage_x", vec![1e-3, 1e-3]),
+        ("/motion/speed", vec![1.0, 1.0, 1.0]),
+    ];
+    let (_, faults) = rows("table", contact, &columns);
+    let faults = faults.expect_err("faults");
+    let pointers: Vec<&str> = faults.iter().map(|fault| &*fault.pointer).collect();
+    let known = [
+        "/columns/~1load~1normal_force_n/1",
+        "/columns/~1motion~1creepage_x",
+        "/columns/~1motion~1speed",
+    ];
+    assert_eq!(pointers, known, "{faults:?}");
+    assert!(faults[0].detail.contains("-1 given"), "{faults:?}");
+}
