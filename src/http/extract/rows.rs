@@ -150,7 +150,7 @@ impl<'de> Visitor<'de> for BodyVisitor {
                     template.replace(value).is_some()
                 }
                 "columns" => columns
-                    .replace(members.next_value::<Columns>()?.0)
+                    .replace(members.next_value::<RowColumns>()?.0)
                     .is_some(),
                 _ => {
                     let known = "allowed: `template`, `columns`";
@@ -172,17 +172,19 @@ impl<'de> Visitor<'de> for BodyVisitor {
     }
 }
 
-struct Columns(Vec<Column>);
+struct RowColumns(Vec<Column>);
 
-impl<'de> Deserialize<'de> for Columns {
+impl<'de> Deserialize<'de> for RowColumns {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_map(ColumnsVisitor).map(Columns)
+        deserializer
+            .deserialize_map(RowColumnsVisitor)
+            .map(RowColumns)
     }
 }
 
-struct ColumnsVisitor;
+struct RowColumnsVisitor;
 
-impl<'de> Visitor<'de> for ColumnsVisitor {
+impl<'de> Visitor<'de> for RowColumnsVisitor {
     type Value = Vec<Column>;
 
     fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {

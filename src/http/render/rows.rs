@@ -13,8 +13,8 @@ use crate::http::render::pieces::body;
 /// Rows written at once.
 const ROWS: usize = 1024;
 
-/// Part of the JSON text.
-enum Part {
+/// RowsPart of the JSON text.
+enum RowsPart {
     Text(String),
     /// Numbers of the column at this place.
     Numbers(usize, Range<usize>),
@@ -24,20 +24,20 @@ enum Part {
 /// `{"rows": …, "columns": {"force_x_n": […], …, "status": […]}}`; null where a row has no number.
 pub fn json_body(answer: RowsAnswer) -> Body {
     let rows = answer.status.len();
-    let mut parts = vec![Part::Text(format!("{{\"rows\":{rows},\"columns\":{{"))];
+    let mut parts = vec![RowsPart::Text(format!("{{\"rows\":{rows},\"columns\":{{"))];
     for (place, (name, _)) in answer.columns().iter().enumerate() {
         let before = if place == 0 { "" } else { "]," };
-        parts.push(Part::Text(format!("{before}\"{name}\":[")));
-        parts.extend(ranges(rows).map(|range| Part::Numbers(place, range)));
+        parts.push(RowsPart::Text(format!("{before}\"{name}\":[")));
+        parts.extend(ranges(rows).map(|range| RowsPart::Numbers(place, range)));
     }
-    parts.push(Part::Text("],\"status\":[".to_owned()));
-    parts.extend(ranges(rows).map(Part::Status));
-    parts.push(Part::Text("]}}".to_owned()));
+    parts.push(RowsPart::Text("],\"status\":[".to_owned()));
+    parts.extend(ranges(rows).map(RowsPart::Status));
+    parts.push(RowsPart::Text("]}}".to_owned()));
     body(parts.into_iter().map(move |part| {
         let text = match part {
-            Part::Text(text) => text,
-            Part::Numbers(place, range) => numbers(answer.columns()[place].1, range),
-            Part::Status(range) => statuses(&answer, range),
+            RowsPart::Text(text) => text,
+            RowsPart::Numbers(place, range) => numbers(answer.columns()[place].1, range),
+            RowsPart::Status(range) => statuses(&answer, range),
         };
         Ok::<_, Infallible>(text.into_bytes())
     }))

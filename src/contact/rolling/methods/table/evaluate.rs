@@ -261,7 +261,7 @@ impl EllipseTable<'_> {
         let table = self.table;
         let (pole, direction) = (table.pole.at(theta), table.direction.at(chi));
         let size = table.size.at(sigma);
-        let near = Near {
+        let near = NearNodes {
             spline: &table.spline,
             ratio: self.ratio,
             pole,
@@ -330,7 +330,7 @@ impl Quarter {
 
 /// The coefficients around a place.
 #[derive(Clone, Copy)]
-struct Near<'a> {
+struct NearNodes<'a> {
     spline: &'a [i16],
     ratio: Weights,
     pole: Weights,
@@ -338,7 +338,7 @@ struct Near<'a> {
     size: usize,
 }
 
-impl Near<'_> {
+impl NearNodes<'_> {
     /// The rows of one a/b and pole, at the four directions.
     #[inline(always)]
     fn row(&self, i: usize, j: usize, k: usize) -> &[i16; NEAR] {

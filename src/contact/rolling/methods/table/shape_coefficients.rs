@@ -1,5 +1,6 @@
 //! Kalker's coefficients as splines in ln(a/b), for many ellipses in little time.
 
+use crate::contact::numerics::lagrange;
 use crate::contact::rolling::linear_theory::{POISSON_RATIOS, coefficients, spin_coefficient};
 use crate::contact::rolling::methods::table::axis::{Axis, free_coefficients};
 use crate::contact::rolling::methods::table::grid::ln_ratio_max;
@@ -80,5 +81,5 @@ impl Default for ShapeCoefficients {
 /// Weights of the values at [`POISSON_RATIOS`]: a polynomial of fourth degree, as in `linear_theory`.
 #[must_use]
 pub fn poisson_weights(poisson_ratio: f64) -> [f64; 5] {
-    crate::contact::numerics::lagrange::weights(&POISSON_RATIOS, poisson_ratio)
+    lagrange::weights(&POISSON_RATIOS, poisson_ratio)
 }
