@@ -62,7 +62,7 @@ pub struct EvaluateAnswer {
     columns: EvaluateColumns,
 }
 
-/// Columns of an answer. With `gradients` also nine of the derivatives, `force_x_n_by_creepage_x` to `moment_z_n_mm_by_spin_per_mm`.
+/// Columns of an answer.
 #[derive(Debug, Serialize, ToSchema)]
 #[allow(
     dead_code,
@@ -81,6 +81,33 @@ pub struct EvaluateColumns {
     friction_power_n: Vec<Option<f64>>,
     /// Share of the patch that sticks, 0 to 1.
     stick_share: Vec<Option<f64>>,
+    /// ∂`force_x_n`/∂`creepage_x`; with `gradients` only.
+    #[schema(nullable = false)]
+    force_x_n_by_creepage_x: Option<Vec<Option<f64>>>,
+    /// ∂`force_x_n`/∂`creepage_y`; with `gradients` only.
+    #[schema(nullable = false)]
+    force_x_n_by_creepage_y: Option<Vec<Option<f64>>>,
+    /// ∂`force_x_n`/∂`spin_per_mm`; with `gradients` only.
+    #[schema(nullable = false)]
+    force_x_n_by_spin_per_mm: Option<Vec<Option<f64>>>,
+    /// ∂`force_y_n`/∂`creepage_x`; with `gradients` only.
+    #[schema(nullable = false)]
+    force_y_n_by_creepage_x: Option<Vec<Option<f64>>>,
+    /// ∂`force_y_n`/∂`creepage_y`; with `gradients` only.
+    #[schema(nullable = false)]
+    force_y_n_by_creepage_y: Option<Vec<Option<f64>>>,
+    /// ∂`force_y_n`/∂`spin_per_mm`; with `gradients` only.
+    #[schema(nullable = false)]
+    force_y_n_by_spin_per_mm: Option<Vec<Option<f64>>>,
+    /// ∂`moment_z_n_mm`/∂`creepage_x`; with `gradients` only.
+    #[schema(nullable = false)]
+    moment_z_n_mm_by_creepage_x: Option<Vec<Option<f64>>>,
+    /// ∂`moment_z_n_mm`/∂`creepage_y`; with `gradients` only.
+    #[schema(nullable = false)]
+    moment_z_n_mm_by_creepage_y: Option<Vec<Option<f64>>>,
+    /// ∂`moment_z_n_mm`/∂`spin_per_mm`; with `gradients` only.
+    #[schema(nullable = false)]
+    moment_z_n_mm_by_spin_per_mm: Option<Vec<Option<f64>>>,
     /// `ok`; `target_missed`: the bound is above the target; `needs_solver`: so it is, and `auto` leaves the row to a job; `not_covered`:
     /// a/b is beyond 0.1 to 10.
     status: Vec<String>,
