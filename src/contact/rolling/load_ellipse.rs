@@ -24,7 +24,7 @@ pub struct LoadEllipse {
 }
 
 /// A part of a patch.
-struct LoadPart {
+struct EllipsePart {
     x: [f64; 2],
     y: f64,
     dy: f64,
@@ -45,7 +45,7 @@ impl LoadEllipse {
         }
         let parts = parts(footprint, patch);
         let load: f64 = parts.iter().map(|part| part.load).sum();
-        let mean = |of: &dyn Fn(&LoadPart) -> f64| {
+        let mean = |of: &dyn Fn(&EllipsePart) -> f64| {
             parts.iter().map(|part| part.load * of(part)).sum::<f64>() / load
         };
         let centre = [
@@ -81,7 +81,7 @@ impl LoadEllipse {
 }
 
 /// The parts of a patch with their loads, in any unit.
-fn parts(footprint: &Footprint, patch: usize) -> Vec<LoadPart> {
+fn parts(footprint: &Footprint, patch: usize) -> Vec<EllipsePart> {
     let [_, _, low, high] = footprint.patches()[patch].extent;
     let dy = (high - low) / STRIPS as f64;
     let strips: Vec<(f64, f64)> = (0..STRIPS)
@@ -92,7 +92,7 @@ fn parts(footprint: &Footprint, patch: usize) -> Vec<LoadPart> {
         let step = (chord.right - chord.left) / PARTS as f64;
         for k in 0..PARTS {
             let x = [k, k + 1].map(|k| chord.left + step * k as f64);
-            parts.push(LoadPart {
+            parts.push(EllipsePart {
                 x,
                 y: chord.y,
                 dy: chord.dy,
@@ -104,7 +104,7 @@ fn parts(footprint: &Footprint, patch: usize) -> Vec<LoadPart> {
 }
 
 /// The share of the load that is elsewhere than on the ellipse.
-fn misplaced(parts: &[LoadPart], load: f64, centre: [f64; 2], [a, b]: [f64; 2]) -> f64 {
+fn misplaced(parts: &[EllipsePart], load: f64, centre: [f64; 2], [a, b]: [f64; 2]) -> f64 {
     let ellipse = Ellipse::of_semi_axes(a, b, Pressing::Force(load), 1.0);
     let (mut apart, mut inside) = (0.0, 0.0);
     for part in parts {
