@@ -4,6 +4,7 @@ import { readdirSync, readFileSync } from 'node:fs';
 import { test } from 'node:test';
 import { at, differences, placeInText, pretty, put } from '../../../src/http/page/web/js/document.js';
 import { formatRoute, parseRoute } from '../../../src/http/page/web/js/routes.js';
+import { withContact } from '../../../src/http/page/web/js/starts.js';
 
 const EXAMPLES = new URL('../../../api/examples/', import.meta.url);
 
@@ -55,4 +56,11 @@ test('addresses lead back to what they were made of', () => {
   assert.deepEqual(parseRoute('#/compare/a/b/c'), { view: 'compare', ids: ['a', 'b', 'c'], query: {} });
   assert.equal(parseRoute('#/nothing').view, 'compose');
   assert.equal(parseRoute('').view, 'compose');
+});
+
+test('a case keeps what it asks for beside the fields when its contact is another one', () => {
+  const asked = { outputs: ['resultants', 'damage'], damage: { models: ['t_gamma'] } };
+  const document = withContact(asked, 'ellipse');
+  assert.deepEqual(document.damage, asked.damage);
+  assert.deepEqual(document.outputs, ['resultants', 'zones', 'tractions', 'pressure', 'slip', 'damage']);
 });

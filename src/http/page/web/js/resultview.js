@@ -7,7 +7,7 @@ import { put } from './document.js';
 import { downloads } from './downloads.js';
 import { drawProfiles } from './drawing/profiles.js';
 import { editDocument, solve } from './editing.js';
-import { ALL_OUTPUTS, inOrder } from './starts.js';
+import { inOrder, withFields } from './starts.js';
 import { indexOf } from './field/cells.js';
 import { hasFields } from './fields.js';
 import { chooseAmounts, chosenAmounts } from './field/palette.js';
@@ -93,7 +93,7 @@ function loaded(app, looked, answer) {
 /** @param {App} app @param {Looked} looked */
 function again(app, looked) {
   if (!looked.document) return;
-  editDocument(app, put(looked.document, '/outputs', ALL_OUTPUTS));
+  editDocument(app, put(looked.document, '/outputs', withFields(looked.document.outputs)));
   solve(app);
 }
 

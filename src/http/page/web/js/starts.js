@@ -3,6 +3,7 @@
 import { isObject } from './document.js';
 
 /** @typedef {import('./document.js').JsonObject} JsonObject */
+/** @typedef {import('./document.js').JsonValue} JsonValue */
 
 /** Parts of an answer that are fields; the page draws all of them. */
 export const ALL_OUTPUTS = ['resultants', 'zones', 'tractions', 'pressure', 'slip'];
@@ -62,8 +63,14 @@ export function withContact(document, type) {
     contact: start.contact,
     ...(start.load ? { load: alike && load ? load : start.load } : {}),
     motion: (type === 'profiles') === (contact.type === 'profiles') && before.motion ? before.motion : start.motion,
-    outputs: ALL_OUTPUTS,
+    outputs: withFields(before.outputs),
   };
+}
+
+/** All fields that are drawn, and what else is asked for. @param {JsonValue | undefined} asked @returns {JsonValue[]} */
+export function withFields(asked) {
+  const others = Array.isArray(asked) ? asked.filter((output) => !ALL_OUTPUTS.includes(String(output))) : [];
+  return [...ALL_OUTPUTS, ...others];
 }
 
 /** Are nothing but the empty braces of a cross-section there yet? @param {JsonObject} document @param {'rail' | 'wheel'} body */
