@@ -92,8 +92,10 @@ pub fn read_csv(text: &[u8]) -> Result<Vec<Column>, ApiError> {
         if !more.map_err(|error| faulty(format!("the table cannot be read: {error}")))? {
             return Ok(columns);
         }
-        // What is left begins with the end of the header, so that lines are counted from it.
-        let line = || record.position().map_or(0, csv::Position::line);
+        let line = || {
+            let start = record.position().map_or(0, csv::Position::byte);
+            line_at(text, end + usize::try_from(start).unwrap_or(0))
+        };
         if record.len() != columns.len() {
             let detail = format!(
                 "line {} has {} fields, the header has {}",
@@ -118,6 +120,15 @@ pub fn read_csv(text: &[u8]) -> Result<Vec<Column>, ApiError> {
             }
         }
     }
+}
+
+/// Number of the line that a record begins on which follows this place, from 1; the reader's own place lies before the end of the line before.
+fn line_at(text: &[u8], place: usize) -> usize {
+    let ends = text[place..]
+        .iter()
+        .take_while(|byte| matches!(byte, b'\n' | b'\r'));
+    let begin = place + ends.count();
+    1 + text[..begin].iter().filter(|byte| **byte == b'\n').count()
 }
 
 /// The JSON body of rows.
@@ -266,6 +277,7 @@ mod tests {
         for (csv, words) in [
             ("creepage_x\n0.1\nx\n", ["line 3", "creepage_x"]),
             ("creepage_x\n0.1\nnan\n", ["line 3", "nan"]),
+            ("creepage_x\r\n0.1\r\n\r\nx\r\n", ["line 4", "creepage_x"]),
             ("creepage_x,spin_per_mm\n0.1\n", ["line 2", "2"]),
             ("speed\n1\n", ["line 1", "speed"]),
         ] {
