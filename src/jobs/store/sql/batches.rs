@@ -1,7 +1,7 @@
-//! Batches in the embedded job table: filled piece by piece, acknowledged once they are complete.
+//! Batches in the job table: filled piece by piece, acknowledged once they are complete.
 //!
-//! No worker claims a job of a batch while it is being filled ([`skip`](crate::jobs::store::claim::ClaimRequest::skip)). A batch that a dead process left incomplete was never
-//! acknowledged and is removed with its jobs.
+//! No worker claims a job of a batch while it is being filled: the statement that claims leaves it out. A batch that a dead process left
+//! incomplete was never acknowledged and is removed with its jobs.
 
 use super::blob_refs::{drop_slices_of_ended, release_blobs};
 use super::engine::{self, DbConnection, SqlStore};
