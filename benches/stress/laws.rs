@@ -141,6 +141,9 @@ fn tangential(
     }
 }
 
+/// Cells of one strip adjoin where less than this part of one lies between them.
+const JOINED: f64 = 1e-6;
+
 /// Coulomb's law cell by cell: the bound holds, slip is along the traction, what sticks does not slip.
 fn coulomb(
     friction: f64,
@@ -166,9 +169,10 @@ fn coulomb(
         worst[0] = worst[0].max(x.hypot(y) - friction * pressure[i] / scales.bound);
         worst[1] = worst[1].max(x.hypot(y) * u.hypot(v) - (x * u + y * v));
         // The last cell of a strip may stick on the whole and slip at its trailing end.
+        let end = |i: usize, side: f64| cells.x_mm[i] + 0.5 * side * cells.dx_mm[i];
         let last = i == 0
             || cells.y_mm[i - 1] != cells.y_mm[i]
-            || cells.x_mm[i - 1] + cells.dx_mm[i - 1] < cells.x_mm[i];
+            || end(i, -1.0) - end(i - 1, 1.0) > JOINED * cells.dx_mm[i];
         if zone[i] == Zone::Stick && !last {
             worst[2] = worst[2].max(u.hypot(v));
         }
