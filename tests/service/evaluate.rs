@@ -31,6 +31,16 @@ async fn evaluate(server: &Server, template: Value, columns: Value) -> crate::se
 }
 
 #[tokio::test]
+async fn creepages_and_spin_that_the_template_leaves_out_are_0() {
+    let server = Server::idle().await;
+    let mut short = template("table");
+    short["motion"] = json!({ "creepage_y": 0.0 });
+    let answer = evaluate(&server, short, columns()).await;
+    let force = answer.json["columns"]["force_x_n"][0].as_f64();
+    assert!(force.is_some_and(|force| force > 1e4), "{}", answer.text);
+}
+
+#[tokio::test]
 async fn rows_are_answered_without_a_job() {
     let server = Server::idle().await;
     let answer = evaluate(&server, template("auto"), columns()).await;

@@ -78,12 +78,7 @@ impl Rows {
         let mut fixed = [f64::NAN; 12];
         for variable in Variable::all() {
             let number = case.pointer(variable.pointer()).and_then(Value::as_f64);
-            // Creepages and spin that a case leaves out are 0; what else it leaves out is not asked for.
-            let motion = matches!(
-                variable,
-                Variable::CreepageX | Variable::CreepageY | Variable::Spin
-            );
-            fixed[variable as usize] = number.unwrap_or(if motion { 0.0 } else { f64::NAN });
+            fixed[variable as usize] = number.unwrap_or(variable.absent());
         }
         let method = method_of(checked).map_err(|error| {
             CaseError(vec![Fault::new("/template/solver/mesh", error.to_string())])

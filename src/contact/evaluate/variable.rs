@@ -111,6 +111,15 @@ impl Variable {
         found.map(|(variable, ..)| *variable)
     }
 
+    /// Its number in a case that leaves it out: creepages and spin are 0 then, anything else is not asked for.
+    #[must_use]
+    pub fn absent(self) -> f64 {
+        match self {
+            Variable::CreepageX | Variable::CreepageY | Variable::Spin => 0.0,
+            _ => f64::NAN,
+        }
+    }
+
     /// Its place in the case, a JSON pointer.
     #[must_use]
     pub fn pointer(self) -> &'static str {
