@@ -14,7 +14,7 @@ use railhead::contact::rolling::operator_store::OperatorStore;
 use serde_json::{Value, json};
 
 use crate::random::Random;
-use crate::solver::{Contact, read, solve, write};
+use crate::solver::{Contact, largest_error, print_errors, read, solve, write};
 
 /// Contacts; of each so many motions.
 pub const CONTACTS: usize = 400;
@@ -116,20 +116,8 @@ pub fn recompute(count: usize, table: &CreepTable) {
             .zip(solve(&operators, contact, &motions, TARGET))
         {
             let found = ellipse.creep(*motion);
-            errors.push(
-                (0..3)
-                    .map(|k| (found.force[k] - answer[k]).abs())
-                    .fold(0.0, f64::max),
-            );
+            errors.push(largest_error(found.force, answer));
         }
     }
-    errors.sort_by(f64::total_cmp);
-    let at = |part: f64| errors[(part * (errors.len() - 1) as f64) as usize];
-    println!(
-        "{} motions solved anew: {:.4} in the median, {:.4} at 99 %, {:.4} at most",
-        errors.len(),
-        at(0.5),
-        at(0.99),
-        at(1.0)
-    );
+    print_errors("motions", errors);
 }

@@ -14,7 +14,7 @@ use railhead::contact::rolling::methods::table::grid::{
 use railhead::contact::rolling::operator_store::OperatorStore;
 
 use crate::random::Random;
-use crate::solver::{Answer, Contact, read, solve, write};
+use crate::solver::{Answer, Contact, largest_error, print_errors, read, solve, write};
 
 /// Sizes that stand for 0 and for infinity.
 const LEAST: f64 = 1e-3;
@@ -160,18 +160,7 @@ pub fn recompute(count: usize, table: &CreepTable) {
         let found = table
             .ellipse(contact.ratio, contact.poisson)
             .creep(creepage);
-        errors.push(
-            (0..3)
-                .map(|k| (found.force[k] - answer[k]).abs())
-                .fold(0.0, f64::max),
-        );
+        errors.push(largest_error(found.force, answer));
     }
-    errors.sort_by(f64::total_cmp);
-    let at = |part: f64| errors[(part * (errors.len() - 1) as f64) as usize];
-    println!(
-        "{count} nodes solved anew: {:.4} in the median, {:.4} at 99 %, {:.4} at most",
-        at(0.5),
-        at(0.99),
-        at(1.0)
-    );
+    print_errors("nodes", errors);
 }

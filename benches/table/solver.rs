@@ -105,3 +105,22 @@ pub fn write(name: &str, numbers: &[f64]) {
     std::fs::write(&half, bytes).expect("a file");
     std::fs::rename(half, folder().join(name)).expect("a file");
 }
+
+/// Largest of the errors of F_x/(μN), F_y/(μN) and M_z/(μNc).
+pub fn largest_error(found: [f64; 3], answer: Answer) -> f64 {
+    let errors = (0..3).map(|k| (found[k] - answer[k]).abs());
+    errors.fold(0.0, f64::max)
+}
+
+/// Prints how far the table is from what was solved anew.
+pub fn print_errors(what: &str, mut errors: Vec<f64>) {
+    errors.sort_by(f64::total_cmp);
+    let at = |part: f64| errors[(part * (errors.len() - 1) as f64) as usize];
+    println!(
+        "{} {what} solved anew: {:.4} in the median, {:.4} at 99 %, {:.4} at most",
+        errors.len(),
+        at(0.5),
+        at(0.99),
+        at(1.0)
+    );
+}

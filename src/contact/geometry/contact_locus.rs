@@ -31,7 +31,7 @@ const WIDENINGS_MAX: usize = 5;
 const APART: f64 = 0.5;
 /// Largest lowering of a wheel in mm; more is no contact of wheel and rail.
 const LOWERING_MAX: f64 = 16.0;
-/// Clearance in mm below which the inclination of a line is kept: more than usual loads lower a wheel, and less than one line in three.
+/// Clearance in mm below which the inclination of a line is kept: more than usual loads lower a wheel. It changes times, no answer.
 const NEAR: f64 = 0.3;
 
 /// Rail and wheel above each other, line by line along x.

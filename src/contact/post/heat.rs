@@ -5,8 +5,7 @@
 //! `B = β₁ + β₂`, `β = √(λρc)` of each body. Both surfaces have one temperature in the contact; without heat that is the mean of the
 //! bulk temperatures weighted with β, which is also how q is shared (Jaeger 1942; Carslaw and Jaeger 1959, §2.4 and 10.7).
 
-/// Metres in a millimetre.
-const METRES: f64 = 1e-3;
+use crate::contact::post::units::METRES;
 
 /// What a body does with heat.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,3 +8,4 @@ pub mod resample;
 pub mod smooth;
 pub mod strip_segments;
 pub mod subsurface;
+pub mod units;

@@ -3,13 +3,9 @@
 use crate::contact::case::words::damage::DamageModel;
 use crate::contact::post::damage::figures::DamageTask;
 use crate::contact::post::damage::models::{archard_coefficient, usfd_rate};
+use crate::contact::post::units::{METRES, NANOMETRES};
 use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::solution::damage::WearAcross;
-
-/// nm in a mm.
-const NANOMETRES: f64 = 1e6;
-/// m in a mm.
-const METRES: f64 = 1e-3;
 
 /// The power of every cell over the rolling speed in N, and the size of its slip.
 #[derive(Debug, Clone, Copy)]

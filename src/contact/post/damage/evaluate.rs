@@ -6,15 +6,11 @@ use crate::contact::post::damage::figures::{DamageFigures, DamageTask, SHAKEDOWN
 use crate::contact::post::damage::models::{
     about, archard_coefficient, over, times, usfd_rate, usfd_regime, wlrm_damage,
 };
+use crate::contact::post::units::{METRES, NANOMETRES};
 use crate::contact::solution::damage::{
     ArchardWear, Damage, RailFatigue, Ranged, ShakedownPlace, SurfaceFatigue, TGamma, UsfdWear,
 };
 use crate::contact::solution::words::PointSolution;
-
-/// nm in a mm.
-const NANOMETRES: f64 = 1e6;
-/// m in a mm.
-const METRES: f64 = 1e-3;
 
 /// A patch and its answer for one motion.
 #[derive(Debug, Clone, Copy)]
