@@ -142,8 +142,12 @@ fn require_keys(document: &mut utoipa::openapi::OpenApi) {
             if path.contains("{id}") {
                 kinds.push(ProblemKind::Expired);
             }
-            // A locked or failing disk can meet every request.
-            kinds.extend([ProblemKind::StorageUnwritable, ProblemKind::StorageFull]);
+            // A locked or failing disk, or a database that is away, can meet every request.
+            kinds.extend([
+                ProblemKind::StorageUnwritable,
+                ProblemKind::StorageUnreachable,
+            ]);
+            kinds.push(ProblemKind::StorageFull);
             describe_also(&mut operation.responses.responses, &kinds);
         }
     }

@@ -122,6 +122,9 @@ pub enum JobsError {
         "the database URL cannot be read ({0}); it looks like postgres://user:password@host:5432/database"
     )]
     BadDatabaseUrl(String),
+    /// The connection to the database is not encrypted as its URL asks for.
+    #[error("the connection to the database is not encrypted as its URL asks for: {0}")]
+    NoTls(String),
     /// A data folder with jobs in it cannot be used beside a database.
     #[error("{} holds the jobs of a service without a database; use another --data-dir beside --database-url", .0.display())]
     DataDirOfEmbedded(PathBuf),

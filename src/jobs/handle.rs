@@ -15,7 +15,6 @@ use crate::jobs::model::{Job, QueuePlace, State};
 use crate::jobs::options::Options;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::cluster::Bell;
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::list::{BatchFilter, Filter, Page};
 use crate::jobs::store::retention::{Deleted, Usage};
 use crate::jobs::worker::attempt_control::StopReason;
@@ -216,7 +215,7 @@ impl Jobs {
         }
         timeout(READY_WITHIN, self.shared.store.ready(false))
             .await
-            .unwrap_or_else(|_| Err(StoreError::timed_out()))?;
+            .unwrap_or_else(|_| Err(self.shared.silent_store()))?;
         self.shared.require_storage().await
     }
 }

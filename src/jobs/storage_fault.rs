@@ -6,6 +6,9 @@ use std::io;
 use crate::jobs::error::JobsError;
 use crate::jobs::store::error::StorageFault;
 
+/// What a folder is called in errors.
+const DISK: &str = "LocalFileSystem";
+
 impl JobsError {
     /// The fault of the storage behind this error, if that is what it is.
     #[must_use]
@@ -15,6 +18,12 @@ impl JobsError {
             JobsError::DataDir { source, .. } => of_io(source),
             JobsError::Blobs(object_store::Error::NotFound { .. }) => None,
             JobsError::Blobs(error) => {
+                let far =
+                    !matches!(error, object_store::Error::Generic { store, .. } if *store == DISK);
+                if far {
+                    // Whatever it is, it is not about the job.
+                    return Some(StorageFault::Unreachable);
+                }
                 let mut cause: Option<&(dyn Error + 'static)> = Some(error);
                 while let Some(error) = cause {
                     if let Some(error) = error.downcast_ref::<io::Error>() {
@@ -22,7 +31,6 @@ impl JobsError {
                     }
                     cause = error.source();
                 }
-                // Whatever it is, it is not about the job.
                 Some(StorageFault::Unwritable)
             }
             _ => None,
@@ -48,15 +56,20 @@ mod tests {
     #[test]
     fn wrapped_causes_are_recognised() {
         let wrapped = JobsError::Blobs(object_store::Error::Generic {
-            store: "a test",
+            store: DISK,
             source: Box::new(io::Error::from(io::ErrorKind::StorageFull)),
         });
         assert_eq!(wrapped.storage_fault(), Some(StorageFault::Full));
         let away = JobsError::Blobs(object_store::Error::Generic {
-            store: "a test",
+            store: DISK,
             source: Box::new(io::Error::from(io::ErrorKind::NotADirectory)),
         });
         assert_eq!(away.storage_fault(), Some(StorageFault::Unwritable));
+        let server = JobsError::Blobs(object_store::Error::Generic {
+            store: "S3",
+            source: Box::new(io::Error::from(io::ErrorKind::ConnectionRefused)),
+        });
+        assert_eq!(server.storage_fault(), Some(StorageFault::Unreachable));
         let gone = JobsError::Blobs(object_store::Error::NotFound {
             path: "a key".to_owned(),
             source: Box::new(io::Error::from(io::ErrorKind::NotFound)),

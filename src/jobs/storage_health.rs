@@ -9,6 +9,7 @@ use std::time::Duration;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::shared::Shared;
+use crate::jobs::store::error::{StorageFault, StoreError};
 
 /// Tries to write where the cause is not the disk, with pauses that double from [`FIRST_PAUSE`].
 const WRITE_TRIES: u32 = 6;
@@ -46,7 +47,13 @@ impl Shared {
             .swap(trouble.is_some(), Ordering::Relaxed);
         self.metrics.storage_failing(trouble.is_some());
         match trouble {
+            Some(StorageFault::Unreachable) if !before => {
+                tracing::error!("the database or the store of results cannot be reached");
+            }
             Some(trouble) if !before => tracing::error!(?trouble, "the disk takes nothing"),
+            None if before && self.store.cluster().is_some() => {
+                tracing::info!("the database takes data again");
+            }
             None if before => tracing::info!("the disk takes data again"),
             _ => {}
         }
@@ -79,6 +86,16 @@ impl Shared {
             }
             pause = (pause * 2).min(LONGEST_PAUSE);
             tries += 1;
+        }
+    }
+
+    /// The store does not answer in time.
+    pub(crate) fn silent_store(&self) -> StoreError {
+        match (StoreError::timed_out(), self.store.cluster()) {
+            (StoreError::Away(_, cause), Some(_)) => {
+                StoreError::Away(StorageFault::Unreachable, cause)
+            }
+            (error, _) => error,
         }
     }
 

@@ -361,6 +361,7 @@ async fn every_kind_of_problem_explains_itself() {
         include_str!("crowds.rs"),
         include_str!("errors.rs"),
         include_str!("order.rs"),
+        include_str!("database_away.rs"),
         include_str!("requests.rs"),
         include_str!("retention.rs"),
         include_str!("shares.rs"),

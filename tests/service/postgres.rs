@@ -17,22 +17,59 @@ use crate::support::skip;
 const STARTS_WITHIN: Duration = Duration::from_secs(60);
 
 struct Server {
+    /// Without TLS, which most tests have no use for.
     url: String,
+    /// Who signed its certificate, which is for `localhost`.
+    authority: Option<PathBuf>,
     /// The server ends with the standard input of this shell, however this process ends.
     _shell: Option<Child>,
 }
 
 /// URL of a server; `None`, said aloud, if there is none on this machine.
 pub fn server() -> Option<&'static str> {
+    Some(the_server()?.url.as_str())
+}
+
+fn the_server() -> Option<&'static Server> {
     static SERVER: OnceLock<Option<Server>> = OnceLock::new();
     let server = SERVER.get_or_init(|| match std::env::var("RAILHEAD_TEST_POSTGRES") {
-        Ok(url) => Some(Server { url, _shell: None }),
+        Ok(url) => Some(Server {
+            url,
+            authority: None,
+            _shell: None,
+        }),
         Err(_) => start(),
     });
     if server.is_none() {
         skip("there is no PostgreSQL here (Debian: apt-get install postgresql)");
     }
-    server.as_ref().map(|server| server.url.as_str())
+    server.as_ref()
+}
+
+/// The port of a server that speaks TLS as `localhost`, and the file with its authority.
+pub fn encrypted() -> Option<(&'static str, &'static Path)> {
+    let server = the_server()?;
+    let Some(authority) = &server.authority else {
+        skip("the certificate of the PostgreSQL that RAILHEAD_TEST_POSTGRES names is not known");
+        return None;
+    };
+    let (_, port) = server.url.rsplit_once(':')?;
+    Some((port.split('/').next()?, authority))
+}
+
+/// The port that a URL names, and what makes the same URL with another one.
+pub fn at_port(url: &str) -> (impl Fn(u16) -> String, u16) {
+    let (front, rest) = url.rsplit_once(':').expect("a URL with a port");
+    let (port, rest) = rest.split_once('/').expect("a URL with a database");
+    let number = port.parse().expect("a number");
+    let (front, rest) = (front.to_owned(), rest.to_owned());
+    (move |port| format!("{front}:{port}/{rest}"), number)
+}
+
+/// A URL with one more parameter.
+pub fn with_parameter(url: &str, parameter: &str) -> String {
+    let mark = if url.contains('?') { '&' } else { '?' };
+    format!("{url}{mark}{parameter}")
 }
 
 /// A database of its own in that server.
@@ -48,8 +85,9 @@ pub async fn database() -> Option<String> {
         .await
         .expect("a database");
     pool.close().await;
-    let (front, _) = url.rsplit_once('/').expect("a URL with a database");
-    Some(format!("{front}/{name}"))
+    let (address, query) = url.split_once('?').unwrap_or((url, ""));
+    let (front, _) = address.rsplit_once('/').expect("a URL with a database");
+    Some(format!("{front}/{name}?{query}"))
 }
 
 /// A schema of its own with the tables of the service, which is made faster than a database.
@@ -65,7 +103,7 @@ pub async fn schema() -> Option<String> {
         .await
         .expect("a schema");
     pool.close().await;
-    let url = format!("{url}?options=-c%20search_path%3D{name}");
+    let url = with_parameter(url, &format!("options=-c%20search_path%3D{name}"));
     migrate(&url).await.expect("tables");
     Some(url)
 }
@@ -116,6 +154,26 @@ fn shell(folder: &Path) -> Command {
     command
 }
 
+/// Writes a certificate for `localhost` with its key, and that of the authority that signed it.
+fn certify(folder: &Path) -> PathBuf {
+    use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, IsCa, KeyPair};
+    let mut authority = CertificateParams::new(Vec::new()).expect("no names");
+    authority.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
+    let authority = CertifiedIssuer::self_signed(authority, KeyPair::generate().expect("a key"))
+        .expect("an authority");
+    let key = KeyPair::generate().expect("a key");
+    let server = CertificateParams::new(vec!["localhost".to_owned()]).expect("a name");
+    let server = server.signed_by(&key, &authority).expect("a certificate");
+    let write = |name: &str, text: String| {
+        let path = folder.join(name);
+        std::fs::write(&path, text).expect("a file");
+        path
+    };
+    write("server.pem", server.pem());
+    write("server.key", key.serialize_pem());
+    write("authority.pem", authority.pem())
+}
+
 fn start() -> Option<Server> {
     let programs = programs()?;
     let folder = tempfile::Builder::new()
@@ -127,11 +185,12 @@ fn start() -> Option<Server> {
         .and_then(|listener| listener.local_addr())
         .expect("a port")
         .port();
-    // It ends as soon as its standard input does, and takes its data with it.
+    let authority = certify(&folder);
+    // Keys are refused that others may read. It ends as soon as its standard input does, and takes its data with it.
     let script = format!(
-        "cd '{data}' && '{bin}/initdb' -D db -U railhead -A trust -E UTF8 --no-locale -N > init.log 2>&1 && \
+        "cd '{data}' && mkdir tls && cp server.pem server.key tls && chmod 600 tls/server.key && '{bin}/initdb' -D db -U railhead -A trust -E UTF8 --no-locale -N > init.log 2>&1 && \
          {{ '{bin}/postgres' -D db -k '{data}' -c listen_addresses=127.0.0.1 -p {port} -c fsync=off \
-         -c max_connections=400 -c shared_buffers=64MB -c deadlock_timeout=200ms > log 2>&1 & }} && echo started && \
+         -c ssl=on -c ssl_cert_file='{data}/tls/server.pem' -c ssl_key_file='{data}/tls/server.key' -c max_connections=400 -c shared_buffers=64MB -c deadlock_timeout=200ms > log 2>&1 & }} && echo started && \
          read nothing; kill -QUIT $!; wait; rm -rf '{data}'",
         data = folder.display(),
         bin = programs.display(),
@@ -149,7 +208,7 @@ fn start() -> Option<Server> {
         "initdb failed in {}",
         folder.display()
     );
-    let url = format!("postgres://railhead@127.0.0.1:{port}/postgres");
+    let url = format!("postgres://railhead@127.0.0.1:{port}/postgres?sslmode=disable");
     let until = Instant::now() + STARTS_WITHIN;
     let ready = || {
         let mut asked = Command::new(programs.join("pg_isready"));
@@ -166,6 +225,7 @@ fn start() -> Option<Server> {
     }
     Some(Server {
         url,
+        authority: Some(authority),
         _shell: Some(child),
     })
 }

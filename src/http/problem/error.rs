@@ -235,14 +235,18 @@ impl From<JobsError> for ApiError {
     }
 }
 
-/// The disk cannot be written; the log has the message of the system.
+/// The storage takes nothing; the log has the message of the system.
 fn troubled(trouble: StorageFault, reason: &JobsError) -> ApiError {
-    tracing::warn!(%reason, "a request failed for want of a disk");
+    tracing::warn!(%reason, "a request failed for want of its storage");
     let (kind, what) = match trouble {
         StorageFault::Full => (ProblemKind::StorageFull, "the disk of the service is full"),
         StorageFault::Unwritable => (
             ProblemKind::StorageUnwritable,
             "the disk of the service cannot be written at the moment",
+        ),
+        StorageFault::Unreachable => (
+            ProblemKind::StorageUnreachable,
+            "the database or the store of results of the service cannot be reached at the moment",
         ),
     };
     ApiError::new(kind, what).after(DISK_RETRY_SECONDS)

@@ -64,6 +64,7 @@ kinds! {
     Internal 500 "internal" "The service failed" "Something went wrong inside the service; its log has the reason under the request id in the header `x-request-id`."
     QueueFull 503 "queue-full" "The queue is full" "The service holds as many unfinished jobs as it may; nothing was stored, try again after `Retry-After` seconds."
     StorageUnwritable 503 "storage-unwritable" "The disk cannot be written" "The disk of the service is read-only or fails, or its job table is locked by another process; nothing was stored, jobs already accepted are kept. Try again after `Retry-After` seconds."
+    StorageUnreachable 503 "storage-unreachable" "The storage cannot be reached" "The database that the nodes share, or the store of the results, does not answer or takes nothing; nothing was stored, jobs already accepted are kept. Try again after `Retry-After` seconds."
     StorageFull 507 "storage-full" "The disk is full" "The disk of the service has no room for another job; nothing was stored, jobs already accepted are kept. Try again after `Retry-After` seconds."
     Draining 503 "draining" "The service is shutting down" "The service takes no new jobs because it is shutting down; jobs already accepted are kept. Try again after `Retry-After` seconds."
     Overloaded 503 "overloaded" "The service has too much to do" "The memory or the turns for requests of this kind are taken, or every connection has a request under way; nothing was done. Try again after `Retry-After` seconds."
@@ -87,6 +88,7 @@ impl ProblemKind {
                 | ProblemKind::QuotaExceeded
                 | ProblemKind::QueueFull
                 | ProblemKind::StorageUnwritable
+                | ProblemKind::StorageUnreachable
                 | ProblemKind::StorageFull
                 | ProblemKind::Draining
                 | ProblemKind::Overloaded

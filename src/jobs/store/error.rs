@@ -10,8 +10,10 @@ use thiserror::Error;
 pub enum StorageFault {
     /// No space is left, or a quota is used up.
     Full,
-    /// It is read-only, fails, is damaged, is locked by another process, or cannot be reached.
+    /// It is read-only, fails, is damaged, or is locked by another process.
     Unwritable,
+    /// It is on another machine, and does not answer or takes nothing.
+    Unreachable,
 }
 
 /// A call of a store failed and changed nothing. Clones share the cause.

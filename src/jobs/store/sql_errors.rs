@@ -17,7 +17,9 @@ impl From<sqlx::Error> for StoreError {
                 let read = if shared { of_state } else { of_code };
                 cause.code().and_then(|code| read(&code))
             }
-            sqlx::Error::PoolTimedOut | sqlx::Error::PoolClosed => Some(StorageFault::Unwritable),
+            sqlx::Error::PoolTimedOut | sqlx::Error::PoolClosed | sqlx::Error::Tls(_) => {
+                Some(StorageFault::Unwritable)
+            }
             sqlx::Error::Io(source) => of_io(source).or_else(|| of_connection(source)),
             _ => None,
         };
@@ -43,6 +45,8 @@ fn of_connection(error: &std::io::Error) -> Option<StorageFault> {
         | ErrorKind::NotConnected
         | ErrorKind::BrokenPipe
         | ErrorKind::UnexpectedEof
+        // A certificate that is no longer accepted.
+        | ErrorKind::InvalidData
         | ErrorKind::TimedOut
         | ErrorKind::HostUnreachable
         | ErrorKind::NetworkUnreachable => Some(StorageFault::Unwritable),

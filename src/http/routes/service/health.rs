@@ -45,7 +45,7 @@ pub async fn alive() -> Json<Health> {
 
 problems! {
     /// What `GET /readyz` can fail with.
-    ReadyProblems: NotReady, Draining, StorageFull, StorageUnwritable
+    ReadyProblems: NotReady, Draining, StorageFull, StorageUnwritable, StorageUnreachable
 }
 
 /// Can the service take jobs? Asks the job store.

@@ -1,6 +1,6 @@
 //! Connections to PostgreSQL, and the locks that nodes take there.
 
-use std::str::FromStr;
+use std::io::ErrorKind;
 use std::time::Duration;
 
 use sqlx::Connection;
@@ -9,6 +9,7 @@ use tokio::time::timeout;
 
 use crate::jobs::error::JobsError;
 use crate::jobs::store::error::StoreError;
+use crate::jobs::store::postgres::url;
 
 /// How long a call waits for a connection.
 const CONNECT_WITHIN: Duration = Duration::from_secs(5);
@@ -37,25 +38,37 @@ pub(crate) const SCHEMA: i32 = 3;
 /// Connects to a database, whatever is in it.
 ///
 /// # Errors
-/// [`JobsError::BadDatabaseUrl`], or it cannot be reached.
+/// [`JobsError::BadDatabaseUrl`], [`JobsError::NoTls`], or it cannot be reached.
 pub(crate) async fn connect(
     url: &str,
     connections: u32,
 ) -> Result<(PgConnectOptions, PgPool), JobsError> {
-    let options = PgConnectOptions::from_str(url)
-        .map_err(|error| JobsError::BadDatabaseUrl(error.to_string()))?
+    let options = url::read(url)?
         .application_name("railhead")
         .statement_cache_capacity(STATEMENTS_KEPT)
         .options(SESSION);
     // A pool tries again until its time is over, and then no longer knows why.
     let first = timeout(CONNECT_WITHIN, PgConnection::connect_with(&options)).await;
-    first.map_err(|_| StoreError::timed_out())??.close().await?;
+    let first = first.map_err(|_| StoreError::timed_out())?;
+    first.map_err(tls_failed)?.close().await?;
     let pool = PgPoolOptions::new()
         .max_connections(connections)
         .acquire_timeout(CONNECT_WITHIN)
         .connect_with(options.clone())
         .await?;
     Ok((options, pool))
+}
+
+/// A connection that is not encrypted as the URL asks, or whose other end cannot be trusted, is no server that is away.
+fn tls_failed(error: sqlx::Error) -> JobsError {
+    match error {
+        sqlx::Error::Tls(cause) => JobsError::NoTls(cause.to_string()),
+        // What the handshake says of a certificate that it does not accept.
+        sqlx::Error::Io(cause) if cause.kind() == ErrorKind::InvalidData => {
+            JobsError::NoTls(cause.to_string())
+        }
+        other => other.into(),
+    }
 }
 
 /// From here to the end of the transaction nobody else has this lock.

@@ -8,7 +8,7 @@ use tokio::time::timeout;
 use uuid::Uuid;
 
 use crate::jobs::store::cluster::Cluster;
-use crate::jobs::store::error::StoreError;
+use crate::jobs::store::error::{StorageFault, StoreError};
 use crate::jobs::store::postgres::connection::{ADMISSION, FOLD, LOCKS, lock};
 use crate::jobs::store::postgres::database::PostgresStore;
 
@@ -134,12 +134,22 @@ pub(crate) async fn again<T, F: Future<Output = Result<T, StoreError>>>(
 ) -> Result<T, StoreError> {
     for _ in 0..REPEATED {
         match timeout(ANSWERED_WITHIN, call()).await {
-            Err(_) => return Err(StoreError::timed_out()),
+            Err(_) => return Err(far(StoreError::timed_out())),
             Ok(Err(error)) if gave_way(&error) => tracing::debug!(%error, "made again"),
-            Ok(answer) => return answer,
+            Ok(answer) => return answer.map_err(far),
         }
     }
-    call().await
+    call().await.map_err(far)
+}
+
+/// A server that takes nothing is no disk that takes nothing: the answer to clients says which.
+fn far(error: StoreError) -> StoreError {
+    match error {
+        StoreError::Away(StorageFault::Unwritable, cause) => {
+            StoreError::Away(StorageFault::Unreachable, cause)
+        }
+        other => other,
+    }
 }
 
 fn gave_way(error: &StoreError) -> bool {

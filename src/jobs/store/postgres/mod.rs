@@ -21,3 +21,4 @@ pub mod schema;
     reason = "the shared statements are compiled once for each database"
 )]
 pub mod sql;
+pub(crate) mod url;

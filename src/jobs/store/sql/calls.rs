@@ -26,7 +26,7 @@ use crate::jobs::store::{KeyStore, Store};
 #[async_trait]
 impl Store for SqlStore {
     async fn ready(&self, write: bool) -> Result<(), StoreError> {
-        self.ready(write).await
+        engine::again(|| self.ready(write)).await
     }
 
     async fn stats(&self) -> Result<Stats, StoreError> {
