@@ -25,7 +25,7 @@ pub enum Command {
     Serve(ServeArgs),
     /// Solve what is submitted to other nodes of the same database; takes the flags of `serve` and answers probes only.
     Worker(ServeArgs),
-    /// Make the job table in a database that several nodes share; changes nothing if it is there.
+    /// Make the job table in a database that several nodes share, or bring it forward to this version.
     Migrate(DatabaseUrlArgs),
     /// Tell how the database is that several nodes share; exit code 1 if something is wrong.
     Doctor(DatabaseUrlArgs),

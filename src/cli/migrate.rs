@@ -9,12 +9,13 @@ use crate::cli::output::print;
 use crate::jobs::store::postgres::doctor::examine;
 use crate::jobs::store::postgres::schema::{Migrated, migrate};
 
-/// Makes the job table, if it is not there.
+/// Makes the job table, or brings it forward.
 pub(super) fn run(args: &DatabaseUrlArgs) -> anyhow::Result<ExitCode> {
     let made = runtime()?.block_on(migrate(&args.database_url))?;
     print(match made {
         Migrated::Made => "the job table was made",
-        Migrated::WasThere => "the job table is there, in the version of this program",
+        Migrated::Advanced => "the job table was brought forward to the version of this program",
+        Migrated::WasThere => "the job table is there, in a version that this program can use",
     })
 }
 

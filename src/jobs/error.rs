@@ -113,8 +113,8 @@ pub enum JobsError {
     TableDamaged(String),
     /// The data folder was written by another version.
     #[error(
-        "the job table was written by another version of railhead, and data folders are not carried over between versions; \
-         use a new data folder, or the version that wrote this one"
+        "the job table was written by another version of railhead that this one cannot go on with; use a new data folder or \
+         database, or that version"
     )]
     OtherForm,
     /// What names the database is no such name.
@@ -133,6 +133,11 @@ pub enum JobsError {
         "there is no job table in the database yet: run `railhead migrate --database-url …` once"
     )]
     NotMigrated,
+    /// The tables in the database are those of an earlier version.
+    #[error(
+        "the job table in the database is that of an earlier version: run `railhead migrate --database-url …` of this version once"
+    )]
+    OldTables,
     /// Reading or writing a stored result failed.
     #[error("the stored results failed: {0}")]
     Blobs(#[from] object_store::Error),

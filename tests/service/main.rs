@@ -43,6 +43,7 @@ mod manners;
 #[cfg(target_os = "linux")]
 mod memory;
 mod metrics;
+mod migrations;
 mod model;
 mod nodes;
 mod order;

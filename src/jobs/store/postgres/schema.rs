@@ -1,29 +1,56 @@
-//! The schema of the shared job table: made once by a command of the operator, required by every node.
+//! The schema of the shared job table: made and brought forward by a command of the operator, required by every node.
+//!
+//! `schema.sql` is its first form. Every later one is a step of its own, so that a database in use is brought forward; a step is one
+//! transaction. Nodes of the version before go on beside newer tables as long as a step leaves what they use: it says from which
+//! form on programs can do so. What such a step leaves behind is removed by a step of the next version.
 
+use sqlx::PgConnection;
 use sqlx::postgres::PgPool;
 
 use crate::jobs::error::JobsError;
 use crate::jobs::store::postgres::connection::{self, connect, lock};
 
-/// The statements that make an empty schema a job table.
+/// The statements that make an empty schema a job table of form 1.
 const SCHEMA: &str = include_str!("schema.sql");
 
-/// The version of `schema.sql` that is read and written; it grows with every change of that file.
-const FORM: i64 = 1;
+/// A change of the tables.
+struct Step {
+    /// The form that it leads to.
+    form: i64,
+    statements: &'static str,
+    /// The oldest form whose programs can use the tables afterwards.
+    readable_from: i64,
+}
+
+/// What is done to tables of an earlier form, in this order. A step that has landed is never changed.
+const STEPS: &[Step] = &[Step {
+    form: 2,
+    statements: include_str!("steps/2.sql"),
+    readable_from: 2,
+}];
+
+/// The form that is read and written.
+const FORM: i64 = STEPS[STEPS.len() - 1].form;
+
+/// The form without a step.
+const FIRST_FORM: i64 = 1;
 
 /// What [`migrate`] did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Migrated {
     /// The tables were made.
     Made,
+    /// They were there, in an earlier form.
+    Advanced,
     /// They were there.
     WasThere,
 }
 
-/// Makes the tables in the first schema of the search path, if they are not there. Several may do so at once.
+/// Makes the tables in the first schema of the search path, or brings them forward to the form of this program. Several may do so
+/// at once.
 ///
 /// # Errors
-/// [`JobsError::OtherForm`] if there are tables of another version, or the database failed.
+/// [`JobsError::OtherForm`] if there are tables that this program cannot use, or the database failed.
 pub async fn migrate(url: &str) -> Result<Migrated, JobsError> {
     let (_, pool) = connect(url, 1).await?;
     let made = make(&pool).await;
@@ -35,42 +62,69 @@ async fn make(pool: &PgPool) -> Result<Migrated, JobsError> {
     let mut transaction = pool.begin().await?;
     // Ends with the transaction: a lock of the session would not pass a pooler.
     lock(&mut transaction, connection::SCHEMA).await?;
-    if is_there(&mut transaction).await? {
-        drop(transaction);
-        require(pool).await?;
+    let before = form(&mut transaction).await?;
+    if before.is_some_and(|form| form >= FORM) {
+        require_within(&mut transaction).await?;
         return Ok(Migrated::WasThere);
     }
-    sqlx::raw_sql(SCHEMA).execute(&mut *transaction).await?;
-    sqlx::query("INSERT INTO deployment (one, form) VALUES (1, $1)")
-        .bind(FORM)
-        .execute(&mut *transaction)
-        .await?;
+    if before.is_none() {
+        sqlx::raw_sql(SCHEMA).execute(&mut *transaction).await?;
+        sqlx::query("INSERT INTO deployment (one, form) VALUES (1, $1)")
+            .bind(FIRST_FORM)
+            .execute(&mut *transaction)
+            .await?;
+    }
+    let reached = before.unwrap_or(FIRST_FORM);
+    for step in STEPS.iter().filter(|step| step.form > reached) {
+        sqlx::raw_sql(step.statements)
+            .execute(&mut *transaction)
+            .await?;
+        sqlx::query("UPDATE deployment SET form = $1, readable_from = $2")
+            .bind(step.form)
+            .bind(step.readable_from)
+            .execute(&mut *transaction)
+            .await?;
+    }
     transaction.commit().await?;
-    Ok(Migrated::Made)
+    Ok(match before {
+        None => Migrated::Made,
+        Some(_) => Migrated::Advanced,
+    })
 }
 
-/// Requires that the tables are there in this version; changes nothing.
+/// Requires tables that this program can use; changes nothing.
 ///
 /// # Errors
-/// [`JobsError::NotMigrated`], [`JobsError::OtherForm`], or the database failed.
+/// [`JobsError::NotMigrated`], [`JobsError::OldTables`], [`JobsError::OtherForm`], or the database failed.
 pub(crate) async fn require(pool: &PgPool) -> Result<(), JobsError> {
     let mut connection = pool.acquire().await?;
-    if !is_there(&mut connection).await? {
+    require_within(&mut connection).await
+}
+
+async fn require_within(connection: &mut PgConnection) -> Result<(), JobsError> {
+    let Some(form) = form(&mut *connection).await? else {
         return Err(JobsError::NotMigrated);
+    };
+    if form < FORM {
+        return Err(JobsError::OldTables);
     }
-    let form: i64 = sqlx::query_scalar("SELECT form FROM deployment")
-        .fetch_one(&mut *connection)
+    let readable_from: i64 = sqlx::query_scalar("SELECT readable_from FROM deployment")
+        .fetch_one(connection)
         .await?;
-    match form == FORM {
+    match readable_from <= FORM {
         true => Ok(()),
         false => Err(JobsError::OtherForm),
     }
 }
 
-async fn is_there(connection: &mut sqlx::PgConnection) -> Result<bool, JobsError> {
-    Ok(
-        sqlx::query_scalar("SELECT to_regclass('deployment') IS NOT NULL")
-            .fetch_one(connection)
-            .await?,
-    )
+/// The form of the tables, if there are any.
+async fn form(connection: &mut PgConnection) -> Result<Option<i64>, JobsError> {
+    let there: bool = sqlx::query_scalar("SELECT to_regclass('deployment') IS NOT NULL")
+        .fetch_one(&mut *connection)
+        .await?;
+    if !there {
+        return Ok(None);
+    }
+    let form = sqlx::query_scalar("SELECT form FROM deployment");
+    Ok(form.fetch_optional(connection).await?)
 }
