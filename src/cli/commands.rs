@@ -8,7 +8,7 @@ use clap::{Args, CommandFactory, Parser, Subcommand};
 use crate::cli::case_args::CaseArgs;
 use crate::cli::database_args::{DatabaseArgs, DatabaseUrlArgs};
 use crate::cli::serve_args::ServeArgs;
-use crate::cli::values::address;
+use crate::cli::values::{address, bound_label};
 
 /// Rolling-contact stress service: tractions, stick and slip zones and forces between wheel and rail.
 #[derive(Debug, Parser)]
@@ -79,9 +79,12 @@ pub enum KeysAction {
         /// What the key is for.
         #[arg(long, value_name = "TEXT")]
         name: Option<String>,
-        /// The key reads what is the tenant's and checks cases, but makes, cancels and deletes nothing.
+        /// The key reads what is the tenant's checks cases and evaluates rows, but makes, cancels and deletes nothing.
         #[arg(long)]
         read_only: bool,
+        /// The key opens only jobs and batches with this label, and what it makes gets it; may be given up to 8 times.
+        #[arg(long = "label", value_name = "KEY:VALUE", value_parser = bound_label)]
+        labels: Vec<(String, String)>,
         /// Data folder of the service.
         #[arg(
             long,

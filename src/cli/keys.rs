@@ -6,6 +6,7 @@ use anyhow::{Context, bail};
 
 use crate::cli::commands::{KeysAction, KeysArgs};
 use crate::cli::output::{print, print_error};
+use crate::jobs::keys::bound::{BOUND_MAX, Labels};
 use crate::jobs::keys::key::Key;
 use crate::jobs::keys::keyring::Keyring;
 
@@ -42,9 +43,13 @@ async fn act(args: &KeysArgs) -> anyhow::Result<ExitCode> {
             tenant,
             name,
             read_only,
+            labels,
             ..
         } => {
-            let (key, secret) = keys.create(tenant, name.clone(), *read_only).await?;
+            let labels = bound_labels(labels)?;
+            let (key, secret) = keys
+                .create(tenant, name.clone(), *read_only, labels)
+                .await?;
             print_error(&format!(
                 "key {} of tenant {} in {} follows; it is shown this one time",
                 key.id, key.tenant, place
@@ -61,21 +66,42 @@ async fn act(args: &KeysArgs) -> anyhow::Result<ExitCode> {
     done
 }
 
+/// The labels of a new key, each key once.
+fn bound_labels(given: &[(String, String)]) -> anyhow::Result<Labels> {
+    let labels: Labels = given.iter().cloned().collect();
+    if labels.len() < given.len() || labels.len() > BOUND_MAX {
+        bail!(
+            "{} labels are given; at most {BOUND_MAX} with different keys are allowed",
+            given.len()
+        );
+    }
+    Ok(labels)
+}
+
+fn labels_text(labels: &Labels) -> String {
+    if labels.is_empty() {
+        return "-".to_owned();
+    }
+    let words = labels.iter().map(|(key, value)| format!("{key}:{value}"));
+    words.collect::<Vec<_>>().join(",")
+}
+
 /// One line per key, columns separated by tabs.
 fn table(keys: &[Key]) -> String {
     let time = |epoch_ms: i64| {
         jiff::Timestamp::from_millisecond(epoch_ms)
             .map_or_else(|_| epoch_ms.to_string(), |time| format!("{time:.0}"))
     };
-    let mut lines = vec!["id\ttenant\tcreated\trevoked\tmay\tname".to_owned()];
+    let mut lines = vec!["id\ttenant\tcreated\trevoked\tmay\tlabels\tname".to_owned()];
     lines.extend(keys.iter().map(|key| {
         format!(
-            "{}\t{}\t{}\t{}\t{}\t{}",
+            "{}\t{}\t{}\t{}\t{}\t{}\t{}",
             key.id,
             key.tenant,
             time(key.created_at),
             key.revoked_at.map_or_else(|| "-".to_owned(), time),
             if key.read_only { "read" } else { "all" },
+            labels_text(&key.labels),
             // Escaped, so that a name cannot send control sequences to the operator's terminal.
             key.name.as_deref().unwrap_or("-").escape_debug()
         )

@@ -3,6 +3,9 @@
 use std::net::SocketAddr;
 use std::time::Duration;
 
+use crate::http::extract::labels;
+use crate::http::extract::query::ReadTexts;
+
 /// How long ended jobs are kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Retention(pub Option<Duration>);
@@ -75,6 +78,14 @@ pub fn address(text: &str) -> Result<SocketAddr, String> {
         "allowed is an IP address with a port, such as `127.0.0.1:8080`, `0.0.0.0:8080` or `[::1]:8080`; names are not looked up"
             .to_owned()
     })
+}
+
+/// Reads a label of a key, by the rule for labels of cases.
+pub fn bound_label(text: &str) -> Result<(String, String), String> {
+    let label = labels::new_label();
+    label
+        .read(&[text])
+        .map_err(|(_, allowed)| allowed.to_owned())
 }
 
 /// Reads a time of at least a millisecond, and not above a day, in s.

@@ -40,7 +40,8 @@ const MEMBERS: [(&str, usize, Option<usize>); 3] = [
 ];
 
 /// Members that are lists of so many numbers, or lists of those.
-const TUPLES: [(&str, &str, usize); 22] = [
+const TUPLES: [(&str, &str, usize); 30] = [
+    ("ArchardFigures", "speeds_mm_per_s", 2),
     ("CrossSection", "points_mm", 2),
     ("FirstTouch", "rail_mm", 2),
     ("FirstTouch", "track_mm", 3),
@@ -62,7 +63,14 @@ const TUPLES: [(&str, &str, usize); 22] = [
     ("Position", "track_mm", 3),
     ("Position", "wheel_mm", 2),
     ("ProfileQuality", "y_mm", 2),
+    ("RemarkEntry", "also_at_points", 2),
     ("SectionQuality", "y_mm", 2),
+    ("StressPoint", "at_mm", 3),
+    ("StressPoint", "principal_mpa", 3),
+    ("StressPoint", "shear_direction", 3),
+    ("StressPoint", "shear_plane_normal", 3),
+    ("Subsurface", "points_mm", 3),
+    ("TemperatureSummary", "at_mm", 2),
 ];
 
 /// Says all of it.

@@ -11,6 +11,7 @@ use crate::contact::case::problem::CheckedCase;
 use crate::contact::error::CaseError;
 use crate::jobs::batch::model::Batch;
 use crate::jobs::error::JobsError;
+use crate::jobs::keys::bound::Labels;
 use crate::jobs::model::{Job, QueuePlace, State};
 use crate::jobs::options::Options;
 use crate::jobs::shared::Shared;
@@ -36,6 +37,8 @@ pub struct Jobs {
     pub(crate) shared: Arc<Shared>,
     /// Whose jobs this handle makes and sees.
     pub(crate) tenant: Arc<str>,
+    /// What this handle sees carries these labels, and what it makes gets them.
+    pub(crate) bound: Arc<Labels>,
 }
 
 impl Jobs {
@@ -45,6 +48,7 @@ impl Jobs {
         Jobs {
             shared: self.shared.clone(),
             tenant,
+            bound: Arc::default(),
         }
     }
 
@@ -75,6 +79,7 @@ impl Jobs {
     pub async fn get(&self, id: Uuid) -> Result<Job, JobsError> {
         let job = self.shared.store.job(&self.tenant, id).await?;
         match job {
+            Some(job) if !self.sees(&job.labels) => Err(JobsError::NotFound),
             Some(job) => self.unexpired(job),
             None => Err(self.missing(id, JobsError::NotFound).await),
         }
@@ -122,6 +127,10 @@ impl Jobs {
             None => None,
         };
         let store = &self.shared.store;
+        let filter = &Filter {
+            labels: self.narrowed(&filter.labels),
+            ..filter.clone()
+        };
         let mut page = store
             .list(&self.tenant, filter, after, limit.clamp(1, PAGE_MAX))
             .await?;
@@ -158,6 +167,10 @@ impl Jobs {
         };
         let limit = limit.clamp(1, BATCH_PAGE_MAX);
         let store = &self.shared.store;
+        let filter = &BatchFilter {
+            labels: self.narrowed(&filter.labels),
+            ..filter.clone()
+        };
         Ok(store.batches(&self.tenant, filter, after, limit).await?)
     }
 

@@ -74,6 +74,7 @@ impl Jobs {
         let (ended, _) = broadcast::channel(1024);
         let jobs = Jobs {
             tenant: ANONYMOUS.into(),
+            bound: Arc::default(),
             shared: Arc::new(Shared {
                 node: Node {
                     id: Uuid::now_v7(),

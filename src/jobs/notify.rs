@@ -104,6 +104,7 @@ impl Jobs {
             .at(&self.tenant, id, age, look)
             .await?;
         match job {
+            Some(job) if !self.sees(&job.labels) => Err(JobsError::NotFound),
             Some(job) => self.unexpired(job),
             None => Err(self.missing(id, JobsError::NotFound).await),
         }
@@ -118,6 +119,7 @@ impl Jobs {
             .at(&self.tenant, id, age, look)
             .await?;
         match batch {
+            Some(batch) if !self.sees(&batch.labels) => Err(JobsError::BatchNotFound),
             Some(batch) => Ok(batch),
             None => Err(self.missing(id, JobsError::BatchNotFound).await),
         }

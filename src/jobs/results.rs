@@ -219,6 +219,9 @@ impl Jobs {
         let Some((job, stored)) = found else {
             return Err(self.missing(id, JobsError::NotFound).await);
         };
+        if !self.sees(&job.labels) {
+            return Err(JobsError::NotFound);
+        }
         let job = self.unexpired(job)?;
         match stored {
             Some(stored) => Ok((job, stored)),

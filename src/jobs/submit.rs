@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::words::solver::Output;
+use crate::contact::error::CaseError;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::idempotency;
@@ -71,7 +72,7 @@ impl Jobs {
         // not take the cores from them either.
         let turn = self.shared.checks.acquire().await;
         let read = tokio::task::spawn_blocking(move || {
-            let digest = || options.digest(&idempotency::digest(&case));
+            let digest = || jobs.bound_digest(options.digest(&idempotency::digest(&case)));
             let idempotency = idempotency_key.map(|key| (key, digest()));
             (jobs.check(&case), serde_json::to_vec(&case), idempotency)
         });
@@ -92,7 +93,8 @@ impl Jobs {
                 answer => return answer,
             }
         }
-        let checked = checked?;
+        let mut checked = checked?;
+        self.bind(&mut checked.label.labels).map_err(CaseError)?;
         let body = Bytes::from(body.map_err(|error| JobsError::Damaged(error.to_string()))?);
         let mut new = NewJob {
             idempotency,

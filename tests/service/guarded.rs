@@ -1,5 +1,7 @@
 //! A service that asks for keys, with some made.
 
+use std::collections::BTreeMap;
+
 use railhead::jobs::Options;
 use railhead::jobs::keys::keyring::Keyring;
 use reqwest::Method;
@@ -21,7 +23,12 @@ impl Guarded {
         change(&mut setup.options);
         setup.http.anonymous = false;
         let keys = Keyring::open(&setup.options.data_dir).await.unwrap();
-        let make = async |tenant: &str| keys.create(tenant, None, false).await.unwrap().1;
+        let make = async |tenant: &str| {
+            keys.create(tenant, None, false, BTreeMap::new())
+                .await
+                .unwrap()
+                .1
+        };
         let (north, south) = (make("north").await, make("south").await);
         let operator = make("operator").await;
         let server = setup.start().await;

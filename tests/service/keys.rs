@@ -5,7 +5,7 @@ use std::process::Output;
 use std::time::{Duration, Instant};
 
 use reqwest::Method;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::server::Server;
 use crate::support::{Service, endless_case, pause, railhead};
@@ -63,10 +63,9 @@ async fn a_key_works_at_once_and_is_refused_seconds_after_it_was_revoked() {
     }
     let list = String::from_utf8(keys(folder.path(), &["list"]).stdout).unwrap();
     let line = list.lines().find(|line| line.starts_with(id)).unwrap();
-    assert!(
-        line.contains("\tnorth\t") && !line.contains("\t-\t"),
-        "{line}"
-    );
+    let columns: Vec<&str> = line.split('\t').collect();
+    assert_eq!((columns[1], columns[5]), ("north", "-"), "{line}");
+    assert_ne!(columns[3], "-", "{line}");
     let unknown = keys(folder.path(), &["revoke", "000000000000"]);
     assert_eq!(unknown.status.code(), Some(1));
 
@@ -81,6 +80,79 @@ async fn a_key_works_at_once_and_is_refused_seconds_after_it_was_revoked() {
             .any(|part| part == secret.as_bytes());
         assert!(!found, "{}", file.display());
     }
+}
+
+#[tokio::test]
+async fn a_key_bound_to_a_label_opens_only_what_carries_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &[]);
+    let all = make_key(folder.path(), "north");
+    let flags = ["create", "--tenant", "north", "--label", "line:7"];
+    let made = String::from_utf8(keys(folder.path(), &flags).stdout).unwrap();
+    let bound = made.trim();
+    let ask = async |key: &str, method: Method, path: &str, body: Option<&Value>| {
+        let mut request = service.request(method.clone(), path).bearer_auth(key);
+        if method == Method::POST && path.ends_with("/jobs") {
+            request = request.header("idempotency-key", "one-of-all");
+        }
+        let request = match body {
+            Some(body) => request.json(body),
+            None => request,
+        };
+        let answer = request.send().await.unwrap();
+        (
+            answer.status().as_u16(),
+            answer.json().await.unwrap_or(Value::Null),
+        )
+    };
+    let (get, post) = (Method::GET, Method::POST);
+    let mut case = crate::support::case("on a line");
+    let (status, other) = ask(&all, post.clone(), "/v1/jobs", Some(&case)).await;
+    assert_eq!(status, 202, "{other}");
+    let other = other["links"]["self"].as_str().expect("a job").to_owned();
+    // The same key of idempotency and the same case: nothing of another line may be answered.
+    let (status, conflict) = ask(bound, post.clone(), "/v1/jobs", Some(&case)).await;
+    assert_eq!(status, 422, "{conflict}");
+    for path in [&other, &format!("{other}/case"), &format!("{other}/result")] {
+        assert_eq!(ask(bound, get.clone(), path, None).await.0, 404, "{path}");
+    }
+    let cancel = format!("{other}/cancel");
+    assert_eq!(ask(bound, post.clone(), &cancel, None).await.0, 404);
+    assert_eq!(ask(bound, Method::DELETE, &other, None).await.0, 404);
+
+    case["labels"] = json!({ "line": "8" });
+    let mut own = case.clone();
+    own["labels"] = json!({ "km": "12.4" });
+    let cases = json!([case, own]);
+    let (status, refused) = ask(bound, post.clone(), "/v1/batches", Some(&cases)).await;
+    assert_eq!(status, 422, "{refused}");
+    let fault = &refused["errors"][0];
+    assert!(fault.to_string().contains("/labels/line"), "{refused}");
+    let path = "/v1/batches?on_invalid=skip";
+    let (status, batch) = ask(bound, post.clone(), path, Some(&cases)).await;
+    assert_eq!((status, &batch["rejected"]), (202, &json!(1)), "{batch}");
+    let batch = batch["links"]["self"].as_str().unwrap();
+    let (_, list) = ask(bound, get.clone(), "/v1/jobs", None).await;
+    let jobs = list["jobs"].as_array().expect("jobs");
+    assert_eq!(jobs.len(), 1, "{list}");
+    assert_eq!(jobs[0]["labels"], json!({ "line": "7", "km": "12.4" }));
+    let (_, batches) = ask(bound, get.clone(), "/v1/batches", None).await;
+    assert_eq!(batches["batches"][0]["labels"], json!({ "line": "7" }));
+    let (_, me) = ask(bound, get.clone(), "/v1/me", None).await;
+    assert_eq!(me["labels"], json!({ "line": "7" }));
+    // The tenant's other keys see both.
+    let (_, list) = ask(&all, get.clone(), "/v1/jobs", None).await;
+    assert_eq!(list["jobs"].as_array().map(Vec::len), Some(2));
+    let (_, own) = ask(
+        &all,
+        post,
+        "/v1/batches",
+        Some(&json!([crate::support::case("x")])),
+    )
+    .await;
+    let own = own["links"]["self"].as_str().unwrap();
+    assert_eq!(ask(bound, get.clone(), own, None).await.0, 404);
+    assert_eq!(ask(bound, get, batch, None).await.0, 200);
 }
 
 #[tokio::test]

@@ -35,6 +35,7 @@ mod guarded;
 mod guides;
 #[cfg(target_os = "linux")]
 mod held_solver;
+mod http2;
 mod keys;
 mod leases;
 mod maintenance;

@@ -61,8 +61,10 @@ where
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
         let access = Access::from_ref(state);
-        let tenant = access.tenant(parts).await?;
-        let tenant = tenant.unwrap_or_else(|| ANONYMOUS.into());
+        let (tenant, labels) = match access.key(parts).await? {
+            Some(key) => (key.tenant, key.labels),
+            None => (ANONYMOUS.into(), Arc::default()),
+        };
         if let Some(held) = parts.extensions.get::<HeldShares>() {
             held.add(ConcurrencyLimits::from_ref(state).request(&tenant)?);
         }
@@ -72,7 +74,7 @@ where
             let credential = Credential(key.into());
             parts.extensions.insert(credential);
         }
-        Ok(Caller(access.jobs.of(tenant)))
+        Ok(Caller(access.jobs.of(tenant).bound_to(labels)))
     }
 }
 
@@ -84,8 +86,8 @@ where
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
         let access = Access::from_ref(state);
-        match access.tenant(parts).await? {
-            Some(tenant) if *tenant != *OPERATOR => Err(ApiError::new(
+        match access.key(parts).await? {
+            Some(key) if *key.tenant != *OPERATOR => Err(ApiError::new(
                 ProblemKind::Forbidden,
                 format!("only keys of the tenant `{OPERATOR}` may read this"),
             )),

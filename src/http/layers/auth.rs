@@ -1,7 +1,5 @@
 //! Whose request is it? API keys and their tenants.
 
-use std::sync::Arc;
-
 use axum::http::request::Parts;
 use axum::http::{Method, header};
 use tracing::field::display;
@@ -13,9 +11,10 @@ use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::http::server::connection::Peer;
 use crate::jobs::Jobs;
+use crate::jobs::keys::key::Key;
 
-/// The one path where a body is sent and nothing is changed.
-const CHECK: &str = "/v1/cases/check";
+/// Paths where a body is sent and nothing is changed.
+const QUESTIONS: [&str; 2] = ["/v1/cases/check", "/v1/evaluate"];
 
 /// Who may ask, and how often; clones share it.
 #[derive(Debug, Clone)]
@@ -39,11 +38,11 @@ impl Access {
         }
     }
 
-    /// The tenant that a request belongs to; `None` for a request without a key where that is allowed.
+    /// The key of a request; `None` for a request without a key where that is allowed.
     ///
     /// # Errors
     /// `unauthorized`, `too-many-requests`, or what [`Guard::require_direct`] says.
-    pub async fn tenant(&self, parts: &Parts) -> Result<Option<Arc<str>>, ApiError> {
+    pub async fn key(&self, parts: &Parts) -> Result<Option<Key>, ApiError> {
         let mut given = parts.headers.get_all(header::AUTHORIZATION).iter();
         let peer = parts.extensions.get::<Peer>().copied();
         let left = parts.extensions.get::<RateLeft>();
@@ -79,20 +78,20 @@ impl Access {
         span.record("tenant", display(&key.tenant));
         span.record("key", display(&key.id));
         self.rate
-            .require_turn(RateKey::Key(key.id), "this key", left)?;
+            .require_turn(RateKey::Key(key.id.clone()), "this key", left)?;
         if key.read_only && changes(parts) {
             return Err(ApiError::new(
                 ProblemKind::Forbidden,
                 "this key may only read; make, cancel and delete jobs with another key of the tenant",
             ));
         }
-        Ok(Some(key.tenant))
+        Ok(Some(key))
     }
 }
 
-/// Would this request change anything? Checking a case does not.
+/// Would this request change anything? Checking a case and evaluating rows does not.
 fn changes(parts: &Parts) -> bool {
-    !matches!(parts.method, Method::GET | Method::HEAD) && parts.uri.path() != CHECK
+    !matches!(parts.method, Method::GET | Method::HEAD) && !QUESTIONS.contains(&parts.uri.path())
 }
 
 fn unauthorized(detail: &str) -> ApiError {

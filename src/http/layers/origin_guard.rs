@@ -104,7 +104,9 @@ impl Guard {
         let origin = text(&header::ORIGIN);
         let known = |origin: &str| {
             let own = origin.split_once("://").map(|(_, authority)| authority);
-            let asked = text(&header::HOST);
+            // HTTP/2 has the name in the address of the request.
+            let asked = parts.uri.authority().map(Authority::as_str);
+            let asked = asked.or_else(|| text(&header::HOST));
             self.origins.iter().any(|allowed| allowed == origin) || (own.is_some() && own == asked)
         };
         let foreign = match (origin, text(&FETCH_SITE)) {

@@ -92,7 +92,9 @@ pub async fn submit(
     let key = idempotency_key(request.headers())?;
     let (batch, submit) = <(BatchQuery, SubmitQuery)>::read(request.uri(), &())?;
     let submit_options = submit.options(request.headers());
-    let labels = labels_of(batch.label.unwrap_or_default())?;
+    let mut labels = labels_of(batch.label.unwrap_or_default())?;
+    jobs.bind(&mut labels)
+        .map_err(|faults| ApiError::bad_parameter("label", faults[0].detail.clone()))?;
     let form = form(&jobs, request.headers(), batch.template).await?;
     let mut draft = read_draft(&jobs, &memory, &options, form, request).await?;
     draft.options = submit_options;

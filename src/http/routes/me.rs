@@ -19,6 +19,8 @@ use crate::jobs::model::State as JobState;
 pub struct Me {
     /// The tenant that the key belongs to; `anonymous` without a key.
     tenant: String,
+    /// Labels that the key is bound to: it opens only what carries them, and what it makes gets them.
+    labels: BTreeMap<String, String>,
     /// What the tenant may use at most.
     quota: Quota,
     /// What the tenant uses at present.
@@ -65,6 +67,7 @@ pub async fn me(
     let number = |state| usage.jobs.get(&state).copied().unwrap_or(0);
     Ok(Json(Me {
         tenant: jobs.tenant().to_owned(),
+        labels: jobs.bound().clone(),
         quota: Quota {
             queued: own.tenant_queue_max.min(own.queue_max),
             staged_bytes: own.staging.tenant.min(own.staging.all),

@@ -6,13 +6,14 @@ use std::time::Duration;
 
 use axum::Router;
 use axum::body::Body;
-use axum::http::{Request, Response};
+use axum::http::{Request, Response, Version};
 use hyper::body::Incoming;
 use tokio::time::sleep;
 use tower::ServiceExt;
 
 use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::server::places::Place;
+use crate::http::server::unread::Unread;
 
 /// The address that a request comes from; in its extensions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,6 +28,7 @@ pub async fn answer(
     router: Router,
     peer: Peer,
     place: &Arc<Place>,
+    unread: &Unread,
     request: Request<Incoming>,
 ) -> Response<Body> {
     let busy = place.begin();
@@ -35,8 +37,14 @@ pub async fn answer(
     if place.probes_only {
         request.extensions_mut().insert(ProbesOnly);
     }
+    let several_at_once = request.version() == Version::HTTP_2;
     let Ok(response) = router.oneshot(request).await;
-    hold_while_sent(response, busy)
+    let response = hold_while_sent(response, busy);
+    if several_at_once {
+        unread.watch(response)
+    } else {
+        response
+    }
 }
 
 /// Ends if there is no complete head within this time.

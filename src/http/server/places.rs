@@ -46,6 +46,8 @@ struct Open {
     network: IpAddr,
     /// The rank among those without a complete head.
     waits: Option<Rank>,
+    /// Requests under way; on HTTP/2 there may be several.
+    busy: usize,
     close: CancellationToken,
 }
 
@@ -124,6 +126,7 @@ impl Places {
             Open {
                 network,
                 waits: None,
+                busy: 0,
                 close: close.clone(),
             },
         );
@@ -181,6 +184,24 @@ impl Register {
         }
     }
 
+    /// A request begins.
+    fn begin(&mut self, id: u64) {
+        self.stop_waiting(id);
+        if let Some(open) = self.open.get_mut(&id) {
+            open.busy += 1;
+        }
+    }
+
+    /// A request ends; after the last one the connection waits for a head.
+    fn end(&mut self, id: u64) {
+        if let Some(open) = self.open.get_mut(&id) {
+            open.busy -= 1;
+            if open.busy == 0 {
+                self.wait(id, true);
+            }
+        }
+    }
+
     fn remove(&mut self, id: u64) -> Option<Open> {
         self.stop_waiting(id);
         let open = self.open.remove(&id)?;
@@ -208,7 +229,7 @@ impl Place {
     #[must_use]
     pub fn begin(self: &Arc<Place>) -> Busy {
         self.used.store(true, Ordering::Relaxed);
-        self.shared.register().stop_waiting(self.id);
+        self.shared.register().begin(self.id);
         Busy(self.clone())
     }
 
@@ -233,7 +254,7 @@ impl Drop for Place {
 
 impl Drop for Busy {
     fn drop(&mut self) {
-        self.0.shared.register().wait(self.0.id, true);
+        self.0.shared.register().end(self.0.id);
         self.0.shared.freed.notify_one();
     }
 }
@@ -289,6 +310,19 @@ mod tests {
         assert_eq!((left.count(), places.open()), (2, 3));
         drop(many);
         assert_eq!(places.open(), 1);
+    }
+
+    #[test]
+    fn a_connection_with_several_requests_waits_when_the_last_one_ends() {
+        let places = Places::new(1, 1);
+        let several = places.enter(address(1));
+        let (first, second) = (several.begin(), several.begin());
+        drop(first);
+        assert!(places.enter(address(1)).probes_only);
+        assert!(!several.close.is_cancelled());
+        drop(second);
+        assert!(!places.enter(address(1)).probes_only);
+        assert!(several.close.is_cancelled());
     }
 
     #[tokio::test]

@@ -22,6 +22,7 @@ impl Jobs {
     pub async fn batch(&self, id: Uuid) -> Result<Batch, JobsError> {
         let batch = self.shared.store.batch(&self.tenant, id).await?;
         match batch {
+            Some(batch) if !self.sees(&batch.labels) => Err(JobsError::BatchNotFound),
             Some(batch) => Ok(batch),
             None => Err(self.missing(id, JobsError::BatchNotFound).await),
         }

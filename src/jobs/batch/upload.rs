@@ -7,7 +7,7 @@ use serde_json::Value;
 use tokio::runtime::Handle;
 use uuid::Uuid;
 
-use crate::contact::error::Fault;
+use crate::contact::error::{CaseError, Fault};
 use crate::jobs::batch::staging::{StagedCase, Staging};
 use crate::jobs::batch::template::Cell;
 use crate::jobs::error::JobsError;
@@ -183,7 +183,11 @@ impl BatchUpload {
             let own = SubmitOptions::default().of_case(own);
             self.digest.update(&own.digest(&[0; 32]));
         }
-        let checked = match self.jobs.check(case) {
+        let bound = self.jobs.check(case).and_then(|mut checked| {
+            let bound = self.jobs.bind(&mut checked.label.labels);
+            bound.map(|()| checked).map_err(CaseError)
+        });
+        let checked = match bound {
             Ok(checked) => checked,
             Err(error) => {
                 let mut faults = error.0;

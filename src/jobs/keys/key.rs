@@ -3,6 +3,8 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use crate::jobs::keys::bound::Labels;
+
 /// The tenant of requests without a key.
 pub const ANONYMOUS: &str = "anonymous";
 
@@ -32,6 +34,8 @@ pub struct Key {
     pub revoked_at: Option<i64>,
     /// It reads what is the tenant's, and changes nothing.
     pub read_only: bool,
+    /// It opens only what carries these labels, and gives them to what it makes; everything of the tenant without any.
+    pub labels: Arc<Labels>,
 }
 
 /// Keys found good, with the time at which they were looked up.

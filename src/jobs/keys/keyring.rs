@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use crate::jobs::clock::Clock;
 use crate::jobs::error::JobsError;
+use crate::jobs::keys::bound::Labels;
 use crate::jobs::keys::key::{Key, MARK, is_tenant};
 use crate::jobs::open_store::{open_beside, open_shared, table_file};
 use crate::jobs::store::Store;
@@ -53,6 +54,7 @@ impl Keyring {
         tenant: &str,
         name: Option<String>,
         read_only: bool,
+        labels: Labels,
     ) -> Result<(Key, String), JobsError> {
         if !is_tenant(tenant) {
             return Err(JobsError::BadTenant);
@@ -72,6 +74,7 @@ impl Keyring {
             created_at: Clock::system().now_ms(),
             revoked_at: None,
             read_only,
+            labels: Arc::new(labels),
         };
         self.store.add_key(&key).await?;
         Ok((key, text))

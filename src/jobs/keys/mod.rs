@@ -1,5 +1,6 @@
 //! API keys: which tenant a request belongs to.
 
+pub mod bound;
 pub mod key;
 pub mod keyring;
 pub mod lookup;

@@ -1,15 +1,16 @@
 //! API keys in the embedded job table.
 
 use super::engine::{DbRow, SqlStore};
-use super::rows::read_flag;
+use super::rows::{from_json, read_flag, to_json};
 use crate::jobs::keys::key::Key;
 use crate::jobs::store::error::StoreError;
 use sqlx::Row;
+use std::sync::Arc;
 
-const ALL: &str = "SELECT id, hash, tenant, name, created_at, revoked_at, read_only FROM api_keys";
+const ALL: &str =
+    "SELECT id, hash, tenant, name, created_at, revoked_at, read_only, labels FROM api_keys";
 
-const ONE: &str =
-    "SELECT id, hash, tenant, name, created_at, revoked_at, read_only FROM api_keys WHERE id = $1";
+const ONE: &str = "SELECT id, hash, tenant, name, created_at, revoked_at, read_only, labels FROM api_keys WHERE id = $1";
 
 impl SqlStore {
     /// Stores a key.
@@ -18,7 +19,7 @@ impl SqlStore {
     /// The database failed, or there is a key with this id.
     pub(crate) async fn add_key(&self, key: &Key) -> Result<(), StoreError> {
         sqlx::query(
-            "INSERT INTO api_keys (id, hash, tenant, name, created_at, revoked_at, read_only) VALUES ($1, $2, $3, $4, $5, $6, $7)",
+            "INSERT INTO api_keys (id, hash, tenant, name, created_at, revoked_at, read_only, labels) VALUES ($1, $2, $3, $4, $5, $6, $7, $8)",
         )
         .bind(&key.id)
         .bind(key.hash.as_bytes().as_slice())
@@ -27,6 +28,7 @@ impl SqlStore {
         .bind(key.created_at)
         .bind(key.revoked_at)
         .bind(i64::from(key.read_only))
+        .bind(to_json(&*key.labels)?)
         .execute(&self.writer)
         .await?;
         Ok(())
@@ -72,6 +74,7 @@ impl SqlStore {
 fn read_key(row: &DbRow) -> Result<Key, StoreError> {
     let hash: Vec<u8> = row.try_get("hash")?;
     let tenant: String = row.try_get("tenant")?;
+    let labels: String = row.try_get("labels")?;
     Ok(Key {
         id: row.try_get("id")?,
         hash: blake3::Hash::from_slice(&hash)
@@ -81,5 +84,6 @@ fn read_key(row: &DbRow) -> Result<Key, StoreError> {
         created_at: row.try_get("created_at")?,
         revoked_at: row.try_get("revoked_at")?,
         read_only: read_flag(row, "read_only")?,
+        labels: Arc::new(from_json(&labels)?),
     })
 }

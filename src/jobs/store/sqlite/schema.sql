@@ -187,5 +187,6 @@ CREATE TABLE api_keys (
     name       TEXT,
     created_at INTEGER NOT NULL,
     revoked_at INTEGER,
-    read_only  INTEGER NOT NULL DEFAULT 0    -- 1: it changes nothing
+    read_only  INTEGER NOT NULL DEFAULT 0,   -- 1: it changes nothing
+    labels     TEXT    NOT NULL DEFAULT '{}' -- it opens only what carries these
 ) STRICT, WITHOUT ROWID;

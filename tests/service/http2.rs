@@ -1,0 +1,101 @@
+//! HTTP/2 by prior knowledge: many requests on one connection, and answers that its client does not take.
+
+use std::time::Duration;
+
+use axum::body::Bytes;
+use futures_util::future::join_all;
+use http_body_util::{BodyExt, Empty};
+use hyper::client::conn::http2::{Builder, SendRequest};
+use hyper::{Method, Request, Version};
+use hyper_util::rt::{TokioExecutor, TokioIo};
+use serde_json::Value;
+use tokio::net::TcpStream;
+use tokio::task::JoinHandle;
+
+use crate::server::{Server, Setup, example};
+
+/// Far beyond every limit that the tests set.
+const FOR_EVER: Duration = Duration::from_secs(60);
+
+/// A client that grants each answer so many bytes, and its connection, which ends when the service closes it.
+async fn connect(server: &Server, window: u32) -> (SendRequest<Empty<Bytes>>, JoinHandle<()>) {
+    let stream = TcpStream::connect(server.address).await;
+    let mut builder = Builder::new(TokioExecutor::new());
+    builder.initial_stream_window_size(window);
+    let stream = TokioIo::new(stream.expect("a connection"));
+    let (sender, connection) = builder.handshake(stream).await.expect("HTTP/2");
+    let connection = tokio::spawn(async move {
+        let _ = connection.await;
+    });
+    (sender, connection)
+}
+
+fn request(method: Method, server: &Server, path: &str) -> Request<Empty<Bytes>> {
+    let address = format!("http://{}{path}", server.address);
+    let request = Request::builder().method(method).uri(address);
+    request.body(Empty::new()).expect("a request")
+}
+
+#[tokio::test]
+async fn many_requests_share_one_connection() {
+    let server = Setup::new().start().await;
+    let job = server.solve(&example("spin.case.json")).await;
+    let path = format!("/v1/jobs/{}", job["id"].as_str().expect("an id"));
+    let (sender, _connection) = connect(&server, 1 << 16).await;
+    let asked = (0..200).map(|_| {
+        let (mut sender, request) = (sender.clone(), request(Method::GET, &server, &path));
+        async move {
+            let answer = sender.send_request(request).await.expect("an answer");
+            assert_eq!(answer.version(), Version::HTTP_2);
+            let body = answer.collect().await.expect("a body").to_bytes();
+            serde_json::from_slice::<Value>(&body).expect("JSON")
+        }
+    });
+    for answer in join_all(asked).await {
+        assert_eq!(answer["state"], "succeeded");
+    }
+}
+
+#[tokio::test]
+async fn without_a_key_the_name_in_the_address_is_judged() {
+    let server = Setup::new().start().await;
+    let (mut sender, _connection) = connect(&server, 1 << 16).await;
+    for (name, allowed) in [("localhost", true), ("rail.example", false)] {
+        let address = format!("http://{name}/v1/jobs");
+        let own = format!("http://{name}");
+        let request = Request::get(address).header("origin", own);
+        let request = request.body(Empty::new()).expect("a request");
+        let answer = sender.send_request(request).await.expect("an answer");
+        assert_eq!(answer.status().is_success(), allowed, "{name}");
+    }
+    // A page of this service may change something; it is known by the same name.
+    let address = format!("http://localhost/v1/jobs/{}/cancel", uuid::Uuid::nil());
+    let request = Request::post(address).header("origin", "http://localhost");
+    let request = request.body(Empty::new()).expect("a request");
+    let answer = sender.send_request(request).await.expect("an answer");
+    assert_eq!(answer.status(), 404);
+}
+
+#[tokio::test]
+async fn a_client_that_grants_no_window_for_its_answer_is_let_go() {
+    let mut setup = Setup::new();
+    setup.http.write_timeout = Duration::from_millis(300);
+    let server = setup.start().await;
+    let (mut sender, connection) = connect(&server, 100).await;
+    // A follower of events waits for the service, which is no fault of its own.
+    let events = request(Method::GET, &server, "/v1/events");
+    let events = sender.send_request(events).await.expect("an answer");
+    assert_eq!(events.status(), 200);
+    tokio::time::sleep(Duration::from_secs(1)).await;
+    assert!(!connection.is_finished());
+    let contract = request(Method::GET, &server, "/openapi.json");
+    let contract = sender.send_request(contract).await.expect("an answer");
+    assert_eq!(contract.status(), 200);
+    let closed = tokio::time::timeout(FOR_EVER, connection).await;
+    closed
+        .expect("the connection is still open")
+        .expect("an end");
+    // Others are served.
+    let job = server.solve(&example("spin.case.json")).await;
+    assert_eq!(job["state"], "succeeded");
+}
