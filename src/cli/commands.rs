@@ -79,7 +79,7 @@ pub enum KeysAction {
         /// What the key is for.
         #[arg(long, value_name = "TEXT")]
         name: Option<String>,
-        /// The key reads what is the tenant's checks cases and evaluates rows, but makes, cancels and deletes nothing.
+        /// The key reads what is the tenant's, checks cases and evaluates rows, but makes, cancels and deletes nothing.
         #[arg(long)]
         read_only: bool,
         /// The key opens only jobs and batches with this label, and what it makes gets it; may be given up to 8 times.

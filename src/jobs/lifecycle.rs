@@ -31,6 +31,7 @@ use crate::jobs::options::Options;
 use crate::jobs::quota::StagedBytes;
 use crate::jobs::recent_reads::RecentReads;
 use crate::jobs::shared::Shared;
+use crate::jobs::store::Store;
 use crate::jobs::store::cluster::Node;
 use crate::jobs::worker::fair_turns::FairTurns;
 use crate::jobs::worker::pool::Worker;
@@ -58,10 +59,7 @@ impl Jobs {
     pub async fn open_with(options: Options, engine: Engine) -> Result<Jobs, JobsError> {
         let lock = lock(&options.data_dir)?;
         let store = open_for_service(&options.data_dir, options.database.as_ref()).await?;
-        let blobs = match store.cluster() {
-            Some(cluster) => Blobs::within(cluster.objects()),
-            None => Blobs::open(&options.data_dir)?,
-        };
+        let blobs = place_of_results(&*store, &options)?;
         let clock_offset_ms = Arc::<AtomicI64>::default();
         let options = Options {
             clock: options.clock.clone().ahead(clock_offset_ms.clone()),
@@ -205,6 +203,14 @@ impl Jobs {
                 .unwrap_or_else(PoisonError::into_inner)
                 .take(),
         );
+    }
+}
+
+/// Where results that are larger than a row are kept.
+fn place_of_results(store: &dyn Store, options: &Options) -> Result<Blobs, JobsError> {
+    match store.cluster() {
+        Some(cluster) => Ok(Blobs::within(cluster.objects())),
+        None => Blobs::open(&options.data_dir),
     }
 }
 

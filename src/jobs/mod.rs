@@ -33,6 +33,7 @@
 pub mod backup;
 pub mod batch;
 pub mod blobs;
+mod bound_access;
 pub mod changes;
 pub mod clock;
 pub mod clock_steps;

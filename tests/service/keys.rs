@@ -82,77 +82,109 @@ async fn a_key_works_at_once_and_is_refused_seconds_after_it_was_revoked() {
     }
 }
 
+/// What a request with a key is answered.
+async fn ask(
+    service: &Service,
+    key: &str,
+    (method, path): (Method, &str),
+    body: Option<&Value>,
+) -> (u16, Value) {
+    let request = service.request(method, path).bearer_auth(key);
+    let request = match body {
+        Some(body) => request.json(body),
+        None => request,
+    };
+    let answer = request.send().await.unwrap();
+    let status = answer.status().as_u16();
+    (status, answer.json().await.unwrap_or(Value::Null))
+}
+
+/// A key of everything that the tenant `north` has, and one that is bound to line 7.
+fn key_and_bound_key(folder: &Path) -> (String, String) {
+    let flags = ["create", "--tenant", "north", "--label", "line:7"];
+    let made = String::from_utf8(keys(folder, &flags).stdout).unwrap();
+    (make_key(folder, "north"), made.trim().to_owned())
+}
+
 #[tokio::test]
-async fn a_key_bound_to_a_label_opens_only_what_carries_it() {
+async fn a_key_bound_to_a_label_opens_nothing_of_others() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(folder.path(), &[]);
-    let all = make_key(folder.path(), "north");
-    let flags = ["create", "--tenant", "north", "--label", "line:7"];
-    let made = String::from_utf8(keys(folder.path(), &flags).stdout).unwrap();
-    let bound = made.trim();
-    let ask = async |key: &str, method: Method, path: &str, body: Option<&Value>| {
-        let mut request = service.request(method.clone(), path).bearer_auth(key);
-        if method == Method::POST && path.ends_with("/jobs") {
-            request = request.header("idempotency-key", "one-of-all");
-        }
-        let request = match body {
-            Some(body) => request.json(body),
-            None => request,
-        };
+    let (all, bound) = key_and_bound_key(folder.path());
+    let case = crate::support::case("on a line");
+    let submit = async |key: &str| {
+        let request = service.request(Method::POST, "/v1/jobs").bearer_auth(key);
+        let request = request.header("idempotency-key", "one-of-all").json(&case);
         let answer = request.send().await.unwrap();
-        (
-            answer.status().as_u16(),
-            answer.json().await.unwrap_or(Value::Null),
-        )
+        let status = answer.status().as_u16();
+        (status, answer.json::<Value>().await.unwrap())
     };
-    let (get, post) = (Method::GET, Method::POST);
-    let mut case = crate::support::case("on a line");
-    let (status, other) = ask(&all, post.clone(), "/v1/jobs", Some(&case)).await;
+    let (status, other) = submit(&all).await;
     assert_eq!(status, 202, "{other}");
-    let other = other["links"]["self"].as_str().expect("a job").to_owned();
-    // The same key of idempotency and the same case: nothing of another line may be answered.
-    let (status, conflict) = ask(bound, post.clone(), "/v1/jobs", Some(&case)).await;
+    // The same case and the same key of idempotency: nothing of another line may be answered.
+    let (status, conflict) = submit(&bound).await;
     assert_eq!(status, 422, "{conflict}");
-    for path in [&other, &format!("{other}/case"), &format!("{other}/result")] {
-        assert_eq!(ask(bound, get.clone(), path, None).await.0, 404, "{path}");
-    }
-    let cancel = format!("{other}/cancel");
-    assert_eq!(ask(bound, post.clone(), &cancel, None).await.0, 404);
-    assert_eq!(ask(bound, Method::DELETE, &other, None).await.0, 404);
-
-    case["labels"] = json!({ "line": "8" });
-    let mut own = case.clone();
-    own["labels"] = json!({ "km": "12.4" });
-    let cases = json!([case, own]);
-    let (status, refused) = ask(bound, post.clone(), "/v1/batches", Some(&cases)).await;
-    assert_eq!(status, 422, "{refused}");
-    let fault = &refused["errors"][0];
-    assert!(fault.to_string().contains("/labels/line"), "{refused}");
-    let path = "/v1/batches?on_invalid=skip";
-    let (status, batch) = ask(bound, post.clone(), path, Some(&cases)).await;
-    assert_eq!((status, &batch["rejected"]), (202, &json!(1)), "{batch}");
+    let other = other["links"]["self"].as_str().unwrap();
+    let (_, batch) = {
+        let cases = json!([case]);
+        ask(&service, &all, (Method::POST, "/v1/batches"), Some(&cases)).await
+    };
     let batch = batch["links"]["self"].as_str().unwrap();
-    let (_, list) = ask(bound, get.clone(), "/v1/jobs", None).await;
-    let jobs = list["jobs"].as_array().expect("jobs");
-    assert_eq!(jobs.len(), 1, "{list}");
-    assert_eq!(jobs[0]["labels"], json!({ "line": "7", "km": "12.4" }));
-    let (_, batches) = ask(bound, get.clone(), "/v1/batches", None).await;
-    assert_eq!(batches["batches"][0]["labels"], json!({ "line": "7" }));
-    let (_, me) = ask(bound, get.clone(), "/v1/me", None).await;
-    assert_eq!(me["labels"], json!({ "line": "7" }));
-    // The tenant's other keys see both.
-    let (_, list) = ask(&all, get.clone(), "/v1/jobs", None).await;
-    assert_eq!(list["jobs"].as_array().map(Vec::len), Some(2));
-    let (_, own) = ask(
-        &all,
-        post,
-        "/v1/batches",
-        Some(&json!([crate::support::case("x")])),
+    for (method, path) in [
+        (Method::GET, other),
+        (Method::GET, &format!("{other}/case")),
+        (Method::GET, &format!("{other}/result")),
+        (Method::GET, &format!("{other}/events")),
+        (Method::POST, &format!("{other}/cancel")),
+        (Method::DELETE, other),
+        (Method::GET, batch),
+        (Method::GET, &format!("{batch}/results")),
+        (Method::POST, &format!("{batch}/cancel")),
+        (Method::DELETE, batch),
+    ] {
+        let (status, _) = ask(&service, &bound, (method.clone(), path), None).await;
+        assert_eq!(status, 404, "{method} {path}");
+    }
+    for list in ["jobs", "batches"] {
+        let path = format!("/v1/{list}");
+        let (_, page) = ask(&service, &bound, (Method::GET, &path), None).await;
+        assert_eq!(page[list], json!([]));
+    }
+}
+
+#[tokio::test]
+async fn a_key_bound_to_a_label_gives_it_to_what_it_makes() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &[]);
+    let (all, bound) = key_and_bound_key(folder.path());
+    let mut foreign = crate::support::case("on a line");
+    foreign["labels"] = json!({ "line": "8" });
+    let mut own = foreign.clone();
+    own["labels"] = json!({ "km": "12.4" });
+    let cases = json!([foreign, own]);
+    let (status, refused) = ask(
+        &service,
+        &bound,
+        (Method::POST, "/v1/jobs"),
+        Some(&cases[0]),
     )
     .await;
-    let own = own["links"]["self"].as_str().unwrap();
-    assert_eq!(ask(bound, get.clone(), own, None).await.0, 404);
-    assert_eq!(ask(bound, get, batch, None).await.0, 200);
+    assert_eq!(status, 422, "{refused}");
+    assert_eq!(refused["errors"][0]["pointer"], "/labels/line", "{refused}");
+    let path = "/v1/batches?on_invalid=skip";
+    let (status, batch) = ask(&service, &bound, (Method::POST, path), Some(&cases)).await;
+    assert_eq!((status, &batch["rejected"]), (202, &json!(1)), "{batch}");
+    for key in [&bound, &all] {
+        let get = async |path| ask(&service, key, (Method::GET, path), None).await.1;
+        let jobs = get("/v1/jobs").await;
+        let labels = &jobs["jobs"][0]["labels"];
+        assert_eq!(*labels, json!({ "line": "7", "km": "12.4" }), "{jobs}");
+        let batches = get("/v1/batches").await;
+        let labels = &batches["batches"][0]["labels"];
+        assert_eq!(*labels, json!({ "line": "7" }), "{batches}");
+    }
+    let (_, me) = ask(&service, &bound, (Method::GET, "/v1/me"), None).await;
+    assert_eq!(me["labels"], json!({ "line": "7" }));
 }
 
 #[tokio::test]
@@ -164,16 +196,7 @@ async fn a_key_that_may_only_read_changes_nothing() {
     let made = String::from_utf8(keys(folder.path(), &flags).stdout).unwrap();
     let reader = made.trim();
     let ask = async |key: &str, method: Method, path: &str, body: Option<&Value>| {
-        let request = service.request(method, path).bearer_auth(key);
-        let request = match body {
-            Some(body) => request.json(body),
-            None => request,
-        };
-        let answer = request.send().await.unwrap();
-        (
-            answer.status().as_u16(),
-            answer.json().await.unwrap_or(Value::Null),
-        )
+        ask(&service, key, (method, path), body).await
     };
     let case = crate::support::case("shown in a hall");
     let (status, job) = ask(&own, Method::POST, "/v1/jobs", Some(&case)).await;
