@@ -37,6 +37,9 @@ fn motions(
     watch: &TimeLimit,
 ) -> Result<(Solution, Fields), SolveError> {
     let task = case.rolling_task(&pressed.footprint);
+    if let Some(reason) = task.falls_too_fast() {
+        return Err(SolveError::NotCovered { reason });
+    }
     let mut levels = Levels::new(&task, operators);
     let mut assembly = Assembly::new(case, pressed);
     let mut before: Option<MotionAnswer> = None;

@@ -7,6 +7,7 @@ use crate::contact::answer::answer;
 use crate::contact::case::press::PressedContact;
 use crate::contact::case::problem::{CheckedCase, Run};
 use crate::contact::error::SolveError;
+use crate::contact::friction::on_rail::in_frame;
 use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
@@ -176,8 +177,10 @@ impl WheelSolve<'_> {
                 report: Some(normal),
                 remarks: Vec::new(),
             };
+            let extents = gap.field.patches().into_iter().map(|patch| patch.extent);
+            let friction = in_frame(&problem.friction, &gap.frame, geometry, extents);
             let part = CheckedCase {
-                problem: problem.of_gap(motions),
+                problem: problem.of_gap(friction, motions),
                 run: run.clone(),
                 label: label.clone(),
                 // They are told of the whole contact.

@@ -1,7 +1,7 @@
 //! Cases to begin with: those of `api/examples`, which the contract shows and `/v1/examples` answers.
 
 /// Name, summary and text of each.
-pub const EXAMPLES: [(&str, &str, &str); 13] = [
+pub const EXAMPLES: [(&str, &str, &str); 14] = [
     (
         "hertz-steel",
         "A wheel on a rail by its radii, with both creepages and spin",
@@ -41,6 +41,11 @@ pub const EXAMPLES: [(&str, &str, &str); 13] = [
         "maintenance",
         "What one wheel does to a rail: stresses below the worst point, wear and fatigue, temperatures",
         include_str!("../../api/examples/maintenance.case.json"),
+    ),
+    (
+        "friction",
+        "A creep curve of a wet rail: friction that falls with slip, and a layer between the bodies",
+        include_str!("../../api/examples/friction.case.json"),
     ),
     (
         "pressure-grid",

@@ -299,6 +299,68 @@ def temperature():
     write_lines("temperature.json", records)
 
 
+def friction_point(creepage, converged, arm):
+    """Motion, and forces on the lower body over the normal force (moment: over that and √(ab))."""
+    forces = [{"value": flipped(converged[q]["value"]), "unc": converged[q]["unc"]} for q in ("Fx_FN", "Fy_FN")]
+    for name, unit in [("Mz_FNc", 1.0), ("Mz_Nmm", arm)]:
+        if name in converged:
+            forces.append({"value": flipped(converged[name]["value"] / unit), "unc": converged[name]["unc"] / unit})
+    return {"motion": creepage, "forces": forces}
+
+
+def friction():
+    """Friction that falls with slip or varies across, and elastic layers, in the words of a case."""
+    records = []
+
+    def add(record, words, points, speed=None):
+        given = record["input"]
+        records.append({
+            "id": record["id"],
+            "semi_axes_mm": [given["hertz"]["a"], given["hertz"]["b"]],
+            "normal_force_n": given["load"]["FN"],
+            "shear_modulus_mpa": given["material"]["G"],
+            "poisson_ratio": given["material"]["nu"],
+            "friction": words,
+            "speed_mm_per_s": speed,
+            "points": points,
+        })
+
+    def load(name):
+        for record in json.loads((SOURCE / f"reference/extended/{name}.json").read_text()):
+            given = record["input"]
+            yield record, given, given["load"]["FN"] * math.sqrt(given["hertz"]["a"] * given["hertz"]["b"])
+
+    laws = {"exp": "exponential", "pol": "exponential", "rat": "rational", "lin": "linear"}
+    for record, given, arm in load("falling"):
+        f = given["friction"]["f"]
+        terms = [{"coefficient": f[k], "half_speed_mm_per_s": f[k + 1]} for k in (1, 3) if f[k]]
+        words = {"law": laws[given["friction"]["law"][:3]], "limit": f[0], "terms": terms}
+        points = [friction_point([p["xi"], given["eta"], given["phi"]], p["converged"], arm) for p in record["curve"]]
+        add(record, words, points, given["V_mm_per_s"])
+    for record, given, arm in load("friction_y"):
+        b, formula = given["hertz"]["b"], given["friction"]["formula"]
+        if "for y<0" in formula:
+            y, mu = [-b, 0.0, 0.0, b], [0.2, 0.2, 0.4, 0.4]
+        else:
+            y = [b * k / 20 for k in range(-20, 21)]
+            mu = [eval(formula.split("=")[1].split("(sampled")[0].replace("^", "**"), {"y": at, "b": b}) for at in y]
+        words = {"across": {"y_mm": y, "coefficient": [round(value, 12) for value in mu]}}
+        creepage = [given["creepage"][k] for k in ("xi", "eta", "phi")]
+        add(record, words, [friction_point(creepage, record["converged"], arm)])
+    for record, given, arm in load("layer"):
+        layer = given["layer"]
+        # The layer named pl_200 never yields; the other plastic one does.
+        if layer["kind"] != "elastic" and record["id"] != "lay_pl_200":
+            continue
+        words = {"coefficient": given["mu"],
+                 "layer": {"shear_modulus_mpa": layer["G3_MPa"], "thickness_mm": layer["thickness_mm"]}}
+        over_load = {theirs.replace("rel", ours): {k: given["mu"] * record["converged"][theirs][k] for k in ("value", "unc")}
+                     for theirs, ours in [("Fx_rel", "FN"), ("Fy_rel", "FN"), ("Mz_rel", "FNc")]}
+        creepage = [given["creepage"][k] for k in ("xi", "eta", "phi")]
+        add(record, words, [friction_point(creepage, over_load, arm)])
+    write_lines("friction.json", records)
+
+
 for name in CLASSES:
     records = json.loads((SOURCE / f"reference/{name}.json").read_text())
     write_lines(f"{name}.json", [reference_case(r) for r in records])
@@ -309,3 +371,4 @@ gap_profiles()
 gap_grids()
 subsurface()
 temperature()
+friction()

@@ -72,6 +72,7 @@ fn one_rule(contact: &Ellipse, rule: Rule) -> Cells {
     let law = NewtonTask {
         rigid: &rigid,
         bound: &bound,
+        fall: None,
         area: &area,
         scale: 1.0,
         // The trapezoid passes the residual of a cell on to its neighbours.

@@ -18,6 +18,7 @@ mod equations;
 mod fastsim;
 mod forces;
 mod friction;
+mod friction_laws;
 mod gap_faults;
 mod gap_hertz;
 mod gap_reference;

@@ -142,6 +142,7 @@ impl Contact {
         NewtonTask {
             rigid,
             bound: &self.bound,
+            fall: None,
             area: &self.area,
             scale: self.scale(rigid),
             tolerance,

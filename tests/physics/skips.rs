@@ -7,7 +7,7 @@ use railhead::contact::half_space::strip_operator::operator::StripOperator;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::methods::boundary_element::newton::Newton;
 use railhead::contact::rolling::methods::boundary_element::solve as boundary_element;
-use railhead::contact::rolling::methods::boundary_element::task::NewtonTask;
+use railhead::contact::rolling::methods::boundary_element::task::{LevelTask, NewtonTask};
 use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use railhead::contact::rolling::slip_equations::SlipEquations;
 use railhead::contact::rolling::slip_rules::Rule;
@@ -36,9 +36,14 @@ fn distance_to_plain_newton(contact: &Ellipse) -> f64 {
     let level = StripMesh::new(&checked.rolling_task(&footprint), size).expect("a mesh");
     let motion = level.scale.motion(&checked.problem.motions[0]);
     let mut workspace = NewtonWorkspace::default();
-    let shortened =
-        boundary_element::solve(&level, &motion, None, 1e-9, &mut workspace, &Unmonitored)
-            .expect("a solution");
+    let asked = LevelTask {
+        level: &level,
+        motion: &motion,
+        fall: None,
+        tolerance: 1e-9,
+    };
+    let shortened = boundary_element::solve(asked, None, &mut workspace, &Unmonitored);
+    let shortened = shortened.expect("a solution");
 
     let nu = checked.problem.elasticity.poisson_ratio;
     let whole = StripOperator::new(
@@ -65,6 +70,7 @@ fn distance_to_plain_newton(contact: &Ellipse) -> f64 {
         let law = NewtonTask {
             rigid: &rigid,
             bound: &bound,
+            fall: None,
             area: &area,
             scale: 1.0,
             tolerance: 1e-9,

@@ -112,6 +112,7 @@ fn newton_and_gmres_allocate_nothing_in_a_workspace_that_has_served_before() {
             let law = NewtonTask {
                 rigid: &rigid,
                 bound,
+                fall: None,
                 area,
                 scale: 1.0,
                 tolerance: 1e-6,

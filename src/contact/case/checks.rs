@@ -6,13 +6,17 @@ use crate::contact::case::motions::ExpandedMotions;
 use crate::contact::case::resolution::resolution;
 use crate::contact::case::size::SizeInput;
 use crate::contact::case::words::contact::{Contact, Load};
+use crate::contact::case::words::friction::Friction;
 use crate::contact::case::words::material::Material;
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::solver::{MethodName, Output, Solver};
 use crate::contact::case::{contact_task, motions, profiles, size};
 use crate::contact::error::Fault;
+use crate::contact::friction::falling::FallingLaw;
+use crate::contact::friction::law::FrictionLaw;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::normal::normal_task::NormalTask;
+use crate::contact::normal::patch::Patch;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::methods::table::solve as table;
@@ -24,7 +28,7 @@ const FRICTION_USUAL_MAX: f64 = 1.0;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PartialCase<'a> {
     pub(crate) material: Option<&'a Material>,
-    pub(crate) friction: Option<f64>,
+    pub(crate) friction: Option<&'a Friction>,
     pub(crate) contact: Option<&'a Contact>,
     pub(crate) load: Option<&'a Load>,
     pub(crate) motion: Option<&'a Motions>,
@@ -75,8 +79,18 @@ impl CheckedParts {
         if let (Some(expanded), Some(motion)) = (&motions, given.motion) {
             let of_profiles = matches!(given.contact, Some(Contact::Profiles { .. }));
             let force = normal_force(task.as_ref().map(|(task, _)| task), given.load);
-            let limit = given.friction.zip(force).map(|(mu, force)| mu * force);
+            let limit = given
+                .friction
+                .zip(force)
+                .map(|(mu, force)| mu.largest() * force);
             faults.extend(expanded.faults(motion, limit, of_profiles));
+            if given
+                .friction
+                .is_some_and(|friction| friction.law.is_some())
+            {
+                faults.extend(expanded.speed_fault(motion, "friction that falls with slip"));
+                faults.extend(expanded.force_fault(motion));
+            }
             faults.extend(given.after.faults(motion, expanded, limits));
         }
         if let Some(solver) = given.solver {
@@ -95,6 +109,26 @@ impl CheckedParts {
                     .and_then(|(task, _)| size::length_over_width(task)),
             };
             faults.extend(size.faults(limits));
+        }
+        faults.extend(friction_fault(&given));
+        let known = (
+            given.friction,
+            elasticity.as_ref(),
+            task.as_ref(),
+            motions.as_ref(),
+        );
+        if let (Some(friction), Some(elasticity), Some((task, _)), Some(motions)) = known {
+            let reduced = Elasticity {
+                shear_modulus: elasticity.shear_modulus * friction.reduction.unwrap_or(1.0),
+                ..*elasticity
+            };
+            let law = friction.into();
+            faults.extend(falls_too_fast(
+                &law,
+                &reduced,
+                &task.patches(),
+                &motions.speeds,
+            ));
         }
         if given
             .solver
@@ -125,12 +159,53 @@ fn not_in_table(elasticity: Option<&Elasticity>, task: Option<&NormalTask>) -> V
         .collect()
 }
 
-pub(crate) fn unusual_friction(coefficient: f64) -> Option<RemarkEntry> {
+/// The fault of friction that falls too fast on patches that are known.
+fn falls_too_fast(
+    law: &FrictionLaw,
+    elasticity: &Elasticity,
+    patches: &[Patch],
+    speeds: &[Option<f64>],
+) -> Option<Fault> {
+    let stability = law.stability(patches, elasticity.shear_modulus, speeds)?;
+    let detail = FallingLaw::too_fast(stability)?;
+    Some(Fault::new("/friction", detail))
+}
+
+/// The fault of friction that the method or the contact does not go with.
+fn friction_fault(given: &PartialCase) -> Option<Fault> {
+    let friction = given.friction?;
+    let angles = friction
+        .across
+        .as_ref()
+        .is_some_and(|across| across.angle_rad.is_some());
+    if angles
+        && given
+            .contact
+            .is_some_and(|contact| !matches!(contact, Contact::Profiles { .. }))
+    {
+        let detail = "given for another contact than \"type\": \"profiles\"; give y_mm instead";
+        return Some(Fault::new("/friction/across/angle_rad", detail));
+    }
+    let method = given.solver?.method;
+    let covered = matches!(method, MethodName::Auto | MethodName::BoundaryElement);
+    if covered || friction.constant().is_some() {
+        return None;
+    }
+    let detail = "only a coefficient is covered by this method; boundary_element covers laws, layers and reductions";
+    Some(Fault::new("/friction", detail))
+}
+
+pub(crate) fn unusual_friction(friction: &Friction) -> Option<RemarkEntry> {
+    let coefficient = friction.largest();
+    let member = match friction.coefficient {
+        Some(_) => "/friction/coefficient",
+        None => "/friction",
+    };
     let remark = Remark::FrictionUnusual {
         coefficient,
         usual_max: FRICTION_USUAL_MAX,
     };
-    (coefficient > FRICTION_USUAL_MAX).then(|| remark.at_pointer("/friction/coefficient"))
+    (coefficient > FRICTION_USUAL_MAX).then(|| remark.at_pointer(member))
 }
 
 fn collect_fault<T>(result: Result<T, Fault>, faults: &mut Vec<Fault>) -> Option<T> {

@@ -1,8 +1,13 @@
 //! Between the words of a case and the types of the numerics: a change of a solver does not change the contract.
 
 use crate::contact::case::words::contact::{FormatName, SideName};
+use crate::contact::case::words::friction::{FallName, Friction};
 use crate::contact::case::words::motion::MotionWords;
 use crate::contact::case::words::solver::{MeshSizeWords, MethodName, Output, TractionBoundName};
+use crate::contact::friction::across::{AcrossLaw, AcrossPlace};
+use crate::contact::friction::falling::{FallForm, FallTerm, FallingLaw};
+use crate::contact::friction::interface::Interface;
+use crate::contact::friction::law::FrictionLaw;
 use crate::contact::geometry::formats::format::Format;
 use crate::contact::geometry::wheel_rail::Side;
 use crate::contact::mesh::size::MeshSize;
@@ -44,6 +49,56 @@ impl From<Motion> for MotionWords {
             creepage_x: motion.creepage_x,
             creepage_y: motion.creepage_y,
             spin_per_mm: motion.spin_per_mm,
+        }
+    }
+}
+
+impl From<FallName> for FallForm {
+    fn from(name: FallName) -> FallForm {
+        match name {
+            FallName::Exponential => FallForm::Exponential,
+            FallName::Rational => FallForm::Rational,
+            FallName::Linear => FallForm::Linear,
+        }
+    }
+}
+
+impl From<&Friction> for FrictionLaw {
+    fn from(words: &Friction) -> FrictionLaw {
+        if let Some(across) = &words.across {
+            let (place, at) = match (&across.angle_rad, &across.y_mm) {
+                (Some(angles), _) => (AcrossPlace::Angle, angles.clone()),
+                (None, y) => (AcrossPlace::Y, y.clone().unwrap_or_default()),
+            };
+            let coefficient = across.coefficient.clone();
+            return FrictionLaw::Across(AcrossLaw::new(place, at, coefficient));
+        }
+        let Some(law) = words.law else {
+            return FrictionLaw::Constant(words.coefficient.unwrap_or(0.0));
+        };
+        let term = |k: usize| match words.terms.get(k) {
+            Some(term) => FallTerm {
+                coefficient: term.coefficient,
+                half_speed: term.half_speed_mm_per_s,
+            },
+            None => FallTerm::NONE,
+        };
+        FrictionLaw::Falling(FallingLaw {
+            form: law.into(),
+            limit: words.limit.unwrap_or(0.0),
+            terms: [term(0), term(1)],
+        })
+    }
+}
+
+impl From<&Friction> for Interface {
+    fn from(words: &Friction) -> Interface {
+        let layer = words
+            .layer
+            .map(|layer| layer.thickness_mm / layer.shear_modulus_mpa);
+        Interface {
+            reduction: words.reduction.unwrap_or(1.0),
+            layer: layer.unwrap_or(0.0),
         }
     }
 }

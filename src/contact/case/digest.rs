@@ -33,7 +33,7 @@ pub(crate) fn digest(
             elasticity.poisson_ratio,
             elasticity.difference,
         ],
-        friction: case.friction.coefficient,
+        friction: (&case.friction).into(),
         contact: &case.contact,
         load: case.load.as_ref(),
         motions: motions.iter().map(|motion| (*motion).into()).collect(),
@@ -58,7 +58,9 @@ pub(crate) fn digest(
         damage: case.damage.as_ref(),
         thermal: case.thermal.as_ref(),
         // Nothing else depends on them.
-        speeds: (case.damage.is_some() || case.thermal.is_some()).then_some(speeds),
+        speeds: Some(speeds).filter(|_| {
+            case.damage.is_some() || case.thermal.is_some() || case.friction.law.is_some()
+        }),
     };
     let mut hasher = blake3::Hasher::new();
     // Writing into a hasher cannot fail, and the structure has no map with keys that are not texts.

@@ -62,9 +62,11 @@ impl CheckedCase {
         RollingTask {
             footprint,
             elasticity: &problem.elasticity,
-            friction: problem.friction,
+            friction: &problem.friction,
+            interface: problem.interface,
             motions: &problem.motions,
             forces: &problem.forces,
+            speeds: &problem.speeds,
             first_motion: problem.part.before,
             single_motion: problem.part.all == 1,
             method: run.method,

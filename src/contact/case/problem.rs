@@ -17,6 +17,7 @@ use crate::contact::case::words::question::Case;
 use crate::contact::case::words::solver::{MethodName, Output};
 use crate::contact::case::{plausibility, profiles};
 use crate::contact::error::CaseError;
+use crate::contact::friction::interface::Interface;
 use crate::contact::friction::law::FrictionLaw;
 use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::half_space::elasticity::Elasticity;
@@ -56,6 +57,8 @@ pub struct Problem {
     pub elasticity: Elasticity,
     /// Bound of the tractions.
     pub friction: FrictionLaw,
+    /// What lies between the bodies.
+    pub interface: Interface,
     /// Where patches and pressures come from.
     pub task: NormalTask,
     /// The motions, in the order of the case; never empty.
@@ -118,7 +121,7 @@ impl CheckedCase {
     pub fn new(case: &Case, limits: &Limits) -> Result<CheckedCase, CaseError> {
         let given = PartialCase {
             material: Some(&case.material),
-            friction: Some(case.friction.coefficient),
+            friction: Some(&case.friction),
             contact: Some(&case.contact),
             load: case.load.as_ref(),
             motion: Some(&case.motion),
@@ -139,7 +142,7 @@ impl CheckedCase {
             return Err(CaseError(faults));
         };
         let of_material = elasticity.remark().map(|r| r.at_pointer("/material"));
-        let of_friction = unusual_friction(case.friction.coefficient);
+        let of_friction = unusual_friction(&case.friction);
         let of_case = of_material.into_iter().chain(of_friction);
         let ExpandedMotions {
             motions,
@@ -156,7 +159,8 @@ impl CheckedCase {
         let digest = digest(case, &elasticity, &motions, &forces, &speeds);
         let problem = Problem {
             elasticity,
-            friction: FrictionLaw::Constant(case.friction.coefficient),
+            friction: (&case.friction).into(),
+            interface: (&case.friction).into(),
             task,
             part: MotionPart {
                 before: 0,
@@ -177,7 +181,8 @@ impl CheckedCase {
                 digest,
                 asked: Asked {
                     contact: case.contact.name().to_owned(),
-                    friction_coefficient: case.friction.coefficient,
+                    friction_coefficient: case.friction.largest(),
+                    friction_varies: case.friction.coefficient.is_none(),
                     load: case.load,
                 },
             },
@@ -230,10 +235,11 @@ impl Problem {
         }
     }
 
-    /// The same question about one gap of a wheel, with motions about its origin.
+    /// The same question about one gap of a wheel, with friction in its axes and motions about its origin.
     #[must_use]
-    pub(crate) fn of_gap(&self, motions: Vec<Motion>) -> Problem {
+    pub(crate) fn of_gap(&self, friction: FrictionLaw, motions: Vec<Motion>) -> Problem {
         Problem {
+            friction,
             motions,
             wheelset: None,
             ..self.clone()

@@ -22,7 +22,7 @@ impl CheckedCase {
     /// A sentence, if no part of the wheel lies above the rail.
     pub fn understood(&self) -> Result<Understanding, String> {
         let patches = self.problem.task.patches();
-        let friction = self.problem.friction;
+        let friction = &self.problem.friction;
         let placement = match &self.problem.task {
             NormalTask::Wheel(task) => Some(placed(task)?),
             _ => None,

@@ -1,24 +1,33 @@
 //! Coulomb friction: the largest traction of a cell and the largest tangential force of a patch.
 //!
-//! A law that varies over the contact, such as a coefficient by y, is one more variant of [`FrictionLaw`], and the compiler asks
-//! for its value at a cell, its largest value and what a patch carries with it. Levels take their bounds cell by cell from
-//! [`FrictionLaw::bounds`]; what is relative to μN takes it from [`FrictionLaw::limit`].
+//! A law that varies over the contact is one more variant of [`FrictionLaw`], and the compiler asks for its value on a strip, its largest
+//! value and what a patch carries with it. Levels take their bounds strip by strip from [`FrictionLaw::share`]; what is relative to μN
+//! takes it from [`FrictionLaw::limit`]. Where the bound of a cell falls with its slip, these are the bounds at rest, and the method
+//! follows [`FrictionLaw::bound_fall`] from there.
 
+use crate::contact::friction::across::AcrossLaw;
+use crate::contact::friction::falling::{BoundFall, FallingLaw};
 use crate::contact::normal::patch::Patch;
 
 /// How the coefficient of friction varies over the contact.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum FrictionLaw {
     /// One coefficient μ everywhere.
     Constant(f64),
+    /// A coefficient that falls with the speed of slip.
+    Falling(FallingLaw),
+    /// A coefficient that varies across the contact.
+    Across(AcrossLaw),
 }
 
 impl FrictionLaw {
     /// The largest coefficient, which scales the tractions.
     #[must_use]
     pub fn largest(&self) -> f64 {
-        match *self {
-            FrictionLaw::Constant(coefficient) => coefficient,
+        match self {
+            FrictionLaw::Constant(coefficient) => *coefficient,
+            FrictionLaw::Falling(law) => law.at_rest(),
+            FrictionLaw::Across(law) => law.largest(),
         }
     }
 
@@ -28,26 +37,60 @@ impl FrictionLaw {
         self.largest() == 0.0
     }
 
-    /// Largest traction of every cell, in units of the largest coefficient times `pressure_max`, for cells with these middles in mm
-    /// and these pressures.
+    /// How the bounds of cells fall with their slip at a rolling speed in mm/s, for slips counted in `slip_unit`; nothing where they
+    /// do not.
     #[must_use]
-    pub fn bounds(
-        &self,
-        middles: impl Iterator<Item = [f64; 2]>,
-        pressures: &[f64],
-        pressure_max: f64,
-    ) -> Vec<f64> {
-        let cells = middles.zip(pressures);
-        cells
-            .map(|(middle, pressure)| self.relative(middle) * pressure / pressure_max)
-            .collect()
+    pub fn bound_fall(&self, rolling_speed: Option<f64>, slip_unit: f64) -> Option<BoundFall> {
+        match self {
+            FrictionLaw::Constant(_) | FrictionLaw::Across(_) => None,
+            FrictionLaw::Falling(law) => {
+                rolling_speed.map(|speed| law.bound_fall(speed, slip_unit))
+            }
+        }
     }
 
-    /// The coefficient of a cell relative to the largest one. Exactly 1 where the coefficient is constant, so that bounds keep
-    /// the last digit of the pressure and a contact without friction has bounds too.
-    fn relative(&self, _middle: [f64; 2]) -> f64 {
+    /// Does the bound of a cell depend on its slip?
+    #[must_use]
+    pub fn depends_on_slip(&self) -> bool {
+        matches!(self, FrictionLaw::Falling(_))
+    }
+
+    /// The largest stability number of a law that falls with slip, see [`FallingLaw::stability`], over patches and motions; nothing for
+    /// other laws, without patches or without speeds.
+    #[must_use]
+    pub fn stability(
+        &self,
+        patches: &[Patch],
+        shear_modulus: f64,
+        speeds: &[Option<f64>],
+    ) -> Option<f64> {
+        let FrictionLaw::Falling(law) = self else {
+            return None;
+        };
+        let pressure = patches
+            .iter()
+            .map(|patch| patch.pressure_max)
+            .reduce(f64::max)?;
+        let speed = speeds.iter().copied().flatten().reduce(f64::max)?;
+        Some(law.stability(speed, pressure, shear_modulus))
+    }
+
+    /// The table of a coefficient that varies across, where it does.
+    #[must_use]
+    pub fn across(&self) -> Option<&AcrossLaw> {
         match self {
-            FrictionLaw::Constant(_) => 1.0,
+            FrictionLaw::Across(law) => Some(law),
+            FrictionLaw::Constant(_) | FrictionLaw::Falling(_) => None,
+        }
+    }
+
+    /// The mean coefficient over loads at places y of a strip, relative to the largest. Exactly 1 where it does not vary across, so that
+    /// bounds keep the last digit of the pressure and a contact without friction has bounds too.
+    #[must_use]
+    pub fn share(&self, loads: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
+        match self {
+            FrictionLaw::Constant(_) | FrictionLaw::Falling(_) => 1.0,
+            FrictionLaw::Across(law) => law.mean(loads) / law.largest(),
         }
     }
 
@@ -55,7 +98,10 @@ impl FrictionLaw {
     #[must_use]
     pub fn limit(&self, patch: &Patch) -> f64 {
         match self {
-            FrictionLaw::Constant(coefficient) => coefficient * patch.normal_force,
+            FrictionLaw::Constant(_) | FrictionLaw::Falling(_) => {
+                self.largest() * patch.normal_force
+            }
+            FrictionLaw::Across(law) => law.limit(patch),
         }
     }
 
@@ -65,6 +111,9 @@ impl FrictionLaw {
         match self {
             FrictionLaw::Constant(coefficient) => {
                 coefficient * patches.iter().map(|patch| patch.normal_force).sum::<f64>()
+            }
+            FrictionLaw::Falling(_) | FrictionLaw::Across(_) => {
+                patches.iter().map(|patch| self.limit(patch)).sum()
             }
         }
     }

@@ -1,3 +1,7 @@
 //! The law of friction: how large a traction can become.
 
+pub mod across;
+pub mod falling;
+pub mod interface;
 pub mod law;
+pub(crate) mod on_rail;

@@ -130,8 +130,31 @@ fn cell_mean_powers(task: &PowerTask, monitor: &dyn Monitor) -> Result<Vec<f64>,
             Precision::Double => Differences::of::<f64>(mesh, nu, traction, monitor)?,
         };
         differences.add_powers(mesh, traction, &mut power);
+        add_layer_powers(mesh, level.layer, traction, &mut power);
     }
     Ok(power)
+}
+
+/// Traction times the mean slip of an elastic layer, whose displacement at an edge is that of the mean of the two tractions beside it and
+/// nothing at the ends of a strip. It adds up to 0.
+fn add_layer_powers(mesh: &Mesh, flexibility: f64, traction: &[Vec<f64>; 2], power: &mut [f64]) {
+    if flexibility == 0.0 {
+        return;
+    }
+    for segment in &mesh.segments {
+        let last = segment.cells.end - 1;
+        for i in segment.cells.clone() {
+            for t in traction {
+                let ahead = if i < last { t[i + 1] } else { 0.0 };
+                let behind = if i > segment.cells.start {
+                    t[i - 1]
+                } else {
+                    0.0
+                };
+                power[i] += 0.5 * flexibility * segment.chord.dy * t[i] * (ahead - behind);
+            }
+        }
+    }
 }
 
 /// `A T·w` of a motion.

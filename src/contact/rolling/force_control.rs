@@ -96,7 +96,8 @@ impl CubicLaw {
             let box_ratio = (extent[1] - extent[0]) / (extent[3] - extent[2]);
             let a_over_b = patch.semi_axes.map_or(box_ratio, |[a, b]| a / b);
             let c = linear_theory::coefficients(a_over_b, task.elasticity.poisson_ratio);
-            let unit = task.elasticity.shear_modulus * patch.area / std::f64::consts::PI;
+            let modulus = task.interface.reduction * task.elasticity.shear_modulus;
+            let unit = modulus * patch.area / std::f64::consts::PI;
             for (k, stiffness) in stiffness.iter_mut().enumerate() {
                 *stiffness += unit * c[k] / limit;
             }

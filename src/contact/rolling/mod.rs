@@ -2,6 +2,7 @@
 
 pub mod answer;
 pub mod force_control;
+pub(crate) mod layer_slip;
 pub mod linear_theory;
 pub mod load_ellipse;
 pub mod mesh_plan;

@@ -62,7 +62,7 @@ impl OwnBlocks {
 }
 
 /// Bytes of all own blocks that an operator may get, for segments with these numbers of cells: one set for each of the three rules. A
-/// folded operator has a second set for each, one half of it for either parity.
+/// folded operator has a second set for each, one half of it for either parity. Blocks of a contact with a layer come on top.
 #[must_use]
 pub fn bytes_max(lengths: impl Iterator<Item = usize>, folded: bool) -> u64 {
     let one: usize = lengths.map(|n| 2 * n * n).sum();
@@ -70,29 +70,35 @@ pub fn bytes_max(lengths: impl Iterator<Item = usize>, folded: bool) -> u64 {
     8 * 3 * parities * one as u64
 }
 
-/// The own blocks of one rule and parity.
-type Made = (Rule, Option<Parity>, Arc<OwnBlocks>);
+/// What own blocks depend on besides the operator: rule, parity and the bits of the flexibility of a layer.
+type Kind = (Rule, Option<Parity>, u64);
 
 /// The own blocks of a level, made once for each rule and parity.
 #[derive(Debug, Default)]
 pub struct SharedBlocks {
-    made: Mutex<Vec<Made>>,
+    made: Mutex<Vec<(Kind, Arc<OwnBlocks>)>>,
 }
 
 impl SharedBlocks {
-    /// The blocks of a rule and parity; `make` is called if they are not there.
+    /// The blocks of a rule and parity with a layer of this flexibility; `make` is called if they are not there. Of layers only the last
+    /// is kept.
     pub fn get(
         &self,
         rule: Rule,
         parity: Option<Parity>,
+        layer: f64,
         make: impl FnOnce() -> OwnBlocks,
     ) -> Arc<OwnBlocks> {
         let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, _, blocks)) = made.iter().find(|m| (m.0, m.1) == (rule, parity)) {
+        let kind = (rule, parity, layer.to_bits());
+        if let Some((_, blocks)) = made.iter().find(|(made, _)| *made == kind) {
             return Arc::clone(blocks);
         }
         let blocks = Arc::new(make());
-        made.push((rule, parity, Arc::clone(&blocks)));
+        made.retain(|((other, of, bits), _)| {
+            (*other, *of, *bits == 0) != (rule, parity, layer == 0.0)
+        });
+        made.push((kind, Arc::clone(&blocks)));
         blocks
     }
 }

@@ -11,6 +11,7 @@ use crate::contact::half_space::strip_operator::operator::{
 };
 use crate::contact::mesh::strips::Mesh;
 use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::rolling::layer_slip::LayerSlip;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::slip_rules::{Rule, Stencils};
 
@@ -22,6 +23,8 @@ pub struct SlipEquations<'a> {
     differences: &'a StripOperator,
     parity: Option<Parity>,
     stencils: Stencils,
+    /// What an elastic layer between the bodies adds.
+    layer: Option<LayerSlip>,
     /// Cells and rows of every segment that has unknowns.
     cells: Vec<std::ops::Range<usize>>,
     rows: Vec<std::ops::Range<usize>>,
@@ -49,6 +52,7 @@ pub struct SlipScratch {
     /// Displacement differences along x, then across.
     differences: Vec<f64>,
     operator: OperatorScratch,
+    layer: [Vec<f64>; 2],
 }
 
 impl<'a> SlipEquations<'a> {
@@ -78,6 +82,7 @@ impl<'a> SlipEquations<'a> {
             differences,
             parity,
             stencils: Stencils::new(rule, mesh, segments),
+            layer: None,
             cells: Vec::with_capacity(count),
             rows: Vec::with_capacity(count),
             padded: differences.padded(parity),
@@ -93,6 +98,15 @@ impl<'a> SlipEquations<'a> {
         }
         equations.row_count = row;
         equations
+    }
+
+    /// The same with an elastic layer of this flexibility between the bodies; with 0 there is none.
+    #[must_use]
+    pub fn with_layer(mut self, mesh: &Mesh, flexibility: f64) -> SlipEquations<'a> {
+        let segments = &mesh.segments[..self.cells.len()];
+        self.layer =
+            (flexibility > 0.0).then(|| LayerSlip::new(self.rule, mesh, segments, flexibility));
+        self
     }
 
     /// Number of cells with unknowns.
@@ -126,6 +140,7 @@ impl<'a> SlipEquations<'a> {
         let SlipScratch {
             differences,
             operator,
+            layer: buffers,
         } = scratch;
         differences.resize(2 * self.row_count, 0.0);
         let (dx, dy) = differences.split_at_mut(self.row_count);
@@ -136,6 +151,10 @@ impl<'a> SlipEquations<'a> {
                 let slip = &mut slip[cells.clone()];
                 self.stencils
                     .elastic(cells.clone(), &differences[rows.clone()], slip);
+            }
+            if let Some(layer) = &self.layer {
+                layer.add(cells.clone(), &tx[cells.clone()], sx, buffers);
+                layer.add(cells.clone(), &ty[cells.clone()], sy, buffers);
             }
         }
     }
@@ -198,7 +217,7 @@ impl<'a> SlipEquations<'a> {
         );
         let [xx, yy] = blocks;
         let [dx, dy] = differences;
-        for (column, cell) in cells.enumerate() {
+        for (in_segment, cell) in cells.enumerate() {
             dx.clear();
             dy.clear();
             for row in rows.clone() {
@@ -206,10 +225,13 @@ impl<'a> SlipEquations<'a> {
                 dx.push(x);
                 dy.push(y);
             }
-            let column = column * n..(column + 1) * n;
+            let column = in_segment * n..(in_segment + 1) * n;
             let (xx, yy) = (&mut xx[column.clone()], &mut yy[column]);
             self.stencils.elastic(own.clone(), dx, xx);
             self.stencils.elastic(own.clone(), dy, yy);
+            if let Some(layer) = &self.layer {
+                layer.add_column(own.clone(), in_segment, [xx, yy]);
+            }
         }
     }
 

@@ -66,6 +66,25 @@ impl Stencils {
         stencils
     }
 
+    /// The same for a quantity that is nothing beyond the leading edge, instead of going on there as in a mirror.
+    #[must_use]
+    pub fn ending_at_the_edge(rule: Rule, mesh: &Mesh, segments: &[Segment]) -> Stencils {
+        let mut stencils = Stencils::new(rule, mesh, segments);
+        let mut points = Vec::new();
+        for segment in segments.iter().filter(|_| rule == Rule::ThreePoint) {
+            observe(mesh, segment, &mut points);
+            let n = segment.cells.len();
+            let last = &mut stencils.band[segment.cells.end - 1];
+            *last = [1.0 / (points[n] - points[n - 1]), 0.0, 0.0];
+            if n > 1 {
+                let [a, b] = [n - 1, n].map(|k| points[k] - points[n - 2]);
+                let (w1, w2) = (b / (a * (b - a)), -a / (b * (b - a)));
+                stencils.band[segment.cells.end - 2] = [w1 + w2, w2, 0.0];
+            }
+        }
+        stencils
+    }
+
     /// Prepares the rule for one segment with these observation points.
     fn prepare(&mut self, rule: Rule, cells: Range<usize>, points: &[f64]) {
         let n = cells.len();

@@ -27,6 +27,22 @@ impl StripChord {
         let stretched = |x: f64| middle + (x - middle) / ratio;
         ratio * footprint.mean_pressure(&self.line, stretched(x0), stretched(x1))
     }
+
+    /// Loads over width at equally spaced places y of the strip.
+    #[must_use]
+    pub fn loads(&self, footprint: &Footprint, patch: usize, samples: usize) -> Vec<(f64, f64)> {
+        let step = self.line.dy / samples as f64;
+        let places =
+            (0..samples).map(|k| self.line.y + (k as f64 + 0.5) * step - 0.5 * self.line.dy);
+        let load = |y: f64| {
+            let across = footprint.chords(patch, &[(y, step)]);
+            let of_chord = |chord: &Chord| {
+                (chord.right - chord.left) * footprint.mean_pressure(chord, chord.left, chord.right)
+            };
+            across.iter().map(of_chord).sum::<f64>()
+        };
+        places.map(|y| (y, load(y))).collect()
+    }
 }
 
 /// Chords of one patch on the strips `(y, dy)`.

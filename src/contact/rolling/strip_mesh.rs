@@ -29,7 +29,7 @@ pub struct Scale {
     pub length: f64,
     /// Unit of traction in MPa: μ times the largest pressure.
     pub traction: f64,
-    /// Combined shear modulus in MPa.
+    /// Combined shear modulus in MPa; of an interface that reduces it, what it is for tractions.
     pub shear_modulus: f64,
     /// Where the dimensionless coordinates are 0, in mm: on the mirror line if there is one.
     pub origin: [f64; 2],
@@ -75,6 +75,8 @@ pub struct StripMesh {
     pub normalised: Mesh,
     /// Friction bound of every cell, dimensionless.
     pub bound: Vec<f64>,
+    /// Flexibility of an elastic layer between the bodies, dimensionless.
+    pub layer: f64,
     poisson_ratio: f64,
     precision: Precision,
     mirrored: bool,
@@ -123,15 +125,14 @@ impl StripMesh {
         let area = mesh.areas();
         let pressure = cell_pressures(footprint, &fitted, &mesh, &area);
         let largest = patches.iter().map(|p| p.pressure_max).fold(0.0, f64::max);
-        let middles = mesh.node.iter().zip(mesh.rows()).map(|(x, y)| [*x, y]);
-        let bound = task.friction.bounds(middles, &pressure, largest);
+        let bound = bounds(task, &fitted, &mesh, &pressure, largest);
         // Pressures enter the equations through their bounds only, so that bounds decide the symmetry.
         let mirror = mesh.mirror_line().filter(|_| bounds_mirror(&mesh, &bound));
         let [x, y] = middle(&patches.iter().map(|p| p.extent).collect::<Vec<_>>());
         let scale = Scale {
             length: (patches.iter().map(|p| p.area).sum::<f64>() / PI).sqrt(),
             traction: task.friction.largest() * largest,
-            shear_modulus,
+            shear_modulus: task.interface.reduction * shear_modulus,
             origin: [x, mirror.unwrap_or(y)],
         };
         let precision = task.precision();
@@ -147,6 +148,7 @@ impl StripMesh {
             scale,
             normalised,
             bound,
+            layer: task.interface.layer * scale.shear_modulus / scale.length,
             poisson_ratio,
             precision,
             mirrored: mirror.is_some(),
@@ -229,6 +231,30 @@ impl StripMesh {
         }
         values
     }
+}
+
+/// Samples across a strip where friction varies.
+const FRICTION_SAMPLES: usize = 16;
+
+/// Friction bounds of the cells, dimensionless: the load-weighted mean coefficient of the strip times the pressure.
+fn bounds(
+    task: &RollingTask,
+    fitted: &[StripChord],
+    mesh: &Mesh,
+    pressure: &[f64],
+    largest: f64,
+) -> Vec<f64> {
+    let mut bound = Vec::with_capacity(pressure.len());
+    for (segment, fitted) in mesh.segments.iter().zip(fitted) {
+        let loads = match task.friction.across() {
+            None => Vec::new(),
+            Some(_) => fitted.loads(task.footprint, segment.chord.patch, FRICTION_SAMPLES),
+        };
+        let share = task.friction.share(loads.iter().copied());
+        let cells = pressure[segment.cells.clone()].iter();
+        bound.extend(cells.map(|pressure| share * pressure / largest));
+    }
+    bound
 }
 
 /// The strips of all patches, fitted to the region.

@@ -1,5 +1,7 @@
 //! What the tangential problem of one footprint asks: physics, method and accuracy.
 
+use crate::contact::friction::falling::{BoundFall, FallingLaw};
+use crate::contact::friction::interface::Interface;
 use crate::contact::friction::law::FrictionLaw;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::half_space::strip_operator::kind::Precision;
@@ -22,11 +24,15 @@ pub struct RollingTask<'a> {
     /// Elastic constants of the pair.
     pub elasticity: &'a Elasticity,
     /// Bound of the tractions.
-    pub friction: FrictionLaw,
+    pub friction: &'a FrictionLaw,
+    /// What lies between the bodies.
+    pub interface: Interface,
     /// The motions, in order; a creepage is 0 where a force is prescribed instead.
     pub motions: &'a [Motion],
     /// Forces prescribed instead of creepages, motion by motion.
     pub forces: &'a [PrescribedForces],
+    /// Rolling speeds in mm/s, motion by motion, where they are known.
+    pub speeds: &'a [Option<f64>],
     /// The number of the first of these motions in its case.
     pub first_motion: usize,
     /// Does the case ask about one motion alone?
@@ -65,6 +71,22 @@ impl RollingTask<'_> {
             }
             Resolution::Mesh(_) => TOLERANCE_LEAST,
         }
+    }
+
+    /// How the bounds of the cells fall with their slip in motion `index`, where they do; slips are counted in `slip_unit`.
+    #[must_use]
+    pub fn bound_fall(&self, index: usize, slip_unit: f64) -> Option<BoundFall> {
+        let speed = self.speeds.get(index).copied().flatten();
+        self.friction.bound_fall(speed, slip_unit)
+    }
+
+    /// Why friction falls too fast with slip for an answer, if it does.
+    #[must_use]
+    pub fn falls_too_fast(&self) -> Option<String> {
+        let modulus = self.interface.reduction * self.elasticity.shear_modulus;
+        let patches = self.footprint.patches();
+        let stability = self.friction.stability(patches, modulus, self.speeds)?;
+        FallingLaw::too_fast(stability)
     }
 
     /// Is a force prescribed for any motion?

@@ -56,8 +56,12 @@ pub struct Solution {
 pub struct Asked {
     /// The `type` of the contact.
     pub contact: String,
-    /// Coefficient of friction: no tangential traction exceeds it times the pressure.
+    /// Largest coefficient of friction: no tangential traction exceeds it times the pressure.
     pub friction_coefficient: f64,
+    /// Whether the coefficient is less elsewhere: it falls with slip, or varies across.
+    #[serde(skip_serializing_if = "std::ops::Not::not", default)]
+    #[schema(required = false)]
+    pub friction_varies: bool,
     /// The load; absent where the case has none.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     #[schema(nullable = false)]

@@ -136,6 +136,7 @@ async fn of_section(
         friction: solution
             .asked
             .as_ref()
+            .filter(|asked| !asked.friction_varies)
             .map(|asked| asked.friction_coefficient),
     };
     Ok(Box::new(move |width| Ok(section::draw(&sections, width))))

@@ -10,12 +10,15 @@ use serde_json::Value;
 use crate::contact::case::after_tasks::AfterWords;
 use crate::contact::case::checks::{PartialCase, faults_of};
 use crate::contact::case::limits::Limits;
-use crate::contact::case::read::faults::{Faults, Interval};
+use crate::contact::case::read::faults::Faults;
 use crate::contact::case::read::object::{Object, has_controls, join, shown};
-use crate::contact::case::read::{contact, damage, material, motion, solver, subsurface, thermal};
+use crate::contact::case::read::{
+    contact, damage, friction, material, motion, solver, subsurface, thermal,
+};
 use crate::contact::case::words::contact::{Contact, Load};
 use crate::contact::case::words::damage::DamageWords;
-use crate::contact::case::words::material::{Friction, Material};
+use crate::contact::case::words::friction::Friction;
+use crate::contact::case::words::material::Material;
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::question::Case;
 use crate::contact::case::words::solver::{Output, Solver};
@@ -32,9 +35,6 @@ const LABELS_MAX: usize = 32;
 const LABEL_KEY_LENGTH_MAX: usize = 64;
 /// Most characters of its value.
 const LABEL_VALUE_LENGTH_MAX: usize = 256;
-const FRICTION: Interval = Interval::closed(0.0, 100.0, "");
-/// A smaller friction coefficient is refused unless it is 0: dimensionless motions would overflow.
-const FRICTION_LEAST: f64 = 1e-12;
 
 /// What could be read of a case: the parts without a fault.
 ///
@@ -86,7 +86,7 @@ impl CaseDraft {
     pub(crate) fn faults_beside(&self, limits: &Limits) -> Vec<Fault> {
         let given = PartialCase {
             material: self.material.as_ref(),
-            friction: self.friction.as_ref().map(|f| f.coefficient),
+            friction: self.friction.as_ref(),
             contact: self.contact.as_ref(),
             load: self.load.as_ref(),
             motion: self.motion.as_ref(),
@@ -141,7 +141,7 @@ fn read(case: &mut Object) -> CaseDraft {
     let name = case.line("name", NAME_LENGTH_MAX);
     let labels = labels(case);
     let material = material::read(case);
-    let friction = friction(case);
+    let friction = friction::read(case);
     let contact = contact::read(case);
     let load = contact::read_load(case);
     let motion = motion::read(case);
@@ -166,18 +166,6 @@ fn read(case: &mut Object) -> CaseDraft {
         damage,
         thermal,
     }
-}
-
-fn friction(case: &mut Object) -> Option<Friction> {
-    let mut block = case.child("friction")?;
-    block.only(&["coefficient"], &[]);
-    let coefficient = block.required_number("coefficient", FRICTION)?;
-    if coefficient > 0.0 && coefficient < FRICTION_LEAST {
-        let detail = format!("{coefficient:e} given; 0 or at least {FRICTION_LEAST:e} is needed");
-        block.fault("coefficient", detail);
-        return None;
-    }
-    Some(Friction { coefficient })
 }
 
 fn labels(case: &mut Object) -> BTreeMap<String, String> {

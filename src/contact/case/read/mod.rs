@@ -4,6 +4,7 @@ pub mod contact;
 pub mod damage;
 pub mod draft;
 pub mod faults;
+pub mod friction;
 pub mod material;
 pub mod motion;
 pub mod object;

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::contact::case::words::contact::{Contact, Load};
 use crate::contact::case::words::damage::DamageWords;
+use crate::contact::case::words::friction::Friction;
 use crate::contact::case::words::material::Material;
 use crate::contact::case::words::motion::{MotionWords, Wheelset};
 use crate::contact::case::words::solver::{MeshSizeWords, MethodName, Output, TractionBoundName};
@@ -17,7 +18,7 @@ pub(crate) struct Canonical<'a> {
     pub(crate) solver_version: &'static str,
     pub(crate) solver_revision: u32,
     pub(crate) elasticity: [f64; 3],
-    pub(crate) friction: f64,
+    pub(crate) friction: FrictionForm<'a>,
     pub(crate) contact: &'a Contact,
     pub(crate) load: Option<&'a Load>,
     pub(crate) motions: Vec<MotionWords>,
@@ -42,4 +43,21 @@ pub(crate) struct Canonical<'a> {
     pub(crate) thermal: Option<&'a ThermalWords>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) speeds: Option<&'a [Option<f64>]>,
+}
+
+/// A constant coefficient alone is its number, however it is written.
+#[derive(Serialize)]
+#[serde(untagged)]
+pub(crate) enum FrictionForm<'a> {
+    Constant(f64),
+    Other(&'a Friction),
+}
+
+impl<'a> From<&'a Friction> for FrictionForm<'a> {
+    fn from(friction: &'a Friction) -> FrictionForm<'a> {
+        match friction.constant() {
+            Some(coefficient) => FrictionForm::Constant(coefficient),
+            None => FrictionForm::Other(friction),
+        }
+    }
 }

@@ -1,4 +1,4 @@
-//! Elastic constants of the bodies, and friction between them.
+//! Elastic constants of the bodies.
 
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -32,12 +32,4 @@ pub struct Elastic {
     /// Poisson's ratio, 0 to 0.5.
     #[schema(minimum = 0.0, maximum = 0.5)]
     pub poisson_ratio: f64,
-}
-
-/// Coulomb friction with one coefficient.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
-pub struct Friction {
-    /// Friction coefficient: 0 (frictionless), or 1e-12 to 100.
-    #[schema(minimum = 0.0, maximum = 100.0)]
-    pub coefficient: f64,
 }

@@ -3,6 +3,7 @@
 pub mod canonical;
 pub mod contact;
 pub mod damage;
+pub mod friction;
 pub mod material;
 pub mod motion;
 pub mod question;

@@ -41,7 +41,7 @@ pub struct AskedMotion {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub force_y_n: Option<f64>,
-    /// Rolling speed in mm/s; only temperatures and Archard's wear depend on it.
+    /// Rolling speed in mm/s; only temperatures, Archard's wear and friction that falls with slip depend on it.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub speed_mm_per_s: Option<f64>,
@@ -119,7 +119,7 @@ pub struct Sweep {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub force_y_n: Option<Swept>,
-    /// Rolling speed in mm/s, the same for all motions; only temperatures and Archard's wear depend on it.
+    /// Rolling speed in mm/s, the same for all motions; only temperatures, Archard's wear and friction that falls with slip depend on it.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub speed_mm_per_s: Option<f64>,

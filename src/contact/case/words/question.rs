@@ -10,7 +10,8 @@ use utoipa::ToSchema;
 
 use crate::contact::case::words::contact::{Contact, Load};
 use crate::contact::case::words::damage::DamageWords;
-use crate::contact::case::words::material::{Friction, Material};
+use crate::contact::case::words::friction::Friction;
+use crate::contact::case::words::material::Material;
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::solver::{Output, Solver};
 use crate::contact::case::words::subsurface::SubsurfaceWords;
@@ -29,7 +30,7 @@ pub struct Case {
     pub labels: BTreeMap<String, String>,
     /// Elastic constants of the two bodies.
     pub material: Material,
-    /// Coulomb friction.
+    /// Friction between them.
     pub friction: Friction,
     /// Where and how the bodies touch.
     pub contact: Contact,

@@ -33,6 +33,19 @@ macro_rules! motion_remarks {
             advice: "Use the forces with their larger error estimate, or try another mesh or target.",
             detail: "the trapezoid rule did not converge; forces come from the three-point rule and their error is larger".to_owned(),
 
+            /// Friction falls so fast with slip that the contact has a second state.
+            SeveralSolutions {
+                /// Difference of the two forces relative to the friction limit.
+                force_change: f64 = 0.08,
+            }
+            code: "several-solutions",
+            severity: Warning,
+            advice: "The answer is the state reached from small slip. Ask with less speed, pressure or fall to see where the two part.",
+            detail: format!(
+                "friction falls so fast with slip that a second state exists, reached from sliding, whose force differs by {force_change:.3} of \
+                 the friction limit; the answer is the one reached from rest"
+            ),
+
             /// The error is not known to be below the target.
             TargetMissed {
                 /// Estimated error relative to μN; absent if it is unknown.

@@ -8,6 +8,7 @@
 use std::f64::consts::PI;
 
 use crate::contact::error::SolveError;
+use crate::contact::friction::interface::Interface;
 use crate::contact::friction::law::FrictionLaw;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::mesh::size::MeshSize;
@@ -112,9 +113,11 @@ impl EllipseMesh {
                 poisson_ratio: 0.0,
                 difference: 0.0,
             },
-            friction: FrictionLaw::Constant(1.0),
+            friction: &FrictionLaw::Constant(1.0),
+            interface: Interface::default(),
             motions: &[],
             forces: &[],
+            speeds: &[],
             first_motion: 0,
             single_motion: true,
             method: Method::Fastsim,

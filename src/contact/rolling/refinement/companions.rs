@@ -7,8 +7,9 @@ use crate::contact::monitor::Monitor;
 use crate::contact::rolling::answer::{LevelAnswer, LevelFailure, Work};
 use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::methods::boundary_element::solve as boundary_element;
-use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::methods::boundary_element::task::LevelTask;
 use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;
+use crate::contact::rolling::refinement::level_solve::MotionTask;
 use crate::contact::rolling::refinement::levels::Levels;
 use crate::contact::rolling::refinement::warm_start::nested_tractions;
 use crate::contact::rolling::resultants::Resultants;
@@ -50,7 +51,8 @@ impl Companion {
         3.0 / ((f64::from(fine) / f64::from(halved)).powi(2) - 1.0)
     }
 
-    /// Solves the companion of level `number` for a motion with the trapezoid rule alone, started from the level's `answer`.
+    /// Solves the companion of level `number` for a motion with the trapezoid rule alone (where bounds fall with the slip, with the
+    /// three-point rule first), started from the level's `answer`.
     ///
     /// # Errors
     /// The monitor may stop the work.
@@ -60,7 +62,7 @@ impl Companion {
         levels: &mut Levels,
         number: usize,
         answer: &LevelAnswer,
-        motion: &Motion,
+        asked: MotionTask,
         monitor: &dyn Monitor,
     ) -> Result<(CompanionAnswer, Work), SolveError> {
         let missing = (CompanionAnswer::Missing, Work::default());
@@ -75,10 +77,13 @@ impl Companion {
         };
         let (fine, level) = (levels.get(number), levels.get(companion));
         let start = nested_tractions(&fine, &answer.traction, &level);
-        let motion = level.scale.motion(motion);
-        let tolerance = task.tolerance();
-        let workspace = &mut levels.workspace;
-        match boundary_element::trapezoid(&level, &motion, &start, tolerance, workspace, monitor) {
+        let of_level = LevelTask {
+            level: &level,
+            motion: &level.scale.motion(&asked.motion),
+            fall: task.bound_fall(asked.index, level.scale.slip()),
+            tolerance: task.tolerance(),
+        };
+        match boundary_element::trapezoid(of_level, &start, &mut levels.workspace, monitor) {
             Ok((traction, work)) => {
                 let patches = task.footprint.patches().len();
                 let found = (0..patches)

@@ -6,6 +6,7 @@ use crate::contact::monitor::Monitor;
 use crate::contact::rolling::answer::{LevelAnswer, LevelFailure, Work};
 use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::methods::boundary_element::solve as boundary_element;
+use crate::contact::rolling::methods::boundary_element::task::LevelTask;
 use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use crate::contact::rolling::methods::liu_hsu::on_level;
 use crate::contact::rolling::methods::method::Method;
@@ -125,7 +126,7 @@ pub fn solve_level(
     let start =
         warm.or_else(|| below.map(|(coarse, answer)| nested_start(&coarse, answer, &level)));
     let workspace = &mut levels.workspace;
-    let tangential = run_method(task, &level, &asked.motion, start, workspace, monitor)
+    let tangential = run_method(task, &level, asked, start, workspace, monitor)
         .map_err(|f| named(f, task, task.first_motion + asked.index))?;
     let patches = task.footprint.patches().len();
     let summed: Vec<Resultants> = (0..patches)
@@ -225,11 +226,12 @@ pub(crate) fn named(failure: LevelFailure, task: &RollingTask, point: usize) -> 
 fn run_method(
     task: &RollingTask,
     level: &StripMesh,
-    motion: &Motion,
+    asked: MotionTask,
     start: Option<Start>,
     workspace: &mut NewtonWorkspace,
     monitor: &dyn Monitor,
 ) -> Result<LevelAnswer, LevelFailure> {
+    let motion = &asked.motion;
     if task.friction.is_frictionless() {
         return Ok(full_slip::frictionless_answer(level, motion));
     }
@@ -241,6 +243,11 @@ fn run_method(
     if task.method == Method::Fastsim {
         return Ok(fastsim::solve(task, level, &motion));
     }
-    let (start, tolerance) = (start.as_ref(), task.tolerance());
-    boundary_element::solve(level, &motion, start, tolerance, workspace, monitor)
+    let of_level = LevelTask {
+        level,
+        motion: &motion,
+        fall: task.bound_fall(asked.index, level.scale.slip()),
+        tolerance: task.tolerance(),
+    };
+    boundary_element::solve(of_level, start.as_ref(), workspace, monitor)
 }

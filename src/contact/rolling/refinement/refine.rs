@@ -196,14 +196,8 @@ pub(crate) fn judge(
         if target.is_some_and(|target| point.error().is_none_or(|error| error > target)) {
             break;
         }
-        let (found, work) = which.solve(
-            task,
-            levels,
-            point.level,
-            &point.tangential,
-            &asked.motion,
-            monitor,
-        )?;
+        let (found, work) =
+            which.solve(task, levels, point.level, &point.tangential, asked, monitor)?;
         solved.indicators.see(task, k, &point.summed, &found);
         seen[k] = found;
         point.work.add(Work {

@@ -1,5 +1,6 @@
 //! A fixed point for the tractions where the rigid slip is large everywhere.
 
+use crate::contact::friction::falling::BoundFall;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
 use crate::contact::rolling::methods::boundary_element::task::{
@@ -36,11 +37,7 @@ pub fn fixed_point(
     }
     let mut report = Convergence::default();
     let follow = |t: &mut [f64], slip: &[f64]| {
-        for i in 0..cells {
-            let factor = law.bound[i] / slip[i].hypot(slip[padded + i]);
-            t[i] = factor * slip[i];
-            t[padded + i] = factor * slip[padded + i];
-        }
+        slide_along(slip, &law.bound[..cells], law.fall.as_ref(), t);
     };
     follow(t, law.rigid);
     for _ in 0..SWEEPS_MAX {
@@ -57,4 +54,26 @@ pub fn fixed_point(
         follow(t, workspace.slip());
     }
     Ok(None)
+}
+
+/// Tractions of these cells at their bounds, along slips, both components one after the other.
+pub(crate) fn slide_along(slip: &[f64], bound: &[f64], fall: Option<&BoundFall>, t: &mut [f64]) {
+    let padded = t.len() / 2;
+    for (i, rest) in bound.iter().enumerate() {
+        let size = slip[i].hypot(slip[padded + i]);
+        let bound = fall.map_or(*rest, |fall| rest * fall.at(size).0);
+        let factor = if size > 0.0 { bound / size } else { 0.0 };
+        t[i] = factor * slip[i];
+        t[padded + i] = factor * slip[padded + i];
+    }
+}
+
+/// Length of the difference of the forces of two sets of tractions on cells with these areas.
+pub(crate) fn force_change(area: &[f64], t: &[f64], other: &[f64]) -> f64 {
+    let padded = t.len() / 2;
+    let [x, y] = [0, padded].map(|from| {
+        let change = |(i, area): (usize, &f64)| area * (other[from + i] - t[from + i]);
+        area.iter().enumerate().map(change).sum::<f64>()
+    });
+    x.hypot(y)
 }

@@ -1,5 +1,9 @@
 //! The friction law linearised at an iterate, cell by cell.
 
+use std::ops::Range;
+
+use crate::contact::rolling::methods::boundary_element::falling_rows::FallingRow;
+
 /// The state of one Newton step: which cells slip, and in which direction.
 #[derive(Debug, Default)]
 pub struct Linearisation {
@@ -7,10 +11,31 @@ pub struct Linearisation {
     pub(crate) direction: Vec<(f64, f64)>,
     /// D where a cell slips, −1 where it sticks.
     pub(crate) stiffness: Vec<f64>,
+    /// Cells that slip under a bound that falls with the slip, in order. They have two unknowns, like those that stick.
+    pub(crate) falling: Vec<FallingRow>,
 }
 
 impl Linearisation {
-    /// Does the cell slip?
+    /// Begins another linearisation.
+    pub(crate) fn clear(&mut self) {
+        self.direction.clear();
+        self.stiffness.clear();
+        self.falling.clear();
+    }
+
+    /// The next cell has two unknowns.
+    pub(crate) fn two_unknowns(&mut self) {
+        self.direction.push((1.0, 0.0));
+        self.stiffness.push(-1.0);
+    }
+
+    /// The rows among these cells whose bound falls with the slip.
+    pub(crate) fn falling_in(&self, cells: Range<usize>) -> &[FallingRow] {
+        let place = |cell| self.falling.partition_point(|row| row.cell < cell);
+        &self.falling[place(cells.start)..place(cells.end)]
+    }
+
+    /// Does the cell slip with one unknown?
     #[must_use]
     pub fn slips(&self, cell: usize) -> bool {
         self.stiffness[cell] >= 0.0

@@ -1,8 +1,10 @@
 //! Semismooth Newton iteration on strips.
 
+mod falling_rows;
 pub mod fixed_point;
 pub mod linearisation;
 pub mod newton;
+mod newton_system;
 pub mod preconditioner;
 pub mod solve;
 pub mod task;

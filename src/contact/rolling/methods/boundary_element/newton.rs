@@ -3,15 +3,16 @@
 //! With `z = T + r s`: a cell sticks where `|z| ≤ g` (both components unknown, `s = 0`), and slips where `|z| > g`
 //! (`T = g d + τ t`, `d = z/|z|`, `t ⟂ d`, one unknown τ, one equation `t·s = D τ`, `D = (|z| − g)/(g r)`). Each step
 //! solves that linear system by GMRES with the segments' own blocks as preconditioner (Alart & Curnier 1991 for the
-//! projection form; `r = 0.3/M_ii` because larger values can cycle on fine meshes).
+//! projection form; `r = 0.3/M_ii` because larger values can cycle on fine meshes). Where the bound falls with the slip, Π is the resolvent
+//! of that law: see [`FallingRow`].
 
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use crate::contact::friction::falling::BoundFall;
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::numerics::gmres::LinearSystem;
+use crate::contact::rolling::methods::boundary_element::falling_rows::FallingRow;
 use crate::contact::rolling::methods::boundary_element::linearisation::Linearisation;
-use crate::contact::rolling::methods::boundary_element::preconditioner::StripFactors;
+use crate::contact::rolling::methods::boundary_element::newton_system::NewtonSystem;
 use crate::contact::rolling::methods::boundary_element::task::{
     Convergence, NewtonExit, NewtonTask,
 };
@@ -19,7 +20,8 @@ use crate::contact::rolling::methods::boundary_element::workspace::{
     NewtonWorkspace, StepVectors, zeroed,
 };
 use crate::contact::rolling::own_blocks::OwnBlocks;
-use crate::contact::rolling::slip_equations::{SlipEquations, SlipScratch};
+use crate::contact::rolling::slip_equations::SlipEquations;
+use crate::contact::rolling::slip_rules::Rule;
 
 // Sensitivities of the numbers below: each changed alone, on the first 160 ellipses of `cargo bench --bench calibrate ellipse` at the
 // targets 0.005 and 0.001, and on 12 sweeps of 9 motions. No change made a solve fail or moved an error beyond its scatter.
@@ -50,6 +52,10 @@ pub struct Newton<'a> {
     own: Arc<OwnBlocks>,
     /// Projection parameter r of every cell.
     parameter: Vec<f64>,
+    /// See [`Newton::compliance`].
+    compliance: f64,
+    /// See [`Newton::stability`].
+    stability: f64,
 }
 
 impl<'a> Newton<'a> {
@@ -63,18 +69,46 @@ impl<'a> Newton<'a> {
     #[must_use]
     pub fn with_blocks(equations: &'a SlipEquations<'a>, own: Arc<OwnBlocks>) -> Newton<'a> {
         let diagonal = own.diagonal(equations);
+        let parameter: Vec<f64> = diagonal.iter().map(|m| PROJECTION / m.abs()).collect();
+        let sum: f64 = parameter.iter().sum();
         Newton {
             equations,
-            parameter: diagonal.iter().map(|m| PROJECTION / m.abs()).collect(),
+            compliance: sum / (PROJECTION * parameter.len().max(1) as f64),
+            parameter,
+            stability: 0.0,
             own,
         }
+    }
+
+    /// The same for bounds that fall with the slip from those at rest: r is at least twice the steepest fall of each cell, so that its
+    /// resolvent is unique.
+    #[must_use]
+    pub fn falling(mut self, bound: &[f64], fall: &BoundFall) -> Newton<'a> {
+        let steepest = fall.steepest();
+        for (r, bound) in self.parameter.iter_mut().zip(bound) {
+            self.stability = self.stability.max(steepest * bound * PROJECTION / *r);
+            *r = r.max(2.0 * steepest * bound);
+        }
+        self
+    }
+
+    /// How fast bounds fall with the slip over how fast slips fall as tractions grow: the largest `|g′| |M_ii|` of a cell. Below 1 every
+    /// cell alone has one solution. 0 for bounds that do not fall.
+    #[must_use]
+    pub fn stability(&self) -> f64 {
+        self.stability
+    }
+
+    /// The rule in use.
+    #[must_use]
+    pub fn rule(&self) -> Rule {
+        self.equations.rule
     }
 
     /// A typical `1/M_ii`: the traction that one unit of slip causes on a cell.
     #[must_use]
     pub fn compliance(&self) -> f64 {
-        let sum: f64 = self.parameter.iter().sum();
-        sum / (PROJECTION * self.parameter.len().max(1) as f64)
+        self.compliance
     }
 
     /// Entries of the influence that one product touches.
@@ -171,16 +205,30 @@ impl<'a> Newton<'a> {
         }
     }
 
+    /// The bounds of all cells at the slips of an iterate that solves the law: those at rest where they stick.
+    #[must_use]
+    pub fn bounds(&self, rest: &[f64], fall: &BoundFall, t: &[f64], slip: &[f64]) -> Vec<f64> {
+        let mut bounds = rest.to_vec();
+        for (i, bound) in bounds.iter_mut().enumerate().take(self.equations.cells()) {
+            let (_, length) = self.projected(t, slip, i);
+            if length > *bound {
+                *bound = fall.resolvent(*bound, self.parameter[i], length).bound;
+            }
+        }
+        bounds
+    }
+
+    /// `z = T + r s` of a cell, and its length.
+    fn projected(&self, t: &[f64], slip: &[f64], cell: usize) -> ([f64; 2], f64) {
+        let (padded, r) = (self.equations.padded(), self.parameter[cell]);
+        let z = [cell, padded + cell].map(|i| t[i] + r * slip[i]);
+        (z, (z[0] * z[0] + z[1] * z[1]).sqrt())
+    }
+
     /// Does a cell slip under tractions `t` with the slips that they cause?
     #[must_use]
     pub fn slips(&self, bound: &[f64], t: &[f64], slip: &[f64], cell: usize) -> bool {
-        let padded = self.equations.padded();
-        let r = self.parameter[cell];
-        let (zx, zy) = (
-            t[cell] + r * slip[cell],
-            t[padded + cell] + r * slip[padded + cell],
-        );
-        (zx * zx + zy * zy).sqrt() > bound[cell]
+        self.projected(t, slip, cell).1 > bound[cell]
     }
 
     /// Computes the slips of `t` and the residual of the projected law; the slips are left in the workspace.
@@ -199,10 +247,10 @@ impl<'a> Newton<'a> {
             let (tx, ty, r) = (t[i], t[padded + i], self.parameter[i]);
             let (zx, zy) = (tx + r * slip[i], ty + r * slip[padded + i]);
             let length = (zx * zx + zy * zy).sqrt();
-            let shrink = if length > law.bound[i] {
-                law.bound[i] / length
-            } else {
-                1.0
+            let shrink = match &law.fall {
+                _ if length <= law.bound[i] => 1.0,
+                None => law.bound[i] / length,
+                Some(fall) => fall.resolvent(law.bound[i], r, length).bound / length,
             };
             sum += law.area[i] * ((tx - shrink * zx).powi(2) + (ty - shrink * zy).powi(2));
             weight += law.area[i];
@@ -245,8 +293,7 @@ impl<'a> Newton<'a> {
             slip,
             ..
         } = &mut *workspace;
-        linear.direction.clear();
-        linear.stiffness.clear();
+        linear.clear();
         to_tangent.clear();
         let (mut lifted, mut weight) = (0.0, 0.0);
         for i in 0..cells {
@@ -254,9 +301,14 @@ impl<'a> Newton<'a> {
             let (zx, zy) = (t[i] + r * slip[i], t[padded + i] + r * slip[padded + i]);
             let (length, bound) = ((zx * zx + zy * zy).sqrt(), law.bound[i]);
             weight += law.area[i];
-            if length <= bound {
-                linear.direction.push((1.0, 0.0));
-                linear.stiffness.push(-1.0);
+            let fall = law.fall.as_ref().filter(|_| length > bound && bound > 0.0);
+            if let Some(fall) = fall {
+                let found = fall.resolvent(bound, r, length);
+                let row = FallingRow::new(i, [zx, zy], length, r, &found);
+                linear.falling.push(row);
+            }
+            if length <= bound || fall.is_some() {
+                linear.two_unknowns();
                 to_tangent.push((0.0, 0.0));
                 continue;
             }
@@ -294,6 +346,10 @@ impl<'a> Newton<'a> {
                 rhs[i] = -sx;
                 rhs[padded + i] = -sy;
             }
+        }
+        for row in &linear.falling {
+            let [x, y] = [row.cell, padded + row.cell];
+            [rhs[x], rhs[y]] = row.right([slip[x], slip[y]], [t[x], t[y]]);
         }
     }
 
@@ -374,52 +430,4 @@ fn inner_tolerance(residual: f64, last: f64, goal: f64) -> f64 {
     progress
         .max(0.3 * goal / residual)
         .clamp(INNER_TOLERANCE.0, INNER_TOLERANCE.1)
-}
-
-/// The linearised equations as GMRES sees them.
-struct NewtonSystem<'a> {
-    equations: &'a SlipEquations<'a>,
-    linear: &'a Linearisation,
-    blocks: &'a mut StripFactors,
-    product: &'a mut SlipScratch,
-    expanded: &'a mut [f64],
-    slip: &'a mut [f64],
-    monitor: &'a dyn Monitor,
-}
-
-impl LinearSystem for NewtonSystem<'_> {
-    fn product(&mut self, x: &[f64], out: &mut [f64]) {
-        let (padded, cells) = (self.equations.padded(), self.equations.cells());
-        for i in 0..cells {
-            if self.linear.slips(i) {
-                let (ux, uy) = self.linear.direction[i];
-                self.expanded[i] = ux * x[i];
-                self.expanded[padded + i] = uy * x[i];
-            } else {
-                self.expanded[i] = x[i];
-                self.expanded[padded + i] = x[padded + i];
-            }
-        }
-        self.equations
-            .elastic(self.expanded, self.slip, self.product);
-        out.fill(0.0);
-        for i in 0..cells {
-            let (sx, sy) = (self.slip[i], self.slip[padded + i]);
-            if self.linear.slips(i) {
-                let (ux, uy) = self.linear.direction[i];
-                out[i] = ux * sx + uy * sy - self.linear.stiffness[i] * x[i];
-            } else {
-                out[i] = sx;
-                out[padded + i] = sy;
-            }
-        }
-    }
-
-    fn precondition(&mut self, x: &mut [f64]) {
-        self.blocks.apply(x);
-    }
-
-    fn tick(&mut self) -> ControlFlow<Stop> {
-        self.monitor.tick(0.0)
-    }
 }

@@ -1,10 +1,13 @@
 //! The preconditioner: every segment's own block of the Newton matrix, factored on its own.
 
+use std::ops::Range;
+
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::lu::partial_pivoting::factor;
 use faer::{MatMut, Par};
 use pulp::{Arch, NullaryFnOnce};
 
+use crate::contact::rolling::methods::boundary_element::falling_rows::{FallingRow, turn_rows};
 use crate::contact::rolling::methods::boundary_element::linearisation::Linearisation;
 use crate::contact::rolling::own_blocks::OwnBlocks;
 use crate::contact::rolling::slip_equations::SlipEquations;
@@ -22,7 +25,7 @@ pub struct StripFactors {
     /// Start of each block's matrix in `factors`.
     offsets: Vec<usize>,
     gathered: Vec<f64>,
-    /// Cells of the newest block that stick.
+    /// Cells of the newest block that have two unknowns.
     stick: Vec<usize>,
     scratch: FactorScratch,
 }
@@ -53,7 +56,8 @@ impl StripFactors {
         let padded = equations.padded();
         for (j, (xx, yy)) in own.blocks().enumerate() {
             let cells = equations.segment(j);
-            if cells.clone().any(|i| linear.slips(i)) {
+            let falling = linear.falling_in(cells.clone());
+            if !falling.is_empty() || cells.clone().any(|i| linear.slips(i)) {
                 let start = self.open_block();
                 self.places.extend(cells.clone());
                 self.places.extend(
@@ -64,6 +68,9 @@ impl StripFactors {
                 );
                 let size = self.places.len() - start;
                 self.fill_block(xx, yy, cells.start, cells.len(), linear, size);
+                if !falling.is_empty() {
+                    self.turn(falling, cells, size);
+                }
                 self.close_block(start);
             } else {
                 for (matrix, shift) in [(xx, 0), (yy, padded)] {
@@ -160,6 +167,18 @@ impl StripFactors {
                 out[n + k] = yy[*row];
             }
         }
+    }
+
+    /// Turns the rows of falling cells in the newest block.
+    fn turn(&mut self, falling: &[FallingRow], cells: Range<usize>, size: usize) {
+        let stick = &self.stick;
+        let rows = falling.iter().filter_map(|row| {
+            let k = row.cell - cells.start;
+            let place = stick.binary_search(&k).ok()?;
+            Some((*row, [k, cells.len() + place]))
+        });
+        let offset = self.offsets[self.offsets.len() - 1];
+        turn_rows(&mut self.factors[offset..], size, rows);
     }
 
     /// `x ← P⁻¹ x`, block by block.

@@ -5,18 +5,23 @@
 //! three-point rule, whose slips are smooth; its direction is that of the traction, as Coulomb's law demands. The difference of the
 //! two rules is one of the indicators of the error.
 
+use std::borrow::Cow;
+
+use crate::contact::friction::falling::BoundFall;
 use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::numerics::gmres::GmresExit;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::answer::{
     LevelAnswer, LevelExit, LevelFailure, Work, project_on_bound,
 };
-use crate::contact::rolling::methods::boundary_element::fixed_point::fixed_point;
+use crate::contact::rolling::methods::boundary_element::fixed_point::{
+    fixed_point, force_change, slide_along,
+};
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
-use crate::contact::rolling::methods::boundary_element::task::{Convergence, NewtonTask};
+use crate::contact::rolling::methods::boundary_element::task::{
+    Convergence, LevelTask, NewtonTask,
+};
 use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
-use crate::contact::rolling::methods::full_slip;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::LevelOperator;
 use crate::contact::rolling::own_blocks::OwnBlocks;
@@ -26,30 +31,36 @@ use crate::contact::rolling::slip_equations::SlipEquations;
 use crate::contact::rolling::slip_rules::Rule;
 use crate::contact::rolling::strip_mesh::StripMesh;
 
-/// Solves one motion (dimensionless, about the level's origin) on one level, from a start or from zero tractions.
+/// Parts of the fall that bounds are given one after the other where the iteration does not settle with all of it.
+const CONTINUATION: [f64; 5] = [0.25, 0.5, 0.75, 0.9, 1.0];
+/// From this stability number on (see [`Newton::stability`]) a second solution is looked for. None was seen below 1.5 in 360 random
+/// motions of the prototype.
+const SECOND_START_FROM: f64 = 0.5;
+/// Forces of two solutions that differ by no more than this part of the friction limit are the same: ten times what the iteration leaves.
+const SAME_SOLUTION: f64 = 4e-3;
+
+/// Solves one motion on one level, from a start or from zero tractions.
+///
+/// Bounds that fall with the slip are followed by the three-point rule, whose slips are smooth, and kept for the trapezoid rule: its own
+/// slips alternate and would carry that into the bounds.
 ///
 /// # Errors
 /// [`LevelFailure::NotConverged`] if no start leads to a solution of the three-point rule; [`LevelFailure::Stopped`] if the
 /// monitor stops the work. If only the trapezoid rule fails, the three-point tractions serve and a remark says so.
 pub fn solve(
-    level: &StripMesh,
-    motion: &Motion,
+    task: LevelTask,
     start: Option<&Start>,
-    tolerance: f64,
     workspace: &mut NewtonWorkspace,
     monitor: &dyn Monitor,
 ) -> Result<LevelAnswer, LevelFailure> {
-    if let Some(answer) = full_slip::rigid_answer(level, motion) {
+    if let Some(answer) = task.without_iteration() {
         return Ok(answer);
     }
+    let level = task.level;
     let operator = level.operator(monitor)?;
-    let parity = level.parity(motion);
-    let control = Control {
-        tolerance,
-        workspace,
-        monitor,
-    };
-    let mut solve = RuleSequence::new(level, motion, &operator, parity, control);
+    let parity = level.parity(task.motion);
+    let control = Control { workspace, monitor };
+    let mut solve = RuleSequence::new(task, &operator, parity, control);
     let mut skips = Vec::new();
     if parity.is_some() {
         skips.push(Skip::HalfTheCells);
@@ -63,6 +74,9 @@ pub fn solve(
     }
     let by_mirror = solve.expand(&t);
     let mut remarks = Vec::new();
+    if let Some(force_change) = mirror.other {
+        remarks.push(Remark::SeveralSolutions { force_change });
+    }
     let warm = start.and_then(|start| start.trapezoid.as_ref());
     let warm = warm.map(|warm| solve.start(Some(warm)));
     let (slips, second) = match solve.trapezoid(&mut t, warm)? {
@@ -73,7 +87,8 @@ pub fn solve(
         }
     };
     let mut traction = solve.expand(&t);
-    let slip = project_on_bound(&level.bound, &slips, &mut traction, &mirror.slip);
+    let bound = solve.bounds();
+    let slip = project_on_bound(&bound, &slips, &mut traction, &mirror.slip);
     Ok(LevelAnswer {
         traction,
         second,
@@ -86,54 +101,41 @@ pub fn solve(
     })
 }
 
-/// Tractions of the trapezoid rule alone, from a start that is near; for the companions of a mesh.
+/// Tractions of the trapezoid rule alone, from a start that is near; for the companions of a mesh. Bounds that fall with the slip are
+/// found by the three-point rule first.
 ///
 /// # Errors
 /// [`LevelFailure::NotConverged`] if neither the start nor the upwind solution leads to a solution; [`LevelFailure::Stopped`] if the
 /// monitor stops the work.
 pub fn trapezoid(
-    level: &StripMesh,
-    motion: &Motion,
+    task: LevelTask,
     start: &[Vec<f64>; 2],
-    tolerance: f64,
     workspace: &mut NewtonWorkspace,
     monitor: &dyn Monitor,
 ) -> Result<([Vec<f64>; 2], Work), LevelFailure> {
-    if let Some(answer) = full_slip::rigid_answer(level, motion) {
+    if let Some(answer) = task.without_iteration() {
         return Ok((answer.traction, answer.work));
     }
+    let level = task.level;
     let operator = level.operator(monitor)?;
-    let parity = level.parity(motion);
-    let control = Control {
-        tolerance,
-        workspace,
-        monitor,
-    };
-    let mut solve = RuleSequence::new(level, motion, &operator, parity, control);
+    let parity = level.parity(task.motion);
+    let control = Control { workspace, monitor };
+    let mut solve = RuleSequence::new(task, &operator, parity, control);
     let mut t = solve.start(Some(start));
+    if task.fall.is_some() {
+        solve.mirror(&mut t, true)?;
+    }
     let Some(slips) = solve.trapezoid(&mut t, None)? else {
         return Err(LevelFailure::NotConverged {
             work: solve.work,
-            tolerance,
+            tolerance: task.tolerance,
             advice: "try another mesh".to_owned(),
         });
     };
     let mut traction = solve.expand(&t);
     let none = [0, 1].map(|_| vec![0.0; slips.len()]);
-    project_on_bound(&level.bound, &slips, &mut traction, &none);
+    project_on_bound(&solve.bounds(), &slips, &mut traction, &none);
     Ok((traction, solve.work))
-}
-
-/// A clause that says why there is no answer, as far as is known, and what to do.
-fn advice(report: &Convergence) -> String {
-    let linear = match report.inexact_steps {
-        0 => String::new(),
-        steps => {
-            let reason = GmresExit::RestartsUsedUp.reason();
-            format!("in {steps} steps {reason}; ")
-        }
-    };
-    format!("{linear}try another mesh, with cells and strips of similar width")
 }
 
 /// What the three-point rule gives besides tractions.
@@ -141,11 +143,12 @@ struct ThreePointAnswer {
     slip: [Vec<f64>; 2],
     slips: Vec<bool>,
     by_fixed_point: bool,
+    /// By how much a second solution differs, see [`RuleSequence::other_solution`].
+    other: Option<f64>,
 }
 
-/// How exactly to solve, with which buffers, and who may stop it.
+/// With which buffers to solve, and who may stop it.
 struct Control<'a> {
-    tolerance: f64,
     workspace: &'a mut NewtonWorkspace,
     monitor: &'a dyn Monitor,
 }
@@ -154,9 +157,14 @@ struct Control<'a> {
 struct RuleSequence<'a> {
     level: &'a StripMesh,
     motion: &'a Motion,
+    fall: Option<BoundFall>,
+    tolerance: f64,
     operator: &'a LevelOperator,
     parity: Option<Parity>,
+    /// Bounds of the cells, at rest where they fall with the slip.
     bound: Vec<f64>,
+    /// The same at the slips of the three-point rule, once it is solved; nothing where they do not fall.
+    slipping: Option<Vec<f64>>,
     area: Vec<f64>,
     control: Control<'a>,
     work: Work,
@@ -164,12 +172,17 @@ struct RuleSequence<'a> {
 
 impl<'a> RuleSequence<'a> {
     fn new(
-        level: &'a StripMesh,
-        motion: &'a Motion,
+        task: LevelTask<'a>,
         operator: &'a LevelOperator,
         parity: Option<Parity>,
         control: Control<'a>,
     ) -> RuleSequence<'a> {
+        let LevelTask {
+            level,
+            motion,
+            fall,
+            tolerance,
+        } = task;
         let padded = operator.influence.padded(parity);
         let resized = |values: &[f64]| {
             let mut values = values.to_vec();
@@ -179,9 +192,12 @@ impl<'a> RuleSequence<'a> {
         RuleSequence {
             level,
             motion,
+            fall,
+            tolerance,
             operator,
             parity,
             bound: resized(&level.bound),
+            slipping: None,
             area: resized(&level.normalised.areas()),
             control,
             work: Work::default(),
@@ -195,15 +211,31 @@ impl<'a> RuleSequence<'a> {
             &self.operator.influence,
             self.parity,
         )
+        .with_layer(&self.level.normalised, self.level.layer)
     }
 
     /// A solver that shares its own blocks with the other motions of the level.
     fn newton<'e>(&self, equations: &'e SlipEquations<'e>) -> Newton<'e> {
-        let own = self
-            .operator
-            .own_blocks
-            .get(equations.rule, self.parity, || OwnBlocks::new(equations));
-        Newton::with_blocks(equations, own)
+        let own =
+            self.operator
+                .own_blocks
+                .get(equations.rule, self.parity, self.level.layer, || {
+                    OwnBlocks::new(equations)
+                });
+        let newton = Newton::with_blocks(equations, own);
+        match self.fall.filter(|_| equations.rule != Rule::Trapezoid) {
+            Some(fall) => newton.falling(&self.bound, &fall),
+            None => newton,
+        }
+    }
+
+    /// The bounds of all cells of the mesh at the slips found.
+    fn bounds(&self) -> Cow<'a, [f64]> {
+        match &self.slipping {
+            None => Cow::Borrowed(&self.level.bound),
+            Some(bound) if self.parity.is_some() => Cow::Owned(self.level.unfold(bound, 1.0)),
+            Some(bound) => Cow::Owned(bound[..self.level.mesh.cells()].to_vec()),
+        }
     }
 
     /// The start brought onto the unknowns, or zero tractions.
@@ -232,16 +264,19 @@ impl<'a> RuleSequence<'a> {
         shortcut: bool,
     ) -> Result<(Convergence, bool), Stop> {
         let largest = rigid.iter().fold(0.0_f64, |m, w| m.max(w.abs()));
+        let falls = newton.rule() != Rule::Trapezoid;
         let law = NewtonTask {
             rigid,
-            bound: &self.bound,
+            bound: match &self.slipping {
+                Some(slipping) if !falls => slipping,
+                _ => &self.bound,
+            },
+            fall: self.fall.filter(|_| falls),
             area: &self.area,
             scale: (largest * newton.compliance()).min(1.0),
-            tolerance: self.control.tolerance,
+            tolerance: self.tolerance,
         };
-        let Control {
-            workspace, monitor, ..
-        } = &mut self.control;
+        let Control { workspace, monitor } = &mut self.control;
         let settled = if shortcut {
             fixed_point(newton, &law, t, workspace, *monitor)?
         } else {
@@ -276,18 +311,61 @@ impl<'a> RuleSequence<'a> {
             self.upwind(t)?;
             report = self.rule(&newton, &rigid, t, false)?.0;
         }
+        if !report.exit.converged()
+            && let Some(fall) = self.fall
+        {
+            for drop in CONTINUATION {
+                self.fall = Some(fall.softened(drop));
+                report = self.rule(&newton, &rigid, t, false)?.0;
+            }
+            self.fall = Some(fall);
+        }
         if !report.exit.converged() {
             return Err(LevelFailure::NotConverged {
                 work: self.work,
-                tolerance: self.control.tolerance,
-                advice: advice(&report),
+                tolerance: self.tolerance,
+                advice: report.advice(),
             });
         }
-        Ok(ThreePointAnswer {
+        let found = ThreePointAnswer {
             slip: self.expand(self.control.workspace.slip()),
             slips: self.zones(&newton, t),
             by_fixed_point,
-        })
+            other: None,
+        };
+        let Some(fall) = self.fall else {
+            return Ok(found);
+        };
+        self.slipping = Some(newton.bounds(&self.bound, &fall, t, self.control.workspace.slip()));
+        let other = match newton.stability() > SECOND_START_FROM {
+            true => self.other_solution(&newton, &rigid, t)?,
+            false => None,
+        };
+        Ok(ThreePointAnswer { other, ..found })
+    }
+
+    /// By how much the force differs, relative to the friction limit, if every cell slips along the rigid slip at first; nothing if
+    /// that leads to no solution or to the same.
+    fn other_solution(
+        &mut self,
+        newton: &Newton,
+        rigid: &[f64],
+        t: &[f64],
+    ) -> Result<Option<f64>, Stop> {
+        let Some(fall) = self.fall else {
+            return Ok(None);
+        };
+        let cells = newton.cells();
+        let (bound, area) = (&self.bound[..cells], &self.area[..cells]);
+        let mut other = vec![0.0; t.len()];
+        slide_along(rigid, bound, Some(&fall), &mut other);
+        let limit: f64 = area.iter().zip(bound).map(|(a, g)| a * g).sum();
+        let report = self.rule(newton, rigid, &mut other, false)?.0;
+        if !report.exit.converged() {
+            return Ok(None);
+        }
+        let change = force_change(&self.area[..cells], t, &other) / limit;
+        Ok((change > SAME_SOLUTION).then_some(change))
     }
 
     /// Which cells of the whole mesh slip; `newton` has evaluated `t` last.

@@ -1,12 +1,43 @@
-//! What the iteration is asked, and how it ended.
+//! What a level and the iteration on it are asked, and how the iteration ended.
+
+use crate::contact::friction::falling::BoundFall;
+use crate::contact::numerics::gmres::GmresExit;
+use crate::contact::rolling::answer::{LevelAnswer, LevelExit};
+use crate::contact::rolling::methods::full_slip;
+use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::strip_mesh::StripMesh;
+
+/// One motion on one level.
+#[derive(Debug, Clone, Copy)]
+pub struct LevelTask<'a> {
+    /// The level.
+    pub level: &'a StripMesh,
+    /// The motion, dimensionless, about the level's origin.
+    pub motion: &'a Motion,
+    /// How the bounds of the cells fall with their slip, where they do.
+    pub fall: Option<BoundFall>,
+    /// Residual to reach.
+    pub tolerance: f64,
+}
+
+impl LevelTask<'_> {
+    /// The answer where nothing moves, or where the rigid slip decides alone, as it does unless bounds depend on the slip.
+    pub(crate) fn without_iteration(&self) -> Option<LevelAnswer> {
+        let answer = full_slip::rigid_answer(self.level, self.motion)?;
+        let still = answer.exit == LevelExit::NoMotion;
+        (still || self.fall.is_none()).then_some(answer)
+    }
+}
 
 /// What a solve needs besides the equations, all per cell, padded like the equations' vectors.
 #[derive(Debug, Clone, Copy)]
 pub struct NewtonTask<'a> {
     /// Rigid slip, x then y.
     pub rigid: &'a [f64],
-    /// Friction bound g = μp.
+    /// Friction bound g = μp; at rest where it falls with the slip.
     pub bound: &'a [f64],
+    /// How the bounds fall with the slip, where they do.
+    pub fall: Option<BoundFall>,
     /// Area of every cell, the weight of its residual.
     pub area: &'a [f64],
     /// Traction scale of the case: residuals are relative to it.
@@ -45,6 +76,21 @@ pub struct Convergence {
     pub residual: f64,
     /// Steps whose linear system was not solved to its tolerance; harmless if the residual still came down.
     pub inexact_steps: u32,
+}
+
+impl Convergence {
+    /// A clause that says why there is no answer, as far as is known, and what to do.
+    #[must_use]
+    pub(crate) fn advice(&self) -> String {
+        let linear = match self.inexact_steps {
+            0 => String::new(),
+            steps => {
+                let reason = GmresExit::RestartsUsedUp.reason();
+                format!("in {steps} steps {reason}; ")
+            }
+        };
+        format!("{linear}try another mesh, with cells and strips of similar width")
+    }
 }
 
 impl Default for Convergence {

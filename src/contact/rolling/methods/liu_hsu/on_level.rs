@@ -133,6 +133,7 @@ impl<'a> DenseParts<'a> {
             law: NewtonTask {
                 rigid: &self.rigid,
                 bound: &self.bound,
+                fall: None,
                 area: &self.area,
                 scale: self.scale,
                 tolerance,

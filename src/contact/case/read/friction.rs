@@ -1,0 +1,220 @@
+//! Reads `friction`: a coefficient, a law that falls with slip or a coefficient across, and what lies between the bodies.
+
+use serde_json::Value;
+
+use crate::contact::case::read::faults::Interval;
+use crate::contact::case::read::object::{Object, join, shown};
+use crate::contact::case::read::samples::{count_rest, numbers};
+use crate::contact::case::words::friction::{
+    AcrossWords, FallName, FallTermWords, Friction, LayerWords,
+};
+
+const COEFFICIENT: Interval = Interval::closed(0.0, 100.0, "");
+/// A smaller friction coefficient is refused unless it is 0: dimensionless motions would overflow.
+const COEFFICIENT_LEAST: f64 = 1e-12;
+const ACROSS: Interval = Interval::closed(COEFFICIENT_LEAST, 100.0, "");
+const SPEED: Interval = Interval::positive(1e9, "mm/s");
+const PLACE: Interval = Interval::closed(-1e6, 1e6, "mm");
+const ANGLE: Interval = Interval::closed(-1.6, 1.6, "rad");
+const MODULUS: Interval = Interval::positive(1e12, "MPa");
+const THICKNESS: Interval = Interval::positive(1e3, "mm");
+const REDUCTION: Interval = Interval::positive(1.0, "");
+/// Points of a coefficient across.
+const POINTS: std::ops::RangeInclusive<usize> = 2..=1000;
+/// The ways to give a coefficient.
+const WAYS: [&str; 3] = ["coefficient", "law", "across"];
+const LAWS: [(&str, FallName); 3] = [
+    ("exponential", FallName::Exponential),
+    ("rational", FallName::Rational),
+    ("linear", FallName::Linear),
+];
+
+/// Reads the required member `friction` of a case.
+pub(crate) fn read(case: &mut Object) -> Option<Friction> {
+    let mut block = case.child("friction")?;
+    let names = [&WAYS[..], &["limit", "terms", "layer", "reduction"]].concat();
+    block.only(&names, &[]);
+    let given: Vec<&str> = WAYS.into_iter().filter(|name| block.has(name)).collect();
+    let mut friction = match given[..] {
+        ["law"] => law(&mut block),
+        ["across"] => across(&mut block).map(|across| Friction {
+            across: Some(across),
+            ..Friction::default()
+        }),
+        [] | [_] => constant(&mut block),
+        [_, second, ..] => {
+            let first = given[0];
+            let detail = format!("given together with {first}; exactly one of the two is allowed");
+            block.fault(second, detail);
+            None
+        }
+    };
+    if !block.has("law") {
+        for name in ["limit", "terms"] {
+            if block.has(name) {
+                block.fault(name, "given without law, to which it belongs");
+                friction = None;
+            }
+        }
+    }
+    let layer = match block.has("layer") {
+        true => layer(&mut block).map(Some),
+        false => Some(None),
+    };
+    let reduction = match block.has("reduction") {
+        true => block.number("reduction", REDUCTION).map(Some),
+        false => Some(None),
+    };
+    Some(Friction {
+        layer: layer?,
+        reduction: reduction?,
+        ..friction?
+    })
+}
+
+fn constant(block: &mut Object) -> Option<Friction> {
+    let coefficient = block.required_number("coefficient", COEFFICIENT)?;
+    enough(block, "coefficient", coefficient)?;
+    Some(Friction {
+        coefficient: Some(coefficient),
+        ..Friction::default()
+    })
+}
+
+/// A coefficient is 0 or not too small.
+fn enough(block: &mut Object, name: &str, coefficient: f64) -> Option<()> {
+    if coefficient > 0.0 && coefficient < COEFFICIENT_LEAST {
+        let detail =
+            format!("{coefficient:e} given; 0 or at least {COEFFICIENT_LEAST:e} is needed");
+        block.fault(name, detail);
+        return None;
+    }
+    Some(())
+}
+
+fn law(block: &mut Object) -> Option<Friction> {
+    let law = block.word("law", &LAWS, &[]);
+    let limit = block.required_number("limit", COEFFICIENT);
+    let what = "an array of one or two objects with coefficient and half_speed_mm_per_s";
+    let value = block.required("terms", what)?;
+    let elements = value.as_array().filter(|all| (1..=2).contains(&all.len()));
+    let Some(elements) = elements else {
+        block.fault("terms", format!("{} given; {what} is needed", shown(value)));
+        return None;
+    };
+    let pointer = block.pointer_to("terms");
+    let mut terms = Vec::new();
+    for (k, element) in elements.iter().enumerate() {
+        let term = Object::open(element, join(&pointer, k), block.faults());
+        terms.push(term.and_then(|mut term| fall_term(&mut term)));
+    }
+    let friction = Friction {
+        law: Some(law?),
+        limit: Some(limit?),
+        terms: terms.into_iter().collect::<Option<_>>()?,
+        ..Friction::default()
+    };
+    let largest = friction.largest();
+    if !(COEFFICIENT_LEAST..=100.0).contains(&largest) {
+        block.fault_here(format!(
+            "limit and terms add up to {largest}; the coefficient at rest has to be a number from {COEFFICIENT_LEAST:e} to 100"
+        ));
+        return None;
+    }
+    Some(friction)
+}
+
+fn fall_term(term: &mut Object) -> Option<FallTermWords> {
+    term.only(&["coefficient", "half_speed_mm_per_s"], &[]);
+    let coefficient = term.required_number("coefficient", COEFFICIENT);
+    let half_speed = term.required_number("half_speed_mm_per_s", SPEED);
+    Some(FallTermWords {
+        coefficient: coefficient?,
+        half_speed_mm_per_s: half_speed?,
+    })
+}
+
+fn across(block: &mut Object) -> Option<AcrossWords> {
+    let mut across = block.child("across")?;
+    across.only(&["y_mm", "angle_rad", "coefficient"], &[]);
+    let angles = across.has("angle_rad");
+    if angles && across.has("y_mm") {
+        across.fault(
+            "angle_rad",
+            "given together with y_mm; exactly one of the two is allowed",
+        );
+        return None;
+    }
+    let (name, allowed) = match angles {
+        true => ("angle_rad", ANGLE),
+        false => ("y_mm", PLACE),
+    };
+    let places = list(&mut across, name, allowed);
+    let coefficient = list(&mut across, "coefficient", ACROSS);
+    let (places, coefficient) = (places?, coefficient?);
+    if places.len() != coefficient.len() {
+        let detail = format!(
+            "{} values given; one coefficient per {name} is needed, which are {}",
+            coefficient.len(),
+            places.len()
+        );
+        across.fault("coefficient", detail);
+        return None;
+    }
+    if let Some(k) = places.windows(2).position(|pair| pair[1] < pair[0]) {
+        let pointer = join(&across.pointer_to(name), k + 1);
+        let detail = format!(
+            "{} given after {}; the places have to be in order, and two may be equal where the coefficient jumps",
+            places[k + 1],
+            places[k]
+        );
+        across.faults().add(pointer, detail);
+        return None;
+    }
+    let places = Some(places);
+    let (y_mm, angle_rad) = if angles {
+        (None, places)
+    } else {
+        (places, None)
+    };
+    Some(AcrossWords {
+        y_mm,
+        angle_rad,
+        coefficient,
+    })
+}
+
+fn list(block: &mut Object, name: &str, allowed: Interval) -> Option<Vec<f64>> {
+    let what = format!("an array of {} to {} numbers", POINTS.start(), POINTS.end());
+    let value = block.required(name, &what)?;
+    let elements = value.as_array().filter(|all| POINTS.contains(&all.len()));
+    let Some(elements) = elements else {
+        block.fault(name, format!("{} given; {what} is needed", shown(value)));
+        return None;
+    };
+    numbers_of(block, name, elements, allowed)
+}
+
+fn numbers_of(
+    block: &mut Object,
+    name: &str,
+    elements: &[Value],
+    allowed: Interval,
+) -> Option<Vec<f64>> {
+    let pointer = block.pointer_to(name);
+    let mut refused = 0;
+    let read = numbers(elements, &pointer, allowed, &mut refused, block.faults());
+    count_rest(&pointer, allowed, refused, block.faults());
+    read
+}
+
+fn layer(block: &mut Object) -> Option<LayerWords> {
+    let mut layer = block.child("layer")?;
+    layer.only(&["shear_modulus_mpa", "thickness_mm"], &[]);
+    let modulus = layer.required_number("shear_modulus_mpa", MODULUS);
+    let thickness = layer.required_number("thickness_mm", THICKNESS);
+    Some(LayerWords {
+        shear_modulus_mpa: modulus?,
+        thickness_mm: thickness?,
+    })
+}

@@ -1,0 +1,304 @@
+//! Friction that falls with the speed of slip: the law, and the bound of a cell as a function of its slip.
+
+use std::f64::consts::LN_2;
+
+/// Largest relative rounding of the slip of [`BoundFall::resolvent`].
+const ROUNDING: f64 = 1e-14;
+/// Steps of its Newton iteration, which is quadratic and needs about four, and of the bisection that would replace it.
+const STEPS_MAX: u32 = 60;
+
+/// Largest slip that a unit of traction over G on one cell takes from it: `max |M_ii|` of the three-point rule on ellipses with a/b from
+/// 0.5 to 1.2, meshes from 6 × 12 to 12 × 24, is 1.5 to 1.8 (`cargo test --test physics -- friction_as_it_is --nocapture` prints it).
+const SLIP_OF_CELL: f64 = 1.7;
+/// Largest stability number that is answered. Up to 1.0 no second state was found in 360 random motions from two starts, at 1.5 one.
+const STABILITY_MAX: f64 = 1.0;
+
+/// How fast the terms of a law fall.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FallForm {
+    /// `μ = f₀ + f₁ exp(−ln 2 v/v₁) + f₂ exp(−ln 2 v/v₂)`. Polach's law `μ₀ ((1 − A) exp(−B v) + A)` (2005) is
+    /// f₀ = A μ₀, f₁ = (1 − A) μ₀, v₁ = ln 2/B.
+    Exponential,
+    /// `μ = f₀ + f₁/(1 + v/v₁) + f₂/(1 + (v/v₂)²)`.
+    Rational,
+    /// `μ = f₀ + f₁ max(0, 1 − v/(2 v₁)) + f₂ max(0, 1 − v/(2 v₂))`.
+    Linear,
+}
+
+/// One term of a law: what it adds at rest, and the speed of slip at which half of that is left.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FallTerm {
+    /// Part of the coefficient that falls, not negative.
+    pub coefficient: f64,
+    /// Speed of slip in mm/s at which half of it is left, positive.
+    pub half_speed: f64,
+}
+
+impl FallTerm {
+    /// A term that is not there.
+    pub const NONE: FallTerm = FallTerm {
+        coefficient: 0.0,
+        half_speed: 1.0,
+    };
+}
+
+/// A coefficient of friction that falls with the speed of slip v in mm/s, as in CONTACT (Vollebregt, user guide, section 3.2).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FallingLaw {
+    /// The form of its terms.
+    pub form: FallForm,
+    /// What is left at the highest speeds, f₀, not negative.
+    pub limit: f64,
+    /// Its terms; a term that is not there has the coefficient 0.
+    pub terms: [FallTerm; 2],
+}
+
+impl FallingLaw {
+    /// The coefficient at rest, which is the largest.
+    #[must_use]
+    pub fn at_rest(&self) -> f64 {
+        self.limit + self.terms.iter().map(|term| term.coefficient).sum::<f64>()
+    }
+
+    /// The coefficient at a speed of slip in mm/s, and its derivative in s/mm, which is never positive.
+    #[must_use]
+    pub fn at(&self, speed: f64) -> (f64, f64) {
+        let mut sum = (self.limit, 0.0);
+        for (k, term) in self.terms.iter().enumerate() {
+            let (f, v) = (term.coefficient, term.half_speed);
+            let x = speed / v;
+            let (value, slope) = match (self.form, k) {
+                (FallForm::Exponential, _) => {
+                    let value = f * (-LN_2 * x).exp();
+                    (value, -LN_2 * value / v)
+                }
+                (FallForm::Rational, 0) => (f / (1.0 + x), -f / (v * (1.0 + x) * (1.0 + x))),
+                (FallForm::Rational, _) => {
+                    let below = 1.0 + x * x;
+                    (f / below, -2.0 * f * x / (v * below * below))
+                }
+                (FallForm::Linear, _) if x < 2.0 => (f * (1.0 - 0.5 * x), -0.5 * f / v),
+                (FallForm::Linear, _) => (0.0, 0.0),
+            };
+            sum = (sum.0 + value, sum.1 + slope);
+        }
+        sum
+    }
+
+    /// A bound in s/mm of the size of the derivative, which is reached unless two terms are steepest at different speeds.
+    #[must_use]
+    pub fn steepest(&self) -> f64 {
+        // 3√3/8: the largest slope of 1/(1 + x²).
+        let second = 3.0 * 3.0_f64.sqrt() / 8.0;
+        let factors = match self.form {
+            FallForm::Exponential => [LN_2, LN_2],
+            FallForm::Rational => [1.0, second],
+            FallForm::Linear => [0.5, 0.5],
+        };
+        let terms = self.terms.iter().zip(factors);
+        terms
+            .map(|(term, factor)| factor * term.coefficient / term.half_speed)
+            .sum()
+    }
+
+    /// Stability number `1.7 V max|μ′| p_max/G` at a rolling speed in mm/s, pressure and shear modulus in MPa: how fast bounds fall with
+    /// slip, compared with how fast slips fall as tractions grow. Up to 1 the contact has one state.
+    #[must_use]
+    pub fn stability(&self, rolling_speed: f64, pressure_max: f64, shear_modulus: f64) -> f64 {
+        SLIP_OF_CELL * rolling_speed * self.steepest() * pressure_max / shear_modulus
+    }
+
+    /// Why there is no answer one can rely on at this stability number, if it is too large.
+    #[must_use]
+    pub fn too_fast(stability: f64) -> Option<String> {
+        (stability > STABILITY_MAX).then(|| {
+            format!(
+                "friction falls too fast with slip for one reliable answer: the stability number is {stability:.3}, at most {STABILITY_MAX} \
+                 is allowed; it is proportional to rolling speed, fall and largest pressure"
+            )
+        })
+    }
+
+    /// The bounds of cells that roll at a speed in mm/s, for slips counted in `slip_unit`.
+    #[must_use]
+    pub fn bound_fall(&self, rolling_speed: f64, slip_unit: f64) -> BoundFall {
+        BoundFall {
+            law: *self,
+            speed: rolling_speed * slip_unit,
+            drop: 1.0,
+        }
+    }
+}
+
+/// The bound of a cell over its bound at rest, as a function of its dimensionless slip.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BoundFall {
+    law: FallingLaw,
+    /// Speed of slip in mm/s for one unit of slip.
+    speed: f64,
+    /// Part of the fall that is taken: 1 of the law itself, less on the way to it.
+    drop: f64,
+}
+
+impl BoundFall {
+    /// The same with a part of the fall, from 0 (a constant bound) to 1 (the law).
+    #[must_use]
+    pub fn softened(&self, drop: f64) -> BoundFall {
+        BoundFall { drop, ..*self }
+    }
+
+    /// Bound over the bound at rest at a slip, and its derivative.
+    #[must_use]
+    pub fn at(&self, slip: f64) -> (f64, f64) {
+        let rest = self.law.at_rest();
+        let (value, slope) = self.law.at(self.speed * slip);
+        (
+            1.0 - self.drop * (1.0 - value / rest),
+            self.drop * self.speed * slope / rest,
+        )
+    }
+
+    /// The largest size of the derivative.
+    #[must_use]
+    pub fn steepest(&self) -> f64 {
+        self.drop * self.speed * self.law.steepest() / self.law.at_rest()
+    }
+
+    /// The slip σ with `g(σ) + r σ = length`, where `g` is the bound of a cell whose bound at rest is `rest`, for a `length` above
+    /// that; with it `g(σ)` and `g′(σ)`. There is one such σ if r exceeds the largest `|g′|`.
+    #[must_use]
+    pub fn resolvent(&self, rest: f64, r: f64, length: f64) -> Slipping {
+        let (mut low, mut high) = ((length - rest) / r, length / r);
+        let mut slip = low;
+        for _ in 0..STEPS_MAX {
+            let (share, slope) = self.at(slip);
+            let excess = rest * share + r * slip - length;
+            if excess > 0.0 {
+                high = slip;
+            } else {
+                low = slip;
+            }
+            let newton = slip - excess / (r + rest * slope);
+            let next = if (low..=high).contains(&newton) {
+                newton
+            } else {
+                0.5 * (low + high)
+            };
+            let change = (next - slip).abs();
+            slip = next;
+            if change <= ROUNDING * slip {
+                break;
+            }
+        }
+        let (share, slope) = self.at(slip);
+        Slipping {
+            slip,
+            bound: rest * share,
+            slope: rest * slope,
+        }
+    }
+}
+
+/// A slipping cell: its slip, and bound with derivative there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slipping {
+    /// Size of the slip.
+    pub slip: f64,
+    /// The bound at this slip.
+    pub bound: f64,
+    /// Its derivative, never positive.
+    pub slope: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn law(form: FallForm) -> FallingLaw {
+        let term = |coefficient, half_speed| FallTerm {
+            coefficient,
+            half_speed,
+        };
+        FallingLaw {
+            form,
+            limit: 0.1,
+            terms: [term(0.15, 150.0), term(0.1, 2500.0)],
+        }
+    }
+
+    const FORMS: [FallForm; 3] = [FallForm::Exponential, FallForm::Rational, FallForm::Linear];
+
+    #[test]
+    fn every_term_has_half_of_its_coefficient_at_its_speed() {
+        for form in FORMS {
+            for k in [0, 1] {
+                let mut one = law(form);
+                one.terms[1 - k].coefficient = 0.0;
+                let (value, _) = one.at(one.terms[k].half_speed);
+                assert!((value - 0.1 - 0.5 * one.terms[k].coefficient).abs() < 1e-15);
+                assert!((one.at(0.0).0 - one.at_rest()).abs() < 1e-15);
+            }
+        }
+    }
+
+    #[test]
+    fn the_derivative_is_that_of_the_law_and_nowhere_steeper_than_said() {
+        for form in FORMS {
+            let law = law(form);
+            for k in 1..200 {
+                let speed = 31.7 * f64::from(k);
+                let (_, slope) = law.at(speed);
+                let found = (law.at(speed + 1e-3).0 - law.at(speed - 1e-3).0) / 2e-3;
+                assert!((found - slope).abs() < 1e-9, "{form:?} {speed}");
+                assert!(slope <= 0.0 && -slope <= law.steepest());
+            }
+        }
+    }
+
+    #[test]
+    fn the_resolvent_solves_its_equation() {
+        // g(σ) = 0.5 (0.6 + 0.4 exp(−σ/0.5)), r = 1.2, length 1.1: a value computed independently.
+        let law = FallingLaw {
+            form: FallForm::Exponential,
+            limit: 0.6,
+            terms: [
+                FallTerm {
+                    coefficient: 0.4,
+                    half_speed: 0.5 * LN_2,
+                },
+                FallTerm {
+                    coefficient: 0.0,
+                    half_speed: 1.0,
+                },
+            ],
+        };
+        let found = law.bound_fall(1.0, 1.0).resolvent(0.5, 1.2, 1.1);
+        assert!((found.slip - 0.618268667424).abs() < 1e-12, "{found:?}");
+        assert!((found.bound - 0.358077599091).abs() < 1e-12, "{found:?}");
+        for form in FORMS {
+            let fall = law_fall(form);
+            let (rest, r) = (0.8, 2.0 * 0.8 * fall.steepest());
+            for length in [0.81, 1.0, 3.0, 50.0] {
+                let found = fall.resolvent(rest, r, length);
+                assert!((found.bound + r * found.slip - length).abs() < 1e-12 * length);
+                let (share, slope) = fall.at(found.slip);
+                assert_eq!(
+                    (rest * share, rest * slope),
+                    (found.bound, found.slope),
+                    "{form:?}"
+                );
+            }
+        }
+    }
+
+    fn law_fall(form: FallForm) -> BoundFall {
+        law(form).bound_fall(20_000.0, 0.005)
+    }
+
+    #[test]
+    fn without_its_fall_a_bound_is_constant() {
+        let still = law_fall(FallForm::Rational).softened(0.0);
+        assert_eq!(still.at(3.0), (1.0, -0.0));
+        assert_eq!(still.steepest(), 0.0);
+    }
+}

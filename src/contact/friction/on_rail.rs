@@ -1,0 +1,43 @@
+//! Friction of a rail in the axes of one of its patches.
+
+use crate::contact::friction::across::{AcrossLaw, AcrossPlace};
+use crate::contact::friction::law::FrictionLaw;
+use crate::contact::geometry::frame::Frame;
+use crate::contact::geometry::wheel_rail::WheelRail;
+
+/// Samples of a coefficient that varies over the rail, across all patches of a frame.
+const SAMPLES: usize = 129;
+
+/// Friction in the axes of a frame whose patches have these extents `[x_min, x_max, y_min, y_max]` in mm: a coefficient by the y of the
+/// rail's profile, or by the inclination of its surface, becomes one by the y of the frame.
+pub(crate) fn in_frame(
+    friction: &FrictionLaw,
+    frame: &Frame,
+    geometry: &WheelRail,
+    extents: impl Iterator<Item = [f64; 4]>,
+) -> FrictionLaw {
+    let Some(law) = friction.across() else {
+        return friction.clone();
+    };
+    let nothing = (f64::INFINITY, f64::NEG_INFINITY);
+    let (low, high) = extents.fold(nothing, |(low, high), e| (low.min(e[2]), high.max(e[3])));
+    let step = (high - low) / (SAMPLES - 1) as f64;
+    let found = (0..SAMPLES).filter_map(|k| {
+        let y = low + k as f64 * step;
+        // Where the rail turns away from the plane nothing touches.
+        let rail = geometry.rail_over(frame, y).ok()?;
+        let at = match law.place {
+            AcrossPlace::Y => geometry.on_rail(rail)[0],
+            AcrossPlace::Angle => {
+                let [across, up] = geometry.rail_at(rail).slope;
+                (up * across.signum()).atan2(across.abs())
+            }
+        };
+        Some((y, law.at(at)))
+    });
+    let (y, coefficient): (Vec<f64>, Vec<f64>) = found.unzip();
+    match y.is_empty() {
+        true => FrictionLaw::Constant(law.largest()),
+        false => FrictionLaw::Across(AcrossLaw::new(AcrossPlace::Y, y, coefficient)),
+    }
+}
