@@ -76,23 +76,8 @@ impl CheckedParts {
         };
         let motions = given.motion.map(|motion| motions::expand(motion, limits));
         let motions = motions.and_then(|motions| collect_fault(motions, &mut faults));
-        if let (Some(expanded), Some(motion)) = (&motions, given.motion) {
-            let of_profiles = matches!(given.contact, Some(Contact::Profiles { .. }));
-            let force = normal_force(task.as_ref().map(|(task, _)| task), given.load);
-            let limit = given
-                .friction
-                .zip(force)
-                .map(|(mu, force)| mu.largest() * force);
-            faults.extend(expanded.faults(motion, limit, of_profiles));
-            if given
-                .friction
-                .is_some_and(|friction| friction.law.is_some())
-            {
-                faults.extend(expanded.speed_fault(motion, "friction that falls with slip"));
-                faults.extend(expanded.force_fault(motion));
-            }
-            faults.extend(given.after.faults(motion, expanded, limits));
-        }
+        let force = normal_force(task.as_ref().map(|(task, _)| task), given.load);
+        faults.extend(motion_faults(&given, motions.as_ref(), force, limits));
         if let Some(solver) = given.solver {
             let size = SizeInput {
                 method: solver.method.into(),
@@ -110,26 +95,16 @@ impl CheckedParts {
             };
             faults.extend(size.faults(limits));
         }
-        faults.extend(friction_fault(&given));
-        let known = (
-            given.friction,
-            elasticity.as_ref(),
-            task.as_ref(),
-            motions.as_ref(),
-        );
-        if let (Some(friction), Some(elasticity), Some((task, _)), Some(motions)) = known {
-            let reduced = Elasticity {
-                shear_modulus: elasticity.shear_modulus * friction.reduction.unwrap_or(1.0),
-                ..*elasticity
-            };
-            let law = friction.into();
-            faults.extend(falls_too_fast(
-                &law,
-                &reduced,
-                &task.patches(),
-                &motions.speeds,
-            ));
-        }
+        let of_friction = friction_fault(&given).or_else(|| {
+            let patches = task.as_ref()?.0.patches();
+            falls_too_fast(
+                given.friction?,
+                elasticity?,
+                &patches,
+                &motions.as_ref()?.speeds,
+            )
+        });
+        faults.extend(of_friction);
         if given
             .solver
             .is_some_and(|solver| solver.method == MethodName::Table)
@@ -148,6 +123,33 @@ impl CheckedParts {
     }
 }
 
+/// Faults of motions beside what goes with them: contact, friction and its limit under a normal force, and outputs.
+fn motion_faults(
+    given: &PartialCase,
+    motions: Option<&ExpandedMotions>,
+    force: Option<f64>,
+    limits: &Limits,
+) -> Vec<Fault> {
+    let (Some(expanded), Some(motion)) = (motions, given.motion) else {
+        return Vec::new();
+    };
+    let of_profiles = matches!(given.contact, Some(Contact::Profiles { .. }));
+    let limit = given
+        .friction
+        .zip(force)
+        .map(|(mu, force)| mu.largest() * force);
+    let mut faults = expanded.faults(motion, limit, of_profiles);
+    if given
+        .friction
+        .is_some_and(|friction| friction.law.is_some())
+    {
+        faults.extend(expanded.speed_fault(motion, "friction that falls with slip"));
+        faults.extend(expanded.force_fault(motion));
+    }
+    faults.extend(given.after.faults(motion, expanded, limits));
+    faults
+}
+
 /// Faults of a case that the table does not cover, as far as that is known before patches are found.
 fn not_in_table(elasticity: Option<&Elasticity>, task: Option<&NormalTask>) -> Vec<Fault> {
     let unlike = elasticity.and_then(table::unlike);
@@ -161,12 +163,13 @@ fn not_in_table(elasticity: Option<&Elasticity>, task: Option<&NormalTask>) -> V
 
 /// The fault of friction that falls too fast on patches that are known.
 fn falls_too_fast(
-    law: &FrictionLaw,
-    elasticity: &Elasticity,
+    friction: &Friction,
+    elasticity: Elasticity,
     patches: &[Patch],
     speeds: &[Option<f64>],
 ) -> Option<Fault> {
-    let stability = law.stability(patches, elasticity.shear_modulus, speeds)?;
+    let modulus = elasticity.shear_modulus * friction.reduction.unwrap_or(1.0);
+    let stability = FrictionLaw::from(friction).stability(patches, modulus, speeds)?;
     let detail = FallingLaw::too_fast(stability)?;
     Some(Fault::new("/friction", detail))
 }

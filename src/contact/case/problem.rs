@@ -179,12 +179,7 @@ impl CheckedCase {
                 name: case.name.clone(),
                 labels: case.labels.clone(),
                 digest,
-                asked: Asked {
-                    contact: case.contact.name().to_owned(),
-                    friction_coefficient: case.friction.largest(),
-                    friction_varies: case.friction.coefficient.is_none(),
-                    load: case.load,
-                },
+                asked: asked(case),
             },
             remarks,
         })
@@ -206,6 +201,16 @@ impl CheckedCase {
             problem,
             ..self.clone()
         }
+    }
+}
+
+/// What of a case stands in its answer.
+fn asked(case: &Case) -> Asked {
+    Asked {
+        contact: case.contact.name().to_owned(),
+        friction_coefficient: case.friction.largest(),
+        friction_varies: case.friction.coefficient.is_none(),
+        load: case.load,
     }
 }
 

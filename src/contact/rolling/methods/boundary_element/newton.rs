@@ -334,6 +334,12 @@ impl<'a> Newton<'a> {
             }
             self.slip(law, t, workspace, report);
         }
+        self.right_hand_side(t, rhs, workspace);
+    }
+
+    /// Sets up the right-hand side of a linearisation at an iterate.
+    fn right_hand_side(&self, t: &[f64], rhs: &mut [f64], workspace: &NewtonWorkspace) {
+        let (padded, cells) = (self.equations.padded(), self.equations.cells());
         let NewtonWorkspace { linear, slip, .. } = workspace;
         rhs.fill(0.0);
         for i in 0..cells {
