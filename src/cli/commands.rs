@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use crate::cli::case_args::CaseArgs;
-use crate::cli::database_args::{DatabaseArgs, DatabaseUrlArgs};
+use crate::cli::database_args::{DatabaseArgs, DatabaseUrlArgs, DoctorArgs};
 use crate::cli::serve_args::ServeArgs;
 use crate::cli::values::{address, bound_label};
 
@@ -28,7 +28,7 @@ pub enum Command {
     /// Make the job table in a database that several nodes share, or bring it forward to this version.
     Migrate(DatabaseUrlArgs),
     /// Tell how the database is that several nodes share; exit code 1 if something is wrong.
-    Doctor(DatabaseUrlArgs),
+    Doctor(DoctorArgs),
     /// Solve one case without a server; the result goes to standard output.
     ///
     /// Exit code 0: solved; 1: no answer; 2: the case is faulty.

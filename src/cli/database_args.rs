@@ -1,8 +1,9 @@
 //! The flags that name the database which several nodes share.
 
-use clap::Args;
+use clap::{ArgAction, Args};
 
 use crate::jobs::options::Database;
+use crate::jobs::result_place::url::{ResultsPlace, ResultsUrl};
 
 /// The database of several nodes.
 #[derive(Debug, Clone, Args)]
@@ -20,6 +21,39 @@ pub struct DatabaseArgs {
     #[arg(long, env = "RAILHEAD_DATABASE_CONNECTIONS", default_value_t = 10, value_name = "N",
           value_parser = clap::value_parser!(u32).range(2..))]
     pub database_connections: u32,
+    #[command(flatten)]
+    pub results: ResultsArgs,
+}
+
+/// The place of large results beside a database.
+#[derive(Debug, Clone, Args)]
+pub struct ResultsArgs {
+    /// Where results above 32 KiB are kept beside a database: `s3://bucket/prefix` (keys, region and address by the usual `AWS_…`
+    /// variables) or `file:///folder`; without it in the database. Every node of a database names the same place.
+    #[arg(long, env = "RAILHEAD_RESULTS_URL", value_name = "URL")]
+    pub results_url: Option<ResultsUrl>,
+    /// The folder that `--results-url` names is the same one on every node (a network file system).
+    #[arg(
+        long,
+        env = "RAILHEAD_RESULTS_SHARED",
+        default_value_t = false,
+        action = ArgAction::Set,
+        num_args = 0..=1,
+        default_missing_value = "true",
+        value_name = "BOOL"
+    )]
+    pub results_shared: bool,
+}
+
+impl ResultsArgs {
+    /// The place, if one is named.
+    #[must_use]
+    pub fn place(&self) -> Option<ResultsPlace> {
+        Some(ResultsPlace {
+            url: self.results_url.clone()?,
+            shared: self.results_shared,
+        })
+    }
 }
 
 impl DatabaseArgs {
@@ -44,4 +78,13 @@ pub struct DatabaseUrlArgs {
         value_name = "URL"
     )]
     pub database_url: String,
+}
+
+/// What `doctor` looks at.
+#[derive(Debug, Clone, Args)]
+pub struct DoctorArgs {
+    #[command(flatten)]
+    pub database: DatabaseUrlArgs,
+    #[command(flatten)]
+    pub results: ResultsArgs,
 }

@@ -4,8 +4,9 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 
-use crate::cli::database_args::DatabaseUrlArgs;
+use crate::cli::database_args::{DatabaseUrlArgs, DoctorArgs};
 use crate::cli::output::print;
+use crate::jobs::result_place::examine_results;
 use crate::jobs::store::postgres::doctor::examine;
 use crate::jobs::store::postgres::schema::{Migrated, migrate};
 
@@ -20,8 +21,13 @@ pub(super) fn run(args: &DatabaseUrlArgs) -> anyhow::Result<ExitCode> {
 }
 
 /// Tells how the database is, one line per question; exit code 1 if something is wrong.
-pub(super) fn doctor(args: &DatabaseUrlArgs) -> anyhow::Result<ExitCode> {
-    let findings = runtime()?.block_on(examine(&args.database_url))?;
+pub(super) fn doctor(args: &DoctorArgs) -> anyhow::Result<ExitCode> {
+    let url = &args.database.database_url;
+    let findings = runtime()?.block_on(async {
+        let mut findings = examine(url).await?;
+        findings.push(examine_results(url, args.results.place().as_ref()).await?);
+        anyhow::Ok(findings)
+    })?;
     let lines = findings.iter().map(|finding| {
         let mark = if finding.wrong { "WRONG" } else { "ok" };
         format!("{mark}\t{}\t{}", finding.about, finding.says)

@@ -166,6 +166,7 @@ async fn open_jobs(args: &ServeArgs, traces: Option<&Traces>) -> anyhow::Result<
         tenant_queue_max: args.tenant_queue_max,
         tracer: traces.map(|traces| Tracer::new(traces.tracer())),
         database: args.database.database(),
+        results: args.database.results.place(),
         ..Options::new(&args.data_dir)
     });
     let recipe = Engine::with_operators(args.case.operators());
@@ -193,7 +194,11 @@ async fn start_listening(
     };
     let probe_address = probe_listener.as_ref().map(TcpListener::local_addr);
     let probe_address = probe_address.transpose()?;
-    let probes_anonymous = probe_address.is_some_and(|address| args.anonymous.on(address));
+    let probes_anonymous = match role {
+        Role::Serve => probe_address.is_some_and(|address| args.anonymous.on(address)),
+        // They are all that it answers, on both addresses.
+        Role::Work => anonymous && probe_address.is_none_or(|address| args.anonymous.on(address)),
+    };
     let [router, probes] = http::routers(
         jobs.clone(),
         options.clone(),

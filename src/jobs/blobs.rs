@@ -56,13 +56,27 @@ impl Blobs {
         })
     }
 
-    /// Keeps results in an object store.
+    /// Keeps results in an object store, which is the folder `root` if there is one.
     #[must_use]
-    pub fn within(objects: Arc<dyn ObjectStore>) -> Blobs {
-        Blobs {
-            objects,
-            root: None,
-        }
+    pub fn at(objects: Arc<dyn ObjectStore>, root: Option<PathBuf>) -> Blobs {
+        Blobs { objects, root }
+    }
+
+    /// Everything that is stored, in the order of the keys: the job, the key, and when it was written, in epoch milliseconds.
+    pub fn listed(&self) -> BoxStream<'static, Result<(Uuid, String, i64), JobsError>> {
+        let listed = self.objects.list(Some(&Path::from(ROOT)));
+        let read = listed
+            .map_err(JobsError::from)
+            .try_filter_map(async |object| {
+                let written = object.last_modified.timestamp_millis();
+                let path = object.location.as_ref();
+                let key = path.rsplit_once('/').map(|(key, _)| key);
+                let job = key.and_then(|key| Uuid::try_parse(key.rsplit('/').nth(1)?).ok());
+                Ok(job
+                    .zip(key)
+                    .map(|(job, key)| (job, key.to_owned(), written)))
+            });
+        read.boxed()
     }
 
     /// Stores a result and returns its key; durable once it returns.

@@ -138,6 +138,9 @@ pub enum JobsError {
         "the job table in the database is that of an earlier version: run `railhead migrate --database-url …` of this version once"
     )]
     OldTables,
+    /// The place of the results cannot be used, or belongs to another database.
+    #[error("the place of the results cannot be used: {0}")]
+    ResultPlace(String),
     /// Reading or writing a stored result failed.
     #[error("the stored results failed: {0}")]
     Blobs(#[from] object_store::Error),

@@ -30,6 +30,7 @@ use crate::jobs::open_store::{note_closed, open_for_service};
 use crate::jobs::options::Options;
 use crate::jobs::quota::StagedBytes;
 use crate::jobs::recent_reads::RecentReads;
+use crate::jobs::result_place::settle::settle;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::Store;
 use crate::jobs::store::cluster::Node;
@@ -59,7 +60,8 @@ impl Jobs {
     pub async fn open_with(options: Options, engine: Engine) -> Result<Jobs, JobsError> {
         let lock = lock(&options.data_dir)?;
         let store = open_for_service(&options.data_dir, options.database.as_ref()).await?;
-        let blobs = place_of_results(&*store, &options)?;
+        let metrics = Metrics::new();
+        let blobs = open_blobs(&*store, &options, &metrics).await?;
         let clock_offset_ms = Arc::<AtomicI64>::default();
         let options = Options {
             clock: options.clock.clone().ahead(clock_offset_ms.clone()),
@@ -91,7 +93,7 @@ impl Jobs {
                 draining: CancellationToken::new(),
                 stopping: CancellationToken::new(),
                 tasks: TaskTracker::new(),
-                metrics: Metrics::new(),
+                metrics,
                 storage_failing: AtomicBool::new(false),
                 trusted: Mutex::default(),
                 checks: Semaphore::new(available_parallelism().map_or(1, usize::from)),
@@ -206,11 +208,21 @@ impl Jobs {
     }
 }
 
-/// Where results that are larger than a row are kept.
-fn place_of_results(store: &dyn Store, options: &Options) -> Result<Blobs, JobsError> {
-    match store.cluster() {
-        Some(cluster) => Ok(Blobs::within(cluster.objects())),
-        None => Blobs::open(&options.data_dir),
+/// The place of large results: a folder of the data folder, or what all nodes of a database have in common.
+async fn open_blobs(
+    store: &dyn Store,
+    options: &Options,
+    metrics: &Metrics,
+) -> Result<Blobs, JobsError> {
+    match (store.cluster(), &options.results) {
+        (Some(cluster), place) => {
+            settle(cluster, place.as_ref(), metrics.store_requests.clone()).await
+        }
+        (None, None) => Blobs::open(&options.data_dir),
+        (None, Some(_)) => Err(JobsError::ResultPlace(
+            "--results-url goes with --database-url; without it results are in the data folder, where `railhead backup` finds them"
+                .to_owned(),
+        )),
     }
 }
 

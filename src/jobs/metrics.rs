@@ -66,6 +66,37 @@ pub(crate) struct Metrics {
     working: Gauge,
     cache_hits: Counter,
     cache_misses: Counter,
+    pub(crate) results_swept: Counter,
+    pub(crate) store_requests: StoreRequests,
+}
+
+/// Requests to an object store.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct StoreRequests(Family<RequestLabel, Counter>);
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+struct RequestLabel {
+    method: String,
+    /// `2xx` to `5xx`, or `none` if there was no answer.
+    status: &'static str,
+}
+
+impl StoreRequests {
+    /// A request was answered with this status, or not at all.
+    pub(crate) fn count(&self, method: &str, status: Option<u16>) {
+        let status = match status.map(|status| status / 100) {
+            Some(2) => "2xx",
+            Some(3) => "3xx",
+            Some(4) => "4xx",
+            Some(_) => "5xx",
+            None => "none",
+        };
+        let label = RequestLabel {
+            method: method.to_owned(),
+            status,
+        };
+        self.0.get_or_create(&label).inc();
+    }
 }
 
 impl Metrics {
@@ -87,6 +118,8 @@ impl Metrics {
             working: Gauge::default(),
             cache_hits: Counter::default(),
             cache_misses: Counter::default(),
+            results_swept: Counter::default(),
+            store_requests: StoreRequests::default(),
         };
         // A series that appears only with its first event hides that event from a rate.
         for state in State::ALL.into_iter().filter(|state| state.ended()) {
@@ -181,8 +214,18 @@ impl Metrics {
             self.operator_bytes.clone(),
         );
         registry.register(
+            "result_store_requests",
+            "Requests to the object store of the results, repeated ones included, by the class of the answer",
+            self.store_requests.0.clone(),
+        );
+        registry.register(
+            "results_swept",
+            "Results without a job removed from outside the database",
+            self.results_swept.clone(),
+        );
+        registry.register(
             "storage_failing",
-            "1 while the disk is full or cannot be written",
+            "1 while the disk is full or cannot be written, or database or object store cannot be reached",
             self.storage_failing.clone(),
         );
         registry.register(

@@ -56,6 +56,7 @@ pub mod options;
 pub mod quota;
 pub mod recent_reads;
 pub mod result_cache;
+pub mod result_place;
 pub mod results;
 pub mod shared;
 pub mod storage_fault;

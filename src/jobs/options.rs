@@ -7,6 +7,7 @@ use std::time::Duration;
 use crate::contact::case::limits::Limits;
 use crate::jobs::clock::Clock;
 use crate::jobs::quota::StagingBounds;
+use crate::jobs::result_place::url::ResultsPlace;
 use crate::jobs::trace::Tracer;
 
 /// A database that several processes share.
@@ -32,6 +33,8 @@ pub struct Options {
     pub data_dir: PathBuf,
     /// The database that keeps jobs and results, if several processes share them; otherwise they are in the data folder.
     pub database: Option<Database>,
+    /// Where large results are kept, if neither in the data folder nor in the database.
+    pub results: Option<ResultsPlace>,
     /// Number of workers, each with a solver thread of its own.
     pub workers: usize,
     /// What one case may use.
@@ -81,6 +84,7 @@ impl Options {
         Options {
             data_dir: data_dir.into(),
             database: None,
+            results: None,
             workers: 1,
             limits: Limits::default(),
             lease: Duration::from_secs(30),

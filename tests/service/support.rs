@@ -88,6 +88,11 @@ impl Service {
         Service::spawn(program, "serve", data_dir, flags)
     }
 
+    /// The real program as it was prepared, `serve` or `worker`.
+    pub fn start_as(program: &mut Command, role: &str, data_dir: &Path, flags: &[&str]) -> Service {
+        Service::spawn(program, role, data_dir, flags)
+    }
+
     fn spawn(program: &mut Command, role: &str, data_dir: &Path, flags: &[&str]) -> Service {
         let mut child = program
             .args([role, "--log-format", "json"])

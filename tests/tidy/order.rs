@@ -67,6 +67,7 @@ const ORDER: &[&str] = &[
     "jobs::maintenance::disk_reserve",
     "jobs::blobs",
     "jobs::metrics",
+    "jobs::result_place",
     "jobs::trace",
     "jobs::batch::staging",
     "jobs::batch::template",

@@ -2,7 +2,10 @@
 
 use std::sync::Arc;
 
+use futures_util::TryStreamExt;
+
 use crate::jobs::error::JobsError;
+use crate::jobs::handle::Jobs;
 use crate::jobs::shared::Shared;
 
 /// Results checked in one call by the sweep for orphans.
@@ -66,4 +69,49 @@ async fn sweep(shared: &Shared) -> Result<usize, JobsError> {
         }
     }
     Ok(removed)
+}
+
+/// Results written less long ago may be on their way to their job, in ms.
+const YOUNG: i64 = 24 * 3600 * 1000;
+
+impl Jobs {
+    /// Removes results outside the database that no job refers to and that were written more than a day ago; returns their number.
+    /// The nodes of a database do so by themselves, one of them once a day.
+    ///
+    /// # Errors
+    /// The database or the place of the results failed; the next sweep will go on.
+    pub async fn sweep_old_results(&self) -> Result<u64, JobsError> {
+        self.shared.sweep_old_results().await
+    }
+}
+
+impl Shared {
+    /// Removes results outside the database that no job refers to and that were written more than a day ago; returns their number.
+    /// Several nodes may do so at once.
+    pub(crate) async fn sweep_old_results(&self) -> Result<u64, JobsError> {
+        let before = self.now_ms() - YOUNG;
+        let mut listed = self.blobs.listed();
+        let (mut some, mut removed) = (Vec::new(), 0);
+        loop {
+            let next = listed.try_next().await?;
+            let last = next.is_none();
+            if let Some((job, key, written)) = next
+                && written < before
+                && some.last().is_none_or(|(_, known)| *known != key)
+            {
+                some.push((job, key));
+            }
+            if some.len() >= SWEEP_CHUNK || last {
+                for key in self.store.orphans(&some).await? {
+                    self.blobs.remove(&key).await?;
+                    self.metrics.results_swept.inc();
+                    removed += 1;
+                }
+                some.clear();
+            }
+            if last {
+                return Ok(removed);
+            }
+        }
+    }
 }

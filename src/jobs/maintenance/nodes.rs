@@ -8,6 +8,7 @@ use std::time::Duration;
 use tokio::time::{MissedTickBehavior, interval, sleep};
 use uuid::Uuid;
 
+use crate::jobs::error::JobsError;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::cluster::{Bell, Cluster, ClusterView};
 use crate::jobs::store::error::StoreError;
@@ -182,11 +183,20 @@ async fn sweep(shared: Arc<Shared>) {
         let Some(cluster) = shared.store.cluster() else {
             return;
         };
-        match cluster.sweep_objects().await {
+        match sweep_once(&shared, cluster).await {
             Ok(0) => {}
             Ok(removed) => tracing::info!(removed, "results without a job removed"),
             Err(error) => tracing::warn!(%error, "results without a job could not be swept"),
         }
+    }
+}
+
+/// In the database every node may look as often as it likes; what is elsewhere is listed once a day, by one of them.
+async fn sweep_once(shared: &Shared, cluster: &dyn Cluster) -> Result<u64, JobsError> {
+    match &shared.options.results {
+        None => Ok(cluster.sweep_objects().await?),
+        Some(_) if cluster.take_sweep().await? => shared.sweep_old_results().await,
+        Some(_) => Ok(0),
     }
 }
 

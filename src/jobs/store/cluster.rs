@@ -38,6 +38,27 @@ pub struct ClusterView {
     pub workers: usize,
 }
 
+/// What a database knows of itself.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Deployment {
+    /// Random, given when the tables were made.
+    pub id: String,
+    /// URL of the place of large results; empty: they are in the database; `None`: not decided.
+    pub results_place: Option<String>,
+    /// There are large results.
+    pub has_results: bool,
+    /// Nodes that have shown themselves lately.
+    pub nodes: u64,
+}
+
+impl Deployment {
+    /// The place of the results can no longer be changed.
+    #[must_use]
+    pub fn in_use(&self) -> bool {
+        self.results_place.is_some() && (self.has_results || self.nodes > 0)
+    }
+}
+
 /// Calls of a store that several processes use at once.
 #[async_trait]
 pub trait Cluster: Send + Sync + Debug {
@@ -64,7 +85,16 @@ pub trait Cluster: Send + Sync + Debug {
     /// Brings what the database counts into a short form.
     async fn fold_counts(&self) -> Result<(), StoreError>;
 
-    /// Where large results are kept.
+    /// What the database knows of itself.
+    async fn deployment(&self) -> Result<Deployment, StoreError>;
+
+    /// Notes the place of the results if it is still what it was before; says whether it was.
+    async fn place_results(&self, before: Option<&str>, place: &str) -> Result<bool, StoreError>;
+
+    /// Takes the turn to sweep results outside the database, unless somebody did so within a day; says whether it has it.
+    async fn take_sweep(&self) -> Result<bool, StoreError>;
+
+    /// Where large results are kept that are in the database.
     fn objects(&self) -> Arc<dyn ObjectStore>;
 
     /// Rings soon, together with what else is to be rung. Never waits.

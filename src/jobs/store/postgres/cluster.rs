@@ -6,7 +6,7 @@ use async_trait::async_trait;
 use object_store::ObjectStore;
 use uuid::Uuid;
 
-use crate::jobs::store::cluster::{Bell, Cluster, ClusterView, Node};
+use crate::jobs::store::cluster::{Bell, Cluster, ClusterView, Deployment, Node};
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::postgres::bell;
 use crate::jobs::store::postgres::database::PostgresStore;
@@ -105,6 +105,18 @@ impl Cluster for PostgresStore {
 
     async fn fold_counts(&self) -> Result<(), StoreError> {
         fold_counts(&self.writer).await
+    }
+
+    async fn deployment(&self) -> Result<Deployment, StoreError> {
+        self.read_deployment(DEAD_AFTER).await
+    }
+
+    async fn place_results(&self, before: Option<&str>, place: &str) -> Result<bool, StoreError> {
+        self.write_results_place(before, place).await
+    }
+
+    async fn take_sweep(&self) -> Result<bool, StoreError> {
+        self.claim_sweep(SWEPT_AFTER).await
     }
 
     fn objects(&self) -> Arc<dyn ObjectStore> {

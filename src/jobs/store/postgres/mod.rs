@@ -11,6 +11,7 @@ pub mod bell;
 pub mod cluster;
 pub mod connection;
 pub mod database;
+mod deployment;
 pub mod doctor;
 pub mod engine;
 pub mod objects;

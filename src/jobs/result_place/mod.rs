@@ -1,0 +1,35 @@
+//! Where large results are, if not in the data folder or the database: a folder that all nodes share, or an object store.
+//!
+//! | to find | look in |
+//! |---|---|
+//! | the URL, and the store that it names | [`url`] |
+//! | how requests to an object store are sent, and how long they are waited for | [`client`] |
+//! | what ties a database and the place of its results together | [`settle`] |
+
+pub(crate) mod client;
+pub(crate) mod settle;
+pub mod url;
+
+use crate::jobs::error::JobsError;
+use crate::jobs::result_place::url::ResultsPlace;
+use crate::jobs::store::postgres::database::PostgresStore;
+use crate::jobs::store::postgres::doctor::Finding;
+
+/// Looks at the place of the results of a database.
+///
+/// # Errors
+/// The database cannot be reached, or has no job table.
+pub async fn examine_results(
+    url: &str,
+    place: Option<&ResultsPlace>,
+) -> Result<Finding, JobsError> {
+    let store = PostgresStore::open(url, 1).await?;
+    let looked = settle::examine(&store, place).await;
+    store.close().await;
+    let (says, wrong) = looked?;
+    Ok(Finding {
+        about: "place of the results",
+        says,
+        wrong,
+    })
+}

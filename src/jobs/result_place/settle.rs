@@ -1,0 +1,229 @@
+//! What ties a database and the place of its results together: the database knows the place, and an object there, the marker, names
+//! the database. A node that is pointed at the results of another database, or away from those of its own, does not start:
+//! otherwise results would be looked for in vain, or swept as orphans.
+
+use std::time::Duration;
+
+use bytes::Bytes;
+use object_store::path::Path;
+use object_store::{Error, ObjectStore, ObjectStoreExt, PutPayload};
+use serde::{Deserialize, Serialize};
+use tokio::time::timeout;
+
+use crate::jobs::blobs::Blobs;
+use crate::jobs::error::JobsError;
+use crate::jobs::metrics::StoreRequests;
+use crate::jobs::result_place::url::{ResultsPlace, ResultsUrl};
+use crate::jobs::store::cluster::{Cluster, Deployment};
+
+/// The object that says whose results these are.
+const MARKER: &str = "railhead.json";
+
+/// How long the first requests may take together.
+const SETTLED_WITHIN: Duration = Duration::from_secs(60);
+
+/// What the database says if its results are in itself.
+const INSIDE: &str = "";
+
+#[derive(Debug, Serialize, Deserialize)]
+struct Marker {
+    deployment: String,
+}
+
+/// The place of the results of a database; on the first call for a database it is decided.
+///
+/// # Errors
+/// [`JobsError::ResultPlace`] if place and database do not belong together, or one of them cannot be reached.
+pub(crate) async fn settle(
+    cluster: &dyn Cluster,
+    place: Option<&ResultsPlace>,
+    requests: StoreRequests,
+) -> Result<Blobs, JobsError> {
+    let settled = async {
+        let Some(place) = place else {
+            return settle_inside(cluster).await;
+        };
+        if let (ResultsUrl::Folder(path), false) = (&place.url, place.shared) {
+            return Err(JobsError::ResultPlace(format!(
+                "{} is a folder of this machine, and the nodes of a database have their results in common; say --results-shared if \
+                 every node has the same folder there (NFS), or use an object store",
+                path.display()
+            )));
+        }
+        let objects = place.url.open(requests)?;
+        settle_outside(cluster, &place.url, &*objects).await?;
+        Ok(Blobs::at(objects, place.url.folder()))
+    };
+    let settled = timeout(SETTLED_WITHIN, settled).await;
+    settled.map_err(|_| JobsError::ResultPlace("it does not answer".to_owned()))?
+}
+
+async fn settle_inside(cluster: &dyn Cluster) -> Result<Blobs, JobsError> {
+    let deployment = cluster.deployment().await?;
+    match deployment.results_place.as_deref() {
+        Some(INSIDE) => {}
+        Some(place) if deployment.in_use() => {
+            return Err(JobsError::ResultPlace(format!(
+                "the results of this database are in {place}; start the node with --results-url {place}"
+            )));
+        }
+        _ => decide(cluster, &deployment, INSIDE).await?,
+    }
+    Ok(Blobs::at(cluster.objects(), None))
+}
+
+async fn settle_outside(
+    cluster: &dyn Cluster,
+    url: &ResultsUrl,
+    objects: &dyn ObjectStore,
+) -> Result<(), JobsError> {
+    let deployment = cluster.deployment().await?;
+    let place = url.to_string();
+    let refused = |why: String| Err(JobsError::ResultPlace(why));
+    match marker(objects).await? {
+        Some(marker) if marker.deployment != deployment.id => refused(format!(
+            "{place} holds the results of another database ({}); use another prefix",
+            marker.deployment
+        )),
+        Some(_) if deployment.results_place.as_ref() == Some(&place) => Ok(()),
+        // The same results under another name, or a place that was marked by a node that then failed.
+        Some(_) if deployment.results_place.as_deref() != Some(INSIDE) => {
+            decide(cluster, &deployment, &place).await
+        }
+        Some(_) | None if deployment.in_use() => {
+            let known = match deployment.results_place.as_deref() {
+                Some(INSIDE) => {
+                    "this database has its results in itself; start the node without --results-url"
+                        .to_owned()
+                }
+                Some(known) if known == place => format!(
+                    "there is no {MARKER} in {place}, where this database has its results: they are gone, or this is another bucket of that name"
+                ),
+                Some(known) => format!(
+                    "the results of this database are in {known}; start the node with --results-url {known}"
+                ),
+                None => "other nodes have just decided otherwise; start again".to_owned(),
+            };
+            refused(known)
+        }
+        _ => {
+            mark(objects, &deployment, &place).await?;
+            decide(cluster, &deployment, &place).await
+        }
+    }
+}
+
+async fn decide(cluster: &dyn Cluster, before: &Deployment, place: &str) -> Result<(), JobsError> {
+    let known = before.results_place.as_deref();
+    if cluster.place_results(known, place).await? {
+        tracing::info!(place, "the place of the results was decided");
+        return Ok(());
+    }
+    match cluster.deployment().await?.results_place {
+        Some(now) if now == place => Ok(()),
+        _ => Err(JobsError::ResultPlace(
+            "another node decided otherwise at the same moment; start again".to_owned(),
+        )),
+    }
+}
+
+async fn marker(objects: &dyn ObjectStore) -> Result<Option<Marker>, JobsError> {
+    let found = match objects.get(&Path::from(MARKER)).await {
+        Ok(found) => found.bytes().await?,
+        Err(Error::NotFound { .. }) => return Ok(None),
+        Err(error) => return Err(unusable(&error)),
+    };
+    let marker = serde_json::from_slice(&found);
+    marker.map(Some).map_err(|error| {
+        JobsError::ResultPlace(format!("{MARKER} is none of this service: {error}"))
+    })
+}
+
+async fn mark(
+    objects: &dyn ObjectStore,
+    deployment: &Deployment,
+    place: &str,
+) -> Result<(), JobsError> {
+    let text = serde_json::json!(Marker {
+        deployment: deployment.id.clone()
+    });
+    let payload = PutPayload::from_bytes(Bytes::from(text.to_string()));
+    let written = objects.put(&Path::from(MARKER), payload).await;
+    written.map_err(|error| unusable(&error))?;
+    // Of two databases that mark the same place at once, the one that wrote last has it.
+    match marker(objects).await? {
+        Some(marker) if marker.deployment == deployment.id => Ok(()),
+        _ => Err(JobsError::ResultPlace(format!(
+            "another database has marked {place} at the same moment"
+        ))),
+    }
+}
+
+fn unusable(error: &Error) -> JobsError {
+    JobsError::ResultPlace(error.to_string())
+}
+
+/// Looks at the place of the results of a database, and writes, reads and removes an object there.
+///
+/// # Errors
+/// The database failed.
+pub(crate) async fn examine(
+    cluster: &dyn Cluster,
+    place: Option<&ResultsPlace>,
+) -> Result<(String, bool), JobsError> {
+    let deployment = cluster.deployment().await?;
+    let Some(place) = place else {
+        return Ok(match deployment.results_place.as_deref() {
+            None => ("not decided: no node has been started".to_owned(), false),
+            Some(INSIDE) => ("in the database".to_owned(), false),
+            Some(known) => (
+                format!("{known}; not looked at without --results-url"),
+                false,
+            ),
+        });
+    };
+    let looked = timeout(SETTLED_WITHIN, look(&deployment, &place.url)).await;
+    Ok(match looked {
+        Ok(Ok(())) => (
+            format!("{}: an object was written, read and removed", place.url),
+            false,
+        ),
+        Ok(Err(error)) => (format!("{}: {error}", place.url), true),
+        Err(_) => (format!("{} does not answer", place.url), true),
+    })
+}
+
+async fn look(deployment: &Deployment, url: &ResultsUrl) -> Result<(), JobsError> {
+    let wrong = |why: String| Err(JobsError::ResultPlace(why));
+    match &deployment.results_place {
+        Some(known) if known != &url.to_string() => {
+            let known = if known == INSIDE { "itself" } else { known };
+            return wrong(format!("this database has its results in {known}"));
+        }
+        _ => {}
+    }
+    let objects = url.open(StoreRequests::default())?;
+    match marker(&*objects).await? {
+        Some(marker) if marker.deployment != deployment.id => {
+            return wrong(format!(
+                "the results of another database ({})",
+                marker.deployment
+            ));
+        }
+        None if deployment.results_place.is_some() => return wrong(format!("no {MARKER} there")),
+        _ => {}
+    }
+    let path = Path::from(format!("probe-{}", uuid::Uuid::now_v7()));
+    let text = Bytes::from_static(b"railhead doctor");
+    let payload = PutPayload::from_bytes(text.clone());
+    let written = objects.put(&path, payload).await;
+    written.map_err(|error| unusable(&error))?;
+    let read = objects.get_range(&path, 9..15).await;
+    let removed = objects.delete(&path).await;
+    removed.map_err(|error| unusable(&error))?;
+    match read {
+        Ok(read) if read == text.slice(9..15) => Ok(()),
+        Ok(_) => wrong("what was written is read back as something else".to_owned()),
+        Err(error) => Err(unusable(&error)),
+    }
+}

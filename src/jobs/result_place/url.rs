@@ -1,0 +1,229 @@
+//! The URL of a place for results.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use object_store::aws::AmazonS3Builder;
+use object_store::local::LocalFileSystem;
+use object_store::prefix::PrefixStore;
+use object_store::{BackoffConfig, ObjectStore, RetryConfig};
+
+use crate::jobs::error::JobsError;
+use crate::jobs::metrics::StoreRequests;
+use crate::jobs::result_place::client::Client;
+
+/// Tries of a request that fails for a moment, beside the first.
+const RETRIES: usize = 5;
+
+/// How long after the first try of a request another one may begin: a client waits for a result meanwhile.
+const RETRIED_WITHIN: Duration = Duration::from_secs(10);
+
+/// Pauses between tries: the first, and the longest.
+const PAUSES: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(2));
+
+/// Where large results are kept.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ResultsUrl {
+    /// `file:///…`: a folder.
+    Folder(PathBuf),
+    /// `s3://bucket/prefix`, and with the features `gs` and `az` those of other providers.
+    Bucket {
+        /// The kind of store.
+        scheme: &'static str,
+        /// Bucket or container.
+        bucket: String,
+        /// What stands before every key; may be empty.
+        prefix: String,
+    },
+}
+
+/// A place for results and whether all nodes see the same one under it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ResultsPlace {
+    /// Where.
+    pub url: ResultsUrl,
+    /// A folder is one that all nodes share.
+    pub shared: bool,
+}
+
+impl FromStr for ResultsUrl {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<ResultsUrl, String> {
+        let shape = "it looks like file:///folder, s3://bucket/prefix, gs://bucket/prefix or az://container/prefix";
+        let Some((scheme, rest)) = text.split_once("://") else {
+            return Err(shape.to_owned());
+        };
+        let scheme = match scheme {
+            "file" if rest.len() > 1 && rest.starts_with('/') => {
+                return Ok(ResultsUrl::Folder(PathBuf::from(rest)));
+            }
+            "file" => return Err("a folder is named from the root: file:///folder".to_owned()),
+            "s3" => "s3",
+            "gs" if cfg!(feature = "gs") => "gs",
+            "az" if cfg!(feature = "az") => "az",
+            "gs" | "az" => {
+                return Err(format!(
+                    "this build cannot use {scheme}://; one with the feature `{scheme}` can (cargo build --release --features {scheme})"
+                ));
+            }
+            _ => return Err(shape.to_owned()),
+        };
+        let (bucket, prefix) = rest.split_once('/').unwrap_or((rest, ""));
+        let named = |c: char| c.is_ascii_alphanumeric() || ".-_".contains(c);
+        if bucket.is_empty() || !bucket.chars().all(named) {
+            return Err(format!("`{bucket}` is no name of a bucket; {shape}"));
+        }
+        let prefix = prefix.trim_matches('/').to_owned();
+        if !prefix.chars().all(|c| named(c) || c == '/') || prefix.contains("//") {
+            return Err(format!(
+                "the prefix `{prefix}` has other characters than letters, digits, `.`, `-`, `_` and `/`"
+            ));
+        }
+        Ok(ResultsUrl::Bucket {
+            scheme,
+            bucket: bucket.to_owned(),
+            prefix,
+        })
+    }
+}
+
+impl fmt::Display for ResultsUrl {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ResultsUrl::Folder(path) => write!(f, "file://{}", path.display()),
+            ResultsUrl::Bucket {
+                scheme,
+                bucket,
+                prefix,
+            } if prefix.is_empty() => write!(f, "{scheme}://{bucket}"),
+            ResultsUrl::Bucket {
+                scheme,
+                bucket,
+                prefix,
+            } => write!(f, "{scheme}://{bucket}/{prefix}"),
+        }
+    }
+}
+
+impl ResultsUrl {
+    /// The store, which is not asked anything yet. Keys, region and address of an object store are those of the usual variables
+    /// of its provider (`AWS_…`, `GOOGLE_…`, `AZURE_…`).
+    ///
+    /// # Errors
+    /// The folder cannot be made, or a variable is wrong.
+    pub(crate) fn open(&self, requests: StoreRequests) -> Result<Arc<dyn ObjectStore>, JobsError> {
+        match self {
+            ResultsUrl::Folder(path) => {
+                std::fs::create_dir_all(path).map_err(|source| JobsError::DataDir {
+                    path: path.clone(),
+                    source,
+                })?;
+                Ok(Arc::new(
+                    LocalFileSystem::new_with_prefix(path)?.with_fsync(true),
+                ))
+            }
+            ResultsUrl::Bucket {
+                scheme,
+                bucket,
+                prefix,
+            } => {
+                let store = bucket_store(scheme, bucket, Client::new(requests)?)?;
+                Ok(match prefix.is_empty() {
+                    true => store,
+                    false => Arc::new(PrefixStore::new(store, prefix.as_str())),
+                })
+            }
+        }
+    }
+
+    /// The folder, if it is one.
+    pub(crate) fn folder(&self) -> Option<PathBuf> {
+        match self {
+            ResultsUrl::Folder(path) => Some(path.clone()),
+            ResultsUrl::Bucket { .. } => None,
+        }
+    }
+}
+
+fn bucket_store(
+    scheme: &str,
+    bucket: &str,
+    client: Client,
+) -> Result<Arc<dyn ObjectStore>, JobsError> {
+    let retry = RetryConfig {
+        backoff: BackoffConfig {
+            init_backoff: PAUSES.0,
+            max_backoff: PAUSES.1,
+            base: 2.0,
+        },
+        max_retries: RETRIES,
+        retry_timeout: RETRIED_WITHIN,
+    };
+    Ok(match scheme {
+        #[cfg(feature = "gs")]
+        "gs" => Arc::new(
+            object_store::gcp::GoogleCloudStorageBuilder::from_env()
+                .with_bucket_name(bucket)
+                .with_retry(retry)
+                .with_http_connector(client)
+                .build()?,
+        ),
+        #[cfg(feature = "az")]
+        "az" => Arc::new(
+            object_store::azure::MicrosoftAzureBuilder::from_env()
+                .with_container_name(bucket)
+                .with_retry(retry)
+                .with_http_connector(client)
+                .build()?,
+        ),
+        _ => Arc::new(
+            AmazonS3Builder::from_env()
+                .with_bucket_name(bucket)
+                .with_retry(retry)
+                .with_http_connector(client)
+                .build()?,
+        ),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_is_read_and_written_back() {
+        for text in [
+            "file:///srv/results",
+            "s3://bucket",
+            "s3://my-bucket/rail/head",
+        ] {
+            let url: ResultsUrl = text.parse().unwrap();
+            assert_eq!(url.to_string(), text);
+        }
+        let trimmed: ResultsUrl = "s3://bucket/a/".parse().unwrap();
+        assert_eq!(trimmed.to_string(), "s3://bucket/a");
+    }
+
+    #[test]
+    fn what_names_no_place_is_told_what_does() {
+        for (text, word) in [
+            ("results", "s3://bucket"),
+            ("ftp://a/b", "s3://bucket"),
+            ("s3://", "no name of a bucket"),
+            ("s3://u:p@host/b", "no name of a bucket"),
+            ("s3://b/a//b", "prefix"),
+            ("file://folder", "from the root"),
+            #[cfg(not(feature = "gs"))]
+            ("gs://bucket", "the feature `gs`"),
+            #[cfg(not(feature = "az"))]
+            ("az://container", "the feature `az`"),
+        ] {
+            let said = text.parse::<ResultsUrl>().unwrap_err();
+            assert!(said.contains(word), "{text}: {said}");
+        }
+    }
+}

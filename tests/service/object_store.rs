@@ -1,0 +1,151 @@
+//! Are large results in an object store read back at every node, and does nothing get lost when it fails?
+
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use railhead::jobs::store::postgres::schema::migrate;
+use reqwest::Method;
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+use crate::faulty_server::FaultyServer;
+use crate::postgres::database;
+use crate::seaweed::{railhead_at, server};
+use crate::support::{Service, long_case, pause};
+
+/// Ends of a guard: something hangs.
+const WITHIN: Duration = Duration::from_secs(60);
+
+const PLACE: &str = "s3://results/of/tests";
+
+/// A case whose result is far above what is kept in a row.
+fn large_case(name: &str) -> Value {
+    let mut case = long_case(name, 12);
+    case["outputs"] = json!(["resultants", "tractions"]);
+    case
+}
+
+/// Nodes on one database, with their results in one bucket.
+struct Nodes {
+    url: String,
+    port: u16,
+    folders: Vec<TempDir>,
+}
+
+impl Nodes {
+    fn start(&mut self, role: &str, flags: &[&str]) -> Service {
+        let folder = tempfile::tempdir().unwrap();
+        let mut all = vec!["--database-url", &self.url, "--results-url", PLACE];
+        all.extend(["--cache", "false", "--lease-s", "2"]);
+        all.extend(flags);
+        let mut program = railhead_at(self.port);
+        let service = Service::start_as(&mut program, role, folder.path(), &all);
+        self.folders.push(folder);
+        service
+    }
+
+    fn doctor(&self, place: &str) -> (bool, String) {
+        let mut command = railhead_at(self.port);
+        command.args([
+            "doctor",
+            "--database-url",
+            &self.url,
+            "--results-url",
+            place,
+        ]);
+        let done = command.output().unwrap();
+        let said = String::from_utf8_lossy(&done.stdout).into_owned();
+        let line = said
+            .lines()
+            .find(|line| line.contains("place of the results"));
+        let line = line.unwrap_or_else(|| panic!("{said}"));
+        (line.starts_with("ok"), line.to_owned())
+    }
+}
+
+async fn result(service: &Service, id: &str) -> (u16, Value) {
+    let path = format!("/v1/jobs/{id}/result");
+    let answer = service.request(Method::GET, &path).send().await.unwrap();
+    let status = answer.status().as_u16();
+    (status, answer.json().await.unwrap_or_default())
+}
+
+/// A counter of `/metrics`, summed over the series whose labels have all these words.
+async fn requests(service: &Service, labels: &[&str]) -> f64 {
+    let answer = service
+        .request(Method::GET, "/metrics")
+        .send()
+        .await
+        .unwrap();
+    let text = answer.text().await.unwrap();
+    let series = text.lines().filter(|line| {
+        line.starts_with("railhead_result_store_requests_total")
+            && labels.iter().all(|label| line.contains(label))
+    });
+    series
+        .filter_map(|line| line.rsplit(' ').next()?.parse::<f64>().ok())
+        .sum()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn results_in_s3_survive_its_faults_and_are_read_at_every_node() {
+    let (Some(url), Some(port)) = (database().await, server()) else {
+        return;
+    };
+    migrate(&url).await.unwrap();
+    let way = FaultyServer::to(port).await;
+    let faults = &way.faults;
+    let mut nodes = Nodes {
+        url,
+        port: way.address.port(),
+        folders: Vec::new(),
+    };
+    let one = nodes.start("serve", &["--workers", "0"]);
+    let other = nodes.start("serve", &["--workers", "0"]);
+    let worker = nodes.start("worker", &["--workers", "1"]);
+
+    // Now and then: no client and no job notices.
+    faults.refused.store(4, Ordering::Relaxed);
+    faults.cut.store(5, Ordering::Relaxed);
+    let mut ids = Vec::new();
+    for number in 0..4 {
+        ids.push(one.submit(&large_case(&format!("case {number}"))).await);
+    }
+    for id in &ids {
+        let job = other.until(id, "succeeded").await;
+        assert_eq!(job["attempt"], 1, "{job}");
+        let (here, there) = (result(&one, id).await, result(&other, id).await);
+        assert_eq!(here, there);
+        assert!(here.0 == 200 && here.1["patches"].is_array(), "{here:?}");
+        let fields = format!("/v1/jobs/{id}/tractions?patch=0&point=3");
+        let parts = [one.get(&fields).await, other.get(&fields).await];
+        assert!(parts[0] == parts[1] && parts[0].is_object());
+    }
+    assert!(faults.made.load(Ordering::Relaxed) > 5);
+    let written = requests(&worker, &["PUT", "2xx"]).await;
+    assert!(written >= 8.0, "{written}");
+    assert!(requests(&one, &["GET"]).await > requests(&one, &["GET", "2xx"]).await);
+
+    // Always: what is asked for is not there at the moment, and what is solved waits.
+    faults.refused.store(1, Ordering::Relaxed);
+    let waiting = one.submit(&large_case("waiting")).await;
+    let answer = result(&other, &ids[0]).await;
+    assert_eq!(
+        (answer.0, &answer.1["type"]),
+        (503, &json!("/problems/storage-unreachable"))
+    );
+    let since = Instant::now();
+    while worker.logged("could not be written yet") == 0 {
+        assert!(since.elapsed() < WITHIN, "the result was written");
+        pause().await;
+    }
+    faults.refused.store(0, Ordering::Relaxed);
+    faults.cut.store(0, Ordering::Relaxed);
+    let job = one.until(&waiting, "succeeded").await;
+    assert_eq!(job["attempt"], 1, "{job}");
+    assert_eq!(result(&other, &waiting).await.0, 200);
+
+    let (well, said) = nodes.doctor(PLACE);
+    assert!(well && said.contains("written, read and removed"), "{said}");
+    assert!(!nodes.doctor("s3://results/of/others").0);
+}

