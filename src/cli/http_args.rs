@@ -108,6 +108,14 @@ pub struct HttpArgs {
     #[arg(long, env = "RAILHEAD_EVALUATE_MAX_ROWS", default_value_t = 1_000_000, value_name = "N",
           value_parser = clap::value_parser!(u32).range(1..))]
     pub evaluate_max_rows: u32,
+    /// Body of `POST /v1/runs` in MiB; beyond: 413.
+    #[arg(long, env = "RAILHEAD_RUN_MAX_MIB", default_value_t = 1024, value_name = "MIB",
+          value_parser = clap::value_parser!(u32).range(1..=65536))]
+    pub run_max_mib: u32,
+    /// Rows of one run; beyond: 413.
+    #[arg(long, env = "RAILHEAD_RUN_MAX_ROWS", default_value_t = 10_000_000, value_name = "N",
+          value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
+    pub run_max_rows: u64,
     /// Names of the service, separated by commas, by which it may be asked without a key; addresses and `localhost` always
     /// may. Others are refused, as a web page could make its own name lead here.
     #[arg(
@@ -149,6 +157,8 @@ impl HttpArgs {
             grid_max_samples: count(self.grid_max_samples),
             evaluate_max_bytes: bytes(self.evaluate_max_mib),
             evaluate_max_rows: count(self.evaluate_max_rows),
+            run_max_bytes: u64::from(self.run_max_mib) << 20,
+            run_max_rows: self.run_max_rows,
             allowed_hosts: self.allowed_host.as_slice().into(),
             page_dir: self.page_dir.as_deref().map(Into::into),
             ..default

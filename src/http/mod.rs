@@ -62,7 +62,8 @@ use crate::http::routes::service::{
 };
 use crate::http::routes::{
     batch_list, batch_results, batches, cases, damage, evaluate, events, fields, job_list, jobs,
-    me, plots, point_fields, resultants, results, subsurface, tenant_events, zones,
+    me, plots, point_fields, resultants, results, run_results, run_totals, runs, subsurface,
+    tenant_events, zones,
 };
 use crate::http::server::drain_body;
 use crate::http::state::AppState;
@@ -161,6 +162,7 @@ fn resources() -> OpenApiRouter<AppState> {
     let changing = OpenApiRouter::with_openapi(contract::head())
         .routes(routes!(jobs::get, jobs::delete))
         .routes(routes!(batches::get, batches::delete))
+        .routes(routes!(runs::get, runs::delete))
         .routes(routes!(methods::methods))
         .routes(routes!(remarks::remarks))
         .routes(routes!(service_examples::examples))
@@ -177,11 +179,14 @@ fn resources() -> OpenApiRouter<AppState> {
     let lists = OpenApiRouter::new()
         .routes(routes!(jobs::submit, job_list::list))
         .routes(routes!(batches::submit, batch_list::list))
+        .routes(routes!(runs::submit, runs::list))
         .route_layer(from_fn(etag::revalidate));
     let lists = contract::conditional(lists);
     let plain = OpenApiRouter::new()
         .routes(routes!(jobs::cancel))
         .routes(routes!(batches::cancel))
+        .routes(routes!(runs::cancel))
+        .routes(routes!(run_results::manifest))
         .routes(routes!(cases::check))
         .routes(routes!(problems::list))
         .routes(routes!(problems::explain))
@@ -190,6 +195,7 @@ fn resources() -> OpenApiRouter<AppState> {
         .merge(finished)
         .merge(plain)
         .routes(routes!(me::me))
+        .routes(routes!(run_totals::totals))
         .merge(lists)
         .route_layer(from_fn(accept::require_json));
     // These choose among several forms themselves.
@@ -214,10 +220,12 @@ fn resources() -> OpenApiRouter<AppState> {
     let events = OpenApiRouter::new()
         .routes(routes!(events::job))
         .routes(routes!(events::batch))
+        .routes(routes!(events::run))
         .routes(routes!(tenant_events::follow))
         .route_layer(from_fn(query::refuse_parameters));
     v1.merge(parts)
         .routes(routes!(batch_results::results))
+        .routes(routes!(run_results::results))
         .routes(routes!(evaluate::evaluate))
         .merge(events)
         .merge(probes())

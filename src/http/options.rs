@@ -51,6 +51,10 @@ pub struct HttpOptions {
     pub evaluate_max_bytes: usize,
     /// Most rows of a body.
     pub evaluate_max_rows: usize,
+    /// Largest body of a run in bytes.
+    pub run_max_bytes: u64,
+    /// Most rows of a run.
+    pub run_max_rows: u64,
     /// Requests without a key are answered, as those of a tenant of their own.
     pub anonymous: bool,
     /// The same for those that came through a proxy.
@@ -92,6 +96,8 @@ impl Default for HttpOptions {
             batch_max_cases: 200_000,
             evaluate_max_bytes: 64 << 20,
             evaluate_max_rows: 1_000_000,
+            run_max_bytes: 1 << 30,
+            run_max_rows: 10_000_000,
             anonymous: true,
             anonymous_proxied: false,
             allowed_hosts: Arc::default(),

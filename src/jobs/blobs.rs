@@ -31,6 +31,9 @@ const SOLUTION: &str = "solution.json";
 
 const FIELDS: &str = "fields.bin";
 
+/// The answers of a chunk of rows, in place of fields: other programs know the file by its name.
+const ROWS: &str = "rows.parquet";
+
 /// The place where results are kept.
 #[derive(Debug, Clone)]
 pub struct Blobs {
@@ -104,9 +107,10 @@ impl Blobs {
     }
 
     async fn put_into(&self, folder: Path, result: EncodedResult) -> Result<String, JobsError> {
+        let name = if result.is_rows() { ROWS } else { FIELDS };
         if let Some(fields) = result.fields {
             self.objects
-                .put(&folder.clone().join(FIELDS), PutPayload::from_bytes(fields))
+                .put(&folder.clone().join(name), PutPayload::from_bytes(fields))
                 .await?;
         }
         self.objects
@@ -125,6 +129,15 @@ impl Blobs {
     /// It cannot be read.
     pub async fn solution(&self, folder: &str) -> Result<Bytes, JobsError> {
         let path = Path::from(folder).join(SOLUTION);
+        Ok(self.objects.get(&path).await?.bytes().await?)
+    }
+
+    /// Reads the answers of a chunk of rows.
+    ///
+    /// # Errors
+    /// They cannot be read.
+    pub async fn rows(&self, folder: &str) -> Result<Bytes, JobsError> {
+        let path = Path::from(folder).join(ROWS);
         Ok(self.objects.get(&path).await?.bytes().await?)
     }
 
@@ -226,7 +239,7 @@ impl Blobs {
     /// Something could not be removed.
     pub async fn remove(&self, key: &str) -> Result<(), JobsError> {
         let folder = Path::from(key);
-        for name in [SOLUTION, FIELDS] {
+        for name in [SOLUTION, FIELDS, ROWS] {
             match self.objects.delete(&folder.clone().join(name)).await {
                 Ok(()) | Err(object_store::Error::NotFound { .. }) => {}
                 Err(error) => return Err(error.into()),
@@ -298,7 +311,7 @@ impl Blobs {
             path: path.clone(),
             source,
         };
-        for name in [SOLUTION, FIELDS] {
+        for name in [SOLUTION, FIELDS, ROWS] {
             let mode = Permissions::from_mode(0o600);
             match tokio::fs::set_permissions(path.join(name), mode).await {
                 Err(source) if source.kind() != std::io::ErrorKind::NotFound => {

@@ -62,6 +62,15 @@ pub enum JobsError {
     /// The job must end first.
     #[error("the job is {}; only an ended job can be deleted, cancel it first", .0.name())]
     NotEnded(State),
+    /// There is no such run.
+    #[error("there is no such run")]
+    RunNotFound,
+    /// The run must end first.
+    #[error("the run has not ended; cancel it first")]
+    RunNotEnded,
+    /// The run has more rows than it may.
+    #[error("the run has more than the {0} rows that are allowed (`--run-max-rows`)")]
+    TooManyRows(u64),
     /// This many jobs of the batch must end first.
     #[error("{0} jobs of the batch have not ended; cancel it first")]
     BatchNotEnded(u64),

@@ -10,6 +10,7 @@ use prometheus_client::metrics::info::Info;
 use prometheus_client::registry::Registry;
 
 use crate::contact::case::words::solver::MethodName;
+use crate::contact::evaluate::many_answer::ManyAnswer;
 use crate::contact::solution::words::Solution;
 use crate::jobs::model::{FailureKind, State};
 use crate::jobs::store::ending::Ending;
@@ -37,6 +38,11 @@ struct ReasonLabel {
     reason: &'static str,
 }
 
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+struct StatusLabel {
+    status: &'static str,
+}
+
 /// A solver at work.
 #[derive(Debug)]
 pub(crate) struct BusyWorker(Gauge);
@@ -57,6 +63,7 @@ pub(crate) struct Metrics {
     pub(crate) operator_bytes: Gauge,
     solve_seconds: Family<MethodLabel, Histogram>,
     iterations: Family<MethodLabel, Histogram>,
+    rows: Family<StatusLabel, Counter>,
     ended: Family<StateLabel, Counter>,
     failures: Family<ReasonLabel, Counter>,
     storage_failing: Gauge,
@@ -109,6 +116,7 @@ impl Metrics {
             operator_bytes: Gauge::default(),
             solve_seconds: Family::new_with_constructor(|| Histogram::new(SOLVE_SECONDS)),
             iterations: Family::new_with_constructor(|| Histogram::new(ITERATIONS)),
+            rows: Family::default(),
             ended: Family::default(),
             failures: Family::default(),
             storage_failing: Gauge::default(),
@@ -152,6 +160,16 @@ impl Metrics {
             self.iterations
                 .get_or_create(&method)
                 .observe(f64::from(point.solver.iterations));
+        }
+    }
+
+    /// Rows of a run were answered.
+    pub(crate) fn rows_ended(&self, answer: &ManyAnswer) {
+        for status in &answer.status {
+            let status = StatusLabel {
+                status: status.name(),
+            };
+            self.rows.get_or_create(&status).inc();
         }
     }
 
@@ -222,6 +240,11 @@ impl Metrics {
             "results_swept",
             "Results without a job removed from outside the database",
             self.results_swept.clone(),
+        );
+        registry.register(
+            "run_rows",
+            "Rows of runs that were answered, by what became of them",
+            self.rows.clone(),
         );
         registry.register(
             "storage_failing",

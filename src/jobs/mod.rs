@@ -58,6 +58,7 @@ pub mod recent_reads;
 pub mod result_cache;
 pub mod result_place;
 pub mod results;
+pub mod run;
 pub mod shared;
 pub mod storage_fault;
 pub mod storage_health;

@@ -34,6 +34,7 @@ mod laws;
 mod liu_hsu;
 mod liu_hsu_newton;
 mod maintenance;
+mod many_rows;
 mod memory;
 mod paper_figures;
 #[path = "../../benches/calibrate/population.rs"]

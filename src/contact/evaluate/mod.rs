@@ -1,5 +1,13 @@
-//! Rows of numbers in, resultants out: one case with columns of values in place of some of its numbers, answered without meshes or jobs.
+//! Rows in, resultants out: one case with columns of values in place of some of its members. [`rows`] answers numbers without meshes, [`many`]
+//! any column with any method.
 
 pub mod answer;
+pub mod column;
+pub mod many;
+pub mod many_answer;
+pub mod placing;
+pub mod request_faults;
 pub mod rows;
+mod rows_checks;
 pub mod variable;
+pub mod varied;

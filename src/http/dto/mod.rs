@@ -6,4 +6,5 @@ pub mod job;
 pub mod problem;
 pub mod result;
 pub mod resultants;
+pub mod run;
 pub mod tenant_limits;

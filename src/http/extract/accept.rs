@@ -47,6 +47,10 @@ pub enum Format {
     Svg,
     /// A picture as PNG.
     Png,
+    /// Arrow's stream of columns.
+    Arrow,
+    /// A Parquet file.
+    Parquet,
     /// Server-sent events.
     Events,
 }
@@ -63,6 +67,8 @@ impl Format {
             Format::Vtk => "vtk",
             Format::Svg => "svg",
             Format::Png => "png",
+            Format::Arrow => "arrow",
+            Format::Parquet => "parquet",
             Format::Events => "events",
         }
     }
@@ -78,6 +84,8 @@ impl Format {
             Format::Vtk => "application/x-vtk",
             Format::Svg => "image/svg+xml",
             Format::Png => "image/png",
+            Format::Arrow => "application/vnd.apache.arrow.stream",
+            Format::Parquet => "application/vnd.apache.parquet",
             Format::Events => "text/event-stream",
         }
     }

@@ -1,4 +1,4 @@
-//! The ids of jobs and batches in paths.
+//! The ids of jobs, batches and runs in paths.
 
 use axum::extract::{FromRequestParts, Path};
 use axum::http::request::Parts;
@@ -31,6 +31,19 @@ impl<S: Send + Sync> FromRequestParts<S> for BatchId {
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
         let id = read_id(parts, state, ProblemKind::BatchNotFound, "batch").await?;
         Ok(BatchId(id))
+    }
+}
+
+/// The id of a run in the path.
+#[derive(Debug, Clone, Copy)]
+pub struct RunId(pub Uuid);
+
+impl<S: Send + Sync> FromRequestParts<S> for RunId {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+        let id = read_id(parts, state, ProblemKind::RunNotFound, "run").await?;
+        Ok(RunId(id))
     }
 }
 

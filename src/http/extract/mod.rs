@@ -1,6 +1,7 @@
 //! What a request contains, read strictly: caller, ids, query, body, and the formats that the client accepts.
 
 pub mod accept;
+pub mod arriving;
 pub mod batch;
 pub mod caller;
 pub mod ids;
@@ -9,4 +10,5 @@ pub mod json_weight;
 pub mod labels;
 pub mod query;
 pub mod rows;
+pub mod run_rows;
 pub mod submit_options;

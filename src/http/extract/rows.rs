@@ -9,7 +9,8 @@ use http_body_util::{BodyExt, Limited};
 use serde::de::{Deserialize, DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::Value;
 
-use crate::contact::evaluate::rows::Column;
+use crate::contact::evaluate::column::Column;
+use crate::contact::evaluate::varied::Values;
 use crate::http::extract::batch::table::column_pointers;
 use crate::http::extract::json::{Strict, unreadable};
 use crate::http::layers::admission::too_long;
@@ -59,10 +60,29 @@ pub async fn read_body(request: Request, options: &HttpOptions) -> Result<Bytes,
 /// # Errors
 /// `malformed-json` with its position, and with column and row where the fault is in a column.
 pub fn read_json(text: &[u8]) -> Result<(Value, Vec<Column>), ApiError> {
+    let (template, columns) = read_json_columns(text)?;
+    let numbers = columns.into_iter().map(|(pointer, values)| match values {
+        Values::Numbers(values) => Ok(Column { pointer, values }),
+        Values::Texts(_) => {
+            let detail = format!("column `{pointer}`, row 0: a text given; a number is needed");
+            Err(ApiError::malformed(&serde_json::Error::custom(detail)))
+        }
+    });
+    Ok((template, numbers.collect::<Result<_, _>>()?))
+}
+
+/// The same with columns of texts allowed beside those of numbers.
+///
+/// # Errors
+/// As [`read_json`].
+pub fn read_json_columns(text: &[u8]) -> Result<(Value, NamedValues), ApiError> {
     let read: RowsBody =
         serde_json::from_slice(text).map_err(|error| ApiError::malformed(&error))?;
     Ok((read.template, read.columns))
 }
+
+/// Columns with their names.
+pub type NamedValues = Vec<(String, Values)>;
 
 /// Columns from CSV, whose first line names them as a table of a batch does.
 ///
@@ -134,7 +154,7 @@ fn line_at(text: &[u8], place: usize) -> usize {
 /// The JSON body of rows.
 struct RowsBody {
     template: Value,
-    columns: Vec<Column>,
+    columns: NamedValues,
 }
 
 impl<'de> Deserialize<'de> for RowsBody {
@@ -183,7 +203,7 @@ impl<'de> Visitor<'de> for BodyVisitor {
     }
 }
 
-struct RowColumns(Vec<Column>);
+struct RowColumns(NamedValues);
 
 impl<'de> Deserialize<'de> for RowColumns {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -196,59 +216,113 @@ impl<'de> Deserialize<'de> for RowColumns {
 struct RowColumnsVisitor;
 
 impl<'de> Visitor<'de> for RowColumnsVisitor {
-    type Value = Vec<Column>;
+    type Value = NamedValues;
 
     fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
         formatter.write_str("an object of columns, each named by a JSON pointer into the case")
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut members: A) -> Result<Vec<Column>, A::Error> {
-        let mut columns: Vec<Column> = Vec::new();
+    fn visit_map<A: MapAccess<'de>>(self, mut members: A) -> Result<NamedValues, A::Error> {
+        let mut columns: NamedValues = Vec::new();
         while let Some(pointer) = members.next_key::<String>()? {
-            if columns.iter().any(|known| known.pointer == pointer) {
+            if columns.iter().any(|(known, _)| *known == pointer) {
                 return Err(A::Error::custom(format_args!(
                     "the column `{pointer}` is written twice"
                 )));
             }
-            let values = members.next_value_seed(Numbers(&pointer))?;
-            columns.push(Column { pointer, values });
+            let values = members.next_value_seed(RowValues(&pointer))?;
+            columns.push((pointer, values));
         }
         Ok(columns)
     }
 }
 
-/// Reads the numbers of a column.
-struct Numbers<'a>(&'a str);
+/// Reads the values of a column: numbers, or texts if the first is one.
+struct RowValues<'a>(&'a str);
 
-impl<'de> DeserializeSeed<'de> for Numbers<'_> {
-    type Value = Vec<f64>;
+impl<'de> DeserializeSeed<'de> for RowValues<'_> {
+    type Value = Values;
 
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Vec<f64>, D::Error> {
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Values, D::Error> {
         deserializer.deserialize_seq(self)
     }
 }
 
-impl<'de> Visitor<'de> for Numbers<'_> {
-    type Value = Vec<f64>;
+impl<'de> Visitor<'de> for RowValues<'_> {
+    type Value = Values;
 
     fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
         write!(formatter, "an array of numbers in the column `{}`", self.0)
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Vec<f64>, A::Error> {
-        let mut numbers = Vec::new();
+    fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Values, A::Error> {
+        let first = items.next_element::<First>();
+        match first.map_err(|error| self.at(0, &error))? {
+            None => Ok(Values::Numbers(Vec::new())),
+            Some(First::Number(first)) => self.rest(items, first).map(Values::Numbers),
+            Some(First::Text(first)) => self.rest(items, first).map(Values::Texts),
+        }
+    }
+}
+
+impl RowValues<'_> {
+    fn rest<'de, A: SeqAccess<'de>, T: Deserialize<'de>>(
+        &self,
+        mut items: A,
+        first: T,
+    ) -> Result<Vec<T>, A::Error> {
+        let mut values = vec![first];
         loop {
-            match items.next_element::<f64>() {
-                Ok(Some(number)) => numbers.push(number),
-                Ok(None) => return Ok(numbers),
-                Err(error) => {
-                    let (column, row) = (self.0, numbers.len());
-                    return Err(A::Error::custom(format_args!(
-                        "column `{column}`, row {row}: {error}"
-                    )));
-                }
+            match items.next_element::<T>() {
+                Ok(Some(value)) => values.push(value),
+                Ok(None) => return Ok(values),
+                Err(error) => return Err(self.at(values.len(), &error)),
             }
         }
+    }
+
+    fn at<E: Error>(&self, row: usize, error: &E) -> E {
+        E::custom(format_args!("column `{}`, row {row}: {error}", self.0))
+    }
+}
+
+/// The first value of a column, which decides what it holds.
+enum First {
+    Number(f64),
+    Text(String),
+}
+
+impl<'de> Deserialize<'de> for First {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<First, D::Error> {
+        deserializer.deserialize_any(FirstVisitor)
+    }
+}
+
+struct FirstVisitor;
+
+impl Visitor<'_> for FirstVisitor {
+    type Value = First;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        formatter.write_str("a number or a text")
+    }
+
+    fn visit_f64<E: Error>(self, number: f64) -> Result<First, E> {
+        Ok(First::Number(number))
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "as every number of JSON")]
+    fn visit_i64<E: Error>(self, number: i64) -> Result<First, E> {
+        Ok(First::Number(number as f64))
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "as every number of JSON")]
+    fn visit_u64<E: Error>(self, number: u64) -> Result<First, E> {
+        Ok(First::Number(number as f64))
+    }
+
+    fn visit_str<E: Error>(self, text: &str) -> Result<First, E> {
+        Ok(First::Text(text.to_owned()))
     }
 }
 

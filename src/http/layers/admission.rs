@@ -80,6 +80,7 @@ pub async fn limit_packed(
     }
     let most = match request.uri().path() {
         "/v1/batches" => options.batch_max_bytes,
+        "/v1/runs" => options.run_max_bytes,
         "/v1/evaluate" => options.evaluate_max_bytes as u64,
         _ => options.body_max_bytes as u64,
     };

@@ -197,6 +197,14 @@ impl From<JobsError> for ApiError {
                     "{jobs} jobs of the batch are queued or running; cancel it first, then delete it"
                 ),
             ),
+            JobsError::RunNotFound => ApiError::new(ProblemKind::RunNotFound, "no run has this id"),
+            JobsError::RunNotEnded => ApiError::new(
+                ProblemKind::RunNotEnded,
+                "rows of the run are waiting or being solved; cancel it first, then delete it",
+            ),
+            JobsError::TooManyRows(_) => {
+                ApiError::new(ProblemKind::BodyTooLarge, error.to_string())
+            }
             JobsError::NoSuchPatch { patches } => ApiError::no_such_index("patch", patches),
             JobsError::NoSuchPoint { points } => ApiError::no_such_index("point", points),
             JobsError::IdempotencyConflict => ApiError::new(

@@ -7,6 +7,7 @@ pub mod npz;
 pub mod picture;
 pub mod pieces;
 pub mod resultants;
+pub mod row_tables;
 pub mod rows;
 pub mod stresses;
 pub mod table;

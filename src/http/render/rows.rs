@@ -91,7 +91,7 @@ fn statuses(answer: &RowsAnswer, range: Range<usize>) -> String {
 }
 
 /// The shortest digits that are read as the same number.
-fn write_number(text: &mut String, number: f64, none: &str) {
+pub fn write_number(text: &mut String, number: f64, none: &str) {
     if number.is_finite() {
         let _ = write!(text, "{number:?}");
     } else {

@@ -118,7 +118,11 @@ pub async fn submit(
     Ok(response)
 }
 
-fn labels_of(given: Vec<(String, String)>) -> Result<BTreeMap<String, String>, ApiError> {
+/// The labels of a submission.
+///
+/// # Errors
+/// They are too many, or two have the same key.
+pub fn labels_of(given: Vec<(String, String)>) -> Result<BTreeMap<String, String>, ApiError> {
     let number = given.len();
     let labels: BTreeMap<String, String> = given.into_iter().collect();
     if labels.len() < number || number > LABELS_MAX {

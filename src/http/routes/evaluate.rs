@@ -12,7 +12,9 @@ use uuid::Uuid;
 
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::evaluate::answer::RowsAnswer;
-use crate::contact::evaluate::rows::{Column, Rows};
+use crate::contact::evaluate::column::Column;
+use crate::contact::evaluate::request_faults::of_first_row;
+use crate::contact::evaluate::rows::Rows;
 use crate::http::extract::accept::{Format, choose, one_of};
 use crate::http::extract::caller::Caller;
 use crate::http::extract::json;
@@ -227,9 +229,11 @@ fn answer(
         return Err(CaseError(vec![Fault::new("/columns", detail)]).into());
     }
     let first = first_row(template, &columns)?;
-    let checked = jobs
-        .check(&first)
-        .map_err(|error| in_request(error, &columns))?;
+    let checked = jobs.check(&first).map_err(|error| {
+        let pointers = columns.iter().map(|column| &*column.pointer);
+        let pointers: Vec<_> = pointers.map(|pointer| (pointer, pointer)).collect();
+        of_first_row(error, &pointers)
+    })?;
     Ok(Rows::new(&first, &checked, columns)?.evaluate())
 }
 
@@ -249,22 +253,4 @@ fn first_row(template: &Value, columns: &[Column]) -> Result<Value, ApiError> {
         let fault = Fault::new("/columns", format!("the column `{column}` {reason}"));
         CaseError(vec![fault]).into()
     })
-}
-
-/// Faults of the first row, with pointers into the request.
-fn in_request(CaseError(faults): CaseError, columns: &[Column]) -> ApiError {
-    let moved = faults.into_iter().map(|fault| {
-        let column = columns
-            .iter()
-            .find(|column| column.pointer == fault.pointer);
-        let pointer = match column {
-            Some(column) => {
-                let escaped = column.pointer.replace('~', "~0").replace('/', "~1");
-                format!("/columns/{escaped}/0")
-            }
-            None => format!("/template{}", fault.pointer),
-        };
-        Fault { pointer, ..fault }
-    });
-    CaseError(moved.collect()).into()
 }

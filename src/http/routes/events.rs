@@ -1,4 +1,4 @@
-//! `/v1/jobs/{id}/events` and `/v1/batches/{id}/events`: changes as they happen, as server-sent events.
+//! `/v1/jobs/{id}/events`, `/v1/batches/{id}/events` and `/v1/runs/{id}/events`: changes as they happen, as server-sent events.
 //!
 //! Nothing is kept for a client: the next event is made when the connection takes it. The id of an event says what was
 //! seen, so `Last-Event-ID` resumes over lost connections and restarts of the service alike.
@@ -18,11 +18,13 @@ use utoipa::{PartialSchema, ToSchema};
 use uuid::Uuid;
 
 use crate::http::dto::batch::BatchAnswer;
-use crate::http::extract::ids::{BatchId, JobId};
+use crate::http::dto::run::RunAnswer;
+use crate::http::extract::ids::{BatchId, JobId, RunId};
 use crate::http::problem::error::ApiError;
 use crate::http::routes::batches::GetBatchProblems;
 use crate::http::routes::event_stream::{EventRequest, changed, event};
 use crate::http::routes::jobs::GetProblems;
+use crate::http::routes::runs::GetRunProblems;
 use crate::jobs::Jobs;
 use crate::jobs::model::{Job, State as JobState};
 
@@ -65,6 +67,17 @@ impl PartialSchema for BatchEventSent {
 }
 
 impl ToSchema for BatchEventSent {}
+
+/// One event of the stream of a run, in the contract.
+pub struct RunEventSent;
+
+impl PartialSchema for RunEventSent {
+    fn schema() -> RefOr<Schema> {
+        event_schema::<RunAnswer>("`state`")
+    }
+}
+
+impl ToSchema for RunEventSent {}
 
 /// An event line by line, called so; its data is `T` as JSON text.
 pub fn event_schema<T: ToSchema>(names: &str) -> RefOr<Schema> {
@@ -189,4 +202,47 @@ async fn next_of_batch(
     let (mark, (ended, all)) = (batch.change_tag(), batch.ended());
     let event = event("state", &mark, &BatchAnswer::from(batch))?;
     Some((Ok(event), (ended < all).then_some(Some(mark))))
+}
+
+/// Follows a run.
+///
+/// Events are called `state`; their data is the run as `/v1/runs/{id}` answers it, whenever one of its pieces has begun or ended. Otherwise as the
+/// events of a job.
+#[utoipa::path(
+    get,
+    path = "/v1/runs/{id}/events",
+    tag = "runs",
+    operation_id = "follow_run",
+    params(
+        ("id" = String, Path, description = "Id of the run", format = "uuid"),
+        ("Last-Event-ID" = Option<String>, Header, description = "Id of the last event that was seen")
+    ),
+    responses(
+        (status = 200, description = "One event per change", content((RunEventSent = "text/event-stream"))),
+        (status = 204, description = "The run has ended and the client has seen it"),
+        GetRunProblems
+    )
+)]
+pub async fn run(request: EventRequest, RunId(id): RunId) -> Result<Response, ApiError> {
+    let jobs = request.jobs.clone();
+    let run = jobs.run(id).await?;
+    let seen = request.seen.clone();
+    if run.state().ended() && seen.as_deref() == Some(&run.chunks.change_tag()) {
+        return Ok(StatusCode::NO_CONTENT.into_response());
+    }
+    request.answer(unfold(Some(seen), move |seen| {
+        let jobs = jobs.clone();
+        async move { next_of_run(&jobs, id, seen?).await }
+    }))
+}
+
+async fn next_of_run(
+    jobs: &Jobs,
+    id: Uuid,
+    seen: Option<String>,
+) -> Option<(Result<Event, Infallible>, Option<Option<String>>)> {
+    let run = changed(jobs.run_changed_since(id, seen.as_deref()).await)?;
+    let (mark, ended) = (run.chunks.change_tag(), run.state().ended());
+    let event = event("state", &mark, &RunAnswer::from(run))?;
+    Some((Ok(event), (!ended).then_some(Some(mark))))
 }

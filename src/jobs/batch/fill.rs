@@ -186,7 +186,10 @@ impl Jobs {
             slice_us: staged.slice_us,
             body: Bytes::from(case),
             row: staged.row,
-            cache_key: self.cache_key(&staged.digest),
+            // A chunk of rows has none.
+            cache_key: Some(staged.digest)
+                .filter(|digest| !digest.is_empty())
+                .and_then(|digest| self.cache_key(&digest)),
             source: None,
             idempotency: None,
             traceparent,

@@ -48,6 +48,17 @@ impl Batch {
     }
 }
 
+/// What is kept of a run beside its chunks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunRecord {
+    /// Its head, as stored.
+    pub head: Bytes,
+    /// Rows of ended chunks that have no answer.
+    pub without_answer: u64,
+    /// Sum of the progress of the chunks that are being solved.
+    pub running: f64,
+}
+
 /// One job of a batch with what is needed to show its result.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BatchItem {

@@ -27,6 +27,19 @@ pub(crate) struct StagedCase {
     pub(crate) own: CaseOptions,
 }
 
+/// An empty file without a name on the file system of a folder.
+pub(crate) fn nameless(folder: &Path) -> Result<File> {
+    let path = folder.join(format!("spool-{}", uuid::Uuid::now_v7()));
+    let file = File::options()
+        .read(true)
+        .write(true)
+        .create_new(true)
+        .mode(0o600)
+        .open(&path)?;
+    std::fs::remove_file(&path)?;
+    Ok(file)
+}
+
 /// Staged cases, first in, first out.
 #[derive(Debug)]
 pub(crate) struct Staging(BufWriter<File>);
@@ -34,15 +47,10 @@ pub(crate) struct Staging(BufWriter<File>);
 impl Staging {
     /// Makes an empty staging file in a folder.
     pub(crate) fn new(folder: &Path) -> Result<Staging> {
-        let path = folder.join(format!("spool-{}", uuid::Uuid::now_v7()));
-        let file = File::options()
-            .read(true)
-            .write(true)
-            .create_new(true)
-            .mode(0o600)
-            .open(&path)?;
-        std::fs::remove_file(&path)?;
-        Ok(Staging(BufWriter::with_capacity(1 << 18, file)))
+        Ok(Staging(BufWriter::with_capacity(
+            1 << 18,
+            nameless(folder)?,
+        )))
     }
 
     /// Appends a case.

@@ -1,8 +1,9 @@
 //! Cases that are rows of a table: a template, and what the row puts into it. Only the latter is kept for each row.
 
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value};
+use serde_json::Value;
 
+use crate::contact::evaluate::placing::put;
 use crate::jobs::error::JobsError;
 use crate::jobs::store::submission::StoredCase;
 
@@ -20,37 +21,6 @@ pub fn fill(template: &Value, row: &[Cell]) -> Result<Value, (usize, String)> {
         put(&mut case, path, value.clone()).map_err(|reason| (number, reason))?;
     }
     Ok(case)
-}
-
-/// Puts a value where the members lead; objects on the way are made.
-fn put(case: &mut Value, path: &[String], value: Value) -> Result<(), String> {
-    let Some((last, way)) = path.split_last() else {
-        return Ok(());
-    };
-    let mut place = case;
-    for member in way {
-        place = step(place, member)?;
-    }
-    *step(place, last)? = value;
-    Ok(())
-}
-
-fn step<'a>(place: &'a mut Value, member: &str) -> Result<&'a mut Value, String> {
-    if place.is_null() {
-        *place = Value::Object(Map::new());
-    }
-    match place {
-        Value::Object(members) => Ok(members.entry(member).or_insert(Value::Null)),
-        Value::Array(items) => {
-            let count = items.len();
-            let index = member.parse::<usize>().ok();
-            let item = index.and_then(|index| items.get_mut(index));
-            item.ok_or_else(|| format!("leads to `{member}` of an array with {count} entries"))
-        }
-        _ => Err(format!(
-            "leads to `{member}` of what is neither an object nor an array in the template"
-        )),
-    }
 }
 
 impl StoredCase {

@@ -138,6 +138,40 @@ impl BatchUpload {
         self.check(line, &case, "", (true, own), &cells)
     }
 
+    /// Adds a chunk of rows of a run, which take so long. Blocks.
+    ///
+    /// # Errors
+    /// As [`BatchUpload::add`].
+    pub(crate) fn add_chunk(
+        &mut self,
+        method: &str,
+        cost_us: u32,
+        body: &[u8],
+    ) -> Result<(), JobsError> {
+        self.count(body.len())?;
+        self.digest.update(body);
+        let index = self.cases;
+        self.cases += 1;
+        self.require_place()?;
+        let staged = StagedCase {
+            index,
+            row: true,
+            method: method.to_owned(),
+            outputs: outputs_text(&[]),
+            cost_us,
+            slice_us: cost_us,
+            digest: String::new(),
+            name: None,
+            labels: BTreeMap::new(),
+            own: CaseOptions::default(),
+        };
+        let Some(staging) = &mut self.staging else {
+            return Ok(());
+        };
+        let written = staging.push(&staged, body);
+        written.map_err(|source| self.jobs.staging_failed(source))
+    }
+
     /// What the next case says; nothing if it cannot be read, which is noted.
     fn good<T>(
         &mut self,

@@ -4,6 +4,7 @@ use bytes::Bytes;
 
 use crate::contact::solution::words::PatchFields;
 use crate::jobs::codec::fields::{Header, PREFIX_BYTES, header_length};
+use crate::jobs::codec::parquet;
 use crate::jobs::error::JobsError;
 
 /// A result in its stored form.
@@ -20,6 +21,13 @@ impl EncodedResult {
     #[must_use]
     pub fn bytes(&self) -> usize {
         self.solution.len() + self.fields.as_ref().map_or(0, Bytes::len)
+    }
+
+    /// These are the answers of a chunk of rows, whose table stands in place of fields.
+    #[must_use]
+    pub fn is_rows(&self) -> bool {
+        let fields = self.fields.as_ref();
+        fields.is_some_and(|fields| fields.starts_with(parquet::MAGIC))
     }
 
     /// The cells of one patch, with the values of one motion or of all of them.

@@ -34,7 +34,7 @@ use std::sync::Arc;
 use async_trait::async_trait;
 use uuid::Uuid;
 
-use crate::jobs::batch::model::{Batch, BatchItem};
+use crate::jobs::batch::model::{Batch, BatchItem, RunRecord};
 use crate::jobs::keys::key::Key;
 use crate::jobs::model::{Failure, Job, State};
 use crate::jobs::store::claim::{
@@ -166,6 +166,9 @@ pub trait Store: KeyStore + Send + Sync + Debug {
 
     /// An acknowledged batch with its counts.
     async fn batch(&self, tenant: &str, id: Uuid) -> Result<Option<Batch>, StoreError>;
+
+    /// The template of an acknowledged batch that is a run, and how far its chunks are.
+    async fn run(&self, tenant: &str, id: Uuid) -> Result<Option<RunRecord>, StoreError>;
 
     /// The jobs of a batch after the job `after`, in the order in which they were sent, at most `limit`; small solutions are read with
     /// them, and none after those of `bytes` together.

@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use crate::jobs::run::lane::{rows_lane, tenant_of};
 use crate::jobs::worker::attempt::{Attempt, TimeSpentOn};
 
 /// Time after which a solver second counts half.
@@ -74,17 +75,25 @@ impl FairTurns {
         inner.used.retain(|_, used| used.now() > FORGOTTEN);
     }
 
-    /// Tenants in the order of their turns: whoever has used the least comes first.
+    /// Lanes in the order of their turns: the tenant that has used the least in both of its lanes comes first, and of these the lane that has.
     pub(crate) fn order(&self, mut tenants: Vec<Arc<str>>) -> Vec<Arc<str>> {
         let inner = self.lock();
         tenants.extend(inner.parked.iter().map(|attempt| attempt.tenant.clone()));
+        let used = |lane: &str| inner.used.get(lane).map_or(0.0, Used::now);
         let mut keyed: Vec<_> = tenants
             .into_iter()
-            .map(|tenant| (inner.used.get(&tenant).map_or(0.0, Used::now), tenant))
+            .map(|lane| {
+                let tenant = tenant_of(&lane);
+                let of_tenant = used(tenant) + used(&rows_lane(tenant));
+                ([of_tenant, used(&lane)], lane)
+            })
             .collect();
-        keyed.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
+        keyed.sort_by(|(a, first), (b, second)| {
+            let used = a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]));
+            used.then_with(|| first.cmp(second))
+        });
         keyed.dedup_by(|a, b| a.1 == b.1);
-        keyed.into_iter().map(|(_, tenant)| tenant).collect()
+        keyed.into_iter().map(|(_, lane)| lane).collect()
     }
 
     /// Has the queue of this tenant had its share beside the long solves, of a slice each?
@@ -167,6 +176,16 @@ mod tests {
             turns.charge(&tenants[2], Duration::from_micros(10), TimeSpentOn::New);
         }
         assert_eq!(names(&turns.order(tenants)), ["c", "b", "a"]);
+    }
+
+    #[test]
+    fn jobs_and_rows_of_a_tenant_share_its_turn() {
+        let turns = FairTurns::default();
+        let lanes: Vec<Arc<str>> = ["a", "a/rows", "b"].map(Arc::from).to_vec();
+        turns.charge(&lanes[1], Duration::from_secs(10), TimeSpentOn::New);
+        assert_eq!(names(&turns.order(lanes.clone())), ["b", "a", "a/rows"]);
+        turns.charge(&lanes[2], Duration::from_secs(20), TimeSpentOn::New);
+        assert_eq!(names(&turns.order(lanes)), ["a", "a/rows", "b"]);
     }
 
     #[test]

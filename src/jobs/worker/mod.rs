@@ -12,6 +12,7 @@ pub mod lease;
 pub mod outcome;
 pub mod pool;
 pub mod record;
+pub mod rows;
 pub mod running;
 pub mod slice_storage;
 pub mod slices;

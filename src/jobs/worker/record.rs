@@ -242,7 +242,8 @@ impl Worker {
     /// Puts a result where it is kept: a small one goes into the database with the end of its job.
     async fn place(&self, claim: &Claim, result: EncodedResult) -> Result<StoredResult, JobsError> {
         let shared = &self.shared;
-        if result.bytes() <= shared.options.small_result_max_bytes {
+        // Other programs read the answers of rows where they lie.
+        if !result.is_rows() && result.bytes() <= shared.options.small_result_max_bytes {
             return Ok(StoredResult::Inline(result));
         }
         let bytes = result.bytes() as u64;

@@ -13,11 +13,13 @@ use crate::jobs::codec::encode::encode;
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::error::JobsError;
 use crate::jobs::model::{Failure, FailureKind};
+use crate::jobs::run::chunk::RunChunk;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::ending::SliceRecord;
 use crate::jobs::store::submission::StoredCase;
 use crate::jobs::worker::attempt_control::AttemptControl;
 use crate::jobs::worker::outcome::{INTERNAL, Outcome, Work};
+use crate::jobs::worker::rows;
 use crate::jobs::worker::slices::SlicedCase;
 
 /// Does the work; a panic becomes a failure and the thread stays usable.
@@ -46,6 +48,9 @@ fn check_and_solve(
     stored: &StoredCase,
     notes: &[SliceRecord],
 ) -> Outcome {
+    if RunChunk::is_one(&stored.body) {
+        return rows::solve_chunk(shared, control, stored);
+    }
     let case = match stored.value() {
         Ok(case) => case,
         Err(error) => return internal(&error.to_string()),

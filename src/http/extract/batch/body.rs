@@ -1,21 +1,17 @@
 //! Reads the body of a batch: cut into cases while it arrives, checked portion by portion.
 
-use std::time::Duration;
-
-use axum::body::{Body, BodyDataStream, Bytes};
+use axum::body::Body;
 use axum::extract::Request;
-use axum::http::{HeaderMap, header};
-use futures_util::StreamExt;
-use tokio::time::{Instant, timeout_at};
+use axum::http::HeaderMap;
 use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 use crate::contact::error::Fault;
+use crate::http::extract::arriving::Arriving;
 use crate::http::extract::batch::own_options;
 use crate::http::extract::batch::splitter::{Element, Layout, Splitter};
 use crate::http::extract::batch::table::TableBody;
-use crate::http::extract::json::{essence, read_json, read_strict, unreadable, weigh_case};
-use crate::http::layers::admission::{PackedLength, too_long};
+use crate::http::extract::json::{essence, read_json, read_strict, weigh_case};
 use crate::http::limits::memory::{Memory, SMALL_BYTES};
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
@@ -23,9 +19,6 @@ use crate::http::problem::kinds::ProblemKind;
 use crate::jobs::Jobs;
 use crate::jobs::batch::upload::BatchUpload;
 
-/// Bytes per second of a batch at least, on average and after a head start of the time that a piece may take: otherwise
-/// one byte at a time could keep a connection and a file open for ever.
-const LOWEST_RATE: f64 = 1024.0;
 /// Cases are checked in portions of about this many bytes.
 const PORTION_BYTES: usize = 256 << 10;
 
@@ -99,7 +92,12 @@ pub async fn read_draft(
     mut form: Form,
     request: Request<Body>,
 ) -> Result<BatchUpload, ApiError> {
-    let mut arriving = Arriving::new(options, request)?;
+    let mut arriving = Arriving::new(
+        options.body_timeout,
+        options.batch_max_bytes,
+        "one batch",
+        request,
+    )?;
     let mut draft = jobs.draft()?;
     if let Form::Table(table) = &form {
         draft.set_template(table.text());
@@ -135,84 +133,6 @@ pub async fn read_draft(
     drop(share);
     require_count(&draft, options)?;
     Ok(draft)
-}
-
-/// A body on its way, held to its limits of size and time.
-struct Arriving<'a> {
-    options: &'a HttpOptions,
-    pieces: BodyDataStream,
-    packed: Option<PackedLength>,
-    total: u64,
-    begun: Instant,
-}
-
-impl Arriving<'_> {
-    /// # Errors
-    /// The body says itself that it is too large.
-    fn new(options: &HttpOptions, request: Request<Body>) -> Result<Arriving<'_>, ApiError> {
-        let declared = request.headers().get(header::CONTENT_LENGTH);
-        let declared = declared.and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
-        let packed = request.extensions().get::<PackedLength>().cloned();
-        let arriving = Arriving {
-            options,
-            pieces: request.into_body().into_data_stream(),
-            packed,
-            total: 0,
-            begun: Instant::now(),
-        };
-        if declared.is_some_and(|length| length > options.batch_max_bytes) {
-            return Err(arriving.too_large());
-        }
-        Ok(arriving)
-    }
-
-    /// The next piece, or nothing at the end.
-    async fn next(&mut self) -> Result<Option<Bytes>, ApiError> {
-        let options = self.options;
-        #[expect(clippy::cast_precision_loss, reason = "far fewer bytes than 2^53")]
-        let owed = Duration::from_secs_f64(self.total as f64 / LOWEST_RATE);
-        let latest = self.begun + options.body_timeout + owed;
-        let piece = timeout_at(
-            latest.min(Instant::now() + options.body_timeout),
-            self.pieces.next(),
-        );
-        let piece = piece.await.map_err(|_| {
-            ApiError::new(
-                ProblemKind::BodyTimeout,
-                format!(
-                    "nothing of the body arrived for {} s, or all of it at less than {LOWEST_RATE} bytes per second",
-                    options.body_timeout.as_secs_f64()
-                ),
-            )
-        })?;
-        let Some(piece) = piece else { return Ok(None) };
-        let piece = piece.map_err(|error| {
-            if too_long(&error) {
-                self.too_large()
-            } else {
-                unreadable(&error)
-            }
-        })?;
-        self.total += piece.len() as u64;
-        if self.total > options.batch_max_bytes {
-            return Err(self.too_large());
-        }
-        let packed = self.packed.as_ref();
-        if packed.is_some_and(|packed| packed.is_bomb(self.total)) {
-            return Err(PackedLength::refusal());
-        }
-        Ok(Some(piece))
-    }
-
-    fn too_large(&self) -> ApiError {
-        ApiError::new(
-            ProblemKind::BodyTooLarge,
-            format!(
-                "the body is larger than the {} bytes that are allowed for one batch",
-                self.options.batch_max_bytes
-            ),
-        )
-    }
 }
 
 fn require_count(draft: &BatchUpload, options: &HttpOptions) -> Result<(), ApiError> {

@@ -17,9 +17,10 @@ use crate::jobs::batch::upload::BatchRow;
 use crate::jobs::submit_options::CaseOptions;
 
 /// Short names of columns and what they stand for.
-const SHORT_NAMES: [(&str, &str); 13] = [
+const SHORT_NAMES: [(&str, &str); 18] = [
     ("name", "/name"),
     ("normal_force_n", "/load/normal_force_n"),
+    ("vertical_force_n", "/load/vertical_force_n"),
     ("approach_mm", "/load/approach_mm"),
     ("creepage_x", "/motion/creepage_x"),
     ("creepage_y", "/motion/creepage_y"),
@@ -31,6 +32,10 @@ const SHORT_NAMES: [(&str, &str); 13] = [
     ("lateral_mm", "/contact/lateral_mm"),
     ("a_mm", "/contact/a_mm"),
     ("b_mm", "/contact/b_mm"),
+    ("rolling_radius_mm", "/contact/rolling_radius_mm"),
+    ("lateral_shift_mm", "/contact/lateral_shift_mm"),
+    ("yaw_rad", "/contact/yaw_rad"),
+    ("roll_rad", "/contact/roll_rad"),
 ];
 
 /// Most columns of a table. A case has far fewer members that differ from line to line.
@@ -115,6 +120,13 @@ fn read_header(line: &[u8]) -> Result<Vec<TemplateColumn>, String> {
         columns.push(column);
     }
     Ok(columns)
+}
+
+/// The JSON pointer that a short name stands for.
+#[must_use]
+pub fn short_pointer(title: &str) -> Option<&'static str> {
+    let short = SHORT_NAMES.iter().find(|(name, _)| *name == title);
+    short.map(|(_, pointer)| *pointer)
 }
 
 /// The JSON pointers that a header names columns by.

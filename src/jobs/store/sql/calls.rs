@@ -7,7 +7,7 @@ use std::sync::Arc;
 use async_trait::async_trait;
 use uuid::Uuid;
 
-use crate::jobs::batch::model::{Batch, BatchItem};
+use crate::jobs::batch::model::{Batch, BatchItem, RunRecord};
 use crate::jobs::keys::key::Key;
 use crate::jobs::model::{Failure, Job, State};
 use crate::jobs::store::claim::{
@@ -145,6 +145,10 @@ impl Store for SqlStore {
 
     async fn batch(&self, tenant: &str, id: Uuid) -> Result<Option<Batch>, StoreError> {
         engine::again(|| self.batch(tenant, id)).await
+    }
+
+    async fn run(&self, tenant: &str, id: Uuid) -> Result<Option<RunRecord>, StoreError> {
+        engine::again(|| self.run(tenant, id)).await
     }
 
     async fn batch_items(

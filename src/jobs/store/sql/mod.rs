@@ -28,5 +28,6 @@ pub mod lists;
 pub mod quota;
 pub mod reap;
 pub mod rows;
+mod runs;
 pub mod slices;
 pub mod stats;

@@ -1,0 +1,238 @@
+//! The body of `POST /v1/runs`: its form, its template, and its rows into a draft.
+
+use std::fs::File;
+use std::io::{BufReader, Seek, SeekFrom, Write};
+
+use axum::body::Body;
+use axum::extract::Request;
+use axum::http::HeaderMap;
+use serde_json::Value;
+use uuid::Uuid;
+
+use crate::contact::evaluate::varied::Values;
+use crate::http::extract::arriving::Arriving;
+use crate::http::extract::json::{essence, read_json};
+use crate::http::extract::rows::{declared_bytes, read_body, read_json_columns};
+use crate::http::extract::run_rows::text::{CsvRows, JsonRows, faulty};
+use crate::http::extract::run_rows::titles::column;
+use crate::http::limits::memory::Memory;
+use crate::http::options::HttpOptions;
+use crate::http::problem::error::ApiError;
+use crate::http::problem::kinds::ProblemKind;
+use crate::jobs::Jobs;
+use crate::jobs::codec::arrow;
+use crate::jobs::codec::parquet::TableReader;
+use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
+use crate::jobs::run::draft::RunDraft;
+use crate::jobs::run::head::RunColumn;
+
+/// Memory that a packed table takes while a piece of it is read.
+const PIECE_BYTES: usize = 64 << 20;
+/// Largest group of rows of a Parquet file, unpacked.
+const GROUP_BYTES_MAX: i64 = 1 << 28;
+
+/// The forms that rows come in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RowsForm {
+    /// Template and columns.
+    Json,
+    /// A line for each row, the first names the columns.
+    Csv,
+    /// An object for each row.
+    Ndjson,
+    /// An Arrow stream or file.
+    Arrow,
+    /// A Parquet file.
+    Parquet,
+}
+
+/// The form that the rows are declared to have, and the template if a job holds it.
+///
+/// # Errors
+/// The content type is none of these, or the template is missing, unknown or not wanted.
+pub async fn form(
+    jobs: &Jobs,
+    headers: &HeaderMap,
+    template: Option<Uuid>,
+) -> Result<(RowsForm, Option<Value>), ApiError> {
+    let form = match essence(headers).as_str() {
+        "application/json" => RowsForm::Json,
+        "text/csv" => RowsForm::Csv,
+        "application/x-ndjson" | "application/ndjson" | "application/jsonl" => RowsForm::Ndjson,
+        "application/vnd.apache.arrow.stream" | "application/vnd.apache.arrow.file" => {
+            RowsForm::Arrow
+        }
+        "application/vnd.apache.parquet" => RowsForm::Parquet,
+        other => {
+            return Err(ApiError::new(
+                ProblemKind::UnsupportedMediaType,
+                format!(
+                    "the content type is `{other}`; send `application/json` with `template` and `columns`, or a table with `text/csv`, `application/x-ndjson`, `application/vnd.apache.arrow.stream` or `application/vnd.apache.parquet`"
+                ),
+            ));
+        }
+    };
+    match (form, template) {
+        (RowsForm::Json, None) => Ok((form, None)),
+        (RowsForm::Json, Some(_)) => Err(ApiError::bad_parameter(
+            "template",
+            "`template` belongs to a table; JSON has a `template` of its own",
+        )),
+        (_, Some(job)) => {
+            let case = jobs.case(job).await;
+            let case = case.map_err(|error| ApiError::from(error).about("template"))?;
+            Ok((form, Some(read_json(&case)?)))
+        }
+        (_, None) => Err(ApiError::bad_parameter(
+            "template",
+            "a table needs `?template=` with the id of a job; its case is what the columns are filled into",
+        )),
+    }
+}
+
+/// Reads the rows into a draft. A table is spooled into a nameless file while it arrives, so that a large one takes little memory.
+///
+/// # Errors
+/// The body is too large, too slow, broken or not of its form; or what the draft says of its rows.
+pub async fn read_run(
+    jobs: &Jobs,
+    memory: &Memory,
+    options: &HttpOptions,
+    (form, template): (RowsForm, Option<Value>),
+    request: Request<Body>,
+) -> Result<RunDraft, ApiError> {
+    let rows_max = options.run_max_rows;
+    let jobs = jobs.clone();
+    let Some(template) = template else {
+        let bytes = 2 * declared_bytes(&request, options).min(options.evaluate_max_bytes);
+        let share = memory.rows(jobs.tenant(), bytes).await?;
+        let text = read_body(request, options).await?;
+        let turn = memory.turn(2 * text.len()).await?;
+        let read = tokio::task::spawn_blocking(move || {
+            let _held = (share, turn);
+            let (template, columns) = read_json_columns(&text)?;
+            drop(text);
+            let (titles, values): (Vec<_>, Vec<_>) = columns.into_iter().unzip();
+            let named = titles.iter().zip(&values);
+            let named =
+                named.map(|(title, values)| column(title, matches!(values, Values::Texts(_))));
+            let mut draft = jobs.draft_run(template, named.collect(), rows_max)?;
+            draft.push(values)?;
+            Ok(draft)
+        });
+        return read.await.map_err(|error| ApiError::internal(&error))?;
+    };
+    let file = spool(&jobs, options, request).await?;
+    let held = (
+        memory.rows(jobs.tenant(), PIECE_BYTES).await?,
+        memory.turn(PIECE_BYTES).await?,
+    );
+    let read = tokio::task::spawn_blocking(move || {
+        let _held = held;
+        let draft = |columns| jobs.draft_run(template.clone(), columns, rows_max);
+        match form {
+            RowsForm::Ndjson => {
+                let mut rows = JsonRows::new(BufReader::new(file))?;
+                let mut draft = draft(rows.columns.clone())?;
+                while let Some(values) = rows.next()? {
+                    draft.push(values)?;
+                }
+                Ok(draft)
+            }
+            RowsForm::Arrow => {
+                let damaged = |error: &dyn std::fmt::Display| {
+                    faulty(format!("the Arrow data cannot be read: {error}"))
+                };
+                let mut tables =
+                    arrow::read(BufReader::new(file)).map_err(|error| damaged(&error))?;
+                let tables = tables
+                    .by_ref()
+                    .map(|table| table.map_err(|error| damaged(&error)));
+                from_tables(tables, draft)
+            }
+            RowsForm::Parquet => from_tables(groups(file)?, draft),
+            RowsForm::Csv | RowsForm::Json => {
+                let mut rows = CsvRows::new(BufReader::new(file))?;
+                let mut draft = draft(rows.columns.clone())?;
+                while let Some(values) = rows.next()? {
+                    draft.push(values)?;
+                }
+                Ok(draft)
+            }
+        }
+    });
+    read.await.map_err(|error| ApiError::internal(&error))?
+}
+
+async fn spool(
+    jobs: &Jobs,
+    options: &HttpOptions,
+    request: Request<Body>,
+) -> Result<File, ApiError> {
+    let timeout = options.body_timeout;
+    let mut arriving = Arriving::new(timeout, options.run_max_bytes, "one run", request)?;
+    let file = jobs.spool_file()?;
+    let mut file = tokio::fs::File::from_std(file);
+    while let Some(piece) = arriving.next().await? {
+        let written = tokio::io::AsyncWriteExt::write_all(&mut file, &piece).await;
+        written.map_err(|source| ApiError::from(jobs.spool_failed(source)))?;
+    }
+    let mut file = file.into_std().await;
+    let ready = file.flush().and_then(|()| file.seek(SeekFrom::Start(0)));
+    ready.map_err(|source| ApiError::from(jobs.spool_failed(source)))?;
+    Ok(file)
+}
+
+/// The groups of rows of a Parquet file.
+fn groups(file: File) -> Result<impl Iterator<Item = Result<RowTable, ApiError>>, ApiError> {
+    let damaged =
+        |error: &dyn std::fmt::Display| faulty(format!("the Parquet file cannot be read: {error}"));
+    let reader = TableReader::new(file).map_err(|error| damaged(&error))?;
+    let large = (0..reader.groups()).find(|group| reader.group_size(*group).1 > GROUP_BYTES_MAX);
+    if let Some(group) = large {
+        return Err(faulty(format!(
+            "the group of rows {group} unpacks to more than {GROUP_BYTES_MAX} bytes; write smaller groups"
+        )));
+    }
+    Ok((0..reader.groups()).map(move |group| {
+        reader
+            .read(group, |_| true)
+            .map_err(|error| damaged(&error))
+    }))
+}
+
+/// A draft of tables that all have the columns of the first.
+fn from_tables(
+    tables: impl Iterator<Item = Result<RowTable, ApiError>>,
+    draft: impl Fn(Vec<RunColumn>) -> Result<RunDraft, crate::jobs::JobsError>,
+) -> Result<RunDraft, ApiError> {
+    let mut begun: Option<RunDraft> = None;
+    for table in tables {
+        let table = table?;
+        let titles = table.columns.iter();
+        let titles = titles.map(|(name, values)| column(name, values.kind() == TableKind::Texts));
+        let draft = match &mut begun {
+            Some(draft) => draft,
+            None => begun.insert(draft(titles.collect())?),
+        };
+        draft.push(
+            table
+                .columns
+                .into_iter()
+                .map(|(_, values)| plain(values))
+                .collect(),
+        )?;
+    }
+    begun.ok_or_else(|| faulty("the table has no rows"))
+}
+
+fn plain(column: TableColumn) -> Values {
+    match column {
+        TableColumn::Numbers(numbers) => Values::Numbers(numbers),
+        TableColumn::Texts(texts) => Values::Texts(texts),
+        #[expect(clippy::cast_precision_loss, reason = "as every number of a case")]
+        TableColumn::Integers(values) => {
+            Values::Numbers(values.into_iter().map(|value| value as f64).collect())
+        }
+    }
+}

@@ -1,0 +1,251 @@
+//! Rows as CSV and NDJSON, some lines at a time. What a column holds, numbers or texts, is decided by the first row.
+
+use std::io::{BufRead, Read};
+
+use serde_json::{Map, Value};
+
+use crate::contact::evaluate::varied::Values;
+use crate::http::extract::run_rows::titles::column;
+use crate::http::problem::error::ApiError;
+use crate::http::problem::kinds::ProblemKind;
+use crate::jobs::run::head::RunColumn;
+
+/// Rows that are read at once.
+const ROWS: usize = 8192;
+/// Longest line in bytes.
+const LINE_BYTES_MAX: u64 = 1 << 20;
+
+pub fn faulty(detail: impl Into<String>) -> ApiError {
+    ApiError::new(ProblemKind::FaultyTable, detail)
+}
+
+/// Rows in CSV, whose first line names the columns.
+pub struct CsvRows<R: Read> {
+    reader: csv::Reader<R>,
+    /// The columns.
+    pub columns: Vec<RunColumn>,
+    /// The next row, if there is one.
+    record: Option<csv::StringRecord>,
+}
+
+impl<R: Read> CsvRows<R> {
+    /// Reads the header and the first row.
+    ///
+    /// # Errors
+    /// `faulty-table`
+    pub fn new(source: R) -> Result<CsvRows<R>, ApiError> {
+        let mut reader = csv::ReaderBuilder::new()
+            .trim(csv::Trim::All)
+            .from_reader(source);
+        let titles = reader.headers();
+        let titles = titles.map_err(|error| faulty(format!("line 1: {error}")))?;
+        let titles: Vec<String> = titles
+            .iter()
+            .map(|title| title.trim_start_matches('\u{feff}').to_owned())
+            .collect();
+        let mut rows = CsvRows {
+            reader,
+            columns: Vec::new(),
+            record: Some(csv::StringRecord::new()),
+        };
+        rows.advance()?;
+        let first = rows.record.as_ref();
+        let text = |place: usize| {
+            let field = first.and_then(|record| record.get(place)).unwrap_or("");
+            !field.is_empty() && field.parse::<f64>().is_err()
+        };
+        let columns = titles.iter().enumerate();
+        rows.columns = columns
+            .map(|(place, title)| column(title, text(place)))
+            .collect();
+        Ok(rows)
+    }
+
+    /// Some more rows, column by column; nothing at the end.
+    ///
+    /// # Errors
+    /// `faulty-table` with line and column.
+    pub fn next(&mut self) -> Result<Option<Vec<Values>>, ApiError> {
+        let mut values = empty(&self.columns);
+        for _ in 0..ROWS {
+            let Some(record) = &self.record else { break };
+            for ((field, column), values) in record.iter().zip(&self.columns).zip(&mut values) {
+                let wrong = || {
+                    let line = record.position().map_or(0, csv::Position::line);
+                    faulty(format!(
+                        "line {line}, column `{}`: `{field}` is no number, as the first row has there",
+                        column.name
+                    ))
+                };
+                match values {
+                    Values::Texts(texts) => texts.push(field.to_owned()),
+                    Values::Numbers(numbers) if field.is_empty() => numbers.push(f64::NAN),
+                    Values::Numbers(numbers) => numbers.push(field.parse().map_err(|_| wrong())?),
+                }
+            }
+            self.advance()?;
+        }
+        let there = values.first().is_some_and(|column| !column.is_empty());
+        Ok(there.then_some(values))
+    }
+
+    fn advance(&mut self) -> Result<(), ApiError> {
+        if let Some(record) = &mut self.record {
+            let more = self.reader.read_record(record);
+            if !more.map_err(|error| faulty(format!("the table cannot be read: {error}")))? {
+                self.record = None;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Rows as JSON objects, one in a line.
+pub struct JsonRows<R: BufRead> {
+    source: R,
+    line: u64,
+    /// The columns: the members of the first row.
+    pub columns: Vec<RunColumn>,
+    row: Option<Map<String, Value>>,
+}
+
+impl<R: BufRead> JsonRows<R> {
+    /// Reads the first row.
+    ///
+    /// # Errors
+    /// `faulty-table`
+    pub fn new(source: R) -> Result<JsonRows<R>, ApiError> {
+        let mut rows = JsonRows {
+            source,
+            line: 0,
+            columns: Vec::new(),
+            row: None,
+        };
+        rows.advance()?;
+        let members = rows.row.iter().flatten();
+        rows.columns = members
+            .map(|(title, value)| column(title, value.is_string()))
+            .collect();
+        Ok(rows)
+    }
+
+    /// Some more rows, column by column; nothing at the end.
+    ///
+    /// # Errors
+    /// `faulty-table` with line and member.
+    pub fn next(&mut self) -> Result<Option<Vec<Values>>, ApiError> {
+        let mut values = empty(&self.columns);
+        for _ in 0..ROWS {
+            let Some(mut row) = self.row.take() else {
+                break;
+            };
+            for (column, values) in self.columns.iter().zip(&mut values) {
+                match (values, row.remove(&column.name)) {
+                    (Values::Texts(texts), Some(Value::String(text))) => texts.push(text),
+                    (Values::Texts(texts), Some(Value::Null)) => texts.push(String::new()),
+                    (Values::Numbers(numbers), Some(Value::Null)) => numbers.push(f64::NAN),
+                    (Values::Numbers(numbers), Some(value)) if value.is_number() => {
+                        numbers.push(value.as_f64().unwrap_or(f64::NAN));
+                    }
+                    (_, Some(value)) => {
+                        return Err(self.wrong(&format!(
+                            "`{}` is {value}, which is of another kind than in the first row",
+                            column.name
+                        )));
+                    }
+                    (_, None) => {
+                        return Err(self.wrong(&format!("the member `{}` is missing", column.name)));
+                    }
+                }
+            }
+            if let Some(other) = row.keys().next() {
+                let detail = format!("the member `{other}` is not in the first row");
+                return Err(self.wrong(&detail));
+            }
+            self.advance()?;
+        }
+        let there = values.first().is_some_and(|column| !column.is_empty());
+        Ok(there.then_some(values))
+    }
+
+    /// Reads the next line that is not blank.
+    fn advance(&mut self) -> Result<(), ApiError> {
+        loop {
+            let mut text = Vec::new();
+            let mut line = (&mut self.source).take(LINE_BYTES_MAX);
+            let read = line.read_until(b'\n', &mut text);
+            let read = read.map_err(|error| ApiError::internal(&error))?;
+            self.line += 1;
+            if read == 0 {
+                self.row = None;
+                return Ok(());
+            }
+            if text.iter().all(u8::is_ascii_whitespace) {
+                continue;
+            }
+            let row = serde_json::from_slice(&text);
+            self.row = Some(row.map_err(|error| self.wrong(&error.to_string()))?);
+            return Ok(());
+        }
+    }
+
+    fn wrong(&self, detail: &str) -> ApiError {
+        faulty(format!("line {}: {detail}", self.line))
+    }
+}
+
+fn empty(columns: &[RunColumn]) -> Vec<Values> {
+    let empty = |column: &RunColumn| match column.text {
+        true => Values::Texts(Vec::new()),
+        false => Values::Numbers(Vec::new()),
+    };
+    columns.iter().map(empty).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn csv_and_ndjson_of_the_same_rows_are_the_same_columns() {
+        let csv = "\u{feff}creepage_x, km ,section\r\n0.1,,a\r\n-2e-3,37.5, \"b, c\" \r\n";
+        let json = "{\"creepage_x\":0.1,\"km\":null,\"section\":\"a\"}\n\n{\"section\":\"b, c\",\"km\":37.5,\"creepage_x\":-2e-3}";
+        let mut by_csv = CsvRows::new(csv.as_bytes()).unwrap();
+        let mut by_json = JsonRows::new(json.as_bytes()).unwrap();
+        assert_eq!(by_csv.columns, by_json.columns);
+        let pointers: Vec<_> = by_csv
+            .columns
+            .iter()
+            .map(|column| column.pointer.as_deref())
+            .collect();
+        assert_eq!(pointers, [Some("/motion/creepage_x"), None, None]);
+        let values = by_csv.next().unwrap().unwrap();
+        assert_eq!(
+            format!("{values:?}"),
+            format!("{:?}", by_json.next().unwrap().unwrap())
+        );
+        assert_eq!(values[0], Values::Numbers(vec![0.1, -2e-3]));
+        assert_eq!(
+            values[2],
+            Values::Texts(vec!["a".to_owned(), "b, c".to_owned()])
+        );
+        assert!(by_csv.next().unwrap().is_none() && by_json.next().unwrap().is_none());
+    }
+
+    #[test]
+    fn faults_name_the_line() {
+        let csv = |text: &str| CsvRows::new(text.as_bytes()).and_then(|mut rows| rows.next());
+        let json = |text: &str| JsonRows::new(text.as_bytes()).and_then(|mut rows| rows.next());
+        for (read, words) in [
+            (csv("creepage_x\n0.1\nx\n"), ["line 3", "creepage_x"]),
+            (csv("creepage_x,a\n0.1\n"), ["the table", "fields"]),
+            (json("{\"a\":1}\n{\"b\":1}"), ["line 2", "`a`"]),
+            (json("{\"a\":1}\n{\"a\":\"x\"}"), ["line 2", "kind"]),
+            (json("{\"a\":1}\n{\"a\":1,\"b\":2}"), ["line 2", "`b`"]),
+            (json("{\"a\":1}\nnothing"), ["line 2", "expected"]),
+        ] {
+            let fault = format!("{:?}", read.expect_err("it is faulty"));
+            assert!(words.iter().all(|word| fault.contains(word)), "{fault}");
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! Tables of rows as CSV, NDJSON, an Arrow stream or a Parquet file, piece by piece.
+
+use std::error::Error;
+use std::fmt::Write;
+
+use crate::http::render::rows::write_number;
+use crate::jobs::codec::arrow::ArrowWriter;
+use crate::jobs::codec::parquet::TableWriter;
+use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
+
+/// Why a table cannot be written.
+pub type WriteError = Box<dyn Error + Send + Sync>;
+
+/// Writes tables with the same columns, one after the other.
+pub enum RowWriter {
+    /// A line with the names of the columns, then one for each row.
+    Csv(Vec<String>),
+    /// An object for each row.
+    Ndjson,
+    /// A stream of batches of records.
+    Arrow(Box<ArrowWriter<Vec<u8>>>),
+    /// One file, a group of rows for each table.
+    Parquet(Box<TableWriter<Vec<u8>>>),
+}
+
+impl RowWriter {
+    /// A line for each row under a header.
+    #[must_use]
+    pub fn csv(columns: &[(String, TableKind)]) -> RowWriter {
+        RowWriter::Csv(columns.iter().map(|(name, _)| name.clone()).collect())
+    }
+
+    /// An Arrow stream.
+    ///
+    /// # Errors
+    /// It cannot be begun.
+    pub fn arrow(columns: &[(String, TableKind)]) -> Result<RowWriter, WriteError> {
+        let writer = ArrowWriter::new(Vec::new(), columns)?;
+        Ok(RowWriter::Arrow(Box::new(writer)))
+    }
+
+    /// A Parquet file.
+    ///
+    /// # Errors
+    /// It cannot be begun.
+    pub fn parquet(columns: &[(String, TableKind)]) -> Result<RowWriter, WriteError> {
+        let writer = TableWriter::new(Vec::new(), columns)?;
+        Ok(RowWriter::Parquet(Box::new(writer)))
+    }
+
+    /// What comes before the first table.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn head(&mut self) -> Result<Vec<u8>, WriteError> {
+        match self {
+            RowWriter::Csv(names) => {
+                let mut writer = csv::Writer::from_writer(Vec::new());
+                writer.write_record(names)?;
+                Ok(writer.into_inner()?)
+            }
+            _ => Ok(Vec::new()),
+        }
+    }
+
+    /// One more table.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn write(&mut self, table: RowTable) -> Result<Vec<u8>, WriteError> {
+        match self {
+            RowWriter::Csv(_) => Ok(csv_lines(&table)?),
+            RowWriter::Ndjson => Ok(json_lines(&table)?.into_bytes()),
+            RowWriter::Arrow(writer) => {
+                writer.write(table)?;
+                Ok(std::mem::take(writer.inner_mut()))
+            }
+            RowWriter::Parquet(writer) => {
+                writer.write(&table)?;
+                Ok(std::mem::take(writer.inner_mut()))
+            }
+        }
+    }
+
+    /// What comes after the last table.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn finish(&mut self) -> Result<Vec<u8>, WriteError> {
+        match self {
+            RowWriter::Csv(_) | RowWriter::Ndjson => Ok(Vec::new()),
+            RowWriter::Arrow(writer) => {
+                writer.finish()?;
+                Ok(std::mem::take(writer.inner_mut()))
+            }
+            RowWriter::Parquet(writer) => {
+                writer.finish()?;
+                Ok(std::mem::take(writer.inner_mut()))
+            }
+        }
+    }
+}
+
+fn csv_lines(table: &RowTable) -> Result<Vec<u8>, WriteError> {
+    let mut writer =
+        csv::Writer::from_writer(Vec::with_capacity(16 * table.rows() * table.columns.len()));
+    let mut field = String::new();
+    for row in 0..table.rows() {
+        for (_, column) in &table.columns {
+            field.clear();
+            match column {
+                TableColumn::Integers(values) => write!(field, "{}", values[row])?,
+                TableColumn::Numbers(values) => write_number(&mut field, values[row], ""),
+                TableColumn::Texts(values) => field.push_str(&values[row]),
+            }
+            writer.write_field(&field)?;
+        }
+        writer.write_record(None::<&[u8]>)?;
+    }
+    Ok(writer.into_inner()?)
+}
+
+fn json_lines(table: &RowTable) -> Result<String, WriteError> {
+    let names = table.columns.iter();
+    let names = names.map(|(name, _)| serde_json::to_string(name));
+    let names: Vec<String> = names.collect::<Result<_, _>>()?;
+    let mut text = String::with_capacity(32 * table.rows() * names.len());
+    for row in 0..table.rows() {
+        for (place, (name, (_, column))) in names.iter().zip(&table.columns).enumerate() {
+            let before = if place == 0 { '{' } else { ',' };
+            write!(text, "{before}{name}:")?;
+            match column {
+                TableColumn::Integers(values) => write!(text, "{}", values[row])?,
+                TableColumn::Numbers(values) => write_number(&mut text, values[row], "null"),
+                TableColumn::Texts(values) if values[row].is_empty() => text.push_str("null"),
+                TableColumn::Texts(values) => text.push_str(&serde_json::to_string(&values[row])?),
+            }
+        }
+        text.push_str("}\n");
+    }
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_quote_what_needs_it_and_leave_gaps() {
+        let table = RowTable {
+            columns: vec![
+                ("row".to_owned(), TableColumn::Integers(vec![3, 4])),
+                ("f".to_owned(), TableColumn::Numbers(vec![f64::NAN, 0.1])),
+                (
+                    "t".to_owned(),
+                    TableColumn::Texts(vec!["a, \"b\"".to_owned(), String::new()]),
+                ),
+            ],
+        };
+        let mut csv = RowWriter::csv(&[("row".to_owned(), TableKind::Integers)]);
+        assert_eq!(csv.head().unwrap(), b"row\n");
+        let lines = csv.write(table.clone()).unwrap();
+        assert_eq!(lines, b"3,,\"a, \"\"b\"\"\"\n4,0.1,\n");
+        let lines = RowWriter::Ndjson.write(table).unwrap();
+        let expected =
+            "{\"row\":3,\"f\":null,\"t\":\"a, \\\"b\\\"\"}\n{\"row\":4,\"f\":0.1,\"t\":null}\n";
+        assert_eq!(String::from_utf8(lines).unwrap(), expected);
+    }
+}

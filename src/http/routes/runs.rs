@@ -1,0 +1,216 @@
+//! `/v1/runs`: many rows over one case, followed and cancelled as one.
+
+use axum::Json;
+use axum::extract::{Request, State};
+use axum::http::{StatusCode, Uri, header};
+use axum::response::{IntoResponse, Response};
+use serde::Serialize;
+use utoipa::ToSchema;
+use uuid::Uuid;
+
+use crate::http::dto::run::{RunAnswer, RunRequest};
+use crate::http::extract::caller::Caller;
+use crate::http::extract::ids::RunId;
+use crate::http::extract::labels::{name, new_label};
+use crate::http::extract::query::{Parameters, Repeated, count, id, query};
+use crate::http::extract::run_rows::body::{form, read_run};
+use crate::http::extract::submit_options::SubmitQuery;
+use crate::http::limits::memory::Memory;
+use crate::http::options::HttpOptions;
+use crate::http::problem::catalogue::problems;
+use crate::http::problem::error::ApiError;
+use crate::http::routes::batches::labels_of;
+use crate::http::routes::job_list::{ListProblems, ListTotal};
+use crate::http::routes::jobs::{idempotency_key, mark_replay};
+use crate::http::routes::next_page::{answer, list_query};
+use crate::jobs::run::draft::RunOptions;
+use crate::jobs::{BATCH_PAGE_MAX, BatchFilter};
+
+/// Runs in one page of a list when nothing is said.
+const LIST_LIMIT_DEFAULT: u32 = 20;
+
+problems! {
+    /// What `POST /v1/runs` can fail with.
+    SubmitRunProblems: MalformedJson, UnreadableBody, BadQuery, BadHeader, BodyTimeout, BodyTooLarge, UnsupportedMediaType, UnsupportedEncoding,
+    FaultyCase, FaultyTable, JobNotFound, IdempotencyConflict, QuotaExceeded, QueueFull, Overloaded, Draining, StorageFull, StorageUnwritable
+}
+
+query! {
+    /// What the query of a submission says about the run itself.
+    RunQuery(() => ()) {
+        /// Name of the run
+        #[param(min_length = 1, max_length = 200, example = "night of 3 May")]
+        name: String as String = name();
+        /// A label of the run, written `key:value`; may be repeated, for at most 32 labels with different keys
+        #[param(max_items = 32, example = json!(["line:A12"]))]
+        label: Vec<(String, String)> as Vec<String> = Repeated(new_label());
+        /// With a table, and needed there: the job whose case is the template
+        #[param(format = "uuid")]
+        template: Uuid as String = id("job");
+    }
+}
+
+/// Submits many rows as one run.
+///
+/// A row is the template with the row's values in place of its own; it is solved as a case of its own would be, to the last bit, whatever stands
+/// beside it. With `auto`, a row takes the table of creep forces where its bound meets the target, and `boundary_element` elsewhere. The body is
+/// JSON with `template` and `columns`, at most as large as one of `/v1/evaluate`, or a table with `?template=`, which is read as it arrives. A
+/// row that cannot be solved has a `status` in the results that says why, and costs no other row.
+#[utoipa::path(
+    post,
+    path = "/v1/runs",
+    tag = "runs",
+    operation_id = "submit_run",
+    params(
+        RunQuery,
+        SubmitQuery,
+        ("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[!-~]+$", description = "1 to 255 visible ASCII characters. Repeating a request with the same key, the same rows and the same options answers the first run instead of making another"),
+        ("traceparent" = Option<String>, Header, description = "W3C trace context: where the service sends traces, that of the run goes on with the client's. What cannot be read is passed over", example = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01")
+    ),
+    request_body(content(
+        (RunRequest = "application/json"),
+        (String = "text/csv"),
+        (String = "application/x-ndjson"),
+        (Vec<u8> = "application/vnd.apache.arrow.stream"),
+        (Vec<u8> = "application/vnd.apache.parquet")
+    ), description = "At most 10 000 000 rows and 1 GiB"),
+    responses(
+        (status = 202, description = "The rows are stored and will be solved", body = RunAnswer, headers(
+            ("Location" = String, description = "Path of the run"),
+            ("Idempotency-Replayed" = String, description = "`true` if this is the run of an earlier request with the same `Idempotency-Key`; absent otherwise")
+        )),
+        SubmitRunProblems
+    )
+)]
+pub async fn submit(
+    Caller(jobs): Caller,
+    State(options): State<HttpOptions>,
+    State(memory): State<Memory>,
+    request: Request,
+) -> Result<Response, ApiError> {
+    let idempotency_key = idempotency_key(request.headers())?;
+    let (run, submit) = <(RunQuery, SubmitQuery)>::read(request.uri(), &())?;
+    let options_of_run = RunOptions {
+        name: run.name,
+        labels: labels_of(run.label.unwrap_or_default())?,
+        submit: submit.options(request.headers()),
+        idempotency_key,
+    };
+    let form = form(&jobs, request.headers(), run.template).await?;
+    let draft = read_run(&jobs, &memory, &options, form, request).await?;
+    let (run, replayed) = jobs.submit_run(draft, options_of_run).await?;
+    let location = [(header::LOCATION, format!("/v1/runs/{}", run.chunks.id))];
+    let run = Json(RunAnswer::from(run));
+    let mut response = (StatusCode::ACCEPTED, location, run).into_response();
+    mark_replay(&mut response, replayed);
+    Ok(response)
+}
+
+/// A page of runs, newest first.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct RunPage {
+    /// The runs of this page.
+    runs: Vec<RunAnswer>,
+    /// Give this as `cursor` for the next page; null on the last one.
+    next_cursor: Option<String>,
+    #[serde(flatten)]
+    count: ListTotal,
+}
+
+list_query! {
+    /// Filters and page of a list of runs.
+    RunListQuery {
+        /// Runs in one page; 20 when left out
+        #[param(minimum = 1, maximum = 100)]
+        limit: u32 as u32 = count(1, BATCH_PAGE_MAX);
+    }
+}
+
+/// Lists runs, newest first.
+#[utoipa::path(
+    get,
+    path = "/v1/runs",
+    tag = "runs",
+    operation_id = "list_runs",
+    params(RunListQuery),
+    responses((status = 200, description = "A page of runs", body = RunPage, headers(
+        ("Link" = String, description = "The next page (`rel=next`), unless this is the last one")
+    )), ListProblems)
+)]
+pub async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Response, ApiError> {
+    let query = RunListQuery::read(&uri, &())?;
+    let filter = BatchFilter {
+        labels: query.label.unwrap_or_default(),
+        name: query.name,
+        created_after: query.created_after,
+        created_before: query.created_before,
+    };
+    let limit = query.limit.unwrap_or(LIST_LIMIT_DEFAULT);
+    let page = jobs.runs(&filter, query.cursor.as_deref(), limit).await?;
+    let cursor = page.next_cursor.clone();
+    let page = RunPage {
+        runs: page.entries.into_iter().map(RunAnswer::from).collect(),
+        next_cursor: page.next_cursor,
+        count: page.total.into(),
+    };
+    Ok(answer(&uri, cursor.as_deref(), page))
+}
+
+problems! {
+    /// What asking for a run can fail with.
+    GetRunProblems: BadQuery, RunNotFound
+}
+
+/// Looks at a run.
+#[utoipa::path(
+    get,
+    path = "/v1/runs/{id}",
+    tag = "runs",
+    operation_id = "get_run",
+    params(("id" = String, Path, description = "Id of the run", format = "uuid")),
+    responses((status = 200, description = "The run", body = RunAnswer), GetRunProblems)
+)]
+pub async fn get(Caller(jobs): Caller, RunId(id): RunId) -> Result<Json<RunAnswer>, ApiError> {
+    Ok(Json(jobs.run(id).await?.into()))
+}
+
+/// Stops a run. Rows that are over keep their answers.
+#[utoipa::path(
+    post,
+    path = "/v1/runs/{id}/cancel",
+    tag = "runs",
+    operation_id = "cancel_run",
+    params(("id" = String, Path, description = "Id of the run", format = "uuid")),
+    responses(
+        (status = 200, description = "The run has ended", body = RunAnswer),
+        (status = 202, description = "What is being solved will stop shortly", body = RunAnswer),
+        GetRunProblems
+    )
+)]
+pub async fn cancel(Caller(jobs): Caller, RunId(id): RunId) -> Result<Response, ApiError> {
+    let run: RunAnswer = jobs.cancel_run(id).await?.into();
+    let status = match run.ended() {
+        true => StatusCode::OK,
+        false => StatusCode::ACCEPTED,
+    };
+    Ok((status, Json(run)).into_response())
+}
+
+problems! {
+    /// What deleting a run can fail with.
+    DeleteRunProblems: BadQuery, RunNotFound, RunNotEnded
+}
+
+/// Removes an ended run with its rows and answers.
+#[utoipa::path(
+    delete,
+    path = "/v1/runs/{id}",
+    tag = "runs",
+    operation_id = "delete_run",
+    params(("id" = String, Path, description = "Id of the run", format = "uuid")),
+    responses((status = 204, description = "The run is gone"), DeleteRunProblems)
+)]
+pub async fn delete(Caller(jobs): Caller, RunId(id): RunId) -> Result<StatusCode, ApiError> {
+    jobs.delete_run(id).await?;
+    Ok(StatusCode::NO_CONTENT)
+}

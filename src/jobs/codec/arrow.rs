@@ -1,0 +1,184 @@
+//! Tables of rows as Arrow: streams that are answered, streams and files that are read.
+
+use std::io::{Read, Seek, SeekFrom, Write};
+use std::sync::Arc;
+
+use arrow_array::cast::AsArray;
+use arrow_array::types::{
+    ArrowPrimitiveType, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type,
+    UInt8Type, UInt16Type, UInt32Type,
+};
+use arrow_array::{Array, ArrayRef, Float64Array, Int64Array, RecordBatch, StringArray};
+use arrow_ipc::reader::{FileReader, StreamReader};
+use arrow_ipc::writer::StreamWriter;
+use arrow_schema::{ArrowError, DataType, Field, Schema};
+
+use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
+
+/// The bytes that a file begins with; a stream begins otherwise.
+const FILE_MAGIC: &[u8] = b"ARROW1";
+
+/// Writes tables with the same columns as a stream, a batch of records for each.
+pub struct ArrowWriter<W: Write> {
+    stream: StreamWriter<W>,
+    schema: Arc<Schema>,
+}
+
+impl<W: Write> ArrowWriter<W> {
+    /// A stream of these columns.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn new(stream: W, columns: &[(String, TableKind)]) -> Result<ArrowWriter<W>, ArrowError> {
+        let fields = columns.iter().map(|(name, kind)| match kind {
+            TableKind::Integers => Field::new(name, DataType::Int64, false),
+            TableKind::Numbers => Field::new(name, DataType::Float64, true),
+            TableKind::Texts => Field::new(name, DataType::Utf8, true),
+        });
+        let schema = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
+        Ok(ArrowWriter {
+            stream: StreamWriter::try_new(stream, &schema)?,
+            schema,
+        })
+    }
+
+    /// Appends a table as a batch of records.
+    ///
+    /// # Errors
+    /// It has other columns, or it cannot be written.
+    pub fn write(&mut self, table: RowTable) -> Result<(), ArrowError> {
+        let columns = table.columns.into_iter().map(|(_, column)| match column {
+            TableColumn::Integers(values) => Arc::new(Int64Array::from(values)) as ArrayRef,
+            TableColumn::Numbers(values) => {
+                let there = |value: f64| (!value.is_nan()).then_some(value);
+                Arc::new(values.into_iter().map(there).collect::<Float64Array>()) as ArrayRef
+            }
+            TableColumn::Texts(values) => {
+                let there = |text: String| (!text.is_empty()).then_some(text);
+                Arc::new(values.into_iter().map(there).collect::<StringArray>()) as ArrayRef
+            }
+        });
+        let batch = RecordBatch::try_new(self.schema.clone(), columns.collect())?;
+        self.stream.write(&batch)
+    }
+
+    /// What is written to.
+    pub fn inner_mut(&mut self) -> &mut W {
+        self.stream.get_mut()
+    }
+
+    /// Ends the stream.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn finish(&mut self) -> Result<(), ArrowError> {
+        self.stream.finish()
+    }
+}
+
+/// Reads the batches of a stream or of a file, one after the other. What it names itself is checked before it is believed.
+///
+/// # Errors
+/// It is neither.
+pub fn read<R: Read + Seek + Send + 'static>(
+    mut source: R,
+) -> Result<impl Iterator<Item = Result<RowTable, ArrowError>>, ArrowError> {
+    let mut begin = [0; FILE_MAGIC.len()];
+    let read = source.read(&mut begin)?;
+    source.seek(SeekFrom::Start(0))?;
+    let batches: Box<dyn Iterator<Item = Result<RecordBatch, ArrowError>> + Send> =
+        match begin[..read] == *FILE_MAGIC {
+            true => Box::new(FileReader::try_new(source, None)?),
+            false => Box::new(StreamReader::try_new(source, None)?),
+        };
+    Ok(batches.map(|batch| table(&batch?)))
+}
+
+fn table(batch: &RecordBatch) -> Result<RowTable, ArrowError> {
+    let fields = batch.schema();
+    let columns = fields.fields().iter().zip(batch.columns());
+    let columns = columns.map(|(field, array)| Ok((field.name().clone(), column(field, array)?)));
+    Ok(RowTable {
+        columns: columns.collect::<Result<_, ArrowError>>()?,
+    })
+}
+
+fn column(field: &Field, array: &ArrayRef) -> Result<TableColumn, ArrowError> {
+    fn numbers<T: ArrowPrimitiveType>(
+        array: &ArrayRef,
+        number: fn(T::Native) -> f64,
+    ) -> TableColumn {
+        let values = array.as_primitive::<T>().iter();
+        TableColumn::Numbers(values.map(|value| value.map_or(f64::NAN, number)).collect())
+    }
+    fn texts<'a>(values: impl Iterator<Item = Option<&'a str>>) -> TableColumn {
+        TableColumn::Texts(
+            values
+                .map(|text| text.unwrap_or_default().to_owned())
+                .collect(),
+        )
+    }
+    #[expect(clippy::cast_precision_loss, reason = "as every number of a case")]
+    Ok(match array.data_type() {
+        DataType::Float64 => numbers::<Float64Type>(array, |value| value),
+        DataType::Float32 => numbers::<Float32Type>(array, f64::from),
+        DataType::Int64 if array.null_count() == 0 => {
+            TableColumn::Integers(array.as_primitive::<Int64Type>().values().to_vec())
+        }
+        DataType::Int64 => numbers::<Int64Type>(array, |value| value as f64),
+        DataType::Int32 => numbers::<Int32Type>(array, f64::from),
+        DataType::Int16 => numbers::<Int16Type>(array, f64::from),
+        DataType::Int8 => numbers::<Int8Type>(array, f64::from),
+        DataType::UInt32 => numbers::<UInt32Type>(array, f64::from),
+        DataType::UInt16 => numbers::<UInt16Type>(array, f64::from),
+        DataType::UInt8 => numbers::<UInt8Type>(array, f64::from),
+        DataType::Utf8 => texts(array.as_string::<i32>().iter()),
+        DataType::LargeUtf8 => texts(array.as_string::<i64>().iter()),
+        DataType::Utf8View => texts(array.as_string_view().iter()),
+        other => {
+            let detail = format!(
+                "the column `{}` is of type {other}; numbers and texts are read",
+                field.name()
+            );
+            return Err(ArrowError::SchemaError(detail));
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Cursor;
+
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_read_again_with_its_gaps() {
+        let table = RowTable {
+            columns: vec![
+                ("row".to_owned(), TableColumn::Integers(vec![7, 8])),
+                ("f".to_owned(), TableColumn::Numbers(vec![f64::NAN, 0.1])),
+                (
+                    "t".to_owned(),
+                    TableColumn::Texts(vec!["é".to_owned(), String::new()]),
+                ),
+            ],
+        };
+        let kinds: Vec<_> = table
+            .columns
+            .iter()
+            .map(|(name, column)| (name.clone(), column.kind()))
+            .collect();
+        let mut writer = ArrowWriter::new(Vec::new(), &kinds).unwrap();
+        for _ in 0..2 {
+            writer.write(table.clone()).unwrap();
+        }
+        writer.finish().unwrap();
+        let stream = std::mem::take(writer.inner_mut());
+        let tables: Vec<_> = read(Cursor::new(stream)).unwrap().collect();
+        assert_eq!(tables.len(), 2);
+        for read in tables {
+            assert_eq!(format!("{:?}", read.unwrap()), format!("{table:?}"));
+        }
+        assert!(read(Cursor::new(b"neither".to_vec())).is_err());
+    }
+}

@@ -1,0 +1,319 @@
+//! Tables of rows as Parquet: how the rows of a run are stored, and how clients may send them.
+//!
+//! Flat columns, uncompressed or packed with Snappy. Numbers and texts that a row does not have are null.
+
+use std::io::Write;
+use std::sync::Arc;
+
+use parquet::basic::{Compression, ConvertedType, Repetition, Type as Physical};
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use parquet::data_type::{
+    ByteArray, ByteArrayType, DataType, DoubleType, FloatType, Int32Type, Int64Type,
+};
+use parquet::errors::{ParquetError, Result};
+use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::file::reader::{ChunkReader, FileReader, SerializedFileReader};
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::types::Type;
+
+use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
+
+/// The bytes that a file begins and ends with.
+pub const MAGIC: &[u8] = b"PAR1";
+
+/// Writes tables with the same columns, a group of rows for each.
+pub struct TableWriter<W: Write + Send>(SerializedFileWriter<W>);
+
+impl<W: Write + Send> TableWriter<W> {
+    /// A file with these columns.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn new(file: W, columns: &[(String, TableKind)]) -> Result<TableWriter<W>> {
+        let fields = columns.iter().map(|(name, kind)| field(name, *kind));
+        let schema = Type::group_type_builder("rows")
+            .with_fields(fields.collect::<Result<_>>()?)
+            .build()?;
+        let mut properties = WriterProperties::builder()
+            .set_compression(Compression::SNAPPY)
+            .set_dictionary_enabled(false)
+            .set_created_by(concat!("railhead version ", env!("CARGO_PKG_VERSION")).to_owned())
+            .set_statistics_enabled(EnabledStatistics::Chunk);
+        for (name, kind) in columns {
+            if *kind == TableKind::Texts {
+                properties = properties.set_column_dictionary_enabled(name.as_str().into(), true);
+            }
+        }
+        let properties = Arc::new(properties.build());
+        Ok(TableWriter(SerializedFileWriter::new(
+            file,
+            Arc::new(schema),
+            properties,
+        )?))
+    }
+
+    /// Appends a table as a group of rows.
+    ///
+    /// # Errors
+    /// It has other columns, or it cannot be written.
+    pub fn write(&mut self, table: &RowTable) -> Result<()> {
+        let mut group = self.0.next_row_group()?;
+        for (_, column) in &table.columns {
+            let Some(mut writer) = group.next_column()? else {
+                return Err(ParquetError::General("a column too many".to_owned()));
+            };
+            match column {
+                TableColumn::Integers(values) => {
+                    writer
+                        .typed::<Int64Type>()
+                        .write_batch(values, None, None)?;
+                }
+                TableColumn::Numbers(values) => {
+                    let there = |value: &&f64| !value.is_nan();
+                    let levels: Vec<i16> = values.iter().map(|v| i16::from(!v.is_nan())).collect();
+                    let values: Vec<f64> = values.iter().filter(there).copied().collect();
+                    let typed = writer.typed::<DoubleType>();
+                    typed.write_batch(&values, Some(&levels), None)?;
+                }
+                TableColumn::Texts(values) => {
+                    let levels: Vec<i16> = values
+                        .iter()
+                        .map(|text| i16::from(!text.is_empty()))
+                        .collect();
+                    let values: Vec<ByteArray> = values
+                        .iter()
+                        .filter(|text| !text.is_empty())
+                        .map(|text| ByteArray::from(text.as_str()))
+                        .collect();
+                    let typed = writer.typed::<ByteArrayType>();
+                    typed.write_batch(&values, Some(&levels), None)?;
+                }
+            }
+            writer.close()?;
+        }
+        group.close()?;
+        Ok(())
+    }
+
+    /// What is written to.
+    pub fn inner_mut(&mut self) -> &mut W {
+        self.0.inner_mut()
+    }
+
+    /// Ends the file.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn finish(&mut self) -> Result<()> {
+        self.0.finish().map(drop)
+    }
+}
+
+fn field(name: &str, kind: TableKind) -> Result<Arc<Type>> {
+    let (physical, repetition) = match kind {
+        TableKind::Integers => (Physical::INT64, Repetition::REQUIRED),
+        TableKind::Numbers => (Physical::DOUBLE, Repetition::OPTIONAL),
+        TableKind::Texts => (Physical::BYTE_ARRAY, Repetition::OPTIONAL),
+    };
+    let mut field = Type::primitive_type_builder(name, physical).with_repetition(repetition);
+    if kind == TableKind::Texts {
+        field = field.with_converted_type(ConvertedType::UTF8);
+    }
+    field.build().map(Arc::new)
+}
+
+/// A table as one file.
+///
+/// # Errors
+/// It cannot be written.
+pub fn encode(table: &RowTable) -> Result<Vec<u8>> {
+    let columns: Vec<_> = table
+        .columns
+        .iter()
+        .map(|(name, column)| (name.clone(), column.kind()))
+        .collect();
+    let mut file = Vec::new();
+    let mut writer = TableWriter::new(&mut file, &columns)?;
+    writer.write(table)?;
+    writer.finish()?;
+    drop(writer);
+    Ok(file)
+}
+
+/// Reads flat files.
+pub struct TableReader<R: ChunkReader + 'static>(SerializedFileReader<R>);
+
+impl<R: ChunkReader + 'static> TableReader<R> {
+    /// Opens a file.
+    ///
+    /// # Errors
+    /// It is no Parquet file.
+    pub fn new(file: R) -> Result<TableReader<R>> {
+        SerializedFileReader::new(file).map(TableReader)
+    }
+
+    /// Number of groups of rows.
+    #[must_use]
+    pub fn groups(&self) -> usize {
+        self.0.num_row_groups()
+    }
+
+    /// Number of rows of a group, and its size once it is unpacked.
+    #[must_use]
+    pub fn group_size(&self, group: usize) -> (i64, i64) {
+        let about = self.0.metadata().row_group(group);
+        (about.num_rows(), about.total_byte_size())
+    }
+
+    /// Names of the columns.
+    #[must_use]
+    pub fn names(&self) -> Vec<String> {
+        let schema = self.0.metadata().file_metadata().schema_descr();
+        let columns = schema.columns().iter();
+        columns.map(|column| column.path().string()).collect()
+    }
+
+    /// A group of rows: the columns that `wanted` says, in the order of the file.
+    ///
+    /// # Errors
+    /// A column is neither number nor text, nested, or cannot be read.
+    pub fn read(&self, group: usize, wanted: impl Fn(&str) -> bool) -> Result<RowTable> {
+        let group = self.0.get_row_group(group)?;
+        let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
+        let mut columns = Vec::new();
+        for (place, name) in self.names().into_iter().enumerate() {
+            if !wanted(&name) {
+                continue;
+            }
+            let column = match group.get_column_reader(place)? {
+                ColumnReader::Int64ColumnReader(reader) => integers(reader, rows)?,
+                ColumnReader::Int32ColumnReader(reader) => {
+                    numbers(read::<Int32Type>(reader, rows)?, f64::from)
+                }
+                ColumnReader::FloatColumnReader(reader) => {
+                    numbers(read::<FloatType>(reader, rows)?, f64::from)
+                }
+                ColumnReader::DoubleColumnReader(reader) => {
+                    numbers(read::<DoubleType>(reader, rows)?, |value| value)
+                }
+                ColumnReader::ByteArrayColumnReader(reader) => texts(reader, rows)?,
+                _ => {
+                    let detail = format!("the column `{name}` holds neither numbers nor texts");
+                    return Err(ParquetError::General(detail));
+                }
+            };
+            if column.len() != rows {
+                let detail = format!("the column `{name}` is nested; columns have to be flat");
+                return Err(ParquetError::General(detail));
+            }
+            columns.push((name, column));
+        }
+        Ok(RowTable { columns })
+    }
+}
+
+/// The values of a column, each if it is there.
+fn read<T: DataType>(mut reader: ColumnReaderImpl<T>, rows: usize) -> Result<Vec<Option<T::T>>> {
+    let (mut values, mut levels) = (Vec::with_capacity(rows), Vec::with_capacity(rows));
+    let mut repeated = Vec::new();
+    let mut read = 0;
+    while read < rows {
+        let (records, _, _) = reader.read_records(
+            rows - read,
+            Some(&mut levels),
+            Some(&mut repeated),
+            &mut values,
+        )?;
+        if records == 0 {
+            break;
+        }
+        read += records;
+    }
+    if levels.is_empty() {
+        return Ok(values.into_iter().map(Some).collect());
+    }
+    let mut values = values.into_iter();
+    let value = |level: i16| if level > 0 { values.next() } else { None };
+    Ok(levels.into_iter().map(value).collect())
+}
+
+fn numbers<T>(values: Vec<Option<T>>, number: impl Fn(T) -> f64) -> TableColumn {
+    let number = |value: Option<T>| value.map_or(f64::NAN, &number);
+    TableColumn::Numbers(values.into_iter().map(number).collect())
+}
+
+/// Whole numbers, or plain ones if some are missing.
+fn integers(reader: ColumnReaderImpl<Int64Type>, rows: usize) -> Result<TableColumn> {
+    let values = read::<Int64Type>(reader, rows)?;
+    Ok(match values.iter().copied().collect::<Option<Vec<i64>>>() {
+        Some(all) => TableColumn::Integers(all),
+        #[expect(clippy::cast_precision_loss, reason = "as every number of a case")]
+        None => numbers(values, |value| value as f64),
+    })
+}
+
+fn texts(reader: ColumnReaderImpl<ByteArrayType>, rows: usize) -> Result<TableColumn> {
+    let values = read::<ByteArrayType>(reader, rows)?;
+    let text = |value: Option<ByteArray>| match value {
+        Some(bytes) => bytes.as_utf8().map(str::to_owned),
+        None => Ok(String::new()),
+    };
+    let texts: Result<Vec<String>> = values.into_iter().map(text).collect();
+    texts.map(TableColumn::Texts)
+}
+
+#[cfg(test)]
+mod tests {
+    use bytes::Bytes;
+
+    use super::*;
+
+    fn table() -> RowTable {
+        RowTable {
+            columns: vec![
+                ("row".to_owned(), TableColumn::Integers(vec![7, 8, 9])),
+                (
+                    "force_x_n".to_owned(),
+                    TableColumn::Numbers(vec![0.1, f64::NAN, -1e300]),
+                ),
+                (
+                    "/a~1b".to_owned(),
+                    TableColumn::Texts(vec!["é".to_owned(), String::new(), "é".to_owned()]),
+                ),
+            ],
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_read_again_with_its_gaps() {
+        let file = encode(&table()).unwrap();
+        assert!(file.starts_with(MAGIC) && file.ends_with(MAGIC));
+        let reader = TableReader::new(Bytes::from(file)).unwrap();
+        assert_eq!((reader.groups(), reader.group_size(0).0), (1, 3));
+        let read = reader.read(0, |_| true).unwrap();
+        assert_eq!(format!("{read:?}"), format!("{:?}", table()));
+        let one = reader.read(0, |name| name == "row").unwrap();
+        assert_eq!(one.columns, table().columns[..1]);
+    }
+
+    #[test]
+    fn several_tables_are_groups_of_one_file() {
+        let columns: Vec<_> = table()
+            .columns
+            .iter()
+            .map(|(name, column)| (name.clone(), column.kind()))
+            .collect();
+        let mut file = Vec::new();
+        let mut writer = TableWriter::new(&mut file, &columns).unwrap();
+        for _ in 0..2 {
+            writer.write(&table()).unwrap();
+        }
+        writer.finish().unwrap();
+        drop(writer);
+        let reader = TableReader::new(Bytes::from(file)).unwrap();
+        assert_eq!(reader.groups(), 2);
+        let cut = reader.read(1, |_| true).unwrap().cut(&(2..3));
+        assert_eq!((cut.rows(), cut.columns.len()), (1, 3));
+        assert!(TableReader::new(Bytes::from_static(b"PAR1 is no file")).is_err());
+    }
+}

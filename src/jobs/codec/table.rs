@@ -1,0 +1,113 @@
+//! A table of rows: named columns of numbers and texts.
+
+/// The values of a column.
+#[derive(Debug, Clone, PartialEq)]
+pub enum TableColumn {
+    /// Whole numbers, one for every row.
+    Integers(Vec<i64>),
+    /// Numbers; NaN where a row has none.
+    Numbers(Vec<f64>),
+    /// Texts; empty where a row has none.
+    Texts(Vec<String>),
+}
+
+/// The kinds of columns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TableKind {
+    /// [`TableColumn::Integers`].
+    Integers,
+    /// [`TableColumn::Numbers`].
+    Numbers,
+    /// [`TableColumn::Texts`].
+    Texts,
+}
+
+/// Columns of the same length.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RowTable {
+    /// Names and values, in their order.
+    pub columns: Vec<(String, TableColumn)>,
+}
+
+impl TableColumn {
+    /// Number of rows.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        match self {
+            TableColumn::Integers(values) => values.len(),
+            TableColumn::Numbers(values) => values.len(),
+            TableColumn::Texts(values) => values.len(),
+        }
+    }
+
+    /// There is no row.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// What it holds.
+    #[must_use]
+    pub fn kind(&self) -> TableKind {
+        match self {
+            TableColumn::Integers(_) => TableKind::Integers,
+            TableColumn::Numbers(_) => TableKind::Numbers,
+            TableColumn::Texts(_) => TableKind::Texts,
+        }
+    }
+
+    /// Only these rows.
+    #[must_use]
+    pub fn rows(self, range: std::ops::Range<usize>) -> TableColumn {
+        fn cut<T>(mut values: Vec<T>, range: std::ops::Range<usize>) -> Vec<T> {
+            values.truncate(range.end);
+            values.drain(..range.start);
+            values
+        }
+        match self {
+            TableColumn::Integers(values) => TableColumn::Integers(cut(values, range)),
+            TableColumn::Numbers(values) => TableColumn::Numbers(cut(values, range)),
+            TableColumn::Texts(values) => TableColumn::Texts(cut(values, range)),
+        }
+    }
+}
+
+impl TableKind {
+    /// A column of so many rows without values.
+    #[must_use]
+    pub fn without_values(self, rows: usize) -> TableColumn {
+        match self {
+            TableKind::Integers => TableColumn::Integers(vec![0; rows]),
+            TableKind::Numbers => TableColumn::Numbers(vec![f64::NAN; rows]),
+            TableKind::Texts => TableColumn::Texts(vec![String::new(); rows]),
+        }
+    }
+}
+
+impl RowTable {
+    /// Number of rows.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.columns.first().map_or(0, |(_, column)| column.len())
+    }
+
+    /// A column by its name.
+    #[must_use]
+    pub fn column(&self, name: &str) -> Option<&TableColumn> {
+        let mut columns = self.columns.iter();
+        columns
+            .find(|(known, _)| known == name)
+            .map(|(_, column)| column)
+    }
+
+    /// Only these rows.
+    #[must_use]
+    pub fn cut(self, range: &std::ops::Range<usize>) -> RowTable {
+        let columns = self.columns.into_iter();
+        RowTable {
+            columns: columns
+                .map(|(name, column)| (name, column.rows(range.clone())))
+                .collect(),
+        }
+    }
+}

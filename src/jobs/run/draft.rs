@@ -1,0 +1,367 @@
+//! A run that is being received: rows are checked and cut into chunks while they arrive.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+
+use serde_json::Value;
+
+use crate::contact::case::words::solver::Output;
+use crate::contact::error::{CaseError, Fault};
+use crate::contact::evaluate::many::{ManyTask, expected_seconds};
+use crate::contact::evaluate::many_answer::number_names;
+use crate::contact::evaluate::request_faults::{column_pointer, of_first_row, of_values};
+use crate::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
+use crate::jobs::batch::staging::nameless;
+use crate::jobs::batch::upload::BatchUpload;
+use crate::jobs::error::JobsError;
+use crate::jobs::handle::Jobs;
+use crate::jobs::run::chunk::RunChunk;
+use crate::jobs::run::head::{RunColumn, RunHead};
+use crate::jobs::run::model::Run;
+use crate::jobs::submit::microseconds;
+use crate::jobs::submit_options::SubmitOptions;
+
+/// Expected solve time of a chunk in s: much longer than a claim takes, shorter than a lease, and soon done again.
+const CHUNK_SECONDS: f64 = 3.0;
+/// Fewest rows of a chunk.
+const CHUNK_ROWS_MIN: usize = 50;
+/// Most rows of a chunk, also the rows that decide the size of all chunks.
+const CHUNK_ROWS_MAX: usize = 10_000;
+
+/// A run that is being received. Dropping it gives everything back.
+#[derive(Debug)]
+pub struct RunDraft {
+    jobs: Jobs,
+    upload: BatchUpload,
+    template: Value,
+    columns: Vec<RunColumn>,
+    /// Rows that are in no chunk yet, column by column.
+    held: Vec<Values>,
+    /// Known once the first rows are there.
+    begun: Option<Begun>,
+    rows: u64,
+    rows_max: u64,
+}
+
+#[derive(Debug)]
+struct Begun {
+    head: RunHead,
+    row_seconds: f64,
+}
+
+/// What a submission says of a run beside its rows.
+#[derive(Debug, Clone, Default)]
+pub struct RunOptions {
+    /// Free text of the client.
+    pub name: Option<String>,
+    /// Labels of the client.
+    pub labels: BTreeMap<String, String>,
+    /// Priority and deadline.
+    pub submit: SubmitOptions,
+    /// The client's idempotency key.
+    pub idempotency_key: Option<String>,
+}
+
+impl Jobs {
+    /// A run of this case without rows, for at most `rows_max` of them.
+    ///
+    /// # Errors
+    /// [`JobsError::Case`]: a column is there twice, or there is none that varies the case; [`JobsError::Draining`], or the data folder cannot
+    /// be written.
+    pub fn draft_run(
+        &self,
+        template: Value,
+        columns: Vec<RunColumn>,
+        rows_max: u64,
+    ) -> Result<RunDraft, JobsError> {
+        let faults = faults_of_columns(&columns);
+        if !faults.is_empty() {
+            return Err(CaseError(faults).into());
+        }
+        let lane = self.rows();
+        Ok(RunDraft {
+            upload: lane.draft()?,
+            jobs: lane,
+            held: columns.iter().map(|column| empty(column.text)).collect(),
+            template,
+            columns,
+            begun: None,
+            rows: 0,
+            rows_max,
+        })
+    }
+
+    /// A nameless file for rows that are being received.
+    ///
+    /// # Errors
+    /// The data folder cannot be written.
+    pub fn spool_file(&self) -> Result<File, JobsError> {
+        let file = nameless(&self.options().data_dir);
+        file.map_err(|source| self.spool_failed(source))
+    }
+
+    /// What a failed write of such a file is.
+    #[must_use]
+    pub fn spool_failed(&self, source: std::io::Error) -> JobsError {
+        self.staging_failed(source)
+    }
+
+    /// Queues a run. Once this returns it survives the death of the process. Also says whether it is that of an earlier submission with the same
+    /// idempotency key.
+    ///
+    /// # Errors
+    /// As [`Jobs::submit_batch`], and [`JobsError::Case`] with every fault of the first row.
+    pub async fn submit_run(
+        &self,
+        draft: RunDraft,
+        options: RunOptions,
+    ) -> Result<(Run, bool), JobsError> {
+        let finished = tokio::task::spawn_blocking(move || draft.finish());
+        let mut upload = finished
+            .await
+            .map_err(|error| JobsError::Damaged(error.to_string()))??;
+        upload.name = options.name;
+        upload.labels = options.labels;
+        upload.options = SubmitOptions {
+            // Rows have no digests to be found by.
+            bypass_cache: true,
+            ..options.submit
+        };
+        let lane = self.rows();
+        let (batch, replayed) = lane.submit_batch(upload, options.idempotency_key).await?;
+        Ok((self.run(batch.id).await?, replayed))
+    }
+}
+
+impl RunDraft {
+    /// The columns in their order.
+    #[must_use]
+    pub fn columns(&self) -> &[RunColumn] {
+        &self.columns
+    }
+
+    /// Rows that were added so far.
+    #[must_use]
+    pub fn rows(&self) -> u64 {
+        self.rows
+    }
+
+    /// Adds rows, column by column. Blocks; not to be called on a thread that answers requests.
+    ///
+    /// # Errors
+    /// [`JobsError::Case`]: the columns differ in length or kind, or hold what no case may have; more rows than are allowed; or as
+    /// [`BatchUpload::add`].
+    pub fn push(&mut self, columns: Vec<Values>) -> Result<(), JobsError> {
+        let faults = self.faults_of_rows(&columns);
+        if !faults.is_empty() {
+            return Err(CaseError(faults).into());
+        }
+        self.rows += columns.first().map_or(0, Values::len) as u64;
+        if self.rows > self.rows_max {
+            return Err(JobsError::TooManyRows(self.rows_max));
+        }
+        for (held, more) in self.held.iter_mut().zip(columns) {
+            match (held, more) {
+                (Values::Numbers(held), Values::Numbers(more)) => held.extend(more),
+                (Values::Texts(held), Values::Texts(more)) => held.extend(more),
+                _ => unreachable!("kinds were compared"),
+            }
+        }
+        if self.held_rows() >= CHUNK_ROWS_MAX {
+            self.cut(false)?;
+        }
+        Ok(())
+    }
+
+    /// Everything is there.
+    fn finish(mut self) -> Result<BatchUpload, JobsError> {
+        if self.rows == 0 {
+            let fault = Fault::new("/columns", "0 rows given; at least one is needed");
+            return Err(CaseError(vec![fault]).into());
+        }
+        self.cut(true)?;
+        if let Some(Begun { mut head, .. }) = self.begun {
+            head.rows = self.rows;
+            self.upload.set_template(head.to_bytes());
+        }
+        Ok(self.upload)
+    }
+
+    fn held_rows(&self) -> usize {
+        self.held.first().map_or(0, Values::len)
+    }
+
+    /// Stages whole chunks of what is held, at the end all of it.
+    fn cut(&mut self, last: bool) -> Result<(), JobsError> {
+        if self.begun.is_none() {
+            self.begun = Some(self.begin()?);
+        }
+        let Some(begun) = &self.begun else {
+            return Ok(());
+        };
+        let each = begun.head.chunk_rows as usize;
+        let held = self.held_rows();
+        let mut begin = 0;
+        while held - begin >= each || (last && begin < held) {
+            let end = (begin + each).min(held);
+            let chunk = RunChunk {
+                first_row: self.rows - (held - begin) as u64,
+                columns: self
+                    .held
+                    .iter()
+                    .map(|values| part(values, begin..end))
+                    .collect(),
+            };
+            let seconds = begun.row_seconds * (end - begin) as f64;
+            let body = chunk
+                .to_bytes()
+                .map_err(|source| self.jobs.staging_failed(source))?;
+            self.upload
+                .add_chunk(&begun.head.method, microseconds(seconds), &body)?;
+            begin = end;
+        }
+        for values in &mut self.held {
+            *values = part(values, begin..held);
+        }
+        Ok(())
+    }
+
+    /// What the first rows decide: is the case good, and how many rows are a chunk?
+    fn begin(&self) -> Result<Begun, JobsError> {
+        let pairs = self.columns.iter().zip(&self.held);
+        let varied: Vec<VariedColumn> = pairs
+            .filter_map(|(column, values)| {
+                Some(VariedColumn {
+                    pointer: column.pointer.clone()?,
+                    values: part(values, 0..values.len().min(CHUNK_ROWS_MAX)),
+                })
+            })
+            .collect();
+        let case = case_of_row(&self.template, &varied, 0).map_err(|(pointer, reason)| {
+            let detail = format!("the column `{pointer}` {reason}");
+            CaseError(vec![Fault::new(column_pointer(&pointer), detail)])
+        })?;
+        let names = self.columns.iter();
+        let names: Vec<(&str, &str)> = names
+            .filter_map(|column| Some((column.pointer.as_deref()?, &*column.name)))
+            .collect();
+        let checked = self.jobs.check(&case);
+        let checked = checked.map_err(|error| of_first_row(error, &names))?;
+        let mut faults = Vec::new();
+        if checked.problem.motions.len() != 1 {
+            let detail = format!(
+                "{} motions given; a row has one motion, and columns vary it",
+                checked.problem.motions.len()
+            );
+            faults.push(Fault::new("/template/motion", detail));
+        }
+        let numbers = [Output::Resultants, Output::Zones, Output::Gradients];
+        if let Some(other) = checked
+            .run
+            .outputs
+            .iter()
+            .find(|asked| !numbers.contains(asked))
+        {
+            let detail = format!(
+                "{other:?} asked for; rows are answered with numbers: allowed are `resultants`, `zones`, which gives the share that sticks, and `gradients`"
+            );
+            faults.push(Fault::new("/template/outputs", detail));
+        }
+        if !faults.is_empty() {
+            return Err(CaseError(faults).into());
+        }
+        let options = self.jobs.options();
+        let rows = varied.first().map_or(1, |column| column.values.len());
+        let task = ManyTask {
+            case: &case,
+            columns: &varied,
+            limits: &options.limits,
+            time_limit: options.time_limit,
+        };
+        let row_seconds = expected_seconds(&task) / rows as f64;
+        let wanted = CHUNK_SECONDS / row_seconds;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a clamped number"
+        )]
+        let chunk_rows = wanted.clamp(CHUNK_ROWS_MIN as f64, CHUNK_ROWS_MAX as f64) as u32;
+        let names = number_names(checked.run.wants(Output::Gradients));
+        let mut head = RunHead::new(
+            case,
+            self.columns.clone(),
+            names.into_iter().map(str::to_owned).collect(),
+            checked.run.method_asked.name().to_owned(),
+        );
+        head.chunk_rows = chunk_rows;
+        Ok(Begun { head, row_seconds })
+    }
+
+    fn faults_of_rows(&self, columns: &[Values]) -> Vec<Fault> {
+        let rows = columns.first().map_or(0, Values::len);
+        let mut faults = Vec::new();
+        for (column, values) in self.columns.iter().zip(columns) {
+            let pointer = column_pointer(&column.name);
+            if values.len() != rows {
+                let detail = format!(
+                    "{} values given, the first column has {rows}; all columns need as many",
+                    values.len()
+                );
+                faults.push(Fault::new(pointer, detail));
+            } else if matches!(values, Values::Texts(_)) != column.text {
+                let needed = if column.text { "texts" } else { "numbers" };
+                let detail =
+                    format!("a value of another kind given; {needed} are needed in this column");
+                faults.push(Fault::new(pointer, detail));
+            } else if let Some(place) = &column.pointer {
+                faults.extend(of_values(&column.name, place, values, self.rows));
+            }
+        }
+        faults
+    }
+}
+
+fn faults_of_columns(columns: &[RunColumn]) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    for (place, column) in columns.iter().enumerate() {
+        let before = &columns[..place];
+        let twice = before.iter().any(|other| {
+            other.name == column.name
+                || (column.pointer.is_some() && other.pointer == column.pointer)
+        });
+        if twice {
+            let detail = format!("the column `{}` is there twice", column.name);
+            faults.push(Fault::new(column_pointer(&column.name), detail));
+        }
+        let own = ["row", "status", "method"];
+        let answered = number_names(true);
+        if column.pointer.is_none()
+            && (own.contains(&&*column.name) || answered.contains(&&*column.name))
+        {
+            let detail = format!(
+                "`{}` is the name of a column of the answers; a column that is carried along needs another name",
+                column.name
+            );
+            faults.push(Fault::new(column_pointer(&column.name), detail));
+        }
+    }
+    if columns.iter().all(|column| column.pointer.is_none()) {
+        let detail = "no column varies the case; name at least one by a JSON pointer such as `/load/normal_force_n` or by a short name";
+        faults.push(Fault::new("/columns", detail));
+    }
+    faults
+}
+
+fn empty(text: bool) -> Values {
+    match text {
+        true => Values::Texts(Vec::new()),
+        false => Values::Numbers(Vec::new()),
+    }
+}
+
+fn part(values: &Values, range: std::ops::Range<usize>) -> Values {
+    match values {
+        Values::Numbers(numbers) => Values::Numbers(numbers[range].to_vec()),
+        Values::Texts(texts) => Values::Texts(texts[range].to_vec()),
+    }
+}

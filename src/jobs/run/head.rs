@@ -1,0 +1,123 @@
+//! What all chunks of a run share: the case, the columns, the sizes.
+
+use bytes::Bytes;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::contact::evaluate::varied::Values;
+use crate::jobs::codec::table::{TableColumn, TableKind};
+use crate::jobs::error::JobsError;
+
+/// The form of heads and chunks that is written.
+const FORM: u32 = 1;
+
+/// A column of the rows of a run.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RunColumn {
+    /// As the client names it, and as it is answered.
+    pub name: String,
+    /// The place in the case that it stands for; a column without one is carried along to the answers.
+    pub pointer: Option<String>,
+    /// It holds texts; otherwise numbers.
+    pub text: bool,
+}
+
+impl RunColumn {
+    /// What it holds.
+    #[must_use]
+    pub fn kind(&self) -> TableKind {
+        match self.text {
+            true => TableKind::Texts,
+            false => TableKind::Numbers,
+        }
+    }
+}
+
+/// The values of a column of rows as a column of a table.
+#[must_use]
+pub fn table_column(values: Values) -> TableColumn {
+    match values {
+        Values::Numbers(numbers) => TableColumn::Numbers(numbers),
+        Values::Texts(texts) => TableColumn::Texts(texts),
+    }
+}
+
+/// What all chunks of a run share.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RunHead {
+    form: u32,
+    /// The case of the first row.
+    pub case: Value,
+    /// The columns that were sent, in their order.
+    pub columns: Vec<RunColumn>,
+    /// Names of the columns of numbers of the answers.
+    pub numbers: Vec<String>,
+    /// The method asked for.
+    pub method: String,
+    /// Number of rows.
+    pub rows: u64,
+    /// Rows of each chunk but the last.
+    pub chunk_rows: u32,
+}
+
+impl RunHead {
+    /// A head of the present form, without rows.
+    #[must_use]
+    pub fn new(case: Value, columns: Vec<RunColumn>, numbers: Vec<String>, method: String) -> Self {
+        RunHead {
+            form: FORM,
+            case,
+            columns,
+            numbers,
+            method,
+            rows: 0,
+            chunk_rows: 0,
+        }
+    }
+
+    /// As it is stored.
+    #[must_use]
+    pub fn to_bytes(&self) -> Bytes {
+        Bytes::from(serde_json::to_vec(self).unwrap_or_default())
+    }
+
+    /// Reads a stored head.
+    ///
+    /// # Errors
+    /// It is damaged, or of another form.
+    pub fn read(text: &[u8]) -> Result<RunHead, JobsError> {
+        let head: RunHead = serde_json::from_slice(text)
+            .map_err(|error| JobsError::Damaged(format!("the head of a run: {error}")))?;
+        match head.form {
+            FORM => Ok(head),
+            form => Err(JobsError::Damaged(format!("a run of form {form}"))),
+        }
+    }
+
+    /// Names and kinds of the columns of the answers, in their order: the row, what was carried along, what became of it, its numbers.
+    #[must_use]
+    pub fn answers(&self) -> Vec<(String, TableKind)> {
+        let carried = self
+            .columns
+            .iter()
+            .filter(|column| column.pointer.is_none());
+        let carried = carried.map(|column| (column.name.clone(), column.kind()));
+        let words = ["status", "method"].map(|name| (name.to_owned(), TableKind::Texts));
+        let numbers = self.numbers.iter();
+        let numbers = numbers.map(|name| (name.clone(), TableKind::Numbers));
+        let row = ("row".to_owned(), TableKind::Integers);
+        std::iter::once(row)
+            .chain(carried)
+            .chain(words)
+            .chain(numbers)
+            .collect()
+    }
+
+    /// The rows of a chunk.
+    #[must_use]
+    pub fn rows_of(&self, chunk: u64) -> std::ops::Range<u64> {
+        let each = u64::from(self.chunk_rows);
+        let begin = (chunk * each).min(self.rows);
+        begin..(begin + each).min(self.rows)
+    }
+}

@@ -1,0 +1,136 @@
+//! The answers of a run, chunk by chunk in the order of its rows.
+
+use bytes::Bytes;
+use uuid::Uuid;
+
+use crate::jobs::batch::model::ItemResult;
+use crate::jobs::codec::parquet::TableReader;
+use crate::jobs::codec::table::{RowTable, TableColumn};
+use crate::jobs::error::JobsError;
+use crate::jobs::handle::Jobs;
+use crate::jobs::model::State;
+use crate::jobs::run::chunk::RunChunk;
+use crate::jobs::run::control::of_run;
+use crate::jobs::run::head::{RunHead, table_column};
+
+/// Chunks that are read from the table of jobs at once.
+const AT_ONCE: u32 = 64;
+
+/// A chunk of a run and where its answers are.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChunkRef {
+    /// Its place among the chunks, from 0.
+    pub index: u64,
+    /// The job that it is.
+    pub job: Uuid,
+    /// Where it stands.
+    pub state: State,
+    /// Why it has no answers, as a word; nothing if it has.
+    pub why: Option<&'static str>,
+    /// The key of its answers, if it has any.
+    pub key: Option<String>,
+}
+
+impl Jobs {
+    /// The chunks of a run from this one on, some of them; none behind the last.
+    ///
+    /// # Errors
+    /// A failed database.
+    pub async fn run_chunks(
+        &self,
+        run: Uuid,
+        after: Option<Uuid>,
+    ) -> Result<Vec<ChunkRef>, JobsError> {
+        let lane = self.rows();
+        let store = &self.shared.store;
+        let items = store.batch_items(&lane.tenant, run, after, AT_ONCE, usize::MAX);
+        let items = items.await.map_err(|error| of_run(error.into()))?;
+        let chunks = items.into_iter().map(|item| ChunkRef {
+            index: u64::from(item.index),
+            job: item.job.id,
+            state: item.job.state,
+            why: match item.job.state {
+                State::Succeeded => None,
+                State::Failed => Some(
+                    item.job
+                        .failure
+                        .map_or("failed", |failure| failure.kind.name()),
+                ),
+                other => Some(other.name()),
+            },
+            key: match item.result {
+                Some(ItemResult::Stored(key)) => Some(key),
+                _ => None,
+            },
+        });
+        Ok(chunks.collect())
+    }
+
+    /// The answers of a chunk, those columns that `wanted` names, or all. Rows of a chunk without answers have its state as their status.
+    ///
+    /// # Errors
+    /// The store failed, or the answers cannot be read.
+    pub async fn chunk_answers(
+        &self,
+        head: &RunHead,
+        chunk: &ChunkRef,
+        wanted: Option<Vec<String>>,
+    ) -> Result<RowTable, JobsError> {
+        let Some(key) = &chunk.key else {
+            return self.without_answers(head, chunk, wanted.as_deref()).await;
+        };
+        let file = self.shared.blobs.rows(key).await?;
+        let read = tokio::task::spawn_blocking(move || read_answers(file, wanted.as_deref()));
+        read.await
+            .map_err(|error| JobsError::Damaged(error.to_string()))?
+    }
+
+    async fn without_answers(
+        &self,
+        head: &RunHead,
+        chunk: &ChunkRef,
+        wanted: Option<&[String]>,
+    ) -> Result<RowTable, JobsError> {
+        let rows = head.rows_of(chunk.index);
+        let sent = self.chunk_rows(head, chunk.job).await?;
+        let count = usize::try_from(rows.end - rows.start).unwrap_or(0);
+        let mut columns = Vec::new();
+        for (name, kind) in head.answers() {
+            if wanted.is_some_and(|wanted| !wanted.contains(&name)) {
+                continue;
+            }
+            let place = head.columns.iter().position(|column| column.name == name);
+            let column = match (name.as_str(), place) {
+                ("row", _) => {
+                    TableColumn::Integers(rows.clone().map(|row| row.cast_signed()).collect())
+                }
+                ("status", _) => {
+                    TableColumn::Texts(vec![chunk.why.unwrap_or("lost").to_owned(); count])
+                }
+                (_, Some(place)) if head.columns[place].pointer.is_none() => {
+                    table_column(sent.columns[place].clone())
+                }
+                _ => kind.without_values(count),
+            };
+            columns.push((name, column));
+        }
+        Ok(RowTable { columns })
+    }
+
+    /// The rows of a chunk as they were sent.
+    ///
+    /// # Errors
+    /// A failed database, or the run has gone.
+    pub async fn chunk_rows(&self, head: &RunHead, job: Uuid) -> Result<RunChunk, JobsError> {
+        let lane = self.rows();
+        let case = self.shared.store.case(&lane.tenant, job).await?;
+        RunChunk::read(&case.ok_or(JobsError::Expired)?.body, &head.columns)
+    }
+}
+
+fn read_answers(file: Bytes, wanted: Option<&[String]>) -> Result<RowTable, JobsError> {
+    let damaged = |error: &dyn std::fmt::Display| JobsError::Damaged(format!("answers: {error}"));
+    let reader = TableReader::new(file).map_err(|error| damaged(&error))?;
+    let wanted = |name: &str| wanted.is_none_or(|wanted| wanted.iter().any(|known| known == name));
+    reader.read(0, wanted).map_err(|error| damaged(&error))
+}

@@ -1,0 +1,136 @@
+//! What a solver thread does for a chunk of rows.
+
+use std::time::Duration;
+
+use bytes::Bytes;
+use serde_json::json;
+
+use crate::contact::case::problem::CheckedCase;
+use crate::contact::error::SolveError;
+use crate::contact::evaluate::many::{ManyTask, solve_many};
+use crate::contact::evaluate::many_answer::ManyAnswer;
+use crate::contact::evaluate::varied::VariedColumn;
+use crate::contact::monitor::Monitor;
+use crate::contact::solution::words::Solution;
+use crate::jobs::codec::parquet::encode;
+use crate::jobs::codec::result::EncodedResult;
+use crate::jobs::codec::table::{RowTable, TableColumn};
+use crate::jobs::error::JobsError;
+use crate::jobs::model::{Failure, FailureKind};
+use crate::jobs::run::chunk::RunChunk;
+use crate::jobs::run::head::{RunHead, table_column};
+use crate::jobs::shared::Shared;
+use crate::jobs::store::submission::StoredCase;
+use crate::jobs::worker::attempt_control::AttemptControl;
+use crate::jobs::worker::outcome::{INTERNAL, Outcome};
+
+/// Solves a chunk; its answers are a Parquet file.
+pub(crate) fn solve_chunk(
+    shared: &Shared,
+    control: &AttemptControl,
+    stored: &StoredCase,
+) -> Outcome {
+    let (head, chunk) = match read(stored) {
+        Ok(read) => read,
+        Err(error) => return broken(&error),
+    };
+    let first_row = chunk.first_row;
+    let (varied, carried) = parted(&head, chunk);
+    let limits = &shared.options.limits;
+    if let Ok(checked) = (shared.engine.check)(&head.case, limits) {
+        control.set_memory_bytes(checked.cost().bytes);
+    }
+    let task = ManyTask {
+        case: &head.case,
+        columns: &varied,
+        limits,
+        time_limit: shared.options.time_limit,
+    };
+    control.begin(Duration::ZERO);
+    let solve = |checked: &CheckedCase, monitor: &dyn Monitor| solve_case(shared, checked, monitor);
+    let solved = solve_many(&task, &solve, control);
+    control.pause();
+    let answer = match solved {
+        Ok(answer) => answer,
+        Err(error) => return Outcome::Unsolved(error),
+    };
+    let rows = answer.status.len();
+    let without = answer.without_answer();
+    shared.metrics.rows_ended(&answer);
+    match encode(&table(&head, first_row, carried, answer)) {
+        Ok(file) => Outcome::Solved {
+            result: EncodedResult {
+                solution: Bytes::from(
+                    json!({ "rows": rows, "without_answer": without }).to_string(),
+                ),
+                fields: Some(Bytes::from(file)),
+            },
+            remarks: Vec::new(),
+            field_patches: u32::try_from(without).unwrap_or(u32::MAX),
+        },
+        Err(error) => broken(&JobsError::Damaged(error.to_string())),
+    }
+}
+
+fn read(stored: &StoredCase) -> Result<(RunHead, RunChunk), JobsError> {
+    let head = RunHead::read(stored.template.as_deref().unwrap_or_default())?;
+    let chunk = RunChunk::read(&stored.body, &head.columns)?;
+    Ok((head, chunk))
+}
+
+/// What varies the case, and what is carried along.
+fn parted(head: &RunHead, chunk: RunChunk) -> (Vec<VariedColumn>, Vec<(String, TableColumn)>) {
+    let (mut varied, mut carried) = (Vec::new(), Vec::new());
+    for (column, values) in head.columns.iter().zip(chunk.columns) {
+        match &column.pointer {
+            Some(pointer) => varied.push(VariedColumn {
+                pointer: pointer.clone(),
+                values,
+            }),
+            None => carried.push((column.name.clone(), table_column(values))),
+        }
+    }
+    (varied, carried)
+}
+
+fn solve_case(
+    shared: &Shared,
+    checked: &CheckedCase,
+    monitor: &dyn Monitor,
+) -> Result<Solution, SolveError> {
+    let mut whole: Option<Solution> = None;
+    for slice in (shared.engine.slices)(checked) {
+        let (solution, _) = (shared.engine.solve)(checked, slice, monitor)?;
+        match &mut whole {
+            None => whole = Some(solution),
+            Some(all) => all.append(solution),
+        }
+    }
+    whole.ok_or(SolveError::Cancelled)
+}
+
+/// The answers in the order of [`RunHead::answers`].
+fn table(
+    head: &RunHead,
+    first_row: u64,
+    carried: Vec<(String, TableColumn)>,
+    answer: ManyAnswer,
+) -> RowTable {
+    let rows = (first_row..).take(answer.status.len());
+    let rows = TableColumn::Integers(rows.map(u64::cast_signed).collect());
+    let status = answer.status.iter().map(|status| status.name().to_owned());
+    let method = answer.method.iter();
+    let method = method.map(|method| method.map_or("", |method| method.name()).to_owned());
+    let mut columns = vec![("row".to_owned(), rows)];
+    columns.extend(carried);
+    columns.push(("status".to_owned(), TableColumn::Texts(status.collect())));
+    columns.push(("method".to_owned(), TableColumn::Texts(method.collect())));
+    let numbers = head.numbers.iter().cloned().zip(answer.numbers);
+    columns.extend(numbers.map(|(name, values)| (name, TableColumn::Numbers(values))));
+    RowTable { columns }
+}
+
+fn broken(error: &JobsError) -> Outcome {
+    tracing::error!(%error, "a chunk of rows fails inside the service");
+    Outcome::Broken(Failure::new(FailureKind::Internal, INTERNAL))
+}

@@ -1,0 +1,144 @@
+//! Many rows: each is answered as a case of its own, whatever stands beside it.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use railhead::contact::case::limits::Limits;
+use railhead::contact::evaluate::many::{ManyTask, solve_many};
+use railhead::contact::evaluate::many_answer::{ManyAnswer, ManyStatus, NUMBER_NAMES};
+use railhead::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
+use railhead::contact::monitor::Unmonitored;
+use railhead::contact::rolling::operator_store::OperatorStore;
+use railhead::contact::{self};
+use serde_json::{Value, json};
+
+use crate::gap_samples::steel;
+
+fn case(method: &str) -> Value {
+    let contact = json!({ "type": "radii", "rolling_mm": 460.0, "lateral_mm": 300.0 });
+    let load = json!({ "normal_force_n": 8e4 });
+    let mut case = steel(contact, load, [1e-3, -5e-4, 2e-4]);
+    case["solver"] = json!({ "method": method, "target_error": 0.004 });
+    case["outputs"] = json!(["resultants", "zones"]);
+    case
+}
+
+fn numbers(pointer: &str, values: &[f64]) -> VariedColumn {
+    VariedColumn {
+        pointer: pointer.to_owned(),
+        values: Values::Numbers(values.to_vec()),
+    }
+}
+
+fn solved(case: &Value, columns: &[VariedColumn]) -> ManyAnswer {
+    let operators = Arc::new(OperatorStore::default());
+    let task = ManyTask {
+        case,
+        columns,
+        limits: &Limits::default(),
+        time_limit: Duration::from_secs(60),
+    };
+    let solve = |checked: &contact::case::problem::CheckedCase,
+                 monitor: &dyn contact::monitor::Monitor| {
+        contact::solve_with(&operators, checked, monitor).map(|(solution, _)| solution)
+    };
+    solve_many(&task, &solve, &Unmonitored).expect("nobody stops it")
+}
+
+/// The numbers of a row as bits, in which equal means the same answer.
+fn bits(answer: &ManyAnswer, row: usize) -> Vec<u64> {
+    answer
+        .numbers
+        .iter()
+        .map(|column| column[row].to_bits())
+        .collect()
+}
+
+fn columns() -> Vec<VariedColumn> {
+    vec![
+        numbers("/load/normal_force_n", &[8e4, 3e4, 8e4, 1.2e5, 3e4, 8e4]),
+        numbers("/motion/spin_per_mm", &[3e-4, -1e-3, 0.0, 1e-5, 2e-4, 3e-4]),
+        numbers("/friction/coefficient", &[0.3, 0.1, 0.5, 0.4, 0.3, 0.3]),
+    ]
+}
+
+#[test]
+fn a_row_of_many_is_the_case_solved_alone_to_the_last_bit() {
+    let (case, columns) = (case("boundary_element"), columns());
+    let answer = solved(&case, &columns);
+    for row in [1, 3] {
+        let single = case_of_row(&case, &columns, row).expect("it leads somewhere");
+        let checked = contact::check(&single, &Limits::default()).expect("a sound case");
+        let (alone, _) = contact::solve(&checked, &Unmonitored).expect("it is solved");
+        let force = [answer.numbers[1][row], answer.numbers[2][row]];
+        assert_eq!(force, [alone.total[0].force_x_n, alone.total[0].force_y_n]);
+        let point = &alone.patches[0].points[0];
+        let stick = point.stick_area_mm2.expect("zones") / alone.patches[0].area_mm2;
+        assert_eq!(answer.numbers[7][row], stick);
+        assert_eq!(answer.numbers[6][row], point.friction_power_n);
+    }
+}
+
+#[test]
+fn neither_order_nor_neighbours_change_a_row() {
+    for method in ["auto", "boundary_element", "fastsim"] {
+        let (case, columns) = (case(method), columns());
+        let whole = solved(&case, &columns);
+        let order = [5, 3, 0, 4, 2, 1];
+        let turned: Vec<_> = columns
+            .iter()
+            .map(|column| match &column.values {
+                Values::Numbers(values) => numbers(&column.pointer, &order.map(|row| values[row])),
+                Values::Texts(_) => unreachable!("numbers"),
+            })
+            .collect();
+        let turned = solved(&case, &turned);
+        for (place, row) in order.into_iter().enumerate() {
+            assert_eq!(
+                bits(&turned, place),
+                bits(&whole, row),
+                "{method}, row {row}"
+            );
+            assert_eq!(turned.method[place], whole.method[row]);
+        }
+    }
+}
+
+#[test]
+fn auto_takes_the_table_where_its_bound_meets_the_target_and_solves_the_rest() {
+    let mut case = case("auto");
+    let answer = solved(&case, &columns());
+    let by_table = |answer: &ManyAnswer| {
+        let methods = answer.method.iter().flatten();
+        methods.filter(|method| method.name() == "table").count()
+    };
+    assert!(by_table(&answer) > 0, "{:?}", answer.method);
+    assert_eq!(answer.status, [ManyStatus::Ok; 6]);
+    // The bound of the table is never as small as this.
+    case["solver"]["target_error"] = json!(0.0005);
+    let exact = solved(&case, &columns()[1..]);
+    assert_eq!(by_table(&exact), 0);
+    assert!(exact.status.iter().all(|status| status.has_answer()));
+    let limit = 0.3 * 8e4;
+    let error = |name: &str| {
+        let column = NUMBER_NAMES
+            .iter()
+            .position(|known| *known == name)
+            .expect("a column");
+        (answer.numbers[column][0] - exact.numbers[column][0]).abs()
+    };
+    assert!(error("force_x_n").max(error("force_y_n")) < 0.008 * limit);
+}
+
+#[test]
+fn a_row_that_cannot_be_solved_has_a_status_and_costs_no_other_row() {
+    let case = case("boundary_element");
+    let answer = solved(
+        &case,
+        &[numbers("/contact/rolling_mm", &[460.0, -1.0, 500.0])],
+    );
+    let refused = [ManyStatus::Ok, ManyStatus::Refused, ManyStatus::Ok];
+    assert_eq!(answer.status, refused);
+    assert!(answer.numbers[1][1].is_nan() && answer.method[1].is_none());
+    assert_eq!(answer.without_answer(), 1);
+}

@@ -1,0 +1,458 @@
+//! Runs: many rows over one case, as one piece of work.
+
+use std::time::{Duration, Instant};
+
+use railhead::jobs::codec::arrow::{ArrowWriter, read};
+use railhead::jobs::codec::parquet::{TableReader, encode};
+use railhead::jobs::codec::table::{RowTable, TableColumn};
+use railhead::jobs::options::Database;
+use reqwest::Method;
+use serde_json::{Value, json};
+
+use crate::errors::assert_problem;
+use crate::postgres;
+use crate::server::{Answer, Server, Setup};
+
+/// Ends of a guard: something hangs.
+const WITHIN: Duration = Duration::from_secs(90);
+
+fn template(method: &str) -> Value {
+    json!({
+        "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
+        "friction": { "coefficient": 0.3 },
+        "contact": { "type": "radii", "rolling_mm": 460, "lateral_mm": 300 },
+        "load": { "normal_force_n": 1 },
+        "motion": { "creepage_x": 0, "creepage_y": 0.0, "spin_per_mm": 0.0004 },
+        "solver": { "method": method, "target_error": 0.01 },
+    })
+}
+
+/// Columns of so many rows: loads, creepages, and where they were.
+fn columns(rows: usize) -> Value {
+    let each = |of: fn(usize) -> f64| (0..rows).map(of).collect::<Vec<_>>();
+    json!({
+        "/load/normal_force_n": each(|k| 5e4 + 1e3 * (k % 7) as f64),
+        "creepage_x": each(|k| 1e-3 * ((k % 11) as f64 - 5.0)),
+        "km": each(|k| k as f64 * 0.1),
+        "section": (0..rows).map(|k| if k % 3 == 0 { "curve" } else { "straight" }).collect::<Vec<_>>(),
+    })
+}
+
+/// Services on every kind of store that there is here.
+async fn services() -> Vec<Server> {
+    let mut services = vec![Server::start().await];
+    if let Some(url) = postgres::schema().await {
+        let mut setup = Setup::new();
+        setup.options.database = Some(Database {
+            url,
+            connections: 4,
+        });
+        services.push(setup.start().await);
+    }
+    services
+}
+
+async fn submit(server: &Server, body: &Value) -> String {
+    let answer = server.post("/v1/runs", body).await;
+    assert_eq!(answer.status, 202, "{}", answer.text);
+    answer.header("location").expect("a location").to_owned()
+}
+
+async fn ended(server: &Server, run: &str) -> Value {
+    let begun = Instant::now();
+    loop {
+        let answer = server.get(run).await;
+        assert_eq!(answer.status, 200, "{}", answer.text);
+        if answer.json["ended_at"].is_string() {
+            return answer.json;
+        }
+        assert!(begun.elapsed() < WITHIN, "{}", answer.text);
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+}
+
+/// A refusal whose faults say this.
+fn assert_faults(answer: &Answer, word: &str) {
+    assert_problem(answer, 422, "faulty-case", "fault");
+    assert!(
+        answer.text.contains(word),
+        "`{word}` is not in: {}",
+        answer.text
+    );
+}
+
+fn lines(answer: &Answer) -> Vec<Value> {
+    let lines = answer.text.lines();
+    lines
+        .map(|line| serde_json::from_str(line).expect("JSON"))
+        .collect()
+}
+
+#[tokio::test]
+async fn a_run_answers_each_of_its_rows_once_in_every_format() {
+    for server in services().await {
+        let (rows, sent) = (120, columns(120));
+        let run = submit(
+            &server,
+            &json!({ "template": template("auto"), "columns": sent }),
+        )
+        .await;
+        let about = ended(&server, &run).await;
+        assert_eq!(about["state"], "succeeded", "{about}");
+        assert_eq!([&about["rows"], &about["rows_done"]], [120, 120]);
+        assert_eq!(about["rows_without_answer"], 0);
+        let results = format!("{run}/results");
+        let all = lines(&server.get(&results).await);
+        let numbers: Vec<_> = all.iter().map(|row| row["row"].as_u64()).collect();
+        assert_eq!(numbers, (0..rows).map(Some).collect::<Vec<_>>());
+        for (place, row) in all.iter().enumerate() {
+            let load = sent["/load/normal_force_n"][place]
+                .as_f64()
+                .expect("a load");
+            assert!((row["normal_force_n"].as_f64().expect("a force") - load).abs() < 1e-3 * load);
+            let creepage = sent["creepage_x"][place].as_f64().expect("a creepage");
+            let force = row["force_x_n"].as_f64().expect("a force");
+            assert!(force * creepage > 0.0 || creepage == 0.0, "{row}");
+            assert_eq!(
+                [&row["km"], &row["section"]],
+                [&sent["km"][place], &sent["section"][place]]
+            );
+            assert!(row["status"] == "ok" && row["method"].is_string(), "{row}");
+        }
+        let csv = server
+            .get(&format!(
+                "{results}?format=csv&columns=row,force_x_n&rows=117:"
+            ))
+            .await;
+        let expected = all[117..]
+            .iter()
+            .map(|row| format!("{},{}\n", row["row"], row["force_x_n"]));
+        assert_eq!(
+            csv.text,
+            format!("row,force_x_n\n{}", expected.collect::<String>())
+        );
+        let parquet = server.get(&format!("{results}?format=parquet")).await;
+        let parquet = TableReader::new(bytes::Bytes::from(parquet.bytes)).expect("Parquet");
+        let arrow = server.get(&format!("{results}?format=arrow")).await;
+        let arrow = read(std::io::Cursor::new(arrow.bytes)).expect("Arrow");
+        let forces: Vec<f64> = all
+            .iter()
+            .filter_map(|row| row["force_x_n"].as_f64())
+            .collect();
+        let of = |table: &RowTable| match table.column("force_x_n") {
+            Some(TableColumn::Numbers(numbers)) => numbers.clone(),
+            _ => Vec::new(),
+        };
+        let groups = (0..parquet.groups())
+            .flat_map(|group| of(&parquet.read(group, |_| true).expect("a group")));
+        assert_eq!(groups.collect::<Vec<_>>(), forces);
+        assert_eq!(
+            arrow
+                .flat_map(|table| of(&table.expect("a batch")))
+                .collect::<Vec<_>>(),
+            forces
+        );
+        let manifest = server.get(&format!("{run}/manifest")).await;
+        let files = manifest.json["files"].as_array().expect("files").clone();
+        assert_eq!(
+            files
+                .iter()
+                .filter_map(|file| file["rows"].as_u64())
+                .sum::<u64>(),
+            rows
+        );
+        let first = server.get(files[0]["url"].as_str().expect("a path")).await;
+        assert_eq!(first.status, 200, "{}", first.text);
+        for other in [
+            format!("/v1/batches/{}", &run[9..]),
+            format!("/v1/jobs/{}", &run[9..]),
+        ] {
+            assert_eq!(server.get(&other).await.status, 404);
+        }
+        let jobs = server.get("/v1/jobs").await;
+        assert_eq!(
+            jobs.json["total"], 0,
+            "pieces of runs are no jobs of the client"
+        );
+        assert_eq!(
+            server.get("/v1/runs?limit=1").await.json["runs"][0]["id"],
+            about["id"]
+        );
+        assert_eq!(server.delete(&run).await.status, 204);
+        assert_problem(&server.get(&results).await, 404, "run-not-found", "run");
+    }
+}
+
+#[tokio::test]
+async fn totals_are_those_of_the_rows_in_all_and_by_section() {
+    let server = Server::start().await;
+    let run = submit(
+        &server,
+        &json!({ "template": template("table"), "columns": columns(90) }),
+    )
+    .await;
+    ended(&server, &run).await;
+    let rows = lines(&server.get(&format!("{run}/results?format=ndjson")).await);
+    let path = format!("{run}/totals?columns=force_x_n&percentiles=100&above=5000&by=section");
+    let totals = server.get(&path).await.json;
+    let sizes = |section: Option<&str>| -> Vec<f64> {
+        let of = rows
+            .iter()
+            .filter(|row| section.is_none_or(|name| row["section"] == name));
+        of.map(|row| row["force_x_n"].as_f64().expect("a force").abs())
+            .collect()
+    };
+    let compare = |totals: &Value, section: Option<&str>| {
+        let sizes = sizes(section);
+        let column = &totals["columns"]["force_x_n"];
+        let largest = sizes.iter().copied().fold(0.0, f64::max);
+        assert_eq!(column["percentiles"]["100"], largest, "{totals}");
+        let above = sizes.iter().filter(|size| **size >= 5000.0).count();
+        assert_eq!(column["above"]["5000"], above, "{totals}");
+        assert_eq!(totals["rows"], sizes.len());
+    };
+    compare(&totals["all"], None);
+    let sections = totals["sections"].as_array().expect("sections");
+    assert_eq!(sections.len(), 2);
+    for section in sections {
+        compare(section, section["value"].as_str());
+    }
+    let by_length = server
+        .get(&format!("{run}/totals?by=km&width=3"))
+        .await
+        .json;
+    let lengths = by_length["sections"].as_array().expect("sections");
+    assert_eq!(
+        lengths
+            .iter()
+            .map(|section| section["rows"].as_u64().expect("rows"))
+            .sum::<u64>(),
+        90
+    );
+    assert_eq!(lengths[1]["from"], 3.0);
+    let fault = server.get(&format!("{run}/totals?by=km")).await;
+    assert_problem(&fault, 400, "bad-query", "width");
+}
+
+/// The same rows as a table in some form.
+fn table() -> RowTable {
+    RowTable {
+        columns: vec![
+            (
+                "normal_force_n".to_owned(),
+                TableColumn::Numbers(vec![5e4, 6e4, 7e4]),
+            ),
+            (
+                "/motion/creepage_x".to_owned(),
+                TableColumn::Numbers(vec![1e-3, 0.0, -2e-3]),
+            ),
+            (
+                "section".to_owned(),
+                TableColumn::Texts(["a", "b", "a"].map(str::to_owned).to_vec()),
+            ),
+        ],
+    }
+}
+
+#[tokio::test]
+async fn the_same_rows_are_answered_alike_whatever_form_they_come_in() {
+    let server = Server::start().await;
+    let job = server
+        .submit(&{
+            let mut case = template("table");
+            case["load"]["normal_force_n"] = json!(1e5);
+            case
+        })
+        .await;
+    let kinds: Vec<_> = table()
+        .columns
+        .iter()
+        .map(|(name, column)| (name.clone(), column.kind()))
+        .collect();
+    let mut arrow = ArrowWriter::new(Vec::new(), &kinds).expect("a stream");
+    arrow.write(table()).expect("a batch");
+    arrow.finish().expect("the end");
+    let csv = "normal_force_n,/motion/creepage_x,section\n5e4,1e-3,a\n6e4,0,b\n7e4,-2e-3,a\n";
+    let ndjson = "{\"normal_force_n\":5e4,\"/motion/creepage_x\":1e-3,\"section\":\"a\"}\n\
+                  {\"normal_force_n\":6e4,\"/motion/creepage_x\":0,\"section\":\"b\"}\n\
+                  {\"normal_force_n\":7e4,\"/motion/creepage_x\":-2e-3,\"section\":\"a\"}\n";
+    let mut answers = Vec::new();
+    for (form, body) in [
+        ("text/csv", csv.as_bytes().to_vec()),
+        ("application/x-ndjson", ndjson.as_bytes().to_vec()),
+        (
+            "application/vnd.apache.arrow.stream",
+            std::mem::take(arrow.inner_mut()),
+        ),
+        (
+            "application/vnd.apache.parquet",
+            encode(&table()).expect("a file"),
+        ),
+    ] {
+        let path = format!("/v1/runs?template={}", &job[9..]);
+        let send =
+            |request: reqwest::RequestBuilder| request.header("content-type", form).body(body);
+        let answer = server.send(Method::POST, &path, send).await;
+        assert_eq!(answer.status, 202, "{form}: {}", answer.text);
+        let run = answer.header("location").expect("a location").to_owned();
+        ended(&server, &run).await;
+        answers.push(server.get(&format!("{run}/results?format=csv")).await.text);
+    }
+    assert!(
+        answers[0]
+            .lines()
+            .nth(1)
+            .is_some_and(|line| line.starts_with("0,a,ok,table,")),
+        "{}",
+        answers[0]
+    );
+    assert!(
+        answers.iter().all(|answer| *answer == answers[0]),
+        "{answers:#?}"
+    );
+}
+
+#[tokio::test]
+async fn a_row_that_cannot_be_solved_has_a_status_and_faults_of_a_run_are_named() {
+    let server = Server::start().await;
+    let mut rows = json!({ "template": template("boundary_element"), "columns": { "/friction/coefficient": [0.3, 0.2], "/material/poisson_ratio": [0.28, 0.3] } });
+    rows["template"]["load"]["normal_force_n"] = json!(8e4);
+    // A row's own fault, which no look at one column shows.
+    rows["columns"]["/contact/gauge_mm"] = json!([1435.0, 1435.0]);
+    let fault = server.post("/v1/runs", &rows).await;
+    assert_faults(&fault, "gauge_mm");
+    rows["columns"] = json!({ "/solver/target_error": [0.01, 7.0, 0.01], "/friction/coefficient": [0.3, 0.2, 0.1] });
+    let run = submit(&server, &rows).await;
+    let about = ended(&server, &run).await;
+    assert_eq!(
+        [&about["state"], &about["rows_without_answer"]],
+        [&json!("succeeded"), &json!(1)]
+    );
+    let all = lines(&server.get(&format!("{run}/results")).await);
+    let statuses: Vec<_> = all.iter().map(|row| row["status"].as_str()).collect();
+    assert_eq!(statuses, [Some("ok"), Some("refused"), Some("ok")]);
+    assert!(all[1]["force_x_n"].is_null() && all[1]["method"].is_null());
+    for (pointer, values, word) in [
+        (
+            "/load/normal_force_n",
+            json!([1e5, -1.0]),
+            "/columns/~1load~1normal_force_n/1",
+        ),
+        (
+            "/load/normal_force_n",
+            json!([1e5]),
+            "all columns need as many",
+        ),
+        (
+            "/load/normal_force_n",
+            json!([]),
+            "all columns need as many",
+        ),
+        ("force_x_n", json!(["a", "b"]), "/columns/force_x_n/0"),
+        ("status", json!(["a", "b"]), "carried along"),
+    ] {
+        let mut body =
+            json!({ "template": template("auto"), "columns": { "creepage_x": [0.0, 1e-3] } });
+        body["columns"][pointer] = values;
+        let answer = server.post("/v1/runs", &body).await;
+        assert_faults(&answer, word);
+    }
+    let mut sweep =
+        json!({ "template": template("auto"), "columns": { "/load/normal_force_n": [1e5] } });
+    sweep["template"]["motion"] = json!([{ "creepage_x": 0.0 }, { "creepage_x": 0.1 }]);
+    sweep["template"]["outputs"] = json!(["resultants", "tractions"]);
+    let answer = server.post("/v1/runs", &sweep).await;
+    assert_faults(&answer, "one motion");
+    assert!(answer.text.contains("/template/outputs"), "{}", answer.text);
+}
+
+#[tokio::test]
+async fn a_key_gives_the_run_again_and_a_cancelled_run_keeps_what_it_has() {
+    for server in services().await {
+        let body = json!({ "template": template("table"), "columns": columns(30) });
+        let keyed = async |body: &Value| {
+            let send = |request: reqwest::RequestBuilder| {
+                request.header("idempotency-key", "night").json(body)
+            };
+            server
+                .send(Method::POST, "/v1/runs?name=night&label=line:A12", send)
+                .await
+        };
+        let (first, again) = (keyed(&body).await, keyed(&body).await);
+        assert_eq!(first.json["id"], again.json["id"]);
+        assert_eq!(again.header("idempotency-replayed"), Some("true"));
+        let other = json!({ "template": template("table"), "columns": columns(31) });
+        assert_problem(&keyed(&other).await, 422, "idempotency-conflict", "Key");
+        let run = format!("/v1/runs/{}", first.json["id"].as_str().expect("an id"));
+        ended(&server, &run).await;
+        assert_eq!(
+            server.get("/v1/runs?label=line:A12&name=NIGHT").await.json["total"],
+            1
+        );
+        let cancelled = server.post(&format!("{run}/cancel"), &json!({})).await;
+        assert_eq!(cancelled.json["state"], "succeeded");
+    }
+    let idle = Server::idle().await;
+    let mut columns = columns(130);
+    columns["/solver/target_error"] = json!(vec![0.001; 130]);
+    let run = submit(
+        &idle,
+        &json!({ "template": template("boundary_element"), "columns": columns }),
+    )
+    .await;
+    let early = idle.get(&format!("{run}/results")).await;
+    assert_problem(&early, 409, "result-not-ready", "queued");
+    assert_problem(&idle.delete(&run).await, 409, "run-not-ended", "cancel");
+    let cancelled = idle.post(&format!("{run}/cancel"), &json!({})).await;
+    assert_eq!(
+        (cancelled.status, &cancelled.json["state"]),
+        (200, &json!("cancelled"))
+    );
+    assert_eq!(cancelled.json["rows_without_answer"], 130);
+    let all = lines(&idle.get(&format!("{run}/results")).await);
+    assert_eq!(all.len(), 130);
+    assert!(
+        all.iter()
+            .all(|row| row["status"] == "cancelled" && row["section"].is_string())
+    );
+}
+
+#[tokio::test]
+async fn more_rows_or_bytes_than_allowed_are_refused() {
+    let mut setup = Setup::new();
+    setup.working = false;
+    (setup.http.run_max_rows, setup.http.run_max_bytes) = (100, 4096);
+    let server = setup.start().await;
+    let body = json!({ "template": template("table"), "columns": columns(101) });
+    assert_problem(
+        &server.post("/v1/runs", &body).await,
+        413,
+        "body-too-large",
+        "run-max-rows",
+    );
+    let mut case = template("table");
+    case["load"]["normal_force_n"] = json!(1e5);
+    let job = server.submit(&case).await;
+    let send = |request: reqwest::RequestBuilder| {
+        request
+            .header("content-type", "text/csv")
+            .body("creepage_x\n".repeat(1000))
+    };
+    let answer = server
+        .send(
+            Method::POST,
+            &format!("/v1/runs?template={}", &job[9..]),
+            send,
+        )
+        .await;
+    assert_problem(&answer, 413, "body-too-large", "4096");
+    let send = |request: reqwest::RequestBuilder| {
+        request.header("content-type", "text/csv").body("a\n1\n")
+    };
+    assert_problem(
+        &server.send(Method::POST, "/v1/runs", send).await,
+        400,
+        "bad-query",
+        "template",
+    );
+}
