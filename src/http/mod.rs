@@ -162,7 +162,6 @@ fn resources() -> OpenApiRouter<AppState> {
     let changing = OpenApiRouter::with_openapi(contract::head())
         .routes(routes!(jobs::get, jobs::delete))
         .routes(routes!(batches::get, batches::delete))
-        .routes(routes!(runs::get, runs::delete))
         .routes(routes!(methods::methods))
         .routes(routes!(remarks::remarks))
         .routes(routes!(service_examples::examples))
@@ -179,14 +178,11 @@ fn resources() -> OpenApiRouter<AppState> {
     let lists = OpenApiRouter::new()
         .routes(routes!(jobs::submit, job_list::list))
         .routes(routes!(batches::submit, batch_list::list))
-        .routes(routes!(runs::submit, runs::list))
         .route_layer(from_fn(etag::revalidate));
     let lists = contract::conditional(lists);
     let plain = OpenApiRouter::new()
         .routes(routes!(jobs::cancel))
         .routes(routes!(batches::cancel))
-        .routes(routes!(runs::cancel))
-        .routes(routes!(run_results::manifest))
         .routes(routes!(cases::check))
         .routes(routes!(problems::list))
         .routes(routes!(problems::explain))
@@ -195,7 +191,6 @@ fn resources() -> OpenApiRouter<AppState> {
         .merge(finished)
         .merge(plain)
         .routes(routes!(me::me))
-        .routes(routes!(run_totals::totals))
         .merge(lists)
         .route_layer(from_fn(accept::require_json));
     // These choose among several forms themselves.
@@ -224,12 +219,30 @@ fn resources() -> OpenApiRouter<AppState> {
         .routes(routes!(tenant_events::follow))
         .route_layer(from_fn(query::refuse_parameters));
     v1.merge(parts)
+        .merge(rows())
         .routes(routes!(batch_results::results))
-        .routes(routes!(run_results::results))
         .routes(routes!(evaluate::evaluate))
         .merge(events)
         .merge(probes())
         .merge(contract)
+}
+
+/// Runs.
+fn rows() -> OpenApiRouter<AppState> {
+    let changing = OpenApiRouter::new()
+        .routes(routes!(runs::get, runs::delete))
+        .route_layer(from_fn(query::refuse_parameters));
+    let lists = OpenApiRouter::new().routes(routes!(runs::submit, runs::list));
+    let tagged = changing.merge(lists).route_layer(from_fn(etag::revalidate));
+    let plain = OpenApiRouter::new()
+        .routes(routes!(runs::cancel))
+        .routes(routes!(run_results::manifest))
+        .route_layer(from_fn(query::refuse_parameters));
+    contract::conditional(tagged)
+        .merge(plain)
+        .routes(routes!(run_totals::totals))
+        .route_layer(from_fn(accept::require_json))
+        .routes(routes!(run_results::results))
 }
 
 /// What is asked every few seconds, of a port of its own if there is one.

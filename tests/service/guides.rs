@@ -106,6 +106,24 @@ fn guide_to_forms_runs_as_it_stands() {
 }
 
 #[test]
+fn guide_to_runs_runs_as_it_stands() {
+    if !has_shell_tools() {
+        return;
+    }
+    let (folder, data) = (folder(), tempfile::tempdir().expect("a folder"));
+    let service = Service::start(data.path(), &[]);
+    let script = blocks("docs/runs.md", "sh", &service);
+    let output = run(Path::new("bash"), &["-euc", &script], folder.path());
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(
+        said.contains("row,km,section,status,method,normal_force_n,force_x_n"),
+        "{said}"
+    );
+    assert!(said.contains("\"value\": \"straight\""), "{said}");
+    begins_with(&folder.path().join("night.parquet"), b"PAR1");
+}
+
+#[test]
 fn creep_curve_from_the_shell_runs_as_it_stands() {
     if !has_shell_tools() {
         return;

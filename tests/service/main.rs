@@ -60,6 +60,7 @@ mod requests;
 mod result_places;
 mod results;
 mod retention;
+mod run_forms;
 mod runs;
 mod schema;
 mod schemathesis;

@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use railhead::jobs::codec::arrow::{ArrowWriter, read};
-use railhead::jobs::codec::parquet::{TableReader, encode};
+use railhead::jobs::codec::arrow::read;
+use railhead::jobs::codec::parquet::TableReader;
 use railhead::jobs::codec::table::{RowTable, TableColumn};
 use railhead::jobs::options::Database;
 use reqwest::Method;
@@ -16,7 +16,7 @@ use crate::server::{Answer, Server, Setup};
 /// Ends of a guard: something hangs.
 const WITHIN: Duration = Duration::from_secs(90);
 
-fn template(method: &str) -> Value {
+pub fn template(method: &str) -> Value {
     json!({
         "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
         "friction": { "coefficient": 0.3 },
@@ -28,7 +28,7 @@ fn template(method: &str) -> Value {
 }
 
 /// Columns of so many rows: loads, creepages, and where they were.
-fn columns(rows: usize) -> Value {
+pub fn columns(rows: usize) -> Value {
     let each = |of: fn(usize) -> f64| (0..rows).map(of).collect::<Vec<_>>();
     json!({
         "/load/normal_force_n": each(|k| 5e4 + 1e3 * (k % 7) as f64),
@@ -58,7 +58,7 @@ async fn submit(server: &Server, body: &Value) -> String {
     answer.header("location").expect("a location").to_owned()
 }
 
-async fn ended(server: &Server, run: &str) -> Value {
+pub async fn ended(server: &Server, run: &str) -> Value {
     let begun = Instant::now();
     loop {
         let answer = server.get(run).await;
@@ -86,6 +86,58 @@ fn lines(answer: &Answer) -> Vec<Value> {
     lines
         .map(|line| serde_json::from_str(line).expect("JSON"))
         .collect()
+}
+
+/// The forms in which the answers come hold the same numbers.
+async fn assert_forms(server: &Server, results: &str, all: &[Value]) {
+    let csv = server
+        .get(&format!(
+            "{results}?format=csv&columns=row,force_x_n&rows=117:"
+        ))
+        .await;
+    let expected = all[117..]
+        .iter()
+        .map(|row| format!("{},{}\n", row["row"], row["force_x_n"]));
+    assert_eq!(
+        csv.text,
+        format!("row,force_x_n\n{}", expected.collect::<String>())
+    );
+    let parquet = server.get(&format!("{results}?format=parquet")).await;
+    let parquet = TableReader::new(bytes::Bytes::from(parquet.bytes)).expect("Parquet");
+    let arrow = server.get(&format!("{results}?format=arrow")).await;
+    let arrow = read(std::io::Cursor::new(arrow.bytes)).expect("Arrow");
+    let forces: Vec<f64> = all
+        .iter()
+        .filter_map(|row| row["force_x_n"].as_f64())
+        .collect();
+    let of = |table: &RowTable| match table.column("force_x_n") {
+        Some(TableColumn::Numbers(numbers)) => numbers.clone(),
+        _ => Vec::new(),
+    };
+    let groups = (0..parquet.groups())
+        .flat_map(|group| of(&parquet.read(group, |_| true).expect("a group")));
+    assert_eq!(groups.collect::<Vec<_>>(), forces);
+    assert_eq!(
+        arrow
+            .flat_map(|table| of(&table.expect("a batch")))
+            .collect::<Vec<_>>(),
+        forces
+    );
+}
+
+/// The files of the manifest hold every row once.
+async fn assert_manifest(server: &Server, run: &str, rows: u64) {
+    let manifest = server.get(&format!("{run}/manifest")).await;
+    let files = manifest.json["files"].as_array().expect("files").clone();
+    assert_eq!(
+        files
+            .iter()
+            .filter_map(|file| file["rows"].as_u64())
+            .sum::<u64>(),
+        rows
+    );
+    let first = server.get(files[0]["url"].as_str().expect("a path")).await;
+    assert_eq!(first.status, 200, "{}", first.text);
 }
 
 #[tokio::test]
@@ -119,50 +171,8 @@ async fn a_run_answers_each_of_its_rows_once_in_every_format() {
             );
             assert!(row["status"] == "ok" && row["method"].is_string(), "{row}");
         }
-        let csv = server
-            .get(&format!(
-                "{results}?format=csv&columns=row,force_x_n&rows=117:"
-            ))
-            .await;
-        let expected = all[117..]
-            .iter()
-            .map(|row| format!("{},{}\n", row["row"], row["force_x_n"]));
-        assert_eq!(
-            csv.text,
-            format!("row,force_x_n\n{}", expected.collect::<String>())
-        );
-        let parquet = server.get(&format!("{results}?format=parquet")).await;
-        let parquet = TableReader::new(bytes::Bytes::from(parquet.bytes)).expect("Parquet");
-        let arrow = server.get(&format!("{results}?format=arrow")).await;
-        let arrow = read(std::io::Cursor::new(arrow.bytes)).expect("Arrow");
-        let forces: Vec<f64> = all
-            .iter()
-            .filter_map(|row| row["force_x_n"].as_f64())
-            .collect();
-        let of = |table: &RowTable| match table.column("force_x_n") {
-            Some(TableColumn::Numbers(numbers)) => numbers.clone(),
-            _ => Vec::new(),
-        };
-        let groups = (0..parquet.groups())
-            .flat_map(|group| of(&parquet.read(group, |_| true).expect("a group")));
-        assert_eq!(groups.collect::<Vec<_>>(), forces);
-        assert_eq!(
-            arrow
-                .flat_map(|table| of(&table.expect("a batch")))
-                .collect::<Vec<_>>(),
-            forces
-        );
-        let manifest = server.get(&format!("{run}/manifest")).await;
-        let files = manifest.json["files"].as_array().expect("files").clone();
-        assert_eq!(
-            files
-                .iter()
-                .filter_map(|file| file["rows"].as_u64())
-                .sum::<u64>(),
-            rows
-        );
-        let first = server.get(files[0]["url"].as_str().expect("a path")).await;
-        assert_eq!(first.status, 200, "{}", first.text);
+        assert_forms(&server, &results, &all).await;
+        assert_manifest(&server, &run, rows).await;
         for other in [
             format!("/v1/batches/{}", &run[9..]),
             format!("/v1/jobs/{}", &run[9..]),
@@ -232,84 +242,6 @@ async fn totals_are_those_of_the_rows_in_all_and_by_section() {
     assert_eq!(lengths[1]["from"], 3.0);
     let fault = server.get(&format!("{run}/totals?by=km")).await;
     assert_problem(&fault, 400, "bad-query", "width");
-}
-
-/// The same rows as a table in some form.
-fn table() -> RowTable {
-    RowTable {
-        columns: vec![
-            (
-                "normal_force_n".to_owned(),
-                TableColumn::Numbers(vec![5e4, 6e4, 7e4]),
-            ),
-            (
-                "/motion/creepage_x".to_owned(),
-                TableColumn::Numbers(vec![1e-3, 0.0, -2e-3]),
-            ),
-            (
-                "section".to_owned(),
-                TableColumn::Texts(["a", "b", "a"].map(str::to_owned).to_vec()),
-            ),
-        ],
-    }
-}
-
-#[tokio::test]
-async fn the_same_rows_are_answered_alike_whatever_form_they_come_in() {
-    let server = Server::start().await;
-    let job = server
-        .submit(&{
-            let mut case = template("table");
-            case["load"]["normal_force_n"] = json!(1e5);
-            case
-        })
-        .await;
-    let kinds: Vec<_> = table()
-        .columns
-        .iter()
-        .map(|(name, column)| (name.clone(), column.kind()))
-        .collect();
-    let mut arrow = ArrowWriter::new(Vec::new(), &kinds).expect("a stream");
-    arrow.write(table()).expect("a batch");
-    arrow.finish().expect("the end");
-    let csv = "normal_force_n,/motion/creepage_x,section\n5e4,1e-3,a\n6e4,0,b\n7e4,-2e-3,a\n";
-    let ndjson = "{\"normal_force_n\":5e4,\"/motion/creepage_x\":1e-3,\"section\":\"a\"}\n\
-                  {\"normal_force_n\":6e4,\"/motion/creepage_x\":0,\"section\":\"b\"}\n\
-                  {\"normal_force_n\":7e4,\"/motion/creepage_x\":-2e-3,\"section\":\"a\"}\n";
-    let mut answers = Vec::new();
-    for (form, body) in [
-        ("text/csv", csv.as_bytes().to_vec()),
-        ("application/x-ndjson", ndjson.as_bytes().to_vec()),
-        (
-            "application/vnd.apache.arrow.stream",
-            std::mem::take(arrow.inner_mut()),
-        ),
-        (
-            "application/vnd.apache.parquet",
-            encode(&table()).expect("a file"),
-        ),
-    ] {
-        let path = format!("/v1/runs?template={}", &job[9..]);
-        let send =
-            |request: reqwest::RequestBuilder| request.header("content-type", form).body(body);
-        let answer = server.send(Method::POST, &path, send).await;
-        assert_eq!(answer.status, 202, "{form}: {}", answer.text);
-        let run = answer.header("location").expect("a location").to_owned();
-        ended(&server, &run).await;
-        answers.push(server.get(&format!("{run}/results?format=csv")).await.text);
-    }
-    assert!(
-        answers[0]
-            .lines()
-            .nth(1)
-            .is_some_and(|line| line.starts_with("0,a,ok,table,")),
-        "{}",
-        answers[0]
-    );
-    assert!(
-        answers.iter().all(|answer| *answer == answers[0]),
-        "{answers:#?}"
-    );
 }
 
 #[tokio::test]
@@ -414,45 +346,5 @@ async fn a_key_gives_the_run_again_and_a_cancelled_run_keeps_what_it_has() {
     assert!(
         all.iter()
             .all(|row| row["status"] == "cancelled" && row["section"].is_string())
-    );
-}
-
-#[tokio::test]
-async fn more_rows_or_bytes_than_allowed_are_refused() {
-    let mut setup = Setup::new();
-    setup.working = false;
-    (setup.http.run_max_rows, setup.http.run_max_bytes) = (100, 4096);
-    let server = setup.start().await;
-    let body = json!({ "template": template("table"), "columns": columns(101) });
-    assert_problem(
-        &server.post("/v1/runs", &body).await,
-        413,
-        "body-too-large",
-        "run-max-rows",
-    );
-    let mut case = template("table");
-    case["load"]["normal_force_n"] = json!(1e5);
-    let job = server.submit(&case).await;
-    let send = |request: reqwest::RequestBuilder| {
-        request
-            .header("content-type", "text/csv")
-            .body("creepage_x\n".repeat(1000))
-    };
-    let answer = server
-        .send(
-            Method::POST,
-            &format!("/v1/runs?template={}", &job[9..]),
-            send,
-        )
-        .await;
-    assert_problem(&answer, 413, "body-too-large", "4096");
-    let send = |request: reqwest::RequestBuilder| {
-        request.header("content-type", "text/csv").body("a\n1\n")
-    };
-    assert_problem(
-        &server.send(Method::POST, "/v1/runs", send).await,
-        400,
-        "bad-query",
-        "template",
     );
 }

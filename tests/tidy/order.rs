@@ -35,6 +35,7 @@ const ORDER: &[&str] = &[
     "contact::slices",
     "contact::evaluate",
     "contact",
+    "contact::evaluate::many",
     "contact::lib",
     "jobs::run::lane",
     "jobs::clock",

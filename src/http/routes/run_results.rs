@@ -24,10 +24,10 @@ use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::http::render::row_tables::{RowWriter, WriteError};
-use crate::jobs::Jobs;
 use crate::jobs::codec::table::{RowTable, TableKind};
 use crate::jobs::run::model::Run;
 use crate::jobs::run::results::ChunkRef;
+use crate::jobs::{Jobs, JobsError};
 
 /// What a reader of answers holds: a chunk as columns and as text.
 const STREAM_BYTES: usize = 12 << 20;
@@ -219,7 +219,7 @@ impl ChunkSource {
     }
 
     /// The next chunk.
-    pub async fn next(&mut self) -> Result<Option<ChunkRef>, crate::jobs::JobsError> {
+    pub async fn next(&mut self) -> Result<Option<ChunkRef>, JobsError> {
         if self.read.is_empty() && !self.over {
             let more = self.jobs.run_chunks(self.run.chunks.id, self.last).await?;
             self.last = more.last().map(|chunk| chunk.job);
@@ -234,7 +234,7 @@ impl ChunkSource {
         &self,
         chunk: &ChunkRef,
         wanted: Vec<String>,
-    ) -> Result<RowTable, crate::jobs::JobsError> {
+    ) -> Result<RowTable, JobsError> {
         self.jobs
             .chunk_answers(&self.run.head, chunk, Some(wanted))
             .await

@@ -167,7 +167,7 @@ pub async fn totals(
 }
 
 /// How rows are told apart.
-struct Section {
+struct RowSection {
     name: String,
     /// Length of an interval; texts have none.
     width: Option<f64>,
@@ -177,7 +177,7 @@ fn section_of(
     columns: &[(String, TableKind)],
     by: Option<String>,
     width: Option<f64>,
-) -> Result<Option<Section>, ApiError> {
+) -> Result<Option<RowSection>, ApiError> {
     let Some(name) = by else {
         return match width {
             None => Ok(None),
@@ -190,7 +190,7 @@ fn section_of(
             let detail = format!("`{name}` is no column of this run");
             Err(ApiError::bad_parameter("by", detail))
         }
-        (Some((_, TableKind::Texts)), None) => Ok(Some(Section { name, width })),
+        (Some((_, TableKind::Texts)), None) => Ok(Some(RowSection { name, width })),
         (Some((_, TableKind::Texts)), Some(_)) => Err(ApiError::bad_parameter(
             "width",
             format!("`{name}` holds texts, which have no intervals"),
@@ -199,7 +199,7 @@ fn section_of(
             "width",
             format!("`{name}` holds numbers; `width` says how long an interval is"),
         )),
-        (Some(_), Some(_)) => Ok(Some(Section { name, width })),
+        (Some(_), Some(_)) => Ok(Some(RowSection { name, width })),
     }
 }
 
@@ -212,7 +212,7 @@ enum SectionKey {
 
 struct Gathered {
     names: Vec<String>,
-    section: Option<Section>,
+    section: Option<RowSection>,
     all: Numbers,
     sections: BTreeMap<SectionKey, Numbers>,
 }
@@ -235,7 +235,7 @@ impl Numbers {
 }
 
 impl Gathered {
-    fn new(names: Vec<String>, section: Option<Section>) -> Gathered {
+    fn new(names: Vec<String>, section: Option<RowSection>) -> Gathered {
         Gathered {
             all: Numbers::new(names.len()),
             names,
@@ -301,7 +301,7 @@ impl Gathered {
     }
 }
 
-impl Section {
+impl RowSection {
     fn key(&self, table: &RowTable, row: usize) -> Option<SectionKey> {
         match table.column(&self.name)? {
             TableColumn::Texts(texts) => Some(SectionKey::Text(texts[row].clone())),

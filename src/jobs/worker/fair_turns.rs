@@ -37,8 +37,9 @@ struct Used {
 }
 
 impl Used {
-    fn now(&self) -> f64 {
-        let lives = self.at.elapsed().as_secs_f64() / HALF_LIFE.as_secs_f64();
+    fn at(&self, now: Instant) -> f64 {
+        let elapsed = now.saturating_duration_since(self.at);
+        let lives = elapsed.as_secs_f64() / HALF_LIFE.as_secs_f64();
         self.seconds * 0.5_f64.powf(lives)
     }
 }
@@ -63,7 +64,7 @@ impl FairTurns {
             queue_since: 0.0,
             parked_was_last: false,
         });
-        used.seconds = used.now() + time.as_secs_f64();
+        used.seconds = used.at(now) + time.as_secs_f64();
         used.at = now;
         match spent {
             TimeSpentOn::New => used.queue_since += time.as_secs_f64(),
@@ -72,14 +73,16 @@ impl FairTurns {
                 used.parked_was_last = spent == TimeSpentOn::Parked;
             }
         }
-        inner.used.retain(|_, used| used.now() > FORGOTTEN);
+        inner.used.retain(|_, used| used.at(now) > FORGOTTEN);
     }
 
     /// Lanes in the order of their turns: the tenant that has used the least in both of its lanes comes first, and of these the lane that has.
     pub(crate) fn order(&self, mut tenants: Vec<Arc<str>>) -> Vec<Arc<str>> {
         let inner = self.lock();
         tenants.extend(inner.parked.iter().map(|attempt| attempt.tenant.clone()));
-        let used = |lane: &str| inner.used.get(lane).map_or(0.0, Used::now);
+        // All at one moment, so that both lanes of a tenant have the same sum.
+        let now = Instant::now();
+        let used = |lane: &str| inner.used.get(lane).map_or(0.0, |used| used.at(now));
         let mut keyed: Vec<_> = tenants
             .into_iter()
             .map(|lane| {

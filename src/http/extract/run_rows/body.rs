@@ -19,12 +19,12 @@ use crate::http::limits::memory::Memory;
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
-use crate::jobs::Jobs;
 use crate::jobs::codec::arrow;
 use crate::jobs::codec::parquet::TableReader;
 use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
 use crate::jobs::run::draft::RunDraft;
 use crate::jobs::run::head::RunColumn;
+use crate::jobs::{Jobs, JobsError};
 
 /// Memory that a packed table takes while a piece of it is read.
 const PIECE_BYTES: usize = 64 << 20;
@@ -204,7 +204,7 @@ fn groups(file: File) -> Result<impl Iterator<Item = Result<RowTable, ApiError>>
 /// A draft of tables that all have the columns of the first.
 fn from_tables(
     tables: impl Iterator<Item = Result<RowTable, ApiError>>,
-    draft: impl Fn(Vec<RunColumn>) -> Result<RunDraft, crate::jobs::JobsError>,
+    draft: impl Fn(Vec<RunColumn>) -> Result<RunDraft, JobsError>,
 ) -> Result<RunDraft, ApiError> {
     let mut begun: Option<RunDraft> = None;
     for table in tables {

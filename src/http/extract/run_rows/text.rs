@@ -208,7 +208,7 @@ mod tests {
 
     #[test]
     fn csv_and_ndjson_of_the_same_rows_are_the_same_columns() {
-        let csv = "\u{feff}creepage_x, km ,section\r\n0.1,,a\r\n-2e-3,37.5, \"b, c\" \r\n";
+        let csv = "\u{feff}creepage_x, km ,section\r\n0.1,,a\r\n-2e-3,37.5,\"b, c\"\r\n";
         let json = "{\"creepage_x\":0.1,\"km\":null,\"section\":\"a\"}\n\n{\"section\":\"b, c\",\"km\":37.5,\"creepage_x\":-2e-3}";
         let mut by_csv = CsvRows::new(csv.as_bytes()).unwrap();
         let mut by_json = JsonRows::new(json.as_bytes()).unwrap();

@@ -91,6 +91,10 @@ pub struct RequestLimits {
     batch_max_bytes: u64,
     /// Most cases of a batch.
     batch_max_cases: u32,
+    /// Largest body of a run in bytes.
+    run_max_bytes: u64,
+    /// Most rows of a run.
+    run_max_rows: u64,
     /// Most queued jobs of the tenant.
     queue_max: u64,
     /// Most samples of a `grid` that a result is resampled on.
@@ -147,6 +151,8 @@ pub async fn methods(
             time_limit_max_seconds: own.time_limit.as_secs_f64(),
             batch_max_bytes: options.batch_max_bytes,
             batch_max_cases: options.batch_max_cases,
+            run_max_bytes: options.run_max_bytes,
+            run_max_rows: options.run_max_rows,
             queue_max: own.tenant_queue_max.min(own.queue_max),
             grid_max_samples: options.grid_max_samples,
             tenant: TenantLimits::of(&options),
