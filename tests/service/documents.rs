@@ -168,7 +168,8 @@ async fn tour_uses_existing_examples_and_routes() {
             .next()
             .expect("a path")
             .replace("$JOB", "/v1/jobs/{id}")
-            .replace("$BATCH", "/v1/batches/{id}");
+            .replace("$BATCH", "/v1/batches/{id}")
+            .replace("$RUN", "/v1/runs/{id}");
         assert!(
             known.contains_key(&path),
             "{line}: the contract has no {path}"

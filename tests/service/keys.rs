@@ -106,6 +106,13 @@ fn key_and_bound_key(folder: &Path) -> (String, String) {
     (make_key(folder, "north"), made.trim().to_owned())
 }
 
+/// Rows of a run.
+fn rows() -> Value {
+    let mut template = crate::support::case("rows");
+    template["outputs"] = json!(["resultants"]);
+    json!({ "template": template, "columns": { "/friction/coefficient": [0.2, 0.3] } })
+}
+
 #[tokio::test]
 async fn a_key_bound_to_a_label_opens_nothing_of_others() {
     let folder = tempfile::tempdir().unwrap();
@@ -130,7 +137,16 @@ async fn a_key_bound_to_a_label_opens_nothing_of_others() {
         ask(&service, &all, (Method::POST, "/v1/batches"), Some(&cases)).await
     };
     let batch = batch["links"]["self"].as_str().unwrap();
+    let rows = rows();
+    let (_, run) = ask(&service, &all, (Method::POST, "/v1/runs"), Some(&rows)).await;
+    let run = run["links"]["self"].as_str().unwrap();
     for (method, path) in [
+        (Method::GET, run),
+        (Method::GET, &format!("{run}/results")),
+        (Method::GET, &format!("{run}/manifest")),
+        (Method::GET, &format!("{run}/totals")),
+        (Method::POST, &format!("{run}/cancel")),
+        (Method::DELETE, run),
         (Method::GET, other),
         (Method::GET, &format!("{other}/case")),
         (Method::GET, &format!("{other}/result")),
@@ -145,7 +161,7 @@ async fn a_key_bound_to_a_label_opens_nothing_of_others() {
         let (status, _) = ask(&service, &bound, (method.clone(), path), None).await;
         assert_eq!(status, 404, "{method} {path}");
     }
-    for list in ["jobs", "batches"] {
+    for list in ["jobs", "batches", "runs"] {
         let path = format!("/v1/{list}");
         let (_, page) = ask(&service, &bound, (Method::GET, &path), None).await;
         assert_eq!(page[list], json!([]));
@@ -183,6 +199,8 @@ async fn a_key_bound_to_a_label_gives_it_to_what_it_makes() {
         let labels = &batches["batches"][0]["labels"];
         assert_eq!(*labels, json!({ "line": "7" }), "{batches}");
     }
+    let (_, run) = ask(&service, &bound, (Method::POST, "/v1/runs"), Some(&rows())).await;
+    assert_eq!(run["labels"], json!({ "line": "7" }), "{run}");
     let (_, me) = ask(&service, &bound, (Method::GET, "/v1/me"), None).await;
     assert_eq!(me["labels"], json!({ "line": "7" }));
 }

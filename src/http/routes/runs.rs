@@ -90,9 +90,12 @@ pub async fn submit(
 ) -> Result<Response, ApiError> {
     let idempotency_key = idempotency_key(request.headers())?;
     let (run, submit) = <(RunQuery, SubmitQuery)>::read(request.uri(), &())?;
+    let mut labels = labels_of(run.label.unwrap_or_default())?;
+    jobs.bind(&mut labels)
+        .map_err(|faults| ApiError::bad_parameter("label", faults[0].detail.clone()))?;
     let options_of_run = RunOptions {
         name: run.name,
-        labels: labels_of(run.label.unwrap_or_default())?,
+        labels,
         submit: submit.options(request.headers()),
         idempotency_key,
     };

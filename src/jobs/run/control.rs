@@ -14,7 +14,10 @@ impl Jobs {
     /// The lane of the tenant in which the chunks of its runs are jobs.
     #[must_use]
     pub(crate) fn rows(&self) -> Jobs {
-        self.of(rows_lane(&self.tenant))
+        Jobs {
+            tenant: rows_lane(&self.tenant),
+            ..self.clone()
+        }
     }
 
     /// A run.
