@@ -6,6 +6,9 @@ pub(crate) const PLACE_MAX: f64 = 65.0;
 const TRIALS_MAX: u32 = 40;
 /// Width of a bracket, relative to its ends, below which it is not divided further.
 const CLOSED: f64 = 1e-13;
+/// The same relative to the tolerance of the value: a function that is not steeper than the inverse of this and misses the tolerance
+/// at both ends has a jump between them. Forces over places are no steeper than 10.
+const CLOSED_OF_TOLERANCE: f64 = 1e-3;
 
 /// How a search ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,7 +79,8 @@ pub(crate) fn find_root<E>(
         let slope = last.map(|[at, before]| (value - before) / (place - at));
         last = Some([place, value]);
         if let (Some([p, f]), Some([q, g])) = (low, high) {
-            if (q - p).abs() <= CLOSED * q.abs().max(p.abs()) {
+            let narrow = (CLOSED * q.abs().max(p.abs())).max(CLOSED_OF_TOLERANCE * tolerance);
+            if (q - p).abs() <= narrow {
                 return ended(place, RootExit::BracketClosed);
             }
             place = (p * g - q * f) / (g - f);

@@ -74,7 +74,8 @@ pub fn solve(
         search.path.clear();
         search.best = None;
         place = search.find(place)?;
-        if search.met() || search.saturated {
+        // Where the force jumps, other levels do not help either.
+        if search.met() || search.saturated || search.exit == RootExit::BracketClosed {
             break;
         }
     }
