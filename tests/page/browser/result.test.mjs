@@ -3,6 +3,7 @@ import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
+import { hex } from '../../../src/http/page/web/js/field/palette.js';
 import { drawn, example, parsed, readout, setUp, withFields } from './harness.mjs';
 
 const { service, onPage } = setUp();
@@ -52,6 +53,45 @@ test('the crosshair says what the API says, by mouse and by keys', () => onPage(
   await page.waitForTimeout(60);
   assert.ok(parsed((await agrees(page, id)).x) > parsed(up.x));
   await page.keyboard.press('Escape');
+}));
+
+test('the colours of the map are those of the values', () => onPage('', async (page) => {
+  const { id, result } = await service.solved(withFields('spin'));
+  await page.goto(`${service.base}/#/jobs/${id}`);
+  await drawn(page);
+  for (const drawnOver of ['arrows', 'stick border']) await page.getByLabel(drawnOver).uncheck();
+  await page.waitForTimeout(60);
+  const { cells } = await service.ask(`/v1/jobs/${id}/tractions?patch=0&point=0`);
+  const bound = example('spin').friction.coefficient * result.patches[0].pressure_max_mpa;
+  const shareOf = (/** @type {number} */ cell) => Math.hypot(cells.traction_x_mpa[cell], cells.traction_y_mpa[cell]) / bound;
+  const base = page.locator('field-map.main canvas').first();
+  const box = await page.locator('field-map.main .over').boundingBox();
+  assert.ok(box);
+  const far = [];
+  for (let number = 0; number < 60; number += 1) {
+    // Places all over the picture, in no pattern of its own.
+    const at = [0.05 + 0.6 * ((number * 0.618) % 1), 0.1 + 0.6 * ((number * 0.414) % 1)];
+    const place = [Math.round(at[0] * box.width), Math.round(at[1] * box.height)];
+    await page.mouse.move(box.x + place[0] + 0.5, box.y + place[1] + 0.5);
+    await page.waitForTimeout(30);
+    const told = await readout(page);
+    const [x, y] = [parsed(told.x), parsed(told.y)];
+    const cell = cellAt(cells, x, y);
+    const around = cell < 0 ? [] : [-1, 0, 1].flatMap((i) => [-1, 0, 1].map((j) => cellAt(cells, cells.x_mm[cell] + i * cells.dx_mm[cell], cells.y_mm[cell] + j * cells.dy_mm[cell])));
+    if (around.length === 0 || around.includes(-1)) continue;
+    const pixel = await base.evaluate((canvas, [left, top]) => {
+      const { context, density } = { context: /** @type {HTMLCanvasElement} */ (canvas).getContext('2d'), density: devicePixelRatio || 1 };
+      return [...(context?.getImageData(Math.round(left * density), Math.round(top * density), 1, 1).data ?? [])];
+    }, place);
+    // Between the cells the map is interpolated: the colour is one of those between the least and the largest value around.
+    const shares = around.map(shareOf);
+    const [low, high] = [Math.min(...shares), Math.max(...shares)];
+    const distances = Array.from({ length: 65 }, (_, step) => hex('viridis', low + (high - low) * step / 64))
+      .map((colour) => Math.max(...[0, 1, 2].map((part) => Math.abs(parseInt(colour.slice(1 + 2 * part, 3 + 2 * part), 16) - pixel[part]))));
+    far.push(Math.min(...distances));
+  }
+  assert.ok(far.length >= 20, `${far.length} places inside`);
+  assert.ok(far.every((distance) => distance <= 6), `${far}`);
 }));
 
 test('touch moves the crosshair', () => onPage('', async (page) => {
