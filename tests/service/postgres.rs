@@ -21,6 +21,8 @@ struct Server {
     url: String,
     /// Who signed its certificate, which is for `localhost`.
     authority: Option<PathBuf>,
+    /// Its data, if it is ours.
+    folder: Option<PathBuf>,
     /// The server ends with the standard input of this shell, however this process ends.
     _shell: Option<Child>,
 }
@@ -36,6 +38,7 @@ fn the_server() -> Option<&'static Server> {
         Ok(url) => Some(Server {
             url,
             authority: None,
+            folder: None,
             _shell: None,
         }),
         Err(_) => start(),
@@ -64,6 +67,18 @@ pub fn at_port(url: &str) -> (impl Fn(u16) -> String, u16) {
     let number = port.parse().expect("a number");
     let (front, rest) = (front.to_owned(), rest.to_owned());
     (move |port| format!("{front}:{port}/{rest}"), number)
+}
+
+/// Ends the server without asking anybody, as `pg_ctl -m immediate` does; it is started again at once. Not in a test, where all use
+/// the same one.
+#[allow(dead_code, reason = "for benches")]
+pub fn crash() {
+    let server = the_server().expect("a server");
+    let folder = server.folder.as_ref().expect("a server of our own");
+    let noted = std::fs::read_to_string(folder.join("db/postmaster.pid")).expect("its number");
+    let number = noted.lines().next().expect("a line");
+    let ended = Command::new("kill").args(["-QUIT", number]).status();
+    assert!(ended.is_ok_and(|status| status.success()));
 }
 
 /// A URL with one more parameter.
@@ -189,9 +204,10 @@ fn start() -> Option<Server> {
     // Keys are refused that others may read. It ends as soon as its standard input does, and takes its data with it.
     let script = format!(
         "cd '{data}' && mkdir tls && cp server.pem server.key tls && chmod 600 tls/server.key && '{bin}/initdb' -D db -U railhead -A trust -E UTF8 --no-locale -N > init.log 2>&1 && \
-         {{ '{bin}/postgres' -D db -k '{data}' -c listen_addresses=127.0.0.1 -p {port} -c fsync=off \
-         -c ssl=on -c ssl_cert_file='{data}/tls/server.pem' -c ssl_key_file='{data}/tls/server.key' -c max_connections=400 -c shared_buffers=64MB -c deadlock_timeout=200ms > log 2>&1 & }} && echo started && \
-         read nothing; kill -QUIT $!; wait; rm -rf '{data}'",
+         {{ while [ ! -e stop ]; do '{bin}/postgres' -D db -k '{data}' -c listen_addresses=127.0.0.1 -p {port} -c fsync=off \
+         -c ssl=on -c ssl_cert_file='{data}/tls/server.pem' -c ssl_key_file='{data}/tls/server.key' -c max_connections=400 -c shared_buffers=64MB -c deadlock_timeout=200ms; done > log 2>&1 & }} && echo started && \
+         read nothing; touch stop; while kill -0 $!; do kill -QUIT $(head -n 1 db/postmaster.pid); sleep 0.1; done 2> /dev/null; \
+         wait; rm -rf '{data}'",
         data = folder.display(),
         bin = programs.display(),
     );
@@ -226,6 +242,7 @@ fn start() -> Option<Server> {
     Some(Server {
         url,
         authority: Some(authority),
+        folder: Some(folder),
         _shell: Some(child),
     })
 }

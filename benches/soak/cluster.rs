@@ -1,0 +1,179 @@
+//! Nodes on one database, as real processes, that are killed and started again.
+
+use std::net::SocketAddr;
+use std::process::Command;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use reqwest::{Client, Method};
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::support::Service;
+
+/// How a program is started: the real one, with what surrounds it.
+type Prepare = Box<dyn Fn() -> Command + Send + Sync>;
+
+/// One node; between a kill and a start there is no process.
+struct Node {
+    role: &'static str,
+    flags: Vec<String>,
+    folder: TempDir,
+    service: Option<Service>,
+}
+
+/// Nodes that share a database.
+pub struct Cluster {
+    prepare: Prepare,
+    nodes: Mutex<Vec<Node>>,
+    /// Where requests can be sent at the moment.
+    apis: Mutex<Vec<SocketAddr>>,
+    client: Client,
+}
+
+impl Cluster {
+    pub fn new(prepare: impl Fn() -> Command + Send + Sync + 'static) -> Arc<Cluster> {
+        let client = Client::builder().timeout(Duration::from_secs(20)).build();
+        Arc::new(Cluster {
+            prepare: Box::new(prepare),
+            nodes: Mutex::default(),
+            apis: Mutex::default(),
+            client: client.expect("a client"),
+        })
+    }
+
+    /// Adds a node and starts it; its number.
+    pub fn add(&self, role: &'static str, flags: &[&str]) -> usize {
+        let mut nodes = self.nodes.lock().expect("the nodes");
+        nodes.push(Node {
+            role,
+            flags: flags.iter().map(ToString::to_string).collect(),
+            folder: tempfile::tempdir().expect("a folder"),
+            service: None,
+        });
+        let number = nodes.len() - 1;
+        drop(nodes);
+        self.start(number);
+        number
+    }
+
+    /// Starts a node that has ended. It panics if the node does not start, and may be called again then.
+    pub fn start(&self, number: usize) {
+        let (role, flags, folder) = {
+            let nodes = self.nodes.lock().expect("the nodes");
+            let node = &nodes[number];
+            (node.role, node.flags.clone(), node.folder.path().to_owned())
+        };
+        let flags: Vec<&str> = flags.iter().map(String::as_str).collect();
+        let service = Service::start_as(&mut (self.prepare)(), role, &folder, &flags);
+        let mut nodes = self.nodes.lock().expect("the nodes");
+        nodes[number].service = Some(service);
+        self.list(&nodes);
+    }
+
+    /// Ends a node with SIGKILL.
+    pub fn kill(&self, number: usize) {
+        let mut nodes = self.nodes.lock().expect("the nodes");
+        let service = nodes[number].service.take();
+        self.list(&nodes);
+        service.expect("it runs").kill();
+    }
+
+    /// Ends a node in good order.
+    pub fn stop(&self, number: usize) {
+        let mut nodes = self.nodes.lock().expect("the nodes");
+        let service = nodes[number].service.take().expect("it runs");
+        self.list(&nodes);
+        drop(nodes);
+        service.signal("TERM");
+        assert!(
+            service.wait().success(),
+            "node {number} did not end in good order"
+        );
+    }
+
+    fn list(&self, nodes: &[Node]) {
+        let apis = nodes.iter().filter(|node| node.role == "serve");
+        let apis = apis.filter_map(|node| Some(node.service.as_ref()?.address()));
+        *self.apis.lock().expect("the list") = apis.collect();
+    }
+
+    /// The nodes that answer requests.
+    pub fn apis(&self) -> Vec<SocketAddr> {
+        self.apis.lock().expect("the list").clone()
+    }
+
+    /// The status and the JSON of an answer; `None` if there was none.
+    pub async fn ask(
+        &self,
+        api: SocketAddr,
+        method: Method,
+        path: &str,
+        shape: impl FnOnce(reqwest::RequestBuilder) -> reqwest::RequestBuilder,
+    ) -> Option<(u16, Value)> {
+        let request = self.client.request(method, format!("http://{api}{path}"));
+        let answer = shape(request).send().await.ok()?;
+        let status = answer.status().as_u16();
+        Some((status, answer.json().await.ok()?))
+    }
+
+    /// Submits a case under a key, at one API node after the other, until it is accepted; the id of the job, and how often it was
+    /// tried again.
+    pub async fn submit(&self, case: &Value, key: &str, mut place: usize) -> (String, usize) {
+        let mut again = 0;
+        loop {
+            let apis = self.apis();
+            place += 1;
+            if !apis.is_empty() {
+                let shape = |request: reqwest::RequestBuilder| {
+                    request.header("Idempotency-Key", key).json(case)
+                };
+                let asked = self.ask(apis[place % apis.len()], Method::POST, "/v1/jobs", shape);
+                if let Some((200 | 202, job)) = asked.await {
+                    let id = job["id"].as_str().expect("an id");
+                    return (id.to_owned(), again);
+                }
+            }
+            again += 1;
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+    }
+
+    /// Everything that the nodes that run have logged and that has this text.
+    pub fn logged(&self, text: &str) -> Vec<String> {
+        let nodes = self.nodes.lock().expect("the nodes");
+        let services = nodes.iter().filter_map(|node| node.service.as_ref());
+        let logs = services.map(Service::log_text);
+        let lines = logs.flat_map(|log| log.lines().map(str::to_owned).collect::<Vec<_>>());
+        lines.filter(|line| line.contains(text)).collect()
+    }
+}
+
+/// Notes every end of a job in a table, so that a job that ends twice is seen.
+pub async fn note_ends(pool: &sqlx::PgPool) {
+    let statements = "CREATE TABLE soak_ends (job text NOT NULL, state text NOT NULL); \
+        CREATE FUNCTION soak_end() RETURNS trigger LANGUAGE plpgsql AS $$ \
+        BEGIN INSERT INTO soak_ends VALUES (NEW.id, NEW.state); RETURN NULL; END $$; \
+        CREATE TRIGGER soak_ends AFTER UPDATE ON jobs FOR EACH ROW \
+        WHEN (NEW.ended_at IS NOT NULL AND (OLD.state <> NEW.state OR OLD.ended_at IS DISTINCT FROM NEW.ended_at)) \
+        EXECUTE FUNCTION soak_end()";
+    sqlx::raw_sql(statements)
+        .execute(pool)
+        .await
+        .expect("a table");
+}
+
+/// A number that a statement counts; asked again while the database is away.
+pub async fn counted(pool: &sqlx::PgPool, statement: &'static str) -> i64 {
+    loop {
+        match sqlx::query_scalar(statement).fetch_one(pool).await {
+            Ok(number) => return number,
+            Err(sqlx::Error::Database(error))
+                if error.code().is_some_and(|code| code.starts_with("42")) =>
+            {
+                panic!("{error}");
+            }
+            Err(_) => tokio::time::sleep(Duration::from_millis(200)).await,
+        }
+    }
+}

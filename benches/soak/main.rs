@@ -1,0 +1,54 @@
+//! Do several nodes keep their promises for long, while everything fails, and what does that cost?
+//!
+//! `cargo bench --bench soak -- NAME …` with PostgreSQL's programs, and for `nodes` SeaweedFS (`weed`), on this machine; the names:
+//! `nodes` (kills, restarts and faults of the object store under load), `queue` (claims with 10⁴ and 10⁶ queued jobs), `snapshot`
+//! (claims while somebody holds an old snapshot), `pooler` (nodes behind PgBouncer), `clocks` (clocks that are 40 s off), `starts` (five
+//! nodes at once), `shares` (solver time of tenants across nodes), `cut` (nodes in network namespaces that are cut off; root). Without a
+//! name nothing is run. A broken promise ends it with a panic. `--profile dev` takes the build of the tests.
+
+#[path = "../../tests/service/cable.rs"]
+#[allow(dead_code, reason = "shared with the tests")]
+mod cable;
+#[path = "../../tests/service/faulty_server.rs"]
+#[allow(dead_code, reason = "shared with the tests")]
+mod faulty_server;
+#[path = "../../tests/service/postgres.rs"]
+#[allow(dead_code, reason = "shared with the tests")]
+mod postgres;
+#[path = "../../tests/service/seaweed.rs"]
+#[allow(dead_code, reason = "shared with the tests")]
+mod seaweed;
+#[path = "../../tests/service/support.rs"]
+#[allow(dead_code, reason = "shared with the tests")]
+mod support;
+
+mod cluster;
+mod nodes;
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    // Run by `cargo test --benches` as well, where there is nothing to measure.
+    if !arguments.iter().any(|argument| argument == "--bench") {
+        return;
+    }
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .enable_all()
+        .build()
+        .expect("a runtime");
+    let number = |name: &str| {
+        let mut values = arguments.iter().filter_map(|one| one.strip_prefix(name));
+        values.find_map(|value| value.parse::<usize>().ok())
+    };
+    println!("| what | measured |\n|---|---|");
+    for name in arguments.iter().filter(|name| !name.contains(['-', '='])) {
+        match name.as_str() {
+            "nodes" => runtime.block_on(nodes::run(number("jobs=").unwrap_or(5000))),
+            _ => panic!("there is no soak named {name}"),
+        }
+    }
+}
+
+/// Prints a line of the table.
+fn row(what: &str, measured: impl std::fmt::Display) {
+    println!("| {what} | {measured} |");
+}

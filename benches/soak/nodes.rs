@@ -1,0 +1,270 @@
+//! Two API nodes and three workers while nodes are killed at random, PostgreSQL crashes, all nodes are replaced one by one, and the object
+//! store fails now and then: is every job that was accepted ended once, and is its result read at every API node?
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use railhead::jobs::store::postgres::schema::migrate;
+use reqwest::Method;
+use serde_json::{Value, json};
+use sqlx::PgPool;
+use tokio::task::{JoinSet, block_in_place};
+use tokio::time::sleep;
+
+use crate::cluster::{Cluster, counted, note_ends};
+use crate::faulty_server::FaultyServer;
+use crate::support::{case, long_case};
+use crate::{postgres, row, seaweed};
+
+const CLIENTS: usize = 6;
+const OPEN: &str = "SELECT COUNT(*) FROM jobs WHERE ended_at IS NULL";
+
+/// Ends of a guard: something hangs.
+const ENDED_WITHIN: Duration = Duration::from_secs(900);
+
+/// Mostly small cases; each twentieth takes a good part of a second and has a result that goes to the object store.
+fn mixed(number: usize) -> Value {
+    let name = format!("case {number}");
+    if !number.is_multiple_of(20) {
+        let mut case = case(&name);
+        case["load"]["normal_force_n"] = json!(60_000 + 7 * number);
+        return case;
+    }
+    let mut case = long_case(&name, 12);
+    case["load"]["normal_force_n"] = json!(60_000 + 7 * number);
+    case["outputs"] = json!(["resultants", "tractions"]);
+    case
+}
+
+/// Submits so many jobs from a number on, and returns their ids and how often one was tried again.
+async fn submit(cluster: &Arc<Cluster>, from: usize, jobs: usize) -> (Vec<String>, usize) {
+    let next = Arc::new(AtomicUsize::new(from));
+    let mut clients = JoinSet::new();
+    for _ in 0..CLIENTS {
+        let (cluster, next) = (cluster.clone(), next.clone());
+        clients.spawn(async move {
+            let (mut ids, mut again) = (Vec::new(), 0);
+            loop {
+                let number = next.fetch_add(1, Ordering::Relaxed);
+                if number >= from + jobs {
+                    return (ids, again);
+                }
+                let key = format!("soak-{number}");
+                let (id, tries) = cluster.submit(&mixed(number), &key, number).await;
+                ids.push(id);
+                again += tries;
+            }
+        });
+    }
+    let all = clients.join_all().await;
+    let again = all.iter().map(|(_, again)| again).sum();
+    (all.into_iter().flat_map(|(ids, _)| ids).collect(), again)
+}
+
+/// Kills a node and starts it again, another one each time, until it is told to stop; the number of kills.
+async fn kill_at_random(cluster: Arc<Cluster>, nodes: Vec<usize>, stop: Arc<AtomicBool>) -> usize {
+    let mut kills = 0;
+    // A generator of its own, so that a run can be repeated.
+    let mut seed: u64 = 0x2545_f491_4f6c_dd1d;
+    while !stop.load(Ordering::Relaxed) {
+        seed ^= seed << 13;
+        seed ^= seed >> 7;
+        seed ^= seed << 17;
+        sleep(Duration::from_millis(1500 + seed % 2500)).await;
+        let node = nodes[usize::try_from(seed >> 33).expect("a number") % nodes.len()];
+        block_in_place(|| cluster.kill(node));
+        sleep(Duration::from_millis(seed % 1500)).await;
+        // While PostgreSQL is away a node does not start; it is tried again then.
+        while !started(&cluster, node).await {}
+        kills += 1;
+    }
+    kills
+}
+
+/// Starts a node; says whether it did.
+async fn started(cluster: &Cluster, node: usize) -> bool {
+    let tried = block_in_place(|| {
+        std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| cluster.start(node)))
+    });
+    if tried.is_err() {
+        sleep(Duration::from_millis(500)).await;
+    }
+    tried.is_ok()
+}
+
+async fn until_all_ended(pool: &PgPool) {
+    let since = Instant::now();
+    while counted(pool, OPEN).await > 0 {
+        assert!(since.elapsed() < ENDED_WITHIN, "some jobs do not end");
+        sleep(Duration::from_millis(200)).await;
+    }
+}
+
+/// Reads the results of these jobs at every API node and compares them.
+async fn read_everywhere(cluster: &Cluster, ids: &[&String]) {
+    for id in ids {
+        let path = format!("/v1/jobs/{id}/result");
+        let mut read = Vec::new();
+        for api in cluster.apis() {
+            let since = Instant::now();
+            let answer = loop {
+                let asked = cluster.ask(api, Method::GET, &path, |request| request);
+                match asked.await {
+                    Some((200, result)) => break result,
+                    // Faults of the object store that are not repaired within the request.
+                    other if since.elapsed() > Duration::from_secs(60) => {
+                        panic!("{path}: {other:?}")
+                    }
+                    _ => sleep(Duration::from_millis(100)).await,
+                }
+            };
+            read.push(answer);
+        }
+        assert!(read[0]["patches"].is_array(), "{path}");
+        assert!(
+            read.windows(2).all(|pair| pair[0] == pair[1]),
+            "{path} differs"
+        );
+    }
+}
+
+pub async fn run(jobs: usize) {
+    let (Some(url), Some(port)) = (postgres::database().await, seaweed::server()) else {
+        return;
+    };
+    migrate(&url).await.expect("tables");
+    let pool = PgPool::connect(&url).await.expect("the database");
+    note_ends(&pool).await;
+    let way = FaultyServer::to(port).await;
+    way.faults.refused.store(25, Ordering::Relaxed);
+    way.faults.cut.store(30, Ordering::Relaxed);
+    let s3 = way.address.port();
+    let cluster = Cluster::new(move || seaweed::railhead_at(s3));
+    let shared = [
+        "--database-url",
+        &url,
+        "--results-url",
+        "s3://soak/results",
+        "--cache",
+        "false",
+    ];
+    let shared = [
+        &shared[..],
+        &[
+            "--lease-s",
+            "3",
+            "--shutdown-grace-s",
+            "2",
+            "--drain-delay-s",
+            "0",
+        ],
+    ]
+    .concat();
+    let all: Vec<usize> = [
+        ("serve", "0"),
+        ("serve", "0"),
+        ("worker", "1"),
+        ("worker", "1"),
+        ("worker", "1"),
+    ]
+    .into_iter()
+    .map(|(role, workers)| cluster.add(role, &[&shared[..], &["--workers", workers]].concat()))
+    .collect();
+
+    // Kills at random, and one crash of the database.
+    let began = Instant::now();
+    let (stop, first) = (Arc::new(AtomicBool::new(false)), jobs * 3 / 5);
+    let killing = tokio::spawn(kill_at_random(cluster.clone(), all.clone(), stop.clone()));
+    let crashing = tokio::spawn(async {
+        sleep(Duration::from_secs(8)).await;
+        postgres::crash();
+    });
+    let (mut ids, again) = submit(&cluster, 0, first).await;
+    crashing.await.expect("a crash");
+    until_all_ended(&pool).await;
+    stop.store(true, Ordering::Relaxed);
+    let kills = killing.await.expect("kills");
+    row(
+        "jobs accepted while nodes were killed, submissions tried again, kills, crashes of PostgreSQL, seconds to the last end",
+        format!(
+            "{}, {again}, {kills}, 1, {:.0}",
+            ids.len(),
+            began.elapsed().as_secs_f64()
+        ),
+    );
+
+    // All nodes replaced one by one: nobody waits for a lease, and no attempt counts.
+    let began = Instant::now();
+    let before = ids.len();
+    let submitting = tokio::spawn({
+        let cluster = cluster.clone();
+        async move { submit(&cluster, first, jobs - first).await }
+    });
+    for node in all {
+        sleep(Duration::from_secs(1)).await;
+        block_in_place(|| cluster.stop(node));
+        block_in_place(|| cluster.start(node));
+    }
+    let (later, again) = submitting.await.expect("clients");
+    ids.extend(later);
+    until_all_ended(&pool).await;
+    let seconds = began.elapsed().as_secs_f64();
+    row(
+        "jobs accepted during a rolling restart, submissions tried again, seconds to the last end",
+        format!("{}, {again}, {seconds:.0}", ids.len() - before),
+    );
+
+    verify(&cluster, &pool, &ids, before).await;
+    let made = way.faults.made.load(Ordering::Relaxed);
+    row("faults of the object store", made);
+}
+
+async fn verify(cluster: &Cluster, pool: &PgPool, ids: &[String], before: usize) {
+    let distinct: std::collections::BTreeSet<_> = ids.iter().collect();
+    assert_eq!(distinct.len(), ids.len(), "a job for each key");
+    let states: Vec<(String, i64, i64)> =
+        sqlx::query_as("SELECT state, COUNT(*), MAX(attempt) FROM jobs GROUP BY state")
+            .fetch_all(pool)
+            .await
+            .expect("states");
+    row("states with jobs and most attempts", format!("{states:?}"));
+    assert!(
+        states.len() == 1 && states[0].0 == "succeeded",
+        "{states:?}"
+    );
+    assert_eq!(states[0].1, i64::try_from(ids.len()).expect("a number"));
+    let twice = "SELECT COUNT(*) FROM (SELECT job FROM soak_ends GROUP BY job HAVING COUNT(*) > 1) AS twice";
+    assert_eq!(counted(pool, twice).await, 0, "a job ended twice");
+    let ended = counted(pool, "SELECT COUNT(DISTINCT job) FROM soak_ends").await;
+    assert_eq!(ended, states[0].1, "every end was noted");
+    let later: Vec<&String> = ids.iter().skip(before).collect();
+    let counted_attempts: i64 =
+        sqlx::query_scalar("SELECT COUNT(*) FROM jobs WHERE attempt > 1 AND id = ANY($1)")
+            .bind(later.iter().map(ToString::to_string).collect::<Vec<_>>())
+            .fetch_one(pool)
+            .await
+            .expect("attempts");
+    row(
+        "jobs of the rolling restart with more than one attempt",
+        counted_attempts,
+    );
+    assert_eq!(counted_attempts, 0, "a rolling restart burns no attempt");
+    let outside = counted(pool, "SELECT COUNT(*) FROM blobs WHERE key IS NOT NULL").await;
+    let began = Instant::now();
+    let some: Vec<&String> = ids.iter().step_by(5).collect();
+    read_everywhere(cluster, &some).await;
+    row(
+        "results in the object store; results read at both API nodes, seconds",
+        format!(
+            "{outside}; {}, {:.0}",
+            some.len(),
+            began.elapsed().as_secs_f64()
+        ),
+    );
+    assert!(
+        cluster.logged("panicked").is_empty(),
+        "{:?}",
+        cluster.logged("panicked")
+    );
+}
