@@ -24,6 +24,7 @@ mod support;
 
 mod cluster;
 mod nodes;
+mod queue;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -43,6 +44,8 @@ fn main() {
     for name in arguments.iter().filter(|name| !name.contains(['-', '='])) {
         match name.as_str() {
             "nodes" => runtime.block_on(nodes::run(number("jobs=").unwrap_or(5000))),
+            "queue" => runtime.block_on(queue::depth()),
+            "snapshot" => runtime.block_on(queue::snapshot()),
             _ => panic!("there is no soak named {name}"),
         }
     }

@@ -194,30 +194,40 @@ pub async fn run(jobs: usize) {
         ),
     );
 
-    // All nodes replaced one by one: nobody waits for a lease, and no attempt counts.
-    let began = Instant::now();
     let before = ids.len();
-    let submitting = tokio::spawn({
-        let cluster = cluster.clone();
-        async move { submit(&cluster, first, jobs - first).await }
-    });
-    for node in all {
-        sleep(Duration::from_secs(1)).await;
-        block_in_place(|| cluster.stop(node));
-        block_in_place(|| cluster.start(node));
-    }
-    let (later, again) = submitting.await.expect("clients");
-    ids.extend(later);
-    until_all_ended(&pool).await;
-    let seconds = began.elapsed().as_secs_f64();
-    row(
-        "jobs accepted during a rolling restart, submissions tried again, seconds to the last end",
-        format!("{}, {again}, {seconds:.0}", ids.len() - before),
-    );
+    ids.extend(roll(&cluster, &pool, all, first, jobs - first).await);
 
     verify(&cluster, &pool, &ids, before).await;
     let made = way.faults.made.load(Ordering::Relaxed);
     row("faults of the object store", made);
+}
+
+/// Replaces all nodes one by one while jobs are submitted: nobody waits for a lease, and no attempt counts.
+async fn roll(
+    cluster: &Arc<Cluster>,
+    pool: &PgPool,
+    nodes: Vec<usize>,
+    first: usize,
+    jobs: usize,
+) -> Vec<String> {
+    let began = Instant::now();
+    let submitting = tokio::spawn({
+        let cluster = cluster.clone();
+        async move { submit(&cluster, first, jobs).await }
+    });
+    for node in nodes {
+        sleep(Duration::from_secs(1)).await;
+        block_in_place(|| cluster.stop(node));
+        block_in_place(|| cluster.start(node));
+    }
+    let (ids, again) = submitting.await.expect("clients");
+    until_all_ended(pool).await;
+    let seconds = began.elapsed().as_secs_f64();
+    row(
+        "jobs accepted during a rolling restart, submissions tried again, seconds to the last end",
+        format!("{}, {again}, {seconds:.0}", ids.len()),
+    );
+    ids
 }
 
 async fn verify(cluster: &Cluster, pool: &PgPool, ids: &[String], before: usize) {

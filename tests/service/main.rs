@@ -80,6 +80,7 @@ mod store_objects;
 mod store_races;
 mod store_searches;
 mod store_slices;
+mod store_snapshots;
 mod store_turns;
 mod support;
 mod sweeps;

@@ -7,6 +7,7 @@ use sqlx::postgres::{PgConnectOptions, PgPool};
 use crate::jobs::error::JobsError;
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::postgres::bell::BellRinger;
+use crate::jobs::store::postgres::claim_memory::ClaimMemory;
 use crate::jobs::store::postgres::connection::connect;
 use crate::jobs::store::postgres::schema::require;
 use crate::jobs::store::postgres::sql::group_commit::GroupCommit;
@@ -19,6 +20,7 @@ pub struct PostgresStore {
     pub(crate) readers: PgPool,
     pub(crate) group_commit: GroupCommit,
     pub(crate) bell: BellRinger,
+    pub(crate) claim_memory: ClaimMemory,
     /// Leases are judged by the times that are given, not by the clock of the database.
     pub(crate) given_clock: bool,
 }
@@ -41,6 +43,7 @@ impl PostgresStore {
         let store = PostgresStore {
             group_commit: GroupCommit::start(writer.clone()),
             bell: BellRinger::start(writer.clone()),
+            claim_memory: ClaimMemory::default(),
             readers: writer.clone(),
             options,
             writer,

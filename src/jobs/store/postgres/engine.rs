@@ -1,5 +1,6 @@
 //! PostgreSQL as the shared statements see it.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use sqlx::Transaction;
@@ -7,6 +8,7 @@ use sqlx::postgres::{PgConnection, PgPool, PgRow, Postgres};
 use tokio::time::timeout;
 use uuid::Uuid;
 
+use crate::jobs::store::claim::ClaimRequest;
 use crate::jobs::store::cluster::Cluster;
 use crate::jobs::store::error::{StorageFault, StoreError};
 use crate::jobs::store::postgres::connection::{ADMISSION, FOLD, LOCKS, lock};
@@ -90,6 +92,39 @@ impl PostgresStore {
     /// Any number of processes use it.
     pub(crate) fn as_cluster(&self) -> Option<&dyn Cluster> {
         Some(self)
+    }
+
+    /// Queued jobs of a tenant; of a long queue, as they were a moment ago.
+    pub(crate) async fn waiting(
+        &self,
+        connection: &mut DbConnection,
+        tenant: &str,
+    ) -> Result<i64, StoreError> {
+        self.claim_memory.waiting(connection, tenant).await
+    }
+
+    /// The first queued jobs of a tenant, in a long queue from where the last claim began.
+    pub(crate) async fn peek(
+        &self,
+        connection: &mut DbConnection,
+        request: &ClaimRequest<'_>,
+        most: i64,
+    ) -> Result<Vec<DbRow>, StoreError> {
+        self.claim_memory.peek(connection, request, most).await
+    }
+
+    /// The tenants with queued jobs, if they were asked for a moment ago and a queue is long.
+    pub(crate) fn known_tenants(&self) -> Option<Vec<Arc<str>>> {
+        self.claim_memory.tenants()
+    }
+
+    pub(crate) fn remember_tenants(&self, tenants: &[Arc<str>]) {
+        self.claim_memory.remember_tenants(tenants);
+    }
+
+    /// Jobs went back to the queue.
+    pub(crate) fn requeued(&self) {
+        self.claim_memory.forget_places();
     }
 
     /// Size of the database.

@@ -8,6 +8,7 @@
 mod tokens;
 
 pub mod bell;
+mod claim_memory;
 pub mod cluster;
 pub mod connection;
 pub mod database;

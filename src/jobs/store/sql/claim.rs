@@ -14,7 +14,7 @@ use crate::jobs::store::error::StoreError;
 macro_rules! peek {
     ($begun:literal) => {
         concat!(
-            "SELECT id, suspect, cost_us FROM jobs \
+            "SELECT id, suspect, cost_us, rank FROM jobs \
              WHERE state = 'queued' AND tenant = $1 AND (deadline IS NULL OR deadline > $3) AND slice_us <= $4 AND ",
             $begun,
             " AND (batch_id IS NULL OR batch_id NOT IN (SELECT id FROM batches WHERE complete = 0 AND tenant = $1)) \
@@ -44,10 +44,16 @@ impl SqlStore {
     /// # Errors
     /// The database failed.
     pub(crate) async fn queued_tenants(&self) -> Result<Vec<Arc<str>>, StoreError> {
+        if let Some(known) = self.known_tenants() {
+            return Ok(known);
+        }
         let rows = sqlx::query(QUEUED_TENANTS).fetch_all(&self.readers).await?;
-        rows.iter()
+        let tenants = rows
+            .iter()
             .map(|row| Ok(row.try_get::<String, _>("tenant")?.into()))
-            .collect()
+            .collect::<Result<Vec<_>, StoreError>>()?;
+        self.remember_tenants(&tenants);
+        Ok(tenants)
     }
 
     /// Claims the first queued job of a tenant together with those behind it that are as small, in their order: by
@@ -57,17 +63,13 @@ impl SqlStore {
     /// The database failed; nothing changed.
     pub(crate) async fn claim(&self, request: &ClaimRequest<'_>) -> Result<Vec<Claim>, StoreError> {
         let mut transaction = engine::begin(&self.writer).await?;
-        let (peek, most) = match request.kind {
-            ClaimKind::New => (PEEK, self.share(&mut transaction, request).await?),
-            ClaimKind::Begun => (PEEK_BEGUN, 1),
+        let queued = match request.kind {
+            ClaimKind::New => {
+                let most = self.share(&mut transaction, request).await?;
+                self.peek(&mut transaction, request, most).await?
+            }
+            ClaimKind::Begun => first_queued(&mut transaction, PEEK_BEGUN, request, 1).await?,
         };
-        let queued = sqlx::query(peek)
-            .bind(request.tenant)
-            .bind(most)
-            .bind(request.late_before)
-            .bind(request.each_slice_us.map_or(i64::MAX, count))
-            .fetch_all(&mut *transaction)
-            .await?;
         if queued.is_empty() {
             return Ok(Vec::new());
         }
@@ -103,14 +105,40 @@ impl SqlStore {
         connection: &mut DbConnection,
         request: &ClaimRequest<'_>,
     ) -> Result<i64, StoreError> {
-        let waiting = sqlx::query(WAITING)
-            .bind(request.tenant)
-            .fetch_one(connection)
-            .await?;
-        let waiting = usize::try_from(read_count(&waiting, "number")?).unwrap_or(usize::MAX);
+        let waiting = self.waiting(connection, request.tenant).await?;
+        let waiting = usize::try_from(waiting).unwrap_or(0);
         let share = waiting.div_ceil(request.workers.max(1));
         Ok(count(share.min(request.jobs).max(1)))
     }
+}
+
+/// The first queued jobs of a tenant, found by a statement from the start of its queue.
+pub(crate) async fn first_queued(
+    connection: &mut DbConnection,
+    peek: &'static str,
+    request: &ClaimRequest<'_>,
+    most: i64,
+) -> Result<Vec<DbRow>, StoreError> {
+    let rows = sqlx::query(peek)
+        .bind(request.tenant)
+        .bind(most)
+        .bind(request.late_before)
+        .bind(request.each_slice_us.map_or(i64::MAX, count))
+        .fetch_all(connection)
+        .await?;
+    Ok(rows)
+}
+
+/// Queued jobs of a tenant.
+pub(crate) async fn count_waiting(
+    connection: &mut DbConnection,
+    tenant: &str,
+) -> Result<i64, StoreError> {
+    let row = sqlx::query(WAITING)
+        .bind(tenant)
+        .fetch_one(connection)
+        .await?;
+    Ok(count(read_count(&row, "number")?))
 }
 
 /// The ids of the next group: the first of the queued jobs together with those behind it that are small enough.

@@ -115,14 +115,17 @@ async fn end_solved(
     update.push(") UPDATE jobs SET state = done.state, ended_at = ");
     update.push_bind(now);
     update.push(", updated_at = ").push_bind(now);
-    update.push(
+    // Jobs are found by their ids: the index of running ones keeps what no longer runs, until that can be removed.
+    update.push(concat!(
         ", remarks = done.remarks, failure = done.failure, blob_id = done.blob, \
          field_patches = done.patches, \
          progress = CASE WHEN done.state = 'succeeded' THEN 1.0 ELSE progress END, \
          lease_until = NULL, worker = NULL, solving = 0, version = version + 1 \
          FROM done WHERE jobs.id = done.id AND jobs.lease_token = done.lease_token \
-         AND jobs.state = 'running' RETURNING jobs.id AS id, jobs.state AS state, slices",
-    );
+         AND ",
+        unordered!("jobs.state"),
+        " = 'running' RETURNING jobs.id AS id, jobs.state AS state, slices",
+    ));
     let ended = update.build().fetch_all(&mut *connection).await?;
     drop_slices_of_ended(connection, &ended).await?;
     let ended = ended

@@ -179,6 +179,7 @@ impl SqlStore {
         let rows = query.build().fetch_all(&mut *transaction).await?;
         drop_slices_of_ended(&mut transaction, &rows).await?;
         transaction.commit().await?;
+        self.requeued();
         rows.iter()
             .map(|row| read_move(row, State::Running))
             .collect()
@@ -186,8 +187,11 @@ impl SqlStore {
 }
 
 /// The end of an update of claimed jobs, as long as their leases are held.
-const OF_HELD: &str = " FROM held WHERE jobs.id = held.id AND jobs.lease_token = held.lease_token \
-     AND jobs.state = 'running' RETURNING ";
+const OF_HELD: &str = concat!(
+    " FROM held WHERE jobs.id = held.id AND jobs.lease_token = held.lease_token AND ",
+    unordered!("jobs.state"),
+    " = 'running' RETURNING "
+);
 
 fn with_held(claims: &[Claim]) -> QueryBuilder<Db> {
     let mut query = QueryBuilder::new("WITH held (id, lease_token) AS (");

@@ -66,6 +66,7 @@ impl SqlStore {
         rows.extend(expired);
         drop_slices_of_ended(&mut transaction, &rows).await?;
         transaction.commit().await?;
+        self.requeued();
         rows.iter()
             .map(|row| read_move(row, State::Running))
             .collect()

@@ -2,14 +2,17 @@
 
 use std::ffi::OsString;
 use std::path::Path;
+use std::sync::Arc;
 
 use sqlx::Transaction;
 use sqlx::sqlite::{Sqlite, SqliteConnection, SqlitePool, SqliteRow};
 use uuid::Uuid;
 
+use crate::jobs::store::claim::ClaimRequest;
 use crate::jobs::store::cluster::Cluster;
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::database::SqliteStore;
+use crate::jobs::store::sqlite::sql::claim::{PEEK, count_waiting, first_queued};
 
 pub(crate) type Db = Sqlite;
 pub(crate) type DbConnection = SqliteConnection;
@@ -66,6 +69,35 @@ impl SqliteStore {
     pub(crate) fn lease_now(&self, now: i64) -> Option<i64> {
         Some(now)
     }
+
+    /// Queued jobs of a tenant.
+    pub(crate) async fn waiting(
+        &self,
+        connection: &mut DbConnection,
+        tenant: &str,
+    ) -> Result<i64, StoreError> {
+        count_waiting(connection, tenant).await
+    }
+
+    /// The first queued jobs of a tenant.
+    pub(crate) async fn peek(
+        &self,
+        connection: &mut DbConnection,
+        request: &ClaimRequest<'_>,
+        most: i64,
+    ) -> Result<Vec<DbRow>, StoreError> {
+        first_queued(connection, PEEK, request, most).await
+    }
+
+    /// They are asked for every time.
+    pub(crate) fn known_tenants(&self) -> Option<Vec<Arc<str>>> {
+        None
+    }
+
+    pub(crate) fn remember_tenants(&self, _: &[Arc<str>]) {}
+
+    /// Every claim walks the queue from its start.
+    pub(crate) fn requeued(&self) {}
 
     /// One process at a time uses it.
     pub(crate) fn as_cluster(&self) -> Option<&dyn Cluster> {

@@ -1,0 +1,203 @@
+//! What a process remembers of long queues between two claims, so that a claim does not walk over what was claimed before.
+//!
+//! Rows that were claimed stay in the index of queued jobs until VACUUM removes them, which it cannot while somebody holds an old
+//! snapshot. A claim therefore begins where the last one of this process began. Jobs that came back to the queue below that place, or
+//! were accepted by a node whose clock is behind, wait until the place is forgotten.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use sqlx::Row;
+use sqlx::postgres::{PgConnection, PgRow};
+
+use crate::jobs::store::claim::ClaimRequest;
+use crate::jobs::store::error::StoreError;
+use crate::jobs::store::postgres::sql::claim::{PEEK, count_waiting, first_queued};
+use crate::jobs::store::postgres::sql::rows::count;
+
+/// Queues that are shorter are counted and walked from their start at every claim.
+const LONG: i64 = 2000;
+
+/// How long the place of a claim is remembered.
+const PLACE_KEPT: Duration = Duration::from_secs(2);
+
+/// How long the length of a queue is remembered, less what was claimed since.
+const LENGTH_KEPT: Duration = Duration::from_secs(1);
+
+/// How long the tenants with queued jobs are remembered while a queue is long.
+const TENANTS_KEPT: Duration = Duration::from_millis(250);
+
+/// Ranks of priority, the most urgent first.
+const RANKS: usize = 3;
+
+macro_rules! peek_of {
+    ($rank:literal, $after:literal) => {
+        concat!(
+            "SELECT * FROM (SELECT id, suspect, cost_us, rank FROM jobs \
+             WHERE state = 'queued' AND tenant = $1 AND (deadline IS NULL OR deadline > $3) AND slice_us <= $4 AND slices = 0 \
+             AND (batch_id IS NULL OR batch_id NOT IN (SELECT id FROM batches WHERE complete = 0 AND tenant = $1)) \
+             AND rank = ",
+            $rank,
+            " AND id >= ",
+            $after,
+            " ORDER BY id LIMIT $2 FOR UPDATE SKIP LOCKED) AS rank",
+            $rank
+        )
+    };
+}
+
+/// As the peek of every claim, from a place in each rank on. The parts are walked in their order, and only as far as needed.
+const PEEK_FROM: &str = concat!(
+    "SELECT id, suspect, cost_us, rank FROM (",
+    peek_of!("0", "$5"),
+    " UNION ALL ",
+    peek_of!("1", "$6"),
+    " UNION ALL ",
+    peek_of!("2", "$7"),
+    ") AS queued LIMIT $2"
+);
+
+/// What is known of the queue of a tenant.
+#[derive(Debug, Clone)]
+struct Queue {
+    waiting: i64,
+    counted: Instant,
+    /// Where the last claim began, in each rank; empty: at its start.
+    places: [String; RANKS],
+    placed: Option<Instant>,
+}
+
+#[derive(Debug, Default)]
+struct Known {
+    queues: HashMap<String, Queue>,
+    tenants: Option<(Instant, Vec<Arc<str>>)>,
+}
+
+/// What a process remembers; clones share it.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct ClaimMemory(Arc<Mutex<Known>>);
+
+impl ClaimMemory {
+    fn known(&self) -> MutexGuard<'_, Known> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Jobs went back to the queue: the next claims walk it from the start.
+    pub(crate) fn forget_places(&self) {
+        for queue in self.known().queues.values_mut() {
+            queue.placed = None;
+        }
+    }
+
+    /// The number of queued jobs of a tenant, exact for a short queue.
+    pub(crate) async fn waiting(
+        &self,
+        connection: &mut PgConnection,
+        tenant: &str,
+    ) -> Result<i64, StoreError> {
+        if let Some(queue) = self.known().queues.get(tenant)
+            && queue.waiting >= LONG
+            && queue.counted.elapsed() < LENGTH_KEPT
+        {
+            return Ok(queue.waiting);
+        }
+        let waiting = count_waiting(connection, tenant).await?;
+        let mut known = self.known();
+        match known.queues.get_mut(tenant) {
+            Some(queue) => {
+                (queue.waiting, queue.counted) = (waiting, Instant::now());
+            }
+            None if waiting >= LONG => {
+                let queue = Queue {
+                    waiting,
+                    counted: Instant::now(),
+                    places: Default::default(),
+                    placed: None,
+                };
+                known.queues.insert(tenant.to_owned(), queue);
+            }
+            None => {}
+        }
+        if waiting < LONG {
+            known.queues.remove(tenant);
+        }
+        Ok(waiting)
+    }
+
+    /// The first queued jobs of a tenant, locked, at most so many.
+    pub(crate) async fn peek(
+        &self,
+        connection: &mut PgConnection,
+        request: &ClaimRequest<'_>,
+        most: i64,
+    ) -> Result<Vec<PgRow>, StoreError> {
+        let places = {
+            let known = self.known();
+            let queue = known.queues.get(request.tenant);
+            let kept = |queue: &&Queue| queue.placed.is_some_and(|at| at.elapsed() < PLACE_KEPT);
+            queue.filter(kept).map(|queue| queue.places.clone())
+        };
+        if let Some([high, normal, low]) = places {
+            let found = sqlx::query(PEEK_FROM)
+                .bind(request.tenant)
+                .bind(most)
+                .bind(request.late_before)
+                .bind(request.each_slice_us.map_or(i64::MAX, count))
+                .bind(high)
+                .bind(normal)
+                .bind(low)
+                .fetch_all(&mut *connection)
+                .await?;
+            if i64::try_from(found.len()).unwrap_or(i64::MAX) == most {
+                self.remember(request.tenant, &found, false)?;
+                return Ok(found);
+            }
+            self.forget_places();
+            if !found.is_empty() {
+                return Ok(found);
+            }
+        }
+        let found = first_queued(connection, PEEK, request, most).await?;
+        if i64::try_from(found.len()).unwrap_or(i64::MAX) == most {
+            self.remember(request.tenant, &found, true)?;
+        }
+        Ok(found)
+    }
+
+    /// Remembers where a full group began.
+    fn remember(&self, tenant: &str, found: &[PgRow], anew: bool) -> Result<(), StoreError> {
+        let mut known = self.known();
+        let Some(queue) = known.queues.get_mut(tenant) else {
+            return Ok(());
+        };
+        if anew {
+            queue.places = Default::default();
+            queue.placed = Some(Instant::now());
+        }
+        queue.waiting -= i64::try_from(found.len()).unwrap_or(0);
+        // The first of each rank, in the order of the queue.
+        for row in found.iter().rev() {
+            let rank: i64 = row.try_get("rank")?;
+            if let Some(place) = usize::try_from(rank)
+                .ok()
+                .and_then(|rank| queue.places.get_mut(rank))
+            {
+                *place = row.try_get("id")?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The tenants with queued jobs as they were a moment ago, if a queue is long.
+    pub(crate) fn tenants(&self) -> Option<Vec<Arc<str>>> {
+        let known = self.known();
+        let (at, tenants) = known.tenants.as_ref()?;
+        (!known.queues.is_empty() && at.elapsed() < TENANTS_KEPT).then(|| tenants.clone())
+    }
+
+    /// Remembers the tenants with queued jobs.
+    pub(crate) fn remember_tenants(&self, tenants: &[Arc<str>]) {
+        self.known().tenants = Some((Instant::now(), tenants.to_vec()));
+    }
+}

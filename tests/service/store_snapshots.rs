@@ -1,0 +1,122 @@
+//! Does it cost claims and ends nothing that somebody keeps a transaction open, so that dead rows stay? Work is counted, not time.
+
+use railhead::jobs::codec::result::EncodedResult;
+use railhead::jobs::store::Store;
+use railhead::jobs::store::claim::{ClaimKind, ClaimRequest, Lease, ReleaseReason};
+use railhead::jobs::store::ending::{Ending, StoredResult};
+use railhead::jobs::store::postgres::database::PostgresStore;
+use railhead::jobs::store::postgres::schema::migrate;
+use sqlx::{Connection, PgConnection};
+
+use crate::postgres::database;
+
+const QUEUED: i64 = 9000;
+const GROUP: usize = 32;
+const GROUPS: usize = 128;
+
+/// Queued jobs whose ids grow, as those of submissions do.
+const FILL: &str = "INSERT INTO jobs (id, tenant, state, labels, method, outputs, cost_us, slice_us, bypass_cache, rank, created_at, updated_at) \
+     SELECT lpad(to_hex(n), 8, '0') || '-0000-7000-8000-000000000000', 'north', 'queued', '{}', 'auto', '[]', 3000, 3000, 1, 1, n, n \
+     FROM generate_series(1, $1) AS n";
+
+/// Entries of an index that statements have read.
+async fn read(connection: &mut PgConnection, index: &str) -> i64 {
+    let read = "SELECT idx_tup_read FROM pg_stat_user_indexes WHERE indexrelname = $1";
+    sqlx::query_scalar(read)
+        .bind(index)
+        .fetch_one(connection)
+        .await
+        .unwrap()
+}
+
+fn request<'a>() -> ClaimRequest<'a> {
+    ClaimRequest {
+        worker: "w",
+        tenant: "north",
+        kind: ClaimKind::New,
+        jobs: GROUP,
+        cost_us: u64::MAX,
+        each_slice_us: None,
+        workers: 1,
+        lease: Lease { now: 0, ms: 30_000 },
+        now: 0,
+        late_before: 0,
+    }
+}
+
+fn success() -> Ending {
+    Ending::Succeeded {
+        remarks: Vec::new(),
+        result: StoredResult::Inline(EncodedResult {
+            solution: b"{}".as_slice().into(),
+            fields: None,
+        }),
+        field_patches: 0,
+    }
+}
+
+#[tokio::test]
+async fn claims_and_ends_do_not_walk_over_dead_rows_and_miss_nothing_that_came_back() {
+    let Some(url) = database().await else {
+        return;
+    };
+    migrate(&url).await.unwrap();
+    let mut connection = PgConnection::connect(&url).await.unwrap();
+    sqlx::query(FILL)
+        .bind(QUEUED)
+        .execute(&mut connection)
+        .await
+        .unwrap();
+    sqlx::raw_sql("VACUUM ANALYZE jobs")
+        .execute(&mut connection)
+        .await
+        .unwrap();
+    let mut holder = PgConnection::connect(&url).await.unwrap();
+    let hold = "BEGIN ISOLATION LEVEL REPEATABLE READ; SELECT COUNT(*) FROM nodes";
+    sqlx::raw_sql(hold).execute(&mut holder).await.unwrap();
+
+    let store = PostgresStore::open(&url, 2).await.unwrap();
+    let ending = success();
+    let mut seen = std::collections::BTreeSet::new();
+    for group in 0..GROUPS {
+        let claims = store.claim(&request()).await.unwrap();
+        assert_eq!(claims.len(), GROUP);
+        if group == GROUPS / 2 {
+            // The next claim begins with them.
+            let back = Store::release(&store, &claims, ReleaseReason::NotBegun, 0).await;
+            assert_eq!(back.unwrap().len(), GROUP);
+            let again = store.claim(&request()).await.unwrap();
+            assert_eq!(again[0].id, claims[0].id);
+            Store::release(&store, &again, ReleaseReason::NotBegun, 0)
+                .await
+                .unwrap();
+            continue;
+        }
+        seen.extend(claims.iter().map(|claim| claim.id));
+        let ends: Vec<_> = claims
+            .into_iter()
+            .map(|claim| (claim, ending.clone()))
+            .collect();
+        let ended = Store::finish(&store, &ends, 0).await.unwrap();
+        assert_eq!(ended.len(), GROUP);
+    }
+    assert_eq!(seen.len(), GROUP * (GROUPS - 1), "no job was claimed twice");
+    // Sessions say what they have done when they end.
+    store.close().await;
+    let jobs = i64::try_from(GROUP * GROUPS).unwrap();
+    let mut told = read(&mut connection, "jobs_queued").await;
+    while told < jobs {
+        tokio::time::sleep(std::time::Duration::from_millis(50)).await;
+        told = read(&mut connection, "jobs_queued").await;
+    }
+    let running = read(&mut connection, "jobs_running").await;
+    // Walks from the start: the first, one every two seconds, and those after jobs came back.
+    assert!(
+        told < 8 * jobs,
+        "{told} entries of the queue for {jobs} jobs"
+    );
+    assert!(
+        running < jobs,
+        "{running} entries of running jobs for {jobs} jobs"
+    );
+}
