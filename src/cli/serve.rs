@@ -164,6 +164,7 @@ async fn open_jobs(args: &ServeArgs, traces: Option<&Traces>) -> anyhow::Result<
         cache: args.cache,
         retention: args.retention.0,
         tenant_queue_max: args.tenant_queue_max,
+        tenant_profiles_max_bytes: u64::from(args.tenant_profiles_mb) << 20,
         tracer: traces.map(|traces| Tracer::new(traces.tracer())),
         database: args.database.database(),
         results: args.database.results.place(),

@@ -79,6 +79,10 @@ pub struct ServeArgs {
     #[arg(long, env = "RAILHEAD_TENANT_QUEUE_MAX", default_value_t = 250_000, value_name = "N",
           value_parser = clap::value_parser!(u64).range(1..))]
     pub tenant_queue_max: u64,
+    /// Profiles in MB that one tenant may keep; beyond: 429.
+    #[arg(long, env = "RAILHEAD_TENANT_PROFILES_MB", default_value_t = 64, value_name = "MB",
+          value_parser = clap::value_parser!(u32).range(1..=65536))]
+    pub tenant_profiles_mb: u32,
     /// Whether requests without an API key are answered. Without keys and without anonymous use the service does not
     /// start.
     #[arg(

@@ -30,6 +30,7 @@ use crate::http::problem::kinds::ProblemKind;
     tags(
         (name = "jobs", description = "Submit cases and follow them"),
         (name = "batches", description = "Many cases at once"),
+        (name = "profiles", description = "Cross-sections that cases name"),
         (name = "runs", description = "Many rows over one case"),
         (name = "results", description = "What came out, part by part"),
         (name = "cases", description = "What can be asked"),

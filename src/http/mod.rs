@@ -62,8 +62,8 @@ use crate::http::routes::service::{
 };
 use crate::http::routes::{
     batch_list, batch_results, batches, cases, damage, evaluate, events, fields, job_list, jobs,
-    me, plots, point_fields, resultants, results, run_results, run_totals, runs, subsurface,
-    tenant_events, zones,
+    me, plots, point_fields, profiles, resultants, results, run_results, run_totals, runs,
+    subsurface, tenant_events, zones,
 };
 use crate::http::server::drain_body;
 use crate::http::state::AppState;
@@ -227,7 +227,7 @@ fn resources() -> OpenApiRouter<AppState> {
         .merge(contract)
 }
 
-/// Runs.
+/// Profiles and runs.
 fn rows() -> OpenApiRouter<AppState> {
     let changing = OpenApiRouter::new()
         .routes(routes!(runs::get, runs::delete))
@@ -235,6 +235,8 @@ fn rows() -> OpenApiRouter<AppState> {
     let lists = OpenApiRouter::new().routes(routes!(runs::submit, runs::list));
     let tagged = changing.merge(lists).route_layer(from_fn(etag::revalidate));
     let plain = OpenApiRouter::new()
+        .routes(routes!(profiles::keep, profiles::list))
+        .routes(routes!(profiles::get, profiles::delete))
         .routes(routes!(runs::cancel))
         .routes(routes!(run_results::manifest))
         .route_layer(from_fn(query::refuse_parameters));

@@ -65,6 +65,14 @@ pub enum JobsError {
     /// There is no such run.
     #[error("there is no such run")]
     RunNotFound,
+    /// There is no such profile.
+    #[error("there is no such profile")]
+    ProfileNotFound,
+    /// The tenant keeps as many bytes of profiles as it may.
+    #[error(
+        "the profiles of this tenant would take more than the {0} bytes that are allowed (`--tenant-profiles-mb`); delete some"
+    )]
+    ProfilesFull(u64),
     /// The run must end first.
     #[error("the run has not ended; cancel it first")]
     RunNotEnded,

@@ -53,6 +53,7 @@ pub mod model;
 pub mod notify;
 pub mod open_store;
 pub mod options;
+pub mod profiles;
 pub mod quota;
 pub mod recent_reads;
 pub mod result_cache;

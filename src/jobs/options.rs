@@ -57,6 +57,8 @@ pub struct Options {
     pub queue_max: u64,
     /// Bound of queued jobs of one tenant.
     pub tenant_queue_max: u64,
+    /// Bytes of cross-sections that a tenant may keep.
+    pub tenant_profiles_max_bytes: u64,
     /// Bounds of what batches that are being received stand for.
     pub staging: StagingBounds,
     /// Most jobs a worker claims together, if they are small; 1 means no groups.
@@ -96,6 +98,7 @@ impl Options {
             attempts_max: 5,
             queue_max: 300_000,
             tenant_queue_max: 250_000,
+            tenant_profiles_max_bytes: 64 << 20,
             staging: StagingBounds {
                 all: 16 << 30,
                 tenant: 4 << 30,

@@ -67,6 +67,7 @@ impl Jobs {
         if self.shared.draining.is_cancelled() {
             return Err(JobsError::Draining);
         }
+        let case = self.with_profiles(case).await?;
         let jobs = self.clone();
         // Checking a large case is arithmetic; it stays off the threads that answer requests, and a crowd of submitters does
         // not take the cores from them either.

@@ -1,5 +1,6 @@
 //! Many rows: each is answered as a case of its own, whatever stands beside it.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -35,6 +36,7 @@ fn solved(case: &Value, columns: &[VariedColumn]) -> ManyAnswer {
     let task = ManyTask {
         case,
         columns,
+        profiles: &BTreeMap::new(),
         limits: &Limits::default(),
         time_limit: Duration::from_secs(60),
     };
@@ -67,7 +69,8 @@ fn a_row_of_many_is_the_case_solved_alone_to_the_last_bit() {
     let (case, columns) = (case("boundary_element"), columns());
     let answer = solved(&case, &columns);
     for row in [1, 3] {
-        let single = case_of_row(&case, &columns, row).expect("it leads somewhere");
+        let single =
+            case_of_row(&case, &columns, &BTreeMap::new(), row).expect("it leads somewhere");
         let checked = contact::check(&single, &Limits::default()).expect("a sound case");
         let (alone, _) = contact::solve(&checked, &Unmonitored).expect("it is solved");
         let force = [answer.numbers[1][row], answer.numbers[2][row]];

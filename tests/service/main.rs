@@ -37,6 +37,7 @@ mod guides;
 #[cfg(target_os = "linux")]
 mod held_solver;
 mod http2;
+mod kept_profiles;
 mod keys;
 mod leases;
 mod maintenance;

@@ -97,6 +97,7 @@ const ORDER: &[&str] = &[
     "jobs::metrics_refresh",
     "jobs::keys",
     "jobs::result_cache",
+    "jobs::profiles",
     "jobs::submit",
     "jobs::notify",
     "jobs::changes",

@@ -19,6 +19,7 @@ pub mod profile_points;
 pub mod profiles;
 pub mod read;
 pub mod resolution;
+pub mod section_check;
 pub mod size;
 pub mod solve_time;
 pub mod subsurface;

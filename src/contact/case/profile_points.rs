@@ -57,7 +57,8 @@ pub fn readings_expected(contact: &WheelTask) -> u32 {
     }
 }
 
-fn section(profile: &Profile, advised: f64) -> SectionQuality {
+/// The quality of one profile, with the smoothing that suits it in mm.
+pub(crate) fn section(profile: &Profile, advised: f64) -> SectionQuality {
     let points = profile.points();
     let chords = points.along.windows(2).enumerate();
     let longest = chords

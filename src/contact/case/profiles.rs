@@ -162,7 +162,11 @@ fn trust(contact: &Contact) -> ProfileTrust {
     }
 }
 
-fn profile(body: Body, section: &CrossSection) -> Result<Profile, Fault> {
+/// The profile of a cross-section as that of a body.
+///
+/// # Errors
+/// Why it is none.
+pub(crate) fn profile(body: Body, section: &CrossSection) -> Result<Profile, Fault> {
     let name = body.name();
     let mut reading = Reading {
         mirror_y: section.mirror_y,

@@ -5,6 +5,7 @@
 //! them; rows of one shape therefore follow each other.
 
 use std::cmp::Ordering;
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
@@ -34,6 +35,8 @@ pub struct ManyTask<'a> {
     pub case: &'a Value,
     /// What differs from it, at least one column; all of the same length.
     pub columns: &'a [VariedColumn],
+    /// Cross-sections that rows name, by their names.
+    pub profiles: &'a BTreeMap<String, Value>,
     /// What a row may use.
     pub limits: &'a Limits,
     /// Longest time for one row; a shorter one of the case counts.
@@ -191,7 +194,7 @@ fn take(
 }
 
 fn row_checked(task: &ManyTask, row: usize) -> Result<CheckedCase, CaseError> {
-    let case = case_of_row(task.case, task.columns, row)
+    let case = case_of_row(task.case, task.columns, task.profiles, row)
         .map_err(|(pointer, reason)| CaseError(vec![Fault::new(pointer, reason)]))?;
     contact::check(&case, task.limits)
 }

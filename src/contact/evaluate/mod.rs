@@ -9,5 +9,6 @@ pub mod placing;
 pub mod request_faults;
 pub mod rows;
 mod rows_checks;
+pub mod sections;
 pub mod variable;
 pub mod varied;

@@ -1,10 +1,12 @@
 //! Columns that may hold any number or text of a case.
 
 use std::cmp::Ordering;
+use std::collections::BTreeMap;
 
 use serde_json::Value;
 
 use crate::contact::evaluate::placing::{members, put};
+use crate::contact::evaluate::sections::{named_sections, put_section};
 
 /// The values of a column, one for each row.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,13 +60,14 @@ impl Values {
     }
 }
 
-/// The case of a row: the template with the row's values in their places.
+/// The case of a row: the template with the row's values in their places, and cross-sections in the place of their names.
 ///
 /// # Errors
 /// The pointer of the first column that leads nowhere in the template, and why.
 pub fn case_of_row(
     template: &Value,
     columns: &[VariedColumn],
+    profiles: &BTreeMap<String, Value>,
     row: usize,
 ) -> Result<Value, (String, String)> {
     let mut case = template.clone();
@@ -75,6 +78,11 @@ pub fn case_of_row(
             column.values.value(row),
         )
         .map_err(|reason| (column.pointer.clone(), reason))?;
+    }
+    for (place, name) in named_sections(&case) {
+        if let Some(section) = profiles.get(&name) {
+            put_section(&mut case, place, section);
+        }
     }
     Ok(case)
 }

@@ -1,6 +1,7 @@
 //! Reads rows: a template case and columns of numbers, as JSON or CSV, straight into columns.
 
 use std::fmt;
+use std::io::Cursor;
 
 use axum::body::{Body, Bytes};
 use axum::extract::Request;
@@ -11,12 +12,14 @@ use serde_json::Value;
 
 use crate::contact::evaluate::column::Column;
 use crate::contact::evaluate::varied::Values;
-use crate::http::extract::batch::table::column_pointers;
+use crate::http::extract::batch::table::{column_pointer, column_pointers};
 use crate::http::extract::json::{Strict, unreadable};
 use crate::http::layers::admission::too_long;
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
+use crate::jobs::codec::arrow;
+use crate::jobs::codec::table::TableColumn;
 
 /// The bytes that a request's body may have, or has as far as it says.
 #[must_use]
@@ -140,6 +143,42 @@ pub fn read_csv(text: &[u8]) -> Result<Vec<Column>, ApiError> {
             }
         }
     }
+}
+
+/// Columns from an Arrow stream or file, named as those of CSV are.
+///
+/// # Errors
+/// `faulty-table` with the column.
+pub fn read_arrow(data: Bytes) -> Result<Vec<Column>, ApiError> {
+    let faulty = |detail: String| ApiError::new(ProblemKind::FaultyTable, detail);
+    let unread =
+        |error: &dyn fmt::Display| faulty(format!("the Arrow data cannot be read: {error}"));
+    let mut columns: Vec<Column> = Vec::new();
+    for table in arrow::read(Cursor::new(data)).map_err(|error| unread(&error))? {
+        let table = table.map_err(|error| unread(&error))?;
+        for (place, (title, values)) in table.columns.into_iter().enumerate() {
+            let numbers = match values {
+                TableColumn::Numbers(numbers) => numbers,
+                #[expect(clippy::cast_precision_loss, reason = "as every number of a case")]
+                TableColumn::Integers(values) => values.iter().map(|value| *value as f64).collect(),
+                TableColumn::Texts(_) => {
+                    return Err(faulty(format!("column `{title}` holds texts, no numbers")));
+                }
+            };
+            if let Some(row) = numbers.iter().position(|number| !number.is_finite()) {
+                let row = row + columns.get(place).map_or(0, |column| column.values.len());
+                return Err(faulty(format!("column `{title}`, row {row}: no number")));
+            }
+            match columns.get_mut(place) {
+                Some(column) => column.values.extend(numbers),
+                None => columns.push(Column {
+                    pointer: column_pointer(&title).map_err(faulty)?,
+                    values: numbers,
+                }),
+            }
+        }
+    }
+    Ok(columns)
 }
 
 /// Number of the line that a record begins on which follows this place, from 1; the reader's own place lies before the end of the line before.

@@ -202,6 +202,12 @@ impl From<JobsError> for ApiError {
                 ProblemKind::RunNotEnded,
                 "rows of the run are waiting or being solved; cancel it first, then delete it",
             ),
+            JobsError::ProfileNotFound => {
+                ApiError::new(ProblemKind::ProfileNotFound, "no profile has this digest")
+            }
+            JobsError::ProfilesFull(_) => {
+                ApiError::new(ProblemKind::ProfilesFull, error.to_string())
+            }
             JobsError::TooManyRows(_) => {
                 ApiError::new(ProblemKind::BodyTooLarge, error.to_string())
             }

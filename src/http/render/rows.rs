@@ -9,9 +9,14 @@ use axum::body::Body;
 
 use crate::contact::evaluate::answer::RowsAnswer;
 use crate::http::render::pieces::body;
+use crate::jobs::codec::arrow::ArrowWriter;
+use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
 
 /// Rows written at once.
 const ROWS: usize = 1024;
+
+/// Rows of a batch of Arrow records.
+const BATCH_ROWS: usize = 1 << 15;
 
 /// RowsPart of the JSON text.
 enum RowsPart {
@@ -62,6 +67,45 @@ pub fn csv_body(answer: RowsAnswer) -> Body {
         text.into_bytes()
     });
     body(std::iter::once(head).chain(lines).map(Ok::<_, Infallible>))
+}
+
+/// An Arrow stream of the same columns; null where a row has no number.
+pub fn arrow_body(answer: RowsAnswer) -> Body {
+    let names = answer.columns().into_iter();
+    let columns: Vec<_> = names
+        .map(|(name, _)| (name.to_owned(), TableKind::Numbers))
+        .chain([("status".to_owned(), TableKind::Texts)])
+        .collect();
+    let rows = answer.status.len();
+    let starts = (0..rows).step_by(BATCH_ROWS);
+    let mut writer = ArrowWriter::new(Vec::new(), &columns);
+    let pieces = starts.map(Some).chain([None]);
+    body(pieces.map(move |start| {
+        let Ok(writer) = &mut writer else {
+            return Err(std::io::Error::other("an Arrow stream cannot be begun"));
+        };
+        let written = match start {
+            Some(start) => writer.write(part(&answer, start..(start + BATCH_ROWS).min(rows))),
+            None => writer.finish(),
+        };
+        written.map_err(std::io::Error::other)?;
+        Ok(std::mem::take(writer.inner_mut()))
+    }))
+}
+
+fn part(answer: &RowsAnswer, range: Range<usize>) -> RowTable {
+    let status = answer.status[range.clone()].iter();
+    let status = status.map(|status| status.name().to_owned()).collect();
+    let numbers = answer.columns().into_iter();
+    let numbers = numbers.map(|(name, column)| {
+        let column = TableColumn::Numbers(column[range.clone()].to_vec());
+        (name.to_owned(), column)
+    });
+    RowTable {
+        columns: numbers
+            .chain([("status".to_owned(), TableColumn::Texts(status))])
+            .collect(),
+    }
 }
 
 fn ranges(count: usize) -> impl Iterator<Item = Range<usize>> {

@@ -73,6 +73,7 @@ pub async fn check(
     if room.turn.is_none() {
         room.turn = Some(memory.turn(0).await?);
     }
+    let value = jobs.with_profiles(value).await?;
     // A large grid takes long enough to check that it must not hold up other requests.
     let checked = tokio::task::spawn_blocking(move || {
         // Memory and turn are held until the work ends, even if the client has gone away.

@@ -20,19 +20,22 @@ use crate::http::extract::caller::Caller;
 use crate::http::extract::json;
 use crate::http::extract::json::essence;
 use crate::http::extract::query::{Parameters, id, query};
-use crate::http::extract::rows::{declared_bytes, read_body, read_csv, read_json};
+use crate::http::extract::rows::{declared_bytes, read_arrow, read_body, read_csv, read_json};
 use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::limits::memory::Memory;
 use crate::http::options::HttpOptions;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
-use crate::http::render::rows::{csv_body, json_body};
+use crate::http::render::rows::{arrow_body, csv_body, json_body};
 use crate::jobs::Jobs;
 use crate::jobs::batch::template::{Cell, fill};
 
+/// The forms of Arrow data.
+const ARROW_STREAM: &str = "application/vnd.apache.arrow.stream";
+const ARROW_FILE: &str = "application/vnd.apache.arrow.file";
 /// The forms of an answer.
-const FORMATS: &[Format] = &[Format::Json, Format::Csv];
+const FORMATS: &[Format] = &[Format::Json, Format::Csv, Format::Arrow];
 
 /// Rows to evaluate: a case, and columns of numbers that stand in place of some of its numbers.
 #[derive(Debug, Serialize, ToSchema)]
@@ -124,11 +127,11 @@ problems! {
 query! {
     /// Parameters of an evaluation.
     EvaluateQuery(() => ()) {
-        /// With `text/csv`, and needed there: the job whose case is the template
+        /// With a table, and needed there: the job whose case is the template
         #[param(format = "uuid")]
         template: Uuid as String = id("job");
-        /// `json` or `csv`; overrides `Accept`
-        #[param(pattern = "^(json|csv)$", example = "csv")]
+        /// `json`, `csv` or `arrow`; overrides `Accept`
+        #[param(pattern = "^(json|csv|arrow)$", example = "csv")]
         format: Format as String = one_of(FORMATS);
     }
 }
@@ -143,8 +146,8 @@ query! {
     tag = "cases",
     operation_id = "evaluate_rows",
     params(EvaluateQuery),
-    request_body(content((EvaluateRequest = "application/json"), (String = "text/csv")), description = "At most 1 000 000 rows and 64 MiB"),
-    responses((status = 200, description = "The rows' resultants", content((EvaluateAnswer = "application/json"), (String = "text/csv"))), EvaluateProblems)
+    request_body(content((EvaluateRequest = "application/json"), (String = "text/csv"), (Vec<u8> = "application/vnd.apache.arrow.stream")), description = "At most 1 000 000 rows and 64 MiB"),
+    responses((status = 200, description = "The rows' resultants", content((EvaluateAnswer = "application/json"), (String = "text/csv"), (Vec<u8> = "application/vnd.apache.arrow.stream"))), EvaluateProblems)
 )]
 pub async fn evaluate(
     Caller(jobs): Caller,
@@ -154,7 +157,9 @@ pub async fn evaluate(
 ) -> Result<Response, ApiError> {
     let EvaluateQuery { template, format } = EvaluateQuery::read(request.uri(), &())?;
     let format = choose(request.headers(), format, FORMATS)?;
-    let template = stored_template(&jobs, &essence(request.headers()), template).await?;
+    let essence = essence(request.headers());
+    let template = stored_template(&jobs, &essence, template).await?;
+    let arrow = essence != "text/csv";
     // First the text and its numbers, then these and the answer: about twice the text at any time.
     let bytes = 2 * declared_bytes(&request, &options).min(options.evaluate_max_bytes);
     let mut share = memory.rows(jobs.tenant(), bytes).await?;
@@ -164,6 +169,7 @@ pub async fn evaluate(
     let work = tokio::task::spawn_blocking(move || {
         let _turn = turn;
         let (template, columns) = match template {
+            Some(template) if arrow => (template, read_arrow(text.clone())?),
             Some(template) => (template, read_csv(&text)?),
             None => read_json(&text)?,
         };
@@ -177,6 +183,7 @@ pub async fn evaluate(
     let (answer, share) = work.await.map_err(|error| ApiError::internal(&error))??;
     let body = match format {
         Format::Csv => csv_body(answer),
+        Format::Arrow => arrow_body(answer),
         _ => json_body(answer),
     };
     let headers = [
@@ -198,19 +205,19 @@ async fn stored_template(
             "template",
             "`template` belongs to a table; JSON has a `template` of its own",
         )),
-        ("text/csv", Some(job)) => {
+        ("text/csv" | ARROW_STREAM | ARROW_FILE, Some(job)) => {
             let case = jobs.case(job).await;
             let case = case.map_err(|error| ApiError::from(error).about("template"))?;
             json::read_json(&case).map(Some)
         }
-        ("text/csv", None) => Err(ApiError::bad_parameter(
+        ("text/csv" | ARROW_STREAM | ARROW_FILE, None) => Err(ApiError::bad_parameter(
             "template",
             "a table needs `?template=` with the id of a job; its case is what the columns are filled into",
         )),
         (other, _) => Err(ApiError::new(
             ProblemKind::UnsupportedMediaType,
             format!(
-                "the content type is `{other}`; send `application/json` with `template` and `columns`, or a table with `text/csv`"
+                "the content type is `{other}`; send `application/json` with `template` and `columns`, or a table with `text/csv` or `application/vnd.apache.arrow.stream`"
             ),
         )),
     }

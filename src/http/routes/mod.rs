@@ -20,6 +20,7 @@ pub mod plot_words;
 pub mod plots;
 pub mod point_fields;
 pub mod prefer_wait;
+pub mod profiles;
 pub mod resultants;
 pub mod results;
 pub mod run_results;

@@ -8,12 +8,14 @@ use tokio::runtime::Handle;
 use uuid::Uuid;
 
 use crate::contact::error::{CaseError, Fault};
+use crate::contact::evaluate::sections::named_sections;
 use crate::jobs::batch::staging::{StagedCase, Staging};
 use crate::jobs::batch::template::Cell;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::idempotency;
 use crate::jobs::model::created_at;
+use crate::jobs::profiles::KnownSections;
 use crate::jobs::store::submission::NewBatch;
 use crate::jobs::submit::{cost_us, outputs_text};
 use crate::jobs::submit_options::{CaseOptions, SubmitOptions};
@@ -82,6 +84,8 @@ pub struct BatchUpload {
     reserved: u32,
     /// Bytes counted so far.
     staged: u64,
+    /// Profiles that its cases name, as far as they came.
+    profiles: KnownSections,
     /// There may be something of it in the job table.
     pub(crate) in_table: bool,
 }
@@ -110,7 +114,11 @@ impl BatchUpload {
             return Ok(());
         };
         let prefix = if wrapped { "/case" } else { "" };
-        let kept = match wrapped {
+        let named = !named_sections(&case).is_empty();
+        let Some(case) = self.with_profiles(line, case, prefix)? else {
+            return Ok(());
+        };
+        let kept = match wrapped || named {
             true => serde_json::to_vec(&case),
             false => Ok(text.to_owned()),
         };
@@ -133,9 +141,37 @@ impl BatchUpload {
         let Some(BatchRow { case, cells, own }) = self.good(line, text, row) else {
             return Ok(());
         };
-        let cells = serde_json::to_vec(&cells);
-        let cells = cells.map_err(|error| JobsError::Damaged(error.to_string()))?;
-        self.check(line, &case, "", (true, own), &cells)
+        // A profile that the row names is kept with it.
+        let row = named_sections(&case).is_empty();
+        let Some(case) = self.with_profiles(line, case, "")? else {
+            return Ok(());
+        };
+        let kept = match row {
+            true => serde_json::to_vec(&cells),
+            false => serde_json::to_vec(&case),
+        };
+        let kept = kept.map_err(|error| JobsError::Damaged(error.to_string()))?;
+        self.check(line, &case, "", (row, own), &kept)
+    }
+
+    /// The case with kept profiles in the place of their names; nothing if one is not kept, which is noted.
+    fn with_profiles(
+        &mut self,
+        line: Option<u64>,
+        case: Value,
+        prefix: &str,
+    ) -> Result<Option<Value>, JobsError> {
+        match self.jobs.with_profiles_here(case, &mut self.profiles) {
+            Ok(case) => Ok(Some(case)),
+            Err(JobsError::Case(CaseError(mut faults))) => {
+                for fault in &mut faults {
+                    fault.pointer.insert_str(0, prefix);
+                }
+                self.reject(line, faults);
+                Ok(None)
+            }
+            Err(error) => Err(error),
+        }
     }
 
     /// Adds a chunk of rows of a run, which take so long. Blocks.
@@ -361,6 +397,7 @@ impl Jobs {
             labels: BTreeMap::new(),
             reserved: 0,
             staged: 0,
+            profiles: KnownSections::new(),
             in_table: false,
         })
     }

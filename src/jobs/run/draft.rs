@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fs::File;
 
 use serde_json::Value;
+use tokio::runtime::Handle;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::error::{CaseError, Fault};
@@ -15,6 +16,7 @@ use crate::jobs::batch::staging::nameless;
 use crate::jobs::batch::upload::BatchUpload;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
+use crate::jobs::profiles::{KnownSections, unknown};
 use crate::jobs::run::chunk::RunChunk;
 use crate::jobs::run::head::{RunColumn, RunHead};
 use crate::jobs::run::model::Run;
@@ -25,6 +27,8 @@ use crate::jobs::submit_options::SubmitOptions;
 const CHUNK_SECONDS: f64 = 3.0;
 /// Fewest rows of a chunk.
 const CHUNK_ROWS_MIN: usize = 50;
+/// Bytes of the profiles that the rows of a run may name together: every chunk is solved with all of them at hand.
+const PROFILE_BYTES_MAX: usize = 8 << 20;
 /// Most rows of a chunk, also the rows that decide the size of all chunks.
 const CHUNK_ROWS_MAX: usize = 10_000;
 
@@ -41,6 +45,9 @@ pub struct RunDraft {
     begun: Option<Begun>,
     rows: u64,
     rows_max: u64,
+    /// Kept profiles that rows name, and the bytes that they take.
+    profiles: KnownSections,
+    profile_bytes: usize,
 }
 
 #[derive(Debug)]
@@ -63,7 +70,7 @@ pub struct RunOptions {
 }
 
 impl Jobs {
-    /// A run of this case without rows, for at most `rows_max` of them.
+    /// A run of this case without rows, for at most `rows_max` of them. Blocks; not to be called on a thread that answers requests.
     ///
     /// # Errors
     /// [`JobsError::Case`]: a column is there twice, or there is none that varies the case; [`JobsError::Draining`], or the data folder cannot
@@ -78,8 +85,12 @@ impl Jobs {
         if !faults.is_empty() {
             return Err(CaseError(faults).into());
         }
+        let mut profiles = KnownSections::new();
+        let template = self.with_profiles_here(template, &mut profiles)?;
         let lane = self.rows();
         Ok(RunDraft {
+            profiles: KnownSections::new(),
+            profile_bytes: 0,
             upload: lane.draft()?,
             jobs: lane,
             held: columns.iter().map(|column| empty(column.text)).collect(),
@@ -152,7 +163,10 @@ impl RunDraft {
     /// [`JobsError::Case`]: the columns differ in length or kind, or hold what no case may have; more rows than are allowed; or as
     /// [`BatchUpload::add`].
     pub fn push(&mut self, columns: Vec<Values>) -> Result<(), JobsError> {
-        let faults = self.faults_of_rows(&columns);
+        let mut faults = self.faults_of_rows(&columns);
+        if faults.is_empty() {
+            faults = self.find_profiles(&columns)?;
+        }
         if !faults.is_empty() {
             return Err(CaseError(faults).into());
         }
@@ -182,6 +196,7 @@ impl RunDraft {
         self.cut(true)?;
         if let Some(Begun { mut head, .. }) = self.begun {
             head.rows = self.rows;
+            head.profiles = self.profiles.into_iter().collect();
             self.upload.set_template(head.to_bytes());
         }
         Ok(self.upload)
@@ -237,10 +252,12 @@ impl RunDraft {
                 })
             })
             .collect();
-        let case = case_of_row(&self.template, &varied, 0).map_err(|(pointer, reason)| {
-            let detail = format!("the column `{pointer}` {reason}");
-            CaseError(vec![Fault::new(column_pointer(&pointer), detail)])
-        })?;
+        let profiles: BTreeMap<String, Value> = self.profiles.clone().into_iter().collect();
+        let case =
+            case_of_row(&self.template, &varied, &profiles, 0).map_err(|(pointer, reason)| {
+                let detail = format!("the column `{pointer}` {reason}");
+                CaseError(vec![Fault::new(column_pointer(&pointer), detail)])
+            })?;
         let names = self.columns.iter();
         let names: Vec<(&str, &str)> = names
             .filter_map(|column| Some((column.pointer.as_deref()?, &*column.name)))
@@ -275,6 +292,7 @@ impl RunDraft {
         let task = ManyTask {
             case: &case,
             columns: &varied,
+            profiles: &profiles,
             limits: &options.limits,
             time_limit: options.time_limit,
         };
@@ -295,6 +313,42 @@ impl RunDraft {
         );
         head.chunk_rows = chunk_rows;
         Ok(Begun { head, row_seconds })
+    }
+
+    /// Reads the kept profiles that rows name.
+    fn find_profiles(&mut self, columns: &[Values]) -> Result<Vec<Fault>, JobsError> {
+        let of_sections = |column: &RunColumn| {
+            let pointer = column.pointer.as_deref();
+            matches!(
+                pointer,
+                Some("/contact/rail/profile" | "/contact/wheel/profile")
+            )
+        };
+        let mut faults = Vec::new();
+        for (column, values) in self.columns.iter().zip(columns) {
+            let Values::Texts(names) = values else {
+                continue;
+            };
+            for (row, name) in (self.rows..).zip(names).filter(|_| of_sections(column)) {
+                if self.profiles.contains_key(name) {
+                    continue;
+                }
+                let found = self.jobs.known_section(name, &mut self.profiles);
+                let pointer = format!("{}/{row}", column_pointer(&column.name));
+                match Handle::current().block_on(found)? {
+                    Some(section) => self.profile_bytes += section.to_string().len(),
+                    None => return Ok(vec![unknown(pointer, name)]),
+                }
+                if self.profile_bytes > PROFILE_BYTES_MAX {
+                    let detail = format!(
+                        "the profiles that rows name take more than {PROFILE_BYTES_MAX} bytes; send the rows as several runs"
+                    );
+                    faults.push(Fault::new(pointer, detail));
+                    return Ok(faults);
+                }
+            }
+        }
+        Ok(faults)
     }
 
     fn faults_of_rows(&self, columns: &[Values]) -> Vec<Fault> {

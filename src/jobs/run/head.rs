@@ -1,5 +1,7 @@
 //! What all chunks of a run share: the case, the columns, the sizes.
 
+use std::collections::BTreeMap;
+
 use bytes::Bytes;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -52,6 +54,9 @@ pub struct RunHead {
     pub columns: Vec<RunColumn>,
     /// Names of the columns of numbers of the answers.
     pub numbers: Vec<String>,
+    /// Kept cross-sections that rows name.
+    #[serde(default)]
+    pub profiles: BTreeMap<String, Value>,
     /// The method asked for.
     pub method: String,
     /// Number of rows.
@@ -69,6 +74,7 @@ impl RunHead {
             case,
             columns,
             numbers,
+            profiles: BTreeMap::new(),
             method,
             rows: 0,
             chunk_rows: 0,

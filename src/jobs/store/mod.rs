@@ -22,6 +22,7 @@ pub mod ending;
 pub mod error;
 pub mod list;
 pub mod postgres;
+pub mod profile;
 pub mod retention;
 mod sql_errors;
 pub mod sqlite;
@@ -44,6 +45,7 @@ use crate::jobs::store::cluster::Cluster;
 use crate::jobs::store::ending::{Ending, NewSlice, ResultRef, SliceRecord, StoredResult};
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::list::{BatchFilter, Change, Filter, Page};
+use crate::jobs::store::profile::{ProfileKept, StoredProfile};
 use crate::jobs::store::retention::{Deleted, Moment, Overdue, RetentionRule, Stats, Usage};
 use crate::jobs::store::submission::{
     BatchBegun, CacheKey, Enqueued, NewBatch, NewJob, QueueBounds, Refusal, StoredCase,
@@ -199,6 +201,33 @@ pub trait Store: KeyStore + Send + Sync + Debug {
 
     /// Was there a job or a batch of this tenant that has expired?
     async fn has_expired(&self, tenant: &str, id: Uuid) -> Result<bool, StoreError>;
+
+    // Profiles.
+
+    /// Keeps a cross-section for a tenant, unless it has it already, or would keep more than `max_bytes` with it.
+    async fn add_profile(
+        &self,
+        tenant: &str,
+        new: &StoredProfile,
+        max_bytes: u64,
+    ) -> Result<ProfileKept, StoreError>;
+
+    /// A cross-section of a tenant by its digest.
+    async fn profile(
+        &self,
+        tenant: &str,
+        digest: &str,
+    ) -> Result<Option<StoredProfile>, StoreError>;
+
+    /// Digests, sizes and times of the cross-sections of a tenant, newest first, at most `limit`.
+    async fn profiles(
+        &self,
+        tenant: &str,
+        limit: u32,
+    ) -> Result<Vec<(String, u64, i64)>, StoreError>;
+
+    /// Removes a cross-section of a tenant; `false` if there was none.
+    async fn delete_profile(&self, tenant: &str, digest: &str) -> Result<bool, StoreError>;
 
     // Control.
 

@@ -43,6 +43,7 @@ pub(crate) fn solve_chunk(
     let task = ManyTask {
         case: &head.case,
         columns: &varied,
+        profiles: &head.profiles,
         limits,
         time_limit: shared.options.time_limit,
     };

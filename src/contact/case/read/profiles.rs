@@ -88,7 +88,11 @@ pub(crate) fn read(block: &mut Object) -> Option<Contact> {
 }
 
 fn section(contact: &mut Object, name: &str) -> Option<CrossSection> {
-    let mut block = contact.child(name)?;
+    section_of(&mut contact.child(name)?)
+}
+
+/// Reads the members of a cross-section.
+pub(crate) fn section_of(block: &mut Object) -> Option<CrossSection> {
     block.only(
         &[
             "points_mm",
@@ -100,9 +104,9 @@ fn section(contact: &mut Object, name: &str) -> Option<CrossSection> {
         ],
         &[],
     );
-    let mirror_y = flag(&mut block, "mirror_y");
-    let mirror_z = flag(&mut block, "mirror_z");
-    let smoothing_mm = smoothing(&mut block);
+    let mirror_y = flag(block, "mirror_y");
+    let mirror_z = flag(block, "mirror_z");
+    let smoothing_mm = smoothing(block);
     let (points_mm, format, text) = match (block.has("points_mm"), block.has("text")) {
         (true, false) => {
             if block.has("format") {
@@ -112,7 +116,7 @@ fn section(contact: &mut Object, name: &str) -> Option<CrossSection> {
                 );
                 return None;
             }
-            (Some(points(&mut block)?), None, None)
+            (Some(points(block)?), None, None)
         }
         (false, true) => {
             let words = FORMATS.map(|(word, _)| word).join(", ");
@@ -138,6 +142,7 @@ fn section(contact: &mut Object, name: &str) -> Option<CrossSection> {
     };
     Some(CrossSection {
         points_mm,
+        profile: None,
         format,
         text,
         mirror_y: mirror_y?,

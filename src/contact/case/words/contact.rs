@@ -113,6 +113,10 @@ pub struct CrossSection {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub points_mm: Option<Vec<[f64; 2]>>,
+    /// Digest of a cross-section that was kept with `POST /v1/profiles`, in place of points or text.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub profile: Option<String>,
     /// Format of `text`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]

@@ -65,7 +65,7 @@ pub async fn form(
         ("text/csv", Some(job)) => {
             let case = jobs.case(job).await;
             let case = case.map_err(|error| ApiError::from(error).about("template"))?;
-            let case = read_json(&case)?;
+            let case = jobs.with_profiles(read_json(&case)?).await?;
             Ok(Form::Table(Box::new(TableBody::new(case))))
         }
         ("text/csv", None) => Err(ApiError::bad_parameter(

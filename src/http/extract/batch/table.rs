@@ -135,9 +135,28 @@ pub fn short_pointer(title: &str) -> Option<&'static str> {
 /// A column that is not known, or is there twice.
 pub fn column_pointers(header: &[u8]) -> Result<Vec<String>, String> {
     let header = header.strip_prefix(b"\xef\xbb\xbf").unwrap_or(header);
+    let columns = read_header(header)?;
+    Ok(columns
+        .iter()
+        .map(|column| pointer_of(&column.path))
+        .collect())
+}
+
+/// The JSON pointer that a title names.
+///
+/// # Errors
+/// It names no place in a case.
+pub fn column_pointer(title: &str) -> Result<String, String> {
+    let path = column(title)?.path;
+    match path.is_empty() {
+        true => Err(format!("`{title}` is no number of a case")),
+        false => Ok(pointer_of(&path)),
+    }
+}
+
+fn pointer_of(path: &[String]) -> String {
     let escaped = |part: &String| format!("/{}", part.replace('~', "~0").replace('/', "~1"));
-    let pointer = |column: TemplateColumn| column.path.iter().map(escaped).collect();
-    Ok(read_header(header)?.into_iter().map(pointer).collect())
+    path.iter().map(escaped).collect()
 }
 
 fn column(title: &str) -> Result<TemplateColumn, String> {

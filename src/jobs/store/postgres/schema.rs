@@ -35,6 +35,12 @@ const STEPS: &[Step] = &[
         // A program that does not know of the labels would open everything to a key that is bound.
         readable_from: 3,
     },
+    Step {
+        form: 4,
+        statements: include_str!("steps/4.sql"),
+        // A new table, which programs before know nothing of.
+        readable_from: 3,
+    },
 ];
 
 /// The form that is read and written.

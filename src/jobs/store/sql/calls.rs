@@ -17,6 +17,7 @@ use crate::jobs::store::cluster::Cluster;
 use crate::jobs::store::ending::{Ending, NewSlice, ResultRef, SliceRecord, StoredResult};
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::list::{BatchFilter, Change, Filter, Page};
+use crate::jobs::store::profile::{ProfileKept, StoredProfile};
 use crate::jobs::store::retention::{Deleted, Moment, Overdue, RetentionRule, Stats, Usage};
 use crate::jobs::store::submission::{
     BatchBegun, CacheKey, Enqueued, NewBatch, NewJob, QueueBounds, Refusal, StoredCase,
@@ -149,6 +150,35 @@ impl Store for SqlStore {
 
     async fn run(&self, tenant: &str, id: Uuid) -> Result<Option<RunRecord>, StoreError> {
         engine::again(|| self.run(tenant, id)).await
+    }
+
+    async fn add_profile(
+        &self,
+        tenant: &str,
+        new: &StoredProfile,
+        max_bytes: u64,
+    ) -> Result<ProfileKept, StoreError> {
+        engine::again(|| self.add_profile(tenant, new, max_bytes)).await
+    }
+
+    async fn profile(
+        &self,
+        tenant: &str,
+        digest: &str,
+    ) -> Result<Option<StoredProfile>, StoreError> {
+        engine::again(|| self.profile(tenant, digest)).await
+    }
+
+    async fn profiles(
+        &self,
+        tenant: &str,
+        limit: u32,
+    ) -> Result<Vec<(String, u64, i64)>, StoreError> {
+        engine::again(|| self.profiles(tenant, limit)).await
+    }
+
+    async fn delete_profile(&self, tenant: &str, digest: &str) -> Result<bool, StoreError> {
+        engine::again(|| self.delete_profile(tenant, digest)).await
     }
 
     async fn batch_items(

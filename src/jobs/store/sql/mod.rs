@@ -25,6 +25,7 @@ pub mod jobs;
 pub mod keys;
 pub mod lease;
 pub mod lists;
+mod profiles;
 pub mod quota;
 pub mod reap;
 pub mod rows;

@@ -12,7 +12,7 @@ const SCHEMA: &str = include_str!("schema.sql");
 const APPLICATION: i64 = 0x7268_6a62;
 
 /// The version of `schema.sql` that is read and written; it grows with every change of that file.
-const FORM: i64 = 6;
+const FORM: i64 = 7;
 
 /// Makes the tables in an empty file.
 ///

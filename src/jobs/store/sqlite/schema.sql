@@ -172,6 +172,16 @@ CREATE TABLE idempotency_keys (
 ) STRICT, WITHOUT ROWID;
 CREATE INDEX idempotency_keys_by_job ON idempotency_keys (job_id);
 
+-- Cross-sections that cases name by their digest.
+CREATE TABLE profiles (
+    tenant     TEXT    NOT NULL,
+    digest     TEXT    NOT NULL,
+    body       BLOB    NOT NULL,
+    bytes      INTEGER NOT NULL,
+    created_at INTEGER NOT NULL,
+    PRIMARY KEY (tenant, digest)
+) STRICT, WITHOUT ROWID;
+
 -- Ids of jobs and batches that have expired.
 CREATE TABLE tombstones (
     id      TEXT    NOT NULL PRIMARY KEY,

@@ -1,0 +1,222 @@
+//! Rows: how many a second does `/v1/evaluate` answer, and how long does a run of a million take?
+
+use std::fmt::Write;
+use std::time::Instant;
+
+use railhead::jobs::codec::arrow::ArrowWriter;
+use railhead::jobs::codec::table::{RowTable, TableColumn};
+use reqwest::Method;
+use serde_json::{Value, json};
+
+use crate::Row;
+use crate::client::Client;
+use crate::service::Service;
+
+/// Rows of one request of `/v1/evaluate` as CSV, whose text stays below 64 MiB.
+const EVALUATED: usize = 500_000;
+/// Rows of a run by the table, and of one by the fast solver.
+const BY_TABLE: usize = 1_000_000;
+const BY_SOLVER: usize = 10_000;
+
+const NAMES: [&str; 7] = [
+    "normal_force_n",
+    "rolling_mm",
+    "lateral_mm",
+    "friction_coefficient",
+    "creepage_x",
+    "creepage_y",
+    "spin_per_mm",
+];
+
+/// Columns of rows of a line: loads, radii, friction, creepages, spin.
+fn columns(rows: usize) -> Vec<Vec<f64>> {
+    let ranges = [
+        [2e4, 1.2e5],
+        [300.0, 600.0],
+        [80.0, 980.0],
+        [0.1, 0.5],
+        [-2e-3, 2e-3],
+        [-2e-3, 2e-3],
+        [-1e-3, 1e-3],
+    ];
+    let mut state = 7_u64;
+    let mut random = move || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        (state >> 40) as f64 / (1_u64 << 24) as f64
+    };
+    ranges
+        .iter()
+        .map(|[low, high]| (0..rows).map(|_| low + (high - low) * random()).collect())
+        .collect()
+}
+
+fn template(method: &str, target: f64) -> Value {
+    json!({
+        "material": { "shear_modulus_mpa": 82_000.0, "poisson_ratio": 0.28 },
+        "friction": { "coefficient": 0.3 },
+        "contact": { "type": "radii", "rolling_mm": 460.0, "lateral_mm": 300.0 },
+        "load": { "normal_force_n": 8e4 },
+        "motion": { "creepage_x": 0.0, "creepage_y": 0.0, "spin_per_mm": 0.0 },
+        "solver": { "method": method, "target_error": target },
+        "outputs": ["resultants"],
+    })
+}
+
+fn csv(columns: &[Vec<f64>]) -> Vec<u8> {
+    let mut text = format!("{}\n", NAMES.join(","));
+    for row in 0..columns[0].len() {
+        for (place, column) in columns.iter().enumerate() {
+            let before = if place == 0 { "" } else { "," };
+            // Nine digits, as measured data have at most.
+            write!(text, "{before}{:.8e}", column[row]).expect("a text");
+        }
+        text.push('\n');
+    }
+    text.into_bytes()
+}
+
+fn arrow(columns: &[Vec<f64>]) -> Vec<u8> {
+    let columns = NAMES.iter().zip(columns);
+    let table = RowTable {
+        columns: columns
+            .map(|(name, column)| ((*name).to_owned(), TableColumn::Numbers(column.clone())))
+            .collect(),
+    };
+    let kinds: Vec<_> = table
+        .columns
+        .iter()
+        .map(|(name, column)| (name.clone(), column.kind()))
+        .collect();
+    let mut writer = ArrowWriter::new(Vec::new(), &kinds).expect("a stream");
+    writer.write(table).expect("a batch");
+    writer.finish().expect("the end");
+    std::mem::take(writer.inner_mut())
+}
+
+/// The figures.
+pub async fn run(workers: usize) -> Vec<Row> {
+    let service = Service::start(workers, &[]);
+    let mut client = Client::new(&service.url);
+    let mut rows = Vec::new();
+    for method in ["table", "boundary_element"] {
+        let job = client
+            .submit(&template(method, 0.005), Some("wait=60"))
+            .await;
+        let id = job["id"].as_str().expect("an id").to_owned();
+        if method == "table" {
+            rows.extend(evaluated(&mut client, &id).await);
+            rows.push(run_of(&service, &mut client, &id, (BY_TABLE, 60.0)).await);
+        } else {
+            let each = bare(&columns(500));
+            let within = 1.25 * each * BY_SOLVER as f64 / workers as f64;
+            rows.push(run_of(&service, &mut client, &id, (BY_SOLVER, within)).await);
+        }
+    }
+    rows
+}
+
+async fn evaluated(client: &mut Client, job: &str) -> Vec<Row> {
+    let columns = columns(EVALUATED);
+    let mut rows = Vec::new();
+    for (name, form, format, body) in [
+        ("CSV", "text/csv", "csv", csv(&columns)),
+        (
+            "Arrow",
+            "application/vnd.apache.arrow.stream",
+            "arrow",
+            arrow(&columns),
+        ),
+    ] {
+        let path = format!("/v1/evaluate?template={job}&format={format}");
+        let mut best = 0.0_f64;
+        for _ in 0..3 {
+            let began = Instant::now();
+            let shape = |request: reqwest::RequestBuilder| {
+                request.header("content-type", form).body(body.clone())
+            };
+            let answer = client.send(Method::POST, &path, &[200], shape).await;
+            let bytes = answer.bytes().await.expect("a body");
+            assert!(bytes.len() > 40 * EVALUATED, "an answer of {}", bytes.len());
+            best = best.max(EVALUATED as f64 / began.elapsed().as_secs_f64());
+        }
+        rows.push(Row::judged(
+            &format!("`/v1/evaluate`, {EVALUATED} rows of 7 numbers, {name} in and out"),
+            format!("{best:.0} rows/s"),
+            "300 000 rows/s",
+            best >= 3e5,
+        ));
+    }
+    rows
+}
+
+async fn run_of(
+    service: &Service,
+    client: &mut Client,
+    job: &str,
+    (count, within): (usize, f64),
+) -> Row {
+    let body = arrow(&columns(count));
+    let began = Instant::now();
+    let shape = |request: reqwest::RequestBuilder| {
+        let request = request.header("content-type", "application/vnd.apache.arrow.stream");
+        request.body(body.clone())
+    };
+    let path = format!("/v1/runs?template={job}");
+    let answer = client.send(Method::POST, &path, &[202], shape).await;
+    let run: Value = answer.json().await.expect("JSON");
+    let accepted = began.elapsed().as_secs_f64();
+    let own = format!("/v1/runs/{}", run["id"].as_str().expect("an id"));
+    let mut memory = 0.0_f64;
+    let (run, ended) = loop {
+        let run = client.json(&own).await;
+        memory = memory.max(service.usage().memory_mb);
+        if run["ended_at"].is_string() {
+            break (run, began.elapsed().as_secs_f64());
+        }
+        tokio::time::sleep(std::time::Duration::from_millis(100)).await;
+    };
+    assert_eq!(run["rows_done"], json!(count), "{run}");
+    let (parquet, seconds) = client.get(&format!("{own}/results?format=parquet")).await;
+    let (text, csv_seconds) = client.get(&format!("{own}/results?format=csv")).await;
+    let lines = text.iter().filter(|byte| **byte == b'\n').count();
+    assert_eq!(lines, count + 1, "lines of the results");
+    memory = memory.max(service.usage().memory_mb);
+    let method = run["method"].as_str().expect("a method").to_owned();
+    Row::judged(
+        &format!("a run of {count} rows by `{method}`, sent as Arrow"),
+        format!(
+            "accepted after {accepted:.1} s, ended after {ended:.1} s; Parquet of {:.0} MB in {seconds:.1} s, CSV in {csv_seconds:.1} s; memory at most {memory:.0} MB",
+            parquet.len() as f64 / 1e6
+        ),
+        &format!("within {within:.0} s, below 1024 MB"),
+        ended <= within && memory < 1024.0,
+    )
+}
+
+/// Seconds of a row by the bare solver on one thread.
+fn bare(columns: &[Vec<f64>]) -> f64 {
+    use railhead::contact::{self, case::limits::Limits, monitor::Unmonitored};
+    let pointers = [
+        "/load/normal_force_n",
+        "/contact/rolling_mm",
+        "/contact/lateral_mm",
+        "/friction/coefficient",
+        "/motion/creepage_x",
+        "/motion/creepage_y",
+        "/motion/spin_per_mm",
+    ];
+    let operators = std::sync::Arc::default();
+    let rows = columns[0].len();
+    let began = Instant::now();
+    for row in 0..rows {
+        let mut case = template("boundary_element", 0.005);
+        for (pointer, column) in pointers.iter().zip(columns) {
+            *case.pointer_mut(pointer).expect("a number") = json!(column[row]);
+        }
+        let checked = contact::check(&case, &Limits::default()).expect("a sound case");
+        contact::solve_with(&operators, &checked, &Unmonitored).expect("an answer");
+    }
+    began.elapsed().as_secs_f64() / rows as f64
+}

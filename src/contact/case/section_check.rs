@@ -1,0 +1,59 @@
+//! A cross-section by itself: is it sound, whose is it, and how good are its points?
+
+use serde_json::Value;
+
+use crate::contact::case::profile_points;
+use crate::contact::case::profiles::profile;
+use crate::contact::case::read::faults::Faults;
+use crate::contact::case::read::object::Object;
+use crate::contact::case::read::profiles::section_of;
+use crate::contact::error::{CaseError, Fault};
+use crate::contact::geometry::profile::Body;
+use crate::contact::geometry::profile_quality::points::advised_smoothing;
+use crate::contact::geometry::profile_quality::shape::{Looks, looks_like};
+use crate::contact::solution::profile_quality::SectionQuality;
+
+/// Contact modulus G/(1 − ν) of steel on steel in MPa, for the smoothing that is suggested.
+const STEEL_MPA: f64 = 82_000.0 / (1.0 - 0.28);
+
+/// What a cross-section was taken for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SectionReport {
+    /// `rail` or `wheel`: what the file says, or what the points look like.
+    pub body: &'static str,
+    /// Its points, and the smoothing that suits them on steel beside another profile of this kind.
+    pub quality: SectionQuality,
+}
+
+/// Reads and checks a cross-section as `rail` or `wheel` of a case has it.
+///
+/// # Errors
+/// Every fault, with pointers into the cross-section.
+pub fn check_section(value: &Value) -> Result<SectionReport, CaseError> {
+    let mut faults = Faults::default();
+    let read = Object::open(value, String::new(), &mut faults)
+        .and_then(|mut block| section_of(&mut block));
+    let listed = faults.into_list();
+    let Some(section) = read.filter(|_| listed.is_empty()) else {
+        return Err(CaseError(listed));
+    };
+    let read = [Body::Rail, Body::Wheel].map(|body| (body, profile(body, &section)));
+    let (body, profile) = match read {
+        [(_, Ok(rail)), (_, Ok(wheel))] => match looks_like(rail.points().at) {
+            Some(Looks::Wheel) => (Body::Wheel, wheel),
+            _ => (Body::Rail, rail),
+        },
+        [(body, Ok(only)), _] | [_, (body, Ok(only))] => (body, only),
+        [(_, Err(fault)), (_, Err(_))] => {
+            let own = fault.pointer.strip_prefix("/contact/rail");
+            let pointer = own.unwrap_or_default().to_owned();
+            return Err(CaseError(vec![Fault { pointer, ..fault }]));
+        }
+    };
+    let grain = profile_points::grain(&profile);
+    let advised = advised_smoothing([grain; 2], STEEL_MPA, profile_points::PRESSURE_USUAL);
+    Ok(SectionReport {
+        body: body.name(),
+        quality: profile_points::section(&profile, advised[0]),
+    })
+}

@@ -1,0 +1,169 @@
+//! `/v1/profiles`: cross-sections kept once, which cases name by their digest.
+
+use axum::Json;
+use axum::extract::{FromRequestParts, Path};
+use axum::http::request::Parts;
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use serde::Serialize;
+use serde_json::Value;
+use utoipa::ToSchema;
+
+use crate::contact::case::words::contact::CrossSection;
+use crate::contact::solution::profile_quality::SectionQuality;
+use crate::http::dto::job::rfc3339;
+use crate::http::extract::caller::Caller;
+use crate::http::extract::json::JsonBody;
+use crate::http::problem::catalogue::{PlainProblems, problems};
+use crate::http::problem::error::ApiError;
+use crate::http::problem::kinds::ProblemKind;
+
+/// The digest in the path.
+#[derive(Debug, Clone)]
+pub struct Digest(String);
+
+impl<S: Send + Sync> FromRequestParts<S> for Digest {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+        let Path(text) = Path::<String>::from_request_parts(parts, state)
+            .await
+            .map_err(|rejection| {
+                ApiError::new(ProblemKind::ProfileNotFound, rejection.body_text())
+            })?;
+        Ok(Digest(text))
+    }
+}
+
+/// A cross-section that is kept.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct KeptProfile {
+    /// What cases name it by: `{ "profile": "<digest>" }` in place of points or text.
+    digest: String,
+    /// `rail` or `wheel`: what the file says, or what the points look like.
+    body: &'static str,
+    /// How far its points can be trusted.
+    quality: SectionQuality,
+    /// When it was first sent.
+    #[schema(format = "date-time")]
+    created_at: String,
+}
+
+problems! {
+    /// What `POST /v1/profiles` can fail with.
+    KeepProfileProblems: BadQuery, MalformedJson, UnreadableBody, BodyTimeout, BodyTooLarge, UnsupportedMediaType, UnsupportedEncoding, FaultyCase,
+    ProfilesFull, Draining, StorageFull, StorageUnwritable
+}
+
+/// Keeps a cross-section, so that cases can name it.
+///
+/// The body is a cross-section as `rail` and `wheel` of a case have it. It is kept for the tenant until it is deleted; the same one again changes
+/// nothing. A case that names it in place of points or text is submitted with its points, so that jobs do not depend on what is deleted later.
+#[utoipa::path(
+    post,
+    path = "/v1/profiles",
+    tag = "profiles",
+    operation_id = "keep_profile",
+    request_body(content = CrossSection, description = "One cross-section", content_type = "application/json"),
+    responses(
+        (status = 201, description = "It is kept", body = KeptProfile, headers(("Location" = String, description = "Path of the profile"))),
+        (status = 200, description = "It was kept before", body = KeptProfile, headers(("Location" = String, description = "Path of the profile"))),
+        KeepProfileProblems
+    )
+)]
+pub async fn keep(
+    Caller(jobs): Caller,
+    JsonBody { value, room }: JsonBody,
+) -> Result<Response, ApiError> {
+    let (kept, report, before) = jobs.keep_profile(value).await?;
+    drop(room);
+    let location = [(header::LOCATION, format!("/v1/profiles/{}", kept.digest))];
+    let status = if before {
+        StatusCode::OK
+    } else {
+        StatusCode::CREATED
+    };
+    let body = Json(KeptProfile {
+        digest: kept.digest,
+        body: report.body,
+        quality: report.quality,
+        created_at: rfc3339(kept.created_at),
+    });
+    Ok((status, location, body).into_response())
+}
+
+/// A kept cross-section in a list.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct ProfileEntry {
+    /// What cases name it by.
+    digest: String,
+    /// What it counts toward `--tenant-profiles-mb`.
+    bytes: u64,
+    /// When it was first sent.
+    #[schema(format = "date-time")]
+    created_at: String,
+}
+
+/// What a tenant keeps.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct ProfileList {
+    /// Newest first, at most 1000.
+    profiles: Vec<ProfileEntry>,
+    /// Bytes that may be kept in all.
+    bytes_max: u64,
+}
+
+/// Lists what is kept, newest first.
+#[utoipa::path(
+    get,
+    path = "/v1/profiles",
+    tag = "profiles",
+    operation_id = "list_profiles",
+    responses((status = 200, description = "What is kept", body = ProfileList), PlainProblems)
+)]
+pub async fn list(Caller(jobs): Caller) -> Result<Json<ProfileList>, ApiError> {
+    let entries = jobs.profiles().await?.into_iter();
+    let entries = entries.map(|(digest, bytes, created_at)| ProfileEntry {
+        digest,
+        bytes,
+        created_at: rfc3339(created_at),
+    });
+    Ok(Json(ProfileList {
+        profiles: entries.collect(),
+        bytes_max: jobs.options().tenant_profiles_max_bytes,
+    }))
+}
+
+problems! {
+    /// What asking for a profile can fail with.
+    ProfileProblems: BadQuery, ProfileNotFound
+}
+
+/// The cross-section as it was sent.
+#[utoipa::path(
+    get,
+    path = "/v1/profiles/{digest}",
+    tag = "profiles",
+    operation_id = "get_profile",
+    params(("digest" = String, Path, description = "Digest of the profile")),
+    responses((status = 200, description = "The cross-section", body = CrossSection), ProfileProblems)
+)]
+pub async fn get(Caller(jobs): Caller, Digest(digest): Digest) -> Result<Json<Value>, ApiError> {
+    let kept = jobs.profile(&digest).await?;
+    let value = serde_json::from_slice(&kept.body);
+    Ok(Json(value.map_err(|error| ApiError::internal(&error))?))
+}
+
+/// Removes a kept cross-section. Jobs and runs that named it are not touched.
+#[utoipa::path(
+    delete,
+    path = "/v1/profiles/{digest}",
+    tag = "profiles",
+    operation_id = "delete_profile",
+    params(("digest" = String, Path, description = "Digest of the profile")),
+    responses((status = 204, description = "It is gone"), ProfileProblems)
+)]
+pub async fn delete(Caller(jobs): Caller, Digest(digest): Digest) -> Result<StatusCode, ApiError> {
+    jobs.delete_profile(&digest).await?;
+    Ok(StatusCode::NO_CONTENT)
+}

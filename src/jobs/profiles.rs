@@ -1,0 +1,168 @@
+//! Cross-sections kept for a tenant, and cases that name them.
+//!
+//! A name is replaced by what it stands for when a case is submitted, so that a job never depends on what is deleted later.
+
+use std::collections::HashMap;
+
+use bytes::Bytes;
+use serde_json::Value;
+use tokio::runtime::Handle;
+
+use crate::contact::case::section_check::{SectionReport, check_section};
+use crate::contact::error::{CaseError, Fault};
+use crate::contact::evaluate::sections::{named_and_given, named_sections, put_section};
+use crate::jobs::error::JobsError;
+use crate::jobs::handle::Jobs;
+use crate::jobs::idempotency;
+use crate::jobs::run::lane::tenant_of;
+use crate::jobs::store::profile::{ProfileKept, StoredProfile};
+
+/// Longest list.
+pub const PROFILES_MAX: u32 = 1000;
+
+/// Cross-sections that were read a moment ago, by their digests.
+pub(crate) type KnownSections = HashMap<String, Value>;
+
+impl Jobs {
+    /// Checks a cross-section and keeps it for the tenant; also says whether it was kept already.
+    ///
+    /// # Errors
+    /// [`JobsError::Case`] with every fault, [`JobsError::ProfilesFull`], [`JobsError::Draining`], or a failed database.
+    pub async fn keep_profile(
+        &self,
+        section: Value,
+    ) -> Result<(StoredProfile, SectionReport, bool), JobsError> {
+        if self.shared.draining.is_cancelled() {
+            return Err(JobsError::Draining);
+        }
+        let read = tokio::task::spawn_blocking(move || {
+            let report = check_section(&section);
+            let digest = blake3::Hash::from(idempotency::digest(&section)).to_hex();
+            (report, digest.to_string(), section.to_string())
+        });
+        let (report, digest, text) = read
+            .await
+            .map_err(|error| JobsError::Damaged(error.to_string()))?;
+        let (report, tenant) = (report?, &self.own_tenant());
+        let new = StoredProfile {
+            digest,
+            body: Bytes::from(text),
+            created_at: self.shared.now_ms(),
+        };
+        let max_bytes = self.shared.options.tenant_profiles_max_bytes;
+        let kept = self.shared.store.add_profile(tenant, &new, max_bytes).await;
+        match self.observe_write(kept)? {
+            ProfileKept::Added => Ok((new, report, false)),
+            ProfileKept::Existing(known) => Ok((known, report, true)),
+            ProfileKept::Full => Err(JobsError::ProfilesFull(max_bytes)),
+        }
+    }
+
+    /// A kept cross-section.
+    ///
+    /// # Errors
+    /// [`JobsError::ProfileNotFound`], or a failed database.
+    pub async fn profile(&self, digest: &str) -> Result<StoredProfile, JobsError> {
+        let found = self
+            .shared
+            .store
+            .profile(&self.own_tenant(), digest)
+            .await?;
+        found.ok_or(JobsError::ProfileNotFound)
+    }
+
+    /// Digests, sizes and times of what is kept, newest first, at most [`PROFILES_MAX`].
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn profiles(&self) -> Result<Vec<(String, u64, i64)>, JobsError> {
+        let store = &self.shared.store;
+        Ok(store.profiles(&self.own_tenant(), PROFILES_MAX).await?)
+    }
+
+    /// Removes a kept cross-section. Jobs and runs that named it have it.
+    ///
+    /// # Errors
+    /// [`JobsError::ProfileNotFound`], or a failed database.
+    pub async fn delete_profile(&self, digest: &str) -> Result<(), JobsError> {
+        let store = &self.shared.store;
+        match store.delete_profile(&self.own_tenant(), digest).await? {
+            true => Ok(()),
+            false => Err(JobsError::ProfileNotFound),
+        }
+    }
+
+    /// The case with kept cross-sections in the place of their names.
+    ///
+    /// # Errors
+    /// [`JobsError::Case`]: the tenant keeps no such cross-section, or one is named and given; or a failed database.
+    pub async fn with_profiles(&self, case: Value) -> Result<Value, JobsError> {
+        self.with_known_profiles(case, &mut KnownSections::new())
+            .await
+    }
+
+    /// The same on a thread that may block, with what was read before.
+    pub(crate) fn with_profiles_here(
+        &self,
+        case: Value,
+        known: &mut KnownSections,
+    ) -> Result<Value, JobsError> {
+        if named_sections(&case).is_empty() {
+            return Ok(case);
+        }
+        Handle::current().block_on(self.with_known_profiles(case, known))
+    }
+
+    async fn with_known_profiles(
+        &self,
+        mut case: Value,
+        known: &mut KnownSections,
+    ) -> Result<Value, JobsError> {
+        if let Some(place) = named_and_given(&case) {
+            let detail = "given together with points; a stored profile stands in place of points_mm or of text and format";
+            return Err(CaseError(vec![Fault::new(format!("{place}/profile"), detail)]).into());
+        }
+        for (place, digest) in named_sections(&case) {
+            let section = self.known_section(&digest, known).await?;
+            let Some(section) = section else {
+                return Err(CaseError(vec![unknown(format!("{place}/profile"), &digest)]).into());
+            };
+            put_section(&mut case, place, &section);
+        }
+        Ok(case)
+    }
+
+    /// A cross-section, if it is kept.
+    pub(crate) async fn known_section(
+        &self,
+        digest: &str,
+        known: &mut KnownSections,
+    ) -> Result<Option<Value>, JobsError> {
+        if let Some(section) = known.get(digest) {
+            return Ok(Some(section.clone()));
+        }
+        let found = self
+            .shared
+            .store
+            .profile(&self.own_tenant(), digest)
+            .await?;
+        let Some(found) = found else { return Ok(None) };
+        let section: Value = serde_json::from_slice(&found.body)
+            .map_err(|error| JobsError::Damaged(format!("profile {digest}: {error}")))?;
+        known.insert(digest.to_owned(), section.clone());
+        Ok(Some(section))
+    }
+
+    /// The tenant, whichever of its lanes this is.
+    fn own_tenant(&self) -> String {
+        tenant_of(&self.tenant).to_owned()
+    }
+}
+
+/// The fault of a name that stands for nothing.
+pub(crate) fn unknown(pointer: String, digest: &str) -> Fault {
+    let detail = format!(
+        "`{digest}` given, which is no profile of this tenant; `POST /v1/profiles` keeps one and answers its digest"
+    );
+    Fault::new(pointer, detail)
+}

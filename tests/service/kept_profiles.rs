@@ -1,0 +1,157 @@
+//! Cross-sections kept once and named by cases, batches and runs.
+
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+use crate::errors::assert_problem;
+use crate::postgres;
+use crate::server::{Server, Setup, example};
+use railhead::jobs::options::Database;
+
+/// The shipped wheel on a rail, its two cross-sections and the same case without them.
+fn pair() -> (Value, Value, Value) {
+    let mut case = example("wheel-rail.case.json");
+    let [rail, wheel] = ["rail", "wheel"].map(|name| case["contact"][name].clone());
+    case["outputs"] = json!(["resultants"]);
+    case["solver"] = json!({ "mesh": { "strips": 6, "cells": 6 } });
+    (case, rail, wheel)
+}
+
+async fn keep(server: &Server, section: &Value) -> Value {
+    let answer = server.post("/v1/profiles", section).await;
+    assert_eq!(answer.status, 201, "{}", answer.text);
+    answer.json
+}
+
+fn forces(result: &Value) -> &Value {
+    &result["total"][0]["force_y_n"]
+}
+
+#[tokio::test]
+async fn a_case_that_names_its_profiles_is_the_case_with_their_points() {
+    let mut servers = vec![Server::start().await];
+    if let Some(url) = postgres::schema().await {
+        let mut setup = Setup::new();
+        setup.options.database = Some(Database {
+            url,
+            connections: 4,
+        });
+        servers.push(setup.start().await);
+    }
+    for server in servers {
+        let (case, rail, wheel) = pair();
+        let (kept_rail, kept_wheel) = (keep(&server, &rail).await, keep(&server, &wheel).await);
+        assert_eq!([&kept_rail["body"], &kept_wheel["body"]], ["rail", "wheel"]);
+        assert!(kept_rail["quality"]["points"].as_u64().expect("points") > 20);
+        assert_eq!(server.post("/v1/profiles", &rail).await.status, 200);
+        let mut named = case.clone();
+        named["contact"]["rail"] = json!({ "profile": kept_rail["digest"] });
+        named["contact"]["wheel"] = json!({ "profile": kept_wheel["digest"] });
+        let by_name = server.solve(&named).await;
+        let by_points = server.solve(&case).await;
+        assert_eq!(forces(&by_name["result"]), forces(&by_points["result"]));
+        assert_eq!(by_points["cached"], true, "both are the same case");
+        let path = format!(
+            "/v1/profiles/{}",
+            kept_rail["digest"].as_str().expect("a digest")
+        );
+        assert_eq!(server.get(&path).await.json, rail);
+        assert_eq!(
+            server.get("/v1/profiles").await.json["profiles"]
+                .as_array()
+                .map(Vec::len),
+            Some(2)
+        );
+        assert_run(&server, &named, &kept_rail).await;
+        assert_eq!(server.delete(&path).await.status, 204);
+        assert_problem(&server.get(&path).await, 404, "profile-not-found", "digest");
+        let gone = server.post("/v1/jobs", &named).await;
+        assert_problem(&gone, 422, "faulty-case", "fault");
+        assert!(gone.text.contains("/contact/rail/profile"), "{}", gone.text);
+    }
+}
+
+/// A run in which each row names its rail.
+async fn assert_run(server: &Server, named: &Value, rail: &Value) {
+    let rows = json!({ "template": named, "columns": {
+        "/contact/rail/profile": [rail["digest"], rail["digest"]], "lateral_shift_mm": [0.0, 1.0]
+    } });
+    let answer = server.post("/v1/runs", &rows).await;
+    assert_eq!(answer.status, 202, "{}", answer.text);
+    let run = answer.header("location").expect("a location").to_owned();
+    let begun = Instant::now();
+    while !server.get(&run).await.json["ended_at"].is_string() {
+        assert!(begun.elapsed() < Duration::from_secs(60));
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    let results = server.get(&format!("{run}/results")).await.text;
+    let rows: Vec<Value> = results
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("JSON"))
+        .collect();
+    let mut single = named.clone();
+    single["contact"]["lateral_shift_mm"] = json!(1.0);
+    let single = server.solve(&single).await;
+    assert_eq!(
+        &rows[1]["force_y_n"],
+        forces(&single["result"]),
+        "{results}"
+    );
+    assert_ne!(rows[0]["force_y_n"], rows[1]["force_y_n"]);
+    let mut unknown =
+        json!({ "template": named, "columns": { "/contact/rail/profile": ["nothing"] } });
+    let refused = server.post("/v1/runs", &unknown).await;
+    assert_problem(&refused, 422, "faulty-case", "fault");
+    unknown["columns"] = json!({ "lateral_shift_mm": [0.0] });
+    unknown["template"]["contact"]["rail"] = json!({ "profile": "nothing" });
+    let refused = server.post("/v1/runs", &unknown).await;
+    assert!(
+        refused.text.contains("/contact/rail/profile"),
+        "{}",
+        refused.text
+    );
+}
+
+#[tokio::test]
+async fn profiles_are_bounded_and_faulty_ones_are_refused() {
+    let mut setup = Setup::new();
+    setup.working = false;
+    let (case, rail, wheel) = pair();
+    setup.options.tenant_profiles_max_bytes = rail.to_string().len() as u64 + 10;
+    let server = setup.start().await;
+    let rail = keep(&server, &rail).await;
+    let full = server.post("/v1/profiles", &wheel).await;
+    assert_problem(&full, 429, "profiles-full", "tenant-profiles-mb");
+    let faulty = server
+        .post("/v1/profiles", &json!({ "points_mm": [[0, 0], [1, 0]] }))
+        .await;
+    assert_problem(&faulty, 422, "faulty-case", "fault");
+    assert_eq!(
+        faulty.json["errors"][0]["pointer"], "/points_mm",
+        "{}",
+        faulty.text
+    );
+    let mut both = case.clone();
+    both["contact"]["rail"]["profile"] = rail["digest"].clone();
+    let refused = server.post("/v1/cases/check", &both).await;
+    assert_problem(&refused, 422, "faulty-case", "fault");
+    // A batch with one case that names it, and one that names nothing.
+    let mut named = case;
+    named["contact"]["rail"] = json!({ "profile": rail["digest"] });
+    let mut unknown = named.clone();
+    unknown["contact"]["rail"]["profile"] = json!("0");
+    let batch = server
+        .post("/v1/batches?on_invalid=skip", &json!([named, unknown]))
+        .await;
+    assert_eq!(
+        (batch.status, &batch.json["rejected"]),
+        (202, &json!(1)),
+        "{}",
+        batch.text
+    );
+    assert_eq!(
+        batch.json["errors"][0]["pointer"],
+        "/1/contact/rail/profile"
+    );
+}
