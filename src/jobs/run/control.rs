@@ -30,6 +30,11 @@ impl Jobs {
     }
 
     async fn with_head(&self, batch: Batch) -> Result<Run, JobsError> {
+        let (_, there) = batch.ended();
+        if there < u64::from(batch.count) {
+            // Its first chunks have expired, or it is being deleted.
+            return Err(JobsError::Expired);
+        }
         let lane = rows_lane(&self.tenant);
         let record = self.shared.store.run(&lane, batch.id).await?;
         let record = record.ok_or(JobsError::RunNotFound)?;
@@ -51,8 +56,8 @@ impl Jobs {
         for batch in page.entries {
             match self.with_head(batch).await {
                 Ok(run) => runs.push(run),
-                // Deleted meanwhile.
-                Err(JobsError::RunNotFound) => {}
+                // Deleted meanwhile, or on its way out.
+                Err(JobsError::RunNotFound | JobsError::Expired) => {}
                 Err(error) => return Err(error),
             }
         }
