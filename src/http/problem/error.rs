@@ -197,20 +197,6 @@ impl From<JobsError> for ApiError {
                     "{jobs} jobs of the batch are queued or running; cancel it first, then delete it"
                 ),
             ),
-            JobsError::RunNotFound => ApiError::new(ProblemKind::RunNotFound, "no run has this id"),
-            JobsError::RunNotEnded => ApiError::new(
-                ProblemKind::RunNotEnded,
-                "rows of the run are waiting or being solved; cancel it first, then delete it",
-            ),
-            JobsError::ProfileNotFound => {
-                ApiError::new(ProblemKind::ProfileNotFound, "no profile has this digest")
-            }
-            JobsError::ProfilesFull(_) => {
-                ApiError::new(ProblemKind::ProfilesFull, error.to_string())
-            }
-            JobsError::TooManyRows(_) => {
-                ApiError::new(ProblemKind::BodyTooLarge, error.to_string())
-            }
             JobsError::NoSuchPatch { patches } => ApiError::no_such_index("patch", patches),
             JobsError::NoSuchPoint { points } => ApiError::no_such_index("point", points),
             JobsError::IdempotencyConflict => ApiError::new(
@@ -241,11 +227,28 @@ impl From<JobsError> for ApiError {
                 ProblemKind::Draining,
                 "the service is shutting down and takes no new jobs",
             ),
-            other => match other.storage_fault() {
-                Some(trouble) => troubled(trouble, &other),
-                None => ApiError::internal(&other),
-            },
+            other => of_rows(other),
         }
+    }
+}
+
+/// What went wrong with a run or a kept profile, or with the store.
+fn of_rows(error: JobsError) -> ApiError {
+    match error {
+        JobsError::RunNotFound => ApiError::new(ProblemKind::RunNotFound, "no run has this id"),
+        JobsError::RunNotEnded => ApiError::new(
+            ProblemKind::RunNotEnded,
+            "rows of the run are waiting or being solved; cancel it first, then delete it",
+        ),
+        JobsError::ProfileNotFound => {
+            ApiError::new(ProblemKind::ProfileNotFound, "no profile has this digest")
+        }
+        JobsError::ProfilesFull(_) => ApiError::new(ProblemKind::ProfilesFull, error.to_string()),
+        JobsError::TooManyRows(_) => ApiError::new(ProblemKind::BodyTooLarge, error.to_string()),
+        other => match other.storage_fault() {
+            Some(trouble) => troubled(trouble, &other),
+            None => ApiError::internal(&other),
+        },
     }
 }
 

@@ -6,6 +6,7 @@ use std::fs::File;
 use serde_json::Value;
 use tokio::runtime::Handle;
 
+use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::words::solver::Output;
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::evaluate::many::{ManyTask, expected_seconds};
@@ -264,26 +265,7 @@ impl RunDraft {
             .collect();
         let checked = self.jobs.check(&case);
         let checked = checked.map_err(|error| of_first_row(error, &names))?;
-        let mut faults = Vec::new();
-        if checked.problem.motions.len() != 1 {
-            let detail = format!(
-                "{} motions given; a row has one motion, and columns vary it",
-                checked.problem.motions.len()
-            );
-            faults.push(Fault::new("/template/motion", detail));
-        }
-        let numbers = [Output::Resultants, Output::Zones, Output::Gradients];
-        if let Some(other) = checked
-            .run
-            .outputs
-            .iter()
-            .find(|asked| !numbers.contains(asked))
-        {
-            let detail = format!(
-                "{other:?} asked for; rows are answered with numbers: allowed are `resultants`, `zones`, which gives the share that sticks, and `gradients`"
-            );
-            faults.push(Fault::new("/template/outputs", detail));
-        }
+        let faults = faults_of_template(&checked);
         if !faults.is_empty() {
             return Err(CaseError(faults).into());
         }
@@ -373,6 +355,31 @@ impl RunDraft {
         }
         faults
     }
+}
+
+/// What the case of a run may not ask for.
+fn faults_of_template(checked: &CheckedCase) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    if checked.problem.motions.len() != 1 {
+        let detail = format!(
+            "{} motions given; a row has one motion, and columns vary it",
+            checked.problem.motions.len()
+        );
+        faults.push(Fault::new("/template/motion", detail));
+    }
+    let numbers = [Output::Resultants, Output::Zones, Output::Gradients];
+    if let Some(other) = checked
+        .run
+        .outputs
+        .iter()
+        .find(|asked| !numbers.contains(asked))
+    {
+        let detail = format!(
+            "{other:?} asked for; rows are answered with numbers: allowed are `resultants`, `zones`, which gives the share that sticks, and `gradients`"
+        );
+        faults.push(Fault::new("/template/outputs", detail));
+    }
+    faults
 }
 
 fn faults_of_columns(columns: &[RunColumn]) -> Vec<Fault> {
