@@ -129,6 +129,23 @@ async fn read_everywhere(cluster: &Cluster, ids: &[&String]) {
     }
 }
 
+/// Two API nodes and three workers with short leases.
+fn add_nodes(cluster: &Cluster, url: &str) -> Vec<usize> {
+    let shared = "--results-url s3://soak/results --cache false --lease-s 3 --shutdown-grace-s 2 --drain-delay-s 0";
+    let roles = [
+        ("serve", "0"),
+        ("serve", "0"),
+        ("worker", "1"),
+        ("worker", "1"),
+        ("worker", "1"),
+    ];
+    let add = |(role, workers)| {
+        let flags = ["--database-url", url, "--workers", workers].into_iter();
+        cluster.add(role, &flags.chain(shared.split(' ')).collect::<Vec<_>>())
+    };
+    roles.into_iter().map(add).collect()
+}
+
 pub async fn run(jobs: usize) {
     let (Some(url), Some(port)) = (postgres::database().await, seaweed::server()) else {
         return;
@@ -141,36 +158,7 @@ pub async fn run(jobs: usize) {
     way.faults.cut.store(30, Ordering::Relaxed);
     let s3 = way.address.port();
     let cluster = Cluster::new(move || seaweed::railhead_at(s3));
-    let shared = [
-        "--database-url",
-        &url,
-        "--results-url",
-        "s3://soak/results",
-        "--cache",
-        "false",
-    ];
-    let shared = [
-        &shared[..],
-        &[
-            "--lease-s",
-            "3",
-            "--shutdown-grace-s",
-            "2",
-            "--drain-delay-s",
-            "0",
-        ],
-    ]
-    .concat();
-    let all: Vec<usize> = [
-        ("serve", "0"),
-        ("serve", "0"),
-        ("worker", "1"),
-        ("worker", "1"),
-        ("worker", "1"),
-    ]
-    .into_iter()
-    .map(|(role, workers)| cluster.add(role, &[&shared[..], &["--workers", workers]].concat()))
-    .collect();
+    let all = add_nodes(&cluster, &url);
 
     // Kills at random, and one crash of the database.
     let began = Instant::now();
