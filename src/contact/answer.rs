@@ -36,7 +36,8 @@ fn motions(
     pressed: &PressedContact,
     watch: &TimeLimit,
 ) -> Result<(Solution, Fields), SolveError> {
-    let task = case.rolling_task(&pressed.footprint);
+    let mut task = case.rolling_task(&pressed.footprint);
+    task.resolution = task.resolution.beside(pressed.coupling_error);
     if let Some(reason) = task.falls_too_fast() {
         return Err(SolveError::NotCovered { reason });
     }
@@ -45,6 +46,10 @@ fn motions(
     let mut before: Option<MotionAnswer> = None;
     for index in 0..case.problem.motions.len() {
         let mut point = force_control::solve(&task, &mut levels, index, before.as_ref(), watch)?;
+        if pressed.coupling_error > 0.0 {
+            let errors = point.errors.iter_mut().flatten();
+            errors.for_each(|error| *error = error.hypot(pressed.coupling_error));
+        }
         if index == 0 {
             // What all motions share is charged to the first.
             point.seconds += pressed.report.map_or(0.0, |report| report.seconds);

@@ -175,6 +175,7 @@ impl WheelSolve<'_> {
             let pressed = PressedContact {
                 footprint: Footprint::computed(gap.field.clone(), load_error),
                 report: Some(normal),
+                coupling_error: problem.first_order_error(run.method),
                 remarks: Vec::new(),
             };
             let extents = gap.field.patches().into_iter().map(|patch| patch.extent);

@@ -24,6 +24,7 @@ pub mod slices;
 pub mod solution;
 pub mod stages;
 pub mod time_limit;
+pub mod unlike;
 
 use std::sync::Arc;
 

@@ -12,6 +12,7 @@ use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::solution::finish::finish;
 use crate::contact::solution::words::{Fields, Solution};
 use crate::contact::time_limit::TimeLimit;
+use crate::contact::unlike;
 
 /// Solves all motions of a problem one after the other, as long as one slice.
 ///
@@ -27,9 +28,14 @@ pub(crate) fn solve_whole(
         trust::solve(operators, case, contact, monitor)?
     } else {
         let watch = TimeLimit::new(monitor, case.run.time_limit, case.problem.motions.len());
-        let pressed = case.pressed(&watch);
-        let pressed = pressed.map_err(|error| watch.explained(error, case))?;
-        answer(operators, case, &pressed, &watch)?
+        if case.problem.is_coupled(&case.run) {
+            let answer = unlike::solve(operators, case, &watch);
+            answer.map_err(|error| watch.explained(error, case))?
+        } else {
+            let pressed = case.pressed(&watch);
+            let pressed = pressed.map_err(|error| watch.explained(error, case))?;
+            answer(operators, case, &pressed, &watch)?
+        }
     };
     finish(case, answer, monitor.elapsed().saturating_sub(began))
 }

@@ -1,7 +1,7 @@
 //! Cases to begin with: those of `api/examples`, which the contract shows and `/v1/examples` answers.
 
 /// Name, summary and text of each.
-pub const EXAMPLES: [(&str, &str, &str); 14] = [
+pub const EXAMPLES: [(&str, &str, &str); 15] = [
     (
         "hertz-steel",
         "A wheel on a rail by its radii, with both creepages and spin",
@@ -46,6 +46,11 @@ pub const EXAMPLES: [(&str, &str, &str); 14] = [
         "friction",
         "A creep curve of a wet rail: friction that falls with slip, and a layer between the bodies",
         include_str!("../../api/examples/friction.case.json"),
+    ),
+    (
+        "unlike-bodies",
+        "A soft roller driving on steel: bodies whose pressure and tractions depend on each other",
+        include_str!("../../api/examples/unlike-bodies.case.json"),
     ),
     (
         "pressure-grid",

@@ -361,6 +361,29 @@ def friction():
     write_lines("friction.json", records)
 
 
+def unlike():
+    """Steady rolling of bodies that differ, three-dimensional."""
+    records = []
+    for record in json.loads((SOURCE / "reference/extended/dissimilar.json").read_text()):
+        if not record["id"].startswith("dis_"):
+            continue
+        given, converged = record["input"], record["converged"]
+        body = lambda k: {"shear_modulus_mpa": given["material"][f"G{k}"], "poisson_ratio": given["material"][f"nu{k}"]}
+        records.append({
+            "id": record["id"],
+            "material": {"upper": body(1), "lower": body(2)},
+            "difference": given["material"]["K"],
+            "radii_mm": [0.5 / given["geometry"]["A"], 0.5 / given["geometry"]["B"]],
+            "normal_force_n": given["load"]["FN"],
+            "friction": given["mu"],
+            "motion": [given["creepage"][k] for k in ("xi", "eta", "phi")],
+            "forces": [{"value": flipped(converged[q]["value"]), "unc": converged[q]["unc"]} for q in ("Fx_rel", "Fy_rel", "Mz_rel")],
+            "arm_mm": math.sqrt(given["hertz_K0"]["a"] * given["hertz_K0"]["b"]),
+            **{ours: {k: converged[theirs][k] for k in ("value", "unc")} for theirs, ours in PRESSED},
+        })
+    write_lines("unlike.json", records)
+
+
 for name in CLASSES:
     records = json.loads((SOURCE / f"reference/{name}.json").read_text())
     write_lines(f"{name}.json", [reference_case(r) for r in records])
@@ -372,3 +395,4 @@ gap_grids()
 subsurface()
 temperature()
 friction()
+unlike()

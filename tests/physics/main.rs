@@ -78,6 +78,7 @@ mod table_rows;
 mod targets;
 #[path = "../../benches/calibrate/truth.rs"]
 mod truth;
+mod unlike;
 mod watched;
 mod workspaces;
 

@@ -30,6 +30,7 @@ const ORDER: &[&str] = &[
     "contact::time_limit",
     "contact::answer",
     "contact::coupling",
+    "contact::unlike",
     "contact::profile_trust",
     "contact::stages",
     "contact::slices",

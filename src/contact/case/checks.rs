@@ -19,6 +19,7 @@ use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::patch::Patch;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
+use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::methods::table::solve as table;
 
 /// Friction coefficient above which the answer carries a remark.
@@ -62,7 +63,10 @@ impl CheckedParts {
     pub(crate) fn check(given: PartialCase, limits: &Limits) -> (CheckedParts, Vec<Fault>) {
         let mut faults = Vec::new();
         let elasticity = given.material.map(Elasticity::combine);
-        let elasticity = elasticity.and_then(|elasticity| collect_fault(elasticity, &mut faults));
+        let method: Option<Method> = given.solver.map(|solver| solver.method.into());
+        // The table says it in its own words.
+        let uncoupled = elasticity.zip(method.filter(|method| *method != Method::Table));
+        faults.extend(uncoupled.and_then(|(pair, method)| pair.uncoupled_fault(method)));
         let task = normal_task(given.contact, given.load, elasticity.as_ref(), limits);
         let task = match (task, given.contact) {
             (None, Some(contact @ Contact::Profiles { .. })) => {

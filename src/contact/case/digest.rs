@@ -13,6 +13,9 @@ use crate::contact::rolling::refinement::resolution::Resolution;
 /// `tests/physics/golden.rs` fails if numbers move without it, and says how to record the new ones.
 pub const SOLVER_REVISION: u32 = 17;
 
+/// The same for bodies that differ alone.
+const COUPLING_REVISION: u32 = 1;
+
 /// Hexadecimal BLAKE3 digest of the canonical case.
 pub(crate) fn digest(
     case: &Case,
@@ -33,6 +36,7 @@ pub(crate) fn digest(
             elasticity.poisson_ratio,
             elasticity.difference,
         ],
+        coupling: (elasticity.difference != 0.0).then_some(COUPLING_REVISION),
         friction: (&case.friction).into(),
         contact: &case.contact,
         load: case.load.as_ref(),

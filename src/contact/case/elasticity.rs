@@ -4,9 +4,10 @@ use crate::contact::case::words::material::{Elastic, Material};
 use crate::contact::error::Fault;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::remark::list::Remark;
+use crate::contact::rolling::methods::method::Method;
 
-/// Largest |K| for which the tangential and the normal problem may be solved one after the other.
-const DIFFERENCE_MAX: f64 = 0.05;
+/// Largest |K| that methods which solve pressure and traction one after the other take.
+const DIFFERENCE_UNCOUPLED: f64 = 0.05;
 /// |K| below this is rounding of equal materials written in two ways.
 const DIFFERENCE_NOISE: f64 = 1e-12;
 
@@ -14,11 +15,8 @@ impl Elasticity {
     /// Elastic constants of the pair: `1/G = ½(1/G₁ + 1/G₂)`, `ν/G = ½(ν₁/G₁ + ν₂/G₂)`,
     /// `K/G = ¼((1−2ν₁)/G₁ − (1−2ν₂)/G₂)` with 1 the upper and 2 the lower body; `G = E/(2(1+ν))` where Young's
     /// modulus is given. G in MPa, ν from 0 to 0.5. Source: Kalker 1990, eq. 1.44.
-    ///
-    /// # Errors
-    /// A fault at `/material` if |K| is more than 0.05, where the coupling of normal and tangential problem,
-    /// which is left out here, is no longer small.
-    pub fn combine(material: &Material) -> Result<Elasticity, Fault> {
+    #[must_use]
+    pub fn combine(material: &Material) -> Elasticity {
         let (lower, upper) = match material {
             Material::Same(both) => (both, both),
             Material::Pair { lower, upper } => (lower, upper),
@@ -26,35 +24,40 @@ impl Elasticity {
         let (g1, g2) = (shear_modulus(upper), shear_modulus(lower));
         let (nu1, nu2) = (upper.poisson_ratio, lower.poisson_ratio);
         if g1 == g2 && nu1 == nu2 {
-            return Ok(Elasticity {
+            return Elasticity {
                 shear_modulus: g1,
                 poisson_ratio: nu1,
                 difference: 0.0,
-            });
+            };
         }
         let g = 2.0 / (1.0 / g1 + 1.0 / g2);
         let nu = 0.5 * g * (nu1 / g1 + nu2 / g2);
         let k = 0.25 * g * ((1.0 - 2.0 * nu1) / g1 - (1.0 - 2.0 * nu2) / g2);
-        if k.abs() > DIFFERENCE_MAX {
-            return Err(Fault::new(
-                "/material",
-                format!(
-                    "the two bodies give the difference parameter K = {k:.4}; at most {DIFFERENCE_MAX} in size is allowed, \
-                     because the coupling of pressure and traction is not solved by this version"
-                ),
-            ));
-        }
-        Ok(Elasticity {
+        Elasticity {
             shear_modulus: g,
             poisson_ratio: nu.clamp(0.0, 0.5),
             difference: if k.abs() < DIFFERENCE_NOISE { 0.0 } else { k },
+        }
+    }
+
+    /// The fault of bodies that differ too much for a method that does not couple pressure and traction.
+    pub(crate) fn uncoupled_fault(&self, method: Method) -> Option<Fault> {
+        let k = self.difference;
+        let needed = method != Method::BoundaryElement && k.abs() > DIFFERENCE_UNCOUPLED;
+        needed.then(|| {
+            let detail = format!(
+                "the two bodies give the difference parameter K = {k:.4}; at most {DIFFERENCE_UNCOUPLED} in size is allowed with this \
+                 method, which does not couple pressure and traction as boundary_element does"
+            );
+            Fault::new("/material", detail)
         })
     }
 
-    /// The remark an answer carries if the bodies differ.
-    pub(crate) fn remark(&self) -> Option<Remark> {
+    /// The remark an answer carries if the bodies differ and the method does not couple pressure and traction.
+    pub(crate) fn remark(&self, method: Method) -> Option<Remark> {
         let difference_parameter = self.difference;
-        (difference_parameter != 0.0).then_some(Remark::CouplingNeglected {
+        let neglected = difference_parameter != 0.0 && method != Method::BoundaryElement;
+        neglected.then_some(Remark::CouplingNeglected {
             difference_parameter,
         })
     }
@@ -82,23 +85,28 @@ mod tests {
         }
     }
 
-    fn pair(upper: Elastic, lower: Elastic) -> Result<Elasticity, Fault> {
+    fn pair(upper: Elastic, lower: Elastic) -> Elasticity {
         Elasticity::combine(&Material::Pair { lower, upper })
     }
 
     // Aluminium on steel: G = 35924, ν = 0.3034, K = 0.100 (CONTACT user guide, section 5.3).
     #[test]
-    fn aluminium_on_steel_is_refused_with_its_difference_parameter() {
-        let fault = pair(body(23_000.0, 0.31), body(82_000.0, 0.28)).unwrap_err();
-        assert_eq!(fault.pointer, "/material");
-        assert!(fault.detail.contains("K = 0.100"), "{}", fault.detail);
+    fn aluminium_on_steel_is_for_the_method_that_couples() {
+        let e = pair(body(23_000.0, 0.31), body(82_000.0, 0.28));
+        assert!((e.difference - 0.1002).abs() < 1e-4);
+        assert_eq!(e.uncoupled_fault(Method::BoundaryElement), None);
+        for method in [Method::Fastsim, Method::LiuHsu, Method::Table] {
+            let fault = e.uncoupled_fault(method).unwrap();
+            assert_eq!(fault.pointer, "/material");
+            assert!(fault.detail.contains("K = 0.100"), "{}", fault.detail);
+        }
     }
 
     #[test]
     fn combined_constants_follow_kalker() {
         // The same pair with ν₁ raised until K is allowed.
         let (g1, nu1, g2, nu2) = (23_000.0, 0.42, 82_000.0, 0.28);
-        let e = pair(body(g1, nu1), body(g2, nu2)).unwrap();
+        let e = pair(body(g1, nu1), body(g2, nu2));
         assert!((e.shear_modulus - 35_923.81).abs() < 0.01);
         assert!((e.poisson_ratio / e.shear_modulus - 0.5 * (nu1 / g1 + nu2 / g2)).abs() < 1e-18);
         let k = 0.25 * ((1.0 - 2.0 * nu1) / g1 - (1.0 - 2.0 * nu2) / g2);
@@ -111,7 +119,7 @@ mod tests {
     #[test]
     fn exchanging_the_bodies_changes_only_the_sign_of_the_difference() {
         let (a, b) = (body(80_000.0, 0.30), body(82_000.0, 0.28));
-        let (ab, ba) = (pair(a, b).unwrap(), pair(b, a).unwrap());
+        let (ab, ba) = (pair(a, b), pair(b, a));
         assert!((ab.shear_modulus - ba.shear_modulus).abs() < 1e-9);
         assert!((ab.difference + ba.difference).abs() < 1e-16 && ab.difference != 0.0);
     }
@@ -123,17 +131,14 @@ mod tests {
             young_modulus_mpa: Some(2.0 * 82_000.0 * 1.28),
             poisson_ratio: 0.28,
         };
-        let e = pair(young, body(82_000.0, 0.28)).unwrap();
+        let e = pair(young, body(82_000.0, 0.28));
         assert_eq!(e.difference, 0.0);
         assert!((e.shear_modulus - 82_000.0).abs() < 1e-9);
-        assert_eq!(e.remark(), None);
+        assert_eq!(e.remark(Method::Fastsim), None);
     }
 
     #[test]
     fn two_incompressible_bodies_do_not_couple() {
-        assert_eq!(
-            pair(body(1.0, 0.5), body(500.0, 0.5)).unwrap().difference,
-            0.0
-        );
+        assert_eq!(pair(body(1.0, 0.5), body(500.0, 0.5)).difference, 0.0);
     }
 }

@@ -6,6 +6,7 @@ pub mod checks;
 pub mod contact_task;
 pub mod conversions;
 pub mod cost;
+pub mod coupled;
 pub mod digest;
 pub mod elasticity;
 pub mod limits;

@@ -19,6 +19,8 @@ pub struct PressedContact {
     pub footprint: Footprint,
     /// How they were found, where they were not known beforehand.
     pub report: Option<NormalReport>,
+    /// Error of forces relative to μN that pressures leave because they do not quite belong to the tractions.
+    pub coupling_error: f64,
     /// Remarks on them.
     pub remarks: Vec<RemarkEntry>,
 }
@@ -32,9 +34,11 @@ impl CheckedCase {
     /// # Panics
     /// On a wheel, whose patches have a frame each: see [`stages`](crate::contact::stages).
     pub fn pressed(&self, monitor: &dyn Monitor) -> Result<PressedContact, SolveError> {
+        let coupling_error = self.problem.first_order_error(self.run.method);
         let known = |footprint| PressedContact {
             footprint,
             report: None,
+            coupling_error,
             remarks: Vec::new(),
         };
         let task = match &self.problem.task {
@@ -49,6 +53,7 @@ impl CheckedCase {
         let pressed = PressedContact {
             footprint: Footprint::computed(found.field, 0.0),
             report: Some(found.report.with_time(seconds)),
+            coupling_error,
             remarks: found.remarks,
         };
         self.fits(&pressed.footprint)?;

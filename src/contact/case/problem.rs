@@ -141,7 +141,8 @@ impl CheckedCase {
         ) else {
             return Err(CaseError(faults));
         };
-        let of_material = elasticity.remark().map(|r| r.at_pointer("/material"));
+        let of_material = elasticity.remark(case.solver.method.into());
+        let of_material = of_material.map(|r| r.at_pointer("/material"));
         let of_friction = unusual_friction(&case.friction);
         let of_case = of_material.into_iter().chain(of_friction);
         let ExpandedMotions {
@@ -172,9 +173,12 @@ impl CheckedCase {
             wheelset: profiles::wheelset(&case.motion),
             checked: Checked,
         };
+        let run = run(case, limits);
+        let first_order = problem.first_order(&run).map(|r| r.at_pointer("/material"));
+        let remarks = merged(remarks.into_iter().chain(first_order));
         Ok(CheckedCase {
             problem,
-            run: run(case, limits),
+            run,
             label: Label {
                 name: case.name.clone(),
                 labels: case.labels.clone(),

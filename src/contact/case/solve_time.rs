@@ -114,6 +114,14 @@ fn gap_guesses(task: &GapTask, target: Option<f64>) -> (Vec<PatchGuess>, f64) {
     (patches, seconds)
 }
 
+/// Rounds of pressure and tractions of unlike bodies, and the time of one in s, most of it for pressure and opening of the gap (12
+/// contacts of `tests/physics/unlike.rs`: 0.03 to 0.1 s in all).
+const UNLIKE_ROUNDS: f64 = 3.0;
+/// See [`UNLIKE_ROUNDS`].
+const GAP_ROUND: f64 = 0.015;
+/// Time of a motion whose surfaces slip by their pressure too over that of like bodies: rounds, and a displacement from the pressure of
+/// every cell at the edges of all others (same contacts).
+const UNLIKE_TIMES: f64 = 4.0;
 /// Time of a motion with friction that falls with slip over that with a coefficient: 2.1 to 5.3 for the ten creep curves of
 /// `tests/physics/friction_laws.rs` at the target 0.005, 3 in the median.
 const FALLING_TIMES: f64 = 3.0;
@@ -141,11 +149,27 @@ impl CheckedCase {
             (method, _) => self.on_one_mesh(method, patches.len()),
         };
         let tangential = self.friction_times() * tangential;
+        let (normal, tangential) = self.unlike_seconds([normal, tangential]);
         let motions = self.problem.motions.len() as f64;
         let after = motions * self.after_seconds(patches.len());
         SolveTime {
             normal,
             whole: normal + tangential + after,
+        }
+    }
+
+    /// Times of the normal and the tangential problem where bodies differ.
+    fn unlike_seconds(&self, [normal, tangential]: [f64; 2]) -> (f64, f64) {
+        let coupled = self.run.method == Method::BoundaryElement;
+        if self.problem.is_coupled(&self.run) {
+            (
+                normal.max(GAP_ROUND) * UNLIKE_ROUNDS,
+                UNLIKE_TIMES * tangential,
+            )
+        } else if coupled && self.problem.elasticity.difference != 0.0 {
+            (normal, UNLIKE_TIMES * tangential)
+        } else {
+            (normal, tangential)
         }
     }
 

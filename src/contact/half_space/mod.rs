@@ -8,3 +8,4 @@ pub mod kernels;
 pub mod rectangle_stress;
 pub mod strip_operator;
 pub mod transforms;
+pub mod unlike_bodies;

@@ -137,12 +137,6 @@ impl Stencils {
             *slip = ahead;
         }
     }
-
-    /// Where the rule samples the given slip of every cell, along x.
-    #[must_use]
-    pub fn samples(&self) -> &[f64] {
-        &self.rigid_at
-    }
 }
 
 /// Weights of the three-point derivative at node `i` on the differences `d_i`, `d_{i+1}`, `d_{i+2}`.

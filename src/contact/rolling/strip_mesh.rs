@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::contact::error::SolveError;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::half_space::strip_operator::kind::{Parity, Precision};
+use crate::contact::half_space::unlike_bodies::pressure_slips;
 use crate::contact::mesh::strips::{Chord, Grading, Mesh, equal_strips, strips_about};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::footprint::Footprint;
@@ -77,6 +78,8 @@ pub struct StripMesh {
     pub bound: Vec<f64>,
     /// Flexibility of an elastic layer between the bodies, dimensionless.
     pub layer: f64,
+    /// Mean slip of every cell from the pressure of unlike bodies, dimensionless, along x and across; none for like bodies.
+    pub pressure_slip: Option<[Vec<f64>; 2]>,
     poisson_ratio: f64,
     precision: Precision,
     mirrored: bool,
@@ -140,6 +143,12 @@ impl StripMesh {
         if precision == Precision::Single {
             normalised.round(COORDINATE_STEP);
         }
+        let pressure_slip = (task.is_coupled() && scale.traction > 0.0).then(|| {
+            // A reduced shear modulus is one for tractions alone.
+            let unit = task.interface.reduction / scale.traction;
+            let relative: Vec<f64> = pressure.iter().map(|p| p * unit).collect();
+            pressure_slips(&normalised, task.elasticity.difference, &relative)
+        });
         Ok(StripMesh {
             plan,
             mesh,
@@ -149,6 +158,7 @@ impl StripMesh {
             normalised,
             bound,
             layer: task.interface.layer * scale.shear_modulus / scale.length,
+            pressure_slip,
             poisson_ratio,
             precision,
             mirrored: mirror.is_some(),
@@ -176,8 +186,10 @@ impl StripMesh {
         if !self.mirrored {
             return None;
         }
+        // The slips from the pressure of unlike bodies are symmetric as those of a longitudinal creepage are.
+        let along = motion.creepage_x != 0.0 || self.pressure_slip.is_some();
         let lateral = motion.creepage_y != 0.0 || motion.spin_per_mm != 0.0;
-        match (motion.creepage_x != 0.0, lateral) {
+        match (along, lateral) {
             (_, false) => Some(Parity::Longitudinal),
             (false, true) => Some(Parity::Lateral),
             (true, true) => None,

@@ -89,6 +89,12 @@ impl RollingTask<'_> {
         FallingLaw::too_fast(stability)
     }
 
+    /// Does the pressure make the surfaces slip, because the bodies differ and the method takes account of it?
+    #[must_use]
+    pub fn is_coupled(&self) -> bool {
+        self.elasticity.difference != 0.0 && self.method == Method::BoundaryElement
+    }
+
     /// Is a force prescribed for any motion?
     #[must_use]
     pub fn has_prescribed_forces(&self) -> bool {

@@ -248,7 +248,10 @@ fn point_solution(
         stick_cells: areas.map(|a| a.stick_cells),
         slip_cells: areas.map(|a| a.slip_cells),
         traction_max_mpa: on_level.map(|(level, fields)| traction_max(level, fields, index)),
-        friction_power_n: power_x + power_y + motion.spin_per_mm * found.moment_z,
+        friction_power_n: power_x
+            + power_y
+            + motion.spin_per_mm * found.moment_z
+            + on_level.map_or(0.0, |(level, fields)| pressure_power(level, fields, index)),
         friction_power_without_spin_n: power_x.abs() + power_y.abs(),
         solver: SolverReport {
             method: point.method.into(),
@@ -331,6 +334,17 @@ fn zone_areas(
     zones.stick_area *= factor;
     zones.slip_area *= factor;
     zones
+}
+
+/// Power of a patch in N that the slips from the pressure of unlike bodies add to that of its forces; the moment against rolling gives it.
+fn pressure_power(level: &StripMesh, fields: &SolvedFields, patch: usize) -> f64 {
+    let Some([x, y]) = &level.pressure_slip else {
+        return 0.0;
+    };
+    let [tx, ty] = &fields.tangential.traction;
+    let of_cell = |i: usize| level.area[i] * (tx[i] * x[i] + ty[i] * y[i]);
+    let sum: f64 = level.patch_cells(patch).map(of_cell).sum();
+    sum * level.scale.traction * level.scale.slip()
 }
 
 /// Creepages made dimensionless with E = 2G(1+ν) and c = √(A/π) (Kalker 1990; the seed uses half the longest strip).

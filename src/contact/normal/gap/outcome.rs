@@ -2,7 +2,6 @@
 
 use crate::contact::normal::answer::{NormalAnswer, NormalError, NormalWork};
 use crate::contact::normal::gap::edges;
-use crate::contact::normal::gap::surface::GapSurface;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::gap::tile::{GapOutcome, Tile};
 use crate::contact::normal::pressure_field::field::PressureField;
@@ -89,7 +88,7 @@ impl GapTask {
         let [x_min, x_max, y_min, y_max] = extent;
         let (a, b) = (0.5 * (x_max - x_min), 0.5 * (y_max - y_min));
         let mut remarks = Vec::new();
-        if let GapSurface::Profile { rolling, .. } = self.gap
+        if let Some(rolling) = self.gap.rolling_radius()
             && a > HALF_LENGTH_USUAL_MAX * rolling
         {
             let remark = Remark::NearlyConformal {

@@ -49,7 +49,7 @@ pub(crate) fn reach(gap: &GapSurface, pressing: Pressing, contact_modulus: f64) 
             Pressing::Force(force) => look.least + MARGIN * look.depth(force / contact_modulus),
         };
         let mut next = look.below(level, limits);
-        if let GapSurface::Profile { rolling, .. } = gap
+        if let Some(rolling) = gap.rolling_radius()
             && level > least
         {
             let half = 1.02 * (2.0 * rolling * (level - least)).sqrt();
@@ -80,7 +80,7 @@ fn length(range: [f64; 2]) -> f64 {
 /// The whole window; where a formula holds, as far as the gap exceeds all that the samples tell.
 fn first_box(gap: &GapSurface) -> Window {
     let mut window = gap.window();
-    if let GapSurface::Profile { rolling, .. } = gap {
+    if let Some(rolling) = gap.rolling_radius() {
         let [low, high] = gap.extremes();
         let half = (2.0 * rolling * (high - low)).sqrt();
         window[0] = [-half, half];

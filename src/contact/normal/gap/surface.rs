@@ -14,6 +14,13 @@ pub enum GapSurface {
     },
     /// Any surface, given on a rectangular grid.
     Grid(Surface),
+    /// Another gap with a small change, which is constant beyond its grid.
+    Changed {
+        /// The other gap.
+        gap: Box<GapSurface>,
+        /// What is added to it.
+        change: Surface,
+    },
 }
 
 /// A curve with a continuous derivative through samples; parabolas are reproduced exactly.
@@ -56,10 +63,30 @@ impl GapSurface {
         GapSurface::Grid(Surface::new(x, y, gap))
     }
 
+    /// The same gap with `change[j][i]` added at `(x[i], y[j])`; axes as of [`GapSurface::grid`].
+    #[must_use]
+    pub fn changed(&self, x: &[f64], y: &[f64], change: &[Vec<f64>]) -> GapSurface {
+        GapSurface::Changed {
+            gap: Box::new(self.clone()),
+            change: Surface::new(x, y, change),
+        }
+    }
+
+    /// The relative radius of a gap that rolls on a circle, in mm.
+    #[must_use]
+    pub fn rolling_radius(&self) -> Option<f64> {
+        match self {
+            GapSurface::Profile { rolling, .. } => Some(*rolling),
+            GapSurface::Grid(_) => None,
+            GapSurface::Changed { gap, .. } => gap.rolling_radius(),
+        }
+    }
+
     /// Where the gap is known.
     #[must_use]
     pub fn window(&self) -> Window {
         match self {
+            GapSurface::Changed { gap, .. } => gap.window(),
             GapSurface::Profile { across, .. } => {
                 [[f64::NEG_INFINITY, f64::INFINITY], range(&across.axis)]
             }
@@ -71,6 +98,7 @@ impl GapSurface {
     #[must_use]
     pub fn samples(&self) -> [&[f64]; 2] {
         match self {
+            GapSurface::Changed { gap, .. } => gap.samples(),
             GapSurface::Profile { across, .. } => [&[], &across.axis],
             GapSurface::Grid(surface) => [&surface.x, &surface.y],
         }
@@ -90,15 +118,28 @@ impl GapSurface {
                     .collect()
             }
             GapSurface::Grid(surface) => surface.on(x, y),
+            GapSurface::Changed { gap, change } => {
+                let inside = |at: &[f64], axis: &[f64]| -> Vec<f64> {
+                    let [low, high] = range(axis);
+                    at.iter().map(|at| at.clamp(low, high)).collect()
+                };
+                let mut values = gap.on(x, y);
+                let changes = change.on(&inside(x, &change.x), &inside(y, &change.y));
+                for (value, change) in values.iter_mut().zip(changes) {
+                    *value += change;
+                }
+                values
+            }
         }
     }
 
-    /// The least and the largest sample; along x = 0 for a profile.
+    /// The least and the largest sample; along x = 0 for a profile, without a change that was added.
     #[must_use]
     pub fn extremes(&self) -> [f64; 2] {
         let values = match self {
             GapSurface::Profile { across, .. } => &across.values,
             GapSurface::Grid(surface) => &surface.values,
+            GapSurface::Changed { gap, .. } => return gap.extremes(),
         };
         let start = [f64::INFINITY, f64::NEG_INFINITY];
         values.iter().fold(start, |[low, high], value| {
@@ -112,6 +153,7 @@ impl GapSurface {
         let place = |name: &str, at: f64| format!("{name} = {at} mm");
         let least = self.extremes()[0];
         match self {
+            GapSurface::Changed { gap, .. } => gap.least_at_edge(),
             GapSurface::Profile { across, .. } => {
                 let last = across.values.len() - 1;
                 let inside = (1..last).any(|k| across.values[k] <= least);
@@ -143,6 +185,7 @@ impl GapSurface {
         let mirrored = |axis: &[f64]| axis.iter().zip(axis.iter().rev()).all(|(a, b)| *a == -b);
         let alike = |values: &[f64]| values.iter().zip(values.iter().rev()).all(|(a, b)| a == b);
         match self {
+            GapSurface::Changed { .. } => [false, false],
             GapSurface::Profile { across, .. } => {
                 [true, mirrored(&across.axis) && alike(&across.values)]
             }

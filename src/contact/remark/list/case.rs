@@ -26,9 +26,24 @@ macro_rules! case_remarks {
             }
             code: "coupling-neglected",
             severity: Warning,
-            advice: "Expect errors of the order of K in tractions; above 0.05 cases are refused.",
+            advice: "Expect errors of the order of K in tractions, or take `boundary_element`, which couples them.",
             detail: format!(
                 "the two bodies differ (K = {difference_parameter:.4}); the coupling of pressure and traction is neglected"
+            ),
+
+            /// The two bodies differ. Tractions follow from the pressure, but the pressure is that without tractions.
+            CouplingFirstOrder {
+                /// Difference parameter K (Kalker 1990, eq. 1.44).
+                difference_parameter: f64 = 0.1,
+                /// Error of forces that this leaves, relative to the friction limit; it is part of the error estimates.
+                error: f64 = 0.018,
+            }
+            code: "coupling-first-order",
+            severity: Warning,
+            advice: "Ask for each motion in a case of its own, by radii or a gap: there the pressure feels the tractions too.",
+            detail: format!(
+                "the two bodies differ (K = {difference_parameter:.4}); tractions feel the pressure, but not the other way round, which leaves an \
+                 error of {error:.4} of the friction limit"
             ),
         }
     };

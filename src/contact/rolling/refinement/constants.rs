@@ -58,12 +58,6 @@ pub const REGION_CELLS: f64 = 44.0;
 /// Relative error of resultants over that of the load they are found under: 2/3 for small creepages (areas of Hertz's
 /// contacts), 1 in full slip.
 pub const LOAD: f64 = 1.0;
-/// Factor on estimates where friction falls with slip: the bounds come from the three-point rule, and so do the changes that tell its
-/// error (100 creepages of 10 laws, of which 94 are covered without it, all with it: `cargo test --test physics -- friction_as_it_is`).
-pub const FALLING: f64 = 1.5;
-/// Factor on estimates with a layer between the bodies, for which both rules leave the same error at the leading edge (5 contacts of the
-/// same test, errors up to 2.2 times the estimate without it).
-pub const LAYER: f64 = 2.5;
 /// Share of the differences that is added to the resultants: errors of second order in strips and in cells (median of the
 /// error halved on 1900 meshes, its 90 % from .0034 to .0026 at 181 to 256 cells; weights .2 to .4 within 10 %).
 pub const EXTRAPOLATED: f64 = 1.0 / 3.0;

@@ -7,12 +7,12 @@ use crate::contact::rolling::mesh_plan::Regime;
 use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::methods::{fastsim, full_slip};
 use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::refinement::caution::caution;
 use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;
 use crate::contact::rolling::refinement::constants::{
-    CAUTION, DATA, DECAY, DENSE_LEVELS, DENSE_LEVELS_NEAR, DIFFERENCES, FALLING, JUMPING, LAYER,
-    LEVELS_LIKE, LEVELS_UNLIKE, LOAD, POLE_WEIGHT, REGION, REGION_CELLS, RULES_ON_MESH,
-    RULES_ON_MESH_SAMPLED, SAMPLED, SAMPLED_DECAY, SHARE_LARGE, STRIPS_FEW, SURPRISES,
-    WITHOUT_COMPANION,
+    CAUTION, DATA, DECAY, DENSE_LEVELS, DENSE_LEVELS_NEAR, DIFFERENCES, JUMPING, LEVELS_LIKE,
+    LEVELS_UNLIKE, LOAD, POLE_WEIGHT, REGION, REGION_CELLS, RULES_ON_MESH, RULES_ON_MESH_SAMPLED,
+    SAMPLED, SAMPLED_DECAY, SHARE_LARGE, STRIPS_FEW, SURPRISES, WITHOUT_COMPANION,
 };
 use crate::contact::rolling::refinement::mesh_policy::CELLS_FIRST;
 use crate::contact::rolling::refinement::resolution::Resolution;
@@ -230,22 +230,7 @@ fn scale(task: &RollingTask, level: &StripMesh, patches: usize) -> f64 {
         }
         None => (1.0, DECAY),
     };
-    of_friction(task) * samples * finer.powf(decay) * few_strips(level).sqrt()
-}
-
-/// The factor for friction that falls with slip, and for what lies between the bodies.
-fn of_friction(task: &RollingTask) -> f64 {
-    let falling = if task.friction.depends_on_slip() {
-        FALLING
-    } else {
-        1.0
-    };
-    let layer = if task.interface.layer > 0.0 {
-        LAYER
-    } else {
-        1.0
-    };
-    falling * layer
+    caution(task) * samples * finer.powf(decay) * few_strips(level).sqrt()
 }
 
 /// Is the pressure one that was given with jumps?
@@ -358,7 +343,7 @@ fn mesh_errors(
         RULES_ON_MESH_SAMPLED
     };
     let factor = factor * circumstances.slenderness.powf(CAUTION) * few_strips(level);
-    let factor = factor * of_friction(task);
+    let factor = factor * caution(task);
     let Some(rules) = rules else {
         return vec![None; sums.len()];
     };

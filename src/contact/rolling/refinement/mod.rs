@@ -1,5 +1,6 @@
 //! From coarse to fine meshes until the estimate of the error meets the target.
 
+mod caution;
 pub mod companion_answer;
 pub mod companions;
 pub mod constants;

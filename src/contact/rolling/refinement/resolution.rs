@@ -20,4 +20,15 @@ impl Resolution {
             Resolution::Mesh(_) => None,
         }
     }
+
+    /// What a target leaves beside another error, which adds to its own as squares do; the target itself if that is as large.
+    #[must_use]
+    pub fn beside(self, error: f64) -> Resolution {
+        match self {
+            Resolution::Target(target) if 0.0 < error && error < target => {
+                Resolution::Target((target * target - error * error).sqrt())
+            }
+            unchanged => unchanged,
+        }
+    }
 }

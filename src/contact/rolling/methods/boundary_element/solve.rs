@@ -27,7 +27,7 @@ use crate::contact::rolling::operator_store::LevelOperator;
 use crate::contact::rolling::own_blocks::OwnBlocks;
 use crate::contact::rolling::refinement::warm_start::Start;
 use crate::contact::rolling::skip::Skip;
-use crate::contact::rolling::slip_equations::SlipEquations;
+use crate::contact::rolling::slip_equations::{SlipEquations, SlipSource};
 use crate::contact::rolling::slip_rules::Rule;
 use crate::contact::rolling::strip_mesh::StripMesh;
 
@@ -214,6 +214,12 @@ impl<'a> RuleSequence<'a> {
         .with_layer(&self.level.normalised, self.level.layer)
     }
 
+    /// Slips of the motion and of the pressure.
+    fn rigid(&self, equations: &SlipEquations) -> Vec<f64> {
+        let source = self.level.pressure_slip.as_ref();
+        equations.given(self.motion, source.map(|[x, y]| SlipSource { x, y }))
+    }
+
     /// A solver that shares its own blocks with the other motions of the level.
     fn newton<'e>(&self, equations: &'e SlipEquations<'e>) -> Newton<'e> {
         let own =
@@ -299,7 +305,7 @@ impl<'a> RuleSequence<'a> {
     /// The three-point rule: from the start, else from zero, else from the upwind solution.
     fn mirror(&mut self, t: &mut [f64], started: bool) -> Result<ThreePointAnswer, LevelFailure> {
         let equations = self.equations(Rule::ThreePoint);
-        let rigid = equations.rigid(self.motion);
+        let rigid = self.rigid(&equations);
         let newton = self.newton(&equations);
         let (mut report, by_fixed_point) = self.rule(&newton, &rigid, t, true)?;
         if !report.exit.converged() && started {
@@ -384,7 +390,7 @@ impl<'a> RuleSequence<'a> {
 
     fn upwind(&mut self, t: &mut [f64]) -> Result<bool, Stop> {
         let equations = self.equations(Rule::Upwind);
-        let rigid = equations.rigid(self.motion);
+        let rigid = self.rigid(&equations);
         let newton = self.newton(&equations);
         Ok(self.rule(&newton, &rigid, t, false)?.0.exit.converged())
     }
@@ -397,7 +403,7 @@ impl<'a> RuleSequence<'a> {
         warm: Option<Vec<f64>>,
     ) -> Result<Option<Vec<bool>>, Stop> {
         let equations = self.equations(Rule::Trapezoid);
-        let rigid = equations.rigid(self.motion);
+        let rigid = self.rigid(&equations);
         let newton = self.newton(&equations);
         let residual = self.work.residual;
         let mut converged = false;

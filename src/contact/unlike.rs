@@ -1,0 +1,213 @@
+//! Solves one motion of bodies that differ: pressure and tractions in turn, until each belongs to the other.
+//!
+//! The pressure of unlike bodies makes the surfaces slip, and their tractions open and close the gap. The tractions are solved with the
+//! slips of the present pressure, the gap is changed by what they open, region and pressure are found anew, and so on (Panagiotopoulos
+//! 1975). Each round leaves a hundredth to a fifth of the change before it.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use crate::contact::answer::answer;
+use crate::contact::case::press::PressedContact;
+use crate::contact::case::problem::CheckedCase;
+use crate::contact::error::SolveError;
+use crate::contact::half_space::grid_operator::GridWorkspace;
+use crate::contact::half_space::unlike_bodies::opening;
+use crate::contact::monitor::Monitor;
+use crate::contact::normal::footprint::Footprint;
+use crate::contact::normal::gap::pilot::PilotOnce;
+use crate::contact::normal::gap::surface::GapSurface;
+use crate::contact::normal::gap::task::GapTask;
+use crate::contact::normal::hertz::{Ellipse, Pressing};
+use crate::contact::normal::normal_task::NormalTask;
+use crate::contact::remark::list::Remark;
+use crate::contact::rolling::force_control;
+use crate::contact::rolling::operator_store::OperatorStore;
+use crate::contact::rolling::refinement::levels::Levels;
+use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::rolling::resultants::Resultants;
+use crate::contact::solution::words::{Fields, NormalReport, Solution};
+use crate::contact::time_limit::TimeLimit;
+
+/// Allowed error of the resultants in the rounds, relative to μN: the opening follows from tractions, whose error counts K times.
+const TARGET_OF_ROUNDS: f64 = 0.008;
+/// Rounds at most; three suffice up to |K| = 0.25.
+const ROUNDS_MAX: usize = 6;
+/// Part of the change of a round that later ones would bring: the largest contraction seen is 0.2.
+const LEFT: f64 = 0.25;
+/// Error of forces relative to μN over |K| that region and pressure leave: their edges are found with tractions of a mesh (12 contacts of
+/// `tests/physics/unlike.rs`, at most 0.022 where rolling is free, 0.009 elsewhere).
+const LEFT_BY_PRESSURE: f64 = 0.02;
+/// The change that is left has to be below this part of the target.
+const PART_OF_TARGET: f64 = 0.3;
+/// The target that stands for an explicit mesh.
+const TARGET_OF_MESH: f64 = 0.005;
+/// The opening is sampled on so many points along each axis, over the patches and by this part of their size around them; beyond it
+/// is taken as constant. It is as smooth as displacements are.
+const SAMPLES: usize = 41;
+const AROUND: f64 = 0.25;
+/// Samples of the parabola across that stands for an ellipse, and how far they reach over its semi-axis. Parabolas are reproduced exactly.
+const PARABOLA: (i32, f64) = (8, 6.0);
+
+/// Solves a problem of one motion whose bodies differ and whose gap is known.
+///
+/// # Errors
+/// A named reason why there is no answer; or the monitor stopped the work.
+pub(crate) fn solve(
+    operators: &Arc<OperatorStore>,
+    case: &CheckedCase,
+    watch: &TimeLimit,
+) -> Result<(Solution, Fields), SolveError> {
+    let began = watch.elapsed();
+    let mut pressed = case.pressed(watch)?;
+    let task = gap_task(case);
+    let rough = CheckedCase {
+        run: case.run.for_resultants(TARGET_OF_ROUNDS),
+        ..case.clone()
+    };
+    let target = match case.run.resolution {
+        Resolution::Target(target) => target,
+        Resolution::Mesh(_) => TARGET_OF_MESH,
+    };
+    let workspace = &mut GridWorkspace::default();
+    let mut before = None;
+    let mut left = f64::INFINITY;
+    for _ in 0..ROUNDS_MAX {
+        let (gap, force) = opened(operators, &rough, &pressed, &task, watch)?;
+        let change = before.map(|before| distance(before, force));
+        before = Some(force);
+        let task = GapTask {
+            gap,
+            pilot: PilotOnce::default(),
+            ..task.clone()
+        };
+        let found = task.solve_for(case.run.target(), workspace, watch)?;
+        pressed = PressedContact {
+            footprint: Footprint::computed(found.field, 0.0),
+            report: Some(found.report.with_time(0.0)),
+            coupling_error: 0.0,
+            remarks: found.remarks,
+        };
+        case.fits(&pressed.footprint)?;
+        if let Some(change) = change {
+            left = LEFT * change;
+            if left <= PART_OF_TARGET * target {
+                break;
+            }
+        }
+    }
+    pressed.coupling_error = left.hypot(LEFT_BY_PRESSURE * case.problem.elasticity.difference);
+    if left > PART_OF_TARGET * target {
+        let remark = Remark::IterationInexact {
+            iteration: "pressure and tractions of unlike bodies",
+            reason: "the rounds were used up",
+            residual: left,
+            tolerance: PART_OF_TARGET * target,
+        };
+        pressed.remarks.push(remark.into());
+    }
+    let seconds = (watch.elapsed() - began).as_secs_f64();
+    pressed.report = pressed
+        .report
+        .map(|report| NormalReport { seconds, ..report });
+    answer(operators, case, &pressed, watch)
+}
+
+/// The gap of a case, and how it is loaded; that of an ellipse is a paraboloid.
+fn gap_task(case: &CheckedCase) -> GapTask {
+    let modulus = case.problem.elasticity.contact_modulus();
+    let ellipse = match &case.problem.task {
+        NormalTask::Gap(task) => return task.as_ref().clone(),
+        NormalTask::Hertz(ellipse) => *ellipse,
+        NormalTask::Given(_) | NormalTask::Wheel(_) => {
+            unreachable!("the gap of a coupled problem is known")
+        }
+    };
+    let load = case.label.asked.load;
+    let pressing = match load.and_then(|load| load.approach_mm) {
+        Some(approach) => Pressing::Approach(approach),
+        None => Pressing::Force(ellipse.normal_force),
+    };
+    GapTask {
+        gap: paraboloid(&ellipse, modulus),
+        pressing,
+        contact_modulus: modulus,
+        pilot: PilotOnce::default(),
+    }
+}
+
+/// The gap that an ellipse belongs to.
+fn paraboloid(ellipse: &Ellipse, modulus: f64) -> GapSurface {
+    let [along, across] = ellipse.curvatures(modulus);
+    let (count, reach) = PARABOLA;
+    let y = (-count..=count).map(|k| reach * ellipse.b * f64::from(k) / f64::from(count));
+    let y: Vec<f64> = y.collect();
+    let gap: Vec<f64> = y.iter().map(|y| across * y * y).collect();
+    GapSurface::profile(0.5 / along, &y, &gap)
+}
+
+/// The gap with what the tractions under a pressure open, and their force over the friction limit.
+fn opened(
+    operators: &Arc<OperatorStore>,
+    case: &CheckedCase,
+    pressed: &PressedContact,
+    task: &GapTask,
+    watch: &TimeLimit,
+) -> Result<(GapSurface, [f64; 2]), SolveError> {
+    let rolling = case.rolling_task(&pressed.footprint);
+    if let Some(reason) = rolling.falls_too_fast() {
+        return Err(SolveError::NotCovered { reason });
+    }
+    let mut levels = Levels::new(&rolling, operators);
+    let point = force_control::solve(&rolling, &mut levels, 0, None, watch)?;
+    let sum = Resultants::default();
+    let sum = point.resultants.iter().fold(sum, |sum, r| sum.plus(*r));
+    let patches = pressed.footprint.patches();
+    let limit = case.problem.friction.limit_of_all(patches);
+    let force = [sum.force_x / limit, sum.force_y / limit];
+    let Some(fields) = &point.fields else {
+        unreachable!("the method that couples has fields")
+    };
+    let level = levels.get(fields.level);
+    let elasticity = &case.problem.elasticity;
+    let unit = level.scale.traction / elasticity.shear_modulus;
+    // Those of the three-point rule are smooth, the others alternate where they stick.
+    let found = &fields.tangential;
+    let traction = found.second.as_ref().unwrap_or(&found.traction);
+    let traction = [0, 1].map(|k| traction[k].iter().map(|t| t * unit).collect::<Vec<f64>>());
+    let mut extent = [
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+    ];
+    for patch in patches {
+        for k in [0, 2] {
+            extent[k] = extent[k].min(patch.extent[k]);
+            extent[k + 1] = extent[k + 1].max(patch.extent[k + 1]);
+        }
+    }
+    let limits = task.gap.window();
+    let [x, y] = [0, 1].map(|k| axis([extent[2 * k], extent[2 * k + 1]], limits[k]));
+    let mut rows = Vec::with_capacity(y.len());
+    for y in &y {
+        if let ControlFlow::Break(stop) = watch.tick(0.0) {
+            return Err(stop.into());
+        }
+        let at = |x: &f64| opening(&level.mesh, elasticity.difference, &traction, [*x, *y]);
+        rows.push(x.iter().map(at).collect());
+    }
+    Ok((task.gap.changed(&x, &y, &rows), force))
+}
+
+/// Points over an extent and around it, inside the limits of the data.
+fn axis([low, high]: [f64; 2], [least, most]: [f64; 2]) -> Vec<f64> {
+    let around = AROUND * (high - low);
+    let (low, high) = ((low - around).max(least), (high + around).min(most));
+    let step = (high - low) / (SAMPLES - 1) as f64;
+    (0..SAMPLES).map(|k| low + k as f64 * step).collect()
+}
+
+fn distance([a, b]: [f64; 2], [c, d]: [f64; 2]) -> f64 {
+    (a - c).hypot(b - d)
+}
