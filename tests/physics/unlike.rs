@@ -2,6 +2,7 @@
 
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
+use railhead::contact::normal::hertz::{Ellipse, Pressing};
 use railhead::contact::solution::words::Solution;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -62,7 +63,11 @@ impl Reference {
 fn unlike_bodies_agree_with_contact_within_one_percent_and_the_estimate() {
     let all: Vec<Reference> = read("unlike.json");
     let (mut failures, mut covered) = (Vec::new(), 0);
-    for reference in &all {
+    // The mirrored case of another one has a test of its own.
+    for reference in all
+        .iter()
+        .filter(|reference| !reference.id.ends_with("mxi"))
+    {
         let began = std::time::Instant::now();
         let (solution, _) = solve(&reference.case(reference.one()));
         let seconds = began.elapsed().as_secs_f64();
@@ -207,4 +212,25 @@ fn methods_that_do_not_couple_refuse_bodies_that_differ_much() {
     assert!(contact::check(&case, &Limits::default()).is_ok());
     case["solver"] = json!({ "method": "fastsim" });
     assert_fault(&case, "/material", &["K = 0.2500", "boundary_element"]);
+}
+
+#[test]
+fn an_ellipse_has_the_curvatures_of_its_radii() {
+    for (rolling, lateral) in [
+        (460.0, 300.0),
+        (300.0, 460.0),
+        (300.0, 300.0),
+        (50.0, 4000.0),
+    ] {
+        let ellipse = Ellipse::of_radii(rolling, lateral, Pressing::Force(8e4), 1.1e5);
+        let [a, b] = ellipse.curvatures(1.1e5);
+        assert!(
+            (2.0 * rolling * a - 1.0).abs() < 1e-12,
+            "{rolling} {lateral}: {a}"
+        );
+        assert!(
+            (2.0 * lateral * b - 1.0).abs() < 1e-12,
+            "{rolling} {lateral}: {b}"
+        );
+    }
 }

@@ -13,6 +13,9 @@ const SLIP_OF_CELL: f64 = 1.7;
 /// Largest stability number that is answered. Up to 1.0 no second state was found in 360 random motions from two starts, at 1.5 one.
 const STABILITY_MAX: f64 = 1.0;
 
+/// Parts of the fall that bounds are given one after the other where the iteration does not settle with all of it.
+pub const CONTINUATION: [f64; 5] = [0.25, 0.5, 0.75, 0.9, 1.0];
+
 /// How fast the terms of a law fall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FallForm {

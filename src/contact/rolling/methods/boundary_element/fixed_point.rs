@@ -15,6 +15,9 @@ const FIXED_POINT_FROM: f64 = 30.0;
 /// Iterations of the fixed point before Newton's take over. 8 and 20 are alike on the same ellipses.
 const SWEEPS_MAX: u32 = 12;
 
+/// Forces of two solutions that differ by no more than this part of the friction limit are the same: ten times what the iteration leaves.
+pub(crate) const SAME_SOLUTION: f64 = 4e-3;
+
 /// Iterates `T ← g s/|s|` if the rigid slip is large on every cell. An iteration costs one product, and its result has to meet the
 /// residual that Newton's iterates have to meet. Returns nothing if it does not settle; `t` is then still a fair start.
 ///

@@ -7,7 +7,7 @@
 
 use std::borrow::Cow;
 
-use crate::contact::friction::falling::BoundFall;
+use crate::contact::friction::falling::{BoundFall, CONTINUATION};
 use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::remark::list::Remark;
@@ -15,7 +15,7 @@ use crate::contact::rolling::answer::{
     LevelAnswer, LevelExit, LevelFailure, Work, project_on_bound,
 };
 use crate::contact::rolling::methods::boundary_element::fixed_point::{
-    fixed_point, force_change, slide_along,
+    SAME_SOLUTION, fixed_point, force_change, slide_along,
 };
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
 use crate::contact::rolling::methods::boundary_element::task::{
@@ -31,13 +31,9 @@ use crate::contact::rolling::slip_equations::{SlipEquations, SlipSource};
 use crate::contact::rolling::slip_rules::Rule;
 use crate::contact::rolling::strip_mesh::StripMesh;
 
-/// Parts of the fall that bounds are given one after the other where the iteration does not settle with all of it.
-const CONTINUATION: [f64; 5] = [0.25, 0.5, 0.75, 0.9, 1.0];
 /// From this stability number on (see [`Newton::stability`]) a second solution is looked for. None was seen below 1.5 in 360 random
 /// motions of the prototype.
 const SECOND_START_FROM: f64 = 0.5;
-/// Forces of two solutions that differ by no more than this part of the friction limit are the same: ten times what the iteration leaves.
-const SAME_SOLUTION: f64 = 4e-3;
 
 /// Solves one motion on one level, from a start or from zero tractions.
 ///
