@@ -147,3 +147,83 @@ fn files_compiled_into(source: &Path) -> Vec<PathBuf> {
     }
     files
 }
+
+/// The manifests by name, without the one that lists them.
+fn manifests() -> Vec<(String, String)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("deploy/kustomize");
+    let names = fs::read_dir(folder).expect("the manifests");
+    let names = names.map(|entry| {
+        entry
+            .expect("an entry")
+            .file_name()
+            .into_string()
+            .expect("a name")
+    });
+    let mut names: Vec<String> = names.filter(|name| name != "kustomization.yaml").collect();
+    names.sort();
+    let text = |name: String| (name.clone(), read(format!("deploy/kustomize/{name}")));
+    names.into_iter().map(text).collect()
+}
+
+#[test]
+fn every_manifest_is_applied() {
+    let list = read("deploy/kustomize/kustomization.yaml");
+    let mut listed: Vec<&str> = list
+        .lines()
+        .filter_map(|line| line.strip_prefix("  - "))
+        .collect();
+    listed.retain(|line| line.ends_with(".yaml"));
+    listed.sort_unstable();
+    let there = manifests();
+    assert_eq!(
+        there.iter().map(|(name, _)| name).collect::<Vec<_>>(),
+        listed
+    );
+    let version = env!("CARGO_PKG_VERSION");
+    assert!(
+        list.contains(&format!("newTag: \"{version}\"")),
+        "another version"
+    );
+}
+
+#[test]
+fn every_flag_and_variable_of_a_manifest_is_a_setting() {
+    let mut flags = 0;
+    for (name, text) in manifests() {
+        let arguments = text
+            .lines()
+            .filter_map(|line| line.trim().strip_prefix("args: ["));
+        for line in arguments {
+            let words: Vec<&str> = line.trim_end_matches(']').split(", ").collect();
+            let help = help(words[0]);
+            for flag in words.iter().filter(|word| word.starts_with("--")) {
+                assert!(help.contains(&format!("{flag} ")), "{name}: {flag}");
+                flags += 1;
+            }
+        }
+        let help = help("serve");
+        let variables = text.lines().filter_map(|line| line.trim().split_once(':'));
+        for (variable, _) in variables.filter(|(variable, _)| variable.starts_with("RAILHEAD_")) {
+            assert!(help.contains(&format!("{variable}=")), "{name}: {variable}");
+        }
+    }
+    assert!(flags > 5);
+}
+
+#[test]
+fn every_figure_that_alerts_and_the_autoscaler_ask_for_is_told() {
+    let manual = read("docs/operations.md");
+    let asked = read("deploy/alerts.yaml") + &read("deploy/kustomize/autoscaling.yaml");
+    let word = |c: char| !c.is_ascii_alphanumeric() && c != '_';
+    let figures: Vec<&str> = asked
+        .split(word)
+        .filter(|word| word.starts_with("railhead_"))
+        .collect();
+    assert!(figures.len() > 8);
+    for figure in figures {
+        assert!(
+            manual.contains(figure),
+            "{figure} is not in docs/operations.md"
+        );
+    }
+}

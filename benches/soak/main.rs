@@ -2,9 +2,7 @@
 //!
 //! `cargo bench --bench soak -- NAME …` with PostgreSQL's programs, and for `nodes` SeaweedFS (`weed`), on this machine; the names:
 //! `nodes` (kills, restarts and faults of the object store under load), `queue` (claims with 10⁴ and 10⁶ queued jobs), `snapshot`
-//! (claims while somebody holds an old snapshot), `pooler` (nodes behind PgBouncer), `clocks` (clocks that are 40 s off), `starts` (five
-//! nodes at once), `shares` (solver time of tenants across nodes), `cut` (nodes in network namespaces that are cut off; root). Without a
-//! name nothing is run. A broken promise ends it with a panic. `--profile dev` takes the build of the tests.
+//! (claims while somebody holds an old snapshot). Without a name nothing is run. A broken promise ends it with a panic. `--profile dev` takes the build of the tests.
 
 #[path = "../../tests/service/cable.rs"]
 #[allow(dead_code, reason = "shared with the tests")]

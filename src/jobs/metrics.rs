@@ -58,6 +58,7 @@ impl Drop for BusyWorker {
 pub(crate) struct Metrics {
     pub(crate) jobs: Family<StateLabel, Gauge>,
     pub(crate) oldest_queued_seconds: Gauge<f64, std::sync::atomic::AtomicU64>,
+    pub(crate) queue_cost_seconds: Gauge<f64, std::sync::atomic::AtomicU64>,
     pub(crate) database_bytes: Gauge,
     pub(crate) result_bytes: Gauge,
     pub(crate) operator_bytes: Gauge,
@@ -111,6 +112,7 @@ impl Metrics {
         let metrics = Metrics {
             jobs: Family::default(),
             oldest_queued_seconds: Gauge::default(),
+            queue_cost_seconds: Gauge::default(),
             database_bytes: Gauge::default(),
             result_bytes: Gauge::default(),
             operator_bytes: Gauge::default(),
@@ -215,6 +217,11 @@ impl Metrics {
             "queue_oldest_age_seconds",
             "Age of the oldest queued job; 0 if none is queued",
             self.oldest_queued_seconds.clone(),
+        );
+        registry.register(
+            "queue_cost_seconds",
+            "Expected solver seconds of all queued jobs, from the mean of up to 1000 of them",
+            self.queue_cost_seconds.clone(),
         );
         registry.register(
             "database_bytes",

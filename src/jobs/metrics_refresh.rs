@@ -7,6 +7,7 @@ use prometheus_client::registry::Registry;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::metrics::state_label;
+use crate::jobs::model::State;
 
 impl Jobs {
     /// Adds what this room counts to a registry.
@@ -32,6 +33,11 @@ impl Jobs {
             }
             stats => stats?,
         };
+        let queued = stats.jobs.get(&State::Queued).copied().unwrap_or(0);
+        #[expect(clippy::cast_precision_loss, reason = "an estimate")]
+        metrics
+            .queue_cost_seconds
+            .set(queued as f64 * stats.mean_cost_us * 1e-6);
         for (state, jobs) in stats.jobs {
             let gauge = metrics.jobs.get_or_create_owned(&state_label(state));
             gauge.set(i64::try_from(jobs).unwrap_or(i64::MAX));

@@ -82,6 +82,7 @@ async fn waiting_failed_cancelled_and_large_jobs_are_seen() {
     let waiting = samples(&server).await;
     assert_eq!(value(&waiting, r#"railhead_jobs{state="queued"}"#), 2.0);
     assert!(value(&waiting, "railhead_queue_oldest_age_seconds") > 0.0);
+    assert!(value(&waiting, "railhead_queue_cost_seconds") > 0.0);
 
     for _ in 0..2 {
         server.post(&format!("{other}/cancel"), &json!({})).await;

@@ -42,12 +42,14 @@ pub struct RetentionRule {
 }
 
 /// Statistics of a job table.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Stats {
     /// Number of jobs in each state; every state is there.
     pub jobs: BTreeMap<State, u64>,
     /// Time of submission of the oldest queued job, epoch milliseconds.
     pub oldest_queued_at: Option<i64>,
+    /// Mean expected solve time of queued jobs in µs; of a long queue, of some of them.
+    pub mean_cost_us: f64,
     /// Size of the database file and its write-ahead log.
     pub database_bytes: u64,
     /// Size of the results outside the table.

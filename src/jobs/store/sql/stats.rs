@@ -13,6 +13,10 @@ use crate::jobs::store::retention::{Stats, Usage};
 pub(crate) const COUNT: &str =
     "SELECT state, CAST(SUM(number) AS bigint) AS jobs FROM job_counts GROUP BY state";
 
+/// Mean expected solve time of queued jobs in µs; of a long queue, of some of them.
+pub(crate) const MEAN_COST: &str = "SELECT CAST(COALESCE(AVG(cost_us), 0) AS double precision) \
+     FROM (SELECT cost_us FROM jobs WHERE state = 'queued' LIMIT 1000) AS some";
+
 pub(crate) const RESULT_BYTES: &str =
     "SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) FROM blobs WHERE key IS NOT NULL";
 
@@ -58,12 +62,16 @@ impl SqlStore {
         ))
         .fetch_one(&self.readers)
         .await?;
+        let mean_cost_us: f64 = sqlx::query_scalar(MEAN_COST)
+            .fetch_one(&self.readers)
+            .await?;
         let result_bytes: i64 = sqlx::query_scalar(RESULT_BYTES)
             .fetch_one(&self.readers)
             .await?;
         Ok(Stats {
             jobs,
             oldest_queued_at,
+            mean_cost_us,
             database_bytes: self.database_bytes().await?,
             result_bytes: u64::try_from(result_bytes).unwrap_or(0),
         })
