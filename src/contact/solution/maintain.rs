@@ -26,7 +26,8 @@ use crate::contact::solution::maintenance::{SubsurfaceSummary, TemperatureSummar
 use crate::contact::solution::words::{PointFields, PointSolution};
 
 /// Stresses are answered from this part of the half-width of the smaller patch on: nearer to the surface the steps of the traction from cell
-/// to cell would show, whose stresses grow without bound.
+/// to cell would show, whose stresses grow without bound. There the largest error in the reference contacts is 0.6 % of the largest pressure
+/// (`cargo test --test physics -- stresses_are --nocapture`).
 const LEAST_DEPTH: f64 = 0.01;
 /// Points between two looks at the monitor.
 const POINTS_UNASKED: usize = 16;

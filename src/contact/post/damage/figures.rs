@@ -9,7 +9,8 @@ use crate::contact::solution::damage::DamageFiguresUsed;
 /// The models that are evaluated where none is named: those whose figures are confirmed.
 pub const DEFAULT_MODELS: [DamageModel; 2] = [DamageModel::TGamma, DamageModel::UsfdWear];
 
-/// Subsurface limit of elastic shakedown, largest pressure over yield in shear.
+/// Subsurface limit of elastic shakedown, largest pressure over yield in shear (Johnson 1985, chapter 9, for a line contact, less than for
+/// any ellipse).
 pub const SHAKEDOWN_LIMIT: f64 = 4.0;
 
 /// Where the figures of the named sets are from.

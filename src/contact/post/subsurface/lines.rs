@@ -5,7 +5,7 @@ use std::cell::OnceCell;
 use crate::contact::mesh::strips::Chord;
 use crate::contact::normal::footprint::Footprint;
 
-/// A strip is halved at most so many times.
+/// A strip is halved at most so many times: of 16 strips a part is then a twentieth of the least depth that is answered.
 pub const HALVINGS_MAX: u32 = 8;
 
 /// A part of a strip: the `index`-th of its `2^level` equal parts.

@@ -5,7 +5,7 @@
 
 use crate::contact::post::subsurface::lines::{HALVINGS_MAX, StripPart};
 
-/// Parts that are kept; 200 bytes each.
+/// Parts that are kept; 200 bytes each, so that they take at most 40 MB.
 const KEPT_MAX: usize = 200_000;
 
 /// A part of a cell: a piece of the strip between two angles of the outline.
