@@ -1,0 +1,135 @@
+//! Friction that falls with slip, varies across or has a layer below it, and bodies that differ: random cases held against laws.
+
+use std::fmt::Write as _;
+
+use railhead::contact;
+use railhead::contact::case::limits::Limits;
+use railhead::contact::monitor::Unmonitored;
+use serde_json::{Value, json};
+
+use crate::random::Random;
+
+/// A class, how many cases of it are solved, and how one is made.
+type Class = (&'static str, usize, fn(&mut Random, &mut Value));
+
+const CLASSES: [Class; 4] = [
+    ("friction falls with slip", 600, falling),
+    ("friction varies across", 400, across),
+    ("a layer, a reduction", 400, layered),
+    ("bodies differ", 60, unlike),
+];
+
+fn falling(random: &mut Random, case: &mut Value) {
+    let law = ["exponential", "rational", "linear"][random.below(3)];
+    let term = |random: &mut Random| json!({ "coefficient": random.between(0.02, 0.3), "half_speed_mm_per_s": random.decades(50.0, 5000.0) });
+    let terms: Vec<Value> = match random.part() < 0.5 {
+        true => vec![term(random)],
+        false => vec![term(random), term(random)],
+    };
+    case["friction"] = json!({ "law": law, "limit": random.between(0.02, 0.3), "terms": terms });
+    case["motion"]["speed_mm_per_s"] = json!(random.decades(300.0, 80_000.0));
+}
+
+fn across(random: &mut Random, case: &mut Value) {
+    let mut y: Vec<f64> = (0..4).map(|_| random.between(-8.0, 8.0)).collect();
+    y.sort_by(f64::total_cmp);
+    y[2] = y[1];
+    let mu: Vec<f64> = (0..4).map(|_| random.decades(0.01, 0.8)).collect();
+    case["friction"] = json!({ "across": { "y_mm": y, "coefficient": mu } });
+}
+
+fn layered(random: &mut Random, case: &mut Value) {
+    let layer = json!({
+        "shear_modulus_mpa": random.decades(10.0, 10_000.0), "thickness_mm": random.decades(1e-4, 0.2)
+    });
+    case["friction"] = match random.part() < 0.5 {
+        true => json!({ "coefficient": 0.35, "layer": layer }),
+        false => {
+            json!({ "coefficient": 0.35, "layer": layer, "reduction": random.between(0.1, 1.0) })
+        }
+    };
+}
+
+fn unlike(random: &mut Random, case: &mut Value) {
+    let body = |random: &mut Random| json!({ "shear_modulus_mpa": random.decades(2e4, 2e5), "poisson_ratio": random.between(0.2, 0.4) });
+    case["material"] = json!({ "upper": body(random), "lower": body(random) });
+    case["solver"] = json!({ "target_error": 0.01 });
+}
+
+fn base(random: &mut Random) -> Value {
+    let ratio = random.decades(0.3, 3.0).sqrt();
+    json!({
+        "material": { "shear_modulus_mpa": 82_000, "poisson_ratio": 0.28 },
+        "friction": { "coefficient": 0.3 },
+        "contact": { "type": "ellipse", "a_mm": 5.0 * ratio, "b_mm": 5.0 / ratio },
+        "load": { "normal_force_n": random.decades(10_000.0, 120_000.0) },
+        "motion": {
+            "creepage_x": random.between(-0.01, 0.01), "creepage_y": random.between(-0.01, 0.01),
+            "spin_per_mm": random.between(-1e-3, 1e-3),
+        },
+        "solver": { "target_error": 0.005 },
+        "outputs": ["resultants"],
+    })
+}
+
+/// The table; cases that failed or broke a law are written out below it.
+pub fn table(seed: u64) -> String {
+    let mut text = String::from(
+        "## Friction as it is, bodies that differ\n\n| cases | tried | refused | solved | target met | several states | failed |\n|---|---|---|---|---|---|---|\n",
+    );
+    let mut troubles = String::new();
+    for (name, count, make) in CLASSES {
+        let mut random = Random(seed);
+        let mut counts = [0; 5];
+        for _ in 0..count {
+            let mut case = base(&mut random);
+            make(&mut random, &mut case);
+            let outcome = one(&case);
+            let k = match &outcome {
+                Ok(None) => 0,
+                Ok(Some([met, several])) => {
+                    counts[2] += usize::from(*met);
+                    counts[3] += usize::from(*several);
+                    1
+                }
+                Err(_) => 4,
+            };
+            counts[k] += 1;
+            if let Err(why) = outcome {
+                let _ = writeln!(troubles, "- {why}: `{case}`");
+            }
+        }
+        let [refused, solved, met, several, failed] = counts;
+        let _ = writeln!(
+            text,
+            "| {name} | {count} | {refused} | {solved} | {met} | {several} | {failed} |"
+        );
+    }
+    text + "\n" + &troubles
+}
+
+/// Whether the target was met and a second state found; nothing if the case was refused.
+fn one(case: &Value) -> Result<Option<[bool; 2]>, String> {
+    let Ok(checked) = contact::check(case, &Limits::default()) else {
+        return Ok(None);
+    };
+    let (solution, _) =
+        contact::solve(&checked, &Unmonitored).map_err(|error| error.to_string())?;
+    let patch = &solution.patches[0];
+    let point = &patch.points[0];
+    let limit = patch.friction_limit_n.unwrap_or(0.0);
+    let force = point.force_x_n.hypot(point.force_y_n);
+    if force > 1.02 * limit {
+        return Err(format!("a force of {force} N beyond {limit} N"));
+    }
+    if point.friction_power_n
+        < -0.01 * limit * point.motion.creepage_x.hypot(point.motion.creepage_y)
+    {
+        return Err(format!("a friction power of {} N", point.friction_power_n));
+    }
+    let several = solution
+        .remarks
+        .iter()
+        .any(|remark| remark.code == "several-solutions");
+    Ok(Some([point.target_met == Some(true), several]))
+}
