@@ -15,7 +15,7 @@ pub(crate) const COUNT: &str =
 
 /// Mean expected solve time of queued jobs in µs; of a long queue, of some of them.
 pub(crate) const MEAN_COST: &str = "SELECT CAST(COALESCE(AVG(cost_us), 0) AS double precision) \
-     FROM (SELECT cost_us FROM jobs WHERE state = 'queued' LIMIT 1000) AS some";
+     FROM (SELECT cost_us FROM jobs WHERE state = 'queued' LIMIT 1000) AS sampled";
 
 pub(crate) const RESULT_BYTES: &str =
     "SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) FROM blobs WHERE key IS NOT NULL";
