@@ -5,7 +5,7 @@ use railhead::contact::case::limits::Limits;
 use railhead::contact::mesh::size::MeshSize;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::methods::boundary_element::newton::Newton;
-use railhead::contact::rolling::methods::boundary_element::task::NewtonTask;
+use railhead::contact::rolling::methods::boundary_element::task::{NewtonTask, STEPS_MAX};
 use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use railhead::contact::rolling::motion::Motion;
 use railhead::contact::rolling::slip_equations::SlipEquations;
@@ -77,6 +77,7 @@ fn one_rule(contact: &Ellipse, rule: Rule) -> Cells {
         scale: 1.0,
         // The trapezoid passes the residual of a cell on to its neighbours.
         tolerance: 0.01 * TOLERANCE_LEAST,
+        steps_max: STEPS_MAX,
     };
     let mut t = vec![0.0; 2 * padded];
     let report = newton.solve(&law, &mut t, &mut workspace, &Unmonitored);

@@ -8,7 +8,9 @@ use railhead::contact::half_space::strip_operator::operator::StripOperator;
 use railhead::contact::mesh::strips::{Chord, Grading, Mesh, equal_strips};
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::methods::boundary_element::newton::Newton;
-use railhead::contact::rolling::methods::boundary_element::task::{Convergence, NewtonTask};
+use railhead::contact::rolling::methods::boundary_element::task::{
+    Convergence, NewtonTask, STEPS_MAX,
+};
 use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use railhead::contact::rolling::methods::liu_hsu::dense_task::DenseTask;
 use railhead::contact::rolling::methods::liu_hsu::solve::ZonesOutcome;
@@ -146,6 +148,7 @@ impl Contact {
             area: &self.area,
             scale: self.scale(rigid),
             tolerance,
+            steps_max: STEPS_MAX,
         }
     }
 

@@ -7,7 +7,9 @@ use railhead::contact::half_space::strip_operator::operator::StripOperator;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::methods::boundary_element::newton::Newton;
 use railhead::contact::rolling::methods::boundary_element::solve as boundary_element;
-use railhead::contact::rolling::methods::boundary_element::task::{LevelTask, NewtonTask};
+use railhead::contact::rolling::methods::boundary_element::task::{
+    LevelTask, NewtonTask, STEPS_MAX,
+};
 use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use railhead::contact::rolling::slip_equations::SlipEquations;
 use railhead::contact::rolling::slip_rules::Rule;
@@ -74,6 +76,7 @@ fn distance_to_plain_newton(contact: &Ellipse) -> f64 {
             area: &area,
             scale: 1.0,
             tolerance: 1e-9,
+            steps_max: STEPS_MAX,
         };
         let report = Newton::new(&equations)
             .solve(&law, &mut t, &mut workspace, &Unmonitored)

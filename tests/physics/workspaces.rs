@@ -6,7 +6,7 @@ use railhead::contact::half_space::grid_operator::{GridOperator, GridWorkspace};
 use railhead::contact::mesh::size::MeshSize;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::methods::boundary_element::newton::Newton;
-use railhead::contact::rolling::methods::boundary_element::task::NewtonTask;
+use railhead::contact::rolling::methods::boundary_element::task::{NewtonTask, STEPS_MAX};
 use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use railhead::contact::rolling::motion::Motion;
 use railhead::contact::rolling::operator_store::{CaseOperators, LevelOperator, OperatorStore};
@@ -116,6 +116,7 @@ fn newton_and_gmres_allocate_nothing_in_a_workspace_that_has_served_before() {
                 area,
                 scale: 1.0,
                 tolerance: 1e-6,
+                steps_max: STEPS_MAX,
             };
             let mut solve = || {
                 t.fill(0.0);

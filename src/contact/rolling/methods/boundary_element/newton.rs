@@ -29,8 +29,6 @@ use crate::contact::rolling::slip_rules::Rule;
 /// Projection parameter r times `M_ii`. 0.2 takes 2 to 8 % more Newton steps, 0.45 takes 1 to 4 % fewer but is nearer to values that
 /// cycle.
 const PROJECTION: f64 = 0.3;
-/// Newton steps after which an iteration is given up. A case of these takes 18 on average over all its levels, rules and companions.
-const ITERATIONS_MAX: u32 = 60;
 /// The first so many steps are never halved: far from the solution the residual may grow for a step or two. With 4 or 16 the steps
 /// change by 0.6 % at most.
 const FREE_STEPS: u32 = 8;
@@ -148,7 +146,7 @@ impl<'a> Newton<'a> {
         let mut recent = [0.0_f64; 3];
         let mut last = f64::INFINITY;
         report.residual = self.evaluate(law, t, workspace, &mut report);
-        while report.iterations < ITERATIONS_MAX {
+        while report.iterations < law.steps_max {
             if report.residual < least {
                 least = report.residual;
                 best.copy_from_slice(t);

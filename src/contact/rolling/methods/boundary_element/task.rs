@@ -47,7 +47,13 @@ pub struct NewtonTask<'a> {
     pub scale: f64,
     /// Residual to reach.
     pub tolerance: f64,
+    /// Most steps; [`STEPS_MAX`] unless there is another start to fall back on.
+    pub steps_max: u32,
 }
+
+/// Newton steps after which an iteration is given up. A case of the ellipses that `newton.rs` names takes 18 on average over all its
+/// levels, rules and companions.
+pub const STEPS_MAX: u32 = 60;
 
 /// How an iteration for the tractions ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -5,7 +5,7 @@ use crate::contact::rolling::answer::{
     LevelAnswer, LevelExit, LevelFailure, Work, project_on_bound,
 };
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
-use crate::contact::rolling::methods::boundary_element::task::NewtonTask;
+use crate::contact::rolling::methods::boundary_element::task::{NewtonTask, STEPS_MAX};
 use crate::contact::rolling::methods::full_slip;
 use crate::contact::rolling::methods::liu_hsu::dense_task::DenseTask;
 use crate::contact::rolling::methods::liu_hsu::solve::{ZonesOutcome, solve_by_upwind};
@@ -137,6 +137,7 @@ impl<'a> DenseParts<'a> {
                 area: &self.area,
                 scale: self.scale,
                 tolerance,
+                steps_max: STEPS_MAX,
             },
             nodes: (&self.level.normalised.node, &self.y),
             motion: self.motion,
