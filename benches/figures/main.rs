@@ -11,10 +11,9 @@ use std::path::{Path, PathBuf};
 
 use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::Unmonitored;
-use railhead::contact::post::outlines::outline::{outlines, patch_outline};
+use railhead::contact::post::smooth::sheet::Sheet;
 use railhead::contact::rolling::motion::Motion;
-use railhead::contact::solution::words::{Fields, PatchFields, Solution};
-use railhead::contact::solution::zone::Zone;
+use railhead::contact::solution::words::{Fields, Solution};
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 
@@ -63,6 +62,8 @@ impl Figure {
         let text = std::fs::read_to_string(path).expect("an example");
         let mut case: Value = serde_json::from_str(&text).expect("an example is JSON");
         case["solver"] = json!({ "mesh": { "strips": STRIPS, "cells": CELLS } });
+        // The border between stick and slip is found from the margin to the bound.
+        case["outputs"] = json!(["resultants", "zones", "pressure", "tractions"]);
         let limits = Limits {
             memory_bytes: 8 << 30,
             ..Limits::default()
@@ -97,19 +98,18 @@ impl Figure {
 
     fn patch(&self) -> Vec<Vec<[f64; 2]>> {
         let patches = self.fields.patches.iter();
-        let outline = |patch: &PatchFields| patch_outline(patch.cells(0));
-        patches.flat_map(outline).collect()
+        let sheets = patches.filter_map(|patch| Sheet::new(patch.cells(0)));
+        sheets.map(|sheet| sheet.border()).collect()
     }
 
-    /// Where it sticks; the steps of the cells are cut at the middle of their edges.
+    /// Where it sticks.
     fn stick(&self, point: usize) -> Vec<Vec<[f64; 2]>> {
-        let of_patch = |patch: usize| -> Vec<Vec<[f64; 2]>> {
-            let patch = &self.fields.patches[patch];
-            let zones = patch.points[point].zone.as_deref();
-            outlines(patch.cells(point), zones, Some(Zone::Stick))
-        };
-        let patches = 0..self.fields.patches.len();
-        patches.flat_map(of_patch).map(|l| smoothed(&l)).collect()
+        let patches = self.fields.patches.iter();
+        let borders = patches.filter_map(|patch| {
+            let cells = patch.cells(point);
+            Sheet::new(cells)?.stick(cells, &patch.points[point])
+        });
+        borders.flatten().collect()
     }
 
     fn frame(&self, [left, top]: [f64; 2], width: f64) -> Frame {
@@ -153,12 +153,6 @@ impl Figure {
             stick / area,
         );
     }
-}
-
-fn smoothed(outline: &[[f64; 2]]) -> Vec<[f64; 2]> {
-    let next = outline.iter().cycle().skip(1);
-    let middle = |(a, b): (&[f64; 2], &[f64; 2])| [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])];
-    outline.iter().zip(next).map(middle).collect()
 }
 
 /// Figure 3: borders of the stick zone under one creepage and several spins.
