@@ -10,7 +10,8 @@ use serde_json::{Value, json};
 
 use crate::errors::assert_problem;
 use crate::guarded::{Guarded, loaded};
-use crate::server::{Answer, Server, Setup};
+use crate::runs::{columns, template};
+use crate::server::{Answer, Server, Setup, example};
 use crate::support::case;
 
 #[tokio::test]
@@ -72,7 +73,10 @@ async fn a_bad_key_is_refused_also_where_none_is_needed() {
     assert_problem(&answer, 401, "unauthorized", "not known");
 }
 
-/// Every operation on one job or batch that the contract has, with the id put in.
+/// An id that nothing has.
+const NOBODY: &str = "01890000-0000-7000-8000-000000000000";
+
+/// Every operation on one job, batch or run that the contract has, with the id put in.
 fn operations_on(kind: &str, id: &str) -> Vec<(Method, String)> {
     let contract: Value = serde_json::from_str(&railhead::http::openapi_json()).unwrap();
     let prefix = format!("/v1/{kind}/{{id}}");
@@ -89,6 +93,65 @@ fn operations_on(kind: &str, id: &str) -> Vec<(Method, String)> {
     found
 }
 
+/// Answers of the south to what is the north's and to what nobody has.
+async fn assert_foreign_is_unknown(
+    guarded: &Guarded,
+    foreign: Vec<(Method, String)>,
+    unknown: Vec<(Method, String)>,
+) {
+    let south = &guarded.south;
+    for ((method, foreign), (_, unknown)) in foreign.into_iter().zip(unknown) {
+        let what = format!("{method} {foreign}");
+        let foreign = guarded.send(south, method.clone(), &foreign, None).await;
+        let unknown = guarded.send(south, method, &unknown, None).await;
+        assert_eq!(foreign.status, 404, "{what}: {}", foreign.text);
+        let told = |answer: &Answer| {
+            let mut problem = answer.json.clone();
+            problem.as_object_mut().unwrap().remove("instance");
+            problem
+        };
+        assert_eq!(told(&foreign), told(&unknown), "{what}");
+    }
+}
+
+#[tokio::test]
+async fn runs_and_profiles_of_another_tenant_are_answered_like_what_does_not_exist() {
+    let guarded = Guarded::start(Setup::new(), |_| {}).await;
+    let (north, south) = (&guarded.north, &guarded.south);
+    let post = async |key: &str, path: &str, body: &Value| {
+        guarded.send(key, Method::POST, path, Some(body)).await
+    };
+    let rows = json!({ "template": template("table"), "columns": columns(3) });
+    let run = post(north, "/v1/runs", &rows).await;
+    let run = run.header("location").expect("a run").to_owned();
+    let id = run.rsplit('/').next().unwrap();
+    assert_foreign_is_unknown(
+        &guarded,
+        operations_on("runs", id),
+        operations_on("runs", NOBODY),
+    )
+    .await;
+    assert_eq!(guarded.get(north, &run).await.status, 200);
+    let seen = guarded.get(south, "/v1/runs").await;
+    assert_eq!(seen.json["runs"], json!([]));
+
+    let mut wheel_on_rail = example("wheel-rail.case.json");
+    let rail = wheel_on_rail["contact"]["rail"].clone();
+    let kept = post(north, "/v1/profiles", &rail).await.json;
+    let on = |digest: &str| {
+        let path = format!("/v1/profiles/{digest}");
+        vec![(Method::GET, path.clone()), (Method::DELETE, path)]
+    };
+    let digest = kept["digest"].as_str().expect("a digest");
+    assert_foreign_is_unknown(&guarded, on(digest), on(&"0".repeat(64))).await;
+    assert_eq!(guarded.get(north, &on(digest)[0].1).await.status, 200);
+    let seen = guarded.get(south, "/v1/profiles").await;
+    assert_eq!(seen.json["profiles"], json!([]));
+    wheel_on_rail["contact"]["rail"] = json!({ "profile": digest });
+    let named = post(south, "/v1/jobs", &wheel_on_rail).await;
+    assert_problem(&named, 422, "faulty-case", "fault");
+}
+
 #[tokio::test]
 async fn what_belongs_to_another_tenant_is_answered_like_what_does_not_exist() {
     let guarded = Guarded::start(Setup::new(), |_| {}).await;
@@ -101,23 +164,14 @@ async fn what_belongs_to_another_tenant_is_answered_like_what_does_not_exist() {
         .await;
     assert_eq!(results.text.lines().count(), 2);
 
-    let nobody = "01890000-0000-7000-8000-000000000000";
     for (kind, path) in [("jobs", &job), ("batches", &batch)] {
         let id = path.rsplit('/').next().unwrap();
-        for ((method, foreign), (_, unknown)) in operations_on(kind, id)
-            .into_iter()
-            .zip(operations_on(kind, nobody))
-        {
-            let foreign = guarded.send(south, method.clone(), &foreign, None).await;
-            let unknown = guarded.send(south, method.clone(), &unknown, None).await;
-            assert_eq!(foreign.status, 404, "{method} {kind}: {}", foreign.text);
-            let told = |answer: &Answer| {
-                let mut problem = answer.json.clone();
-                problem.as_object_mut().unwrap().remove("instance");
-                problem
-            };
-            assert_eq!(told(&foreign), told(&unknown));
-        }
+        assert_foreign_is_unknown(
+            &guarded,
+            operations_on(kind, id),
+            operations_on(kind, NOBODY),
+        )
+        .await;
     }
     // Nothing of what was tried has touched them.
     assert_eq!(
@@ -192,15 +246,25 @@ async fn figures_of_the_whole_service_are_for_the_operator() {
     assert!(!answer.text.contains("north"), "no tenant is named");
 }
 
-/// Every path of the contract with a parameter belongs to a job or a batch, whose operations are all tried below, or
+/// Every path of the contract with a parameter belongs to a job, a batch, a run or a profile, whose operations are all tried below, or
 /// concerns no tenant.
 #[test]
-fn whatever_has_an_id_belongs_to_a_job_or_a_batch() {
+fn whatever_has_an_id_belongs_to_something_of_a_tenant() {
     let contract: Value = serde_json::from_str(&railhead::http::openapi_json()).unwrap();
     let paths = contract["paths"].as_object().unwrap().keys();
     let others: Vec<&String> = paths
         .filter(|path| path.contains('{'))
-        .filter(|path| !path.starts_with("/v1/jobs/{id}") && !path.starts_with("/v1/batches/{id}"))
+        .filter(|path| {
+            let tried = [
+                "jobs/{id}",
+                "batches/{id}",
+                "runs/{id}",
+                "profiles/{digest}",
+            ];
+            !tried
+                .iter()
+                .any(|tried| path.starts_with(&format!("/v1/{tried}")))
+        })
         .collect();
     assert_eq!(
         others,

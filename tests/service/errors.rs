@@ -360,10 +360,12 @@ async fn every_kind_of_problem_explains_itself() {
         include_str!("caching.rs"),
         include_str!("crowds.rs"),
         include_str!("errors.rs"),
+        include_str!("kept_profiles.rs"),
         include_str!("order.rs"),
         include_str!("database_away.rs"),
         include_str!("requests.rs"),
         include_str!("retention.rs"),
+        include_str!("runs.rs"),
         include_str!("shares.rs"),
         include_str!("storage.rs")
     );

@@ -18,6 +18,13 @@ use parquet::schema::types::Type;
 
 use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
 
+/// Rows of one group that are read at most; writers make groups of 10⁵ or 10⁶ rows.
+const GROUP_ROWS_MAX: usize = 1 << 21;
+/// Values of one group that are read at most, over all columns. A file may say in a few bytes that one value stands in all rows.
+const GROUP_VALUES_MAX: usize = 1 << 24;
+/// Bytes of the texts of one column of a group at most.
+const TEXT_BYTES_MAX: usize = 1 << 27;
+
 /// The bytes that a file begins and ends with.
 pub const MAGIC: &[u8] = b"PAR1";
 
@@ -180,8 +187,17 @@ impl<R: ChunkReader + 'static> TableReader<R> {
     pub fn read(&self, group: usize, wanted: impl Fn(&str) -> bool) -> Result<RowTable> {
         let group = self.0.get_row_group(group)?;
         let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
+        let names = self.names();
+        if rows > GROUP_ROWS_MAX || rows * names.len() > GROUP_VALUES_MAX {
+            let detail = format!(
+                "a group of {rows} rows in {} columns; at most {GROUP_ROWS_MAX} rows and {GROUP_VALUES_MAX} values are read at once, \
+                 write smaller groups",
+                names.len()
+            );
+            return Err(ParquetError::General(detail));
+        }
         let mut columns = Vec::new();
-        for (place, name) in self.names().into_iter().enumerate() {
+        for (place, name) in names.into_iter().enumerate() {
             if !wanted(&name) {
                 continue;
             }
@@ -254,6 +270,13 @@ fn integers(reader: ColumnReaderImpl<Int64Type>, rows: usize) -> Result<TableCol
 
 fn texts(reader: ColumnReaderImpl<ByteArrayType>, rows: usize) -> Result<TableColumn> {
     let values = read::<ByteArrayType>(reader, rows)?;
+    let bytes: usize = values.iter().flatten().map(ByteArray::len).sum();
+    if bytes > TEXT_BYTES_MAX {
+        let detail = format!(
+            "a column of texts of {bytes} bytes; at most {TEXT_BYTES_MAX} are read at once, write smaller groups"
+        );
+        return Err(ParquetError::General(detail));
+    }
     let text = |value: Option<ByteArray>| match value {
         Some(bytes) => bytes.as_utf8().map(str::to_owned),
         None => Ok(String::new()),
@@ -315,5 +338,48 @@ mod tests {
         let cut = reader.read(1, |_| true).unwrap().cut(&(2..3));
         assert_eq!((cut.rows(), cut.columns.len()), (1, 3));
         assert!(TableReader::new(Bytes::from_static(b"PAR1 is no file")).is_err());
+    }
+
+    #[test]
+    fn groups_that_unpack_to_far_more_than_they_say_are_refused() {
+        let rows = GROUP_ROWS_MAX + 1;
+        let constant = TableColumn::Numbers(vec![1.0; rows]);
+        let long = RowTable {
+            columns: vec![("x".to_owned(), constant)],
+        };
+        let reader = TableReader::new(Bytes::from(encode(&long).unwrap())).unwrap();
+        let refused = reader.read(0, |_| true).unwrap_err().to_string();
+        assert!(refused.contains("smaller groups"), "{refused}");
+        // One text in all rows takes a few bytes.
+        let text = "a".repeat(1 << 16);
+        let texts = RowTable {
+            columns: vec![("t".to_owned(), TableColumn::Texts(vec![text; 3000]))],
+        };
+        let file = encode(&texts).unwrap();
+        assert!(file.len() < 1 << 17, "{}", file.len());
+        let reader = TableReader::new(Bytes::from(file)).unwrap();
+        let refused = reader.read(0, |_| true).unwrap_err().to_string();
+        assert!(refused.contains("column of texts"), "{refused}");
+    }
+
+    /// A size that a file states may be anything. An allocation that fails would end the process, a panic only the request.
+    #[test]
+    fn damaged_files_are_errors_whatever_byte_is_wrong() {
+        let file = encode(&table()).unwrap();
+        let mut read = 0;
+        for place in 0..file.len() {
+            for wrong in [[0xff; 5], [0x7f; 5], [0xff, 0xff, 0xff, 0xff, 0x0f]] {
+                let mut damaged = file.clone();
+                let end = (place + wrong.len()).min(damaged.len());
+                damaged[place..end].copy_from_slice(&wrong[..end - place]);
+                let looked = std::panic::catch_unwind(|| {
+                    let reader = TableReader::new(Bytes::from(damaged)).ok()?;
+                    (0..reader.groups().min(3)).find_map(|group| reader.read(group, |_| true).ok())
+                });
+                read += usize::from(matches!(looked, Ok(Some(_))));
+            }
+        }
+        // Most bytes matter, those of statistics and values do not.
+        assert!(read < 2 * file.len(), "{read} of {}", 3 * file.len());
     }
 }
