@@ -92,7 +92,7 @@ mod tests {
     use super::*;
     use crate::contact::mesh::strips::{Chord, Grading};
 
-    /// Corner sums of the rectangle |x| ≤ 0.5, |y| ≤ 0.3, computed with 40 digits.
+    /// Corner sums of the rectangle |x| ≤ 0.5, |y| ≤ 0.3, computed with 40 digits and written with 12.
     #[test]
     fn the_sums_of_a_rectangle_have_their_known_digits() {
         let chord = Chord {
@@ -115,7 +115,7 @@ mod tests {
         for (at, sums) in known {
             of_segment(&mesh, &mesh.segments[0], at, |_, found| {
                 for k in [0, 1] {
-                    assert!((found[k] - sums[k]).abs() < 3e-12, "{at:?}: {found:?}");
+                    assert!((found[k] - sums[k]).abs() < 1e-11, "{at:?}: {found:?}");
                 }
             });
         }
