@@ -132,9 +132,8 @@ async fn each_job_ends_once_and_is_read_everywhere_although_a_worker_and_an_api_
     first.kill();
     let third = nodes.api();
     until("all jobs end", async || {
-        let open =
-            in_state(&second, "queued").await.len() + in_state(&second, "running").await.len();
-        open == 0
+        // One look: between two of them a job could go back to the queue and be in neither.
+        in_state(&second, "succeeded").await.len() == ids.len() + 60
     })
     .await;
 
