@@ -29,7 +29,8 @@ use crate::contact::rolling::resultants::Resultants;
 use crate::contact::solution::words::{Fields, NormalReport, Solution};
 use crate::contact::time_limit::TimeLimit;
 
-/// Allowed error of the resultants in the rounds, relative to μN: the opening follows from tractions, whose error counts K times.
+/// Allowed error of the resultants in the rounds, relative to μN: the opening follows from tractions, whose error counts K times. Chosen on the 12
+/// contacts of `tests/physics/unlike.rs`, not on others.
 const TARGET_OF_ROUNDS: f64 = 0.008;
 /// Rounds at most; three suffice up to |K| = 0.25.
 const ROUNDS_MAX: usize = 6;

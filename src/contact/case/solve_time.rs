@@ -34,8 +34,9 @@ const DOUBLE_TIMES: f64 = 2.5;
 const TRIALS: f64 = 3.0;
 /// Least time of a solve, in s.
 const SECONDS_MIN: f64 = 5e-5;
-/// A motion by the table, with its place in the answer, in s.
-const TABLE_SECONDS: f64 = 5e-6;
+/// A motion by the table, with its place in the answer, in s; twice what a row of a run of a million takes on an idle machine
+/// (`cargo bench --bench load -- rows`).
+pub(crate) const TABLE_SECONDS: f64 = 5e-6;
 /// Explicit meshes with so many cells have matrices that no cache holds.
 const MESH_CELLS_SLOW: f64 = 1600.0;
 /// Cells that a patch has at least.

@@ -15,6 +15,7 @@ use serde_json::Value;
 use crate::contact;
 use crate::contact::case::limits::Limits;
 use crate::contact::case::problem::CheckedCase;
+use crate::contact::case::solve_time::TABLE_SECONDS;
 use crate::contact::case::words::solver::{MethodName, Output};
 use crate::contact::error::{CaseError, Fault, SolveError};
 use crate::contact::evaluate::answer::{RowStatus, RowsAnswer};
@@ -114,11 +115,9 @@ pub fn expected_seconds(task: &ManyTask) -> f64 {
 
 /// Rows that [`expected_seconds`] looks at.
 const SAMPLED: usize = 16;
-/// Time of a row by the table with all that is written of it.
-const TABLE_SECONDS: f64 = 5e-6;
-/// The same by the simplified theory.
+/// Time of a row by the simplified theory, in s: 0.017 LU of the report (`cargo bench --bench report`) and what is written of it.
 const FASTSIM_SECONDS: f64 = 3e-5;
-/// Time of a row that is refused.
+/// Time of a row that is refused, in s; not measured, it only keeps chunks of faulty rows from being endless.
 const REFUSED_SECONDS: f64 = 1e-4;
 
 /// Why a row has no solution.

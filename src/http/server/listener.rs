@@ -23,7 +23,7 @@ use crate::http::server::write_timeout::WriteTimeout;
 /// Requests of one HTTP/2 connection at a time; more of them wait at the client. Clients send as many before they are told
 /// (RFC 9113, section 6.5.2, advises no less).
 const STREAMS_MAX: u32 = 100;
-/// How long the peer of an HTTP/2 connection may leave a ping unanswered.
+/// How long the peer of an HTTP/2 connection may leave a ping unanswered. A choice, as long as hyper's own.
 const PING_WITHIN: Duration = Duration::from_secs(20);
 
 /// Serves a router until `stop`; then no connection is accepted any more, and this returns when the open requests have
