@@ -2,7 +2,7 @@
 //!
 //! `cargo bench --bench soak -- NAME …` with PostgreSQL's programs, and for `nodes` SeaweedFS (`weed`), on this machine; the names:
 //! `nodes` (kills, restarts and faults of the object store under load), `queue` (claims with 10⁴ and 10⁶ queued jobs), `snapshot`
-//! (claims while somebody holds an old snapshot). Without a name nothing is run. A broken promise ends it with a panic. `--profile dev` takes the build of the tests.
+//! (claims while somebody holds an old snapshot), `network` (hosts that are cut off; needs root or namespaces for users, `ip` and `nft`). Without a name nothing is run. A broken promise ends it with a panic. `--profile dev` takes the build of the tests.
 
 #[path = "../../tests/service/cable.rs"]
 #[allow(dead_code, reason = "shared with the tests")]
@@ -21,6 +21,8 @@ mod seaweed;
 mod support;
 
 mod cluster;
+mod hosts;
+mod network;
 mod nodes;
 mod queue;
 
@@ -28,6 +30,9 @@ fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     // Run by `cargo test --benches` as well, where there is nothing to measure.
     if !arguments.iter().any(|argument| argument == "--bench") {
+        return;
+    }
+    if arguments.iter().any(|name| name == "network") && hosts::moved_into_a_network_of_its_own() {
         return;
     }
     let runtime = tokio::runtime::Builder::new_multi_thread()
@@ -44,6 +49,7 @@ fn main() {
             "nodes" => runtime.block_on(nodes::run(number("jobs=").unwrap_or(5000))),
             "queue" => runtime.block_on(queue::depth()),
             "snapshot" => runtime.block_on(queue::snapshot()),
+            "network" => runtime.block_on(network::run()),
             _ => panic!("there is no soak named {name}"),
         }
     }

@@ -81,3 +81,56 @@ async fn a_database_that_is_away_is_no_full_disk_and_costs_no_job() {
     let job = service.until(&solving, "succeeded").await;
     assert_eq!(job["attempt"], 1, "{job}");
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_way_that_swallows_everything_keeps_no_connection_and_no_request() {
+    let Some(url) = database().await else {
+        return;
+    };
+    migrate(&url).await.unwrap();
+    let (with_port, port) = at_port(&url);
+    let cable = Cable::to(port).await;
+    let url = with_port(cable.address.port());
+    let folder = tempfile::tempdir().unwrap();
+    // Two connections: no request is served while one of them is kept.
+    let flags = [
+        "--database-url",
+        &url,
+        "--workers",
+        "1",
+        "--database-connections",
+        "2",
+    ];
+    let service = Service::start(folder.path(), &flags);
+    let done = service.submit(&case("done")).await;
+    service.until(&done, "succeeded").await;
+
+    cable.swallow();
+    let asked = Instant::now();
+    let job = service.request(Method::GET, &format!("/v1/jobs/{done}"));
+    let (status, kind, text) = problem(job).await;
+    assert_eq!(
+        (status, kind.as_str()),
+        (503, "/problems/storage-unreachable"),
+        "{text}"
+    );
+    assert!(
+        asked.elapsed() < WITHIN,
+        "TCP gives up after a quarter of an hour"
+    );
+    cable.set_whole(true);
+    let since = Instant::now();
+    while service
+        .request(Method::GET, "/readyz")
+        .send()
+        .await
+        .unwrap()
+        .status()
+        != 200
+    {
+        assert!(since.elapsed() < WITHIN, "it is not ready again");
+        pause().await;
+    }
+    let later = service.submit(&case("later")).await;
+    service.until(&later, "succeeded").await;
+}

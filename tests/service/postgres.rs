@@ -16,6 +16,10 @@ use crate::support::skip;
 /// How long the server may take to start.
 const STARTS_WITHIN: Duration = Duration::from_secs(60);
 
+/// An address of this machine, of a network of 24 bits that is trusted, on which the server listens as well; to be set before it starts.
+#[allow(dead_code, reason = "for benches")]
+pub static ALSO_AT: OnceLock<&'static str> = OnceLock::new();
+
 struct Server {
     /// Without TLS, which most tests have no use for.
     url: String,
@@ -79,6 +83,18 @@ pub fn crash() {
     let number = noted.lines().next().expect("a line");
     let ended = Command::new("kill").args(["-QUIT", number]).status();
     assert!(ended.is_ok_and(|status| status.success()));
+}
+
+/// What the server has logged so far; `None`, said aloud, if it is not ours.
+#[allow(dead_code, reason = "not for every program that has this file")]
+pub fn log_lines() -> Option<Vec<String>> {
+    let Some(folder) = &the_server()?.folder else {
+        skip("the log of the PostgreSQL that RAILHEAD_TEST_POSTGRES names cannot be read");
+        return None;
+    };
+    let text = std::fs::read(folder.join("log")).expect("its log");
+    let text = String::from_utf8_lossy(&text);
+    Some(text.lines().map(str::to_owned).collect())
 }
 
 /// A URL with one more parameter.
@@ -201,10 +217,17 @@ fn start() -> Option<Server> {
         .expect("a port")
         .port();
     let authority = certify(&folder);
+    let (more, trusted) = match ALSO_AT.get() {
+        Some(address) => (
+            format!(",{address}"),
+            format!("echo host all all {address}/24 trust >> db/pg_hba.conf && "),
+        ),
+        None => Default::default(),
+    };
     // Keys are refused that others may read. It ends as soon as its standard input does, and takes its data with it.
     let script = format!(
-        "cd '{data}' && mkdir tls && cp server.pem server.key tls && chmod 600 tls/server.key && '{bin}/initdb' -D db -U railhead -A trust -E UTF8 --no-locale -N > init.log 2>&1 && \
-         {{ while [ ! -e stop ]; do '{bin}/postgres' -D db -k '{data}' -c listen_addresses=127.0.0.1 -p {port} -c fsync=off \
+        "cd '{data}' && mkdir tls && cp server.pem server.key tls && chmod 600 tls/server.key && '{bin}/initdb' -D db -U railhead -A trust -E UTF8 --no-locale -N > init.log 2>&1 && {trusted}\
+         {{ while [ ! -e stop ]; do '{bin}/postgres' -D db -k '{data}' -c listen_addresses=127.0.0.1{more} -p {port} -c fsync=off \
          -c ssl=on -c ssl_cert_file='{data}/tls/server.pem' -c ssl_key_file='{data}/tls/server.key' -c max_connections=400 -c shared_buffers=64MB -c deadlock_timeout=200ms; done > log 2>&1 & }} && echo started && \
          read nothing; touch stop; while kill -0 $!; do kill -QUIT $(head -n 1 db/postmaster.pid); sleep 0.1; done 2> /dev/null; \
          wait; rm -rf '{data}'",

@@ -54,7 +54,7 @@ pub(crate) use conformance;
 pub struct Table {
     pub store: Arc<dyn Store>,
     pub folder: TempDir,
-    kind: StoreKind,
+    pub kind: StoreKind,
     /// Of the database, if it is on a server.
     pub url: Option<String>,
 }

@@ -1,5 +1,5 @@
 //! Does a store behave like a plain model of it, whatever is asked in whatever order? Tenants, priorities, groups, batches,
-//! deadlines, slices, shared results, expiry: by the calls that production makes.
+//! deadlines, slices, shared results, expiry, clocks that are set, a database that goes back in time: by the calls that production makes.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
@@ -50,6 +50,8 @@ enum Move {
     Release(Index),
     Cancel(Index),
     Delete(Index),
+    Save,
+    GoBack,
 }
 
 fn moves() -> impl Strategy<Value = Move> {
@@ -66,6 +68,7 @@ fn moves() -> impl Strategy<Value = Move> {
         7 => (0..2_usize, 1..4_usize, prop::bool::weighted(0.3))
             .prop_map(|(tenant, jobs, begun)| Move::Claim { tenant, jobs, begun }),
         3 => (1_i64..12).prop_map(Move::Pass),
+        1 => (-12_i64..0).prop_map(Move::Pass),
         2 => prop::bool::weighted(0.3).prop_map(|dead| Move::Reap { dead }),
         1 => Just(Move::Deadlines),
         1 => Just(Move::Expire),
@@ -77,6 +80,8 @@ fn moves() -> impl Strategy<Value = Move> {
         1 => at().prop_map(Move::Release),
         2 => at().prop_map(Move::Cancel),
         2 => at().prop_map(Move::Delete),
+        2 => Just(Move::Save),
+        2 => Just(Move::GoBack),
     ]
 }
 
@@ -102,6 +107,8 @@ impl Pair {
             Move::Reap { dead } => self.reap(dead).await,
             Move::Deadlines => self.pass_deadlines().await,
             Move::Expire => self.expire().await,
+            Move::Save => self.save().await,
+            Move::GoBack => self.go_back().await,
             Move::FillBatch(at) if !self.batches.is_empty() => {
                 self.fill_batch(*at.get(&self.batches)).await;
             }
@@ -304,6 +311,8 @@ fn agrees(kind: StoreKind, steps: Vec<Move>) {
         let table = Table::new(kind).await;
         let mut pair = Pair {
             store: table.store.clone(),
+            table,
+            saved: None,
             model: Model::default(),
             ids: Vec::new(),
             batches: Vec::new(),
@@ -316,7 +325,7 @@ fn agrees(kind: StoreKind, steps: Vec<Move>) {
             pair.make(step).await;
             pair.compare().await;
         }
-        table.store.close().await;
+        pair.store.close().await;
     });
 }
 

@@ -18,7 +18,8 @@ use railhead::jobs::{Failure, FailureKind, State};
 use uuid::Uuid;
 
 use crate::model::{ATTEMPTS_MAX, BOUNDS, Model, Row};
-use crate::store::new_job;
+use crate::store::{Table, new_job};
+use crate::store_back::Saved;
 
 pub const LEASE: i64 = 10;
 const KEPT: i64 = 15;
@@ -26,7 +27,9 @@ pub const TENANTS: [&str; 2] = ["a", "b"];
 
 /// A store and its model, side by side.
 pub struct Pair {
+    pub table: Table,
     pub store: Arc<dyn Store>,
+    pub saved: Option<Saved>,
     pub model: Model,
     pub ids: Vec<Uuid>,
     pub batches: Vec<Uuid>,

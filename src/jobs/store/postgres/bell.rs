@@ -5,10 +5,12 @@ use std::time::Duration;
 
 use sqlx::postgres::{PgConnectOptions, PgListener, PgPool};
 use tokio::sync::mpsc;
+use tokio::time::timeout;
 use uuid::Uuid;
 
 use crate::jobs::store::cluster::Bell;
 use crate::jobs::store::error::StoreError;
+use crate::jobs::store::postgres::engine::in_time;
 
 /// The channel of all nodes.
 const CHANNEL: &str = "railhead";
@@ -18,6 +20,9 @@ const PAUSE: Duration = Duration::from_millis(10);
 
 /// Most bells in one notification, whose text may have 8000 bytes.
 const TOGETHER: usize = 200;
+
+/// After so long without a bell the server is asked whether it is still there: on a way that was cut, silence is all there is.
+const SILENT_FOR: Duration = Duration::from_secs(10);
 
 /// Bells that wait; further ones are left out, and found by looking.
 const WAITING: usize = 10_000;
@@ -49,8 +54,8 @@ async fn ring_all(pool: PgPool, mut waiting: mpsc::Receiver<Bell>) {
         let rung = sqlx::query("SELECT pg_notify($1, $2)")
             .bind(CHANNEL)
             .bind(text)
-            .execute(&pool)
-            .await;
+            .execute(&pool);
+        let rung = in_time(async { Ok(rung.await?) }).await;
         if let Err(error) = rung {
             tracing::debug!(%error, "a bell could not be rung");
         }
@@ -88,16 +93,27 @@ pub(crate) async fn listen(
     options: PgConnectOptions,
     heard: &(dyn Fn(Bell) + Send + Sync),
 ) -> Result<(), StoreError> {
-    let pool = sqlx::postgres::PgPoolOptions::new()
-        .max_connections(1)
-        .connect_with(options)
-        .await?;
-    let mut listener = PgListener::connect_with(&pool).await?;
-    listener.listen(CHANNEL).await?;
+    let mut listener = in_time(async {
+        let pool = sqlx::postgres::PgPoolOptions::new()
+            .max_connections(1)
+            .connect_with(options)
+            .await?;
+        let mut listener = PgListener::connect_with(&pool).await?;
+        listener.listen(CHANNEL).await?;
+        Ok(listener)
+    })
+    .await?;
     loop {
-        // `None`: the connection failed and was made again; what was rung meanwhile is found by looking.
-        let Some(notification) = listener.try_recv().await? else {
-            continue;
+        let notification = match timeout(SILENT_FOR, listener.try_recv()).await {
+            Ok(Ok(Some(notification))) => notification,
+            // The connection failed and was made again; what was rung meanwhile is found by looking.
+            Ok(Ok(None)) => continue,
+            Ok(Err(error)) => return Err(error.into()),
+            Err(_) => {
+                let asked = sqlx::query("SELECT 1").execute(&mut listener);
+                in_time(async { Ok(asked.await?) }).await?;
+                continue;
+            }
         };
         notification
             .payload()

@@ -10,7 +10,7 @@ use crate::jobs::store::cluster::{Bell, Cluster, ClusterView, Deployment, Node};
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::postgres::bell;
 use crate::jobs::store::postgres::database::PostgresStore;
-use crate::jobs::store::postgres::engine::fold_counts;
+use crate::jobs::store::postgres::engine::{fold_counts, in_time};
 use crate::jobs::store::postgres::objects::PgObjects;
 use crate::jobs::store::postgres::sql::rows::{count, read_id, read_small};
 
@@ -35,11 +35,65 @@ const SWEEP: &str = "DELETE FROM objects WHERE made_at < CAST(extract(epoch FROM
 #[async_trait]
 impl Cluster for PostgresStore {
     async fn now(&self) -> Result<i64, StoreError> {
-        Ok(sqlx::query_scalar(NOW).fetch_one(&self.writer).await?)
+        in_time(self.read_clock()).await
     }
 
     async fn beat(&self, node: &Node) -> Result<ClusterView, StoreError> {
-        let now = self.now().await?;
+        in_time(self.show(node)).await
+    }
+
+    async fn leave(&self, node: Uuid) -> Result<(), StoreError> {
+        in_time(self.forget(node)).await
+    }
+
+    async fn cancel_requests(&self, running: &[Uuid]) -> Result<Vec<Uuid>, StoreError> {
+        in_time(self.read_cancel_requests(running)).await
+    }
+
+    async fn keep_batches(&self, batches: &[Uuid]) -> Result<(), StoreError> {
+        in_time(self.renew_batches(batches)).await
+    }
+
+    async fn sweep_objects(&self) -> Result<u64, StoreError> {
+        in_time(self.sweep()).await
+    }
+
+    async fn fold_counts(&self) -> Result<(), StoreError> {
+        in_time(fold_counts(&self.writer)).await
+    }
+
+    async fn deployment(&self) -> Result<Deployment, StoreError> {
+        in_time(self.read_deployment(DEAD_AFTER)).await
+    }
+
+    async fn place_results(&self, before: Option<&str>, place: &str) -> Result<bool, StoreError> {
+        in_time(self.write_results_place(before, place)).await
+    }
+
+    async fn take_sweep(&self) -> Result<bool, StoreError> {
+        in_time(self.claim_sweep(SWEPT_AFTER)).await
+    }
+
+    fn objects(&self) -> Arc<dyn ObjectStore> {
+        Arc::new(PgObjects::new(self.writer.clone()))
+    }
+
+    fn ring(&self, bell: Bell) {
+        self.bell.ring(bell);
+    }
+
+    async fn listen(&self, heard: &(dyn Fn(Bell) + Send + Sync)) -> Result<(), StoreError> {
+        bell::listen(self.options.clone(), heard).await
+    }
+}
+
+impl PostgresStore {
+    async fn read_clock(&self) -> Result<i64, StoreError> {
+        Ok(sqlx::query_scalar(NOW).fetch_one(&self.writer).await?)
+    }
+
+    async fn show(&self, node: &Node) -> Result<ClusterView, StoreError> {
+        let now = self.read_clock().await?;
         sqlx::query(
             "INSERT INTO nodes (id, version, workers, seen_at) VALUES ($1, $2, $3, $4) \
              ON CONFLICT (id) DO UPDATE SET workers = $3, seen_at = $4",
@@ -66,7 +120,7 @@ impl Cluster for PostgresStore {
         })
     }
 
-    async fn leave(&self, node: Uuid) -> Result<(), StoreError> {
+    async fn forget(&self, node: Uuid) -> Result<(), StoreError> {
         sqlx::query("DELETE FROM nodes WHERE id = $1")
             .bind(node.to_string())
             .execute(&self.writer)
@@ -74,7 +128,7 @@ impl Cluster for PostgresStore {
         Ok(())
     }
 
-    async fn cancel_requests(&self, running: &[Uuid]) -> Result<Vec<Uuid>, StoreError> {
+    async fn read_cancel_requests(&self, running: &[Uuid]) -> Result<Vec<Uuid>, StoreError> {
         let ids: Vec<String> = running.iter().map(Uuid::to_string).collect();
         let rows = sqlx::query(
             "SELECT id FROM jobs WHERE id = ANY($1) AND state = 'running' AND cancel_requested = 1",
@@ -85,7 +139,7 @@ impl Cluster for PostgresStore {
         rows.iter().map(read_id).collect()
     }
 
-    async fn keep_batches(&self, batches: &[Uuid]) -> Result<(), StoreError> {
+    async fn renew_batches(&self, batches: &[Uuid]) -> Result<(), StoreError> {
         let ids: Vec<String> = batches.iter().map(Uuid::to_string).collect();
         sqlx::query(
             "UPDATE batches SET filled_until = CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint) + $2 \
@@ -98,36 +152,8 @@ impl Cluster for PostgresStore {
         Ok(())
     }
 
-    async fn sweep_objects(&self) -> Result<u64, StoreError> {
+    async fn sweep(&self) -> Result<u64, StoreError> {
         let swept = sqlx::query(SWEEP).bind(SWEPT_AFTER).execute(&self.writer);
         Ok(swept.await?.rows_affected())
-    }
-
-    async fn fold_counts(&self) -> Result<(), StoreError> {
-        fold_counts(&self.writer).await
-    }
-
-    async fn deployment(&self) -> Result<Deployment, StoreError> {
-        self.read_deployment(DEAD_AFTER).await
-    }
-
-    async fn place_results(&self, before: Option<&str>, place: &str) -> Result<bool, StoreError> {
-        self.write_results_place(before, place).await
-    }
-
-    async fn take_sweep(&self) -> Result<bool, StoreError> {
-        self.claim_sweep(SWEPT_AFTER).await
-    }
-
-    fn objects(&self) -> Arc<dyn ObjectStore> {
-        Arc::new(PgObjects::new(self.writer.clone()))
-    }
-
-    fn ring(&self, bell: Bell) {
-        self.bell.ring(bell);
-    }
-
-    async fn listen(&self, heard: &(dyn Fn(Bell) + Send + Sync)) -> Result<(), StoreError> {
-        bell::listen(self.options.clone(), heard).await
     }
 }

@@ -17,15 +17,22 @@ const CONNECT_WITHIN: Duration = Duration::from_secs(5);
 /// Prepared statements kept by a connection. Statements on several rows have a text for each number of rows.
 const STATEMENTS_KEPT: usize = 300;
 
+/// How long a connection may take to say that it is alive, before it is used and before it is kept for later.
+const ALIVE_WITHIN: Duration = Duration::from_secs(3);
+
+/// A connection that was used so lately is not asked.
+const ALIVE_FOR: Duration = Duration::from_secs(1);
+
 /// Settings of every session. A node that was cut off inside a transaction keeps its rows locked, and others pass them by,
-/// until the server ends the session.
-const SESSION: [(&str, &str); 6] = [
-    ("statement_timeout", "20s"),
+/// until the server ends the session: because nothing is asked in the transaction, or because nobody takes what it sends.
+const SESSION: [(&str, &str); 7] = [
+    ("statement_timeout", "10s"),
     ("lock_timeout", "5s"),
-    ("idle_in_transaction_session_timeout", "5s"),
+    ("idle_in_transaction_session_timeout", "3s"),
     ("tcp_keepalives_idle", "10"),
     ("tcp_keepalives_interval", "5"),
     ("tcp_keepalives_count", "3"),
+    ("tcp_user_timeout", "10s"),
 ];
 
 /// Locks of this service are told from those of others in the same database by this number ("rhjb"); the second number says
@@ -54,9 +61,31 @@ pub(crate) async fn connect(
     let pool = PgPoolOptions::new()
         .max_connections(connections)
         .acquire_timeout(CONNECT_WITHIN)
+        // The questions of the pool itself have no end: on a way that swallows everything they would keep all connections for
+        // as long as TCP tries, which is a quarter of an hour.
+        .test_before_acquire(false)
+        .before_acquire(|connection, used| {
+            Box::pin(async move {
+                match used.idle_for < ALIVE_FOR {
+                    true => Ok(true),
+                    false => alive(connection).await.map(|()| true),
+                }
+            })
+        })
+        .after_release(|connection, _| {
+            Box::pin(async move { alive(connection).await.map(|()| true) })
+        })
         .connect_with(options.clone())
         .await?;
     Ok((options, pool))
+}
+
+/// Asks the server for a sign of life; a transaction that was left is rolled back with it.
+async fn alive(connection: &mut PgConnection) -> Result<(), sqlx::Error> {
+    let silent = |_| sqlx::Error::Io(ErrorKind::TimedOut.into());
+    timeout(ALIVE_WITHIN, connection.ping())
+        .await
+        .map_err(silent)?
 }
 
 /// A connection that is not encrypted as the URL asks, or whose other end cannot be trusted, is no server that is away.

@@ -30,7 +30,7 @@ pub(crate) const LEASE_NOW: (&str, &str) = (
 const REPEATED: u32 = 4;
 
 /// How long a call may take; the server ends its statements before.
-const ANSWERED_WITHIN: Duration = Duration::from_secs(30);
+const ANSWERED_WITHIN: Duration = Duration::from_secs(15);
 
 /// Begins a transaction.
 pub(crate) async fn begin(pool: &DbPool) -> Result<Transaction<'static, Db>, StoreError> {
@@ -174,7 +174,17 @@ pub(crate) async fn again<T, F: Future<Output = Result<T, StoreError>>>(
             Ok(answer) => return answer.map_err(far),
         }
     }
-    call().await.map_err(far)
+    in_time(call()).await
+}
+
+/// Makes a call that ends in any case, also if nothing comes back.
+pub(crate) async fn in_time<T>(
+    call: impl Future<Output = Result<T, StoreError>>,
+) -> Result<T, StoreError> {
+    let answer = timeout(ANSWERED_WITHIN, call).await;
+    answer
+        .unwrap_or_else(|_| Err(StoreError::timed_out()))
+        .map_err(far)
 }
 
 /// A server that takes nothing is no disk that takes nothing: the answer to clients says which.

@@ -74,6 +74,10 @@ pub async fn migrate(url: &str) -> Result<Migrated, JobsError> {
 
 async fn make(pool: &PgPool) -> Result<Migrated, JobsError> {
     let mut transaction = pool.begin().await?;
+    // What is done to a large table takes its time.
+    sqlx::raw_sql("SET LOCAL statement_timeout = 0")
+        .execute(&mut *transaction)
+        .await?;
     // Ends with the transaction: a lock of the session would not pass a pooler.
     lock(&mut transaction, connection::SCHEMA).await?;
     let before = form(&mut transaction).await?;

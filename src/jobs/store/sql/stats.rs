@@ -13,9 +13,17 @@ use crate::jobs::store::retention::{Stats, Usage};
 pub(crate) const COUNT: &str =
     "SELECT state, CAST(SUM(number) AS bigint) AS jobs FROM job_counts GROUP BY state";
 
-/// Mean expected solve time of queued jobs in µs; of a long queue, of some of them.
-pub(crate) const MEAN_COST: &str = "SELECT CAST(COALESCE(AVG(cost_us), 0) AS double precision) \
-     FROM (SELECT cost_us FROM jobs WHERE state = 'queued' LIMIT 1000) AS sampled";
+/// Mean expected solve time of queued jobs in µs; of each tenant, of those that come first.
+pub(crate) const MEAN_COST: &str = "SELECT CAST(COALESCE(SUM(number * mean) / SUM(number), 0) AS double precision) FROM (SELECT number, \
+     (SELECT AVG(cost_us) FROM (SELECT cost_us FROM jobs WHERE state = 'queued' AND tenant = queued.tenant ORDER BY rank, id LIMIT 100) AS sampled) AS mean \
+     FROM (SELECT tenant, SUM(number) AS number FROM job_counts WHERE state = 'queued' GROUP BY tenant HAVING SUM(number) > 0) AS queued) AS means";
+
+/// When the oldest queued job was submitted: the first of each tenant and priority is looked at, however long their queues are. The
+/// priority is no equation, so that only the index of the queue has the order that is asked for.
+pub(crate) const OLDEST: &str = "SELECT MIN(first) FROM (SELECT (SELECT created_at FROM jobs \
+     WHERE state = 'queued' AND tenant = queued.tenant AND rank >= ranks.rank AND rank <= ranks.rank ORDER BY rank, id LIMIT 1) AS first \
+     FROM (SELECT tenant FROM job_counts WHERE state = 'queued' GROUP BY tenant HAVING SUM(number) > 0) AS queued, \
+     (SELECT 0 AS rank UNION ALL SELECT 1 UNION ALL SELECT 2) AS ranks) AS firsts";
 
 pub(crate) const RESULT_BYTES: &str =
     "SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) FROM blobs WHERE key IS NOT NULL";
@@ -55,13 +63,7 @@ impl SqlStore {
         for row in &rows {
             jobs.insert(read_state(row)?, read_count(row, "jobs")?);
         }
-        let oldest_queued_at = sqlx::query_scalar(concat!(
-            "SELECT MIN(created_at) FROM jobs WHERE id = (SELECT MIN(",
-            unordered!("id"),
-            ") FROM jobs WHERE state = 'queued')"
-        ))
-        .fetch_one(&self.readers)
-        .await?;
+        let oldest_queued_at = sqlx::query_scalar(OLDEST).fetch_one(&self.readers).await?;
         let mean_cost_us: f64 = sqlx::query_scalar(MEAN_COST)
             .fetch_one(&self.readers)
             .await?;

@@ -12,7 +12,7 @@ use crate::jobs::store::sqlite::sql::deadlines::{FAIL_LATE, LATE};
 use crate::jobs::store::sqlite::sql::expire::EXPIRED;
 use crate::jobs::store::sqlite::sql::reap::{REAP, REAP_BYSTANDERS};
 use crate::jobs::store::sqlite::sql::slices::{NOTES, RESULTS};
-use crate::jobs::store::sqlite::sql::stats::{BEFORE, COUNT, RESULT_BYTES};
+use crate::jobs::store::sqlite::sql::stats::{BEFORE, COUNT, OLDEST, RESULT_BYTES};
 use crate::jobs::store::sqlite::sql::{batch_lists, lists};
 
 #[tokio::test]
@@ -264,6 +264,12 @@ async fn figures_are_read_from_indices_alone() {
     assert!(steps[0].contains("COVERING INDEX"), "{steps:?}");
     let steps = plan(&store, COUNT).await;
     assert_eq!(steps, ["SCAN job_counts"], "a row per state and tenant");
+    let steps = plan(&store, OLDEST).await;
+    let seeks = |step: &String| step.contains("jobs_queued (tenant=? AND rank>? AND rank<?");
+    assert!(steps.iter().any(seeks), "{steps:?}");
+    let walks =
+        |step: &String| step.contains("SCAN jobs") || step.contains("TEMP B-TREE FOR ORDER");
+    assert!(!steps.iter().any(walks), "{steps:?}");
 }
 
 #[tokio::test]

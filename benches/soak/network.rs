@@ -1,0 +1,345 @@
+//! Nodes on hosts of their own while one of them is cut off, or stands still for longer than its lease: when are its jobs free, does it
+//! change anything afterwards, and when does it work again?
+
+use std::time::{Duration, Instant};
+
+use railhead::jobs::store::postgres::schema::migrate;
+use reqwest::{Client, Method};
+use serde_json::json;
+use sqlx::PgPool;
+use tempfile::TempDir;
+use tokio::time::sleep;
+
+use crate::cluster::{counted, note_ends};
+use crate::hosts::{self, Cut, Host};
+use crate::support::{Service, case, endless_case, long_case};
+use crate::{postgres, row};
+
+const LEASE: Duration = Duration::from_secs(3);
+
+/// By then what a cut-off node held is free: the lease, a round of whoever takes jobs from silent workers (a third of it), one second for
+/// everything else.
+const FREE_WITHIN: Duration = Duration::from_secs(5);
+
+/// Ends of a guard: something hangs.
+const WITHIN: Duration = Duration::from_secs(120);
+
+/// Notes which host claims what, and ends claims of the second host slowly while a row says so.
+const NOTES: &str = "CREATE TABLE soak_claims (job text NOT NULL, host text NOT NULL); \
+    CREATE TABLE soak_slow (host text NOT NULL); \
+    CREATE FUNCTION soak_claim() RETURNS trigger LANGUAGE plpgsql AS $$ \
+    BEGIN INSERT INTO soak_claims VALUES (NEW.id, host(inet_client_addr())); \
+    IF EXISTS (SELECT 1 FROM soak_slow WHERE host = host(inet_client_addr())) THEN PERFORM pg_sleep(1); END IF; RETURN NULL; END $$; \
+    CREATE TRIGGER soak_claims AFTER UPDATE ON jobs FOR EACH ROW \
+    WHEN (NEW.state = 'running' AND OLD.state = 'queued') EXECUTE FUNCTION soak_claim()";
+
+const OPEN: &str = "SELECT COUNT(*) FROM jobs WHERE ended_at IS NULL";
+
+/// Everything that an end or a stale owner could change.
+const AS_THEY_ARE: &str = "SELECT COALESCE(md5(string_agg(concat_ws(',', id, state, ended_at, lease_token, blob_id, attempt, version), ' ' ORDER BY id)), '') \
+    FROM jobs WHERE ended_at IS NOT NULL";
+
+/// What is taken away from the node.
+#[derive(Debug, Clone, Copy)]
+enum Away {
+    Cut(Cut),
+    /// Its process stands still.
+    Paused,
+}
+
+/// The database and an API node here, and two workers on hosts of their own.
+struct Network {
+    pool: PgPool,
+    url: String,
+    api: Service,
+    hosts: [Host; 2],
+    workers: [Service; 2],
+    /// Theirs.
+    _folders: Vec<TempDir>,
+}
+
+fn start(host: &Host, role: &str, url: &str, folder: &TempDir) -> Service {
+    let mut program = host.command(env!("CARGO_BIN_EXE_railhead"));
+    for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("RAILHEAD_")) {
+        program.env_remove(name);
+    }
+    let listen = format!("{}:0", host.address);
+    let workers = if role == "worker" { "1" } else { "0" };
+    let lease = LEASE.as_secs().to_string();
+    let mut flags = vec!["--database-url", url, "--workers", workers];
+    flags.extend(["--listen", &listen, "--lease-s", &lease, "--cache", "false"]);
+    if role == "serve" {
+        flags.extend(["--anonymous", "always"]);
+    }
+    Service::start_as(&mut program, role, folder.path(), &flags)
+}
+
+impl Network {
+    async fn new() -> Option<Network> {
+        postgres::ALSO_AT.set(hosts::HERE).expect("the first");
+        let near = postgres::database().await?;
+        migrate(&near).await.expect("tables");
+        let pool = PgPool::connect(&near).await.expect("the database");
+        note_ends(&pool).await;
+        sqlx::raw_sql(NOTES).execute(&pool).await.expect("notes");
+        let url = near.replace("127.0.0.1", hosts::HERE);
+        let folders: Vec<_> = (0..3)
+            .map(|_| tempfile::tempdir().expect("a folder"))
+            .collect();
+        let flags = ["--database-url", &url, "--workers", "0", "--lease-s", "3"];
+        let flags = [&flags[..], &["--cache", "false"]].concat();
+        let api = Service::start(folders[2].path(), &flags);
+        let hosts = [Host::new(2), Host::new(3)];
+        let workers = [0, 1].map(|number| start(&hosts[number], "worker", &url, &folders[number]));
+        Some(Network {
+            pool,
+            url,
+            api,
+            hosts,
+            workers,
+            _folders: folders,
+        })
+    }
+
+    /// Jobs of some seconds, and many small ones behind them.
+    async fn submit(&self, long: usize, small: usize) {
+        for number in 0..long {
+            let mut case = long_case(&format!("long {number}"), 150);
+            case["solver"]["mesh"] = json!({ "strips": 32, "cells": 32 });
+            self.api.submit(&case).await;
+        }
+        for number in 0..small {
+            self.api.submit(&case(&format!("small {number}"))).await;
+        }
+    }
+
+    /// How often the first host has claimed a job.
+    async fn claims(&self) -> i64 {
+        counted(
+            &self.pool,
+            "SELECT COUNT(*) FROM soak_claims WHERE host = '10.77.0.2'",
+        )
+        .await
+    }
+
+    /// The running jobs that the first host has claimed last, with their tokens.
+    async fn held(&self) -> Vec<(String, i64)> {
+        sqlx::query_as(
+            "SELECT id, lease_token FROM jobs WHERE state = 'running' \
+             AND (SELECT host FROM soak_claims WHERE job = id ORDER BY soak_claims.ctid DESC LIMIT 1) = '10.77.0.2'",
+        )
+        .fetch_all(&self.pool)
+        .await
+        .expect("what it holds")
+    }
+
+    async fn as_they_are(&self) -> String {
+        let asked = sqlx::query_scalar(AS_THEY_ARE).fetch_one(&self.pool);
+        asked.await.expect("all ended jobs")
+    }
+
+    async fn until_all_ended(&self) {
+        until("all jobs end", async || {
+            counted(&self.pool, OPEN).await == 0
+        })
+        .await;
+    }
+
+    fn take_away(&self, how: Away) {
+        match how {
+            Away::Cut(cut) => self.hosts[0].cut(cut),
+            Away::Paused => self.workers[0].signal("STOP"),
+        }
+    }
+
+    fn give_back(&self, how: Away) {
+        match how {
+            Away::Cut(cut) => self.hosts[0].heal(cut),
+            Away::Paused => self.workers[0].signal("CONT"),
+        }
+    }
+
+    /// Takes the first host away for three leases while it solves.
+    async fn lose(&self, how: Away) {
+        self.submit(6, 60).await;
+        until("the first host solves", async || {
+            !self.held().await.is_empty()
+        })
+        .await;
+        let lost = Instant::now();
+        self.take_away(how);
+        // What it held at that moment; it may have ended some in the meantime.
+        let held = self.held().await;
+        let (ids, tokens): (Vec<_>, Vec<_>) = held.into_iter().unzip();
+        until("its jobs are free", async || {
+            let left: i64 = sqlx::query_scalar(
+                "SELECT COUNT(*) FROM jobs JOIN unnest($1::text[], $2::bigint[]) AS held (one, token) \
+                 ON id = one AND lease_token = token WHERE state = 'running'",
+            )
+            .bind(&ids)
+            .bind(&tokens)
+            .fetch_one(&self.pool)
+            .await
+            .expect("what it holds");
+            left == 0
+        })
+        .await;
+        let free = lost.elapsed();
+        self.until_all_ended().await;
+        sleep((3 * LEASE).saturating_sub(lost.elapsed())).await;
+        let ended = self.as_they_are().await;
+        let before = self.claims().await;
+        self.give_back(how);
+        let back = Instant::now();
+        sleep(2 * LEASE).await;
+        assert_eq!(
+            ended,
+            self.as_they_are().await,
+            "{how:?}: a stale owner changed something"
+        );
+        until("it works again", async || {
+            self.submit(0, 4).await;
+            sleep(Duration::from_millis(200)).await;
+            self.claims().await > before
+        })
+        .await;
+        let works = back.elapsed();
+        self.until_all_ended().await;
+        let twice = "SELECT COUNT(*) FROM (SELECT job FROM soak_ends GROUP BY job HAVING COUNT(*) > 1) AS twice";
+        assert_eq!(
+            counted(&self.pool, twice).await,
+            0,
+            "{how:?}: a job ended twice"
+        );
+        row(
+            &format!(
+                "{how:?}: jobs held, seconds until they were free, seconds from its return to its next claim (at least 6)"
+            ),
+            format!(
+                "{}, {:.1}, {:.1}",
+                ids.len(),
+                free.as_secs_f64(),
+                works.as_secs_f64()
+            ),
+        );
+        assert!(
+            free < FREE_WITHIN,
+            "{how:?}: its jobs were free after {free:?}"
+        );
+    }
+
+    /// Cuts the first host off while a claim of it is not committed: nobody else can take the rows until the server ends its session.
+    async fn lose_in_a_transaction(&self) {
+        let slow = "INSERT INTO soak_slow VALUES ('10.77.0.2')";
+        sqlx::raw_sql(slow).execute(&self.pool).await.expect("slow");
+        let sleeping = "SELECT COUNT(*) FROM pg_stat_activity WHERE wait_event = 'PgSleep' AND host(client_addr) = '10.77.0.2'";
+        let mut lost = None;
+        until("a claim is under way", async || {
+            if counted(&self.pool, sleeping).await == 0 {
+                self.submit(0, 1).await;
+                return false;
+            }
+            self.hosts[0].cut(Cut::BlackHole);
+            lost = Some(Instant::now());
+            true
+        })
+        .await;
+        let lost = lost.expect("it was cut off");
+        let slow = "TRUNCATE soak_slow";
+        sqlx::raw_sql(slow).execute(&self.pool).await.expect("fast");
+        let open = "SELECT COUNT(*) FROM pg_stat_activity WHERE xact_start IS NOT NULL AND host(client_addr) = '10.77.0.2'";
+        until("its transaction is over", async || {
+            counted(&self.pool, open).await == 0
+        })
+        .await;
+        let free = lost.elapsed();
+        self.until_all_ended().await;
+        self.hosts[0].heal(Cut::BlackHole);
+        row(
+            "cut off in the transaction of a claim: seconds until its rows were free",
+            format!("{:.1}", free.as_secs_f64()),
+        );
+        assert!(free < FREE_WITHIN, "its rows were free after {free:?}");
+    }
+
+    /// An API node whose way to the database swallows everything: what do clients hear, and when does it serve them again?
+    async fn lose_the_database(&self) {
+        let (host, folder) = (Host::new(4), tempfile::tempdir().expect("a folder"));
+        let node = start(&host, "serve", &self.url, &folder);
+        let running = node.submit(&endless_case("endless")).await;
+        node.until(&running, "running").await;
+        let (_, port) = postgres::at_port(&self.url);
+        host.cut(Cut::Port(port));
+        let client = Client::builder().timeout(WITHIN).build().expect("a client");
+        let ask = async |method: Method, path: &str| {
+            let url = format!("http://{}{path}", node.address());
+            let mut request = client.request(method.clone(), url);
+            if method == Method::POST {
+                request = request.json(&case("refused"));
+            }
+            let since = Instant::now();
+            let status = request.send().await.expect("an answer").status().as_u16();
+            (status, since.elapsed().as_secs_f64())
+        };
+        let mut said = Vec::new();
+        for (method, path) in [
+            (Method::GET, "/v1/jobs"),
+            (Method::GET, "/readyz"),
+            (Method::POST, "/v1/jobs"),
+            (Method::GET, "/v1/jobs"),
+        ] {
+            let (status, seconds) = ask(method.clone(), path).await;
+            said.push(format!("{method} {path} {status} after {seconds:.1} s"));
+            assert_eq!(status, 503, "{said:?}");
+        }
+        row("an API node without its database", said.join(", "));
+        host.heal(Cut::Port(port));
+        let back = Instant::now();
+        until("it is ready again", async || {
+            ask(Method::GET, "/readyz").await.0 == 200
+        })
+        .await;
+        let ready = back.elapsed().as_secs_f64();
+        // Hears of the cancellation at another node by the bell, or looks.
+        let cancel = format!("/v1/jobs/{running}/cancel");
+        let cancelled = self.api.request(Method::POST, &cancel).send().await;
+        assert_eq!(cancelled.expect("an answer").status(), 202);
+        node.until(&running, "cancelled").await;
+        row(
+            "seconds from the return of the database until it is ready",
+            format!("{ready:.1}"),
+        );
+    }
+}
+
+async fn until(what: &str, mut done: impl AsyncFnMut() -> bool) {
+    let since = Instant::now();
+    while !done().await {
+        assert!(since.elapsed() < WITHIN, "not seen: {what}");
+        sleep(Duration::from_millis(20)).await;
+    }
+}
+
+/// All of it, one after the other.
+pub async fn run() {
+    let Some(network) = Network::new().await else {
+        return;
+    };
+    for how in [
+        Away::Cut(Cut::BlackHole),
+        Away::Cut(Cut::Cable),
+        Away::Cut(Cut::OneWay),
+        Away::Paused,
+    ] {
+        network.lose(how).await;
+    }
+    network.lose_in_a_transaction().await;
+    network.lose_the_database().await;
+    for worker in &network.workers {
+        assert!(
+            !worker.log_text().contains("panicked"),
+            "{}",
+            worker.log_text()
+        );
+    }
+}

@@ -1,0 +1,115 @@
+//! A database that goes back to an earlier moment, as after a failover that lost the last commits or a restore: workers go on with claims
+//! that it knows nothing of.
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+
+use sqlx::{AssertSqlSafe, Connection, PgConnection, SqliteConnection};
+use uuid::Uuid;
+
+use crate::model::Model;
+use crate::store::StoreKind;
+use crate::store_moves::Pair;
+
+/// The tables of a PostgreSQL, those first that others refer to.
+const TABLES: [&str; 13] = [
+    "batches",
+    "blobs",
+    "jobs",
+    "cases",
+    "job_labels",
+    "job_counts",
+    "objects",
+    "blob_outbox",
+    "job_slices",
+    "batch_templates",
+    "batch_keys",
+    "idempotency_keys",
+    "tombstones",
+];
+
+/// What was known at a moment to which the database may go back.
+#[derive(Debug)]
+pub struct Saved {
+    model: Model,
+    ids: Vec<Uuid>,
+    batches: Vec<Uuid>,
+    given: BTreeSet<String>,
+}
+
+impl Pair {
+    /// The file of an embedded store, and its copy.
+    fn files(&self) -> [PathBuf; 2] {
+        ["jobs.db", "saved.db"].map(|name| self.table.folder.path().join(name))
+    }
+
+    async fn server(&self, statements: String) {
+        let url = self.table.url.as_deref().expect("a server");
+        let mut connection = PgConnection::connect(url).await.unwrap();
+        let done = sqlx::raw_sql(AssertSqlSafe(statements)).execute(&mut connection);
+        done.await.unwrap();
+        connection.close().await.unwrap();
+    }
+
+    /// Keeps the database as it is.
+    pub async fn save(&mut self) {
+        match self.table.kind {
+            StoreKind::Sqlite => {
+                let [file, copy] = self.files();
+                let _ = std::fs::remove_file(&copy);
+                let url = format!("sqlite:{}", file.display());
+                let mut connection = SqliteConnection::connect(&url).await.unwrap();
+                sqlx::query("VACUUM INTO $1")
+                    .bind(copy.to_str())
+                    .execute(&mut connection)
+                    .await
+                    .unwrap();
+                connection.close().await.unwrap();
+            }
+            StoreKind::Postgres => {
+                let copy = TABLES.map(|table| {
+                    format!("DROP TABLE IF EXISTS saved_{table}; CREATE TABLE saved_{table} AS TABLE {table};")
+                });
+                self.server(copy.join(" ")).await;
+            }
+        }
+        self.saved = Some(Saved {
+            model: self.model.clone(),
+            ids: self.ids.clone(),
+            batches: self.batches.clone(),
+            given: self.given.clone(),
+        });
+    }
+
+    /// The database is as it was when it was kept. The claims that were made since are still in the hands of workers.
+    pub async fn go_back(&mut self) {
+        let Some(saved) = &self.saved else {
+            return;
+        };
+        match self.table.kind {
+            StoreKind::Sqlite => {
+                self.store.close().await;
+                let [file, copy] = self.files();
+                for end in ["-wal", "-shm"] {
+                    let _ = std::fs::remove_file(format!("{}{end}", file.display()));
+                }
+                std::fs::copy(copy, file).unwrap();
+                self.store = self.table.open_again().await;
+            }
+            StoreKind::Postgres => {
+                let back =
+                    TABLES.map(|table| format!("INSERT INTO {table} SELECT * FROM saved_{table};"));
+                let statements = format!(
+                    "BEGIN; ALTER TABLE jobs DISABLE TRIGGER USER; TRUNCATE {}; {} ALTER TABLE jobs ENABLE TRIGGER USER; COMMIT",
+                    TABLES.join(", "),
+                    back.join(" ")
+                );
+                self.server(statements).await;
+            }
+        }
+        self.model = saved.model.clone();
+        self.ids = saved.ids.clone();
+        self.batches = saved.batches.clone();
+        self.given = saved.given.clone();
+    }
+}
