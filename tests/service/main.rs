@@ -52,6 +52,7 @@ mod model;
 mod nodes;
 mod object_store;
 mod order;
+mod orphans;
 mod ownership;
 mod page;
 mod pictures;

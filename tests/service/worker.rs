@@ -390,34 +390,6 @@ async fn waiting_ends_with_the_time_allowed_and_for_unknown_jobs_at_once() {
     assert_eq!(waiting.await.unwrap().state, State::Cancelled);
 }
 
-#[tokio::test]
-async fn results_without_a_job_are_swept_at_the_start() {
-    let folder = tempfile::tempdir().unwrap();
-    let options = Options {
-        small_result_max_bytes: 0,
-        ..Options::new(folder.path())
-    };
-    let jobs = open(options, solve).await;
-    let kept = jobs.submit(case("kept"), None).await.unwrap().id;
-    jobs.worker("w").unwrap().step().await.unwrap();
-    let kept_file = only_solution(&folder.path().join("results"));
-    let orphan = uuid::Uuid::now_v7().to_string();
-    let orphan = kept_file
-        .to_str()
-        .unwrap()
-        .replace(&kept.to_string(), &orphan);
-    let orphan = std::path::PathBuf::from(orphan);
-    std::fs::create_dir_all(orphan.parent().unwrap()).unwrap();
-    std::fs::copy(&kept_file, &orphan).unwrap();
-
-    jobs.start().unwrap();
-    while orphan.parent().unwrap().parent().unwrap().exists() {
-        tokio::time::sleep(Duration::from_millis(5)).await;
-    }
-    jobs.shutdown(Duration::from_secs(10)).await;
-    assert!(kept_file.exists());
-}
-
 fn files_below(folder: &std::path::Path) -> usize {
     let Ok(entries) = std::fs::read_dir(folder) else {
         return 0;
@@ -426,21 +398,4 @@ fn files_below(folder: &std::path::Path) -> usize {
         .map(|entry| entry.unwrap().path())
         .map(|path| if path.is_dir() { files_below(&path) } else { 1 })
         .sum()
-}
-
-fn only_solution(folder: &std::path::Path) -> std::path::PathBuf {
-    let mut path = folder.to_owned();
-    while path.is_dir() {
-        path = if path.join("solution.json").exists() {
-            path.join("solution.json")
-        } else {
-            std::fs::read_dir(&path)
-                .unwrap()
-                .next()
-                .unwrap()
-                .unwrap()
-                .path()
-        };
-    }
-    path
 }

@@ -1,6 +1,7 @@
 //! Removes large results that no job refers to any more.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use futures_util::TryStreamExt;
 
@@ -10,6 +11,9 @@ use crate::jobs::shared::Shared;
 
 /// Results checked in one call by the sweep for orphans.
 const SWEEP_CHUNK: usize = 500;
+
+/// Time between two looks at results whose jobs were running.
+const UNDECIDED_EVERY: Duration = Duration::from_secs(1);
 
 /// Results taken from the outbox at once.
 const COLLECT_CHUNK: u32 = 500;
@@ -43,7 +47,8 @@ impl Shared {
 }
 
 /// Removes results that no job refers to and that are not on their way to one: what a process left behind that was
-/// killed between the two. Runs once, beside everything else.
+/// killed between the two. Runs once, beside everything else, and ends when the last job has ended that was running meanwhile and
+/// has such a result.
 pub(crate) async fn sweep_orphans(shared: Arc<Shared>) {
     if shared.store.cluster().is_some() {
         // There may be very many, and other nodes: the database looks for them itself, once in a while.
@@ -59,16 +64,29 @@ pub(crate) async fn sweep_orphans(shared: Arc<Shared>) {
 
 async fn sweep(shared: &Shared) -> Result<usize, JobsError> {
     shared.collect_blobs().await;
-    let mut removed = 0;
+    let (mut removed, mut undecided) = (0, Vec::new());
     for month in shared.blobs.months().await? {
         for some in shared.blobs.keys(&month).await?.chunks(SWEEP_CHUNK) {
-            for key in shared.store.orphans(some).await? {
-                shared.blobs.remove(&key).await?;
-                removed += 1;
-            }
+            let orphans = shared.store.orphans(some).await?;
+            undecided.extend(orphans.undecided);
+            removed += remove(shared, &orphans.certain).await?;
         }
     }
+    // A job whose process was killed may have been claimed anew before its earlier result was looked at.
+    while !undecided.is_empty() {
+        tokio::time::sleep(UNDECIDED_EVERY).await;
+        let orphans = shared.store.orphans(&undecided).await?;
+        undecided = orphans.undecided;
+        removed += remove(shared, &orphans.certain).await?;
+    }
     Ok(removed)
+}
+
+async fn remove(shared: &Shared, keys: &[String]) -> Result<usize, JobsError> {
+    for key in keys {
+        shared.blobs.remove(key).await?;
+    }
+    Ok(keys.len())
 }
 
 /// Results written less long ago may be on their way to their job, in ms.
@@ -102,7 +120,7 @@ impl Shared {
                 some.push((job, key));
             }
             if some.len() >= SWEEP_CHUNK || last {
-                for key in self.store.orphans(&some).await? {
+                for key in self.store.orphans(&some).await?.certain {
                     self.blobs.remove(&key).await?;
                     self.metrics.results_swept.inc();
                     removed += 1;

@@ -329,11 +329,21 @@ pub trait Store: KeyStore + Send + Sync + Debug {
     /// Leaves a large result that was written and that no job will refer to, to be removed.
     async fn abandon_blob(&self, key: &str) -> Result<(), StoreError>;
 
-    /// Those of these large results that no job refers to, and whose job is not running and might still do so.
-    async fn orphans(&self, results: &[(Uuid, String)]) -> Result<Vec<String>, StoreError>;
+    /// Which of these large results no job refers to.
+    async fn orphans(&self, results: &[(Uuid, String)]) -> Result<Orphans, StoreError>;
 
     /// Gives up to `step` free pages back to the file system if there are more than `spare`; says whether it did.
     async fn compact(&self, spare: i64, step: u32) -> Result<bool, StoreError>;
+}
+
+/// Large results that no job refers to.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub struct Orphans {
+    /// Keys of those that none will refer to.
+    pub certain: Vec<String>,
+    /// Those whose job is running, with its id: this attempt may have written them and refer to them when it ends, or an earlier
+    /// one may have left them behind.
+    pub undecided: Vec<(Uuid, String)>,
 }
 
 /// Where API keys are kept.

@@ -7,6 +7,7 @@ use sqlx::QueryBuilder;
 use std::collections::HashSet;
 use uuid::Uuid;
 
+use crate::jobs::store::Orphans;
 use crate::jobs::store::error::StoreError;
 
 impl SqlStore {
@@ -42,12 +43,9 @@ impl SqlStore {
 }
 
 impl SqlStore {
-    /// Those of these large results that no job refers to, and whose job is not running.
-    pub(crate) async fn orphans(
-        &self,
-        results: &[(Uuid, String)],
-    ) -> Result<Vec<String>, StoreError> {
-        let mut orphans = Vec::new();
+    /// Which of these large results no job refers to.
+    pub(crate) async fn orphans(&self, results: &[(Uuid, String)]) -> Result<Orphans, StoreError> {
+        let mut orphans = Orphans::default();
         for some in results.chunks(VALUES_PER_STATEMENT) {
             // In this order: what a running job has written is known by its key before the job no longer runs.
             let running = self.running(some).await?;
@@ -60,10 +58,13 @@ impl SqlStore {
                 .await?
                 .into_iter()
                 .collect();
-            let orphaned = some
-                .iter()
-                .filter(|(id, key)| !running.contains(id) && !known.contains(key));
-            orphans.extend(orphaned.map(|(_, key)| key.clone()));
+            for result in some.iter().filter(|(_, key)| !known.contains(key)) {
+                if running.contains(&result.0) {
+                    orphans.undecided.push(result.clone());
+                } else {
+                    orphans.certain.push(result.1.clone());
+                }
+            }
         }
         Ok(orphans)
     }

@@ -22,7 +22,7 @@ use crate::jobs::store::retention::{Deleted, Moment, Overdue, RetentionRule, Sta
 use crate::jobs::store::submission::{
     BatchBegun, CacheKey, Enqueued, NewBatch, NewJob, QueueBounds, Refusal, StoredCase,
 };
-use crate::jobs::store::{KeyStore, Store};
+use crate::jobs::store::{KeyStore, Orphans, Store};
 
 #[async_trait]
 impl Store for SqlStore {
@@ -323,7 +323,7 @@ impl Store for SqlStore {
         engine::again(|| self.abandon_blob(key)).await
     }
 
-    async fn orphans(&self, results: &[(Uuid, String)]) -> Result<Vec<String>, StoreError> {
+    async fn orphans(&self, results: &[(Uuid, String)]) -> Result<Orphans, StoreError> {
         engine::again(|| self.orphans(results)).await
     }
 
