@@ -4,7 +4,8 @@
 //! prints a table. The parts: `mixed` (64 clients for a minute), `soak` (20 000 small jobs, one by one, removed after a
 //! while; `jobs=N` for another number), `batch` (20 000 cases in one request), `crowds` (silent connections, followers, large bodies,
 //! unread answers), `claims` (1 and 64 workers), `lists` (filters that match nothing among 200 000 jobs), `mixed-lengths` (a long sweep
-//! and short jobs on one worker), `rows` (`/v1/evaluate` and runs of a million rows), `shared` (claims and ends on the PostgreSQL that `RAILHEAD_TEST_POSTGRES` names); all of them without a name. The driver runs on one thread of the same
+//! and short jobs on one worker), `rows` (`/v1/evaluate` and runs of a million rows), `memory` (four workers and
+//! mixed cases), `shared` (claims and ends on the PostgreSQL that `RAILHEAD_TEST_POSTGRES` names); all of them without a name. The driver runs on one thread of the same
 //! machine. A broken promise (a wrong answer, a lost or doubled job) ends it with a panic; missed goals are printed.
 
 #[path = "../machine.rs"]
@@ -15,6 +16,7 @@ mod cases;
 mod client;
 mod crowds;
 mod lengths;
+mod memory;
 mod mixed;
 mod rows;
 mod service;
@@ -63,6 +65,7 @@ fn main() {
             "mixed-lengths",
             "shared",
             "rows",
+            "memory",
         ];
         !arguments
             .iter()
@@ -103,6 +106,9 @@ fn main() {
     }
     if wanted("rows") {
         print(runtime.block_on(rows::run(workers)));
+    }
+    if wanted("memory") {
+        print(runtime.block_on(memory::run()));
     }
     if wanted("shared") {
         print(runtime.block_on(shared::ends()));

@@ -10,6 +10,9 @@ use serde_json::Value;
 /// How long the program may take to listen.
 const STARTS_WITHIN: Duration = Duration::from_secs(20);
 
+/// Linux tells times of processes in these.
+const TICKS_PER_SECOND: f64 = 100.0;
+
 /// A running service; killed when dropped.
 pub struct Service {
     child: Child,
@@ -24,6 +27,10 @@ pub struct Service {
 pub struct Usage {
     /// Resident memory in MB.
     pub memory_mb: f64,
+    /// Most resident memory so far in MB.
+    pub peak_mb: f64,
+    /// Processor time so far in s, of the program and of the kernel for it.
+    pub processor_s: f64,
     /// Open descriptors.
     pub descriptors: usize,
     /// Files in the data folder.
@@ -58,15 +65,24 @@ impl Service {
     pub fn usage(&self) -> Usage {
         let process = PathBuf::from(format!("/proc/{}", self.child.id()));
         let status = std::fs::read_to_string(process.join("status")).expect("the process lives");
-        let resident = status
-            .lines()
-            .find_map(|line| line.strip_prefix("VmRSS:")?.trim().strip_suffix(" kB"))
-            .and_then(|text| text.trim().parse::<f64>().ok())
-            .expect("its resident memory");
+        let megabytes = |name: &str| {
+            status
+                .lines()
+                .find_map(|line| line.strip_prefix(name)?.trim().strip_suffix(" kB"))
+                .and_then(|text| text.trim().parse::<f64>().ok())
+                .expect("its resident memory")
+                / 1024.0
+        };
+        let stat = std::fs::read_to_string(process.join("stat")).expect("the process lives");
+        // Fields 14 and 15, in ticks; the second, a name, may have spaces and ends with a bracket.
+        let ticks = stat.rsplit(')').next().expect("its fields").split(' ');
+        let processor = ticks.skip(12).take(2).map(|field| field.parse::<f64>());
         let descriptors = std::fs::read_dir(process.join("fd")).expect("its descriptors");
         let (files, bytes) = below(&self.data);
         Usage {
-            memory_mb: resident / 1024.0,
+            memory_mb: megabytes("VmRSS:"),
+            peak_mb: megabytes("VmHWM:"),
+            processor_s: processor.sum::<Result<f64, _>>().expect("ticks") / TICKS_PER_SECOND,
             descriptors: descriptors.count(),
             files,
             stored_mb: bytes as f64 / 1e6,

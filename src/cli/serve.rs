@@ -26,6 +26,7 @@ use crate::cli::values::Anonymous;
 use crate::http::{self, HttpOptions};
 use crate::jobs::engine::Engine;
 use crate::jobs::trace::Tracer;
+use crate::jobs::worker::heap;
 use crate::jobs::{Jobs, Options};
 use crate::telemetry::{self, Traces};
 
@@ -69,6 +70,7 @@ impl Role {
 
 /// Serves until a signal says stop.
 pub(super) fn run(args: &ServeArgs, role: Role) -> anyhow::Result<ExitCode> {
+    heap::bound_heap();
     let log = telemetry::start(args.log.log_format, &args.log.log)?;
     for name in unknown_variables() {
         tracing::warn!(

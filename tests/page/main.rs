@@ -92,7 +92,7 @@ fn test_files(name: &str) -> Vec<String> {
 
 fn run_tests(name: &str, variables: &[(&str, &Path)]) {
     let files = test_files(name);
-    let mut arguments = vec!["--test", "--test-concurrency=1", "--test-reporter=spec"];
+    let mut arguments = vec!["--test", "--test-concurrency=2", "--test-reporter=spec"];
     arguments.extend(files.iter().map(String::as_str));
     node(&arguments, variables);
 }

@@ -6,6 +6,7 @@ pub mod begin;
 pub mod claim_loop;
 pub mod fair_turns;
 pub mod gate;
+pub mod heap;
 pub mod heartbeat;
 pub mod judge;
 pub mod lease;

@@ -5,29 +5,13 @@ use std::sync::{Arc, OnceLock, mpsc};
 use std::time::{Duration, Instant};
 
 use crate::jobs::error::JobsError;
+use crate::jobs::worker::heap::give_memory_back;
 
 /// After tasks of at least this length free memory is given back to the system, which takes a walk over the whole heap.
 const LONG: Duration = Duration::from_secs(1);
 
 /// Stack of a solver thread.
 const STACK_BYTES: usize = 16 << 20;
-
-/// Gives free pages back to the system. glibc keeps what lies between blocks that are still in use: about 100 MB after 900 motions
-/// of a creep map, whose operators come and go beside those that are kept.
-#[cfg_attr(
-    all(target_os = "linux", target_env = "gnu"),
-    expect(
-        unsafe_code,
-        reason = "a function of the C library; the only one that is called"
-    )
-)]
-fn give_memory_back() {
-    #[cfg(all(target_os = "linux", target_env = "gnu"))]
-    // SAFETY: the function takes a number, touches free memory only and locks every arena while it does.
-    unsafe {
-        libc::malloc_trim(0);
-    }
-}
 
 /// Something to compute.
 pub(crate) type Task = Box<dyn FnOnce() + Send>;

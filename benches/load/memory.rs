@@ -1,0 +1,62 @@
+//! What four workers keep of the memory of mixed cases. With `MALLOC_ARENA_MAX=16` in the environment the C library's own settings apply.
+
+use reqwest::Method;
+use serde_json::{Value, json};
+
+use crate::Row;
+use crate::client::Client;
+use crate::service::Service;
+
+const WORKERS: usize = 4;
+const CASES: usize = 400;
+/// Shipped examples, as submitted: ellipses, and a wheel on the crown of a rail and at its gauge corner.
+const EXAMPLES: [&str; 4] = [
+    include_str!("../../api/examples/spin.case.json"),
+    include_str!("../../api/examples/hertz-steel.case.json"),
+    include_str!("../../api/examples/wheel-rail.case.json"),
+    include_str!("../../api/examples/wheel-rail-flange.case.json"),
+];
+
+/// Examples in turn, without fields, with loads that differ, four in ten to the finest target.
+fn case(number: usize) -> Value {
+    let mut case: Value = serde_json::from_str(EXAMPLES[number % EXAMPLES.len()]).expect("JSON");
+    let share = (number * 197 % CASES) as f64 / CASES as f64;
+    let load = case["load"]
+        .as_object_mut()
+        .expect("the load of an example");
+    for force in load.values_mut() {
+        let usual = force.as_f64().expect("a force in N");
+        *force = json!(usual * (0.8 + 0.4 * share));
+    }
+    let target = if number % 10 < 4 { 0.001 } else { 0.005 };
+    case["solver"] = json!({ "target_error": target });
+    case["outputs"] = json!(["resultants"]);
+    case
+}
+
+/// Resident memory of the process when it is idle, at its peak and afterwards, and its processor time.
+pub async fn run() -> Vec<Row> {
+    let service = Service::start(WORKERS, &[]);
+    let idle = service.usage().memory_mb;
+    let cases: Vec<Value> = (0..CASES).map(case).collect();
+    let mut client = Client::new(&service.url);
+    let answer = client.send(Method::POST, "/v1/batches", &[202], |request| {
+        request.json(&cases)
+    });
+    let batch: Value = answer.await.json().await.expect("JSON");
+    let path = batch["links"]["results"].as_str().expect("a link");
+    let (text, _) = client.get(&format!("{path}?wait=600")).await;
+    let text = String::from_utf8(text).expect("text");
+    let succeeded = text
+        .lines()
+        .filter(|line| line.contains("\"state\":\"succeeded\""));
+    assert_eq!(succeeded.count(), CASES);
+    let usage = service.usage();
+    vec![Row::plain(
+        "memory: 400 mixed cases on 4 workers; idle, peak, afterwards; processor time",
+        format!(
+            "{idle:.0}, {:.0}, {:.0} MB; {:.2} s",
+            usage.peak_mb, usage.memory_mb, usage.processor_s
+        ),
+    )]
+}
