@@ -24,6 +24,20 @@ mod shared;
 mod soak;
 mod table;
 
+/// What can be measured; see above.
+const PARTS: [&str; 10] = [
+    "mixed",
+    "soak",
+    "batch",
+    "crowds",
+    "claims",
+    "lists",
+    "mixed-lengths",
+    "rows",
+    "memory",
+    "shared",
+];
+
 /// One line of the table: what was measured, the figure, and the goal if there is one.
 pub struct Row(pub String, pub String, pub String);
 
@@ -55,22 +69,8 @@ fn main() {
     let workers = number("workers=").unwrap_or((cores - 1).max(1));
     let jobs = number("jobs=").unwrap_or(20_000);
     let wanted = |part: &str| {
-        let names = [
-            "mixed",
-            "soak",
-            "batch",
-            "crowds",
-            "claims",
-            "lists",
-            "mixed-lengths",
-            "shared",
-            "rows",
-            "memory",
-        ];
-        !arguments
-            .iter()
-            .any(|argument| names.contains(&argument.as_str()))
-            || arguments.iter().any(|argument| argument == part)
+        let parts = || arguments.iter().filter(|one| PARTS.contains(&one.as_str()));
+        parts().next().is_none() || parts().any(|named| named == part)
     };
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()

@@ -56,7 +56,8 @@ fn unlike(random: &mut Random, case: &mut Value) {
     case["solver"] = json!({ "target_error": 0.01 });
 }
 
-fn base(random: &mut Random) -> Value {
+/// A case to begin with: like bodies, a coefficient of friction, an ellipse, creepages of a wheel on a rail.
+pub fn base(random: &mut Random) -> Value {
     let ratio = random.decades(0.3, 3.0).sqrt();
     json!({
         "material": { "shear_modulus_mpa": 82_000, "poisson_ratio": 0.28 },

@@ -86,6 +86,7 @@ const ORDER: &[&str] = &[
     "jobs::worker::lease",
     "jobs::worker::slices",
     "jobs::worker::outcome",
+    "jobs::worker::heap",
     "jobs::worker::solver_thread",
     "jobs::worker::attempt",
     "jobs::worker::fair_turns",

@@ -1,0 +1,233 @@
+//! Stresses below the surface, damage and heat: random cases held against laws.
+
+use std::fmt::Write as _;
+
+use railhead::contact;
+use railhead::contact::case::limits::Limits;
+use railhead::contact::monitor::Unmonitored;
+use serde_json::{Value, json};
+
+use crate::physics;
+use crate::random::Random;
+
+/// A law: what it was broken by, if it was. It is given the answer and the case.
+type Law = fn(&Value, &Value) -> Result<(), String>;
+/// A class, how many cases of it are solved, how one is made, and the law that holds for it.
+type Class = (&'static str, usize, fn(&mut Random, &mut Value), Law);
+
+const CLASSES: [Class; 3] = [
+    (
+        "stresses below the surface",
+        300,
+        stressed,
+        stresses_are_in_balance,
+    ),
+    ("damage", 1500, damaged, damage_follows_its_resultants),
+    ("temperature", 700, heated, heat_warms),
+];
+
+/// Half the side of the horizontal plane of stresses and its depth, in half-widths of the patch; points along a side. Of the load, the part
+/// `(depth / half side)³` is outside.
+const PLANE: (f64, f64, usize) = (8.0, 0.8, 49);
+/// How far sums over that plane may be from the load: the part outside and that of the trapezoidal rule.
+const BALANCE: f64 = 0.01;
+
+fn stressed(random: &mut Random, case: &mut Value) {
+    contact_type(random, case);
+    let (reach, depth, points) = PLANE;
+    let c = half_width(case);
+    let axis = json!({ "from": -reach * c, "to": reach * c, "points": points });
+    case["outputs"] = json!(["subsurface"]);
+    case["subsurface"] =
+        json!({ "plane": { "x_mm": axis, "y_mm": axis, "depths_mm": depth * c }, "worst": true });
+    if random.part() < 0.5 {
+        case["subsurface"]["body"] = json!("upper");
+    }
+}
+
+fn damaged(random: &mut Random, case: &mut Value) {
+    contact_type(random, case);
+    motion_of_any_size(random, case);
+    case["motion"]["speed_mm_per_s"] = json!(random.decades(10.0, 100_000.0));
+    case["outputs"] = json!(["damage"]);
+    case["damage"] = json!({ "across": random.part() < 0.3, "models": [
+        "t_gamma", "usfd_wear", "archard_wear", "wlrm", "surface_fatigue_index", "shakedown"
+    ] });
+}
+
+fn heated(random: &mut Random, case: &mut Value) {
+    contact_type(random, case);
+    motion_of_any_size(random, case);
+    case["motion"]["speed_mm_per_s"] = json!(random.decades(100.0, 100_000.0));
+    case["outputs"] = json!(["temperature"]);
+    let body = |random: &mut Random| {
+        json!({
+            "conductivity_w_per_mk": random.decades(1.0, 400.0), "density_kg_per_m3": random.decades(1000.0, 9000.0),
+            "specific_heat_j_per_kgk": random.decades(100.0, 2000.0), "bulk_c": random.between(-30.0, 80.0),
+        })
+    };
+    case["thermal"] = if random.part() < 0.5 {
+        body(random)
+    } else {
+        json!({ "upper": body(random), "lower": body(random) })
+    };
+}
+
+fn motion_of_any_size(random: &mut Random, case: &mut Value) {
+    let size = random.decades(1e-6, 0.05);
+    let signed = |random: &mut Random| size * random.between(-1.0, 1.0);
+    case["motion"] = json!({
+        "creepage_x": signed(random), "creepage_y": signed(random), "spin_per_mm": 0.1 * signed(random)
+    });
+}
+
+fn contact_type(random: &mut Random, case: &mut Value) {
+    if random.part() < 0.5 {
+        let radius = |random: &mut Random| random.decades(50.0, 2000.0);
+        case["contact"] =
+            json!({ "type": "radii", "rolling_mm": radius(random), "lateral_mm": radius(random) });
+    }
+}
+
+/// A length of the order of the patch in mm.
+fn half_width(case: &Value) -> f64 {
+    let contact = &case["contact"];
+    let number = |name: &str| contact[name].as_f64();
+    if let (Some(a), Some(b)) = (number("a_mm"), number("b_mm")) {
+        return a.max(b);
+    }
+    let modulus = 82_000.0 / (1.0 - 0.28);
+    let load = case["load"]["normal_force_n"].as_f64().unwrap_or(0.0);
+    let radius = number("rolling_mm")
+        .unwrap_or(0.0)
+        .max(number("lateral_mm").unwrap_or(0.0));
+    (0.75 * load * radius / modulus).cbrt()
+}
+
+fn point(answer: &Value) -> &Value {
+    &answer["patches"][0]["points"][0]
+}
+
+fn held(holds: bool, what: impl FnOnce() -> String) -> Result<(), String> {
+    if holds { Ok(()) } else { Err(what()) }
+}
+
+/// The stress across a plane below carries the load, and no point of it is worse than the worst one.
+fn stresses_are_in_balance(answer: &Value, case: &Value) -> Result<(), String> {
+    let load = case["load"]["normal_force_n"].as_f64().unwrap_or(f64::NAN);
+    let places = answer["fields"][0]["points"][0]["subsurface"]
+        .as_array()
+        .ok_or("no stresses")?;
+    let all = |pointer: &str| -> Result<Vec<f64>, String> {
+        let value = |place: &Value| place.pointer(pointer).and_then(Value::as_f64);
+        places
+            .iter()
+            .map(|place| value(place).ok_or_else(|| format!("no {pointer}")))
+            .collect()
+    };
+    let (reach, _, points) = PLANE;
+    let cell = (2.0 * reach * half_width(case) / (points - 1) as f64).powi(2);
+    let carried = -cell * all("/stress_mpa/zz")?.iter().sum::<f64>();
+    held((carried - load).abs() <= BALANCE * load, || {
+        format!("the plane carries {carried} N of {load} N")
+    })?;
+    let worst = point(answer)["subsurface"]["worst"]["von_mises_mpa"]
+        .as_f64()
+        .ok_or("no worst point")?;
+    let most = all("/von_mises_mpa")?.into_iter().fold(0.0, f64::max);
+    held(most <= 1.001 * worst, || {
+        format!("{most} MPa in the plane, {worst} MPa at the worst point")
+    })
+}
+
+/// Every figure lies in its interval, wear is not negative, and Tγ is the power of the resultants.
+fn damage_follows_its_resultants(answer: &Value, _: &Value) -> Result<(), String> {
+    let point = point(answer);
+    let damage = &point["damage"];
+    let power = point["friction_power_n"].as_f64().unwrap_or(f64::NAN);
+    let with_spin = damage["t_gamma"]["with_spin_n"]["value"]
+        .as_f64()
+        .unwrap_or(f64::NAN);
+    held((with_spin - power).abs() <= 1e-9 * power.abs(), || {
+        format!("Tγ of {with_spin} N for a power of {power} N")
+    })?;
+    for (model, figures) in damage.as_object().into_iter().flatten() {
+        for (name, figure) in figures.as_object().into_iter().flatten() {
+            let [value, low, high] = ["value", "low", "high"].map(|key| figure[key].as_f64());
+            let (Some(value), Some(low), Some(high)) = (value, low, high) else {
+                continue;
+            };
+            held(low <= value && value <= high, || {
+                format!("{model} {name}: {value} is not between {low} and {high}")
+            })?;
+            let wear = model.ends_with("_wear");
+            held(!wear || value >= 0.0, || format!("{model} {name}: {value}"))?;
+        }
+    }
+    Ok(())
+}
+
+/// Friction warms, and the heat goes into the two bodies.
+fn heat_warms(answer: &Value, _: &Value) -> Result<(), String> {
+    let temperature = &point(answer)["temperature"];
+    let number = |name: &str| {
+        temperature[name]
+            .as_f64()
+            .ok_or_else(|| format!("no {name}"))
+    };
+    let (most, without) = (number("max_c")?, number("without_friction_c")?);
+    held(most >= without - 1e-9 * without.abs().max(1.0), || {
+        format!("{most} °C with friction, {without} °C without")
+    })?;
+    let share = number("heat_share_lower")?;
+    held((0.0..=1.0).contains(&share), || {
+        format!("a share of heat of {share}")
+    })
+}
+
+/// The table; cases that failed or broke a law are written out below it.
+pub fn table(seed: u64) -> String {
+    let mut text = String::from(
+        "## Stresses below the surface, damage, heat\n\n*Laws*: a plane below carries the load within 1 %, and no point of it is worse than the worst point; damage \
+         lies in its interval, wear is not negative, Tγ is the power of the resultants; friction warms, the shares of its heat are between 0 and 1.\n\n\
+         | cases | tried | refused | solved | target met | failed |\n|---|---|---|---|---|---|\n",
+    );
+    let mut troubles = String::new();
+    for (name, count, make, law) in CLASSES {
+        let mut random = Random(seed);
+        let [mut refused, mut solved, mut met, mut failed] = [0; 4];
+        for _ in 0..count {
+            let mut case = physics::base(&mut random);
+            make(&mut random, &mut case);
+            match one(&case, law) {
+                Ok(None) => refused += 1,
+                Ok(Some(target_met)) => {
+                    solved += 1;
+                    met += usize::from(target_met);
+                }
+                Err(why) => {
+                    failed += 1;
+                    let _ = writeln!(troubles, "- {why}: `{case}`");
+                }
+            }
+        }
+        let _ = writeln!(
+            text,
+            "| {name} | {count} | {refused} | {solved} | {met} | {failed} |"
+        );
+    }
+    text + "\n" + &troubles
+}
+
+/// Whether the target was met; nothing if the case was refused.
+fn one(case: &Value, law: Law) -> Result<Option<bool>, String> {
+    let Ok(checked) = contact::check(case, &Limits::default()) else {
+        return Ok(None);
+    };
+    let (solution, fields) =
+        contact::solve(&checked, &Unmonitored).map_err(|error| error.to_string())?;
+    let mut answer = serde_json::to_value(&solution).map_err(|error| error.to_string())?;
+    answer["fields"] = serde_json::to_value(&fields).map_err(|error| error.to_string())?;
+    law(&answer, case)?;
+    Ok(Some(point(&answer)["target_met"] == json!(true)))
+}
