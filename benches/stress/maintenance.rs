@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::Unmonitored;
+use railhead::contact::post::subsurface::states::points;
 use serde_json::{Value, json};
 
 use crate::physics;
@@ -34,9 +35,9 @@ const BALANCE: f64 = 0.01;
 
 fn stressed(random: &mut Random, case: &mut Value) {
     contact_type(random, case);
-    let (reach, depth, points) = PLANE;
+    let (reach, depth, count) = PLANE;
     let c = half_width(case);
-    let axis = json!({ "from": -reach * c, "to": reach * c, "points": points });
+    let axis = json!({ "from": -reach * c, "to": reach * c, "points": count });
     case["outputs"] = json!(["subsurface"]);
     case["subsurface"] =
         json!({ "plane": { "x_mm": axis, "y_mm": axis, "depths_mm": depth * c }, "worst": true });
@@ -115,9 +116,7 @@ fn held(holds: bool, what: impl FnOnce() -> String) -> Result<(), String> {
 /// The stress across a plane below carries the load, and no point of it is worse than the worst one.
 fn stresses_are_in_balance(answer: &Value, case: &Value) -> Result<(), String> {
     let load = case["load"]["normal_force_n"].as_f64().unwrap_or(f64::NAN);
-    let places = answer["fields"][0]["points"][0]["subsurface"]
-        .as_array()
-        .ok_or("no stresses")?;
+    let places = answer["stresses"].as_array().ok_or("no stresses")?;
     let all = |pointer: &str| -> Result<Vec<f64>, String> {
         let value = |place: &Value| place.pointer(pointer).and_then(Value::as_f64);
         places
@@ -125,8 +124,8 @@ fn stresses_are_in_balance(answer: &Value, case: &Value) -> Result<(), String> {
             .map(|place| value(place).ok_or_else(|| format!("no {pointer}")))
             .collect()
     };
-    let (reach, _, points) = PLANE;
-    let cell = (2.0 * reach * half_width(case) / (points - 1) as f64).powi(2);
+    let (reach, _, count) = PLANE;
+    let cell = (2.0 * reach * half_width(case) / (count - 1) as f64).powi(2);
     let carried = -cell * all("/stress_mpa/zz")?.iter().sum::<f64>();
     held((carried - load).abs() <= BALANCE * load, || {
         format!("the plane carries {carried} N of {load} N")
@@ -227,7 +226,13 @@ fn one(case: &Value, law: Law) -> Result<Option<bool>, String> {
     let (solution, fields) =
         contact::solve(&checked, &Unmonitored).map_err(|error| error.to_string())?;
     let mut answer = serde_json::to_value(&solution).map_err(|error| error.to_string())?;
-    answer["fields"] = serde_json::to_value(&fields).map_err(|error| error.to_string())?;
+    let stored = fields
+        .patches
+        .first()
+        .and_then(|patch| patch.points.first());
+    if let Some(stored) = stored.and_then(|point| point.subsurface.as_ref()) {
+        answer["stresses"] = json!(points(stored));
+    }
     law(&answer, case)?;
     Ok(Some(point(&answer)["target_met"] == json!(true)))
 }
