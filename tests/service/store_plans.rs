@@ -87,6 +87,13 @@ async fn use_store(store: &Arc<dyn Store>) {
         .cancel_requests(&ids)
         .await
         .unwrap();
+    maintain(store).await;
+    read_lists(store, ids[0]).await;
+    store.delete(TENANT, ids[0]).await.unwrap();
+}
+
+/// What a node does by itself, and what every client asks.
+async fn maintain(store: &Arc<dyn Store>) {
     store.reap(Reap::Expired { now: 1 }, 2, 5).await.unwrap();
     let failure = Failure::new(FailureKind::DeadlinePassed, "late");
     let moment = Moment {
@@ -122,8 +129,6 @@ async fn use_store(store: &Arc<dyn Store>) {
     store.queued_tenants().await.unwrap();
     store.stats().await.unwrap();
     store.usage(TENANT).await.unwrap();
-    read_lists(store, ids[0]).await;
-    store.delete(TENANT, ids[0]).await.unwrap();
     store.ready(true).await.unwrap();
 }
 

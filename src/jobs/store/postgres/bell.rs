@@ -10,7 +10,7 @@ use uuid::Uuid;
 
 use crate::jobs::store::cluster::Bell;
 use crate::jobs::store::error::StoreError;
-use crate::jobs::store::postgres::engine::in_time;
+use crate::jobs::store::postgres::answer::in_time;
 
 /// The channel of all nodes.
 const CHANNEL: &str = "railhead";

@@ -1,16 +1,15 @@
 //! PostgreSQL as the shared statements see it.
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use sqlx::Transaction;
 use sqlx::postgres::{PgConnection, PgPool, PgRow, Postgres};
-use tokio::time::timeout;
 use uuid::Uuid;
 
 use crate::jobs::store::claim::ClaimRequest;
 use crate::jobs::store::cluster::Cluster;
-use crate::jobs::store::error::{StorageFault, StoreError};
+use crate::jobs::store::error::StoreError;
+use crate::jobs::store::postgres::answer::in_time;
 use crate::jobs::store::postgres::connection::{ADMISSION, FOLD, LOCKS, lock};
 use crate::jobs::store::postgres::database::PostgresStore;
 
@@ -28,9 +27,6 @@ pub(crate) const LEASE_NOW: (&str, &str) = (
 
 /// How often a call that gave way to another one is made again before its error counts.
 const REPEATED: u32 = 4;
-
-/// How long a call may take; the server ends its statements before.
-const ANSWERED_WITHIN: Duration = Duration::from_secs(15);
 
 /// Begins a transaction.
 pub(crate) async fn begin(pool: &DbPool) -> Result<Transaction<'static, Db>, StoreError> {
@@ -168,33 +164,12 @@ pub(crate) async fn again<T, F: Future<Output = Result<T, StoreError>>>(
     call: impl Fn() -> F,
 ) -> Result<T, StoreError> {
     for _ in 0..REPEATED {
-        match timeout(ANSWERED_WITHIN, call()).await {
-            Err(_) => return Err(far(StoreError::timed_out())),
-            Ok(Err(error)) if gave_way(&error) => tracing::debug!(%error, "made again"),
-            Ok(answer) => return answer.map_err(far),
+        match in_time(call()).await {
+            Err(error) if gave_way(&error) => tracing::debug!(%error, "made again"),
+            answer => return answer,
         }
     }
     in_time(call()).await
-}
-
-/// Makes a call that ends in any case, also if nothing comes back.
-pub(crate) async fn in_time<T>(
-    call: impl Future<Output = Result<T, StoreError>>,
-) -> Result<T, StoreError> {
-    let answer = timeout(ANSWERED_WITHIN, call).await;
-    answer
-        .unwrap_or_else(|_| Err(StoreError::timed_out()))
-        .map_err(far)
-}
-
-/// A server that takes nothing is no disk that takes nothing: the answer to clients says which.
-fn far(error: StoreError) -> StoreError {
-    match error {
-        StoreError::Away(StorageFault::Unwritable, cause) => {
-            StoreError::Away(StorageFault::Unreachable, cause)
-        }
-        other => other,
-    }
 }
 
 fn gave_way(error: &StoreError) -> bool {

@@ -7,6 +7,7 @@
 #[macro_use]
 mod tokens;
 
+pub(crate) mod answer;
 pub mod bell;
 mod claim_memory;
 pub mod cluster;
