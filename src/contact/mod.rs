@@ -25,6 +25,7 @@ pub mod solution;
 pub mod stages;
 pub mod time_limit;
 pub mod unlike;
+pub mod wheelset;
 
 use std::sync::Arc;
 

@@ -20,6 +20,26 @@ pub trait Monitor {
     fn elapsed(&self) -> Duration;
 }
 
+/// The monitor of a part of the work.
+pub(crate) struct MonitorPart<'a> {
+    /// That of all of it.
+    pub(crate) inner: &'a dyn Monitor,
+    /// Progress when the part begins.
+    pub(crate) before: f64,
+    /// What the part adds to it.
+    pub(crate) own: f64,
+}
+
+impl Monitor for MonitorPart<'_> {
+    fn tick(&self, progress: f64) -> ControlFlow<Stop> {
+        self.inner.tick(self.before + self.own * progress)
+    }
+
+    fn elapsed(&self) -> Duration {
+        self.inner.elapsed()
+    }
+}
+
 /// Never stops a solve and measures no time; for tests and for callers that just want the answer.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Unmonitored;

@@ -3,14 +3,13 @@
 //! A slice knows nothing of the others: no start, mesh or creepage is carried over a cut. So an answer does not depend on when and where
 //! its slices were solved, or whether a restart came between: [`solve`](crate::contact::solve) takes the same slices one after the other.
 
-use std::ops::{ControlFlow, Range};
+use std::ops::Range;
 use std::sync::Arc;
-use std::time::Duration;
 
 use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::solve_time::SolveTime;
 use crate::contact::error::SolveError;
-use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::monitor::{Monitor, MonitorPart};
 use crate::contact::remark::entry::merged;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::solution::words::{Fields, Solution};
@@ -52,29 +51,12 @@ pub fn solve_slice(
     if range == (0..all) {
         return solve_whole(operators, case, monitor);
     }
-    let share = Share {
+    let share = MonitorPart {
         inner: monitor,
         before: range.start as f64 / all as f64,
         own: range.len() as f64 / all as f64,
     };
     solve_whole(operators, &case.slice(range), &share)
-}
-
-/// The monitor of a part of the work.
-struct Share<'a> {
-    inner: &'a dyn Monitor,
-    before: f64,
-    own: f64,
-}
-
-impl Monitor for Share<'_> {
-    fn tick(&self, progress: f64) -> ControlFlow<Stop> {
-        self.inner.tick(self.before + self.own * progress)
-    }
-
-    fn elapsed(&self) -> Duration {
-        self.inner.elapsed()
-    }
 }
 
 impl Solution {

@@ -13,6 +13,7 @@ use crate::contact::solution::finish::finish;
 use crate::contact::solution::words::{Fields, Solution};
 use crate::contact::time_limit::TimeLimit;
 use crate::contact::unlike;
+use crate::contact::wheelset::solve;
 
 /// Solves all motions of a problem one after the other, as long as one slice.
 ///
@@ -26,6 +27,8 @@ pub(crate) fn solve_whole(
     let began = monitor.elapsed();
     let answer = if let NormalTask::Wheel(contact) = &case.problem.task {
         trust::solve(operators, case, contact, monitor)?
+    } else if let NormalTask::Wheelset(wheelset) = &case.problem.task {
+        solve::solve(operators, case, wheelset, monitor)?
     } else {
         let watch = TimeLimit::new(monitor, case.run.time_limit, case.problem.motions.len());
         if case.problem.is_coupled(&case.run) {

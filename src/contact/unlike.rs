@@ -120,7 +120,7 @@ fn gap_task(case: &CheckedCase) -> GapTask {
     let ellipse = match &case.problem.task {
         NormalTask::Gap(task) => return task.as_ref().clone(),
         NormalTask::Hertz(ellipse) => *ellipse,
-        NormalTask::Given(_) | NormalTask::Wheel(_) => {
+        NormalTask::Given(_) | NormalTask::Wheel(_) | NormalTask::Wheelset(_) => {
             unreachable!("the gap of a coupled problem is known")
         }
     };

@@ -20,6 +20,7 @@ const FORMS: [(&str, &[&str]); 6] = [
             "GapGridContact",
             "PressureGridContact",
             "ProfilesContact",
+            "WheelsetContact",
         ],
     ),
     ("Motions", &["SweepMotions", "WheelsetMotion"]),
@@ -35,14 +36,15 @@ const TOLD_BY: [(&str, &str); 1] = [("Contact", "type")];
 /// Least and largest number of members.
 const MEMBERS: [(&str, usize, Option<usize>); 3] = [
     ("AskedMotion", 1, None),
-    ("Load", 1, Some(1)),
+    ("Load", 1, Some(2)),
     ("Sweep", 1, None),
 ];
 
 /// Members that are lists of so many numbers, or lists of those.
-const TUPLES: [(&str, &str, usize); 30] = [
+const TUPLES: [(&str, &str, usize); 31] = [
     ("ArchardFigures", "speeds_mm_per_s", 2),
     ("CrossSection", "points_mm", 2),
+    ("EquivalentConicity", "turns_mm", 2),
     ("FirstTouch", "rail_mm", 2),
     ("FirstTouch", "track_mm", 3),
     ("FirstTouch", "wheel_mm", 2),

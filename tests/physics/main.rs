@@ -80,6 +80,7 @@ mod targets;
 mod truth;
 mod unlike;
 mod watched;
+mod wheelset;
 mod workspaces;
 
 #[global_allocator]

@@ -10,7 +10,7 @@ use crate::contact::case::words::friction::Friction;
 use crate::contact::case::words::material::Material;
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::solver::{MethodName, Output, Solver};
-use crate::contact::case::{contact_task, motions, profiles, size};
+use crate::contact::case::{contact_task, motions, profiles, size, wheelsets};
 use crate::contact::error::Fault;
 use crate::contact::friction::falling::FallingLaw;
 use crate::contact::friction::law::FrictionLaw;
@@ -43,7 +43,7 @@ pub(crate) fn faults_of(given: PartialCase, limits: &Limits) -> Vec<Fault> {
     // Without a load, which is a fault already, no patch can be found; profiles are checked nevertheless.
     let without_load = matches!(
         given.contact,
-        Some(Contact::PressureGrid { .. } | Contact::Profiles { .. })
+        Some(Contact::PressureGrid { .. } | Contact::Profiles { .. } | Contact::Wheelset { .. })
     );
     let contact = given
         .contact
@@ -69,9 +69,8 @@ impl CheckedParts {
         faults.extend(uncoupled.and_then(|(pair, method)| pair.uncoupled_fault(method)));
         let task = normal_task(given.contact, given.load, elasticity.as_ref(), limits);
         let task = match (task, given.contact) {
-            (None, Some(contact @ Contact::Profiles { .. })) => {
-                let modulus = elasticity.map(|elasticity| elasticity.contact_modulus());
-                profiles::task(contact, given.load, modulus).unwrap_or_else(|found| {
+            (None, Some(contact)) if contact.has_profiles() => {
+                on_rails(contact, given.load, elasticity, limits).unwrap_or_else(|found| {
                     faults.extend(found);
                     None
                 })
@@ -90,7 +89,8 @@ impl CheckedParts {
                 segments: task
                     .as_ref()
                     .map_or_else(|| vec![1.0], |(task, _)| size::segments(task)),
-                motions: motions.as_ref().map_or(1, |m| m.motions.len()),
+                motions: motions.as_ref().map_or(1, |m| m.motions.len())
+                    * task.as_ref().map_or(1, |(task, _)| size::positions(task)),
                 fields: given.outputs.iter().any(|output| output.is_per_cell()),
                 stress_points: given.after.stress_points(),
                 ellipse: task
@@ -124,6 +124,20 @@ impl CheckedParts {
             motions,
         };
         (parts, faults)
+    }
+}
+
+/// The task of a wheel or a wheelset with its remarks; `None` without faults where something it depends on is not known.
+fn on_rails(
+    contact: &Contact,
+    load: Option<&Load>,
+    elasticity: Option<Elasticity>,
+    limits: &Limits,
+) -> Result<Option<(NormalTask, Vec<RemarkEntry>)>, Vec<Fault>> {
+    let modulus = elasticity.map(|elasticity| elasticity.contact_modulus());
+    match contact {
+        Contact::Wheelset { .. } => wheelsets::task(contact, load, modulus, limits),
+        _ => profiles::task(contact, load, modulus),
     }
 }
 
@@ -185,12 +199,8 @@ fn friction_fault(given: &PartialCase) -> Option<Fault> {
         .across
         .as_ref()
         .is_some_and(|across| across.angle_rad.is_some());
-    if angles
-        && given
-            .contact
-            .is_some_and(|contact| !matches!(contact, Contact::Profiles { .. }))
-    {
-        let detail = "given for another contact than \"type\": \"profiles\"; give y_mm instead";
+    if angles && given.contact.is_some_and(|contact| !contact.has_profiles()) {
+        let detail = "given for another contact than \"type\": \"profiles\" or \"wheelset\"; give y_mm instead";
         return Some(Fault::new("/friction/across/angle_rad", detail));
     }
     let method = given.solver?.method;
@@ -226,7 +236,7 @@ pub(crate) fn normal_task(
     elasticity: Option<&Elasticity>,
     limits: &Limits,
 ) -> Option<Result<(NormalTask, Vec<RemarkEntry>), Fault>> {
-    let contact = contact.filter(|contact| !matches!(contact, Contact::Profiles { .. }))?;
+    let contact = contact.filter(|contact| !contact.has_profiles())?;
     if let Contact::PressureGrid {
         x_mm,
         y_mm,

@@ -43,7 +43,8 @@ pub(crate) fn hertz(
         Contact::GapProfile { .. }
         | Contact::GapGrid { .. }
         | Contact::PressureGrid { .. }
-        | Contact::Profiles { .. } => {
+        | Contact::Profiles { .. }
+        | Contact::Wheelset { .. } => {
             return Err(fault(
                 "/contact/type",
                 "neither gaps nor profiles nor pressures on a grid make an ellipse".to_owned(),

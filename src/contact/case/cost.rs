@@ -1,7 +1,7 @@
 //! What a case will cost, estimated before it is queued: memory from its finest mesh (`size.rs`), time from its motions (`solve_time.rs`).
 
 use crate::contact::case::problem::CheckedCase;
-use crate::contact::case::size::{SizeInput, length_over_width, segments};
+use crate::contact::case::size::{SizeInput, length_over_width, positions, segments};
 use crate::contact::post::subsurface::task::SubsurfaceTask;
 
 impl CheckedCase {
@@ -22,7 +22,7 @@ impl CheckedCase {
             method: self.run.method,
             resolution: self.run.resolution,
             segments: segments(&self.problem.task),
-            motions: self.problem.motions.len(),
+            motions: self.problem.motions.len() * positions(&self.problem.task),
             fields: self.run.outputs.iter().any(|output| output.is_per_cell()),
             stress_points: self.run.after.subsurface.as_ref().map_or(0, places),
             ellipse: length_over_width(&self.problem.task),

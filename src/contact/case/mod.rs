@@ -25,4 +25,5 @@ pub mod size;
 pub mod solve_time;
 pub mod subsurface;
 pub mod understood;
+pub mod wheelsets;
 pub mod words;

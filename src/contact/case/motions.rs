@@ -172,7 +172,7 @@ fn sweep_length(sweep: &Sweep) -> u128 {
 }
 
 fn write_out(sweep: &Sweep) -> Vec<AskedMotion> {
-    let values = components(sweep).map(|swept| swept.map_or_else(|| vec![0.0], values));
+    let values = components(sweep).map(|swept| swept.map_or_else(|| vec![0.0], swept_values));
     let [x, y, spin] = &values;
     let forced = [sweep.force_x_n.is_some(), sweep.force_y_n.is_some()];
     let motion = |i: usize, j: usize, k: usize| AskedMotion {
@@ -202,7 +202,8 @@ fn write_out(sweep: &Sweep) -> Vec<AskedMotion> {
     }
 }
 
-fn values(swept: &Swept) -> Vec<f64> {
+/// The values of a component in order.
+pub(crate) fn swept_values(swept: &Swept) -> Vec<f64> {
     match swept {
         Swept::Constant(value) => vec![*value],
         Swept::Range(range) => range_values(range),

@@ -45,7 +45,9 @@ impl CheckedCase {
             NormalTask::Hertz(ellipse) => return Ok(known(Footprint::hertz(*ellipse))),
             NormalTask::Given(field) => return Ok(known(Footprint::given(field.clone()))),
             NormalTask::Gap(task) => task,
-            NormalTask::Wheel(_) => unreachable!("a wheel is brought to rest first"),
+            NormalTask::Wheel(_) | NormalTask::Wheelset(_) => {
+                unreachable!("a wheel is brought to rest first")
+            }
         };
         let began = monitor.elapsed();
         let found = task.solve_for(self.run.target(), &mut GridWorkspace::default(), monitor)?;

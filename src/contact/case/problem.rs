@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::Arc;
 use std::time::Duration;
 
 use crate::contact::case::after_tasks::AfterTasks;
@@ -22,6 +23,7 @@ use crate::contact::friction::law::FrictionLaw;
 use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::normal::normal_task::NormalTask;
+use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::rolling::methods::method::{Method, TractionBound};
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
@@ -68,6 +70,8 @@ pub struct Problem {
     /// The motion of the wheelset that stands in place of the one motion above, which is then 0: the creepages of the patches
     /// follow from it.
     pub wheelset: Option<WheelsetMotion>,
+    /// Torque about the axle in N mm that the rails are to balance; the angular velocity of the wheelset is then found.
+    pub drive_torque: Option<f64>,
     /// Forces prescribed instead of creepages, motion by motion.
     pub forces: Vec<PrescribedForces>,
     /// Rolling speeds in mm/s, motion by motion, where they are given.
@@ -143,18 +147,15 @@ impl CheckedCase {
         };
         let of_material = elasticity.remark(case.solver.method.into());
         let of_material = of_material.map(|r| r.at_pointer("/material"));
-        let of_friction = unusual_friction(&case.friction);
-        let of_case = of_material.into_iter().chain(of_friction);
+        let of_case = of_material
+            .into_iter()
+            .chain(unusual_friction(&case.friction));
         let ExpandedMotions {
             motions,
             forces,
             speeds,
         } = motions;
-        // Creepages that are searched are looked at when they are found.
-        let given: &[Motion] = match forces.iter().all(|forces| *forces == [None; 2]) {
-            true => &motions,
-            false => &[],
-        };
+        let given = given_creepages(&motions, &forces);
         let implausible = plausibility::of_case(&case.contact, &task.patches(), given);
         let remarks = merged(of_case.chain(remarks).chain(implausible));
         let digest = digest(case, &elasticity, &motions, &forces, &speeds);
@@ -171,6 +172,7 @@ impl CheckedCase {
             forces,
             speeds,
             wheelset: profiles::wheelset(&case.motion),
+            drive_torque: profiles::drive_torque(&case.motion),
             checked: Checked,
         };
         let run = run(case, limits);
@@ -208,6 +210,14 @@ impl CheckedCase {
     }
 }
 
+/// The motions whose creepages are given; those that are searched are looked at when they are found.
+fn given_creepages<'a>(motions: &'a [Motion], forces: &[PrescribedForces]) -> &'a [Motion] {
+    match forces.iter().all(|forces| *forces == [None; 2]) {
+        true => motions,
+        false => &[],
+    }
+}
+
 /// What of a case stands in its answer.
 fn asked(case: &Case) -> Asked {
     Asked {
@@ -240,6 +250,17 @@ impl Problem {
             motions: chosen.iter().map(|k| self.motions[*k]).collect(),
             forces: chosen.iter().map(|k| self.forces[*k]).collect(),
             speeds: chosen.iter().map(|k| self.speeds[*k]).collect(),
+            ..self.clone()
+        }
+    }
+
+    /// The same question about one wheel of a wheelset that moves as a whole.
+    #[must_use]
+    pub(crate) fn of_wheel(&self, wheel: Arc<WheelTask>, wheelset: WheelsetMotion) -> Problem {
+        Problem {
+            task: NormalTask::Wheel(wheel),
+            wheelset: Some(wheelset),
+            drive_torque: None,
             ..self.clone()
         }
     }

@@ -46,7 +46,7 @@ pub(crate) fn task(
     Ok(Some((NormalTask::Wheel(Arc::new(contact)), remarks)))
 }
 
-/// The motion of the wheelset, if the case gives it instead of creepages.
+/// The motion of the wheelset, if the case gives it instead of creepages; its angular velocity is NaN where it has to be found.
 pub(crate) fn wheelset(motions: &Motions) -> Option<WheelsetMotion> {
     let Motions::Wheelset { wheelset } = motions else {
         return None;
@@ -55,6 +55,7 @@ pub(crate) fn wheelset(motions: &Motions) -> Option<WheelsetMotion> {
         speed_mm_per_s: speed,
         angular_velocity_rad_per_s,
         free_rolling_radius_mm,
+        drive_torque_n_mm: _,
         lateral_velocity_mm_per_s,
         yaw_rate_rad_per_s,
         roll_rate_rad_per_s,
@@ -67,6 +68,14 @@ pub(crate) fn wheelset(motions: &Motions) -> Option<WheelsetMotion> {
         yaw_rate: yaw_rate_rad_per_s,
         roll_rate: roll_rate_rad_per_s,
     })
+}
+
+/// The torque about the axle in N mm that the rails are to balance.
+pub(crate) fn drive_torque(motions: &Motions) -> Option<f64> {
+    match motions {
+        Motions::Wheelset { wheelset } => wheelset.drive_torque_n_mm,
+        _ => None,
+    }
 }
 
 fn loading(load: &Load) -> Option<WheelLoad> {
@@ -108,7 +117,7 @@ fn wheel_rail(contact: &Contact) -> Result<WheelRail, Vec<Fault>> {
         (Err(faults), Ok(_)) | (Ok(_), Err(faults)) => return Err(faults),
     };
     if !accept_rough_profiles {
-        exchanged(&rail, &wheel)?;
+        exchanged([&rail, &wheel], ["/contact/rail", "/contact/wheel"])?;
     }
     let placement = Placement {
         side: (*side).into(),
@@ -126,8 +135,11 @@ fn wheel_rail(contact: &Contact) -> Result<WheelRail, Vec<Fault>> {
         .map_err(|detail| vec![fault("/contact/rolling_radius_mm".to_owned(), detail)])
 }
 
-/// Faults of two profiles that both look like the other body's; one of them alone may be an unusual shape.
-fn exchanged(rail: &Profile, wheel: &Profile) -> Result<(), Vec<Fault>> {
+/// Faults of two profiles that both look like the other body's, at the pointers of both; one of them alone may be an unusual shape.
+pub(crate) fn exchanged(
+    [rail, wheel]: [&Profile; 2],
+    pointers: [&str; 2],
+) -> Result<(), Vec<Fault>> {
     let both = profile_points::misplaced(rail, Body::Rail)
         .zip(profile_points::misplaced(wheel, Body::Wheel));
     let Some((rail, wheel)) = both else {
@@ -140,8 +152,8 @@ fn exchanged(rail: &Profile, wheel: &Profile) -> Result<(), Vec<Fault>> {
         )
     };
     Err(vec![
-        fault("/contact/rail".to_owned(), refused(rail)),
-        fault("/contact/wheel".to_owned(), refused(wheel)),
+        fault(pointers[0].to_owned(), refused(rail)),
+        fault(pointers[1].to_owned(), refused(wheel)),
     ])
 }
 
@@ -167,6 +179,18 @@ fn trust(contact: &Contact) -> ProfileTrust {
 /// # Errors
 /// Why it is none.
 pub(crate) fn profile(body: Body, section: &CrossSection) -> Result<Profile, Fault> {
+    profile_at(&format!("/contact/{}", body.name()), body, section)
+}
+
+/// The same at a pointer.
+///
+/// # Errors
+/// Why it is none.
+pub(crate) fn profile_at(
+    pointer: &str,
+    body: Body,
+    section: &CrossSection,
+) -> Result<Profile, Fault> {
     let name = body.name();
     let mut reading = Reading {
         mirror_y: section.mirror_y,
@@ -177,7 +201,7 @@ pub(crate) fn profile(body: Body, section: &CrossSection) -> Result<Profile, Fau
         },
     };
     if let (Some(format), Some(text)) = (section.format, &section.text) {
-        let refuse = |detail| fault(format!("/contact/{name}/text"), detail);
+        let refuse = |detail| fault(format!("{pointer}/text"), detail);
         let contents = formats::read(format.into(), text).map_err(refuse)?;
         let is_wheel = body == Body::Wheel;
         if contents.wheel.is_some_and(|wheel| wheel != is_wheel) {
@@ -192,7 +216,7 @@ pub(crate) fn profile(body: Body, section: &CrossSection) -> Result<Profile, Fau
     }
     let points = section.points_mm.as_deref().unwrap_or_default();
     Profile::new(body, points, reading)
-        .map_err(|detail| fault(format!("/contact/{name}/points_mm"), detail))
+        .map_err(|detail| fault(format!("{pointer}/points_mm"), detail))
 }
 
 fn fault(pointer: String, detail: String) -> Fault {

@@ -60,6 +60,16 @@ pub(crate) fn segments(task: &NormalTask) -> Vec<f64> {
         NormalTask::Gap(contact) => vec![1.0; contact.outlook().summits],
         NormalTask::Given(field) => field.segments_per_strip(),
         NormalTask::Hertz(_) | NormalTask::Wheel(_) => vec![1.0],
+        // Both wheels of one position; the answers of all are kept.
+        NormalTask::Wheelset(_) => vec![1.0; 2],
+    }
+}
+
+/// Positions of a wheelset, each with answers of its own; 1 of other contacts.
+pub(crate) fn positions(task: &NormalTask) -> usize {
+    match task {
+        NormalTask::Wheelset(task) => task.poses.len(),
+        _ => 1,
     }
 }
 
@@ -67,7 +77,10 @@ pub(crate) fn segments(task: &NormalTask) -> Vec<f64> {
 pub(crate) fn length_over_width(task: &NormalTask) -> Option<f64> {
     match task {
         NormalTask::Hertz(ellipse) => Some(ellipse.a / ellipse.b),
-        NormalTask::Gap(_) | NormalTask::Given(_) | NormalTask::Wheel(_) => None,
+        NormalTask::Gap(_)
+        | NormalTask::Given(_)
+        | NormalTask::Wheel(_)
+        | NormalTask::Wheelset(_) => None,
     }
 }
 

@@ -15,6 +15,7 @@ use crate::contact::case::profile_points;
 use crate::contact::half_space::strip_operator::kind::Precision;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::normal_task::NormalTask;
+use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::refinement::mesh_policy::CELLS_MAX;
@@ -63,6 +64,13 @@ const TEETH_ROUGH: f64 = 4e-3;
 /// Time in s to bring a wheel to rest on its rail once, with two grids for every height.
 const WHEEL: f64 = 9e-3;
 
+/// How often both wheels are solved until their heights agree with the roll, and until the rails balance a torque besides.
+const ROUNDS_ROLL: f64 = 2.0;
+const ROUNDS_TORQUE: f64 = 5.0;
+/// Time in s to prepare the rigid wheelset, and to place it at one shift with two readings of its profiles.
+const RIGID: f64 = 0.02;
+const RIGID_SHIFT: f64 = 3e-3;
+
 /// Patches of a contact, and the time in s to find region and pressure.
 fn guesses(task: &NormalTask, target: Option<f64>) -> (Vec<PatchGuess>, f64) {
     match task {
@@ -84,6 +92,12 @@ fn guesses(task: &NormalTask, target: Option<f64>) -> (Vec<PatchGuess>, f64) {
         NormalTask::Wheel(task) => {
             let solves = f64::from(1 + profile_points::readings_expected(task));
             (vec![PatchGuess::of_wheel(task)], WHEEL * solves)
+        }
+        NormalTask::Wheelset(task) => {
+            let solves = |side: &WheelTask| f64::from(1 + profile_points::readings_expected(side));
+            let solves: f64 = task.sides.iter().map(solves).sum();
+            let patches = task.sides.iter().map(PatchGuess::of_wheel).collect();
+            (patches, WHEEL * solves)
         }
     }
 }
@@ -153,10 +167,26 @@ impl CheckedCase {
         let (normal, tangential) = self.unlike_seconds([normal, tangential]);
         let motions = self.problem.motions.len() as f64;
         let after = motions * self.after_seconds(patches.len());
+        let whole = normal + tangential + after;
         SolveTime {
             normal,
-            whole: normal + tangential + after,
+            whole: self.wheelset_seconds(whole),
         }
+    }
+
+    /// The time of a whole wheelset in all its positions, from that of both wheels once.
+    fn wheelset_seconds(&self, once: f64) -> f64 {
+        let NormalTask::Wheelset(task) = &self.problem.task else {
+            return once;
+        };
+        let rounds = match self.problem.drive_torque {
+            Some(_) => ROUNDS_TORQUE,
+            None => ROUNDS_ROLL,
+        };
+        let kinematics = task.kinematics.as_ref().map_or(0.0, |asked| {
+            RIGID + RIGID_SHIFT * (2.0 * asked.reach / asked.step)
+        });
+        once * rounds * task.poses.len() as f64 + kinematics
     }
 
     /// Times of the normal and the tangential problem where bodies differ.

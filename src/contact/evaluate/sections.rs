@@ -3,7 +3,12 @@
 use serde_json::Value;
 
 /// Where a case has cross-sections.
-const PLACES: [&str; 2] = ["/contact/rail", "/contact/wheel"];
+const PLACES: [&str; 4] = [
+    "/contact/rail",
+    "/contact/wheel",
+    "/contact/right/rail",
+    "/contact/right/wheel",
+];
 /// The member that names a stored cross-section.
 const PROFILE: &str = "profile";
 /// What it stands for.

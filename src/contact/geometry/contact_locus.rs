@@ -18,7 +18,7 @@ use crate::contact::numerics::bisection::bisect;
 /// Spacing of the search across the track, in mm.
 pub(crate) const STEP: f64 = 0.01;
 /// Spacing of the points along the curves, in mm.
-const CURVE_STEP: f64 = 0.02;
+pub(crate) const CURVE_STEP: f64 = 0.02;
 /// The window of a gap is larger than the overlap by this fraction on either side.
 const MARGIN: f64 = 0.15;
 /// Length in mm by which it is larger on either side as well.
@@ -297,13 +297,14 @@ fn apart(mut gap: LocalGap, limits: [Option<f64>; 2]) -> LocalGap {
 }
 
 /// Upper edge of a curve on the lines `k STEP`: height and parameter.
-struct Envelope {
-    first: i64,
-    points: Vec<Option<[f64; 2]>>,
+#[derive(Debug, Clone)]
+pub(crate) struct Envelope {
+    pub(crate) first: i64,
+    pub(crate) points: Vec<Option<[f64; 2]>>,
 }
 
 /// `curve` lists `[y, height, parameter]`; lines over a part without points have none.
-fn envelope(curve: &[Option<[f64; 3]>]) -> Envelope {
+pub(crate) fn envelope(curve: &[Option<[f64; 3]>]) -> Envelope {
     let y = || curve.iter().flatten().map(|point| point[0] / STEP);
     let first = y().fold(f64::INFINITY, f64::min).ceil() as i64;
     let last = y().fold(f64::NEG_INFINITY, f64::max).floor() as i64;

@@ -1,5 +1,6 @@
 //! Where do the bodies touch? Cross-sections of wheel and rail, their placement, and the gaps of their patches.
 
+pub mod conicity;
 pub mod contact_locus;
 pub mod crossing;
 pub mod formats;
@@ -12,8 +13,10 @@ pub mod plane_curve;
 pub mod profile;
 pub mod profile_quality;
 pub mod rail_in_frame;
+pub mod rigid_touch;
 pub mod smoothing;
 pub mod surface_exit;
 pub mod wheel_in_frame;
 pub mod wheel_rail;
 pub mod wheelset;
+pub mod wheelset_pose;

@@ -65,14 +65,39 @@ pub struct WheelRail {
     /// The rail in track axes.
     rail: PlaneCurve,
     wheel: Profile,
+    axes: AxleAxes,
+    /// Rail and wheel line by line, once they were looked for.
+    pub(crate) locus: LocusOnce,
+}
+
+/// Unit vectors of the wheelset in track axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct AxleAxes {
+    /// Along the axle, to the left.
     axle: [f64; 3],
     /// Length of the axle's part across the track.
     across: f64,
-    /// Unit vectors at right angles to the axle: nearly forward, and nearly down (without a part along x).
+    /// At right angles to the axle: nearly forward, and nearly down (without a part along x).
     forward: [f64; 3],
     down: [f64; 3],
-    /// Rail and wheel line by line, once they were looked for.
-    pub(crate) locus: LocusOnce,
+}
+
+impl AxleAxes {
+    fn new(placement: &Placement) -> AxleAxes {
+        let (yaw, roll) = (placement.yaw, placement.roll);
+        let axle = [-yaw.sin() * roll.cos(), yaw.cos() * roll.cos(), roll.sin()];
+        let across = axle[1].hypot(axle[2]);
+        AxleAxes {
+            axle,
+            across,
+            forward: [
+                across,
+                -axle[0] * axle[1] / across,
+                -axle[0] * axle[2] / across,
+            ],
+            down: [0.0, axle[2] / across, -axle[1] / across],
+        }
+    }
 }
 
 /// A point of the wheel's meridian: position along the axle and radius, with their derivatives to the profile's parameter.
@@ -120,10 +145,8 @@ impl WheelRail {
             .map(|at| at[1])
             .fold(f64::NEG_INFINITY, f64::max);
         let gauge_point = nearest_above(&places, top - placement.gauge_height);
-        let (yaw, roll) = (placement.yaw, placement.roll);
-        let axle = [-yaw.sin() * roll.cos(), yaw.cos() * roll.cos(), roll.sin()];
-        let across = axle[1].hypot(axle[2]);
         let origin = [0.5 * placement.gauge - gauge_point, -top];
+        let axes = AxleAxes::new(&placement);
         WheelRail {
             placement,
             rail: rail
@@ -131,16 +154,35 @@ impl WheelRail {
                 .placed(placement.cant, origin, placement.side.sign()),
             rail_given: rail,
             wheel,
-            axle,
-            across,
-            forward: [
-                across,
-                -axle[0] * axle[1] / across,
-                -axle[0] * axle[2] / across,
-            ],
-            down: [0.0, axle[2] / across, -axle[1] / across],
+            axes,
             locus: LocusOnce::default(),
         }
+    }
+
+    /// The same rail and wheel with the wheelset elsewhere: shift to the left in mm, yaw and roll in rad.
+    #[must_use]
+    pub fn posed(&self, lateral_shift: f64, yaw: f64, roll: f64) -> WheelRail {
+        let placement = Placement {
+            lateral_shift,
+            yaw,
+            roll,
+            ..self.placement
+        };
+        WheelRail {
+            axes: AxleAxes::new(&placement),
+            placement,
+            locus: LocusOnce::default(),
+            ..self.clone()
+        }
+    }
+
+    /// Moves the wheelset in place; what was found of the places of contact is forgotten.
+    pub(crate) fn pose(&mut self, lateral_shift: f64, yaw: f64, roll: f64) {
+        self.placement.lateral_shift = lateral_shift;
+        self.placement.yaw = yaw;
+        self.placement.roll = roll;
+        self.axes = AxleAxes::new(&self.placement);
+        self.locus = LocusOnce::default();
     }
 
     /// The profiles of rail (before cant) and wheel.
@@ -162,7 +204,7 @@ impl WheelRail {
     /// Unit vector along the axle, to the left.
     #[must_use]
     pub fn axle(&self) -> [f64; 3] {
-        self.axle
+        self.axes.axle
     }
 
     /// First and last parameter of the rail's and of the wheel's curve.
@@ -202,14 +244,14 @@ impl WheelRail {
     #[must_use]
     pub fn lowest(&self, s: f64) -> Option<[f64; 3]> {
         let circle = self.meridian(s);
-        let sin = circle.radius_slope * self.axle[0] / (circle.along_slope * self.across);
+        let sin = circle.radius_slope * self.axes.axle[0] / (circle.along_slope * self.axes.across);
         if sin.is_nan() || sin.abs() >= 1.0 {
             return None;
         }
         let cos = (1.0 - sin * sin).sqrt();
         let mut point = [0, 1, 2].map(|k| {
-            circle.along * self.axle[k]
-                + circle.radius * (cos * self.down[k] + sin * self.forward[k])
+            circle.along * self.axes.axle[k]
+                + circle.radius * (cos * self.axes.down[k] + sin * self.axes.forward[k])
         });
         point[1] += self.placement.lateral_shift;
         Some(point)
@@ -219,7 +261,7 @@ impl WheelRail {
     #[must_use]
     pub fn wheel_section(&self, s: f64) -> [f64; 2] {
         let circle = self.meridian(s);
-        let at = |k: usize| circle.along * self.axle[k] + circle.radius * self.down[k];
+        let at = |k: usize| circle.along * self.axes.axle[k] + circle.radius * self.axes.down[k];
         [at(1) + self.placement.lateral_shift, at(2)]
     }
 

@@ -7,6 +7,7 @@ use crate::contact::normal::hertz::Ellipse;
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::normal::wheel_height::task::WheelTask;
+use crate::contact::normal::wheel_height::wheelset_task::WheelsetTask;
 
 /// What is known of a contact before it is solved. Solved, it is a [`Footprint`](crate::contact::normal::footprint::Footprint).
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +20,8 @@ pub enum NormalTask {
     Gap(Box<GapTask>),
     /// A wheel on a rail: the places of its patches have to be found first, each in a frame of its own.
     Wheel(Arc<WheelTask>),
+    /// A wheelset on both rails, in one or several positions.
+    Wheelset(Arc<WheelsetTask>),
 }
 
 impl NormalTask {
@@ -28,7 +31,7 @@ impl NormalTask {
         match self {
             NormalTask::Hertz(ellipse) => vec![ellipse.patch()],
             NormalTask::Given(field) => field.patches(),
-            NormalTask::Gap(_) | NormalTask::Wheel(_) => Vec::new(),
+            NormalTask::Gap(_) | NormalTask::Wheel(_) | NormalTask::Wheelset(_) => Vec::new(),
         }
     }
 }

@@ -32,14 +32,38 @@ pub(crate) fn solve(
 ) -> Result<(Solution, Fields), SolveError> {
     let settled = settle::settled(case, contact, monitor)?;
     let contact = settled.as_ref().unwrap_or(contact);
+    let found = judged(operators, case, contact, monitor)?;
+    let found = trusted(operators, case, contact, found, monitor)?;
+    Ok((found.solution, found.fields))
+}
+
+/// Solves a wheel on a rail and refuses profiles that allow no answer; how far the others can be trusted is not assessed.
+///
+/// # Errors
+/// As [`solve`].
+pub(crate) fn judged(
+    operators: &Arc<OperatorStore>,
+    case: &CheckedCase,
+    contact: &WheelTask,
+    monitor: &dyn Monitor,
+) -> Result<Found, SolveError> {
+    coupling::solve(operators, case, contact, &Judgement { contact }, monitor)
+}
+
+/// Assesses the profiles under the patches of a wheel that was solved.
+///
+/// # Errors
+/// As [`solve`].
+pub(crate) fn trusted(
+    operators: &Arc<OperatorStore>,
+    case: &CheckedCase,
+    contact: &WheelTask,
+    mut found: Found,
+    monitor: &dyn Monitor,
+) -> Result<Found, SolveError> {
     let judgement = Judgement { contact };
-    let found = coupling::solve(operators, case, contact, &judgement, monitor)?;
     let (qualities, findings) = judgement.of(&found.wheel)?;
-    let Found {
-        mut solution,
-        fields,
-        ..
-    } = found;
+    let solution = &mut found.solution;
     for (patch, quality) in solution.patches.iter_mut().zip(qualities) {
         patch.quality = Some(quality);
     }
@@ -47,7 +71,7 @@ pub(crate) fn solve(
         finding.of_roughness() && finding.has_evidence() && finding.share > uncertainty::HARMLESS
     });
     let suspicious = rough || settle::undecided(contact);
-    let changes = uncertainty::add(operators, case, contact, suspicious, &mut solution, monitor)?;
+    let changes = uncertainty::add(operators, case, contact, suspicious, solution, monitor)?;
     let told = findings
         .into_iter()
         .filter(|finding| finding.is_told(changes[finding.patch]));
@@ -56,8 +80,8 @@ pub(crate) fn solve(
     solution.remarks.extend(told.iter().map(Finding::remark));
     solution
         .remarks
-        .extend(uncertainty::target_below(case, &solution));
-    Ok((solution, fields))
+        .extend(uncertainty::target_below(case, solution));
+    Ok(found)
 }
 
 /// The worst finding of each kind and body. A rough profile has dozens of patches, of which one remark each would be too many.

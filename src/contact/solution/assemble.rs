@@ -150,6 +150,7 @@ impl<'a> Assembly<'a> {
             remarks: merged(self.remarks),
             normal: self.pressed.report,
             wheel_lowering_mm: None,
+            wheelset: None,
             origin: Origin {
                 x_mm: 0.0,
                 y_mm: 0.0,

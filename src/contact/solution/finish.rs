@@ -128,6 +128,11 @@ fn implausible(solution: &Solution, before: usize) -> Vec<RemarkEntry> {
             said.extend(remark.map(|remark| at(remark, Some(before + motion))));
         }
     }
-    said.extend(plausibility::load(force.sum()).map(RemarkEntry::from));
+    let positions = solution
+        .wheelset
+        .as_ref()
+        .map_or(1, |all| all.positions.len());
+    let load = force.sum::<f64>() / positions as f64;
+    said.extend(plausibility::load(load).map(RemarkEntry::from));
     said
 }

@@ -10,5 +10,6 @@ pub mod maintenance;
 pub mod profile_quality;
 pub mod track_axes;
 pub mod understanding;
+pub mod wheelset;
 pub mod words;
 pub mod zone;

@@ -189,7 +189,7 @@ fn sum(so_far: Option<Total>, part: Total) -> Option<Total> {
 }
 
 /// One report for two parts: the finer grid, all the work, the worse residual.
-fn both(one: Option<NormalReport>, other: Option<NormalReport>) -> Option<NormalReport> {
+pub(crate) fn both(one: Option<NormalReport>, other: Option<NormalReport>) -> Option<NormalReport> {
     let (Some(one), Some(other)) = (one, other) else {
         return one.or(other);
     };

@@ -13,6 +13,7 @@ use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::solution::damage::{Damage, DamageFiguresUsed};
 use crate::contact::solution::maintenance::{SubsurfaceSummary, TemperatureSummary};
 use crate::contact::solution::profile_quality::{PatchQuality, ProfileUncertainty};
+use crate::contact::solution::wheelset::WheelsetAnswer;
 use crate::contact::solution::zone::Zone;
 
 /// The answer to one case, without fields.
@@ -31,6 +32,11 @@ pub struct Solution {
     /// How far the wheel is below the height of first touch, vertically, in mm; only for `profiles`.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub wheel_lowering_mm: Option<f64>,
+    /// The positions of the wheelset and its kinematics; only for `wheelset`. `total` then has one entry per position, and every patch
+    /// belongs to one side of one position.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub wheelset: Option<Box<WheelsetAnswer>>,
     /// The point that rigid slip and moments refer to, and where it is.
     pub origin: Origin,
     /// The frame in words.

@@ -303,7 +303,12 @@ impl RunDraft {
             let pointer = column.pointer.as_deref();
             matches!(
                 pointer,
-                Some("/contact/rail/profile" | "/contact/wheel/profile")
+                Some(
+                    "/contact/rail/profile"
+                        | "/contact/wheel/profile"
+                        | "/contact/right/rail/profile"
+                        | "/contact/right/wheel/profile"
+                )
             )
         };
         let mut faults = Vec::new();

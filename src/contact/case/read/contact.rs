@@ -6,6 +6,7 @@ use crate::contact::case::read::faults::Interval;
 use crate::contact::case::read::object::{Object, shown};
 use crate::contact::case::read::profiles;
 use crate::contact::case::read::samples::{Quantity, axis, line, samples};
+use crate::contact::case::read::wheelset;
 use crate::contact::case::words::contact::{Contact, Load};
 
 const RADIUS: Interval = Interval::positive(1e9, "mm");
@@ -34,15 +35,17 @@ enum ContactWord {
     GapGrid,
     PressureGrid,
     Profiles,
+    Wheelset,
 }
 
-const KINDS: [(&str, ContactWord); 6] = [
+const KINDS: [(&str, ContactWord); 7] = [
     ("radii", ContactWord::Radii),
     ("ellipse", ContactWord::Ellipse),
     ("gap_profile", ContactWord::GapProfile),
     ("gap_grid", ContactWord::GapGrid),
     ("pressure_grid", ContactWord::PressureGrid),
     ("profiles", ContactWord::Profiles),
+    ("wheelset", ContactWord::Wheelset),
 ];
 
 /// Reads the required member `contact` of a case.
@@ -100,6 +103,7 @@ pub(crate) fn read(case: &mut Object) -> Option<Contact> {
             })
         }
         ContactWord::Profiles => profiles::read(&mut block),
+        ContactWord::Wheelset => wheelset::read(&mut block),
     }
 }
 
@@ -111,14 +115,10 @@ pub(crate) fn read_load(case: &mut Object) -> Option<Load> {
         .value("contact")
         .and_then(|contact| contact.get("type"))
         .and_then(Value::as_str);
-    if kind == Some("pressure_grid") {
-        if case.has("load") {
-            case.fault(
-                "load",
-                "given together with a pressure_grid, which carries its own load; leave it out",
-            );
-        }
-        return None;
+    match kind {
+        Some("wheelset") => return wheelset::read_load(case, FORCE),
+        Some("pressure_grid") => return no_load(case),
+        _ => {}
     }
     let of_gap = matches!(kind, Some("gap_profile" | "gap_grid"));
     let of_profiles = kind == Some("profiles");
@@ -171,8 +171,20 @@ pub(crate) fn read_load(case: &mut Object) -> Option<Load> {
     Some(Load {
         normal_force_n,
         vertical_force_n,
+        left_share: None,
         approach_mm,
     })
+}
+
+/// The load of a pressure that is given.
+fn no_load(case: &mut Object) -> Option<Load> {
+    if case.has("load") {
+        case.fault(
+            "load",
+            "given together with a pressure_grid, which carries its own load; leave it out",
+        );
+    }
+    None
 }
 
 type Grid = (Option<Vec<f64>>, Option<Vec<f64>>, Option<Vec<Vec<f64>>>);

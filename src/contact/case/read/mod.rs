@@ -13,3 +13,4 @@ pub mod samples;
 pub mod solver;
 pub mod subsurface;
 pub mod thermal;
+pub mod wheelset;

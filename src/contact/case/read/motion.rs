@@ -15,6 +15,7 @@ const SPEED: Interval = Interval::positive(1e9, "mm/s");
 const VELOCITY: Interval = Interval::closed(-1e9, 1e9, "mm/s");
 const RATE: Interval = Interval::closed(-1e6, 1e6, "rad/s");
 const RADIUS: Interval = Interval::positive(1e9, "mm");
+const TORQUE: Interval = Interval::closed(-1e15, 1e15, "N mm");
 /// Most motions of a sweep, before the limit of the service.
 const POINTS_MAX: u32 = 1_000_000;
 const FORCE: Interval = Interval::closed(-1e15, 1e15, "N");
@@ -40,11 +41,12 @@ pub(crate) fn read(case: &mut Object) -> Option<Motions> {
     let kind = case
         .value("contact")
         .and_then(|contact| contact.get("type"));
-    let of_profiles = kind.and_then(Value::as_str) == Some("profiles");
+    let kind = kind.and_then(Value::as_str);
+    let (of_profiles, of_wheelset) = (kind == Some("profiles"), kind == Some("wheelset"));
     let pointer = case.pointer_to("motion");
     let faults = case.faults();
     match value {
-        Value::Object(members) if members.contains_key("sweep") => {
+        Value::Object(members) if members.contains_key("sweep") && !of_wheelset => {
             let mut block = Object::open(value, pointer, faults)?;
             block.only(&["sweep"], &[]);
             let sweep = sweep(&mut block.child("sweep")?)?;
@@ -53,15 +55,21 @@ pub(crate) fn read(case: &mut Object) -> Option<Motions> {
         Value::Object(members) if members.contains_key("wheelset") => {
             let mut block = Object::open(value, pointer, faults)?;
             block.only(&["wheelset"], &[]);
-            if !of_profiles {
+            if !of_profiles && !of_wheelset {
                 block.fault(
                     "wheelset",
-                    "given for another contact than \"type\": \"profiles\"; give creepages instead",
+                    "given for another contact than \"type\": \"profiles\" or \"wheelset\"; give creepages instead",
                 );
                 return None;
             }
-            let wheelset = wheelset(&mut block.child("wheelset")?)?;
+            let wheelset = wheelset(&mut block.child("wheelset")?, of_wheelset)?;
             Some(Motions::Wheelset { wheelset })
+        }
+        _ if of_wheelset => {
+            let what = "the motion of the wheelset is needed, such as {\"wheelset\": {\"speed_mm_per_s\": 20000, \"drive_torque_n_mm\": 0}}, from which \
+                        every patch gets its own creepages";
+            faults.add(pointer, format!("{} given; {what}", shown(value)));
+            None
         }
         Value::Object(_) => motion(value, pointer, faults).map(Motions::One),
         Value::Array(elements) if !elements.is_empty() => {
@@ -113,19 +121,31 @@ fn speed(block: &mut Object) -> Option<Option<f64>> {
     }
 }
 
-fn wheelset(block: &mut Object) -> Option<Wheelset> {
-    const SPINS: [&str; 2] = ["angular_velocity_rad_per_s", "free_rolling_radius_mm"];
+/// The motion of a wheelset; only one on both rails can have a torque balanced.
+fn wheelset(block: &mut Object, on_both_rails: bool) -> Option<Wheelset> {
+    const SPINS: [(&str, Interval); 3] = [
+        ("angular_velocity_rad_per_s", RATE),
+        ("free_rolling_radius_mm", RADIUS),
+        ("drive_torque_n_mm", TORQUE),
+    ];
     const RATES: [(&str, Interval); 3] = [
         ("lateral_velocity_mm_per_s", VELOCITY),
         ("yaw_rate_rad_per_s", RATE),
         ("roll_rate_rad_per_s", RATE),
     ];
-    let names = ["speed_mm_per_s"].into_iter().chain(SPINS);
-    let names: Vec<&str> = names.chain(RATES.map(|(name, _)| name)).collect();
+    let spins = if on_both_rails {
+        &SPINS[..]
+    } else {
+        &SPINS[..2]
+    };
+    let names = spins.iter().chain(&RATES).map(|(name, _)| *name);
+    let names: Vec<&str> = ["speed_mm_per_s"].into_iter().chain(names).collect();
     block.only(&names, &[]);
     let speed_mm_per_s = block.required_number("speed_mm_per_s", SPEED);
-    let angular_velocity_rad_per_s = block.number(SPINS[0], RATE);
-    let free_rolling_radius_mm = block.number(SPINS[1], RADIUS);
+    let mut spin = [None; 3];
+    for (k, (name, allowed)) in spins.iter().enumerate() {
+        spin[k] = block.number(name, *allowed);
+    }
     let rates = RATES.map(|(name, allowed)| {
         if block.has(name) {
             block.number(name, allowed)
@@ -133,32 +153,39 @@ fn wheelset(block: &mut Object) -> Option<Wheelset> {
             Some(0.0)
         }
     });
-    match SPINS.map(|name| block.has(name)) {
-        [true, true] => {
+    let given: Vec<&str> = spins.iter().map(|(name, _)| *name).collect();
+    let given: Vec<&str> = given.into_iter().filter(|name| block.has(name)).collect();
+    match given.as_slice() {
+        [_] => {}
+        [] => {
+            let others: Vec<&str> = spins[1..].iter().map(|(name, _)| *name).collect();
+            let others = others.join(" or ");
             block.fault(
-                SPINS[1],
-                format!(
-                    "given together with {}; exactly one of the two is allowed",
-                    SPINS[0]
-                ),
+                SPINS[0].0,
+                format!("missing; {RATE} is needed, or {others} instead"),
             );
             return None;
         }
-        [false, false] => {
+        [first, second, ..] => {
             block.fault(
-                SPINS[0],
-                format!("missing; {RATE} is needed, or {} instead", SPINS[1]),
+                second,
+                format!("given together with {first}; exactly one of the two is allowed"),
             );
             return None;
         }
-        _ => {}
     }
-    angular_velocity_rad_per_s.or(free_rolling_radius_mm)?;
+    let [
+        angular_velocity_rad_per_s,
+        free_rolling_radius_mm,
+        drive_torque_n_mm,
+    ] = spin;
+    spin.into_iter().flatten().next()?;
     let [lateral, yaw, roll] = rates;
     Some(Wheelset {
         speed_mm_per_s: speed_mm_per_s?,
         angular_velocity_rad_per_s,
         free_rolling_radius_mm,
+        drive_torque_n_mm,
         lateral_velocity_mm_per_s: lateral?,
         yaw_rate_rad_per_s: yaw?,
         roll_rate_rad_per_s: roll?,
@@ -168,7 +195,7 @@ fn wheelset(block: &mut Object) -> Option<Wheelset> {
 fn sweep(block: &mut Object) -> Option<Sweep> {
     let mut read = [const { None }; COMPONENTS.len()];
     components(block, &["combine", SPEED_NAME], |block, k, name| {
-        read[k] = Some(swept(block, k, name));
+        read[k] = Some(swept(block, name, interval(k)));
     })?;
     let speed_mm_per_s = speed(block)?;
     let combine = block.word(
@@ -258,14 +285,14 @@ fn components(
 }
 
 /// A number, `{"from": …, "to": …, "points": …}` or `{"values": […]}`.
-fn swept(block: &mut Object, k: usize, name: &str) -> Option<Swept> {
+pub(crate) fn swept(block: &mut Object, name: &str, allowed: Interval) -> Option<Swept> {
     let what = "a number, {\"from\": …, \"to\": …, \"points\": …} or {\"values\": […]}";
     match block.value(name)? {
-        Value::Number(_) => block.number(name, interval(k)).map(Swept::Constant),
+        Value::Number(_) => block.number(name, allowed).map(Swept::Constant),
         Value::Object(members) if members.contains_key("values") => {
-            list(block, k, name).map(Swept::List)
+            list(block, name, allowed).map(Swept::List)
         }
-        Value::Object(_) => range(block, k, name).map(Swept::Range),
+        Value::Object(_) => range(block, name, allowed).map(Swept::Range),
         other => {
             block.fault(name, format!("{} given; {what} is needed", shown(other)));
             None
@@ -273,7 +300,7 @@ fn swept(block: &mut Object, k: usize, name: &str) -> Option<Swept> {
     }
 }
 
-fn list(block: &mut Object, k: usize, name: &str) -> Option<ValueList> {
+fn list(block: &mut Object, name: &str, allowed: Interval) -> Option<ValueList> {
     let mut block = block.child(name)?;
     block.only(&["values"], &[]);
     let value = block.value("values")?;
@@ -289,17 +316,17 @@ fn list(block: &mut Object, k: usize, name: &str) -> Option<ValueList> {
         return None;
     };
     let pointer = block.pointer_to("values");
-    let (mut refused, allowed) = (0, interval(k));
+    let mut refused = 0;
     let values = numbers(elements, &pointer, allowed, &mut refused, block.faults());
     count_rest(&pointer, allowed, refused, block.faults());
     Some(ValueList { values: values? })
 }
 
-fn range(block: &mut Object, k: usize, name: &str) -> Option<Range> {
+fn range(block: &mut Object, name: &str, allowed: Interval) -> Option<Range> {
     let mut block = block.child(name)?;
     block.only(&["from", "to", "points"], &[]);
-    let from = block.required_number("from", interval(k));
-    let to = block.required_number("to", interval(k));
+    let from = block.required_number("from", allowed);
+    let to = block.required_number("to", allowed);
     let points = block.required_count("points", 1, POINTS_MAX);
     let (from, to, points) = (from?, to?, points?);
     if points == 1 && from.to_bits() != to.to_bits() {

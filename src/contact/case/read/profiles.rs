@@ -15,12 +15,12 @@ const FORMATS: [(&str, FormatName); 3] = [
     ("simpack", FormatName::Simpack),
     ("miniprof", FormatName::Miniprof),
 ];
-const ROLLING_RADIUS: Interval = Interval::positive(1e5, "mm");
-const DISTANCE: Interval = Interval::positive(1e5, "mm");
-const PLACE: Interval = Interval::closed(-1e3, 1e3, "mm");
-const DEPTH: Interval = Interval::closed(0.0, 100.0, "mm");
-const CANT: Interval = Interval::closed(-0.5, 0.5, "rad");
-const ANGLE: Interval = Interval::closed(-0.3, 0.3, "rad");
+pub(crate) const ROLLING_RADIUS: Interval = Interval::positive(1e5, "mm");
+pub(crate) const DISTANCE: Interval = Interval::positive(1e5, "mm");
+pub(crate) const PLACE: Interval = Interval::closed(-1e3, 1e3, "mm");
+pub(crate) const DEPTH: Interval = Interval::closed(0.0, 100.0, "mm");
+pub(crate) const CANT: Interval = Interval::closed(-0.5, 0.5, "rad");
+pub(crate) const ANGLE: Interval = Interval::closed(-0.3, 0.3, "rad");
 const COORDINATE: Interval = Interval::closed(-1e6, 1e6, "mm");
 const SMOOTHING: Interval = Interval::closed(0.0, 50.0, "mm");
 /// Characters of a file.
@@ -87,7 +87,8 @@ pub(crate) fn read(block: &mut Object) -> Option<Contact> {
     })
 }
 
-fn section(contact: &mut Object, name: &str) -> Option<CrossSection> {
+/// Reads a cross-section that is needed.
+pub(crate) fn section(contact: &mut Object, name: &str) -> Option<CrossSection> {
     section_of(&mut contact.child(name)?)
 }
 
@@ -173,7 +174,7 @@ fn smoothing(block: &mut Object) -> Option<Smoothing> {
 }
 
 /// A truth value that may be left out; the outer `None` is a fault.
-fn flag(block: &mut Object, name: &str) -> Option<Option<bool>> {
+pub(crate) fn flag(block: &mut Object, name: &str) -> Option<Option<bool>> {
     let Some(value) = block.value(name) else {
         return Some(None);
     };

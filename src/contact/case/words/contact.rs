@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::contact::case::words::motion::{Combine, Swept};
+
 /// Where the bodies touch.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[serde(tag = "type", rename_all = "snake_case")]
@@ -98,6 +100,56 @@ pub enum Contact {
         #[schema(required = false)]
         accept_rough_profiles: bool,
     },
+    /// A wheelset on both rails of a track, by their cross-sections. Its roll and its height are found, and every patch of both wheels.
+    Wheelset {
+        /// Cross-section of both rails, or of the left one where `right` has another.
+        #[schema(inline = false)]
+        rail: Box<CrossSection>,
+        /// Cross-section of both wheels, or of the left one where `right` has another.
+        #[schema(inline = false)]
+        wheel: Box<CrossSection>,
+        /// What differs on the right; nothing when left out.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schema(nullable = false, inline = false)]
+        right: Option<Box<RightSide>>,
+        /// Radius of the wheels where z of their cross-section is 0, in mm.
+        #[schema(exclusive_minimum = 0.0)]
+        rolling_radius_mm: f64,
+        /// Distance of the gauge faces of the two rails, in mm; 1435 when left out.
+        #[schema(required = false)]
+        gauge_mm: f64,
+        /// Depth below the top of the rail at which the gauge is measured, in mm; 14 when left out.
+        #[schema(required = false)]
+        gauge_height_mm: f64,
+        /// Turn of each rail about the origin of its cross-section, in rad, positive with its top toward the track centre; 0
+        /// when left out.
+        #[schema(required = false)]
+        cant_rad: f64,
+        /// Distance of the backs of the two flanges, in mm; 1360 when left out.
+        #[schema(required = false)]
+        flange_back_distance_mm: f64,
+        /// y of the back of the flange in the wheels' cross-section, in mm; -70 when left out.
+        #[schema(required = false)]
+        flange_back_position_mm: f64,
+        /// Shift of the wheelset to the left, in mm: a number, or several; 0 when left out. A shift and a yaw make a position, and every
+        /// position has its own patches.
+        #[schema(required = false, inline = false)]
+        lateral_shift_mm: Swept,
+        /// Yaw of the wheelset in rad, positive from x to y: a number, or several; 0 when left out.
+        #[schema(required = false, inline = false)]
+        yaw_rad: Swept,
+        /// How several shifts and several yaws make positions: `together` (default) or `grid`, yaw fastest.
+        #[schema(required = false)]
+        combine: Combine,
+        /// Asks for the difference of the rolling radii over the shift, and for the equivalent conicity.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schema(nullable = false, inline = false)]
+        kinematics: Option<KinematicsWords>,
+        /// As of `profiles`.
+        #[serde(skip_serializing_if = "is_false")]
+        #[schema(required = false)]
+        accept_rough_profiles: bool,
+    },
 }
 
 fn is_false(value: &bool) -> bool {
@@ -140,6 +192,37 @@ pub struct CrossSection {
     pub smoothing_mm: Smoothing,
 }
 
+/// What differs on the right of a wheelset or of the track; at least one member is given.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct RightSide {
+    /// Cross-section of the right rail.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, inline = false)]
+    pub rail: Option<Box<CrossSection>>,
+    /// Cross-section of the right wheel.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, inline = false)]
+    pub wheel: Option<Box<CrossSection>>,
+    /// Radius of the right wheel where z of its cross-section is 0, in mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    pub rolling_radius_mm: Option<f64>,
+}
+
+/// What is asked of the rigid wheelset over a range of shifts, without yaw.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct KinematicsWords {
+    /// Largest shift to either side, in mm; 10 when left out.
+    #[schema(required = false, exclusive_minimum = 0.0)]
+    pub reach_mm: f64,
+    /// Distance of the shifts, in mm; 0.1 when left out.
+    #[schema(required = false, exclusive_minimum = 0.0)]
+    pub step_mm: f64,
+    /// Amplitudes in mm at which the equivalent conicity is answered; 1 to 7 when left out. That of vehicle acceptance is 3.
+    #[schema(required = false)]
+    pub amplitudes_mm: Vec<f64>,
+}
+
 /// How a cross-section is smoothed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 #[serde(untagged)]
@@ -159,6 +242,12 @@ pub enum SmoothingWord {
 }
 
 impl Contact {
+    /// Are patches found from cross-sections?
+    #[must_use]
+    pub fn has_profiles(&self) -> bool {
+        matches!(self, Contact::Profiles { .. } | Contact::Wheelset { .. })
+    }
+
     /// The word for `contact.type`.
     #[must_use]
     pub fn name(&self) -> &'static str {
@@ -169,21 +258,27 @@ impl Contact {
             Contact::GapGrid { .. } => "gap_grid",
             Contact::PressureGrid { .. } => "pressure_grid",
             Contact::Profiles { .. } => "profiles",
+            Contact::Wheelset { .. } => "wheelset",
         }
     }
 }
 
-/// How hard the bodies are pressed together; exactly one member is given.
+/// How hard the bodies are pressed together; exactly one member is given, for `wheelset` with `left_share` beside it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Load {
     /// Normal force in N, more than 0. For `profiles` the sum over all patches, each along its own normal.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub normal_force_n: Option<f64>,
-    /// Vertical force of the wheel on the rail in N, more than 0; for `profiles` only.
+    /// Vertical force of the wheel on the rail in N, more than 0; for `profiles` only. For `wheelset`, which needs it, that of both
+    /// wheels together.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub vertical_force_n: Option<f64>,
+    /// The part of the vertical force that the left wheel carries; for `wheelset` only, 0.5 when left out.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false, minimum = 0.01, maximum = 0.99)]
+    pub left_share: Option<f64>,
     /// Approach of distant points in mm. For `radii` and `ellipse` it is measured from first touch and is more than 0. For gaps it is
     /// measured from gap = 0 of the data and is more than the least gap. For `profiles` it is the vertical distance by which the wheel is
     /// lowered from first touch.

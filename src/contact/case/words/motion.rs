@@ -60,14 +60,14 @@ pub enum Motions {
         /// The values of its components.
         sweep: Sweep,
     },
-    /// The motion of the wheelset, from which every patch gets its own creepages; for `profiles` only.
+    /// The motion of the wheelset, from which every patch gets its own creepages; for `profiles` and `wheelset`.
     Wheelset {
         /// How the wheelset moves.
         wheelset: Wheelset,
     },
 }
 
-/// Motion of a wheelset. Exactly one of `angular_velocity_rad_per_s` and `free_rolling_radius_mm` is given.
+/// Motion of a wheelset. Exactly one of `angular_velocity_rad_per_s`, `free_rolling_radius_mm` and `drive_torque_n_mm` is given.
 ///
 /// With the speed V, the axle e, the angular velocity ω = Ω e + (roll rate, 0, yaw rate) and r from the wheelset's centre to the
 /// patch, the wheel's material moves with v = (V, lateral velocity, 0) + ω × r; the creepages of a patch with the tangent t and the
@@ -85,6 +85,11 @@ pub struct Wheelset {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub free_rolling_radius_mm: Option<f64>,
+    /// Torque about the axle that a drive or a brake exerts on the wheelset, in N mm, positive if it drives forward; for the contact
+    /// `wheelset` only. The angular velocity is found at which the rails balance it: 0 is a wheelset that rolls freely.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub drive_torque_n_mm: Option<f64>,
     /// Velocity of the centre to the left in mm/s; 0 when left out.
     #[schema(required = false)]
     pub lateral_velocity_mm_per_s: f64,

@@ -4,3 +4,4 @@ pub mod bracket;
 pub mod gap_remarks;
 pub mod search;
 pub mod task;
+pub mod wheelset_task;

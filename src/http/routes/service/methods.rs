@@ -245,6 +245,12 @@ fn contacts() -> Vec<ContactCapability> {
             summary: "A wheel on a rail by their cross-sections: every patch is found, with its place and its own frame.",
         },
         ContactCapability {
+            name: "wheelset",
+            needs_load: true,
+            summary: "A wheelset on both rails by their cross-sections, in one or several positions: its roll, its height and every patch are found; with \
+                      its equivalent conicity if asked.",
+        },
+        ContactCapability {
             name: "pressure_grid",
             needs_load: false,
             summary: "A given pressure on a grid; its positive part is the contact, in one or several patches.",

@@ -84,7 +84,7 @@ function loaded(app, looked, answer) {
       <div class="aside">
         ${looked.placed && patch.position ? profilePanel(app, looked, answer) : nothing}
         ${patch.points.length > 2 ? curvePanel(app, looked, patch) : nothing}
-        ${answer.patches.length > 1 ? totalPanel(answer, looked.point) : nothing}
+        ${answer.patches.length > 1 ? totalPanel(answer, looked.point, looked.patch) : nothing}
         ${factsPanel(answer, patch, point)}
       </div>
     </div>`;
@@ -261,9 +261,15 @@ function curvePanel(app, looked, patch) {
 /** @param {unknown} label @param {unknown} value */
 const row = (label, value) => html`<div><dt>${label}</dt><dd>${value}</dd></div>`;
 
-/** The sum of all patches. @param {JobResult} answer @param {number} point */
-function totalPanel(answer, point) {
-  const total = answer.total[point];
+/** The position of a wheelset that a patch belongs to. @param {JobResult} answer @param {number} patch */
+function positionOf(answer, patch) {
+  const { positions } = answer.wheelset ?? {};
+  return positions?.findIndex(({ left, right }) => left.patches.includes(patch) || right.patches.includes(patch));
+}
+
+/** The sum of all patches. @param {JobResult} answer @param {number} point @param {number} patch */
+function totalPanel(answer, point, patch) {
+  const total = answer.total[positionOf(answer, patch) ?? point];
   if (!total) return nothing;
   const errors = total.error_estimate;
   const force = (/** @type {number} */ value, /** @type {number | undefined} */ error) => {

@@ -1,0 +1,220 @@
+//! Reads a contact of the type `wheelset`, and the load that goes with it.
+
+use crate::contact::case::read::faults::Interval;
+use crate::contact::case::read::motion::swept;
+use crate::contact::case::read::object::{Object, shown};
+use crate::contact::case::read::profiles::{
+    ANGLE, CANT, DEPTH, DISTANCE, PLACE, ROLLING_RADIUS, flag, section,
+};
+use crate::contact::case::read::samples::{count_rest, numbers};
+use crate::contact::case::words::contact::{Contact, KinematicsWords, Load, RightSide};
+use crate::contact::case::words::motion::{Combine, Swept};
+
+const SHARE: Interval = Interval::closed(0.01, 0.99, "");
+const REACH: Interval = Interval::positive(50.0, "mm");
+const STEP: Interval = Interval::positive(5.0, "mm");
+/// Most shifts to one side, and most amplitudes.
+const SHIFTS_MAX: f64 = 1000.0;
+const AMPLITUDES_MAX: usize = 100;
+const MEMBERS: [&str; 14] = [
+    "type",
+    "rail",
+    "wheel",
+    "right",
+    "rolling_radius_mm",
+    "gauge_mm",
+    "gauge_height_mm",
+    "cant_rad",
+    "flange_back_distance_mm",
+    "flange_back_position_mm",
+    "lateral_shift_mm",
+    "yaw_rad",
+    "combine",
+    "kinematics",
+];
+
+/// Reads the members of the contact.
+pub(crate) fn read(block: &mut Object) -> Option<Contact> {
+    let members: Vec<&str> = MEMBERS
+        .into_iter()
+        .chain(["accept_rough_profiles"])
+        .collect();
+    block.only(&members, &[]);
+    let rail = section(block, "rail");
+    let wheel = section(block, "wheel");
+    let right = right(block);
+    let rolling_radius_mm = block.required_number("rolling_radius_mm", ROLLING_RADIUS);
+    let mut or = |name: &str, allowed: Interval, default: f64| {
+        if block.has(name) {
+            block.number(name, allowed)
+        } else {
+            Some(default)
+        }
+    };
+    let gauge_mm = or("gauge_mm", DISTANCE, 1435.0);
+    let gauge_height_mm = or("gauge_height_mm", DEPTH, 14.0);
+    let cant_rad = or("cant_rad", CANT, 0.0);
+    let flange_back_distance_mm = or("flange_back_distance_mm", DISTANCE, 1360.0);
+    let flange_back_position_mm = or("flange_back_position_mm", PLACE, -70.0);
+    let (shifts, yaws, combine) = poses(block)?;
+    let kinematics = kinematics(block);
+    let accept_rough_profiles = flag(block, "accept_rough_profiles");
+    Some(Contact::Wheelset {
+        rail: Box::new(rail?),
+        wheel: Box::new(wheel?),
+        right: right?.map(Box::new),
+        rolling_radius_mm: rolling_radius_mm?,
+        gauge_mm: gauge_mm?,
+        gauge_height_mm: gauge_height_mm?,
+        cant_rad: cant_rad?,
+        flange_back_distance_mm: flange_back_distance_mm?,
+        flange_back_position_mm: flange_back_position_mm?,
+        lateral_shift_mm: shifts,
+        yaw_rad: yaws,
+        combine,
+        kinematics: kinematics?,
+        accept_rough_profiles: accept_rough_profiles?.unwrap_or(false),
+    })
+}
+
+/// Shifts, yaws, and how they are combined.
+fn poses(block: &mut Object) -> Option<(Swept, Swept, Combine)> {
+    let mut values = |name: &str, allowed: Interval| {
+        if block.has(name) {
+            swept(block, name, allowed)
+        } else {
+            Some(Swept::Constant(0.0))
+        }
+    };
+    let shifts = values("lateral_shift_mm", PLACE);
+    let yaws = values("yaw_rad", ANGLE);
+    let words = [("together", Combine::Together), ("grid", Combine::Grid)];
+    let combine = block.word("combine", &words, &[]);
+    if block.has("combine") {
+        combine?;
+    }
+    let (shifts, yaws, combine) = (shifts?, yaws?, combine.unwrap_or_default());
+    let [a, b] = [&shifts, &yaws].map(Swept::points);
+    if combine == Combine::Together && a != b && a > 1 && b > 1 {
+        block.fault(
+            "yaw_rad",
+            format!(
+                "{b} values given with {a} of lateral_shift_mm; values combined \"together\" need the same number, which \"combine\": \
+                 \"grid\" does not"
+            ),
+        );
+        return None;
+    }
+    Some((shifts, yaws, combine))
+}
+
+/// What differs on the right; the outer `None` is a fault.
+fn right(block: &mut Object) -> Option<Option<RightSide>> {
+    const MEMBERS: [&str; 3] = ["rail", "wheel", "rolling_radius_mm"];
+    if !block.has("right") {
+        return Some(None);
+    }
+    let mut side = block.child("right")?;
+    side.only(&MEMBERS, &[]);
+    if !MEMBERS.iter().any(|name| side.has(name)) {
+        let names = MEMBERS.join(", ");
+        side.fault_here(format!("empty; at least one of {names} is needed"));
+        return None;
+    }
+    let mut own = |name: &str| match side.has(name) {
+        true => section(&mut side, name).map(|section| Some(Box::new(section))),
+        false => Some(None),
+    };
+    let (rail, wheel) = (own("rail"), own("wheel"));
+    let radius = side.number("rolling_radius_mm", ROLLING_RADIUS);
+    if side.has("rolling_radius_mm") {
+        radius?;
+    }
+    Some(Some(RightSide {
+        rail: rail?,
+        wheel: wheel?,
+        rolling_radius_mm: radius,
+    }))
+}
+
+/// What is asked of the rigid wheelset; the outer `None` is a fault.
+fn kinematics(block: &mut Object) -> Option<Option<KinematicsWords>> {
+    if !block.has("kinematics") {
+        return Some(None);
+    }
+    let mut asked = block.child("kinematics")?;
+    asked.only(&["reach_mm", "step_mm", "amplitudes_mm"], &[]);
+    let mut or = |name: &str, allowed: Interval, default: f64| {
+        if asked.has(name) {
+            asked.number(name, allowed)
+        } else {
+            Some(default)
+        }
+    };
+    let reach_mm = or("reach_mm", REACH, 10.0);
+    let step_mm = or("step_mm", STEP, 0.1);
+    let amplitudes_mm = amplitudes(&mut asked);
+    let (reach_mm, step_mm) = (reach_mm?, step_mm?);
+    if reach_mm / step_mm > SHIFTS_MAX || reach_mm / step_mm < 2.0 {
+        asked.fault(
+            "step_mm",
+            format!("{step_mm} given for a reach of {reach_mm} mm; 2 to {SHIFTS_MAX} steps to either side are allowed"),
+        );
+        return None;
+    }
+    Some(Some(KinematicsWords {
+        reach_mm,
+        step_mm,
+        amplitudes_mm: amplitudes_mm?,
+    }))
+}
+
+fn amplitudes(asked: &mut Object) -> Option<Vec<f64>> {
+    let Some(value) = asked.value("amplitudes_mm") else {
+        return Some((1..=7).map(f64::from).collect());
+    };
+    let elements = value
+        .as_array()
+        .filter(|elements| (1..=AMPLITUDES_MAX).contains(&elements.len()));
+    let Some(elements) = elements else {
+        let detail = format!(
+            "{} given; an array of 1 to {AMPLITUDES_MAX} amplitudes in mm is needed",
+            shown(value)
+        );
+        asked.fault("amplitudes_mm", detail);
+        return None;
+    };
+    let (pointer, mut refused) = (asked.pointer_to("amplitudes_mm"), 0);
+    let values = numbers(elements, &pointer, REACH, &mut refused, asked.faults());
+    count_rest(&pointer, REACH, refused, asked.faults());
+    values
+}
+
+/// Reads the load of a wheelset: the vertical force of both wheels, and the part of the left one.
+pub(crate) fn read_load(case: &mut Object, force: Interval) -> Option<Load> {
+    let what = "{\"vertical_force_n\": …}, the force of both wheels";
+    case.required("load", what)?;
+    let mut block = case.child("load")?;
+    for name in ["normal_force_n", "approach_mm"] {
+        if let Some(value) = block.value(name).cloned() {
+            let detail = format!(
+                "{} given for a wheelset; give vertical_force_n, the force of both wheels",
+                shown(&value)
+            );
+            block.fault(name, detail);
+            return None;
+        }
+    }
+    block.only(&["vertical_force_n", "left_share"], &[]);
+    let vertical_force_n = block.required_number("vertical_force_n", force);
+    let left_share = block.number("left_share", SHARE);
+    if block.has("left_share") {
+        left_share?;
+    }
+    Some(Load {
+        normal_force_n: None,
+        vertical_force_n: Some(vertical_force_n?),
+        left_share,
+        approach_mm: None,
+    })
+}

@@ -1,0 +1,239 @@
+//! From the words of a wheelset to both wheels over their rails, with every fault of the cross-sections.
+
+use std::sync::Arc;
+
+use crate::contact::case::limits::Limits;
+use crate::contact::case::motions::swept_values;
+use crate::contact::case::profile_points;
+use crate::contact::case::profiles::{exchanged, profile_at};
+use crate::contact::case::words::contact::{Contact, CrossSection, Load, Smoothing};
+use crate::contact::case::words::motion::{Combine, Swept};
+use crate::contact::error::Fault;
+use crate::contact::geometry::contact_locus::ContactLocus;
+use crate::contact::geometry::profile::{Body, Profile};
+use crate::contact::geometry::wheel_rail::{Placement, Side, WheelRail};
+use crate::contact::normal::normal_task::NormalTask;
+use crate::contact::normal::wheel_height::task::{ProfileTrust, WheelLoad, WheelTask};
+use crate::contact::normal::wheel_height::wheelset_task::{KinematicsTask, WheelsetTask};
+use crate::contact::remark::entry::{RemarkEntry, merged};
+
+/// The part of the load on the left wheel when nothing is said.
+const LEFT_SHARE: f64 = 0.5;
+
+/// The task of a wheelset with its remarks; `None` without faults where the load or the contact modulus in MPa is not known.
+///
+/// # Errors
+/// Every fault of the cross-sections; or that wheels and rails cannot meet; or too many positions.
+pub(crate) fn task(
+    contact: &Contact,
+    load: Option<&Load>,
+    contact_modulus: Option<f64>,
+    limits: &Limits,
+) -> Result<Option<(NormalTask, Vec<RemarkEntry>)>, Vec<Fault>> {
+    let Contact::Wheelset {
+        lateral_shift_mm,
+        yaw_rad,
+        combine,
+        kinematics,
+        right,
+        ..
+    } = contact
+    else {
+        return Ok(None);
+    };
+    let poses = poses(lateral_shift_mm, yaw_rad, *combine, limits)?;
+    let sections = sections(contact);
+    let profiles = sections.map(|[rail, wheel]| {
+        let rail = profile_at(rail.0, Body::Rail, rail.1);
+        (rail, profile_at(wheel.0, Body::Wheel, wheel.1))
+    });
+    let [left, right_profiles] = profiles;
+    let sides = [both(left)?, both(right_profiles)?];
+    let mut geometries = Vec::with_capacity(2);
+    let mut remarks = Vec::new();
+    for (k, profiles) in sides.into_iter().enumerate() {
+        let pointers = sections[k].map(|(pointer, _)| pointer);
+        let geometry = in_place(contact, k, profiles, pointers, poses[0])?;
+        remarks.extend(remarks_of(&geometry, pointers));
+        geometries.push(geometry);
+    }
+    let force = load.and_then(|load| load.vertical_force_n);
+    let (Some(force), Some(contact_modulus)) = (force, contact_modulus) else {
+        return Ok(None);
+    };
+    let left = load.and_then(|load| load.left_share).unwrap_or(LEFT_SHARE);
+    let mut geometries = geometries.into_iter();
+    let mut side = |k: usize, share: f64| {
+        let geometry = geometries.next()?;
+        Some(WheelTask {
+            geometry,
+            loading: WheelLoad::Vertical(share * force),
+            contact_modulus,
+            trust: trust(contact, sections[k].map(|(_, section)| section)),
+        })
+    };
+    let (Some(left), Some(right_side)) = (side(0, left), side(1, 1.0 - left)) else {
+        return Ok(None);
+    };
+    let task = WheelsetTask {
+        sides: [left, right_side],
+        poses,
+        kinematics: kinematics.as_ref().map(|asked| KinematicsTask {
+            reach: asked.reach_mm,
+            step: asked.step_mm,
+            amplitudes: asked.amplitudes_mm.clone(),
+        }),
+        own_right: right.as_ref().map_or([false; 2], |right| {
+            [right.rail.is_some(), right.wheel.is_some()]
+        }),
+    };
+    Ok(Some((
+        NormalTask::Wheelset(Arc::new(task)),
+        merged(remarks),
+    )))
+}
+
+/// Shift and yaw of every position.
+fn poses(
+    shifts: &Swept,
+    yaws: &Swept,
+    combine: Combine,
+    limits: &Limits,
+) -> Result<Vec<[f64; 2]>, Vec<Fault>> {
+    let [a, b] = [shifts, yaws].map(|swept| swept.points() as u128);
+    let count = match combine {
+        Combine::Together => a.max(b),
+        Combine::Grid => a * b,
+    };
+    if count > limits.motions_max as u128 {
+        let detail = format!(
+            "{count} positions given; at most {} are allowed in one case",
+            limits.motions_max
+        );
+        return Err(vec![Fault::new("/contact/lateral_shift_mm", detail)]);
+    }
+    let (shifts, yaws) = (swept_values(shifts), swept_values(yaws));
+    Ok(match combine {
+        Combine::Grid => shifts
+            .iter()
+            .flat_map(|shift| yaws.iter().map(|yaw| [*shift, *yaw]))
+            .collect(),
+        Combine::Together => (0..count as usize)
+            .map(|k| [shifts[k.min(shifts.len() - 1)], yaws[k.min(yaws.len() - 1)]])
+            .collect(),
+    })
+}
+
+/// Of the left and of the right side, the cross-sections of rail and wheel with their pointers.
+type Sections<'a> = [[(&'static str, &'a CrossSection); 2]; 2];
+
+fn sections(contact: &Contact) -> Sections<'_> {
+    let Contact::Wheelset {
+        rail, wheel, right, ..
+    } = contact
+    else {
+        unreachable!("only wheelsets have two sides")
+    };
+    let left: [(&'static str, &CrossSection); 2] =
+        [("/contact/rail", rail), ("/contact/wheel", wheel)];
+    let own = right.as_ref().map(|right| [&right.rail, &right.wheel]);
+    let pointers = ["/contact/right/rail", "/contact/right/wheel"];
+    let of_right = |k: usize| match own.and_then(|own| own[k].as_deref()) {
+        Some(section) => (pointers[k], section),
+        None => left[k],
+    };
+    [left, [of_right(0), of_right(1)]]
+}
+
+type Read = (Result<Profile, Fault>, Result<Profile, Fault>);
+
+fn both((rail, wheel): Read) -> Result<[Profile; 2], Vec<Fault>> {
+    match (rail, wheel) {
+        (Ok(rail), Ok(wheel)) => Ok([rail, wheel]),
+        (rail, wheel) => Err([rail.err(), wheel.err()].into_iter().flatten().collect()),
+    }
+}
+
+/// A wheel over its rail in the first position, without roll.
+fn in_place(
+    contact: &Contact,
+    side: usize,
+    [rail, wheel]: [Profile; 2],
+    pointers: [&str; 2],
+    [lateral_shift, yaw]: [f64; 2],
+) -> Result<WheelRail, Vec<Fault>> {
+    let Contact::Wheelset {
+        right,
+        rolling_radius_mm,
+        gauge_mm,
+        gauge_height_mm,
+        cant_rad,
+        flange_back_distance_mm,
+        flange_back_position_mm,
+        accept_rough_profiles,
+        ..
+    } = contact
+    else {
+        unreachable!("only wheelsets have two sides")
+    };
+    if !accept_rough_profiles {
+        exchanged([&rail, &wheel], pointers)?;
+    }
+    let own = right.as_ref().and_then(|right| right.rolling_radius_mm);
+    let own = own.filter(|_| side == 1);
+    let placement = Placement {
+        side: [Side::Left, Side::Right][side],
+        rolling_radius: own.unwrap_or(*rolling_radius_mm),
+        gauge: *gauge_mm,
+        gauge_height: *gauge_height_mm,
+        cant: *cant_rad,
+        flange_back_distance: *flange_back_distance_mm,
+        flange_back_position: *flange_back_position_mm,
+        lateral_shift,
+        yaw,
+        roll: 0.0,
+    };
+    let radius = match own {
+        Some(_) => "/contact/right/rolling_radius_mm",
+        None => "/contact/rolling_radius_mm",
+    };
+    let geometry = WheelRail::new(rail, wheel, placement)
+        .map_err(|detail| vec![Fault::new(radius, detail)])?;
+    if let Err(detail) = ContactLocus::new(&geometry) {
+        return Err(vec![Fault::new("/contact", detail)]);
+    }
+    Ok(geometry)
+}
+
+/// Remarks on two profiles, at their pointers.
+fn remarks_of(geometry: &WheelRail, pointers: [&str; 2]) -> Vec<RemarkEntry> {
+    let bodies = [Body::Rail, Body::Wheel];
+    let profiles = geometry.profiles().into_iter().zip(bodies).zip(pointers);
+    profiles
+        .flat_map(|((profile, body), pointer)| {
+            let own = profile.remarks.iter().cloned();
+            let own = own.map(|remark| remark.at_pointer(pointer));
+            let misplaced = profile_points::misplaced(profile, body);
+            let misplaced = misplaced.map(|remark| RemarkEntry {
+                pointer: Some(pointer.to_owned()),
+                ..remark
+            });
+            own.chain(misplaced).collect::<Vec<_>>()
+        })
+        .collect()
+}
+
+fn trust(contact: &Contact, sections: [&CrossSection; 2]) -> ProfileTrust {
+    let accept_rough = matches!(
+        contact,
+        Contact::Wheelset {
+            accept_rough_profiles: true,
+            ..
+        }
+    );
+    let auto = |section: &CrossSection| matches!(section.smoothing_mm, Smoothing::ByNoise(_));
+    ProfileTrust {
+        auto: sections.map(auto),
+        accept_rough,
+    }
+}

@@ -1,0 +1,136 @@
+//! A rigid wheelset on both rails: the roll and the height at which both wheels touch.
+
+use crate::contact::geometry::rigid_touch::{RailTop, RigidTouch};
+use crate::contact::geometry::wheel_rail::WheelRail;
+
+/// The wheels' heights may differ by so much in mm, 1e-10 rad of roll.
+const LEVEL: f64 = 1e-7;
+/// Steps for the roll; between two places of contact the heights have a kink, which costs some.
+const STEPS_MAX: u32 = 40;
+
+/// Both wheels over both rails, to be placed again and again.
+#[derive(Debug, Clone)]
+pub struct PairOfRails {
+    /// Left and right.
+    sides: [WheelRail; 2],
+    tops: [RailTop; 2],
+}
+
+/// A wheelset at rest on its rails, all rigid; left and right where there are two.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RigidPose {
+    /// Shift to the left in mm.
+    pub lateral_shift: f64,
+    /// Yaw in rad.
+    pub yaw: f64,
+    /// Roll in rad at which both wheels touch.
+    pub roll: f64,
+    /// Height of the wheelset's centre over the top of the rails in mm.
+    pub height: f64,
+    /// Where they touch.
+    pub touches: [RigidTouch; 2],
+}
+
+impl RigidPose {
+    /// Rolling radius of the left wheel less that of the right one, in mm.
+    #[must_use]
+    pub fn radius_difference(&self) -> f64 {
+        self.touches[0].radius - self.touches[1].radius
+    }
+
+    /// Distance of the places of contact across the track in mm.
+    #[must_use]
+    pub fn contact_distance(&self) -> f64 {
+        self.touches[0].at[1] - self.touches[1].at[1]
+    }
+}
+
+impl PairOfRails {
+    /// Left and right side.
+    #[must_use]
+    pub fn new(sides: [WheelRail; 2]) -> PairOfRails {
+        let tops = [RailTop::new(&sides[0]), RailTop::new(&sides[1])];
+        PairOfRails { sides, tops }
+    }
+
+    /// The wheelset at a shift to the left in mm and a yaw in rad, from a roll nearby.
+    ///
+    /// # Errors
+    /// A sentence, if a wheel is not over its rail or the roll is not found.
+    pub fn pose(
+        &mut self,
+        lateral_shift: f64,
+        yaw: f64,
+        mut roll: f64,
+    ) -> Result<RigidPose, String> {
+        let mut bracket = [f64::NEG_INFINITY, f64::INFINITY];
+        for _ in 0..STEPS_MAX {
+            let touches = self.touches(lateral_shift, yaw, roll)?;
+            // Rolled to the left rail's side up, the left wheel hangs higher: this falls with the roll.
+            let above = touches[0].height - touches[1].height;
+            let pose = RigidPose {
+                lateral_shift,
+                yaw,
+                roll,
+                height: 0.5 * (touches[0].height + touches[1].height),
+                touches,
+            };
+            if above.abs() <= LEVEL {
+                return Ok(pose);
+            }
+            let side = usize::from(above < 0.0);
+            bracket[side] = roll;
+            let next = roll + above / pose.contact_distance();
+            let middle = 0.5 * (bracket[0] + bracket[1]);
+            let inside = next > bracket[0] && next < bracket[1];
+            roll = if inside { next } else { middle };
+        }
+        Err(format!(
+            "no roll of the wheelset was found at which both wheels touch, at a lateral shift of {lateral_shift} mm"
+        ))
+    }
+
+    /// The wheelset at a shift to the left in mm and a yaw in rad with its axle level, as if one wheel could hang in the air.
+    ///
+    /// # Errors
+    /// A sentence, if a wheel is not over its rail.
+    pub fn pose_without_roll(&mut self, lateral_shift: f64, yaw: f64) -> Result<RigidPose, String> {
+        let touches = self.touches(lateral_shift, yaw, 0.0)?;
+        Ok(RigidPose {
+            lateral_shift,
+            yaw,
+            roll: 0.0,
+            height: touches[0].height.max(touches[1].height),
+            touches,
+        })
+    }
+
+    fn touches(
+        &mut self,
+        lateral_shift: f64,
+        yaw: f64,
+        roll: f64,
+    ) -> Result<[RigidTouch; 2], String> {
+        let mut touch = |k: usize| {
+            self.sides[k].pose(lateral_shift, yaw, roll);
+            let found = self.tops[k].touch(&self.sides[k]);
+            found.ok_or_else(|| {
+                let side = ["left", "right"][k];
+                format!(
+                    "at a lateral shift of {lateral_shift} mm no part of the {side} wheel lies above its rail; check gauge, flange-back \
+                     distance and position"
+                )
+            })
+        };
+        Ok([touch(0)?, touch(1)?])
+    }
+
+    /// Where the wheels touch, on the cross-sections of rail and wheel, `[y, z]` in mm, y to the field side and z down.
+    #[must_use]
+    pub fn on_profiles(&self, side: usize, touch: &RigidTouch) -> [[f64; 2]; 2] {
+        [
+            self.sides[side].on_rail(touch.rail),
+            self.sides[side].on_wheel(touch.wheel),
+        ]
+    }
+}

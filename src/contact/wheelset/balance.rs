@@ -1,0 +1,288 @@
+//! Brings a wheelset to rest on both rails under its load: the roll at which both wheels agree about the height of the centre, and
+//! the angular velocity at which the rails balance a torque.
+//!
+//! Each wheel carries a given vertical force, so that at a given roll it has a height of its own. The difference of the two heights falls
+//! by the distance of the contacts per radian; a Newton step from the rigid wheelset leaves so little that one more solve suffices.
+
+use std::sync::Arc;
+
+use crate::contact::case::problem::CheckedCase;
+use crate::contact::coupling::Found;
+use crate::contact::error::SolveError;
+use crate::contact::geometry::wheelset::WheelsetMotion;
+use crate::contact::geometry::wheelset_pose::RigidPose;
+use crate::contact::monitor::Monitor;
+use crate::contact::normal::wheel_height::task::WheelTask;
+use crate::contact::normal::wheel_height::wheelset_task::WheelsetTask;
+use crate::contact::numerics::bracketed_root::find_root;
+use crate::contact::profile_trust::trust;
+use crate::contact::rolling::operator_store::OperatorStore;
+use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::solution::words::{PatchSolution, Solution};
+
+/// The heights of the centre by both wheels may differ by so much in mm. It leaves a roll of 2e-7 rad, which moves a contact by 1e-4 mm.
+const LEVEL: f64 = 3e-4;
+/// Rounds for the roll. Each leaves about a hundredth of the difference before.
+const ROUNDS_MAX: u32 = 8;
+/// After the last round, so much is answered all the same: it moves a contact by 5e-3 mm.
+const LEVEL_POOR: f64 = 1e-2;
+/// A torque is balanced to this part of the target of forces, and at least to this part of the friction limit.
+const TORQUE_OF_TARGET: f64 = 0.2;
+const TORQUE_LEAST: f64 = 1e-4;
+/// The target that stands for an explicit mesh.
+const TARGET_OF_MESH: f64 = 0.005;
+/// Kalker's coefficient C₁₁ of a circle at ν = 0.28, for the unit of creepage in the search for the angular velocity.
+const C11: f64 = 4.3;
+
+/// A wheelset that is to be solved in one position.
+pub(crate) struct WheelsetSolve<'a> {
+    pub(crate) operators: &'a Arc<OperatorStore>,
+    pub(crate) case: &'a CheckedCase,
+    pub(crate) task: &'a WheelsetTask,
+    /// Left and right wheel, with settled smoothing.
+    pub(crate) sides: &'a [WheelTask; 2],
+    pub(crate) monitor: &'a dyn Monitor,
+}
+
+/// A wheelset at rest.
+pub(crate) struct AtRest {
+    /// Shift in mm, yaw and roll in rad.
+    pub(crate) pose: [f64; 3],
+    /// Height of the centre in mm.
+    pub(crate) height: f64,
+    /// Angular velocity about the axle in rad/s.
+    pub(crate) angular_velocity: f64,
+    /// Torque about the axle in N mm that balances the forces of the rails.
+    pub(crate) torque: f64,
+    /// Left and right.
+    pub(crate) sides: [Found; 2],
+}
+
+/// Both wheels solved at one roll and one angular velocity.
+struct Both {
+    wheels: [WheelTask; 2],
+    cases: [CheckedCase; 2],
+    found: [Found; 2],
+}
+
+impl Both {
+    /// By how much the left wheel holds the centre higher than the right one, in mm.
+    fn above(&self) -> f64 {
+        self.found[0].wheel.centre - self.found[1].wheel.centre
+    }
+
+    /// Height of the centre in mm.
+    fn height(&self) -> f64 {
+        0.5 * (self.found[0].wheel.centre + self.found[1].wheel.centre)
+    }
+
+    /// Distance across of what carries the load, in mm.
+    fn distance(&self) -> f64 {
+        let [left, right] = [0, 1].map(|k| self.found[k].solution.origin.y_mm);
+        left - right
+    }
+}
+
+impl WheelsetSolve<'_> {
+    /// The wheelset at rest in a position, from that of the rigid one.
+    ///
+    /// # Errors
+    /// Why there is no answer, with the wheel and the position.
+    pub(crate) fn at_rest(&self, rigid: &RigidPose) -> Result<AtRest, SolveError> {
+        let problem = &self.case.problem;
+        let Some(motion) = problem.wheelset else {
+            return Err(SolveError::NormalProblem {
+                reason: "a wheelset has no motion".to_owned(),
+            });
+        };
+        let mut pose = [rigid.lateral_shift, rigid.yaw, rigid.roll];
+        let (both, angular_velocity) = match problem.drive_torque {
+            None => (self.level(&mut pose, &motion)?, motion.angular_velocity),
+            Some(torque) => self.driven(&mut pose, rigid, motion, torque)?,
+        };
+        let height = both.height();
+        let torque = -torque_of_rails(&both.found, pose, height);
+        let Both {
+            wheels,
+            cases,
+            found: [left, right],
+        } = both;
+        let trusted = |found: Found, k: usize| {
+            trust::trusted(self.operators, &cases[k], &wheels[k], found, self.monitor)
+                .map_err(|error| self.of_side(error, k, pose))
+        };
+        Ok(AtRest {
+            pose,
+            height,
+            angular_velocity,
+            torque,
+            sides: [trusted(left, 0)?, trusted(right, 1)?],
+        })
+    }
+
+    /// Both wheels at the roll at which their heights agree; `pose` has it afterwards.
+    fn level(&self, pose: &mut [f64; 3], motion: &WheelsetMotion) -> Result<Both, SolveError> {
+        let mut rounds = 1;
+        loop {
+            let both = self.both(*pose, motion)?;
+            let above = both.above();
+            if above.abs() <= LEVEL || rounds == ROUNDS_MAX && above.abs() <= LEVEL_POOR {
+                return Ok(both);
+            }
+            if rounds == ROUNDS_MAX {
+                return Err(SolveError::NormalProblem {
+                    reason: format!(
+                        "at a lateral shift of {} mm no roll was found at which both wheels carry their loads: their heights still differ by \
+                         {above:.4} mm after {ROUNDS_MAX} rounds",
+                        pose[0]
+                    ),
+                });
+            }
+            pose[2] += above / both.distance();
+            rounds += 1;
+        }
+    }
+
+    /// Both wheels with the angular velocity at which the rails balance a torque.
+    fn driven(
+        &self,
+        pose: &mut [f64; 3],
+        rigid: &RigidPose,
+        motion: WheelsetMotion,
+        torque: f64,
+    ) -> Result<(Both, f64), SolveError> {
+        let radius = 0.5 * (rigid.touches[0].radius + rigid.touches[1].radius);
+        let free = motion.speed / radius;
+        let target = match self.case.run.resolution {
+            Resolution::Target(target) => target,
+            Resolution::Mesh(_) => TARGET_OF_MESH,
+        };
+        let modulus = self.case.problem.elasticity.shear_modulus;
+        // What the search calls 1: the slip at which linear theory reaches the limit of friction.
+        let (mut unit, mut last) = (None, None);
+        let root = find_root(0.0, |place, tolerance: &mut f64| {
+            let velocity = free * (1.0 + unit.unwrap_or(0.0) * place);
+            let moving = WheelsetMotion {
+                angular_velocity: velocity,
+                ..motion
+            };
+            let both = self.level(pose, &moving)?;
+            let patches = both.found.iter().flat_map(|found| &found.solution.patches);
+            let (mut limit, mut stiffness) = (0.0, 0.0);
+            for patch in patches {
+                limit += patch.friction_limit_n.unwrap_or(0.0);
+                stiffness += C11 * modulus * patch.area_mm2 / std::f64::consts::PI;
+            }
+            unit.get_or_insert(limit / stiffness);
+            let rails = torque_of_rails(&both.found, *pose, both.height());
+            last = Some((both, velocity));
+            *tolerance = (TORQUE_OF_TARGET * target).max(TORQUE_LEAST);
+            Ok::<f64, SolveError>(-(torque + rails) / (limit * radius).max(f64::MIN_POSITIVE))
+        })?;
+        if !root.exit.converged() {
+            return Err(SolveError::NormalProblem {
+                reason: format!(
+                    "at a lateral shift of {} mm no angular velocity was found at which the rails balance a drive torque of {torque} N mm: {}; \
+                     friction may not carry it",
+                    pose[0],
+                    root.exit.reason()
+                ),
+            });
+        }
+        last.ok_or(SolveError::Cancelled)
+    }
+
+    /// Both wheels at a shift, a yaw and a roll.
+    fn both(&self, pose: [f64; 3], motion: &WheelsetMotion) -> Result<Both, SolveError> {
+        let wheel = |k: usize| {
+            let side = &self.sides[k];
+            WheelTask {
+                geometry: side.geometry.posed(pose[0], pose[1], pose[2]),
+                ..side.clone()
+            }
+        };
+        let wheels = [wheel(0), wheel(1)];
+        let case = |k: usize| CheckedCase {
+            problem: self
+                .case
+                .problem
+                .of_wheel(Arc::new(wheels[k].clone()), *motion),
+            run: self.case.run.clone(),
+            label: self.case.label.clone(),
+            // They are told of the whole wheelset.
+            remarks: Vec::new(),
+        };
+        let cases = [case(0), case(1)];
+        let found = |k: usize| {
+            let found = trust::judged(self.operators, &cases[k], &wheels[k], self.monitor);
+            found.map_err(|error| self.of_side(error, k, pose))
+        };
+        let found = [found(0)?, found(1)?];
+        Ok(Both {
+            wheels,
+            cases,
+            found,
+        })
+    }
+
+    /// An error with the wheel and the position it belongs to.
+    fn of_side(&self, error: SolveError, side: usize, pose: [f64; 3]) -> SolveError {
+        let name = ["left", "right"][side];
+        let place = format!("the {name} wheel at a lateral shift of {} mm", pose[0]);
+        match error {
+            SolveError::NormalProblem { reason } => SolveError::NormalProblem {
+                reason: format!("{place}: {reason}"),
+            },
+            SolveError::RoughProfile { pointer, reason } => SolveError::RoughProfile {
+                pointer: if side == 1 {
+                    self.task.pointer_on_right(&pointer)
+                } else {
+                    pointer
+                },
+                reason: format!("{place}: {reason}"),
+            },
+            other => other,
+        }
+    }
+}
+
+/// Torque of the rails on the wheelset about its axle in N mm, positive if it drives forward.
+fn torque_of_rails(found: &[Found; 2], pose: [f64; 3], height: f64) -> f64 {
+    let [_, yaw, roll] = pose;
+    let axle = [-yaw.sin() * roll.cos(), yaw.cos() * roll.cos(), roll.sin()];
+    let centre = [0.0, pose[0], height];
+    let patches = |found: &Found| -> f64 {
+        let Solution { patches, .. } = &found.solution;
+        patches
+            .iter()
+            .map(|patch| torque(patch, centre, axle))
+            .sum()
+    };
+    found.iter().map(patches).sum()
+}
+
+/// That of one patch: friction acts about the origin of its frame, the normal force at its load centre.
+fn torque(patch: &PatchSolution, centre: [f64; 3], axle: [f64; 3]) -> f64 {
+    let (Some(position), Some(point)) = (&patch.position, patch.points.first()) else {
+        return 0.0;
+    };
+    let (sin, cos) = position.contact_angle_rad.sin_cos();
+    let about = |at: [f64; 3], force: [f64; 3]| {
+        let arm = [0, 1, 2].map(|k| at[k] - centre[k]);
+        let cross = [
+            arm[1] * force[2] - arm[2] * force[1],
+            arm[2] * force[0] - arm[0] * force[2],
+            arm[0] * force[1] - arm[1] * force[0],
+        ];
+        (0..3).map(|k| axle[k] * cross[k]).sum::<f64>()
+    };
+    // Of the wheel on the rail; the wheelset feels the opposite.
+    let tangential = [
+        point.force_x_n,
+        point.force_y_n * cos,
+        point.force_y_n * sin,
+    ];
+    let normal = [0.0, patch.normal_force_n * sin, -patch.normal_force_n * cos];
+    let spin = point.moment_z_n_mm * (axle[2] * cos - axle[1] * sin);
+    -(about(position.origin_track_mm, tangential) + about(position.track_mm, normal) + spin)
+}

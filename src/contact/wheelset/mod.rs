@@ -1,0 +1,6 @@
+//! Solves a wheelset on both rails: its roll and height, the patches of both wheels, and its kinematics as a rigid body.
+
+pub mod balance;
+pub mod gather;
+pub mod kinematics;
+pub mod solve;

@@ -1,0 +1,253 @@
+//! What must hold for a wheelset on both rails: mirror images, balance, closed forms of the conicity, and the single wheel in its place.
+
+use railhead::contact::solution::wheelset::{Kinematics, WheelsetAnswer};
+use railhead::contact::solution::words::Solution;
+use serde_json::{Value, json};
+
+use crate::profile_cases::put;
+use crate::profile_shapes::{rail_60e1, s1002};
+use crate::reference::solve;
+
+/// A wheelset of S1002 on 60E1 inclined 1:40, as the single wheels of these tests lie.
+fn wheelset() -> Value {
+    on(
+        json!({ "points_mm": rail_60e1() }),
+        json!({ "points_mm": s1002() }),
+        0.025,
+    )
+}
+
+fn on(rail: Value, wheel: Value, cant: f64) -> Value {
+    json!({
+        "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
+        "friction": { "coefficient": 0.3 },
+        "contact": {
+            "type": "wheelset", "rail": rail, "wheel": wheel, "rolling_radius_mm": 460, "cant_rad": cant,
+        },
+        "load": { "vertical_force_n": 150_000 },
+        "motion": { "wheelset": { "speed_mm_per_s": 20000, "free_rolling_radius_mm": 460 } },
+        "outputs": ["resultants"],
+    })
+}
+
+fn answer(solution: &Solution) -> &WheelsetAnswer {
+    solution.wheelset.as_ref().expect("a wheelset")
+}
+
+fn kinematics(case: &Value) -> Kinematics {
+    let (solution, _) = solve(case);
+    let found = answer(&solution).kinematics.clone();
+    *found.expect("kinematics")
+}
+
+fn near(a: f64, b: f64, within: f64) {
+    assert!((a - b).abs() <= within, "{a} {b} within {within}");
+}
+
+#[test]
+fn a_mirrored_wheelset_has_its_sides_exchanged() {
+    let place = json!({ "lateral_shift_mm": { "values": [3, -3] }, "yaw_rad": { "values": [0.002, -0.002] } });
+    let case = put(&wheelset(), "contact", place);
+    let (solution, _) = solve(&case);
+    let [one, other] = answer(&solution).positions.as_slice() else {
+        panic!("two positions")
+    };
+    near(one.roll_rad, -other.roll_rad, 1e-7);
+    near(one.centre_height_mm, other.centre_height_mm, 2e-4);
+    near(one.radius_difference_mm, -other.radius_difference_mm, 1e-3);
+    // Shifted to the left, the left wheel runs on the larger radius.
+    assert!(one.radius_difference_mm > 0.1);
+    for (left, right) in [(&one.left, &other.right), (&one.right, &other.left)] {
+        assert_eq!(left.patches.len(), right.patches.len());
+        near(left.force_x_n, right.force_x_n, 20.0);
+        near(left.force_y_n, -right.force_y_n, 20.0);
+        near(left.force_z_n, right.force_z_n, 40.0);
+        near(left.contact_angle_rad, -right.contact_angle_rad, 1e-4);
+        near(left.moment_z_n_mm, -right.moment_z_n_mm, 2e4);
+    }
+}
+
+/// Vertical forces are those of the load, the totals are the sums of both wheels, and a torque that is given is balanced.
+#[test]
+fn a_wheelset_balances_its_load_and_its_torque() {
+    let mut case = put(
+        &wheelset(),
+        "contact",
+        json!({ "lateral_shift_mm": 2.0, "yaw_rad": 0.001 }),
+    );
+    case["load"] = json!({ "vertical_force_n": 120_000, "left_share": 0.6 });
+    for torque in [0.0, 5e6, -5e6] {
+        case["motion"] =
+            json!({ "wheelset": { "speed_mm_per_s": 20000, "drive_torque_n_mm": torque } });
+        let (solution, _) = solve(&case);
+        let position = &answer(&solution).positions[0];
+        near(position.left.force_z_n, -72e3, 72.0);
+        near(position.right.force_z_n, -48e3, 48.0);
+        let limit = 0.3 * 120e3 * 460.0;
+        near(position.drive_torque_n_mm, torque, 1.5e-3 * limit);
+        // A driven wheelset pushes the rails backward, and rolls faster than a free one.
+        near(
+            solution.total[0].force_x_n,
+            -torque / 460.0,
+            0.01 * 0.3 * 120e3,
+        );
+        let free = 20000.0 / 460.0;
+        let faster = position.angular_velocity_rad_per_s / free - 1.0;
+        assert!(torque == 0.0 || faster * torque > 0.0, "{faster} {torque}");
+        let sums = [position.left.force_y_n, position.right.force_y_n];
+        near(solution.total[0].force_y_n, sums[0] + sums[1], 1e-6);
+        let moment = position.left.moment_z_n_mm + position.right.moment_z_n_mm;
+        near(solution.total[0].moment_z_n_mm, moment, 1.0);
+        let count = position.left.patches.len() + position.right.patches.len();
+        assert_eq!(count, solution.patches.len());
+    }
+}
+
+#[test]
+fn a_single_wheel_in_the_place_of_one_of_a_wheelset_has_its_patch() {
+    let case = put(
+        &wheelset(),
+        "contact",
+        json!({ "lateral_shift_mm": 1.5, "yaw_rad": 0.002 }),
+    );
+    let (solution, _) = solve(&case);
+    let position = &answer(&solution).positions[0];
+    for (side, wheel) in [("left", &position.left), ("right", &position.right)] {
+        let mut single = put(
+            &case,
+            "contact",
+            json!({ "type": "profiles", "side": side, "roll_rad": position.roll_rad }),
+        );
+        single["load"] = json!({ "vertical_force_n": 75_000 });
+        let (alone, _) = solve(&single);
+        let [patch] = wheel.patches.as_slice() else {
+            panic!("one patch")
+        };
+        let (own, alone) = (&solution.patches[*patch], &alone.patches[0]);
+        near(own.area_mm2 / alone.area_mm2, 1.0, 1e-9);
+        near(own.points[0].force_x_n, alone.points[0].force_x_n, 1e-6);
+        near(
+            own.points[0].motion.creepage_y,
+            alone.points[0].motion.creepage_y,
+            1e-12,
+        );
+    }
+}
+
+fn arc(radius: f64, sign: f64, tilt: f64) -> Value {
+    // Heights over y, z down: a head that is convex, or a tread that is hollow, inclined by the tilt in its middle.
+    let depth = |y: f64| sign * (radius - (radius * radius - y * y).sqrt()) - tilt * y;
+    let points: Vec<[f64; 2]> = (-100..=100)
+        .map(|k| 0.3 * f64::from(k))
+        .map(|y| [y, depth(y)])
+        .collect();
+    json!({ "points_mm": points, "mirror_y": false, "mirror_z": false })
+}
+
+fn with_kinematics(mut case: Value) -> Value {
+    case["contact"]["kinematics"] =
+        json!({ "reach_mm": 5, "step_mm": 0.25, "amplitudes_mm": [1, 3] });
+    // The middle of the wheel over that of the rail, which begins at the gauge.
+    case["contact"]["flange_back_position_mm"] = json!(-67.5);
+    case
+}
+
+/// Wickens 1965 for arcs: `λ = δ₀ R_w / (R_w − R_r) · (l + R_r δ₀) / (l − r δ₀)` with half the distance l of the contacts and the contact
+/// angle δ₀ in the middle; of a cone `R_w` is infinite. The second factor is that of the roll.
+fn wickens(slope: f64, rail: f64, wheel: f64, half: f64) -> [f64; 2] {
+    let level = slope / (1.0 - rail / wheel);
+    [
+        level * (half + rail * slope) / (half - 460.0 * slope),
+        level,
+    ]
+}
+
+#[test]
+fn a_cone_on_any_crown_has_its_tangent_for_its_conicity() {
+    for (tangent, crown) in [(0.05, 300.0), (0.025, 300.0), (0.05, 80.0)] {
+        let cone: Vec<[f64; 2]> = (-60..=60)
+            .map(f64::from)
+            .map(|y| [y, -tangent * y])
+            .collect();
+        let cone = json!({ "points_mm": cone, "mirror_y": false, "mirror_z": false });
+        let found = kinematics(&with_kinematics(on(arc(crown, 1.0, 0.0), cone, 0.0)));
+        let [rolled, level] = wickens(
+            tangent,
+            crown,
+            f64::INFINITY,
+            0.5 * found.contact_distance_mm,
+        );
+        for entry in &found.conicity {
+            near(entry.conicity_without_roll.unwrap() / level, 1.0, 1e-3);
+            near(entry.conicity.unwrap() / rolled, 1.0, 3e-3);
+            near(entry.conicity_harmonic.unwrap() / rolled, 1.0, 3e-3);
+            assert!(entry.error_estimate.unwrap() < 1e-3 * tangent, "{entry:?}");
+        }
+        near(found.equilibrium_shift_mm.unwrap(), 0.0, 1e-6);
+        let wavelength = found.conicity[1].wavelength_mm.unwrap();
+        let half = 0.5 * found.contact_distance_mm;
+        // Klingel's formula.
+        let klingel = 2.0 * std::f64::consts::PI * (460.0 * half / rolled).sqrt();
+        near(wavelength / klingel, 1.0, 5e-3);
+    }
+}
+
+#[test]
+fn two_arcs_have_wickens_conicity() {
+    let wheel = arc(500.0, 1.0, 0.02);
+    let found = kinematics(&with_kinematics(on(arc(300.0, 1.0, 0.0), wheel, 0.0)));
+    // Where the slopes agree: y/300 on the rail, 0.05 + (y − y₀)/500 on the wheel, from the angle that is found.
+    let middle = found.lateral_shift_mm.len() / 2;
+    let slope = found.left.contact_angle_rad[middle].tan();
+    let [rolled, level] = wickens(slope, 300.0, 500.0, 0.5 * found.contact_distance_mm);
+    for entry in &found.conicity {
+        near(entry.conicity_without_roll.unwrap() / level, 1.0, 0.01);
+        near(entry.conicity.unwrap() / rolled, 1.0, 0.01);
+    }
+}
+
+/// With wheels of different radii the wheelset steers to where both roll on the same one.
+#[test]
+fn wheels_that_differ_move_the_equilibrium() {
+    let cone: Vec<[f64; 2]> = (-60..=60).map(f64::from).map(|y| [y, -0.05 * y]).collect();
+    let cone = json!({ "points_mm": cone, "mirror_y": false, "mirror_z": false });
+    let mut case = with_kinematics(on(arc(300.0, 1.0, 0.0), cone, 0.0));
+    case["contact"]["right"] = json!({ "rolling_radius_mm": 460.1 });
+    let found = kinematics(&case);
+    // The left wheel needs 0.1 mm more: 1 mm of shift at a conicity of 0.05, less what the roll adds.
+    let shift = found.equilibrium_shift_mm.expect("an equilibrium");
+    assert!((0.85..=1.05).contains(&shift), "{shift}");
+}
+
+#[test]
+fn the_shipped_wheelset_answers_every_position_and_amplitude() {
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../api/examples/wheelset.case.json"
+    );
+    let text = std::fs::read_to_string(path).expect("an example");
+    let case: Value = serde_json::from_str(&text).expect("a case");
+    let (solution, _) = solve(&case);
+    let found = answer(&solution);
+    assert_eq!(found.positions.len(), 3);
+    assert_eq!(solution.total.len(), 3);
+    let kinematics = found.kinematics.as_ref().expect("kinematics");
+    for position in &found.positions {
+        // The loaded wheels roll where the rigid ones touch, as near as a patch is wide.
+        let shifts = &kinematics.lateral_shift_mm;
+        let at = shifts
+            .iter()
+            .position(|s| (s - position.lateral_shift_mm).abs() < 1e-6);
+        let rigid = kinematics.radius_difference_mm[at.expect("a shift")];
+        near(position.radius_difference_mm, rigid, 0.1);
+    }
+    assert_eq!(kinematics.conicity.len(), 5);
+    for entry in &kinematics.conicity {
+        let conicity = entry.conicity.expect("a conicity");
+        assert!((0.02..0.6).contains(&conicity), "{entry:?}");
+        assert!(
+            entry.error_estimate.expect("an estimate") < 0.1 * conicity,
+            "{entry:?}"
+        );
+    }
+}
