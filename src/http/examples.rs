@@ -1,7 +1,7 @@
 //! Cases to begin with: those of `api/examples`, which the contract shows and `/v1/examples` answers.
 
 /// Name, summary and text of each.
-pub const EXAMPLES: [(&str, &str, &str); 15] = [
+pub const EXAMPLES: [(&str, &str, &str); 16] = [
     (
         "hertz-steel",
         "A wheel on a rail by its radii, with both creepages and spin",
@@ -36,6 +36,11 @@ pub const EXAMPLES: [(&str, &str, &str); 15] = [
         "wheel-rail-flange",
         "A wheel on a rail by their cross-sections, touching at the gauge corner and at the flange",
         include_str!("../../api/examples/wheel-rail-flange.case.json"),
+    ),
+    (
+        "wheelset",
+        "A wheelset on both rails at three shifts, rolling freely, with its equivalent conicity",
+        include_str!("../../api/examples/wheelset.case.json"),
     ),
     (
         "maintenance",

@@ -76,6 +76,7 @@ async fn methods_name_every_word_of_the_contract() {
             Some("gap_profile") => "uic60-crown.case.json",
             Some("gap_grid") => "two-patches.case.json",
             Some("profiles") => "wheel-rail.case.json",
+            Some("wheelset") => "wheelset.case.json",
             Some("pressure_grid") => "pressure-grid.case.json",
             other => panic!("{other:?} has no example"),
         };

@@ -106,6 +106,22 @@ fn guide_to_forms_runs_as_it_stands() {
 }
 
 #[test]
+fn guide_to_wheelsets_runs_as_it_stands() {
+    if !has_shell_tools() {
+        return;
+    }
+    let (folder, data) = (folder(), tempfile::tempdir().expect("a folder"));
+    let service = Service::start(data.path(), &[]);
+    let script = blocks("docs/wheelset.md", "sh", &service);
+    let output = run(Path::new("bash"), &["-euc", &script], folder.path());
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(
+        said.contains("\"radius_difference_mm\": 0.75") && said.contains("\"conicity\": 0.183"),
+        "{said}"
+    );
+}
+
+#[test]
 fn guide_to_runs_runs_as_it_stands() {
     if !has_shell_tools() {
         return;
