@@ -8,7 +8,7 @@ use railhead::contact::case::problem::CheckedCase;
 use railhead::contact::half_space::grid_operator::GridWorkspace;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::normal::normal_task::NormalTask;
-use railhead::contact::normal::wheel_height::search::{Accuracy, NormalPass};
+use railhead::contact::normal::wheel_height::search::{Accuracy, HeightStart, NormalPass};
 use railhead::contact::solution::words::Solution;
 use serde_json::{Value, json};
 
@@ -253,7 +253,7 @@ fn at_rest(checked: &CheckedCase) -> (f64, u32) {
             .press(
                 &search,
                 wanted,
-                None,
+                HeightStart::default(),
                 &mut GridWorkspace::default(),
                 &Unmonitored,
             )

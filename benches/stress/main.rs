@@ -1,8 +1,8 @@
 //! Stability: thousands of cases from all over the allowed ground, every answer held against the laws of contact.
 //!
 //! `cargo bench --bench stress [-- cases seed]` prints the table and writes it to `docs/stability.md`; it ends with an error if a
-//! case crashes, hangs or breaks a law. `-- --only` with `times`, `after`, `physics`, `maintenance`, `creep-map`, `sweep-with-zones` or `damaged-profile` prints one
-//! section, `-- --case 1511` one case as JSON.
+//! case crashes, hangs or breaks a law. `-- --only` with `times`, `after`, `physics`, `maintenance`, `rows`, `creep-map`, `sweep-with-zones` or
+//! `damaged-profile` prints one section, `-- --case 1511` one case as JSON.
 
 extern crate railhead_contact as railhead;
 
@@ -20,6 +20,7 @@ mod profile_reference_files;
 #[path = "../../tests/physics/profile_shapes.rs"]
 mod profile_shapes;
 mod random;
+mod rows;
 mod sweeps;
 mod times;
 mod trial;
@@ -70,12 +71,13 @@ fn main() -> ExitCode {
             Some("after") => after::table(),
             Some("physics") => physics::table(SEED),
             Some("maintenance") => maintenance::table(SEED),
+            Some("rows") => rows::table(SEED),
             Some("creep-map") => sweeps::creep_maps(),
             Some("sweep-with-zones") => sweeps::with_zones(),
             Some("damaged-profile") => damaged_table::tables(SEED),
             _ => {
                 eprintln!(
-                    "--only takes times, after, physics, maintenance, creep-map, sweep-with-zones or damaged-profile"
+                    "--only takes times, after, physics, maintenance, rows, creep-map, sweep-with-zones or damaged-profile"
                 );
                 return ExitCode::FAILURE;
             }
@@ -109,6 +111,7 @@ fn main() -> ExitCode {
         }
     }
     let mut text = report(count, seed, &rows, &troubles);
+    text.push_str(&rows::table(SEED));
     text.push_str(&damaged_table::tables(SEED));
     text.push_str(&physics::table(SEED));
     text.push_str(&maintenance::table(SEED));

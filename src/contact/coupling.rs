@@ -7,21 +7,19 @@ use crate::contact::answer::answer;
 use crate::contact::case::press::PressedContact;
 use crate::contact::case::problem::{CheckedCase, Run};
 use crate::contact::error::SolveError;
+use crate::contact::forecast::{can_forecast, forecast, motion_in};
 use crate::contact::friction::on_rail::in_frame;
 use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::geometry::wheelset::{WheelsetMotion, creepages};
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::footprint::Footprint;
-use crate::contact::normal::wheel_height::search::{
-    Accuracy, NormalPass, PressedGap, PressedWheel,
-};
+use crate::contact::normal::wheel_height::pressed::{PressedGap, PressedWheel};
+use crate::contact::normal::wheel_height::search::{Accuracy, HeightStart, NormalPass};
 use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
-use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::solution::track_axes::merge;
@@ -80,7 +78,7 @@ pub(crate) fn solve(
     if solve.balanced {
         return solve.balance(workspace);
     }
-    let mut at_rest = solve.rest(solve.exactly(0.0), None, workspace)?;
+    let mut at_rest = solve.rest(solve.exactly(0.0), HeightStart::default(), workspace)?;
     let answers = solve.answers(&at_rest, &case.run)?;
     if vertical {
         let remark = Remark::NormalForcesAloneBalance {};
@@ -123,14 +121,14 @@ impl WheelSolve<'_> {
     fn rest(
         &self,
         wanted: NormalPass,
-        before: Option<&PressedWheel>,
+        start: HeightStart,
         workspace: &mut GridWorkspace<f32>,
     ) -> Result<Rest, SolveError> {
         let watch = TimeLimit::new(self.monitor, self.case.run.time_limit, 1);
         let began = self.monitor.elapsed();
         let wheel = self
             .contact
-            .press(&self.search, wanted, before, workspace, &watch);
+            .press(&self.search, wanted, start, workspace, &watch);
         let wheel = wheel.map_err(|failure| watch.explained(failure.into(), self.case))?;
         if matches!(wanted.accuracy, Accuracy::For(_)) {
             self.judge.before(&wheel)?;
@@ -169,7 +167,7 @@ impl WheelSolve<'_> {
             };
             let motions = match &problem.wheelset {
                 None => problem.motions.clone(),
-                Some(wheelset) => vec![at_rest.motion(gap, geometry, wheelset)?],
+                Some(wheelset) => vec![motion_in(gap, geometry, wheel.centre, wheelset)?],
             };
             let load_error = wheel.load_error.hypot(at_rest.unbalanced);
             let pressed = PressedContact {
@@ -194,18 +192,35 @@ impl WheelSolve<'_> {
         Ok(answers)
     }
 
-    /// Brings normal and tangential forces to balance the vertical force together.
-    fn balance(&self, workspace: &mut GridWorkspace<f32>) -> Result<Found, SolveError> {
+    /// The first rest with friction's share in it, and whether it is an exact one: the share is forecast while the height is sought, or
+    /// found on a coarse mesh at about the right height.
+    fn first_rest(&self, workspace: &mut GridWorkspace<f32>) -> Result<(Rest, bool), SolveError> {
         let WheelSolve { case, contact, .. } = *self;
-        let coarse = case.run.for_resultants(TARGET_FIRST);
+        let share = |wheel: &PressedWheel| forecast(&case.problem, &contact.geometry, wheel);
+        if can_forecast(&case.problem) {
+            let start = HeightStart {
+                before: None,
+                forecast: Some(&share),
+            };
+            return Ok((self.rest(self.exactly(0.0), start, workspace)?, true));
+        }
         let about = NormalPass {
             friction_share: 0.0,
             accuracy: Accuracy::About(TOLERANCE_FIRST),
         };
-        let mut at_rest = self.rest(about, None, workspace)?;
+        let mut at_rest = self.rest(about, HeightStart::default(), workspace)?;
+        let coarse = case.run.for_resultants(TARGET_FIRST);
         let answers = self.answers(&at_rest, &coarse)?;
-        let mut share = friction_share(&at_rest.wheel, &answers);
-        let mut counted = share;
+        at_rest.wheel.friction_share = friction_share(&at_rest.wheel, &answers);
+        Ok((at_rest, false))
+    }
+
+    /// Brings normal and tangential forces to balance the vertical force together.
+    fn balance(&self, workspace: &mut GridWorkspace<f32>) -> Result<Found, SolveError> {
+        let WheelSolve { case, contact, .. } = *self;
+        let (mut at_rest, mut exact) = self.first_rest(workspace)?;
+        let mut counted = at_rest.wheel.friction_share;
+        let mut share = counted;
         let mut previous = None;
         let tolerance = tolerance(case.run.resolution);
         let mut exit = BalanceExit::NothingCarried;
@@ -215,8 +230,15 @@ impl WheelSolve<'_> {
                 exit = BalanceExit::NothingCarried;
                 break;
             }
-            let wanted = self.exactly(counted);
-            at_rest = at_rest.again(self.rest(wanted, Some(&at_rest.wheel), workspace)?);
+            if !exact {
+                let start = HeightStart {
+                    before: Some(&at_rest.wheel),
+                    forecast: None,
+                };
+                let later = self.rest(self.exactly(counted), start, workspace)?;
+                at_rest = at_rest.again(later);
+            }
+            exact = false;
             let answers = self.answers(&at_rest, &case.run)?;
             share = friction_share(&at_rest.wheel, &answers);
             let before = previous.replace((counted, share));
@@ -376,32 +398,6 @@ impl Rest {
             seconds: self.seconds + later.seconds,
             unbalanced: later.unbalanced,
         }
-    }
-
-    /// Creepages and spin about the origin of a gap: those at its patches, weighted with their forces. Between patches
-    /// that share a gap the surfaces do not touch, so that the origin itself says nothing.
-    fn motion(
-        &self,
-        gap: &PressedGap,
-        geometry: &WheelRail,
-        wheelset: &WheelsetMotion,
-    ) -> Result<Motion, SolveError> {
-        let force = gap.normal_force();
-        let mut motion = Motion {
-            creepage_x: 0.0,
-            creepage_y: 0.0,
-            spin_per_mm: 0.0,
-        };
-        for (k, patch) in gap.field.patches().iter().enumerate() {
-            let [x, y] = gap.field.load_centre(Some(k));
-            let place = geometry.moved(&gap.frame, [x, y], self.wheel.centre)?;
-            let [along, across, spin] = creepages(geometry, &place, self.wheel.centre, wheelset)?;
-            let share = patch.normal_force / force;
-            motion.creepage_x += share * (along + spin * y);
-            motion.creepage_y += share * (across - spin * x);
-            motion.spin_per_mm += share * spin;
-        }
-        Ok(motion)
     }
 }
 

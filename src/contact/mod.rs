@@ -9,6 +9,7 @@ pub mod conventions;
 pub mod coupling;
 pub mod error;
 pub mod evaluate;
+pub mod forecast;
 pub mod friction;
 pub mod geometry;
 pub mod half_space;

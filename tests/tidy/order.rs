@@ -30,6 +30,7 @@ const ORDER: &[&str] = &[
     "contact::solution",
     "contact::time_limit",
     "contact::answer",
+    "contact::forecast",
     "contact::coupling",
     "contact::unlike",
     "contact::profile_trust",

@@ -128,11 +128,24 @@ impl Cubic {
 
 /// Weights of the nodes `i − 1` to `i + 2` in the value of the curve at x between nodes `i` and `i + 1`.
 pub(crate) fn weights(axis: &[f64], i: usize, x: f64) -> [f64; 4] {
-    std::array::from_fn(|k| {
-        let mut values = [0.0; 4];
-        values[k] = 1.0;
-        Cubic::between(axis, i, values).at(x)
-    })
+    let [before, length, after] = [
+        axis[i] - axis[i - 1],
+        axis[i + 1] - axis[i],
+        axis[i + 2] - axis[i + 1],
+    ];
+    let s = (x - axis[i]) / length;
+    // Hermite's functions of the rise and of the two tangents, which are means of the slopes beside their nodes.
+    let rise = s * s * (3.0 - 2.0 * s);
+    let start = s * (1.0 - s) * (1.0 - s) / (before + length);
+    let end = s * s * (s - 1.0) / (length + after);
+    let (outer_start, inner_start) = (start * length * length / before, start * before);
+    let (outer_end, inner_end) = (end * length * length / after, end * after);
+    [
+        -outer_start,
+        1.0 - rise + outer_start - inner_start - inner_end,
+        rise + inner_start + inner_end - outer_end,
+        outer_end,
+    ]
 }
 
 /// Index i of the interval from node `i` to `i + 1` that holds x; the first or last one for points outside.

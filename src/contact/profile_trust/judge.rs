@@ -9,7 +9,7 @@ use crate::contact::geometry::profile_quality::points::{
 use crate::contact::geometry::profile_quality::shape;
 use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::normal::wheel_height::search::PressedGap;
+use crate::contact::normal::wheel_height::pressed::PressedGap;
 use crate::contact::profile_trust::finding::{AMBIGUOUS, Cause, Finding};
 use crate::contact::solution::profile_quality::{PatchQuality, ProfileQuality};
 

@@ -8,7 +8,7 @@ use crate::contact::geometry::profile::Body;
 use crate::contact::geometry::profile_quality::points::advised_smoothing;
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::wheel_height::search::{Accuracy, NormalPass};
+use crate::contact::normal::wheel_height::search::{Accuracy, HeightStart, NormalPass};
 use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
@@ -87,7 +87,13 @@ pub(crate) fn settled(
         accuracy: Accuracy::About(TOLERANCE),
     };
     let watch = TimeLimit::new(monitor, case.run.time_limit, 1);
-    let wheel = trial.press(&search, wanted, None, &mut GridWorkspace::default(), &watch)?;
+    let wheel = trial.press(
+        &search,
+        wanted,
+        HeightStart::default(),
+        &mut GridWorkspace::default(),
+        &watch,
+    )?;
     let pressures = wheel.patches.iter().flat_map(|gap| gap.field.patches());
     let main = pressures
         .max_by(|a, b| a.normal_force.total_cmp(&b.normal_force))

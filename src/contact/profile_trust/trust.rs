@@ -1,5 +1,6 @@
 //! Solves a wheel on a rail and assesses its profiles.
 
+use std::cell::RefCell;
 use std::sync::Arc;
 
 use crate::contact::case::problem::CheckedCase;
@@ -10,7 +11,7 @@ use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::profile::{Body, Profile};
 use crate::contact::geometry::profile_quality::holes::{Hole, holes};
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::wheel_height::search::{PressedGap, PressedWheel};
+use crate::contact::normal::wheel_height::pressed::{PressedGap, PressedWheel};
 use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::profile_trust::finding::{Cause, Finding};
 use crate::contact::profile_trust::judge::{FoundPatch, judge};
@@ -32,8 +33,9 @@ pub(crate) fn solve(
 ) -> Result<(Solution, Fields), SolveError> {
     let settled = settle::settled(case, contact, monitor)?;
     let contact = settled.as_ref().unwrap_or(contact);
-    let found = judged(operators, case, contact, monitor)?;
-    let found = trusted(operators, case, contact, found, monitor)?;
+    let judgement = Judgement::new(contact);
+    let found = coupling::solve(operators, case, contact, &judgement, monitor)?;
+    let found = assessed(operators, case, &judgement, found, monitor)?;
     Ok((found.solution, found.fields))
 }
 
@@ -47,7 +49,7 @@ pub(crate) fn judged(
     contact: &WheelTask,
     monitor: &dyn Monitor,
 ) -> Result<Found, SolveError> {
-    coupling::solve(operators, case, contact, &Judgement { contact }, monitor)
+    coupling::solve(operators, case, contact, &Judgement::new(contact), monitor)
 }
 
 /// Assesses the profiles under the patches of a wheel that was solved.
@@ -58,10 +60,20 @@ pub(crate) fn trusted(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
     contact: &WheelTask,
+    found: Found,
+    monitor: &dyn Monitor,
+) -> Result<Found, SolveError> {
+    assessed(operators, case, &Judgement::new(contact), found, monitor)
+}
+
+fn assessed(
+    operators: &Arc<OperatorStore>,
+    case: &CheckedCase,
+    judgement: &Judgement,
     mut found: Found,
     monitor: &dyn Monitor,
 ) -> Result<Found, SolveError> {
-    let judgement = Judgement { contact };
+    let contact = judgement.contact;
     let (qualities, findings) = judgement.of(&found.wheel)?;
     let solution = &mut found.solution;
     for (patch, quality) in solution.patches.iter_mut().zip(qualities) {
@@ -101,7 +113,15 @@ fn worst_of_each(findings: impl Iterator<Item = Finding>) -> Vec<Finding> {
 /// Assesses the profiles under the patches of a wheel at rest.
 struct Judgement<'a> {
     contact: &'a WheelTask,
+    /// The last wheel that was assessed and what was found: it is asked about before and after its motions are solved.
+    last: RefCell<Option<(WheelAtRest, Assessed)>>,
 }
+
+/// The quality of the profiles under every patch, and the findings.
+type Assessed = (Vec<PatchQuality>, Vec<Finding>);
+
+/// What tells one wheel at rest of a contact from another: its lowering, and the normal forces of its gaps.
+type WheelAtRest = (f64, Vec<f64>);
 
 impl Judge for Judgement<'_> {
     /// Fails before the tangential problem is solved if the answer would mislead: on the ridge under an outlier, for example, that
@@ -153,9 +173,29 @@ fn rough(finding: &Finding, more: &str) -> SolveError {
     }
 }
 
-impl Judgement<'_> {
+impl<'a> Judgement<'a> {
+    fn new(contact: &'a WheelTask) -> Judgement<'a> {
+        Judgement {
+            contact,
+            last: RefCell::default(),
+        }
+    }
+
     /// The quality of the profiles under every patch, and the findings.
-    fn of(&self, wheel: &PressedWheel) -> Result<(Vec<PatchQuality>, Vec<Finding>), SolveError> {
+    fn of(&self, wheel: &PressedWheel) -> Result<Assessed, SolveError> {
+        let forces = wheel.patches.iter().map(PressedGap::normal_force).collect();
+        let asked = (wheel.lowering, forces);
+        if let Some((known, assessed)) = &*self.last.borrow()
+            && *known == asked
+        {
+            return Ok(assessed.clone());
+        }
+        let assessed = self.assess(wheel)?;
+        self.last.replace(Some((asked, assessed.clone())));
+        Ok(assessed)
+    }
+
+    fn assess(&self, wheel: &PressedWheel) -> Result<Assessed, SolveError> {
         let contact = self.contact;
         let (mut qualities, mut findings) = (Vec::new(), Vec::new());
         let mut width: f64 = 0.0;

@@ -16,7 +16,7 @@ use crate::contact::geometry::profile::Profile;
 use crate::contact::geometry::profile_quality::flattening::noise_pressure;
 use crate::contact::geometry::profile_quality::points::SMOOTHING_ADVISED;
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::normal::wheel_height::search::PressedWheel;
+use crate::contact::normal::wheel_height::pressed::PressedWheel;
 use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;

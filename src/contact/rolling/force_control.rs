@@ -4,7 +4,7 @@
 //! bracketed between a creepage that gives too little and one that gives too much; for two forces the search for the first runs
 //! inside the search for the second. The unknown is not the creepage but its *place* r: by Vermeulen and Johnson's cubic law with
 //! Kalker's coefficients (Vermeulen & Johnson 1964; Kalker 1990, §2.2.3) the creepage at r gives the force r μN, so that the force
-//! found is close to r.
+//! found is close to r. The search starts where the table of creep forces has the forces.
 
 use std::time::Duration;
 
@@ -13,9 +13,11 @@ use crate::contact::monitor::Monitor;
 use crate::contact::numerics::bracketed_root::{PLACE_MAX, RootExit, find_root};
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::answer::Work;
-use crate::contact::rolling::linear_theory;
+use crate::contact::rolling::cubic_law::CubicLaw;
+use crate::contact::rolling::load_ellipse::LoadEllipse;
 use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::methods::method::Method;
+use crate::contact::rolling::methods::table::solve as table;
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::refinement::level_solve::MotionTask;
@@ -37,8 +39,6 @@ const NEAR_LIMIT: f64 = 10.0;
 /// No force is sought more closely than this, relative to μN or, if they are smaller, to the forces of the first motion tried: where
 /// everything slips, elastic slip still turns the tractions by this much.
 const MISSED_LEAST: f64 = 2e-7;
-/// From this place on the cubic law is continued by its tangent.
-const KNEE: f64 = 0.9;
 /// Motions tried for two forces at once.
 const TRIALS_AT_ONCE: u32 = 14;
 /// Longest step of a place when two are searched at once.
@@ -82,57 +82,10 @@ pub fn solve(
     search.finish(place, began)
 }
 
-/// The cubic law of a problem.
-#[derive(Debug, Clone, Copy)]
-struct CubicLaw {
-    /// Force of linear theory over μN and creepage, along x and across.
-    stiffness: [f64; 2],
-}
-
-impl CubicLaw {
-    fn new(task: &RollingTask, limit: f64) -> CubicLaw {
-        let mut stiffness = [0.0; 2];
-        for patch in task.footprint.patches() {
-            let extent = patch.extent;
-            let box_ratio = (extent[1] - extent[0]) / (extent[3] - extent[2]);
-            let a_over_b = patch.semi_axes.map_or(box_ratio, |[a, b]| a / b);
-            let c = linear_theory::coefficients(a_over_b, task.elasticity.poisson_ratio);
-            let modulus = task.interface.reduction * task.elasticity.shear_modulus;
-            let unit = modulus * patch.area / std::f64::consts::PI;
-            for (k, stiffness) in stiffness.iter_mut().enumerate() {
-                *stiffness += unit * c[k] / limit;
-            }
-        }
-        CubicLaw { stiffness }
-    }
-
-    /// Force of linear theory over μN at which the cubic law gives the force `place` μN.
-    fn linear(place: f64) -> f64 {
-        let inside = place.abs().min(KNEE);
-        let slope = (1.0 - KNEE).powf(-2.0 / 3.0);
-        let beyond = slope * (place.abs() - inside);
-        (3.0 * (1.0 - (1.0 - inside).cbrt()) + beyond).copysign(place)
-    }
-
-    fn creepage(&self, k: usize, place: f64) -> f64 {
-        CubicLaw::linear(place) / self.stiffness[k]
-    }
-
-    fn place(&self, k: usize, creepage: f64) -> f64 {
-        let linear = (creepage * self.stiffness[k]).abs();
-        let knee = CubicLaw::linear(KNEE);
-        let inside = 1.0 - (1.0 - linear.min(knee) / 3.0).powi(3);
-        let beyond = (linear - knee).max(0.0) * (1.0 - KNEE).powf(2.0 / 3.0);
-        (inside + beyond).min(PLACE_MAX).copysign(creepage)
-    }
-
-    fn places(&self, motion: &Motion) -> [f64; 2] {
-        [
-            self.place(0, motion.creepage_x),
-            self.place(1, motion.creepage_y),
-        ]
-    }
-}
+/// Steps by which a start is moved to where the table has the forces; they fall short where the force hardly grows with its place.
+const TABLE_STEPS: u32 = 40;
+/// The start is good enough when the table misses the forces by no more than this, relative to μN: about what the table is off.
+const TABLE_MISSED: f64 = 1e-3;
 
 /// The search for the creepages of one motion.
 struct ForceSearch<'a, 'p> {
@@ -144,6 +97,8 @@ struct ForceSearch<'a, 'p> {
     /// μN of all patches in N.
     limit: f64,
     law: CubicLaw,
+    /// The ellipses that stand for the patches, where the table can tell a start.
+    ellipses: Vec<LoadEllipse>,
     /// The levels to solve on, coarse to fine; chosen by the next trial if empty.
     path: Vec<MeshPlan>,
     /// The answer nearest to the forces, and how far it is from them, relative to μN.
@@ -165,8 +120,14 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
     ) -> ForceSearch<'a, 'p> {
         let patches = task.footprint.patches();
         let limit = task.friction.limit_of_all(patches);
+        let ellipses = if table::tells(task.elasticity, task.interface, task.friction) {
+            levels.ellipses().to_vec()
+        } else {
+            Vec::new()
+        };
         ForceSearch {
             task,
+            ellipses,
             levels,
             index,
             monitor,
@@ -185,12 +146,13 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
     /// Places to start from: those of the cubic law, corrected by what the law was off at the motion before.
     fn start(&self, before: Option<&MotionAnswer>) -> [f64; 2] {
         let wanted = self.forces.map(|f| f.unwrap_or(0.0) / self.limit);
-        let mut place = self.guess(wanted);
+        let mut place = self.guess(wanted, &self.task.motions[self.index]);
         if let Some(before) = before.filter(|point| !point.saturated) {
             let sum = total(before);
             let forces = [sum.force_x / self.limit, sum.force_y / self.limit];
             let had = [0, 1].map(|k| self.forces[k].map_or(0.0, |_| forces[k]));
-            let (guess, found) = (self.guess(had), self.law.places(&before.motion));
+            let guess = self.guess(had, &before.motion);
+            let found = self.law.places(&before.motion);
             for k in 0..2 {
                 let correction = found[k] - guess[k];
                 if correction.abs() < CORRECTION_MAX {
@@ -201,14 +163,39 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
         place
     }
 
-    /// Places of the creepages that give forces by the cubic law without spin.
-    fn guess(&self, force: [f64; 2]) -> [f64; 2] {
+    /// Places of the creepages that give forces relative to μN: by the table with the rest of a motion, or by the cubic law without spin.
+    fn guess(&self, force: [f64; 2], rest: &Motion) -> [f64; 2] {
         let length = force[0].hypot(force[1]);
-        if length == 0.0 {
-            return [0.0; 2];
+        let linear = if length > 0.0 {
+            CubicLaw::linear(length.min(1.0)) / length
+        } else {
+            0.0
+        };
+        let cubic = [0, 1].map(|k| self.law.place(k, linear * force[k] / self.law.stiffness[k]));
+        self.by_table(force, rest, cubic).unwrap_or(cubic)
+    }
+
+    /// Places at which the table has the forces, from a start: a force is close to its place, so that what is missed is the step.
+    fn by_table(&self, force: [f64; 2], rest: &Motion, start: [f64; 2]) -> Option<[f64; 2]> {
+        let modulus = self.task.interface.reduction * self.task.elasticity.shear_modulus;
+        let poisson_ratio = self.task.elasticity.poisson_ratio;
+        let patches = self.task.footprint.patches();
+        let mut place = start;
+        for _ in 0..TABLE_STEPS * u32::from(!self.ellipses.is_empty()) {
+            let motion = self.at(place, rest);
+            let mut found = [0.0; 2];
+            for (ellipse, patch) in self.ellipses.iter().zip(patches) {
+                let limit = self.task.friction.limit(patch);
+                let own = table::forces(modulus, poisson_ratio, ellipse, limit, &motion);
+                found = [0, 1].map(|k| found[k] + own[k] / self.limit);
+            }
+            let off = [0, 1].map(|k| self.forces[k].map_or(0.0, |_| found[k] - force[k]));
+            if length(off) <= TABLE_MISSED {
+                return Some(place);
+            }
+            place = [0, 1].map(|k| (place[k] - off[k]).clamp(-PLACE_MAX, PLACE_MAX));
         }
-        let linear = CubicLaw::linear(length.min(1.0)) / length;
-        [0, 1].map(|k| self.law.place(k, linear * force[k] / self.law.stiffness[k]))
+        None
     }
 
     /// Finds the places at which the forces are as prescribed, or as near to that as can be.
@@ -362,7 +349,11 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
     }
 
     fn motion(&self, place: [f64; 2]) -> Motion {
-        let given = self.task.motions[self.index];
+        self.at(place, &self.task.motions[self.index])
+    }
+
+    /// A motion with the creepages of these places where forces are prescribed.
+    fn at(&self, place: [f64; 2], given: &Motion) -> Motion {
         let creepage = |k: usize, given: f64| match self.forces[k] {
             Some(_) => self.law.creepage(k, place[k]),
             None => given,
@@ -370,7 +361,7 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
         Motion {
             creepage_x: creepage(0, given.creepage_x),
             creepage_y: creepage(1, given.creepage_y),
-            ..given
+            ..*given
         }
     }
 

@@ -1,6 +1,7 @@
 //! The tangential problem of steady rolling.
 
 pub mod answer;
+pub mod cubic_law;
 pub mod force_control;
 pub(crate) mod layer_slip;
 pub mod linear_theory;

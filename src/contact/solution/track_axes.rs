@@ -4,7 +4,7 @@ use crate::contact::case::problem::CheckedCase;
 use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::normal::wheel_height::search::{PressedGap, PressedWheel};
+use crate::contact::normal::wheel_height::pressed::{PressedGap, PressedWheel};
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
 use crate::contact::solution::words::{

@@ -12,7 +12,7 @@ use realfft::RealFftPlanner;
 /// Length in mm over which heights are tapered to 0 at both ends.
 const TAPER: f64 = 2.0;
 /// Padded length relative to that of the heights; the zeros keep the periodic transform from coupling the two ends.
-const PADDING: usize = 4;
+const PADDING: usize = 2;
 
 /// Plans of the transforms, which take longer to make than to use. Lengths are powers of two, so that there are few.
 static PLANNER: LazyLock<Mutex<RealFftPlanner<f64>>> = LazyLock::new(Mutex::default);
@@ -25,7 +25,11 @@ pub fn flattening(heights: &[f64], step: f64, modulus: f64) -> Vec<f64> {
     let mut values = vec![0.0; padded];
     for (k, height) in heights.iter().enumerate() {
         let from_end = step * k.min(count - 1 - k) as f64;
-        values[k] = height * 0.5 * (1.0 - (PI * (from_end / TAPER).min(1.0)).cos());
+        values[k] = if from_end < TAPER {
+            height * 0.5 * (1.0 - (PI * from_end / TAPER).cos())
+        } else {
+            *height
+        };
     }
     let (forward, backward) = {
         // A planner that a panic left behind holds whole plans still.

@@ -46,9 +46,12 @@ pub fn roughness(points: Points, smoothing: f64, contact: [f64; 2], modulus: f64
     let step = STEP.max((window[1] - window[0]) / SAMPLES_MAX as f64);
     let count = ((window[1] - window[0]) / step).floor() as usize + 1;
     let places: Vec<f64> = (0..count).map(|k| window[0] + step * k as f64).collect();
-    let used = HeightCurve::smoothed(part, smoothing);
-    let pressures = |other: &HeightCurve| {
-        let heights: Vec<f64> = places.iter().map(|s| used.above(other, *s)).collect();
+    let used = spline(part, smoothing);
+    let used: Vec<CurvePoint> = places.iter().map(|s| used.at(*s)).collect();
+    let pressures = |other: &dyn Fn(f64) -> [f64; 2]| {
+        let heights: Vec<f64> = (used.iter().zip(&places))
+            .map(|(used, s)| above(used, other(*s)))
+            .collect();
         flattening(&heights, step, modulus)
     };
     let over_contact = |pressures: &[f64]| {
@@ -63,7 +66,8 @@ pub fn roughness(points: Points, smoothing: f64, contact: [f64; 2], modulus: f64
         }
         (sum / count.max(1.0)).sqrt()
     };
-    let waves = pressures(&HeightCurve::smoothed(part, reference));
+    let smoother = spline(part, reference);
+    let waves = pressures(&|s| smoother.at(s).at);
     let mut sizes: Vec<f64> = waves.iter().map(|pressure| pressure.abs()).collect();
     Roughness {
         waviness: over_contact(&waves),
@@ -71,43 +75,25 @@ pub fn roughness(points: Points, smoothing: f64, contact: [f64; 2], modulus: f64
         ambiguity: if smoothing > 0.0 {
             0.0
         } else {
-            over_contact(&pressures(&HeightCurve::Akima(Akima::new(part))))
+            let akima = Akima::new(part);
+            over_contact(&pressures(&|s| akima.at(s)))
         },
     }
 }
 
-/// A curve through or near points.
-enum HeightCurve {
-    Spline(PlaneCurve),
-    Akima(Akima),
+/// The spline near points, without waves below `cut` mm.
+fn spline(points: Points, cut: f64) -> PlaneCurve {
+    let [y, z] = [0, 1].map(|part| {
+        let values: Vec<f64> = points.at.iter().map(|at| at[part]).collect();
+        Spline::new(points.along, &values, cut)
+    });
+    PlaneCurve::new(&y, &z)
 }
 
-impl HeightCurve {
-    fn smoothed(points: Points, cut: f64) -> HeightCurve {
-        let [y, z] = [0, 1].map(|part| {
-            let values: Vec<f64> = points.at.iter().map(|at| at[part]).collect();
-            Spline::new(points.along, &values, cut)
-        });
-        HeightCurve::Spline(PlaneCurve::new(&y, &z))
-    }
-
-    fn at(&self, s: f64) -> [f64; 2] {
-        match self {
-            HeightCurve::Spline(curve) => curve.at(s).at,
-            HeightCurve::Akima(curve) => curve.at(s),
-        }
-    }
-
-    /// Distance from this spline to another curve along its normal, positive if the spline is above.
-    fn above(&self, other: &HeightCurve, s: f64) -> f64 {
-        let HeightCurve::Spline(curve) = self else {
-            return 0.0;
-        };
-        let CurvePoint { at, slope, .. } = curve.at(s);
-        let [other_y, other_z] = other.at(s);
-        let length = slope[0].hypot(slope[1]).max(f64::MIN_POSITIVE);
-        (slope[0] * (at[1] - other_z) - slope[1] * (at[0] - other_y)) / length
-    }
+/// Distance from a point of a spline to that of another curve along its normal, positive if the spline is above.
+fn above(CurvePoint { at, slope, .. }: &CurvePoint, [other_y, other_z]: [f64; 2]) -> f64 {
+    let length = slope[0].hypot(slope[1]).max(f64::MIN_POSITIVE);
+    (slope[0] * (at[1] - other_z) - slope[1] * (at[0] - other_y)) / length
 }
 
 /// Akima's curve (Journal of the ACM 17, 1970): cubics whose slopes at the points favour the straighter side, so that it stays close to

@@ -136,6 +136,13 @@ impl PressureField {
         sum.map(|sum| sum / weight)
     }
 
+    /// Mean square distances `[along, across]` in mm² from the load centre of one patch, weighted with the pressure.
+    #[must_use]
+    pub fn load_spread(&self, patch: usize) -> [f64; 2] {
+        let [grid, label] = self.places[patch];
+        self.grids[grid].load_spread(label)
+    }
+
     /// The same pressure with coordinates relative to another origin, in mm.
     #[must_use]
     pub fn from_origin(mut self, origin: [f64; 2]) -> PressureField {

@@ -223,22 +223,12 @@ impl GridPressure {
         }
         let t = (y - rows[j]) / (rows[j + 1] - rows[j]);
         let weights = weights(rows, j, y);
-        // One more node on either side, needed for the slopes.
-        let nodes = shape.columns.start() - 1..=shape.columns.end() + 2;
         let line = GridLine {
             axis: x,
-            first: *nodes.start(),
-            values: nodes.map(|i| self.value_on_column(i, j, weights)).collect(),
-            smooth: shape
-                .columns
-                .clone()
-                .map(|i| self.is_smooth(i, j))
-                .collect(),
-            allowed: shape
-                .columns
-                .clone()
-                .map(|i| self.allowed(label, i, j, t))
-                .collect(),
+            intervals: shape.columns.clone(),
+            value: |i| self.value_on_column(i, j, weights),
+            smooth: |i| self.is_smooth(i, j),
+            allowed: |i| self.allowed(label, i, j, t),
         };
         line.segments()
     }

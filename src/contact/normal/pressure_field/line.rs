@@ -2,18 +2,18 @@
 
 use crate::contact::numerics::cubic::Cubic;
 
-/// Values at the nodes of an axis, and the intervals that may belong to a patch.
-#[derive(Debug)]
-pub(crate) struct GridLine<'f> {
+/// Values at the nodes of an axis, and the intervals that may belong to a patch. Everything is asked for when it is needed: most
+/// intervals of a line lie inside the contact, where the values at their two ends tell all.
+pub(crate) struct GridLine<'f, V, S, A> {
     pub(crate) axis: &'f [f64],
-    /// Node of the axis that `values` starts with.
-    pub(crate) first: usize,
-    pub(crate) values: Vec<f64>,
-    /// For each interval from the second node on: are the samples around it smooth?
-    pub(crate) smooth: Vec<bool>,
-    /// For each interval from the second node on: which part of it may belong to the patch, from 0 at its start to 1
-    /// at its end; nothing if the part is empty.
-    pub(crate) allowed: Vec<[f64; 2]>,
+    /// The intervals, each named by the node at its start. Values are asked for one node before and one after them as well.
+    pub(crate) intervals: std::ops::RangeInclusive<usize>,
+    /// The value at a node.
+    pub(crate) value: V,
+    /// Are the samples around an interval smooth?
+    pub(crate) smooth: S,
+    /// Which part of an interval may belong to the patch, from 0 at its start to 1 at its end; nothing if the part is empty.
+    pub(crate) allowed: A,
 }
 
 /// A cubic kept within the bounds that its ends suggest.
@@ -23,17 +23,30 @@ pub(crate) struct Bounded {
     bounds: [f64; 2],
 }
 
-impl GridLine<'_> {
+impl<V, S, A> GridLine<'_, V, S, A>
+where
+    V: Fn(usize) -> f64,
+    S: Fn(usize) -> bool,
+    A: Fn(usize) -> [f64; 2],
+{
     /// The segments where the curve is positive, from smaller to larger coordinate.
     pub(crate) fn segments(&self) -> Vec<(f64, f64)> {
         let mut segments: Vec<(f64, f64)> = Vec::new();
-        for (k, [from, to]) in self
-            .allowed
-            .iter()
-            .enumerate()
-            .filter(|(_, [from, to])| to > from)
-        {
-            let node = self.first + 1 + k;
+        let first = *self.intervals.start();
+        let mut values = [0, 1, 2, 3].map(|k| (self.value)(first + k - 1));
+        for node in self.intervals.clone() {
+            if node > first {
+                values = [values[1], values[2], values[3], (self.value)(node + 2)];
+            }
+            let [_, here, next, _] = values;
+            // Between two nodes that are not positive, a positive part counts only where it continues a smooth edge.
+            if here <= 0.0 && next <= 0.0 && !(self.smooth)(node) {
+                continue;
+            }
+            let [from, to] = (self.allowed)(node);
+            if to <= from {
+                continue;
+            }
             let (low, high) = (self.axis[node], self.axis[node + 1]);
             // The ends of a whole interval are its nodes to the last digit, so that segments join there.
             let part = |s: f64, end: f64| {
@@ -43,8 +56,8 @@ impl GridLine<'_> {
                     low + s * (high - low)
                 }
             };
-            let (from, to) = (part(*from, low), part(*to, high));
-            self.positive_parts(k, |left, right| {
+            let (from, to) = (part(from, low), part(to, high));
+            self.positive_parts(node, values, |left, right| {
                 let (left, right) = (left.max(from), right.min(to));
                 match segments.last_mut() {
                     _ if left >= right => {}
@@ -56,19 +69,13 @@ impl GridLine<'_> {
         segments
     }
 
-    /// Tells where the curve is positive in one interval, part by part.
-    fn positive_parts(&self, k: usize, mut tell: impl FnMut(f64, f64)) {
-        let node = self.first + 1 + k;
+    /// Tells where the curve is positive between a node and the next one, part by part; `values` are those of the nodes around.
+    fn positive_parts(&self, node: usize, values: [f64; 4], mut tell: impl FnMut(f64, f64)) {
         let (low, high) = (self.axis[node], self.axis[node + 1]);
-        let values = [0, 1, 2, 3].map(|m| self.values[k + m]);
         let [_, here, next, _] = values;
         // Between two positive nodes the contact is whole: a gap there is not in the data.
         if here > 0.0 && next > 0.0 {
             tell(low, high);
-            return;
-        }
-        // Between two nodes that are not positive, a positive part counts only where it continues a smooth edge.
-        if here <= 0.0 && next <= 0.0 && !self.smooth[k] {
             return;
         }
         let mut start = (here > 0.0).then_some(low);

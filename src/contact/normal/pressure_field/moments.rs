@@ -22,6 +22,26 @@ impl GridPressure {
         sum.map(|sum| sum / weight)
     }
 
+    /// Mean square distances `[along, across]` in mm² from the load centre of one patch, weighted with the pressure.
+    #[must_use]
+    pub fn load_spread(&self, patch: usize) -> [f64; 2] {
+        let centre = self.load_centre(Some(patch));
+        let width = self.grid.x.len();
+        let share = |axis: &[f64], k: usize| 0.5 * (axis[k + 1] - axis[k - 1]);
+        let (mut weight, mut sum) = (0.0, [0.0; 2]);
+        for (k, q) in self.q.iter().enumerate() {
+            if *q <= 0.0 || usize::from(self.cells[k]) != patch {
+                continue;
+            }
+            let [i, j] = [k % width, k / width];
+            let own = q.sqrt() * share(&self.grid.x, i) * share(&self.grid.y, j);
+            let from = [self.grid.x[i] - centre[0], self.grid.y[j] - centre[1]];
+            weight += own;
+            sum = [0, 1].map(|axis| sum[axis] + own * from[axis] * from[axis]);
+        }
+        sum.map(|sum| sum / weight)
+    }
+
     /// The same pressure with coordinates relative to another origin, in mm.
     #[must_use]
     pub fn from_origin(mut self, origin: [f64; 2]) -> GridPressure {

@@ -2,6 +2,7 @@
 
 pub mod bracket;
 pub mod gap_remarks;
+pub mod pressed;
 pub mod search;
 pub mod task;
 pub mod wheelset_task;

@@ -5,24 +5,20 @@
 //! from the stiffness of flat punches of the same areas, `dN/dδ = 2 E* √(A/π)`. Until the height is nearly found, gaps are sampled
 //! and solved coarsely.
 
-use std::f64::consts::PI;
-
 use crate::contact::geometry::contact_locus::ContactLocus;
-use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::local_gap::{Detail, LocalGap};
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::answer::{NormalError, NormalWork};
+use crate::contact::normal::answer::NormalError;
 use crate::contact::normal::gap::pilot::PilotOnce;
 use crate::contact::normal::gap::surface::GapSurface;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::hertz::Pressing;
 use crate::contact::normal::neighbours::{Neighbour, neglected};
-use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::normal::wheel_height::bracket::{Bracket, HeightExit};
 use crate::contact::normal::wheel_height::gap_remarks::{cut_patches, missed_beside};
+use crate::contact::normal::wheel_height::pressed::{PressedGap, PressedWheel};
 use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
-use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 
 /// Heights after which the search is given up.
@@ -31,64 +27,8 @@ const HEIGHTS_MAX: u32 = 40;
 /// contacts scale; the error left is of second order for these, and at worst about a third of the tolerance in pressures and lengths.
 /// Below the lower bound the forces of neighbouring heights differ by no more than those of different grids.
 const FORCE_TOLERANCE: [f64; 2] = [5e-4, 5e-3];
-/// The third that is left, as an error of the load.
-const CORRECTED: f64 = 1.0 / 3.0;
-/// Coarse gaps are replaced by fine ones when the force is missed by no more than this. 0.005 and 0.05 change
-/// forces by 0.3 % and pressures by 0.04 % at most on the wheels of `cargo bench --bench calibrate profiles`, with as many iterations.
-const NEAR: f64 = 0.02;
 /// A gap whose overlap is less than this fraction of the deepest one is left out: its force is about the power 3/2 of this, 1e-4.
 const DEPTH_SHARE_MIN: f64 = 2e-3;
-
-/// The wheel at rest on its rail.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PressedWheel {
-    /// How far the wheel is below first touch, in mm.
-    pub lowering: f64,
-    /// The force that is prescribed, in N, as it came out at the last height, and its derivative by the lowering.
-    found: [f64; 2],
-    /// By how much, relatively, the load of region and pressure may differ from the one wanted.
-    pub load_error: f64,
-    /// By which part the prescribed force was missed at the last height, before the contact was corrected to it.
-    pub force_residual: f64,
-    /// Height of the wheel's centre over the top of the rail, in mm.
-    pub centre: f64,
-    /// Heights that were solved.
-    pub heights: u32,
-    /// The gaps in contact, from smaller to larger y of the track; never empty.
-    pub patches: Vec<PressedGap>,
-    /// Remarks for the answer.
-    pub remarks: Vec<RemarkEntry>,
-}
-
-/// The contact in one gap: usually one patch, several where they lie near each other.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PressedGap {
-    /// Frame of the coordinates, with its origin at the load centre.
-    pub frame: Frame,
-    /// Deepest overlap of the undeformed bodies in mm.
-    approach: f64,
-    /// Region and pressure.
-    pub field: PressureField,
-    /// How it was found.
-    pub report: NormalWork,
-    /// Remarks for the answer.
-    pub remarks: Vec<RemarkEntry>,
-}
-
-impl PressedGap {
-    /// Sum of the normal forces in N.
-    #[must_use]
-    pub fn normal_force(&self) -> f64 {
-        let patches = self.field.patches();
-        patches.iter().map(|patch| patch.normal_force).sum()
-    }
-
-    /// Force per mm of approach of flat punches of the same areas (exact for circles), divided by `2 E*`.
-    fn stiffness(&self) -> f64 {
-        let patches = self.field.patches();
-        patches.iter().map(|patch| (patch.area / PI).sqrt()).sum()
-    }
-}
 
 /// How a wheel should come to rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -97,6 +37,18 @@ pub struct NormalPass {
     pub friction_share: f64,
     /// How exactly.
     pub accuracy: Accuracy,
+}
+
+/// Tells from a wheel at some height what friction will carry, see [`NormalPass::friction_share`]; nothing where it cannot be told.
+pub type ShareForecast<'a> = dyn Fn(&PressedWheel) -> Option<f64> + 'a;
+
+/// What is known before the search for a height begins.
+#[derive(Clone, Copy, Default)]
+pub struct HeightStart<'a> {
+    /// An earlier rest under a similar load.
+    pub before: Option<&'a PressedWheel>,
+    /// Asked at coarse heights, in place of [`NormalPass::friction_share`].
+    pub forecast: Option<&'a ShareForecast<'a>>,
 }
 
 /// How exactly a force is to be carried.
@@ -139,46 +91,6 @@ impl Fineness {
     }
 }
 
-impl PressedWheel {
-    /// The wheel at the height where the search ended, corrected to the force that was wanted.
-    fn at_rest(mut self, exit: HeightExit, wanted: f64) -> PressedWheel {
-        let [carried, slope] = self.found;
-        // Where the force jumps, its slope says nothing of the height.
-        let lower = if exit.converged() {
-            (wanted - carried) / slope
-        } else {
-            0.0
-        };
-        self.force_residual = exit.missed();
-        self.load_error = match exit {
-            HeightExit::Jump { .. } => exit.missed(),
-            _ => CORRECTED * exit.missed(),
-        };
-        self.remarks.extend(exit.remark().map(RemarkEntry::from));
-        self.correct(wanted / carried, lower);
-        self
-    }
-
-    /// Forces times a factor near 1, and the wheel lower by so much in mm.
-    fn correct(&mut self, factor: f64, lower: f64) {
-        self.found[0] *= factor;
-        self.lowering += lower;
-        self.centre -= lower;
-        for gap in &mut self.patches {
-            let approach = lower * gap.frame.angle.cos();
-            gap.approach += approach;
-            gap.field = gap.field.clone().corrected(factor, approach);
-        }
-    }
-
-    /// Vertical part of the normal forces in N.
-    #[must_use]
-    pub fn vertical_force(&self) -> f64 {
-        let part = |gap: &PressedGap| gap.normal_force() * gap.frame.angle.cos();
-        self.patches.iter().map(part).sum()
-    }
-}
-
 impl WheelTask {
     /// The same with other smoothings of rail and wheel, in mm.
     #[must_use]
@@ -204,7 +116,16 @@ impl WheelTask {
         Ok(search.grouped_near(expected))
     }
 
-    /// Brings the wheel to rest, from an earlier rest under a similar load if there is one.
+    /// The force that normal forces carry where friction carries its share; nothing where the height is given.
+    fn target(&self, friction_share: f64) -> Option<f64> {
+        match self.loading {
+            WheelLoad::Vertical(force) => Some(force / (1.0 + friction_share)),
+            WheelLoad::Normal(force) => Some(force),
+            WheelLoad::Lowering(_) => None,
+        }
+    }
+
+    /// Brings the wheel to rest.
     ///
     /// # Errors
     /// A reason why there is no answer; or the monitor stopped the work.
@@ -212,28 +133,50 @@ impl WheelTask {
         &self,
         search: &ContactLocus,
         wanted: NormalPass,
-        before: Option<&PressedWheel>,
+        start: HeightStart,
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<PressedWheel, NormalError> {
-        let target = match self.loading {
-            WheelLoad::Vertical(force) => force / (1.0 + wanted.friction_share),
-            WheelLoad::Normal(force) => force,
-            WheelLoad::Lowering(lowering) => {
-                let fineness = Fineness::fine(wanted);
-                return self.lowered(search, lowering, fineness, workspace, monitor);
-            }
-        };
+        if let WheelLoad::Lowering(lowering) = self.loading {
+            let fineness = Fineness::fine(wanted);
+            return self.lowered(search, lowering, fineness, workspace, monitor);
+        }
+        let force = self.target(wanted.friction_share).unwrap_or_default();
+        let tolerance = wanted.accuracy.tolerance();
+        let corrected = start
+            .before
+            .and_then(|wheel| wheel.carrying(force, tolerance));
+        match (corrected, wanted.accuracy) {
+            (Some(wheel), Accuracy::For(_)) => Ok(PressedWheel {
+                friction_share: wanted.friction_share,
+                ..wheel
+            }),
+            _ => self.height_sought(search, wanted, start, workspace, monitor),
+        }
+    }
+
+    /// The wheel at the height that carries the force, height by height.
+    fn height_sought(
+        &self,
+        search: &ContactLocus,
+        wanted: NormalPass,
+        HeightStart { before, forecast }: HeightStart,
+        workspace: &mut GridWorkspace<f32>,
+        monitor: &dyn Monitor,
+    ) -> Result<PressedWheel, NormalError> {
+        let target = |friction_share: f64| self.target(friction_share).unwrap_or_default();
+        let mut friction_share = wanted.friction_share;
+        let mut force = target(friction_share);
         let tolerance = wanted.accuracy.tolerance();
         let exact = matches!(wanted.accuracy, Accuracy::For(_));
         let (mut bracket, mut fineness) = (Bracket::default(), Fineness::fine(wanted));
-        let starts_near = before.is_some_and(|before| near(before.found[0], target));
+        let starts_near = before.is_some_and(|before| before.is_near(force));
         if !(exact && starts_near) {
             fineness.detail = Detail::Coarse;
         }
         let mut lowering = match before.map(|before| (before.lowering, before.found)) {
-            Some((height, [carried, slope])) => bracket.next(height, carried, target, slope),
-            None => search.estimated_lowering(target / self.contact_modulus),
+            Some((height, [carried, slope])) => bracket.next(height, carried, force, slope),
+            None => search.estimated_lowering(force / self.contact_modulus),
         };
         for heights in 1..=HEIGHTS_MAX {
             let mut found = match self.looked_at(search, lowering, fineness, workspace, monitor) {
@@ -248,27 +191,32 @@ impl WheelTask {
             };
             let [carried, slope] = found.found;
             let known = bracket.slope;
-            let next = bracket.next(lowering, carried, target, slope);
+            let fine = fineness.detail == Detail::Fine;
+            if let Some(share) = forecast.filter(|_| !fine).and_then(|told| told(&found)) {
+                friction_share = share;
+                force = target(share);
+            }
+            let next = bracket.next(lowering, carried, force, slope);
             found.found[1] = bracket.slope.or(known).unwrap_or(slope);
             found.heights = heights;
-            let missed = (carried / target - 1.0).abs();
-            let fine = fineness.detail == Detail::Fine;
+            found.friction_share = friction_share;
+            let missed = (carried / force - 1.0).abs();
             if missed <= tolerance && !exact {
                 return Ok(found);
             }
             if missed <= tolerance && fine {
-                return Ok(found.at_rest(HeightExit::Met { missed }, target));
+                return Ok(found.at_rest(HeightExit::Met { missed }, force));
             }
             if let Some(reason) = bracket.closed_on_refusal(lowering) {
                 return Err(NormalError::NoAnswer(reason));
             }
             let closed = bracket.is_closed(lowering);
             if closed && fine {
-                let exit = HeightExit::closed(target / carried, tolerance);
-                return Ok(found.at_rest(exit, target));
+                let exit = HeightExit::closed(force / carried, tolerance);
+                return Ok(found.at_rest(exit, force));
             }
             lowering = if closed { found.lowering } else { next };
-            if closed || !fine && near(carried, target) {
+            if closed || !fine && found.is_near(force) {
                 // Forces of coarse gaps are too inexact as ends of the bracket; their slope is exact enough.
                 fineness.detail = Detail::Fine;
                 bracket = bracket.opened(found.found[1]);
@@ -331,6 +279,8 @@ impl WheelTask {
             force_residual: 0.0,
             centre,
             heights: 1,
+            friction_share: 0.0,
+            met: false,
             patches,
             remarks: Vec::new(),
         };
@@ -430,11 +380,6 @@ impl WheelTask {
         // The power 3/2 of Hertz's contacts is a bound for anything that grows as it is pressed.
         slope.max(carried / found.lowering)
     }
-}
-
-/// Is a force found with coarse gaps near enough to go on with fine ones?
-fn near(force: f64, target: f64) -> bool {
-    (force / target - 1.0).abs() <= NEAR
 }
 
 /// Deepest overlap of a gap in mm.

@@ -49,8 +49,9 @@ pub fn error_class(bound: TractionBound, mesh: MeshSize) -> f64 {
 
 /// Tractions, slips and zones of one dimensionless motion on a level.
 ///
-/// Each patch is taken by itself, with the flexibilities of the ellipse that has its area and its ratio of second moments of
-/// area, and creepages about its centre of area; for an ellipse that is the ellipse. Slips are those of the single flexibility
+/// Each patch is taken by itself, with the flexibilities of the ellipse that carries its load the same way (see
+/// [`LoadEllipse`](crate::contact::rolling::load_ellipse::LoadEllipse)), and creepages about its load centre; for an ellipse that is the
+/// ellipse. Slips are those of the single flexibility
 /// `(L1|ν_x| + L2|ν_y| + L3|φ|c)/√(ν_x² + ν_y² + φ²c²)`. Tractions with the parabolic bound exceed μp in the middle of a patch.
 #[must_use]
 pub fn solve(task: &RollingTask, level: &StripMesh, motion: &Motion) -> LevelAnswer {
@@ -214,32 +215,28 @@ struct EquivalentEllipse {
 impl EquivalentEllipse {
     fn like(level: &StripMesh, index: usize, patch: &Patch) -> EquivalentEllipse {
         let mesh = &level.normalised;
-        let segments = || mesh.segments.iter().filter(|s| s.chord.patch == index);
-        let (mut area, mut first, mut second) = (0.0, [0.0; 2], [0.0; 2]);
-        for segment in segments() {
-            let chord = &segment.chord;
-            let (length, middle) = (chord.right - chord.left, 0.5 * (chord.right + chord.left));
-            let weight = length * chord.dy;
-            area += weight;
-            for (k, (place, width)) in [(middle, length), (chord.y, chord.dy)].iter().enumerate() {
-                first[k] += weight * place;
-                second[k] += weight * (place * place + width * width / 12.0);
+        let (mut load, mut first, mut second) = (0.0, [0.0; 2], [0.0; 2]);
+        for segment in mesh.segments.iter().filter(|s| s.chord.patch == index) {
+            for i in segment.cells.clone() {
+                let own = level.pressure[i] * level.area[i];
+                let along = (
+                    0.5 * (mesh.left[i] + mesh.right[i]),
+                    mesh.right[i] - mesh.left[i],
+                );
+                let across = (segment.chord.y, segment.chord.dy);
+                load += own;
+                for (k, (place, width)) in [along, across].into_iter().enumerate() {
+                    first[k] += own * place;
+                    second[k] += own * (place * place + width * width / 12.0);
+                }
             }
         }
-        let centre = first.map(|m| m / area);
-        let a_over_b = match patch.semi_axes {
-            Some([a, b]) => a / b,
-            None => {
-                let about = [0, 1].map(|k| second[k] / area - centre[k] * centre[k]);
-                (about[0] / about[1]).sqrt()
-            }
+        let centre = first.map(|moment| moment / load);
+        let [a, b] = match patch.semi_axes {
+            Some(semi_axes) => semi_axes.map(|axis| axis / level.scale.length),
+            None => [0, 1].map(|k| (5.0 * (second[k] / load - centre[k] * centre[k])).sqrt()),
         };
-        let c = (patch.area / PI).sqrt() / level.scale.length;
-        EquivalentEllipse {
-            centre,
-            a: c * a_over_b.sqrt(),
-            b: c / a_over_b.sqrt(),
-        }
+        EquivalentEllipse { centre, a, b }
     }
 }
 

@@ -3,6 +3,8 @@
 use std::ops::ControlFlow;
 
 use crate::contact::error::SolveError;
+use crate::contact::friction::interface::Interface;
+use crate::contact::friction::law::FrictionLaw;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::monitor::Monitor;
 use crate::contact::rolling::answer::Work;
@@ -117,6 +119,50 @@ fn still(motion: &Motion) -> bool {
     motion.creepage_x == 0.0 && motion.creepage_y == 0.0 && motion.spin_per_mm == 0.0
 }
 
+/// Can the table tell where a search should begin? It knows like bodies with nothing between them but a coefficient of friction that does
+/// not fall with slip.
+#[must_use]
+pub(crate) fn tells(elasticity: &Elasticity, interface: Interface, friction: &FrictionLaw) -> bool {
+    elasticity.difference == 0.0 && interface.layer == 0.0 && !friction.depends_on_slip()
+}
+
+/// F_x and F_y in N on an ellipse for a motion about the origin of the case, with a limit μN in N; beyond the ratios of its axes that the
+/// table covers, those at the nearest one.
+#[must_use]
+pub(crate) fn forces(
+    shear_modulus: f64,
+    poisson_ratio: f64,
+    ellipse: &LoadEllipse,
+    limit: f64,
+    motion: &Motion,
+) -> [f64; 2] {
+    if limit <= 0.0 {
+        return [0.0; 2];
+    }
+    let creepage = dimensionless(shear_modulus, ellipse, limit, motion);
+    let ratio = ellipse.ratio().clamp(RATIO_MIN, RATIO_MAX);
+    let Creep { force, .. } = table().ellipse(ratio, poisson_ratio).creep(creepage);
+    [limit * force[0], limit * force[1]]
+}
+
+/// Creepages about the centre of an ellipse and spin, as the table has them.
+fn dimensionless(
+    shear_modulus: f64,
+    ellipse: &LoadEllipse,
+    limit: f64,
+    motion: &Motion,
+) -> [f64; 3] {
+    let c = ellipse.length();
+    let [x, y] = ellipse.centre;
+    let unit = shear_modulus * c * c / limit;
+    let spin = motion.spin_per_mm;
+    [
+        unit * (motion.creepage_x - spin * y),
+        unit * (motion.creepage_y + spin * x),
+        unit * c * spin,
+    ]
+}
+
 /// What the table says of one patch.
 struct PatchAnswer {
     resultants: Resultants,
@@ -144,12 +190,7 @@ fn on_ellipse(
     let c = ellipse.length();
     let [x, y] = ellipse.centre;
     let unit = elasticity.shear_modulus * c * c / limit;
-    let spin = motion.spin_per_mm;
-    let creepage = [
-        unit * (motion.creepage_x - spin * y),
-        unit * (motion.creepage_y + spin * x),
-        unit * c * spin,
-    ];
+    let creepage = dimensionless(elasticity.shear_modulus, ellipse, limit, motion);
     let here = table().ellipse(ellipse.ratio(), elasticity.poisson_ratio);
     let (
         Creep {

@@ -72,6 +72,17 @@ fn transformed(matrix: &[Vec<f64>], before: usize, from: &[f32], inner: usize) -
     to
 }
 
+/// Adds the rows of an array times the weight of each function.
+fn add(to: &mut [f32], from: &[f32], weights: [f32; OUTPUTS]) {
+    let (to, _) = to.as_chunks_mut::<OUTPUTS>();
+    let (from, _) = from.as_chunks::<OUTPUTS>();
+    for (to, from) in to.iter_mut().zip(from) {
+        for k in 0..OUTPUTS {
+            to[k] += weights[k] * from[k];
+        }
+    }
+}
+
 /// Splines over the poles of an array `[a/b][pole][direction][row]`: the parts even and odd in the direction by themselves.
 fn over_poles(from: &[f32]) -> Vec<f32> {
     let of_ends = |ends: [Mirror; 2]| mirrored_coefficients(POLES, ends);
@@ -81,23 +92,20 @@ fn over_poles(from: &[f32]) -> Vec<f32> {
     let blocks = from.chunks_exact(POLES * block);
     for (from, to) in blocks.zip(to.chunks_exact_mut(POLE_COEFFICIENTS * block)) {
         for (pole, to) in to.chunks_exact_mut(block).enumerate() {
-            let weights: [Vec<[f32; 2]>; OUTPUTS] = std::array::from_fn(|k| {
-                let [same, other] = &matrices[k];
-                let pairs = same[pole].iter().zip(&other[pole]);
-                // Half the sum and half the difference of the two weights act on χ and on −χ.
-                pairs
-                    .map(|(e, o)| [0.5 * (e + o) as f32, 0.5 * (e - o) as f32])
-                    .collect()
-            });
             for (node, from) in from.chunks_exact(block).enumerate() {
+                // Half the sum and half the difference of the two weights act on χ and on −χ.
+                let half = |sign: f64| -> [f32; OUTPUTS] {
+                    std::array::from_fn(|k| {
+                        let [same, other] = &matrices[k];
+                        0.5 * (same[pole][node] + sign * other[pole][node]) as f32
+                    })
+                };
+                let (here, mirrored) = (half(1.0), half(-1.0));
                 for chi in 0..DIRECTIONS {
-                    let here = &from[chi * ROW..(chi + 1) * ROW];
-                    let mirrored = &from[(DIRECTIONS - 1 - chi) * ROW..(DIRECTIONS - chi) * ROW];
                     let to = &mut to[chi * ROW..(chi + 1) * ROW];
-                    for (i, to) in to.iter_mut().enumerate() {
-                        let [a, b] = weights[i % OUTPUTS][node];
-                        *to += a * here[i] + b * mirrored[i];
-                    }
+                    add(to, &from[chi * ROW..(chi + 1) * ROW], here);
+                    let image = DIRECTIONS - 1 - chi;
+                    add(to, &from[image * ROW..(image + 1) * ROW], mirrored);
                 }
             }
         }
@@ -115,9 +123,7 @@ fn over_directions(from: &[f32]) -> Vec<f32> {
             for (node, from) in from.chunks_exact(ROW).enumerate() {
                 let weights: [f32; OUTPUTS] =
                     std::array::from_fn(|k| matrices[k][chi][node] as f32);
-                for (i, (to, from)) in to.iter_mut().zip(from).enumerate() {
-                    *to += weights[i % OUTPUTS] * from;
-                }
+                add(to, from, weights);
             }
         }
     }

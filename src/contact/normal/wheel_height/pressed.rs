@@ -1,0 +1,137 @@
+//! A wheel at rest on its rail, and the same wheel corrected to a force nearby.
+
+use std::f64::consts::PI;
+
+use crate::contact::geometry::frame::Frame;
+use crate::contact::normal::answer::NormalWork;
+use crate::contact::normal::pressure_field::field::PressureField;
+use crate::contact::normal::wheel_height::bracket::HeightExit;
+use crate::contact::remark::entry::RemarkEntry;
+
+/// The third that is left, as an error of the load.
+const CORRECTED: f64 = 1.0 / 3.0;
+/// Coarse gaps are replaced by fine ones when the force is missed by no more than this. 0.005 and 0.05 change
+/// forces by 0.3 % and pressures by 0.04 % at most on the wheels of `cargo bench --bench calibrate profiles`, with as many iterations.
+const NEAR: f64 = 0.02;
+/// The same with a single patch, whose force grows as Hertz's: the next height misses the force by the square of this.
+const NEAR_SINGLE: f64 = 0.1;
+
+/// The wheel at rest on its rail.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PressedWheel {
+    /// How far the wheel is below first touch, in mm.
+    pub lowering: f64,
+    /// The force that is prescribed, in N, as it came out at the last height, and its derivative by the lowering.
+    pub(crate) found: [f64; 2],
+    /// By how much, relatively, the load of region and pressure may differ from the one wanted.
+    pub load_error: f64,
+    /// By which part the prescribed force was missed at the last height, before the contact was corrected to it.
+    pub force_residual: f64,
+    /// Height of the wheel's centre over the top of the rail, in mm.
+    pub centre: f64,
+    /// Heights that were solved.
+    pub heights: u32,
+    /// What friction was taken to carry, the `friction_share` of the pass.
+    pub friction_share: f64,
+    /// Was the force met by fine gaps? Then the contact may be corrected to another force nearby.
+    pub(crate) met: bool,
+    /// The gaps in contact, from smaller to larger y of the track; never empty.
+    pub patches: Vec<PressedGap>,
+    /// Remarks for the answer.
+    pub remarks: Vec<RemarkEntry>,
+}
+
+/// The contact in one gap: usually one patch, several where they lie near each other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PressedGap {
+    /// Frame of the coordinates, with its origin at the load centre.
+    pub frame: Frame,
+    /// Deepest overlap of the undeformed bodies in mm.
+    pub(crate) approach: f64,
+    /// Region and pressure.
+    pub field: PressureField,
+    /// How it was found.
+    pub report: NormalWork,
+    /// Remarks for the answer.
+    pub remarks: Vec<RemarkEntry>,
+}
+
+impl PressedGap {
+    /// Sum of the normal forces in N.
+    #[must_use]
+    pub fn normal_force(&self) -> f64 {
+        let patches = self.field.patches();
+        patches.iter().map(|patch| patch.normal_force).sum()
+    }
+
+    /// Force per mm of approach of flat punches of the same areas (exact for circles), divided by `2 E*`.
+    pub(crate) fn stiffness(&self) -> f64 {
+        let patches = self.field.patches();
+        patches.iter().map(|patch| (patch.area / PI).sqrt()).sum()
+    }
+}
+
+impl PressedWheel {
+    /// The wheel at the height where the search ended, corrected to the force that was wanted.
+    pub(crate) fn at_rest(mut self, exit: HeightExit, wanted: f64) -> PressedWheel {
+        let [carried, slope] = self.found;
+        // Where the force jumps, its slope says nothing of the height.
+        let lower = if exit.converged() {
+            (wanted - carried) / slope
+        } else {
+            0.0
+        };
+        self.force_residual = exit.missed();
+        self.met = exit.converged();
+        self.load_error = match exit {
+            HeightExit::Jump { .. } => exit.missed(),
+            _ => CORRECTED * exit.missed(),
+        };
+        self.remarks.extend(exit.remark().map(RemarkEntry::from));
+        self.correct(wanted / carried, lower);
+        self
+    }
+
+    /// The same wheel under another force, where both together miss what was solved by no more than the tolerance.
+    pub(crate) fn carrying(&self, wanted: f64, tolerance: f64) -> Option<PressedWheel> {
+        let [carried, slope] = self.found;
+        let factor = wanted / carried;
+        let missed = self.force_residual + (factor - 1.0).abs();
+        (self.met && missed <= tolerance).then(|| {
+            let mut wheel = PressedWheel {
+                force_residual: missed,
+                load_error: CORRECTED * missed,
+                heights: 0,
+                ..self.clone()
+            };
+            wheel.correct(factor, (wanted - carried) / slope);
+            wheel
+        })
+    }
+
+    /// Is the force near enough to go on with fine gaps?
+    pub(crate) fn is_near(&self, target: f64) -> bool {
+        let single = matches!(&self.patches[..], [gap] if gap.field.patches().len() == 1);
+        let near = if single { NEAR_SINGLE } else { NEAR };
+        (self.found[0] / target - 1.0).abs() <= near
+    }
+
+    /// Forces times a factor near 1, and the wheel lower by so much in mm.
+    fn correct(&mut self, factor: f64, lower: f64) {
+        self.found[0] *= factor;
+        self.lowering += lower;
+        self.centre -= lower;
+        for gap in &mut self.patches {
+            let approach = lower * gap.frame.angle.cos();
+            gap.approach += approach;
+            gap.field = gap.field.clone().corrected(factor, approach);
+        }
+    }
+
+    /// Vertical part of the normal forces in N.
+    #[must_use]
+    pub fn vertical_force(&self) -> f64 {
+        let part = |gap: &PressedGap| gap.normal_force() * gap.frame.angle.cos();
+        self.patches.iter().map(part).sum()
+    }
+}
