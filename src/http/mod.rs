@@ -62,7 +62,7 @@ use crate::http::routes::service::{
 };
 use crate::http::routes::{
     batch_list, batch_results, batches, cases, damage, evaluate, events, fields, job_list, jobs,
-    me, plots, point_fields, profiles, resultants, results, run_results, run_totals, runs,
+    me, plots, point_fields, profiles, resultants, results, run_results, run_row, run_totals, runs,
     subsurface, tenant_events, zones,
 };
 use crate::http::server::drain_body;
@@ -239,6 +239,7 @@ fn rows() -> OpenApiRouter<AppState> {
         .routes(routes!(profiles::get, profiles::delete))
         .routes(routes!(runs::cancel))
         .routes(routes!(run_results::manifest))
+        .routes(routes!(run_row::row))
         .route_layer(from_fn(query::refuse_parameters));
     contract::conditional(tagged)
         .merge(plain)

@@ -140,6 +140,25 @@ async fn assert_manifest(server: &Server, run: &str, rows: u64) {
     assert_eq!(first.status, 200, "{}", first.text);
 }
 
+/// Row 17 by itself is the case that it stands for, with the answer that the results have; there are no rows beyond the last.
+async fn assert_row(server: &Server, run: &str, sent: &Value, line: &Value) {
+    let alone = server.get(&format!("{run}/rows/17")).await;
+    assert_eq!(alone.status, 200, "{}", alone.text);
+    assert_eq!(alone.json["answer"], *line);
+    let case = &alone.json["case"];
+    assert_eq!(
+        case["load"]["normal_force_n"],
+        sent["/load/normal_force_n"][17]
+    );
+    assert_eq!(case["motion"]["creepage_x"], sent["creepage_x"][17]);
+    let checked = server.post("/v1/cases/check", case).await;
+    assert_eq!(checked.status, 200, "{}", checked.text);
+    for beyond in ["120", "-1", "x"] {
+        let answer = server.get(&format!("{run}/rows/{beyond}")).await;
+        assert_problem(&answer, 404, "row-not-found", "rows");
+    }
+}
+
 #[tokio::test]
 async fn a_run_answers_each_of_its_rows_once_in_every_format() {
     for server in services().await {
@@ -173,6 +192,7 @@ async fn a_run_answers_each_of_its_rows_once_in_every_format() {
         }
         assert_forms(&server, &results, &all).await;
         assert_manifest(&server, &run, rows).await;
+        assert_row(&server, &run, &sent, &all[17]).await;
         for other in [
             format!("/v1/batches/{}", &run[9..]),
             format!("/v1/jobs/{}", &run[9..]),

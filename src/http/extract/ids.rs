@@ -47,6 +47,26 @@ impl<S: Send + Sync> FromRequestParts<S> for RunId {
     }
 }
 
+/// The id of a run in the path, and the number of one of its rows.
+#[derive(Debug, Clone, Copy)]
+pub struct RunRowId(pub Uuid, pub u64);
+
+impl<S: Send + Sync> FromRequestParts<S> for RunRowId {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+        let path = Path::<(String, String)>::from_request_parts(parts, state).await;
+        let Path((id, row)) = path
+            .map_err(|rejection| ApiError::new(ProblemKind::RunNotFound, rejection.body_text()))?;
+        let id = parsed(&id, ProblemKind::RunNotFound, "run")?;
+        let number = row.parse().map_err(|_| {
+            let detail = format!("`{row}` is no number of a row; rows are counted from 0");
+            ApiError::new(ProblemKind::RowNotFound, detail)
+        })?;
+        Ok(RunRowId(id, number))
+    }
+}
+
 async fn read_id<S: Send + Sync>(
     parts: &mut Parts,
     state: &S,
@@ -56,6 +76,10 @@ async fn read_id<S: Send + Sync>(
     let Path(text) = Path::<String>::from_request_parts(parts, state)
         .await
         .map_err(|rejection| ApiError::new(kind, rejection.body_text()))?;
-    Uuid::try_parse(&text)
+    parsed(&text, kind, what)
+}
+
+fn parsed(text: &str, kind: ProblemKind, what: &str) -> Result<Uuid, ApiError> {
+    Uuid::try_parse(text)
         .map_err(|_| ApiError::new(kind, format!("`{text}` is no {what} id; ids are UUIDs")))
 }

@@ -43,6 +43,7 @@ kinds! {
     JobNotFound 404 "job-not-found" "There is no such job" "No job has this id; it was never made here, or it was deleted."
     BatchNotFound 404 "batch-not-found" "There is no such batch" "No batch has this id; it was never made here, or it was deleted."
     RunNotFound 404 "run-not-found" "There is no such run" "No run has this id; it was never made here, or it was deleted."
+    RowNotFound 404 "row-not-found" "There is no such row" "The run has no row of this number; rows are counted from 0 in the order in which they were sent."
     ProfileNotFound 404 "profile-not-found" "There is no such profile" "No profile of the tenant has this digest; it was never kept here, or it was deleted."
     OutputNotAsked 404 "output-not-asked" "This output was not asked for" "The case did not ask for this output, so it was not computed; submit the case again with the output named in `outputs`."
     MethodNotAllowed 405 "method-not-allowed" "This method is not allowed here" "The resource exists, but not for this HTTP method; the header `Allow` lists those it has."

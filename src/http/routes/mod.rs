@@ -24,6 +24,7 @@ pub mod profiles;
 pub mod resultants;
 pub mod results;
 pub mod run_results;
+pub mod run_row;
 pub mod run_totals;
 pub mod runs;
 pub mod service;

@@ -2,9 +2,10 @@
 
 use std::io::Read;
 
-use crate::contact::evaluate::varied::Values;
+use crate::contact::evaluate::varied::{Values, VariedColumn};
+use crate::jobs::codec::table::TableColumn;
 use crate::jobs::error::JobsError;
-use crate::jobs::run::head::RunColumn;
+use crate::jobs::run::head::{RunColumn, RunHead, table_column};
 
 /// What a chunk begins with; no other body of a case does.
 const MAGIC: &[u8] = b"RHROWS1\n";
@@ -94,6 +95,24 @@ fn number(rest: &mut &[u8]) -> Option<u64> {
     let (head, after) = rest.split_first_chunk::<8>()?;
     *rest = after;
     Some(u64::from_le_bytes(*head))
+}
+
+/// What varies the case, and what is carried along.
+pub(crate) fn parted(
+    head: &RunHead,
+    chunk: RunChunk,
+) -> (Vec<VariedColumn>, Vec<(String, TableColumn)>) {
+    let (mut varied, mut carried) = (Vec::new(), Vec::new());
+    for (column, values) in head.columns.iter().zip(chunk.columns) {
+        match &column.pointer {
+            Some(pointer) => varied.push(VariedColumn {
+                pointer: pointer.clone(),
+                values,
+            }),
+            None => carried.push((column.name.clone(), table_column(values))),
+        }
+    }
+    (varied, carried)
 }
 
 #[cfg(test)]

@@ -1,17 +1,20 @@
 //! The answers of a run, chunk by chunk in the order of its rows.
 
 use bytes::Bytes;
+use serde_json::Value;
 use uuid::Uuid;
 
+use crate::contact::evaluate::varied::case_of_row;
 use crate::jobs::batch::model::ItemResult;
 use crate::jobs::codec::parquet::TableReader;
 use crate::jobs::codec::table::{RowTable, TableColumn};
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::State;
-use crate::jobs::run::chunk::RunChunk;
+use crate::jobs::run::chunk::{RunChunk, parted};
 use crate::jobs::run::control::of_run;
 use crate::jobs::run::head::{RunHead, table_column};
+use crate::jobs::run::model::Run;
 
 /// Chunks that are read from the table of jobs at once.
 const AT_ONCE: u32 = 64;
@@ -64,6 +67,39 @@ impl Jobs {
             },
         });
         Ok(chunks.collect())
+    }
+
+    /// The case that a row of a run stands for, and its answer as a table of one row if it is there.
+    ///
+    /// # Errors
+    /// A failed store, or the run has gone.
+    pub async fn run_row(
+        &self,
+        run: &Run,
+        row: u64,
+    ) -> Result<(Value, Option<RowTable>), JobsError> {
+        let head = &run.head;
+        let index = row / u64::from(head.chunk_rows.max(1));
+        let mut last = None;
+        let chunk = loop {
+            let chunks = self.run_chunks(run.chunks.id, last).await?;
+            last = Some(chunks.last().ok_or(JobsError::Expired)?.job);
+            if let Some(chunk) = chunks.into_iter().find(|chunk| chunk.index == index) {
+                break chunk;
+            }
+        };
+        let place = usize::try_from(row - head.rows_of(index).start).unwrap_or(0);
+        let sent = self.chunk_rows(head, chunk.job).await?;
+        let (varied, _) = parted(head, sent);
+        let case = case_of_row(&head.case, &varied, &head.profiles, place);
+        let case = case.map_err(|(pointer, reason)| {
+            JobsError::Damaged(format!("row {row} of a run: {pointer}: {reason}"))
+        })?;
+        let answer = match chunk.state.ended() {
+            true => Some(self.chunk_answers(head, &chunk, None).await?),
+            false => None,
+        };
+        Ok((case, answer.map(|table| table.cut(&(place..place + 1)))))
     }
 
     /// The answers of a chunk, those columns that `wanted` names, or all. Rows of a chunk without answers have its state as their status.

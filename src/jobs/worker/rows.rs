@@ -9,7 +9,6 @@ use crate::contact::case::problem::CheckedCase;
 use crate::contact::error::SolveError;
 use crate::contact::evaluate::many::{ManyTask, solve_many};
 use crate::contact::evaluate::many_answer::ManyAnswer;
-use crate::contact::evaluate::varied::VariedColumn;
 use crate::contact::monitor::Monitor;
 use crate::contact::solution::words::Solution;
 use crate::jobs::codec::parquet::encode;
@@ -17,8 +16,8 @@ use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::codec::table::{RowTable, TableColumn};
 use crate::jobs::error::JobsError;
 use crate::jobs::model::{Failure, FailureKind};
-use crate::jobs::run::chunk::RunChunk;
-use crate::jobs::run::head::{RunHead, table_column};
+use crate::jobs::run::chunk::{RunChunk, parted};
+use crate::jobs::run::head::RunHead;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::submission::StoredCase;
 use crate::jobs::worker::attempt_control::AttemptControl;
@@ -77,21 +76,6 @@ fn read(stored: &StoredCase) -> Result<(RunHead, RunChunk), JobsError> {
     let head = RunHead::read(stored.template.as_deref().unwrap_or_default())?;
     let chunk = RunChunk::read(&stored.body, &head.columns)?;
     Ok((head, chunk))
-}
-
-/// What varies the case, and what is carried along.
-fn parted(head: &RunHead, chunk: RunChunk) -> (Vec<VariedColumn>, Vec<(String, TableColumn)>) {
-    let (mut varied, mut carried) = (Vec::new(), Vec::new());
-    for (column, values) in head.columns.iter().zip(chunk.columns) {
-        match &column.pointer {
-            Some(pointer) => varied.push(VariedColumn {
-                pointer: pointer.clone(),
-                values,
-            }),
-            None => carried.push((column.name.clone(), table_column(values))),
-        }
-    }
-    (varied, carried)
 }
 
 fn solve_case(
