@@ -2,7 +2,7 @@
 //!
 //! `cargo bench --bench soak -- NAME …` with PostgreSQL's programs, and for `nodes` SeaweedFS (`weed`), on this machine; the names:
 //! `nodes` (kills, restarts and faults of the object store under load), `queue` (claims with 10⁴ and 10⁶ queued jobs), `snapshot`
-//! (claims while somebody holds an old snapshot), `network` (hosts that are cut off; needs root or namespaces for users, `ip` and `nft`). Without a name nothing is run. A broken promise ends it with a panic. `--profile dev` takes the build of the tests.
+//! (claims while somebody holds an old snapshot), `rate` (8 workers), `simulation` (1 to 100 nodes with the costs measured here), `network` (hosts that are cut off; needs root or namespaces for users, `ip` and `nft`). Without a name nothing is run. A broken promise ends it with a panic. `--profile dev` takes the build of the tests.
 
 #[path = "../../tests/service/cable.rs"]
 #[allow(dead_code, reason = "shared with the tests")]
@@ -25,6 +25,7 @@ mod hosts;
 mod network;
 mod nodes;
 mod queue;
+mod simulation;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -49,6 +50,12 @@ fn main() {
             "nodes" => runtime.block_on(nodes::run(number("jobs=").unwrap_or(5000))),
             "queue" => runtime.block_on(queue::depth()),
             "snapshot" => runtime.block_on(queue::snapshot()),
+            "rate" => runtime.block_on(queue::rate()),
+            "simulation" => {
+                if let Some(costs) = runtime.block_on(queue::costs()) {
+                    simulation::run(costs);
+                }
+            }
             "network" => runtime.block_on(network::run()),
             _ => panic!("there is no soak named {name}"),
         }

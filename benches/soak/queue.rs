@@ -4,16 +4,19 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use railhead::jobs::State;
 use railhead::jobs::codec::result::EncodedResult;
 use railhead::jobs::store::Store;
 use railhead::jobs::store::claim::{ClaimKind, ClaimRequest, Lease};
 use railhead::jobs::store::cluster::Cluster;
 use railhead::jobs::store::ending::{Ending, StoredResult};
+use railhead::jobs::store::list::Filter;
 use railhead::jobs::store::postgres::database::PostgresStore;
 use railhead::jobs::store::postgres::schema::migrate;
 use sqlx::{Connection, PgConnection, PgPool};
 use tokio::task::JoinSet;
 
+use crate::simulation::Costs;
 use crate::{postgres, row};
 
 const TENANT: &str = "north";
@@ -53,7 +56,7 @@ struct Work {
     ends: Vec<f64>,
 }
 
-async fn work(store: Arc<PostgresStore>, until: Instant) -> Work {
+async fn work(store: Arc<PostgresStore>, until: Instant, group: usize) -> Work {
     let result = EncodedResult {
         solution: vec![b'x'; RESULT_BYTES].into(),
         fields: None,
@@ -67,7 +70,7 @@ async fn work(store: Arc<PostgresStore>, until: Instant) -> Work {
         worker: "w",
         tenant: TENANT,
         kind: ClaimKind::New,
-        jobs: GROUP,
+        jobs: group,
         cost_us: u64::MAX,
         each_slice_us: None,
         workers: 1,
@@ -95,8 +98,18 @@ async fn work(store: Arc<PostgresStore>, until: Instant) -> Work {
     done
 }
 
-/// Claims and ends by several workers at once.
+/// Claims and ends by several workers at once, in groups of 32.
 async fn measure(store: &Arc<PostgresStore>, how_long: Duration) -> Work {
+    measure_as(store, how_long, WORKERS, GROUP).await
+}
+
+/// The same with so many workers and jobs in a group.
+async fn measure_as(
+    store: &Arc<PostgresStore>,
+    how_long: Duration,
+    workers_at_once: usize,
+    group: usize,
+) -> Work {
     let until = Instant::now() + how_long;
     let mut workers = JoinSet::new();
     // As nodes do.
@@ -109,8 +122,8 @@ async fn measure(store: &Arc<PostgresStore>, how_long: Duration) -> Work {
             }
         }
     });
-    for _ in 0..WORKERS {
-        workers.spawn(work(store.clone(), until));
+    for _ in 0..workers_at_once {
+        workers.spawn(work(store.clone(), until, group));
     }
     let mut all = Work::default();
     let done = workers.join_all().await;
@@ -158,7 +171,7 @@ impl std::fmt::Display for Figures {
 async fn open() -> Option<(Arc<PostgresStore>, PgPool, String)> {
     let url = postgres::database().await?;
     migrate(&url).await.expect("tables");
-    let store = PostgresStore::open(&url, 8).await.expect("the database");
+    let store = PostgresStore::open(&url, 12).await.expect("the database");
     let pool = PgPool::connect(&url).await.expect("the database");
     Some((Arc::new(store), pool, url))
 }
@@ -185,9 +198,19 @@ pub async fn depth() {
     }
     let shallow = figures(shallow, MEASURED);
     row("10⁴ queued jobs, 4 workers, groups of 32", &shallow);
+    let looks = look(&store).await;
     fill(&pool, next, 1_000_000).await;
     let deep = figures(measure(&store, MEASURED).await, MEASURED);
     row("10⁶ queued jobs", &deep);
+    let deep_looks = look(&store).await;
+    let against = |each: usize| {
+        let (few, many) = (looks[each], deep_looks[each]);
+        format!("{few:.2} and {many:.2} ms, {:.2} ×", many / few)
+    };
+    row(
+        "10⁶ against 10⁴: list, list of queued jobs, figures of /metrics, use of a tenant",
+        (0..4).map(against).collect::<Vec<_>>().join("; "),
+    );
     row(
         "10⁶ against 10⁴: time per job, per claim, per end",
         format!(
@@ -197,6 +220,91 @@ pub async fn depth() {
             deep.end_ms / shallow.end_ms
         ),
     );
+}
+
+/// Medians, in ms, of what clients and operators look at: a page of a list, one of queued jobs, figures, use of a tenant.
+async fn look(store: &Arc<PostgresStore>) -> [f64; 4] {
+    let store: &dyn Store = &**store;
+    let queued = Filter {
+        states: vec![State::Queued],
+        ..Filter::default()
+    };
+    let mut times: [Vec<f64>; 4] = Default::default();
+    for _ in 0..40 {
+        let mut began = Instant::now();
+        let mut lap = |look: usize| {
+            times[look].push(began.elapsed().as_secs_f64());
+            began = Instant::now();
+        };
+        let page = store.list(TENANT, &Filter::default(), None, 50).await;
+        page.expect("a list");
+        lap(0);
+        let page = store.list(TENANT, &queued, None, 50).await;
+        page.expect("a list");
+        lap(1);
+        store.stats().await.expect("figures");
+        lap(2);
+        store.usage(TENANT).await.expect("use");
+        lap(3);
+    }
+    times.map(|mut times| median(&mut times) * 1e3)
+}
+
+/// Claims and ends per second by 8 workers, in groups of 32 with results of 4 kB, 10⁵ queued.
+pub async fn rate() {
+    let Some((store, pool, _)) = open().await else {
+        return;
+    };
+    fill(&pool, 0, 300_000).await;
+    let measured = figures(measure_as(&store, MEASURED, 8, GROUP).await, MEASURED);
+    row("8 workers, groups of 32, results of 4 kB", &measured);
+}
+
+/// Processor seconds of everything that the server runs.
+async fn server_seconds(pool: &PgPool) -> f64 {
+    let processes: Vec<i32> = sqlx::query_scalar("SELECT pid FROM pg_stat_activity")
+        .fetch_all(pool)
+        .await
+        .expect("its processes");
+    let ticks = processes.iter().map(|process| {
+        let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
+        // After the name, which may hold anything: state, then ten numbers, then user and system time in hundredths of seconds.
+        let numbers = stat.rsplit(')').next().unwrap_or_default();
+        let ticks = numbers.split_whitespace().skip(11).take(2);
+        ticks
+            .filter_map(|ticks| ticks.parse::<f64>().ok())
+            .sum::<f64>()
+    });
+    ticks.sum::<f64>() / 100.0
+}
+
+/// What a claim with its end costs the server, and what one more job in it.
+pub async fn costs() -> Option<Costs> {
+    let (store, pool, _) = open().await?;
+    fill(&pool, 0, 300_000).await;
+    let mut measured = Vec::new();
+    for group in [1, 64] {
+        // Connections and plans are made before.
+        measure_as(&store, MEASURED / 10, 4, group).await;
+        let before = server_seconds(&pool).await;
+        let done = measure_as(&store, MEASURED, 4, group).await;
+        let seconds = server_seconds(&pool).await - before;
+        #[expect(clippy::cast_precision_loss, reason = "few claims")]
+        let server_us = seconds * 1e6 / done.claims.len() as f64;
+        let mut times: Vec<_> = done
+            .claims
+            .iter()
+            .zip(&done.ends)
+            .map(|(claim, end)| claim + end)
+            .collect();
+        measured.push((server_us, median(&mut times) * 1e6));
+    }
+    let job_us = (measured[1].0 - measured[0].0) / 63.0;
+    Some(Costs {
+        group_us: (measured[0].0 - job_us).max(0.0),
+        job_us,
+        round_trip_us: (measured[0].1 - measured[0].0).max(0.0),
+    })
 }
 
 /// Claims before, and in the last quarter of a minute in which somebody holds an old snapshot.

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use crate::cli::case_args::CaseArgs;
-use crate::cli::database_args::{DatabaseArgs, DatabaseUrlArgs, DoctorArgs};
+use crate::cli::database_args::{DatabaseArgs, DatabaseUrlArgs, DoctorArgs, ResultsArgs};
 use crate::cli::serve_args::ServeArgs;
 use crate::cli::values::{address, bound_label};
 
@@ -37,6 +37,8 @@ pub enum Command {
     Keys(KeysArgs),
     /// Copy the data folder, also while the service runs; a service can be started on the copy.
     Backup(BackupArgs),
+    /// Move what is in a data folder, which no service uses, into a database that several nodes share.
+    Move(MoveArgs),
     /// Print the settings that `serve` would run with and where each comes from, as JSON; takes the flags of `serve`.
     Config(ServeArgs),
     /// Ask a running service whether it is ready; exit code 0 if it is, 1 if not.
@@ -59,6 +61,23 @@ pub struct BackupArgs {
         value_name = "FOLDER"
     )]
     pub data_dir: PathBuf,
+}
+
+/// Settings of `move`.
+#[derive(Debug, Clone, Args)]
+pub struct MoveArgs {
+    /// Data folder to move.
+    #[arg(
+        long,
+        env = "RAILHEAD_DATA_DIR",
+        default_value = "./railhead-data",
+        value_name = "FOLDER"
+    )]
+    pub data_dir: PathBuf,
+    #[command(flatten)]
+    pub database: DatabaseUrlArgs,
+    #[command(flatten)]
+    pub results: ResultsArgs,
 }
 
 /// Settings of `keys`.

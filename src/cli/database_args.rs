@@ -2,7 +2,7 @@
 
 use clap::{ArgAction, Args};
 
-use crate::jobs::options::Database;
+use crate::jobs::options::{Bells, Database};
 use crate::jobs::result_place::url::{ResultsPlace, ResultsUrl};
 
 /// The database of several nodes.
@@ -21,6 +21,15 @@ pub struct DatabaseArgs {
     #[arg(long, env = "RAILHEAD_DATABASE_CONNECTIONS", default_value_t = 10, value_name = "N",
           value_parser = clap::value_parser!(u32).range(2..))]
     pub database_connections: u32,
+    /// The same database past a pooler that gives each transaction another session (PgBouncer in transaction mode), where nodes hear
+    /// each other; `none`: they do not, and notice what others did up to a second later. Without it at `--database-url`.
+    #[arg(
+        long,
+        env = "RAILHEAD_DATABASE_DIRECT_URL",
+        hide_env_values = true,
+        value_name = "URL"
+    )]
+    pub database_direct_url: Option<String>,
     #[command(flatten)]
     pub results: ResultsArgs,
 }
@@ -63,6 +72,11 @@ impl DatabaseArgs {
         Some(Database {
             url: self.database_url.clone()?,
             connections: self.database_connections,
+            bells: match self.database_direct_url.as_deref() {
+                None => Bells::There,
+                Some("none") => Bells::Unheard,
+                Some(url) => Bells::Direct(url.to_owned()),
+            },
         })
     }
 }

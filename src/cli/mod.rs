@@ -16,6 +16,7 @@ mod http_args;
 mod keys;
 mod migrate;
 mod output;
+mod relocate;
 mod serve;
 mod serve_args;
 mod solve;
@@ -51,6 +52,7 @@ pub fn run() -> ExitCode {
             (Some(command), Some(given)) => print(&config::describe(command, given, &args)),
             _ => unreachable!("the subcommand was read from these"),
         },
+        Command::Move(args) => relocate::run(&args),
         Command::Backup(args) => backup::run(&args),
         Command::Keys(args) => keys::run(&args),
         Command::Healthcheck(args) => healthcheck::run(&args),

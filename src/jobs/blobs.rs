@@ -233,6 +233,29 @@ impl Blobs {
             .map_err(damaged)
     }
 
+    /// Copies the result under a key to another place, where it has the same key; its bytes, or `None` if it is not there.
+    ///
+    /// # Errors
+    /// It cannot be read or written.
+    pub async fn copy(&self, key: &str, to: &Blobs) -> Result<Option<u64>, JobsError> {
+        let folder = Path::from(key);
+        let mut bytes = 0;
+        // The solution last, as it is written.
+        for name in [FIELDS, ROWS, SOLUTION] {
+            let path = folder.clone().join(name);
+            let body = match self.objects.get(&path).await {
+                Ok(found) => found.bytes().await?,
+                Err(object_store::Error::NotFound { .. }) if name == SOLUTION => return Ok(None),
+                Err(object_store::Error::NotFound { .. }) => continue,
+                Err(error) => return Err(error.into()),
+            };
+            bytes += body.len() as u64;
+            to.objects.put(&path, PutPayload::from_bytes(body)).await?;
+        }
+        to.make_private(&folder).await?;
+        Ok(Some(bytes))
+    }
+
     /// Removes the result under a key; one that is gone already is no error.
     ///
     /// # Errors

@@ -145,6 +145,11 @@ pub enum JobsError {
     /// A data folder with jobs in it cannot be used beside a database.
     #[error("{} holds the jobs of a service without a database; use another --data-dir beside --database-url", .0.display())]
     DataDirOfEmbedded(PathBuf),
+    /// A data folder is moved only into a database without jobs.
+    #[error(
+        "the database has jobs or batches already; move into one that `railhead migrate` has just made"
+    )]
+    DatabaseNotEmpty,
     /// There is no job table in the database.
     #[error(
         "there is no job table in the database yet: run `railhead migrate --database-url …` once"

@@ -228,7 +228,7 @@ async fn open_blobs(
 
 /// Creates the data folder if needed and takes it for this process alone. The system frees the lock when the process
 /// ends, however it ends.
-fn lock(data_dir: &Path) -> Result<File, JobsError> {
+pub(crate) fn lock(data_dir: &Path) -> Result<File, JobsError> {
     let failed = |path: &Path, source| JobsError::DataDir {
         path: path.to_owned(),
         source,

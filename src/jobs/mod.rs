@@ -56,6 +56,7 @@ pub mod options;
 pub mod profiles;
 pub mod quota;
 pub mod recent_reads;
+pub mod relocate;
 pub mod result_cache;
 pub mod result_place;
 pub mod results;

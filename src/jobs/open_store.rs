@@ -37,9 +37,8 @@ pub async fn open_for_service(
     if table.exists() {
         return Err(JobsError::DataDirOfEmbedded(table));
     }
-    Ok(Arc::new(
-        PostgresStore::open(&database.url, database.connections).await?,
-    ))
+    let store = PostgresStore::open(&database.url, database.connections).await?;
+    Ok(Arc::new(store.hearing(&database.bells)?))
 }
 
 async fn open_embedded(data_dir: &Path) -> Result<Arc<dyn Store>, JobsError> {

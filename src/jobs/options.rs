@@ -17,6 +17,20 @@ pub struct Database {
     pub url: String,
     /// Most connections of this process, beside the one on which it listens.
     pub connections: u32,
+    /// Where nodes hear each other's bells.
+    pub bells: Bells,
+}
+
+/// Where nodes hear each other's bells. What is not heard is found by looking, up to a second later.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum Bells {
+    /// At the URL of the database.
+    #[default]
+    There,
+    /// At another URL of the same database: a pooler that gives each transaction another session passes none on.
+    Direct(String),
+    /// Nowhere.
+    Unheard,
 }
 
 impl fmt::Debug for Database {

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::errors::assert_problem;
 use crate::postgres;
 use crate::server::{Server, Setup, example};
-use railhead::jobs::options::Database;
+use railhead::jobs::options::{Bells, Database};
 
 /// The shipped wheel on a rail, its two cross-sections and the same case without them.
 fn pair() -> (Value, Value, Value) {
@@ -36,6 +36,7 @@ async fn a_case_that_names_its_profiles_is_the_case_with_their_points() {
         setup.options.database = Some(Database {
             url,
             connections: 4,
+            bells: Bells::There,
         });
         servers.push(setup.start().await);
     }

@@ -59,6 +59,7 @@ mod pictures;
 mod point_fields;
 mod postgres;
 mod profiles;
+mod relocation;
 mod requests;
 mod result_places;
 mod results;

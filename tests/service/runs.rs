@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use railhead::jobs::codec::arrow::read;
 use railhead::jobs::codec::parquet::TableReader;
 use railhead::jobs::codec::table::{RowTable, TableColumn};
-use railhead::jobs::options::Database;
+use railhead::jobs::options::{Bells, Database};
 use reqwest::Method;
 use serde_json::{Value, json};
 
@@ -46,6 +46,7 @@ async fn services() -> Vec<Server> {
         setup.options.database = Some(Database {
             url,
             connections: 4,
+            bells: Bells::There,
         });
         services.push(setup.start().await);
     }

@@ -100,6 +100,6 @@ pub trait Cluster: Send + Sync + Debug {
     /// Rings soon, together with what else is to be rung. Never waits.
     fn ring(&self, bell: Bell);
 
-    /// Listens to the bells of all nodes until the connection fails.
+    /// Listens to the bells of all nodes until the connection fails; for ever if none are to be heard.
     async fn listen(&self, heard: &(dyn Fn(Bell) + Send + Sync)) -> Result<(), StoreError>;
 }

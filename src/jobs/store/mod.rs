@@ -21,6 +21,7 @@ pub mod cluster;
 pub mod ending;
 pub mod error;
 pub mod list;
+pub(crate) mod portion;
 pub mod postgres;
 pub mod profile;
 pub mod retention;

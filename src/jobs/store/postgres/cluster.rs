@@ -80,11 +80,16 @@ impl Cluster for PostgresStore {
     }
 
     fn ring(&self, bell: Bell) {
-        self.bell.ring(bell);
+        if self.hears_at.is_some() {
+            self.bell.ring(bell);
+        }
     }
 
     async fn listen(&self, heard: &(dyn Fn(Bell) + Send + Sync)) -> Result<(), StoreError> {
-        bell::listen(self.options.clone(), heard).await
+        match &self.hears_at {
+            Some(options) => bell::listen(options.clone(), heard).await,
+            None => std::future::pending().await,
+        }
     }
 }
 

@@ -42,6 +42,17 @@ pub(crate) const ADMISSION: i32 = 1;
 pub(crate) const FOLD: i32 = 2;
 pub(crate) const SCHEMA: i32 = 3;
 
+/// How sessions with a database begin.
+///
+/// # Errors
+/// [`JobsError::BadDatabaseUrl`].
+pub(crate) fn session(url: &str) -> Result<PgConnectOptions, JobsError> {
+    let options = url::read(url)?.application_name("railhead");
+    Ok(options
+        .statement_cache_capacity(STATEMENTS_KEPT)
+        .options(SESSION))
+}
+
 /// Connects to a database, whatever is in it.
 ///
 /// # Errors
@@ -50,10 +61,7 @@ pub(crate) async fn connect(
     url: &str,
     connections: u32,
 ) -> Result<(PgConnectOptions, PgPool), JobsError> {
-    let options = url::read(url)?
-        .application_name("railhead")
-        .statement_cache_capacity(STATEMENTS_KEPT)
-        .options(SESSION);
+    let options = session(url)?;
     // A pool tries again until its time is over, and then no longer knows why.
     let first = timeout(CONNECT_WITHIN, PgConnection::connect_with(&options)).await;
     let first = first.map_err(|_| StoreError::timed_out())?;

@@ -5,17 +5,19 @@ use std::fmt;
 use sqlx::postgres::{PgConnectOptions, PgPool};
 
 use crate::jobs::error::JobsError;
+use crate::jobs::options::Bells;
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::postgres::bell::BellRinger;
 use crate::jobs::store::postgres::claim_memory::ClaimMemory;
-use crate::jobs::store::postgres::connection::connect;
+use crate::jobs::store::postgres::connection::{connect, session};
 use crate::jobs::store::postgres::schema::require;
 use crate::jobs::store::postgres::sql::group_commit::GroupCommit;
 
 /// The job table that several processes share.
 #[derive(Clone)]
 pub struct PostgresStore {
-    pub(crate) options: PgConnectOptions,
+    /// The way on which bells are heard.
+    pub(crate) hears_at: Option<PgConnectOptions>,
     pub(crate) writer: PgPool,
     pub(crate) readers: PgPool,
     pub(crate) group_commit: GroupCommit,
@@ -27,8 +29,8 @@ pub struct PostgresStore {
 
 impl fmt::Debug for PostgresStore {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // The options have a password in them.
-        write!(f, "PostgresStore({})", self.options.get_host())
+        // The options of a pool have a password in them.
+        write!(f, "PostgresStore({} connections)", self.writer.size())
     }
 }
 
@@ -45,11 +47,24 @@ impl PostgresStore {
             bell: BellRinger::start(writer.clone()),
             claim_memory: ClaimMemory::default(),
             readers: writer.clone(),
-            options,
+            hears_at: Some(options),
             writer,
             given_clock: false,
         };
         Ok(store)
+    }
+
+    /// The same with bells that are heard elsewhere, or not at all.
+    ///
+    /// # Errors
+    /// [`JobsError::BadDatabaseUrl`].
+    pub fn hearing(self, bells: &Bells) -> Result<PostgresStore, JobsError> {
+        let hears_at = match bells {
+            Bells::There => return Ok(self),
+            Bells::Direct(url) => Some(session(url)?),
+            Bells::Unheard => None,
+        };
+        Ok(PostgresStore { hears_at, ..self })
     }
 
     /// The same with leases that are judged by the times that are given, so that tests need no clock.

@@ -36,7 +36,7 @@ struct Question {
     wrong: fn(i64) -> bool,
 }
 
-const NUMBERS: [Question; 9] = [
+const NUMBERS: [Question; 10] = [
     Question {
         about: "server version",
         statement: "SELECT CAST(current_setting('server_version_num') AS bigint)",
@@ -51,6 +51,12 @@ const NUMBERS: [Question; 9] = [
         about: "commits are on the disk when they are answered (0: they may be lost)",
         statement: "SELECT CASE WHEN current_setting('synchronous_commit') = 'off' OR current_setting('fsync') = 'off' THEN 0::bigint ELSE 1 END",
         wrong: |durable| durable == 0,
+    },
+    // Behind a pooler that drops the settings with which sessions begin, those of the role count.
+    Question {
+        about: "seconds after which a session that was left inside a transaction is ended (0: never)",
+        statement: "SELECT setting::bigint / 1000 FROM pg_settings WHERE name = 'idle_in_transaction_session_timeout'",
+        wrong: |seconds| seconds == 0,
     },
     Question {
         about: "nodes seen within 20 s",

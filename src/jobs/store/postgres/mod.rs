@@ -16,6 +16,7 @@ pub mod database;
 mod deployment;
 pub mod doctor;
 pub mod engine;
+mod import;
 pub mod objects;
 pub mod schema;
 #[path = "../sql/mod.rs"]

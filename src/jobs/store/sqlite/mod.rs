@@ -5,6 +5,7 @@ mod tokens;
 
 pub mod database;
 pub mod engine;
+mod export;
 #[cfg(test)]
 mod plans;
 pub mod schema;

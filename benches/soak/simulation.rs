@@ -1,0 +1,153 @@
+//! How many nodes does one PostgreSQL carry? Events of workers that claim, solve and end are played through with the costs of claims and
+//! ends as they are measured here; what is simulated is who waits for whom.
+//!
+//! The server is some cores that serve statements in the order in which they come. A worker claims a group or one chunk, solves it, and
+//! ends it; a claim or an end keeps a core for a time of its own and one for each job, and takes a round trip on top, in which the server
+//! does something else. Times of solves vary evenly by a half.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use crate::row;
+
+/// What a statement keeps a core of the server busy with, and how long its round trip takes, in µs.
+#[derive(Debug, Clone, Copy)]
+pub struct Costs {
+    /// Of a claim and the end that follows, whatever is claimed.
+    pub group_us: f64,
+    /// Of each job of the group.
+    pub job_us: f64,
+    pub round_trip_us: f64,
+}
+
+/// What is solved: units of a claim, their number, and how long each takes.
+#[derive(Debug, Clone, Copy)]
+struct Work {
+    name: &'static str,
+    /// Units that are claimed and ended together.
+    group: usize,
+    unit_us: f64,
+    /// What a unit counts for: a job, or the rows of a chunk.
+    counts: usize,
+}
+
+const WORKS: [Work; 3] = [
+    Work {
+        name: "jobs of 3 ms, groups of 66 (200 ms)",
+        group: 66,
+        unit_us: 3_000.0,
+        counts: 1,
+    },
+    Work {
+        name: "jobs of 20 ms, groups of 10 (200 ms)",
+        group: 10,
+        unit_us: 20_000.0,
+        counts: 1,
+    },
+    Work {
+        name: "rows of runs of 3 ms, chunks of 1000 (3 s)",
+        group: 1,
+        unit_us: 3_000_000.0,
+        counts: 1000,
+    },
+];
+
+const NODES: [usize; 6] = [1, 2, 4, 10, 30, 100];
+const WORKERS_OF_A_NODE: usize = 16;
+const SERVER_CORES: usize = 4;
+
+/// Simulated time, in µs; the first tenth is not counted.
+const LASTS_US: f64 = 60e6;
+
+/// A moment; moments are never NaN.
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+struct At(f64);
+
+impl Eq for At {}
+
+#[expect(clippy::derive_ord_xor_partial_ord, reason = "moments are never NaN")]
+impl Ord for At {
+    fn cmp(&self, other: &At) -> std::cmp::Ordering {
+        self.0.total_cmp(&other.0)
+    }
+}
+
+/// What came out: units per second, and the part of the workers' and of the server's time that is used.
+struct Figures {
+    per_s: f64,
+    workers: f64,
+    server: f64,
+}
+
+/// A worker asks the server at a moment: to end what it has solved, and for the next group.
+fn play(work: Work, workers: usize, costs: Costs) -> Figures {
+    let mut cores = BinaryHeap::from([Reverse(At(0.0)); SERVER_CORES]);
+    let mut seed: u64 = 0x9e37_79b9_7f4a_7c15;
+    let mut random = || {
+        seed ^= seed << 13;
+        seed ^= seed >> 7;
+        seed ^= seed << 17;
+        #[expect(clippy::cast_precision_loss, reason = "a random number")]
+        let part = (seed >> 11) as f64 / (1_u64 << 53) as f64;
+        part
+    };
+    #[expect(clippy::cast_precision_loss, reason = "few")]
+    let (group, counts) = (work.group as f64, work.counts as f64);
+    let solve_us = group * work.unit_us;
+    // All begin within one solve.
+    let mut asks: BinaryHeap<_> = (0..workers)
+        .map(|_| Reverse(At(random() * solve_us)))
+        .collect();
+    let asked_us = costs.group_us + group * costs.job_us;
+    let (mut units, mut solving, mut serving) = (0.0, 0.0, 0.0);
+    while let Some(Reverse(At(now))) = asks.pop() {
+        if now > LASTS_US {
+            break;
+        }
+        let Some(Reverse(At(free))) = cores.pop() else {
+            break;
+        };
+        let served = free.max(now) + asked_us;
+        cores.push(Reverse(At(served)));
+        let solve = solve_us * (0.75 + 0.5 * random());
+        asks.push(Reverse(At(served + costs.round_trip_us + solve)));
+        if now > LASTS_US / 10.0 {
+            units += group * counts;
+            solving += solve;
+            serving += asked_us;
+        }
+    }
+    let counted = 0.9 * LASTS_US;
+    #[expect(clippy::cast_precision_loss, reason = "few")]
+    let (workers, cores) = (workers as f64, SERVER_CORES as f64);
+    Figures {
+        per_s: units / (counted * 1e-6),
+        workers: solving / (counted * workers),
+        server: serving / (counted * cores),
+    }
+}
+
+/// Plays nodes from 1 to 100 through, for small jobs and for chunks of runs.
+pub fn run(costs: Costs) {
+    row(
+        "costs: of a claim with its end, of each job in it, round trips",
+        format!(
+            "{:.0} µs, {:.0} µs, {:.0} µs; nodes of {WORKERS_OF_A_NODE} workers, a server of {SERVER_CORES} cores",
+            costs.group_us, costs.job_us, costs.round_trip_us
+        ),
+    );
+    for work in WORKS {
+        for nodes in NODES {
+            let played = play(work, nodes * WORKERS_OF_A_NODE, costs);
+            row(
+                &format!("{}: {nodes} nodes", work.name),
+                format!(
+                    "{:.0} per second, workers {:.0} % busy, server {:.0} %",
+                    played.per_s,
+                    100.0 * played.workers,
+                    100.0 * played.server
+                ),
+            );
+        }
+    }
+}

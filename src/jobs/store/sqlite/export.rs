@@ -1,0 +1,112 @@
+//! The rows of an embedded job table, for those who move them elsewhere.
+
+use futures_util::TryStreamExt;
+use sqlx::sqlite::SqliteRow;
+use sqlx::{AssertSqlSafe, Row};
+use tokio::sync::mpsc;
+
+use crate::jobs::store::error::StoreError;
+use crate::jobs::store::portion::{Portion, Values};
+use crate::jobs::store::sqlite::database::SqliteStore;
+
+/// A portion ends with this row, or once its bytes are so many.
+const ROWS_MAX: usize = 500;
+const BYTES_MAX: usize = 4 << 20;
+
+impl SqliteStore {
+    /// The rows of a table, some at a time.
+    pub(crate) fn portions(
+        &self,
+        table: &'static str,
+    ) -> mpsc::Receiver<Result<Portion, StoreError>> {
+        let (sender, portions) = mpsc::channel(1);
+        let store = self.clone();
+        tokio::spawn(async move {
+            if let Err(error) = store.send(table, &sender).await {
+                // Nobody may listen any more.
+                let _ = sender.send(Err(error)).await;
+            }
+        });
+        portions
+    }
+
+    async fn send(
+        &self,
+        table: &'static str,
+        sender: &mpsc::Sender<Result<Portion, StoreError>>,
+    ) -> Result<(), StoreError> {
+        let columns: Vec<(String, String)> =
+            sqlx::query_as("SELECT name, type FROM pragma_table_info($1) ORDER BY cid")
+                .bind(table)
+                .fetch_all(&self.readers)
+                .await?;
+        let names: Vec<_> = columns
+            .iter()
+            .map(|(name, _)| format!("\"{name}\""))
+            .collect();
+        let statement = AssertSqlSafe(format!("SELECT {} FROM {table}", names.join(", ")));
+        let mut rows = sqlx::query(statement).fetch(&self.readers);
+        let (mut portion, mut bytes) = (empty(&columns), 0);
+        while let Some(row) = rows.try_next().await? {
+            bytes += add(&mut portion, &row)?;
+            if portion.rows == ROWS_MAX || bytes >= BYTES_MAX {
+                let full = std::mem::replace(&mut portion, empty(&columns));
+                bytes = 0;
+                if sender.send(Ok(full)).await.is_err() {
+                    return Ok(());
+                }
+            }
+        }
+        if portion.rows > 0 {
+            let _ = sender.send(Ok(portion)).await;
+        }
+        Ok(())
+    }
+}
+
+fn empty(columns: &[(String, String)]) -> Portion {
+    let values = |kind: &str| match kind {
+        "INTEGER" => Values::Integer(Vec::new()),
+        "REAL" => Values::Real(Vec::new()),
+        "BLOB" => Values::Bytes(Vec::new()),
+        _ => Values::Text(Vec::new()),
+    };
+    Portion {
+        columns: columns
+            .iter()
+            .map(|(name, kind)| (name.clone(), values(kind)))
+            .collect(),
+        rows: 0,
+    }
+}
+
+/// Adds a row; its bytes, as far as they count.
+fn add(portion: &mut Portion, row: &SqliteRow) -> Result<usize, StoreError> {
+    let mut bytes = 0;
+    for (place, (_, values)) in portion.columns.iter_mut().enumerate() {
+        match values {
+            Values::Integer(values) => values.push(row.try_get(place)?),
+            Values::Real(values) => values.push(row.try_get(place)?),
+            Values::Text(values) => {
+                let value: Option<String> = row.try_get(place)?;
+                bytes += value.as_ref().map_or(0, String::len);
+                values.push(value);
+            }
+            Values::Bytes(values) => {
+                let value: Option<Vec<u8>> = row.try_get(place)?;
+                bytes += value.as_ref().map_or(0, Vec::len);
+                values.push(value);
+            }
+        }
+    }
+    portion.rows += 1;
+    Ok(bytes)
+}
+
+impl SqliteStore {
+    /// The keys of the large results that something refers to.
+    pub(crate) async fn large_results(&self) -> Result<Vec<String>, StoreError> {
+        let keys = sqlx::query_scalar("SELECT DISTINCT key FROM blobs WHERE key IS NOT NULL");
+        Ok(keys.fetch_all(&self.readers).await?)
+    }
+}

@@ -1,0 +1,145 @@
+//! Is everything of a data folder there after it was moved into a database, and is nothing moved twice?
+
+use std::collections::BTreeMap;
+
+use reqwest::Method;
+use serde_json::{Value, json};
+
+use crate::postgres::database;
+use crate::support::{Service, case, endless_case, long_case, railhead};
+
+/// What the program says about a data folder and a database, and whether it succeeded.
+fn say(words: &[&str]) -> (bool, String) {
+    let done = railhead().args(words).output().unwrap();
+    let said = [done.stdout, done.stderr].concat();
+    (
+        done.status.success(),
+        String::from_utf8_lossy(&said).into_owned(),
+    )
+}
+
+/// Answers to paths as a client sees them.
+async fn read(service: &Service, paths: &[String]) -> BTreeMap<String, Value> {
+    let mut answers = BTreeMap::new();
+    for path in paths {
+        answers.insert(path.clone(), service.get(path).await);
+    }
+    answers
+}
+
+#[tokio::test]
+async fn a_data_folder_moves_into_a_database_with_all_that_is_in_it() {
+    let Some(url) = database().await else {
+        return;
+    };
+    let [from, to, node, place] = [(); 4].map(|()| tempfile::tempdir().unwrap());
+    let folder = from.path().to_str().unwrap();
+    let (_, secret) = say(&["keys", "create", "--tenant", "north", "--data-dir", folder]);
+    let secret = secret
+        .lines()
+        .find(|line| line.starts_with("rh_"))
+        .unwrap()
+        .to_owned();
+
+    let before = Service::start(from.path(), &["--workers", "1", "--shutdown-grace-s", "0"]);
+    let small = before.submit(&case("small")).await;
+    let mut large = long_case("large", 12);
+    large["outputs"] = json!(["resultants", "tractions"]);
+    let large = before.submit(&large).await;
+    let lines = [case("first"), case("second")]
+        .map(|case| case.to_string())
+        .join("\n");
+    let batch = before
+        .request(Method::POST, "/v1/batches")
+        .header("Content-Type", "application/x-ndjson");
+    let batch: Value = batch
+        .body(lines)
+        .send()
+        .await
+        .unwrap()
+        .json()
+        .await
+        .unwrap();
+    let batch = format!("/v1/batches/{}", batch["id"].as_str().unwrap());
+    for id in [&small, &large] {
+        before.until(id, "succeeded").await;
+    }
+    while before.get(&batch).await["states"]["succeeded"] != 2 {
+        crate::support::pause().await;
+    }
+    let running = before.submit(&endless_case("running")).await;
+    before.until(&running, "running").await;
+    let mut paths = vec![batch];
+    for id in [&small, &large] {
+        paths.extend([format!("/v1/jobs/{id}"), format!("/v1/jobs/{id}/result")]);
+    }
+    let known = read(&before, &paths).await;
+
+    let results = format!("file://{}", place.path().display());
+    let mut words = vec!["move", "--data-dir", folder, "--database-url", &url];
+    words.extend(["--results-url", &results, "--results-shared"]);
+    assert!(say(&["migrate", "--database-url", &url]).0);
+    let (moved, said) = say(&words);
+    assert!(!moved && said.contains("in use"), "{said}");
+    // As after a power cut: nobody has put the running job back.
+    before.kill();
+    let (moved, said) = say(&words);
+    assert!(moved && said.contains("jobs\t5\n"), "{said}");
+    assert!(
+        said.contains("large results\t1\n") && said.contains("missing\t0"),
+        "{said}"
+    );
+    let (moved, said) = say(&words);
+    assert!(!moved && said.contains("jobs.db"), "{said}");
+
+    let flags = [
+        "--database-url",
+        &url,
+        "--workers",
+        "0",
+        "--results-url",
+        &results,
+        "--results-shared",
+    ];
+    let after = Service::start(node.path(), &flags);
+    assert_eq!(read(&after, &paths).await, known);
+    assert_eq!(
+        after.get(&format!("/v1/jobs/{running}")).await["state"],
+        "queued"
+    );
+    let me = after
+        .request(Method::GET, "/v1/me")
+        .bearer_auth(&secret)
+        .send();
+    let me: Value = me.await.unwrap().json().await.unwrap();
+    assert_eq!(me["tenant"], "north", "{me}");
+    // A result that was moved answers the same case, and new results have keys of their own.
+    let worker = Service::start_worker(to.path(), &[&flags[..3], &["1"], &flags[4..]].concat());
+    let again = after
+        .request(Method::POST, "/v1/jobs")
+        .json(&case("small"))
+        .send();
+    let again: Value = again.await.unwrap().json().await.unwrap();
+    assert_eq!(again["cached"], true, "{again}");
+    after.until(&running, "running").await;
+    let mut new = case("new");
+    new["load"]["normal_force_n"] = json!(61_000);
+    let new = after.submit(&new).await;
+    after.until(&new, "succeeded").await;
+    let cancel = format!("/v1/jobs/{running}/cancel");
+    after.request(Method::POST, &cancel).send().await.unwrap();
+    after.until(&running, "cancelled").await;
+    drop(worker);
+
+    // Not into a database that has jobs.
+    let full = tempfile::tempdir().unwrap();
+    drop(Service::start(full.path(), &["--workers", "1"]));
+    let (moved, said) = say(&[
+        "move",
+        "--data-dir",
+        full.path().to_str().unwrap(),
+        "--database-url",
+        &url,
+    ]);
+    assert!(!moved && said.contains("has jobs"), "{said}");
+}
