@@ -8,6 +8,7 @@ use crate::contact::case::limits::Limits;
 use crate::jobs::clock::Clock;
 use crate::jobs::quota::StagingBounds;
 use crate::jobs::result_place::url::ResultsPlace;
+pub use crate::jobs::store::cluster::Bells;
 use crate::jobs::trace::Tracer;
 
 /// A database that several processes share.
@@ -19,18 +20,6 @@ pub struct Database {
     pub connections: u32,
     /// Where nodes hear each other's bells.
     pub bells: Bells,
-}
-
-/// Where nodes hear each other's bells. What is not heard is found by looking, up to a second later.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub enum Bells {
-    /// At the URL of the database.
-    #[default]
-    There,
-    /// At another URL of the same database: a pooler that gives each transaction another session passes none on.
-    Direct(String),
-    /// Nowhere.
-    Unheard,
 }
 
 impl fmt::Debug for Database {

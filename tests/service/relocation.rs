@@ -27,21 +27,8 @@ async fn read(service: &Service, paths: &[String]) -> BTreeMap<String, Value> {
     answers
 }
 
-#[tokio::test]
-async fn a_data_folder_moves_into_a_database_with_all_that_is_in_it() {
-    let Some(url) = database().await else {
-        return;
-    };
-    let [from, to, node, place] = [(); 4].map(|()| tempfile::tempdir().unwrap());
-    let folder = from.path().to_str().unwrap();
-    let (_, secret) = say(&["keys", "create", "--tenant", "north", "--data-dir", folder]);
-    let secret = secret
-        .lines()
-        .find(|line| line.starts_with("rh_"))
-        .unwrap()
-        .to_owned();
-
-    let before = Service::start(from.path(), &["--workers", "1", "--shutdown-grace-s", "0"]);
+/// Has a small and a large result and those of a batch; where they are read.
+async fn fill(before: &Service) -> Vec<String> {
     let small = before.submit(&case("small")).await;
     let mut large = long_case("large", 12);
     large["outputs"] = json!(["resultants", "tractions"]);
@@ -67,12 +54,54 @@ async fn a_data_folder_moves_into_a_database_with_all_that_is_in_it() {
     while before.get(&batch).await["states"]["succeeded"] != 2 {
         crate::support::pause().await;
     }
-    let running = before.submit(&endless_case("running")).await;
-    before.until(&running, "running").await;
     let mut paths = vec![batch];
     for id in [&small, &large] {
         paths.extend([format!("/v1/jobs/{id}"), format!("/v1/jobs/{id}/result")]);
     }
+    paths
+}
+
+/// Old results and old jobs are used, and new ones are made.
+async fn goes_on(after: &Service, running: &str) {
+    // A result that was moved answers the same case, and new results have keys of their own.
+    let again = after
+        .request(Method::POST, "/v1/jobs")
+        .json(&case("small"))
+        .send();
+    let again: Value = again.await.unwrap().json().await.unwrap();
+    assert_eq!(again["cached"], true, "{again}");
+    after.until(running, "running").await;
+    let mut new = case("new");
+    new["load"]["normal_force_n"] = json!(61_000);
+    let new = after.submit(&new).await;
+    after.until(&new, "succeeded").await;
+    let cancel = format!("/v1/jobs/{running}/cancel");
+    after.request(Method::POST, &cancel).send().await.unwrap();
+    after.until(running, "cancelled").await;
+}
+
+/// The secret of a key of the tenant `north`.
+fn make_key(folder: &str) -> String {
+    let (_, said) = say(&["keys", "create", "--tenant", "north", "--data-dir", folder]);
+    let mut lines = said.lines();
+    lines
+        .find(|line| line.starts_with("rh_"))
+        .unwrap()
+        .to_owned()
+}
+
+#[tokio::test]
+async fn a_data_folder_moves_into_a_database_with_all_that_is_in_it() {
+    let Some(url) = database().await else {
+        return;
+    };
+    let [from, to, node, place] = [(); 4].map(|()| tempfile::tempdir().unwrap());
+    let folder = from.path().to_str().unwrap();
+    let secret = make_key(folder);
+    let before = Service::start(from.path(), &["--workers", "1", "--shutdown-grace-s", "0"]);
+    let paths = fill(&before).await;
+    let running = before.submit(&endless_case("running")).await;
+    before.until(&running, "running").await;
     let known = read(&before, &paths).await;
 
     let results = format!("file://{}", place.path().display());
@@ -113,22 +142,8 @@ async fn a_data_folder_moves_into_a_database_with_all_that_is_in_it() {
         .send();
     let me: Value = me.await.unwrap().json().await.unwrap();
     assert_eq!(me["tenant"], "north", "{me}");
-    // A result that was moved answers the same case, and new results have keys of their own.
     let worker = Service::start_worker(to.path(), &[&flags[..3], &["1"], &flags[4..]].concat());
-    let again = after
-        .request(Method::POST, "/v1/jobs")
-        .json(&case("small"))
-        .send();
-    let again: Value = again.await.unwrap().json().await.unwrap();
-    assert_eq!(again["cached"], true, "{again}");
-    after.until(&running, "running").await;
-    let mut new = case("new");
-    new["load"]["normal_force_n"] = json!(61_000);
-    let new = after.submit(&new).await;
-    after.until(&new, "succeeded").await;
-    let cancel = format!("/v1/jobs/{running}/cancel");
-    after.request(Method::POST, &cancel).send().await.unwrap();
-    after.until(&running, "cancelled").await;
+    goes_on(&after, &running).await;
     drop(worker);
 
     // Not into a database that has jobs.

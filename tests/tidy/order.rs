@@ -113,6 +113,7 @@ const ORDER: &[&str] = &[
     "jobs::worker",
     "jobs::lifecycle",
     "jobs::backup",
+    "jobs::relocate",
     "jobs",
     "http::options",
     "http::problem::kinds",
@@ -150,6 +151,7 @@ const ORDER: &[&str] = &[
     "cli::healthcheck",
     "cli::config",
     "cli::backup",
+    "cli::relocate",
     "cli",
     "",
 ];

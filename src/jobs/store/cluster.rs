@@ -20,6 +20,18 @@ pub enum Bell {
     Cancel(Uuid),
 }
 
+/// Where nodes hear each other's bells. What is not heard is found by looking, up to a second later.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum Bells {
+    /// At the URL of the database.
+    #[default]
+    There,
+    /// At another URL of the same database: a pooler that gives each transaction another session passes none on.
+    Direct(String),
+    /// Nowhere.
+    Unheard,
+}
+
 /// A node as it shows itself to the others.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Node {

@@ -5,7 +5,7 @@ use std::fmt;
 use sqlx::postgres::{PgConnectOptions, PgPool};
 
 use crate::jobs::error::JobsError;
-use crate::jobs::options::Bells;
+use crate::jobs::store::cluster::Bells;
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::postgres::bell::BellRinger;
 use crate::jobs::store::postgres::claim_memory::ClaimMemory;
