@@ -54,6 +54,7 @@ mod profile_formats;
 mod profile_geometry;
 mod profile_laws;
 mod profile_manchester;
+mod profile_planes;
 mod profile_reference;
 mod profile_reference_files;
 mod profile_robustness;

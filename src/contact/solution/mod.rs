@@ -7,6 +7,7 @@ pub mod finish;
 pub mod finite;
 pub mod maintain;
 pub mod maintenance;
+pub mod plane_error;
 pub mod profile_quality;
 pub mod track_axes;
 pub mod understanding;

@@ -7,8 +7,9 @@ use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::wheel_height::pressed::{PressedGap, PressedWheel};
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
+use crate::contact::solution::plane_error;
 use crate::contact::solution::words::{
-    ErrorEstimate, Fields, NormalReport, Origin, Position, Solution, Total,
+    ErrorEstimate, Fields, NormalReport, Origin, PlaneUncertainty, Position, Solution, Total,
 };
 
 /// A patch over which the rail turns by more than this, in rad, is remarked on.
@@ -36,18 +37,17 @@ pub fn merge(
 ) -> Result<(Solution, Fields), SurfaceMissed> {
     let parts: Vec<Part> = wheel.patches.iter().map(Part::new).collect();
     let origin = load_centre(&parts);
-    let motions = answers.first().map_or(0, |(first, _)| first.total.len());
-    let total = (0..motions)
-        .map(|motion| {
-            let part = |(part, (answer, _)): (&Part, &(Solution, Fields))| {
-                part.in_track(&answer.total[motion], origin)
-            };
-            parts.iter().zip(&answers).map(part).fold(None, sum)
-        })
-        .collect::<Option<Vec<Total>>>()
-        .unwrap_or_default();
+    let plane = plane_error::of_wheel(case, geometry, wheel, &answers);
+    let total = totals(
+        &parts,
+        origin,
+        &answers,
+        plane.map(|plane| plane.uncertainty),
+    );
     let mut remarks = case.remarks.clone();
     remarks.extend_from_slice(&wheel.remarks);
+    let of_plane = plane.and_then(|plane| plane.remark(case));
+    remarks.extend(of_plane.map(RemarkEntry::from));
     let alone = answers.len() == 1;
     let mut whole: Option<(Solution, Fields)> = None;
     for (gap, (mut solution, fields)) in wheel.patches.iter().zip(answers) {
@@ -91,6 +91,29 @@ pub fn merge(
         ..solution
     };
     Ok((solution, fields))
+}
+
+/// The totals of all motions in track axes.
+fn totals(
+    parts: &[Part],
+    origin: [f64; 2],
+    answers: &[(Solution, Fields)],
+    plane_uncertainty: Option<PlaneUncertainty>,
+) -> Vec<Total> {
+    let motions = answers.first().map_or(0, |(first, _)| first.total.len());
+    (0..motions)
+        .map(|motion| {
+            let part = |(part, (answer, _)): (&Part, &(Solution, Fields))| {
+                part.in_track(&answer.total[motion], origin)
+            };
+            let all = parts.iter().zip(answers).map(part).fold(None, sum);
+            all.map(|total| Total {
+                plane_uncertainty,
+                ..total
+            })
+        })
+        .collect::<Option<Vec<Total>>>()
+        .unwrap_or_default()
 }
 
 /// A remark on a part of the contact, renumbered for the whole; `first` is the index of the part's first patch. A remark without a
@@ -152,6 +175,7 @@ impl Part {
                 }
             }),
             profile_uncertainty: None,
+            plane_uncertainty: None,
         }
     }
 }
@@ -185,6 +209,7 @@ fn sum(so_far: Option<Total>, part: Total) -> Option<Total> {
                 moment_z_n_mm: a.moment_z_n_mm + b.moment_z_n_mm,
             }),
         profile_uncertainty: None,
+        plane_uncertainty: None,
     })
 }
 

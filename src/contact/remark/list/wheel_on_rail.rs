@@ -79,6 +79,20 @@ macro_rules! wheel_remarks {
                 "the rail turns by {turn_rad:.2} rad over the contact, which a plane of contact and half-spaces describe only roughly"
             ),
 
+            /// The rail bends so much under the patches of one plane of contact that forces depend on it by some percent.
+            PlaneOfContact {
+                /// What the plane leaves open of the forces, relative to μN.
+                share: f64 = 0.02,
+                /// Largest inclination of the rail under a patch to the plane of contact.
+                turn_rad: f64 = 0.2,
+            }
+            code: "plane-of-contact",
+            severity: Info,
+            advice: "Take `plane_uncertainty` of the total as a further error of the forces.",
+            detail: format!(
+                "the rail is inclined to the plane of contact by up to {turn_rad:.2} rad under the patches, which leaves forces uncertain by {:.1} % of μN", 100.0 * share
+            ),
+
             /// The force jumps at the height of the wheel that carries the load, where patches merge; forces were scaled to the load.
             ForceJumps {
                 /// Load over force found.
