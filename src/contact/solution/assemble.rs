@@ -390,7 +390,6 @@ fn total(case: &CheckedCase, patches: &[Patch], point: &MotionAnswer) -> Total {
         .iter()
         .fold(Resultants::default(), |sum, r| sum.plus(*r));
     Total {
-        plane_uncertainty: None,
         force_x_n: sum.force_x,
         force_y_n: sum.force_y,
         force_z_n: None,

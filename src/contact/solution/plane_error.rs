@@ -11,10 +11,10 @@ use crate::contact::case::problem::CheckedCase;
 use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::geometry::wheelset::{WheelsetMotion, creepages};
-use crate::contact::normal::wheel_height::search::{PressedGap, PressedWheel};
+use crate::contact::normal::wheel_height::pressed::{PressedGap, PressedWheel};
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::refinement::resolution::Resolution;
-use crate::contact::solution::words::{Fields, PatchSolution, PlaneUncertainty, Solution};
+use crate::contact::solution::words::{Fields, PatchSolution, Solution};
 
 /// Strips of a patch.
 const STRIPS: usize = 9;
@@ -26,7 +26,8 @@ const TOLD: f64 = 0.02;
 /// What the plane leaves open of a wheel on its rail.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PlaneError {
-    pub(crate) uncertainty: PlaneUncertainty,
+    /// Length of the difference of the forces in N.
+    force: f64,
     /// Friction limit of all patches in N.
     limit: f64,
     /// Largest inclination of the rail under a patch to its plane in rad.
@@ -40,7 +41,7 @@ impl PlaneError {
             Resolution::Target(target) => target.max(TOLD),
             Resolution::Mesh(_) => TOLD,
         };
-        let share = self.uncertainty.force_x_n / self.limit;
+        let share = self.force / self.limit;
         let turn_rad = self.turn;
         (self.limit > 0.0 && share > least).then_some(Remark::PlaneOfContact { share, turn_rad })
     }
@@ -75,12 +76,8 @@ pub(crate) fn of_wheel(
         across += own[1].abs();
     }
     // How it is divided among both components depends on the law more than its length does.
-    let length = along.hypot(across);
     Some(PlaneError {
-        uncertainty: PlaneUncertainty {
-            force_x_n: length,
-            force_y_n: length,
-        },
+        force: along.hypot(across),
         limit,
         turn,
     })

@@ -9,7 +9,7 @@ use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
 use crate::contact::solution::plane_error;
 use crate::contact::solution::words::{
-    ErrorEstimate, Fields, NormalReport, Origin, PlaneUncertainty, Position, Solution, Total,
+    ErrorEstimate, Fields, NormalReport, Origin, Position, Solution, Total,
 };
 
 /// A patch over which the rail turns by more than this, in rad, is remarked on.
@@ -38,12 +38,7 @@ pub fn merge(
     let parts: Vec<Part> = wheel.patches.iter().map(Part::new).collect();
     let origin = load_centre(&parts);
     let plane = plane_error::of_wheel(case, geometry, wheel, &answers);
-    let total = totals(
-        &parts,
-        origin,
-        &answers,
-        plane.map(|plane| plane.uncertainty),
-    );
+    let total = totals(&parts, origin, &answers);
     let mut remarks = case.remarks.clone();
     remarks.extend_from_slice(&wheel.remarks);
     let of_plane = plane.and_then(|plane| plane.remark(case));
@@ -94,23 +89,14 @@ pub fn merge(
 }
 
 /// The totals of all motions in track axes.
-fn totals(
-    parts: &[Part],
-    origin: [f64; 2],
-    answers: &[(Solution, Fields)],
-    plane_uncertainty: Option<PlaneUncertainty>,
-) -> Vec<Total> {
+fn totals(parts: &[Part], origin: [f64; 2], answers: &[(Solution, Fields)]) -> Vec<Total> {
     let motions = answers.first().map_or(0, |(first, _)| first.total.len());
     (0..motions)
         .map(|motion| {
             let part = |(part, (answer, _)): (&Part, &(Solution, Fields))| {
                 part.in_track(&answer.total[motion], origin)
             };
-            let all = parts.iter().zip(answers).map(part).fold(None, sum);
-            all.map(|total| Total {
-                plane_uncertainty,
-                ..total
-            })
+            parts.iter().zip(answers).map(part).fold(None, sum)
         })
         .collect::<Option<Vec<Total>>>()
         .unwrap_or_default()
@@ -175,7 +161,6 @@ impl Part {
                 }
             }),
             profile_uncertainty: None,
-            plane_uncertainty: None,
         }
     }
 }
@@ -209,7 +194,6 @@ fn sum(so_far: Option<Total>, part: Total) -> Option<Total> {
                 moment_z_n_mm: a.moment_z_n_mm + b.moment_z_n_mm,
             }),
         profile_uncertainty: None,
-        plane_uncertainty: None,
     })
 }
 

@@ -315,21 +315,6 @@ pub struct Total {
     /// What the measurement of the profiles leaves open; only for `profiles`.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub profile_uncertainty: Option<ProfileUncertainty>,
-    /// What the plane of contact leaves open where the rail bends under the patches; only with the motion of a wheelset, which gives every
-    /// place creepages of its own.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
-    pub plane_uncertainty: Option<PlaneUncertainty>,
-}
-
-/// What the plane of contact leaves open of the forces where the rail bends under a patch, absolute; beside the numerical
-/// `error_estimate`.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
-pub struct PlaneUncertainty {
-    /// Of `force_x_n`, in N.
-    pub force_x_n: f64,
-    /// Of `force_y_n`, in N.
-    pub force_y_n: f64,
 }
 
 /// The values per cell of all patches: what was asked for, nothing else.

@@ -9,7 +9,7 @@ use crate::contact::solution::wheelset::{
     Kinematics, WheelOnRail, WheelsetAnswer, WheelsetPosition,
 };
 use crate::contact::solution::words::{
-    ErrorEstimate, Fields, Origin, PatchSolution, PlaneUncertainty, Solution, Total,
+    ErrorEstimate, Fields, Origin, PatchSolution, Solution, Total,
 };
 use crate::contact::wheelset::balance::AtRest;
 
@@ -179,13 +179,6 @@ fn plus(one: &Total, other: &Total) -> Total {
                 force_x_n: a.force_x_n + b.force_x_n,
                 force_y_n: a.force_y_n + b.force_y_n,
                 moment_z_n_mm: a.moment_z_n_mm + b.moment_z_n_mm,
-            }),
-        plane_uncertainty: one
-            .plane_uncertainty
-            .zip(other.plane_uncertainty)
-            .map(|(a, b)| PlaneUncertainty {
-                force_x_n: a.force_x_n + b.force_x_n,
-                force_y_n: a.force_y_n + b.force_y_n,
             }),
         profile_uncertainty: one.profile_uncertainty.zip(other.profile_uncertainty).map(
             |(a, b)| ProfileUncertainty {

@@ -191,7 +191,6 @@ mod tests {
         };
         let points: Vec<_> = (0..points).map(point).collect();
         let total = points.iter().map(|point| Total {
-            plane_uncertainty: None,
             force_x_n: point.force_x_n,
             force_y_n: point.force_y_n,
             force_z_n: None,

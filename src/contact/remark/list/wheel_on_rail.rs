@@ -88,7 +88,7 @@ macro_rules! wheel_remarks {
             }
             code: "plane-of-contact",
             severity: Info,
-            advice: "Take `plane_uncertainty` of the total as a further error of the forces.",
+            advice: "Take this share of μN as a further error of the forces; `error_estimate` does not have it.",
             detail: format!(
                 "the rail is inclined to the plane of contact by up to {turn_rad:.2} rad under the patches, which leaves forces uncertain by {:.1} % of μN", 100.0 * share
             ),
