@@ -28,7 +28,7 @@ use crate::contact::time_limit::TimeLimit;
 
 /// The vertical force may be missed by this fraction; it bounds the change of friction's share in one round.
 const BALANCE: f64 = 5e-4;
-/// And by this fraction of the target error, if that is less.
+/// Upper limit of that fraction, relative to the target error.
 const BALANCE_OF_TARGET: f64 = 0.1;
 /// When the rounds are used up, a share that still changes by no more than this is answered with a remark.
 const BALANCE_POOR: f64 = 5e-3;
@@ -182,7 +182,7 @@ impl WheelSolve<'_> {
                 problem: problem.of_gap(friction, motions),
                 run: run.clone(),
                 label: label.clone(),
-                // They are told of the whole contact.
+                // Remarks are added once, for the whole contact.
                 remarks: Vec::new(),
             };
             part.fits(&pressed.footprint)?;

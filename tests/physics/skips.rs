@@ -116,7 +116,7 @@ fn mirror_symmetry_halves_the_work_and_does_not_move_the_answer() {
     for (motion, words) in [
         ([0.3, 0.0, 0.0], "half the cells"),
         ([0.0, 0.4, 0.8], "half the cells"),
-        ([0.3, 0.2, 0.8], "half the influence"),
+        ([0.3, 0.2, 0.8], "half of the influence matrix"),
     ] {
         let contact = Ellipse::steel(0.7, 0.28).normalised(motion[0], motion[1], motion[2]);
         let skipped = answered(&contact).solver.skipped;
@@ -131,7 +131,7 @@ fn full_slip_needs_no_newton_and_does_not_move_the_answer() {
     for motion in [[60.0, 0.0, 0.0], [80.0, -40.0, 3.0]] {
         let contact = Ellipse::steel(1.4, 0.28).normalised(motion[0], motion[1], motion[2]);
         let point = answered(&contact);
-        let words = "fixed point instead of Newton";
+        let words = "fixed-point iteration replaced Newton's method";
         assert!(
             point.solver.skipped.iter().any(|s| s.contains(words)),
             "{:?}",
@@ -149,7 +149,7 @@ fn overwhelming_slip_needs_no_influence_and_does_not_move_the_answer() {
         let contact = Ellipse::steel(a_over_b, nu).normalised(3e7, 2e7, 0.0);
         let point = answered(&contact);
         assert_eq!(point.solver.products, 0, "{:?}", point.solver.skipped);
-        assert!(point.solver.skipped[0].contains("million times"));
+        assert!(point.solver.skipped[0].contains("factor of a million"));
         let distance = distance_to_plain_newton(&contact);
         assert!(distance < 1e-6, "a/b {a_over_b}: {distance:e}");
     }

@@ -25,11 +25,13 @@ impl Skip {
             Skip::NoMotion => "no creepage and no spin: nothing to solve",
             Skip::NoFriction => "no friction: no tractions",
             Skip::RigidSlip => {
-                "rigid slip exceeds any elastic slip a million times: everything slips along it"
+                "the rigid slip exceeds the elastic slip by a factor of a million: tractions follow the rigid slip"
             }
-            Skip::FullSlip => "everything slips: fixed point instead of Newton",
+            Skip::FullSlip => "all cells slip: a fixed-point iteration replaced Newton's method",
             Skip::HalfTheCells => "mirror symmetry of patch and motion: half the cells",
-            Skip::HalfTheOperator => "mirror symmetry of the patch: half the influence",
+            Skip::HalfTheOperator => {
+                "mirror symmetry of the patch: half of the influence matrix was computed"
+            }
         }
     }
 }

@@ -55,7 +55,7 @@ impl RollingTask<'_> {
         }
     }
 
-    /// Residual to reach: far below the target, since every iteration below it is for nothing.
+    /// Residual to reach: far below the target, but no further, because iterating further does not improve the answer.
     #[must_use]
     pub fn tolerance(&self) -> f64 {
         match self.resolution {

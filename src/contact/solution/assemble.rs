@@ -348,7 +348,7 @@ fn pressure_power(level: &StripMesh, fields: &SolvedFields, patch: usize) -> f64
     sum * level.scale.traction * level.scale.slip()
 }
 
-/// Creepages made dimensionless with E = 2G(1+ν) and c = √(A/π) (Kalker 1990; the seed uses half the longest strip).
+/// Creepages made dimensionless with E = 2G(1+ν) and c = √(A/π) (Kalker 1990).
 fn normalised(case: &CheckedCase, patch: &Patch, motion: &Motion) -> NormalisedMotion {
     let c = (patch.area / std::f64::consts::PI).sqrt();
     let bound = case.problem.friction.limit(patch);

@@ -45,13 +45,13 @@ pub struct StressPoint {
     pub shear_direction: [f64; 3],
 }
 
-/// Stresses below a patch in short; those at the requested points are a part of the result of their own.
+/// Summary of the stresses below a patch. `/subsurface` returns the stresses at the requested points.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct SubsurfaceSummary {
     /// The body whose stresses these are.
     pub body: BodyName,
-    /// Depth in mm below which no point is evaluated: nearer to the surface the steps of the mesh would show. Points asked for above it
-    /// are answered at this depth.
+    /// Smallest depth in mm at which stresses are evaluated; closer to the surface, mesh steps would distort them. Shallower points are
+    /// evaluated at this depth.
     pub least_depth_mm: f64,
     /// Where von Mises' stress is largest; absent unless it was asked for.
     #[serde(skip_serializing_if = "Option::is_none", default)]
@@ -72,6 +72,7 @@ pub struct TemperatureSummary {
     pub without_friction_c: f64,
     /// Share of the friction heat that flows into the lower body.
     pub heat_share_lower: f64,
-    /// The smaller Péclet number of the two bodies; the theory, which lets heat flow into the depth only, is for large ones.
+    /// Smaller of the two bodies' Péclet numbers. The theory assumes that heat flows only into the depth, which holds for large
+    /// values.
     pub peclet: f64,
 }

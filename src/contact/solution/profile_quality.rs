@@ -14,16 +14,16 @@ pub struct PatchQuality {
     pub wheel: ProfileQuality,
 }
 
-/// What the points of a profile are like under a patch. Waviness and ambiguity are pressures that compare with that of the patch: what
-/// it takes to press flat the difference between two readings of the same points.
+/// What the points of a profile are like under a patch. Waviness and ambiguity are pressures, comparable with that of the patch: the
+/// pressure that would flatten the difference between two interpolations of the same points.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ProfileQuality {
     /// The part of the profile under the patch, from and to y in mm (y to the field side, as `position` has it).
     pub y_mm: [f64; 2],
     /// Largest distance of neighbouring points under the patch in mm.
     pub spacing_mm: f64,
-    /// The same over the width of the patch. From 1 on a remark says so, from 1.5 on the job fails, where the points leave the curve open
-    /// or are more than 10 mm apart.
+    /// The same over the width of the patch. If the points leave the curve ambiguous or are more than 10 mm apart, a value of at least 1
+    /// adds a remark and a value of at least 1.5 fails the job.
     pub spacing_over_width: f64,
     /// Standard deviation of the noise of the points along the normal in µm; absent where they lie too far apart to tell.
     #[serde(skip_serializing_if = "Option::is_none", default)]
@@ -32,7 +32,7 @@ pub struct ProfileQuality {
     /// Root mean square of the pressure that flattens waves shorter than twice the smoothing or 3 mm, in MPa.
     pub waviness_mpa: f64,
     /// Root mean square of the pressure that flattens the difference of a spline and of Akima's curve through the points, in MPa; 0
-    /// with a smoothing. From half of the largest pressure on the job fails.
+    /// with a smoothing. The job fails if this reaches half of the largest pressure.
     pub ambiguity_mpa: f64,
     /// Length in mm of a stretch without points near the contact where the bodies may touch as well; absent if there is none.
     #[serde(skip_serializing_if = "Option::is_none", default)]
@@ -80,8 +80,8 @@ pub struct PairQuality {
     pub wheel: SectionQuality,
 }
 
-/// What the measurement of the profiles leaves open, absolute: how much the answer changes with their reading. Apart from
-/// `error_estimate`, which is numerical.
+/// Absolute uncertainty due to the measurement of the profiles: how much the answer changes between plausible interpolations of the
+/// points. Separate from `error_estimate`, which is numerical.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 pub struct ProfileUncertainty {
     /// Of `force_x_n`, in N.

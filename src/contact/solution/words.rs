@@ -88,8 +88,8 @@ pub struct NormalReport {
     pub residual: f64,
     /// Largest pressure on the last grid but one, relative to that on the last, less 1; 0 if there was only one.
     pub pressure_change: f64,
-    /// For a wheel on a rail: by which part the prescribed force was missed at the last height, before the contact was grown to it
-    /// as Hertz's would be; 0 where no height is sought.
+    /// For a wheel on a rail: relative difference between the force found at the last height and the prescribed force, before the
+    /// contact was scaled to the prescribed force by Hertz's laws; 0 if no height was searched for.
     pub force_residual: f64,
     /// Wall time in s.
     pub seconds: f64,
@@ -282,7 +282,7 @@ pub struct SolverReport {
     pub products: u32,
     /// Last residual of the contact law, relative to the traction scale of the case.
     pub residual: f64,
-    /// Work that was recognised as unnecessary, in words; empty if none.
+    /// Descriptions of the solver steps that this motion did not need; empty if none.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub skipped: Vec<String>,
     /// Wall time of this point's share, in s.

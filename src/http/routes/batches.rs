@@ -68,7 +68,7 @@ query! {
         SubmitQuery,
         ("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[!-~]+$", description = "1 to 255 visible ASCII characters. Repeating a request with the same key, the same cases and the same options answers the first batch instead of making another"),
         ("Cache-Control" = Option<String>, Header, description = "`no-cache`: solve all cases, also those that are identical to cases solved before", example = "no-cache"),
-        ("traceparent" = Option<String>, Header, description = "W3C trace context: where the service sends traces, that of the jobs goes on with the client's. What cannot be read is passed over", example = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01")
+        ("traceparent" = Option<String>, Header, description = "W3C trace context: if the service exports traces, the traces of the jobs continue the client's trace. An unreadable value is ignored", example = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01")
     ),
     request_body(content(
         (Cases = "application/json"),
@@ -170,7 +170,7 @@ problems! {
     GetBatchProblems: BadQuery, BatchNotFound
 }
 
-/// Looks at a batch.
+/// Returns a batch.
 #[utoipa::path(
     get,
     path = "/v1/batches/{id}",

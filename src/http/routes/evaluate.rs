@@ -113,8 +113,8 @@ pub struct EvaluateColumns {
     /// ∂`moment_z_n_mm`/∂`spin_per_mm`; with `gradients` only.
     #[schema(nullable = false)]
     moment_z_n_mm_by_spin_per_mm: Option<Vec<Option<f64>>>,
-    /// `ok`; `target_missed`: the bound is above the target; `needs_solver`: so it is, and `auto` leaves the row to a job; `not_covered`:
-    /// a/b is beyond 0.1 to 10.
+    /// `ok`; `target_missed`: the bound is above the target; `needs_solver`: the bound is above the target and `auto` does not solve
+    /// rows here; submit the row as a job; `not_covered`: a/b is beyond 0.1 to 10.
     status: Vec<String>,
 }
 
@@ -138,8 +138,8 @@ query! {
 
 /// Evaluates rows of numbers by the table of creep forces or by the simplified theory, and answers at once.
 ///
-/// A row is the template with the row's numbers in place of its own. No job is made and nothing is stored. Numbers that no case may have
-/// refuse the request and are named by row and column.
+/// A row is the template with the row's numbers in place of its own. No job is made and nothing is stored. If a number is outside the
+/// range allowed in a case, the request is refused with its row and column.
 #[utoipa::path(
     post,
     path = "/v1/evaluate",

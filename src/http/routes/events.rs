@@ -162,8 +162,8 @@ async fn next_of_job(
 
 /// Follows a batch.
 ///
-/// Events are called `state`; their data is the batch as `/v1/batches/{id}` answers it. Several changes between two looks are one event.
-/// Otherwise as the events of a job.
+/// Events are called `state`; their data is the batch as `/v1/batches/{id}` answers it. Changes in quick succession are merged into
+/// one event. Otherwise these events work like those of a job.
 #[utoipa::path(
     get,
     path = "/v1/batches/{id}/events",

@@ -62,7 +62,7 @@ pub struct ListTotal {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     total: Option<u64>,
-    /// There are at least so many; where they are too many to be counted, or found only by looking at each.
+    /// Lower bound of the number of entries, given instead of `total` if an exact count would be too expensive.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     total_at_least: Option<u64>,
@@ -140,7 +140,7 @@ fn fields() -> Reader<Vec<&'static str>> {
 
 /// Lists jobs, newest first.
 ///
-/// A filter by `name`, `updated_after` or a second `label` looks at each job that the other filters leave, at most 20 000 for one page: such a page
+/// A filter by `name`, `updated_after` or a second `label` examines every job that matches the other filters, up to 20 000 per page: such a page
 /// may have fewer jobs than asked for, or none, although `next_cursor` is there.
 #[utoipa::path(
     get,

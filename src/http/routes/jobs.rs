@@ -54,13 +54,13 @@ problems! {
         ("Prefer" = Option<String>, Header, description = "`wait=N`: answer when the job has ended, at most N seconds (60 at most) later (RFC 7240)", example = "wait=10"),
         ("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[!-~]+$", description = "1 to 255 visible ASCII characters. Repeating a request with the same key, the same case and the same options answers the first job instead of making another"),
         ("Cache-Control" = Option<String>, Header, description = "`no-cache`: solve the case even if an identical one was solved before", example = "no-cache"),
-        ("traceparent" = Option<String>, Header, description = "W3C trace context: where the service sends traces, that of the job goes on with the client's. What cannot be read is passed over", example = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01")
+        ("traceparent" = Option<String>, Header, description = "W3C trace context: if the service exports traces, the trace of the job continues the client's trace. An unreadable value is ignored", example = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01")
     ),
     request_body(content = Case, description = "One case", content_type = "application/json"),
     responses(
         (status = 202, description = "The job is stored and will be solved", body = JobAnswer, headers(
             ("Location" = String, description = "Path of the job"),
-            ("Retry-After" = u32, description = "Seconds after which to look again"),
+            ("Retry-After" = u32, description = "Seconds to wait before asking again"),
             ("Preference-Applied" = String, description = "The wait that was applied, if one was asked for"),
             ("Idempotency-Replayed" = String, description = "`true` if this is the job of an earlier request with the same `Idempotency-Key`; absent otherwise")
         )),
@@ -181,7 +181,7 @@ problems! {
     GetProblems: BadQuery, JobNotFound
 }
 
-/// Looks at a job.
+/// Returns a job.
 #[utoipa::path(
     get,
     path = "/v1/jobs/{id}",

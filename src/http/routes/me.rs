@@ -19,7 +19,7 @@ use crate::jobs::model::State as JobState;
 pub struct Me {
     /// The tenant that the key belongs to; `anonymous` without a key.
     tenant: String,
-    /// Labels that the key is bound to: it opens only what carries them, and what it makes gets them.
+    /// Labels that the key is bound to: the key can access only resources with these labels, and resources created with it get them.
     labels: BTreeMap<String, String>,
     /// What the tenant may use at most.
     quota: Quota,
@@ -34,7 +34,7 @@ pub struct Me {
 pub struct Quota {
     /// Queued jobs, with those of batches that are being received.
     queued: u64,
-    /// Bytes that batches being received stand for.
+    /// Bytes reserved for batches that are being received.
     staged_bytes: u64,
 }
 
@@ -43,14 +43,14 @@ pub struct Quota {
 pub struct Used {
     /// Queued jobs, with the places that are reserved for batches being received.
     queued: u64,
-    /// Bytes that batches being received stand for.
+    /// Bytes reserved for batches that are being received.
     staged_bytes: u64,
     /// Number of its jobs in each state.
     #[schema(value_type = BTreeMap<String, u64>)]
     jobs: BTreeMap<&'static str, u64>,
 }
 
-/// Who the service takes the client for, how many jobs it has, and how many it may have.
+/// Returns the client's tenant, its use and its limits.
 #[utoipa::path(
     get,
     path = "/v1/me",

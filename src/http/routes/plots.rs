@@ -32,10 +32,10 @@ query! {
         /// the case asks for it
         #[param(inline, example = "curve")]
         view: View as View = reader(View::ALL.map(View::name).join(", "), View::from_name);
-        /// Of the view `patch`: `traction` (when left out), `pressure`, `slip` or `zones`; the case has to ask for that output. The border of the stick
-        /// zone is drawn if it asks for `zones` too
+        /// Field of the view `patch`: `traction` (default), `pressure`, `slip`, `temperature` or `zones`; the case must request that output. The
+        /// border of the stick zone is drawn if the case requests `zones` too
         #[param(example = "traction")]
-        field: Output as String = reader("`traction`, `pressure`, `slip` or `zones`", |text| match text {
+        field: Output as String = reader("`traction`, `pressure`, `slip`, `temperature` or `zones`", |text| match text {
             "traction" => Some(Output::Tractions),
             "pressure" => Some(Output::Pressure),
             "slip" => Some(Output::Slip),

@@ -82,9 +82,9 @@ pub struct RunRow {
 
 /// The answers of an ended run in the order of its rows.
 ///
-/// One line, or one row of a table, for each row that was sent, whatever became of it. Columns: `row`, the columns that were carried along,
+/// One line, or one row of a table, for each row that was sent, whatever became of it. Columns: `row`, the columns that were passed through unchanged,
 /// `status`, `method`, then numbers: forces and moment are sums over the patches about the origin of the case, `error_estimate` is that of the less
-/// certain force. Answers of a cancelled run are there as far as they came.
+/// certain force. A cancelled run keeps the answers it had computed.
 #[utoipa::path(
     get,
     path = "/v1/runs/{id}/results",

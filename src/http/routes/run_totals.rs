@@ -41,10 +41,10 @@ query! {
         percentiles: Vec<f64> as String = reader("numbers from 0 to 100 with commas between", |text| {
             numbers(text).filter(|all| all.iter().all(|percent| (0.0..=100.0).contains(percent)))
         });
-        /// Numbers, with commas between: how many rows have a value of at least this size, whatever its sign?
+        /// Comma-separated thresholds: counts the rows whose absolute value is at least each threshold
         #[param(example = "20000,30000")]
         above: Vec<f64> as String = reader("numbers with commas between", numbers);
-        /// A column that was carried along: totals for each of its values, or of its intervals if it holds numbers
+        /// A column that was passed through unchanged: totals for each of its values, or of its intervals if it holds numbers
         #[param(example = "section")]
         by: String as String = reader("the name of a column", |text| Some(text.to_owned()));
         /// With `by`, and needed there if it holds numbers: the length of an interval
@@ -106,7 +106,7 @@ pub struct ColumnTotals {
     max: Option<f64>,
     /// The mean.
     mean: Option<f64>,
-    /// Percentiles of the sizes of the numbers, whatever their signs: the least size that so many of a hundred do not exceed.
+    /// Percentiles of the absolute values.
     percentiles: BTreeMap<String, f64>,
     /// How many are at least this large, whatever their signs.
     above: BTreeMap<String, u64>,

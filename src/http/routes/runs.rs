@@ -55,7 +55,7 @@ query! {
 /// A row is the template with the row's values in place of its own; it is solved as a case of its own would be, to the last bit, whatever stands
 /// beside it. With `auto`, a row takes the table of creep forces where its bound meets the target, and `boundary_element` elsewhere. The body is
 /// JSON with `template` and `columns`, at most as large as one of `/v1/evaluate`, or a table with `?template=`, which is read as it arrives. A
-/// row that cannot be solved has a `status` in the results that says why, and costs no other row.
+/// row that cannot be solved has a `status` in the results that says why, and does not affect other rows.
 #[utoipa::path(
     post,
     path = "/v1/runs",
@@ -65,7 +65,7 @@ query! {
         RunQuery,
         SubmitQuery,
         ("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[!-~]+$", description = "1 to 255 visible ASCII characters. Repeating a request with the same key, the same rows and the same options answers the first run instead of making another"),
-        ("traceparent" = Option<String>, Header, description = "W3C trace context: where the service sends traces, that of the run goes on with the client's. What cannot be read is passed over", example = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01")
+        ("traceparent" = Option<String>, Header, description = "W3C trace context: if the service exports traces, the trace of the run continues the client's trace. An unreadable value is ignored", example = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01")
     ),
     request_body(content(
         (RunRequest = "application/json"),
@@ -164,7 +164,7 @@ problems! {
     GetRunProblems: BadQuery, RunNotFound
 }
 
-/// Looks at a run.
+/// Returns a run.
 #[utoipa::path(
     get,
     path = "/v1/runs/{id}",
@@ -177,7 +177,7 @@ pub async fn get(Caller(jobs): Caller, RunId(id): RunId) -> Result<Json<RunAnswe
     Ok(Json(jobs.run(id).await?.into()))
 }
 
-/// Stops a run. Rows that are over keep their answers.
+/// Stops a run. Finished rows keep their answers.
 #[utoipa::path(
     post,
     path = "/v1/runs/{id}/cancel",

@@ -48,10 +48,9 @@ impl ToSchema for TenantEventSent {
 
 /// Follows everything of the tenant: jobs that were submitted alone, and batches.
 ///
-/// The first event is `start`; to have no gap, connect first, and read the lists once it has come. An event `job` or `batch` then
-/// tells whatever changed, as `/v1/jobs/{id}` or `/v1/batches/{id}` answers it; jobs of batches are told with their batch. Several changes between
-/// two looks are one event, and after `Last-Event-ID` some are told again. What was deleted is not told. The stream ends when the service
-/// shuts down.
+/// The first event is `start`. To miss no change, connect first and read the lists after `start`. Each `job` or `batch` event carries the
+/// changed resource as its route returns it; jobs of a batch are reported through the batch. Changes in quick succession are merged into one
+/// event; after `Last-Event-ID` some events may repeat. Deletions are not reported. The stream ends when the service shuts down.
 #[utoipa::path(
     get,
     path = "/v1/events",

@@ -7,7 +7,7 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[schema(as = Damage)]
 pub struct DamageWords {
-    /// The models; those whose figures are confirmed when left out: `t_gamma` and `usfd_wear`.
+    /// Models to evaluate. When left out: `t_gamma` and `usfd_wear`, the models whose parameters are confirmed.
     #[schema(required = false)]
     pub models: Vec<DamageModel>,
     /// The name of a set of figures, or figures in place of some of the default set's.

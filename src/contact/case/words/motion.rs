@@ -129,7 +129,8 @@ pub struct Sweep {
     #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub speed_mm_per_s: Option<f64>,
     /// `together` (default): all components that vary have the same number of values, and motion n has value n of each; `grid`: every
-    /// combination of values. There the last component in this list varies fastest; a force counts at the place of its creepage.
+    /// combination of values. In a grid, the last component of this list varies fastest; a force takes the position of the creepage it
+    /// replaces.
     #[schema(required = false)]
     pub combine: Combine,
 }

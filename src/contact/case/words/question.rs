@@ -50,7 +50,7 @@ pub struct Case {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub subsurface: Option<SubsurfaceWords>,
-    /// Which damage models are evaluated; for the output `damage`, which takes those with confirmed figures without it.
+    /// Damage models for the output `damage`. When left out, the models with confirmed parameters are evaluated.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub damage: Option<DamageWords>,

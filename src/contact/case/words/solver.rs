@@ -44,8 +44,8 @@ pub enum MethodName {
     LiuHsu,
     /// Kalker's simplified theory: a draft in microseconds.
     Fastsim,
-    /// Interpolated in a table that `boundary_element` made: resultants of elliptic patches in less than a microsecond, with a bound of
-    /// their error. Other patches by the ellipse that carries their load the same way.
+    /// Interpolates resultants of elliptic patches in a table computed by `boundary_element`, in less than a microsecond, with an error
+    /// bound. A patch of another shape is replaced by the ellipse with the same load distribution.
     Table,
 }
 

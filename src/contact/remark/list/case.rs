@@ -40,10 +40,10 @@ macro_rules! case_remarks {
             }
             code: "coupling-first-order",
             severity: Warning,
-            advice: "Ask for each motion in a case of its own, by radii or a gap: there the pressure feels the tractions too.",
+            advice: "Ask for each motion in a case of its own, with `radii`, `ellipse` or a gap as its contact: such cases also include the effect of tractions on pressure.",
             detail: format!(
-                "the two bodies differ (K = {difference_parameter:.4}); tractions feel the pressure, but not the other way round, which leaves an \
-                 error of {error:.4} of the friction limit"
+                "the two bodies differ (K = {difference_parameter:.4}); the effect of pressure on tractions is included, the effect of tractions on \
+                 pressure is not; this leaves an error of {error:.4} of the friction limit"
             ),
         }
     };

@@ -122,8 +122,8 @@ macro_rules! profile_remarks {
             severity: Warning,
             advice: "Remove or correct the point; smoothing only spreads its error.",
             detail: format!(
-                "the {profile}'s point at y = {at_y_mm:.2} mm is {distance_um:.1} µm off the curve of its neighbours, worth {waviness_mpa:.0} MPa: \
-                 remove or correct it"
+                "the {profile}'s point at y = {at_y_mm:.2} mm is {distance_um:.1} µm off the curve of its neighbours, equivalent to \
+                 {waviness_mpa:.0} MPa of contact pressure: remove or correct it"
             ),
 
             /// A profile jumps between two points near the contact.
@@ -143,8 +143,8 @@ macro_rules! profile_remarks {
             severity: Warning,
             advice: "Measure this part again, or join the pieces better: smoothing does not remove a step, and forces are wrong as well.",
             detail: format!(
-                "the {profile}'s points jump by {:.1} µm at y = {at_y_mm:.2} mm, worth {waviness_mpa:.0} MPa: smoothing does not remove a step, measure \
-                 this part again", height_um.abs()
+                "the {profile}'s points jump by {:.1} µm at y = {at_y_mm:.2} mm, equivalent to {waviness_mpa:.0} MPa of contact pressure: smoothing does \
+                 not remove a step, measure this part again", height_um.abs()
             ),
 
             /// The points of a profile lie on straight chords between fewer points, as linear resampling leaves them.
@@ -167,12 +167,12 @@ macro_rules! profile_remarks {
             advice: "Send the points as measured, without resampling, or give the `smoothing_mm` named here.",
             detail: format!(
                 "the {profile}'s points under the patch (y {:.1} to {:.1} mm) lie on straight chords of {chord_mm:.2} mm, as linear resampling leaves \
-                 them; the kinks are worth {waviness_mpa:.0} MPa: send the points as measured{}",
+                 them; the kinks are equivalent to {waviness_mpa:.0} MPa of contact pressure: send the points as measured{}",
                 y_mm[0], y_mm[1],
                 smoothing_mm.map_or_else(String::new, |length| format!(", or give smoothing_mm: {length}"))
             ),
 
-            /// Noise of the points of a profile, from the measurement or from rounding, changes the pressure by a good part.
+            /// Noise of the points of a profile, from the measurement or from rounding, changes the pressure considerably.
             ProfileNoise {
                 /// Whose.
                 profile: &'static str = "rail",
@@ -195,14 +195,14 @@ macro_rules! profile_remarks {
             severity: Warning,
             advice: "Give the `smoothing_mm` named here, or `\"auto\"`; send points with more decimals where they were rounded.",
             detail: format!(
-                "noise of {noise_um:.2} µm{} at points {spacing_mm:.2} mm apart makes waves on the {profile} (y {:.1} to {:.1} mm) worth \
-                 {waviness_mpa:.0} MPa{}",
+                "noise of {noise_um:.2} µm{} at points {spacing_mm:.2} mm apart makes waves on the {profile} (y {:.1} to {:.1} mm) equivalent \
+                 to {waviness_mpa:.0} MPa of contact pressure{}",
                 rounding_mm.map_or_else(String::new, |step| format!(" (heights rounded to {step} mm)")),
                 y_mm[0], y_mm[1],
                 smoothing_mm.map_or_else(String::new, |length| format!(": give smoothing_mm: {length}"))
             ),
 
-            /// Waves of a profile that are neither noise nor a single fault change the pressure by a good part.
+            /// Waves of a profile that are neither noise nor a single fault change the pressure considerably.
             ProfileWaves {
                 /// Whose.
                 profile: &'static str = "wheel",
@@ -219,8 +219,8 @@ macro_rules! profile_remarks {
             severity: Warning,
             advice: "If they come from the measurement, remove them with a `smoothing_mm` of about their length; waves that are really there belong to the answer.",
             detail: format!(
-                "waves on the {profile} shorter than {shorter_than_mm:.1} mm (y {:.1} to {:.1} mm) are worth {waviness_mpa:.0} MPa: if they come \
-                 from the measurement, remove them with smoothing_mm", y_mm[0], y_mm[1]
+                "waves on the {profile} shorter than {shorter_than_mm:.1} mm (y {:.1} to {:.1} mm) are equivalent to {waviness_mpa:.0} MPa of \
+                 contact pressure: if they come from the measurement, remove them with smoothing_mm", y_mm[0], y_mm[1]
             ),
 
             /// The points of a profile under the contact are so far apart that the curve between them is uncertain.

@@ -61,7 +61,7 @@ macro_rules! wheel_remarks {
             }
             code: "patch-cut",
             severity: Warning,
-            advice: "Do not use pressures near that line, nor the largest pressure if the answer has `gap-rough` as well. Under this load two patches have grown into one that bends; under a smaller load they are two.",
+            advice: "Do not use pressures near that line, nor the largest pressure if the answer has `gap-rough` as well. At this load two patches have merged into one curved patch; at a smaller load they are separate.",
             detail: format!(
                 "the patch reaches the line y = {rail_y_mm:.2} mm on the rail, where the contact is divided between two planes: its edge and its \
                  pressure there come from that division"
@@ -124,7 +124,7 @@ macro_rules! wheel_remarks {
             NormalForcesAloneBalance {}
             code: "normal-forces-alone-balance",
             severity: Warning,
-            advice: "Ask for the motions in cases of their own if friction is to carry its share of the load.",
+            advice: "Ask for the motions in cases of their own if friction forces should be included in the vertical balance.",
             detail: "normal forces alone balance the vertical force, because several motions share their patches; the totals of a motion \
                      include its friction, so that they differ from the load".to_owned(),
         }

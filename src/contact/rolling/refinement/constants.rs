@@ -32,8 +32,8 @@ pub const LEVEL_RATIO_MIN: f64 = 1.8;
 pub const POLE: f64 = 0.45;
 /// The weight of that error; see [`POLE`].
 pub const POLE_WEIGHT: f64 = 0.3;
-/// With the load on fewer strips than these, counted by `(Σ load)² / Σ load²`, the estimate grows as what is missing; four
-/// strips of an ellipse count as 3.5. 3 and 4.5 are alike on ellipses; it is for the odd patches of gaps.
+/// With the load on fewer strips than these, counted by `(Σ load)² / Σ load²`, the estimate is multiplied by the square of the shortfall; four
+/// strips of an ellipse count as 3.5. 3 and 4.5 are alike on ellipses; needed for irregular patches of gaps.
 pub const STRIPS_FEW: f64 = 3.5;
 /// Factor where a smooth pressure is given in samples, and the power of the cells that it falls with in place of [`DECAY`]. 80 grids
 /// at targets of 0.02, 0.005 and 0.001: .99, .96 and .95 covered, estimates 4.2, 3.6 and 3.6 times the error in the median
@@ -92,5 +92,5 @@ pub const CAUTION: f64 = 0.4;
 pub const DENSE_LEVELS: f64 = 1.25;
 /// The factor for levels that are near each other; see [`DENSE_LEVELS`].
 pub const DENSE_LEVELS_NEAR: f64 = 1.9;
-/// What tells such levels; see [`DENSE_LEVELS`].
+/// Threshold that identifies such levels; see [`DENSE_LEVELS`].
 pub const SHARE_LARGE: f64 = 1.5;

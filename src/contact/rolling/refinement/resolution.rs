@@ -21,7 +21,8 @@ impl Resolution {
         }
     }
 
-    /// What a target leaves beside another error, which adds to its own as squares do; the target itself if that is as large.
+    /// The target reduced so that its root sum of squares with another error equals the original; unchanged if that error is 0 or at least
+    /// the target.
     #[must_use]
     pub fn beside(self, error: f64) -> Resolution {
         match self {
