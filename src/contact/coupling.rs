@@ -26,21 +26,25 @@ use crate::contact::solution::track_axes::merge;
 use crate::contact::solution::words::{Fields, NormalReport, Solution};
 use crate::contact::time_limit::TimeLimit;
 
-/// The vertical force may be missed by this fraction; it bounds the change of friction's share in one round.
+/// The vertical force may be missed by this fraction; it bounds the change of friction's share in one round. Chosen by judgement; how much it
+/// matters was not measured.
 const BALANCE: f64 = 5e-4;
-/// Upper limit of that fraction, relative to the target error.
+/// Upper limit of that fraction, relative to the target error. Chosen by judgement; how much it matters was not measured.
 const BALANCE_OF_TARGET: f64 = 0.1;
-/// When the rounds are used up, a share that still changes by no more than this is answered with a remark.
+/// When the rounds are used up, a share that still changes by no more than this is answered with a remark. Chosen by judgement; how much it matters
+/// was not measured.
 const BALANCE_POOR: f64 = 5e-3;
 /// Rounds of the balance; each leaves about a tenth of the difference before, on steep flanges a third, less by the secant.
 const ROUNDS_MAX: u32 = 12;
 /// Range of the slope of the friction found over the friction assumed that a secant step uses. Numeric safety, not tuned.
 const SLOPES: [f64; 2] = [-0.9, 0.6];
-/// Least fraction of the vertical part of its normal forces that a wheel carries; on a steep flange friction may take away all of it.
+/// Least fraction of the vertical part of its normal forces that a wheel carries; on a steep flange friction may take away all of it. Chosen by
+/// judgement; how much it matters was not measured.
 const CARRIED_MIN: f64 = 0.1;
-/// Allowed error of the resultants in the first round, relative to μN.
+/// Allowed error of the resultants in the first round, relative to μN. Chosen by judgement; how much it matters was not measured.
 const TARGET_FIRST: f64 = 0.05;
-/// Largest change of a patch's force by its neighbours, relative to the load, that is not remarked on where no target is given.
+/// Largest change of a patch's force by its neighbours, relative to the load, that is not remarked on where no target is given. Chosen by
+/// judgement; how much it matters was not measured.
 const UNCOUPLED: f64 = 0.01;
 /// Tolerance of the force at the first height: friction's share hardly depends on it.
 const TOLERANCE_FIRST: f64 = 0.1;

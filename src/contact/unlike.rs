@@ -39,13 +39,14 @@ const LEFT: f64 = 0.25;
 /// Error of forces relative to μN over |K| that region and pressure leave: their edges are found with tractions of a mesh (12 contacts of
 /// `tests/physics/unlike.rs`, at most 0.022 where rolling is free, 0.009 elsewhere).
 const LEFT_BY_PRESSURE: f64 = 0.02;
-/// The change that is left has to be below this part of the target.
+/// The change that is left has to be below this part of the target. Chosen by judgement; how much it matters was not measured.
 const PART_OF_TARGET: f64 = 0.3;
 /// The target that stands for an explicit mesh.
 const TARGET_OF_MESH: f64 = 0.005;
 /// The opening is sampled on so many points along each axis, over the patches and by this part of their size around them; beyond it
-/// is taken as constant. It is as smooth as displacements are.
+/// is taken as constant. It is as smooth as displacements are. Both were chosen by judgement; how much they matter was not measured.
 const SAMPLES: usize = 41;
+/// See [`SAMPLES`].
 const AROUND: f64 = 0.25;
 /// Samples of the parabola across that stands for an ellipse, and how far they reach over its semi-axis. Parabolas are reproduced exactly.
 const PARABOLA: (i32, f64) = (8, 6.0);

@@ -1,10 +1,11 @@
 //! The root of an increasing function of one variable, without a bracket to start from.
 
-/// Largest argument tried: a hundred times the creepage at which the cubic law predicts full slip.
+/// Largest argument tried: a hundred times the creepage at which the cubic law predicts full slip. Chosen by judgement; how much it matters was not
+/// measured.
 pub(crate) const PLACE_MAX: f64 = 65.0;
-/// Most arguments tried.
+/// Most arguments tried. Keeps the numbers safe; not tuned.
 const TRIALS_MAX: u32 = 40;
-/// Width of a bracket, relative to its ends, below which it is not divided further.
+/// Width of a bracket, relative to its ends, below which it is not divided further. Keeps the numbers safe; not tuned.
 const CLOSED: f64 = 1e-13;
 /// The same relative to the tolerance of the value: a function that is not steeper than the inverse of this and misses the tolerance
 /// at both ends has a jump between them. Forces over places are no steeper than 10.

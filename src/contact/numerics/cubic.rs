@@ -162,6 +162,7 @@ pub(crate) fn interval(axis: &[f64], x: f64) -> usize {
 /// over to a mean that favours the flatter side, which keeps the curve from overshooting the values. At the ends the
 /// parabola of the adjacent node is used.
 pub(crate) fn sober_slopes(axis: &[f64], values: &[f64]) -> Vec<f64> {
+    /// How many times as strongly a parabola may be curved as its neighbours. Chosen by judgement; how much it matters was not measured.
     const BEND_MAX: f64 = 8.0;
     let n = axis.len();
     let rises: Vec<f64> = (1..n)

@@ -7,7 +7,7 @@ use crate::contact::monitor::Stop;
 /// Basis vectors kept before a restart. A Newton step takes 4 products on average; 30 gives the same work on the 160 ellipses that
 /// `newton.rs` of the boundary element method names.
 const BASIS_MAX: usize = 60;
-/// Restarts after which the solve ends without convergence.
+/// Restarts after which the solve ends without convergence. Keeps the numbers safe; not tuned.
 const RESTARTS_MAX: usize = 3;
 
 /// Buffers that live as long as a solve.

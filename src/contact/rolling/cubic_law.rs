@@ -5,7 +5,7 @@ use crate::contact::rolling::linear_theory;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::task::RollingTask;
 
-/// From this place on the cubic law is continued by its tangent.
+/// From this place on the cubic law is continued by its tangent. Chosen by judgement; how much it matters was not measured.
 const KNEE: f64 = 0.9;
 
 /// The cubic law of a problem.

@@ -27,27 +27,32 @@ use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::task::RollingTask;
 
-/// A prescribed force may be missed by this part of the target error.
+/// A prescribed force may be missed by this part of the target error. Chosen by judgement; how much it matters was not measured.
 const SHARE_OF_TARGET: f64 = 0.02;
 /// Smallest tolerance of a force with a target, relative to μN: ten times the residual to which tractions are solved, because a
 /// starting iterate that meets this residual is accepted unchanged.
 const MISSED_FOR_TARGET: f64 = 1e-5;
 /// Tolerance of a force on an explicit mesh and for the simplified theory, relative to μN.
 const MISSED: f64 = 1e-6;
-/// Near μN the creepage depends on the small remainder `1 − force/μN`; the tolerance is at most this multiple of the remainder.
+/// Near μN the creepage depends on the small remainder `1 − force/μN`; the tolerance is at most this multiple of the remainder. Chosen by
+/// judgement; how much it matters was not measured.
 const NEAR_LIMIT: f64 = 10.0;
 /// No force is sought more closely than this, relative to μN or, if they are smaller, to the forces of the first motion tried: where
-/// everything slips, elastic slip still turns the tractions by this much.
+/// everything slips, elastic slip still turns the tractions by this much. Chosen by judgement; how much it matters was not measured.
 const MISSED_LEAST: f64 = 2e-7;
-/// Motions tried for two forces at once.
+/// Motions tried for two forces at once. Chosen by judgement; how much it matters was not measured.
 const TRIALS_AT_ONCE: u32 = 14;
-/// Longest step of a place when two are searched at once.
+/// Longest step of a place when two are searched at once. Chosen by judgement; how much it matters was not measured.
 const STEP_MAX: f64 = 0.4;
-/// Trials in a row without improvement after which the search for two places at once is given up.
+/// Trials in a row without improvement after which the search for two places at once is given up. Keeps the numbers safe; not tuned.
 const WORSE_MAX: u32 = 3;
-/// How often the levels are chosen anew because the motion that was found does not meet its target on them.
+/// Tolerance of the inner one of two nested searches over that of the outer one, to which the error of the inner one is noise. Chosen by
+/// judgement; how much it matters was not measured.
+const INNER_TOLERANCE: f64 = 0.3;
+/// How often the levels are chosen anew because the motion that was found does not meet its target on them. Keeps the numbers safe; not tuned.
 const CLIMBS_MAX: u32 = 3;
-/// Largest correction of a starting place by what the cubic law was off at the motion before.
+/// Largest correction of a starting place by what the cubic law was off at the motion before. Chosen by judgement; how much it matters was not
+/// measured.
 const CORRECTION_MAX: f64 = 0.3;
 
 /// Solves motion `index` of a problem; where forces are prescribed, finds the creepages that give them. `before` is the answer to
@@ -269,7 +274,7 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
             let mut off = [0.0; 2];
             let inner = find_root(along, |at, tolerance| {
                 off = self.trial([at, across])?;
-                *tolerance = 0.3 * self.tolerance();
+                *tolerance = INNER_TOLERANCE * self.tolerance();
                 Ok::<f64, SolveError>(off[0])
             })?;
             (along, exit_along) = (inner.place, inner.exit);

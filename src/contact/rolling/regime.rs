@@ -8,9 +8,10 @@ use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::rolling::task::RollingTask;
 use crate::contact::rolling::vortex::vortex_centre;
 
-/// A pole this far out, relative to the half axes of the box around the patches, is outside.
+/// A pole this far out, relative to the half axes of the box around the patches, is outside. Chosen by judgement; how much it matters was not
+/// measured.
 const POLE_INSIDE: f64 = 0.9;
-/// Cells gather no farther out than here.
+/// Cells gather no farther out than here. Chosen by judgement; how much it matters was not measured.
 const POLE_OUTMOST: f64 = 0.95;
 
 /// The regime that the next level should be made for, judged by this one.

@@ -10,8 +10,17 @@ use crate::contact::rolling::methods::method::{Method, TractionBound};
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::refinement::resolution::Resolution;
 
-/// Targets from here on are met with an operator in single precision.
+/// Targets from here on are met with an operator in single precision. Chosen by judgement; how much it matters was not measured.
 const SINGLE_PRECISION_FROM: f64 = 5e-4;
+
+/// Residual to reach over the target error. Chosen by judgement; how much it matters was not measured.
+const RESIDUAL_OF_TARGET: f64 = 0.04;
+/// The same where forces are prescribed. A force is searched as a function of its creepage, and what the iteration leaves is noise to that
+/// search. It is less than a tenth of what a force may be missed by (`SHARE_OF_TARGET`), because a start that meets it is left as it is. Chosen
+/// by judgement; how much it matters was not measured.
+const RESIDUAL_FOR_FORCES: f64 = 0.0015;
+/// Largest residual that any target allows, relative to the traction scale. Chosen by judgement; how much it matters was not measured.
+const TOLERANCE_LARGEST: f64 = 4e-4;
 
 /// Residual of the friction law to which every method solves on a mesh of the client's, relative to the traction scale.
 pub const TOLERANCE_LEAST: f64 = 1e-6;
@@ -60,14 +69,12 @@ impl RollingTask<'_> {
     pub fn tolerance(&self) -> f64 {
         match self.resolution {
             Resolution::Target(target) => {
-                // A force is searched as a function of its creepage: what the iteration leaves is noise to that. Ten times less than a
-                // force may be missed by (`SHARE_OF_TARGET`): a start that meets it is left as it is.
                 let part = if self.has_prescribed_forces() {
-                    0.0015
+                    RESIDUAL_FOR_FORCES
                 } else {
-                    0.04
+                    RESIDUAL_OF_TARGET
                 };
-                (part * target).clamp(TOLERANCE_LEAST, 4e-4)
+                (part * target).clamp(TOLERANCE_LEAST, TOLERANCE_LARGEST)
             }
             Resolution::Mesh(_) => TOLERANCE_LEAST,
         }

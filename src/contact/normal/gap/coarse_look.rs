@@ -2,7 +2,7 @@
 
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Unmonitored;
-use crate::contact::normal::gap::constants::{CELLS_FIRST, NEAR, RESOLUTION};
+use crate::contact::normal::gap::constants::{CELLS_FIRST, LEVEL_BEYOND, NEAR, RESOLUTION};
 use crate::contact::normal::gap::grid::PressureGrid;
 use crate::contact::normal::gap::pilot::{GapPilot, PilotPatch};
 use crate::contact::normal::gap::search_box::{reach, reach_of_level};
@@ -29,7 +29,7 @@ impl GapTask {
                 .ok()?;
             let depth = pressed.approach - reach.least;
             if pressed.approach > reach.level {
-                reach = reach_of_level(&self.gap, pressed.approach + 0.2 * depth);
+                reach = reach_of_level(&self.gap, pressed.approach + LEVEL_BEYOND * depth);
                 continue;
             }
             let area = grid.step[0] * grid.step[1];

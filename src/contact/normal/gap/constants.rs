@@ -53,5 +53,9 @@ pub(crate) const TOLERANCE: f64 = 2e-4;
 /// Most grids that are tried; each is larger, shifted or finer than the one before. Numeric safety.
 pub(crate) const GRIDS_MAX: usize = 12;
 
+/// Where the approach found is beyond the level that a box was made for, the next box is made for the approach and this part of the depth of
+/// overlap more. Chosen by judgement; the box grows again where it is not enough.
+pub(crate) const LEVEL_BEYOND: f64 = 0.2;
+
 /// Cells outside the contact that nearly touch, relative to the deepest overlap, belong to the next grid.
 pub(crate) const NEAR: f64 = 0.03;

@@ -9,8 +9,9 @@ use crate::contact::monitor::Monitor;
 use crate::contact::normal::answer::{NormalAnswer, NormalError, edge_reached, no_touch};
 use crate::contact::normal::gap::conjugate_gradients::{Pressed, PressureTask, press};
 use crate::contact::normal::gap::constants::{
-    APPROACH_CHANGE, CELLS_FIRST, COARSER_MAX, GRIDS_MAX, NEAR, PRESSURE_CHANGE, REFINEMENT,
-    RESOLUTION, RESOLUTION_COARSE, TARGET_POWER, TARGET_USUAL, TOLERANCE, TOLERANCE_FIRST,
+    APPROACH_CHANGE, CELLS_FIRST, COARSER_MAX, GRIDS_MAX, LEVEL_BEYOND, NEAR, PRESSURE_CHANGE,
+    REFINEMENT, RESOLUTION, RESOLUTION_COARSE, TARGET_POWER, TARGET_USUAL, TOLERANCE,
+    TOLERANCE_FIRST,
 };
 use crate::contact::normal::gap::grid::{GridFineness, GridSide, PressureGrid};
 use crate::contact::normal::gap::search_box::{Reach, reach, reach_of_level};
@@ -102,7 +103,7 @@ impl GapTask {
             let next = if pressed.approach > reach.level {
                 // The estimate was too small: parts of the gap beyond the box may touch as well.
                 let depth = pressed.approach - reach.least;
-                reach = reach_of_level(&self.gap, pressed.approach + 0.2 * depth);
+                reach = reach_of_level(&self.gap, pressed.approach + LEVEL_BEYOND * depth);
                 NextStep::PressureGrid(first(&reach))
             } else {
                 let depth = pressed.approach - reach.least;

@@ -24,12 +24,13 @@ const TILES_MAX: usize = 6;
 /// Most cells of all grids together. Three patches of like size have 89 × 89 cells each, a small patch beside a large one up to 30 000
 /// in all. A gap that wants more is rough: with 60 000 cells such gaps took up to 10 s and did not settle.
 const CELLS_MAX: usize = 36_000;
-/// Cells along either axis of a grid whose patch is hardly known yet, at least and at most.
+/// Cells along either axis of a grid whose patch is hardly known yet, at least and at most. Chosen by judgement; how much it matters was not
+/// measured.
 const CELLS_FIRST: [f64; 2] = [24.0, 56.0];
 /// Violation of the contact conditions relative to the deepest overlap. Small patches yield less than large ones: a quarter of
-/// what serves for one grid.
+/// what serves for one grid. Chosen by judgement; how much it matters was not measured.
 const TOLERANCE: f64 = 5e-5;
-/// A patch with less than this fraction of the load needs fewer cells.
+/// A patch with less than this fraction of the load needs fewer cells. Chosen by judgement; how much it matters was not measured.
 const SHARE_LARGE: f64 = 0.25;
 /// Cells across such a patch over those across a large one. On 22 gaps with a patch of radius 1 to 60 mm beside one of 300 mm (1 to 60 kN
 /// on the small one), 0.5 and 1 change its force by 0.05 %, its pressure by 0.2 %, its width by 0.4 % and F_x by 0.0003 μN at most.

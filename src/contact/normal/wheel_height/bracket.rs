@@ -8,12 +8,13 @@ use crate::contact::remark::list::Remark;
 /// A bracket narrower than this fraction of the lowering is closed: it holds a jump of the force, or only differences between grids.
 /// 5e-5 and 1e-3 change nothing on the wheels of `cargo bench --bench calibrate profiles`, whose searches end before that.
 const BRACKET_MIN: f64 = 2e-4;
-/// Steps in a row that may leave the bracket more than half as wide.
+/// Steps in a row that may leave the bracket more than half as wide. Keeps the numbers safe; not tuned.
 const SLOW_MAX: u32 = 3;
 /// The search ends when it comes this close, relatively, to a lowering that cannot be solved. 0.005 and 0.05
 /// change nothing on the same wheels.
 const CLOSE: f64 = 0.02;
-/// A closed bracket holds a jump of the force if the force is missed by more than this fraction; differences between grids are smaller.
+/// A closed bracket holds a jump of the force if the force is missed by more than this fraction; differences between grids are smaller. Chosen by
+/// judgement; how much it matters was not measured.
 const JUMP_MIN: f64 = 5e-3;
 
 /// How the search for a height ends, with the part by which the force is missed.

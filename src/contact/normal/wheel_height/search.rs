@@ -21,7 +21,7 @@ use crate::contact::normal::wheel_height::pressed::{PressedGap, PressedWheel};
 use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
 use crate::contact::remark::list::Remark;
 
-/// Heights after which the search is given up.
+/// Heights after which the search is given up. Keeps the numbers safe; not tuned.
 const HEIGHTS_MAX: u32 = 40;
 /// Bounds of the tolerance of the force, which is the target of the resultants' error. The contact is then scaled to the force as Hertz's
 /// contacts scale; the error left is of second order for these, and at worst about a third of the tolerance in pressures and lengths.

@@ -16,7 +16,7 @@ pub const DIFFERENCES: f64 = 0.6;
 /// work, 0.18 takes 8 to 25 % less and leaves one case in a hundred more uncovered.
 pub const DECAY: f64 = 0.12;
 /// The difference of the rules counts for more where a companion did not converge, which happens on two to four strips or
-/// cells; one case in a thousand.
+/// cells; one case in a thousand. Chosen by judgement; how much it matters was not measured.
 pub const WITHOUT_COMPANION: f64 = 1.5;
 /// Factor on the change from a coarser level, times 1 over (ratio of cells − 1): between levels of one kind, and from the
 /// first mesh to one that is not gathered. It only lets a mesh be refused before its companions are solved; 0.2 and 0.45 change the work
@@ -74,7 +74,7 @@ pub const STICK_NEGLIGIBLE: f64 = 0.12;
 /// With less stick than this on the first level, a pole in a sticking cell may as well be in a slipping one. 0.12 and 0.3 are alike.
 pub const STICK_UNCERTAIN: f64 = 0.2;
 /// A motion of a sweep goes on with half the cells when its estimate is smaller than this part of the target: less often than the
-/// estimate's own changes along a sweep would have it.
+/// estimate's own changes along a sweep would have it. Chosen by judgement; how much it matters was not measured.
 pub const SLACK: f64 = 1.0 / 6.0;
 /// The same about a pole, where every motion has a mesh of its own to be filled, and a finer one costs four times as much: the
 /// estimate about doubles with half the cells, and stays below the target. With 1/6 creep maps at fixed spin took 1.4 times as
@@ -85,12 +85,12 @@ pub const SLACK_POLE: f64 = 0.4;
 pub const RULES_ON_MESH: f64 = 2.3;
 /// The second of these factors; see [`RULES_ON_MESH`].
 pub const RULES_ON_MESH_SAMPLED: f64 = 3.45;
-/// That estimate grows as this power of the slenderness of a patch.
+/// That estimate grows as this power of the slenderness of a patch. Chosen by judgement; how much it matters was not measured.
 pub const CAUTION: f64 = 0.4;
 /// The dense method's change between its two levels, times 1 over (ratio of cells − 1); the second where they are so near each
-/// other that this is more than `SHARE_LARGE`.
+/// other that this is more than `SHARE_LARGE`. Chosen by judgement; how much it matters was not measured.
 pub const DENSE_LEVELS: f64 = 1.25;
-/// The factor for levels that are near each other; see [`DENSE_LEVELS`].
+/// The factor for levels that are near each other; see [`DENSE_LEVELS`]. Chosen by judgement; how much it matters was not measured.
 pub const DENSE_LEVELS_NEAR: f64 = 1.9;
-/// Threshold that identifies such levels; see [`DENSE_LEVELS`].
+/// Threshold that identifies such levels; see [`DENSE_LEVELS`]. Chosen by judgement; how much it matters was not measured.
 pub const SHARE_LARGE: f64 = 1.5;

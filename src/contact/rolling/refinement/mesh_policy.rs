@@ -13,16 +13,18 @@ use crate::contact::rolling::refinement::resolution::Resolution;
 /// targets 0.005 and 0.001, 48 takes 4 to 10 % more work and 90 takes 15 % less, with one case more or less covered.
 /// On the 62 Hertz cases of the report 90 takes 7 to 66 % more time, and one case is not covered at 0.02.
 pub const CELLS_FIRST: f64 = 64.0;
-/// Cells of the finest mesh a target may ask for.
+/// Cells of the finest mesh a target may ask for. Chosen by judgement; how much it matters was not measured.
 pub const CELLS_MAX: u32 = 2048;
-/// Fewest strips, and cells in one, that the rules are good for; twice as many in slender patches.
+/// Fewest strips, and cells in one, that the rules are good for; twice as many in slender patches. Chosen by judgement; how much it matters was not
+/// measured.
 const SIDE_MIN: f64 = 4.0;
 /// Patches longer than this many times their width, or the reverse, are slender. On the same ellipses 4 takes 17 % less work at 0.005 and
 /// 15 % more at 0.001, 7 takes 12 and 7 % more; errors and coverage are alike.
 const SLENDER: f64 = 5.0;
 /// Coordinates of a vortex centre are rounded to multiples of this. 0.02 and 0.1 take 1 to 6 % more work on the same ellipses.
 const POLE_GRID: f64 = 0.05;
-/// Half-doublings of the number of cells from which on steps of less than two times the cells do not pay.
+/// Half-doublings of the number of cells from which on steps of less than two times the cells do not pay. Chosen by judgement; how much it matters
+/// was not measured.
 const SMALL_STEPS_BELOW: i32 = 4;
 
 /// The meshes that suit the patches of a footprint.
