@@ -102,6 +102,8 @@ impl Gmres {
         let mut beta = norm_b;
         for restart in 0..=RESTARTS_MAX {
             if restart > 0 {
+                // The norm that a cycle ends with was carried along by rotations and collects rounding errors: each restart
+                // begins with the residual itself.
                 system.product(x, &mut self.product);
                 report.products += 1;
                 for i in 0..b.len() {
@@ -119,6 +121,7 @@ impl Gmres {
         }
         self.residual = residual;
         report.residual = beta / norm_b;
+        // A residual that is not a number fails every comparison and must not pass for converged.
         if beta > tolerance * norm_b || beta.is_nan() {
             report.exit = GmresExit::RestartsUsedUp;
         }
@@ -145,11 +148,14 @@ impl Gmres {
                 return Err(stop);
             }
             self.direction.copy_from_slice(&self.basis[k]);
+            // Preconditioned from the right: the residual that is minimised is that of the system itself, so that the
+            // tolerance means the same with any preconditioner.
             system.precondition(&mut self.direction);
             system.product(&self.direction, &mut self.product);
             report.products += 1;
             let breakdown = self.orthogonalise(k);
             k += 1;
+            // The last rotated entry is the norm of the residual; the solution need not be formed to know it.
             if breakdown || self.rhs[k].abs() <= goal {
                 break;
             }
@@ -203,6 +209,7 @@ impl Gmres {
         let last = self.rhs[k];
         self.rhs[k] = c * last;
         self.rhs.push(-s * last);
+        // What is left is rounding; scaled up to a basis vector it would be noise.
         if rest <= 1e-14 * before {
             return true;
         }
@@ -221,15 +228,18 @@ impl Gmres {
             for j in i + 1..k {
                 y[i] -= self.columns[j][i] * y[j];
             }
+            // A pivot of 0 belongs to a singular system: that direction is left out.
             let pivot = self.columns[i][i];
             y[i] = if pivot == 0.0 { 0.0 } else { y[i] / pivot };
         }
         self.direction.fill(0.0);
+        // The basis may still hold vectors of a longer cycle; the weights end the sum.
         for (weight, basis) in self.weights.iter().zip(&self.basis) {
             for (d, b) in self.direction.iter_mut().zip(basis) {
                 *d += weight * b;
             }
         }
+        // The preconditioner is linear, so that one application to the sum is enough.
         system.precondition(&mut self.direction);
         for (to, d) in x.iter_mut().zip(&self.direction) {
             *to += d;

@@ -77,6 +77,7 @@ impl<'a> Assembly<'a> {
         let on_level = level.as_deref().zip(fields);
         let index = self.total.len();
         self.remarks.extend(remarks(case, index, point));
+        // A sweep repeats its remarks motion by motion; merged on the way they never take much memory.
         if self.remarks.len() > REMARKS_AT_ONCE {
             self.remarks = merged(std::mem::take(&mut self.remarks));
         }
@@ -114,6 +115,7 @@ impl<'a> Assembly<'a> {
         self.fields
             .patches
             .resize_with(patches, PatchFields::default);
+        // From the end, because a motion mostly shares the mesh of the one before it.
         let known = self.levels.iter().rposition(|known| *known == found.level);
         let mesh = known.unwrap_or(self.levels.len());
         if known.is_none() {
@@ -412,6 +414,7 @@ fn remarks(
 ) -> impl Iterator<Item = RemarkEntry> {
     let own = point.remarks.iter().cloned();
     let missed = target_missed(case, point);
+    // Parts of a sweep are numbered through, as the client counts its motions.
     let number = case.problem.part.before + index;
     own.chain(unreachable(case, index, point))
         .chain(missed)

@@ -80,6 +80,7 @@ impl<T: Number> CellEdges<T> {
             let distance = p.abs();
             let pp = p * p;
             let (r1, r2) = ((pp + q1 * q1).sqrt(), (pp + q2 * q2).sqrt());
+            // `TINY` keeps the logarithm finite at the corner itself, where its factor is 0.
             let along1 = q1 * ((distance + r1 + T::TINY).ln() - ln_q1s[e]);
             let along2 = q2 * ((distance + r2 + T::TINY).ln() - ln_q2s[e]);
             out_a[e] = if p < T::ZERO {
@@ -88,6 +89,7 @@ impl<T: Number> CellEdges<T> {
                 along1 - along2
             };
             let (g1, g2) = (q1.abs() + r1, q2.abs() + r2);
+            // `|q| + r` is a sum of like signs, while `r − |q|` would cancel: the ratio is written without it.
             let (above, below) = if q2 >= T::ZERO {
                 (g1, g2)
             } else if q1 <= T::ZERO {
@@ -203,6 +205,7 @@ impl<T: Number> NullaryFnOnce for SegmentRows<'_, T> {
         edges.corner_sums(points[0]);
         let row_length = if folded { 6 * stride } else { 3 * stride };
         for (point, out) in points[1..].iter().zip(target.chunks_exact_mut(row_length)) {
+            // Neighbouring rows share a point, whose sums are computed once.
             std::mem::swap(&mut edges.now, &mut edges.before);
             edges.corner_sums(*point);
             edges.row(mesh, nu);

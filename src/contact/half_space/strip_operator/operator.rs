@@ -202,6 +202,7 @@ impl StripOperator {
     #[must_use]
     pub fn own(&self, row: usize, cell: usize, parity: Option<Parity>) -> (f64, f64) {
         if self.is_folded() && parity.is_none() {
+            // In half the sum of both parities the mirrored cell cancels: what is left is the cell's own influence.
             let half = |k: usize| 0.5 * (self.stored(row, k, cell) + self.stored(row, k + 1, cell));
             return (half(0), half(4));
         }
@@ -228,6 +229,7 @@ impl StripOperator {
             let row = mirror_image(&self.first_row, row);
             (row, mirror_image(&self.first_cell, cell), -1.0)
         };
+        // Half the sum of the two stored values belongs to the cell itself, half their difference to its mirror image.
         let (cell, sign) = if cell < self.first_cell[self.segments()] {
             (cell, 0.5)
         } else {
@@ -290,6 +292,8 @@ impl StripOperator {
     ) {
         let (stride, rows) = (self.stride, self.row_count());
         let OperatorScratch { narrow, halves } = scratch;
+        // The parities do not mix, so that each product keeps to the stored half of the rows and cells, and no matrix
+        // of the whole mesh is needed.
         let [parts, sums] = halves;
         parts.resize(4 * stride, 0.0);
         sums.resize(4 * rows, 0.0);
@@ -344,6 +348,7 @@ impl StripOperator {
             let rows = self.rows(j);
             let image = total - rows.end;
             for (k, i) in rows.enumerate() {
+                // The part of opposite parity changes its sign in the mirrored half.
                 out[i] = same[i] + opposite[i];
                 out[image + k] = same[i] - opposite[i];
             }

@@ -32,8 +32,9 @@ pub const LEVEL_RATIO_MIN: f64 = 1.8;
 pub const POLE: f64 = 0.45;
 /// The weight of that error; see [`POLE`].
 pub const POLE_WEIGHT: f64 = 0.3;
-/// With the load on fewer strips than these, counted by `(Σ load)² / Σ load²`, the estimate is multiplied by the square of the shortfall; four
-/// strips of an ellipse count as 3.5. 3 and 4.5 are alike on ellipses; needed for irregular patches of gaps.
+/// With the load on fewer strips than these, counted by `(Σ load)² / Σ load²`, the estimate is multiplied by the shortfall (this number over
+/// the count), on an explicit mesh by its square; four strips of an ellipse count as 3.5. 3 and 4.5 are alike on ellipses; needed
+/// for irregular patches of gaps.
 pub const STRIPS_FEW: f64 = 3.5;
 /// Factor where a smooth pressure is given in samples, and the power of the cells that it falls with in place of [`DECAY`]. 80 grids
 /// at targets of 0.02, 0.005 and 0.001: .99, .96 and .95 covered, estimates 4.2, 3.6 and 3.6 times the error in the median

@@ -122,11 +122,13 @@ pub fn solve_level(
         .as_ref()
         .map(|point| (levels.get(point.level), &point.tangential));
     let motion = level.scale.motion(&asked.motion);
+    // The motion before on this mesh is preferred: its tractions need not be interpolated from other cells.
     let warm = levels.sweep.start(number, &level, &motion);
     let start =
         warm.or_else(|| below.map(|(coarse, answer)| nested_start(&coarse, answer, &level)));
     let workspace = &mut levels.workspace;
     let tangential = run_method(task, &level, asked, start, workspace, monitor)
+        // A part of a sweep counts from its own first motion, the client from that of the case.
         .map_err(|f| named(f, task, task.first_motion + asked.index))?;
     let patches = task.footprint.patches().len();
     let summed: Vec<Resultants> = (0..patches)
@@ -145,6 +147,7 @@ pub fn solve_level(
     };
     let indicators = Indicators::of_level(task, &level, &tangential, &summed, circumstances);
     levels.sweep.remember(number, motion, &tangential);
+    // A search for creepages solves its later trials on the same levels.
     levels.path.push(number);
     let mut work = coarser.as_ref().map_or(Work::default(), |point| point.work);
     work.add(tangential.work);
@@ -154,6 +157,7 @@ pub fn solve_level(
         motion: asked.motion,
         tangential,
         level: number,
+        // Extrapolated later, if both companions are solved.
         resultants: summed.clone(),
         summed,
         errors: indicators.errors(),
@@ -232,6 +236,7 @@ fn run_method(
     monitor: &dyn Monitor,
 ) -> Result<LevelAnswer, LevelFailure> {
     let motion = &asked.motion;
+    // Tractions are 0, whatever the method.
     if task.friction.is_frictionless() {
         return Ok(full_slip::frictionless_answer(level, motion));
     }

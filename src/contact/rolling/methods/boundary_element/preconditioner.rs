@@ -73,6 +73,7 @@ impl StripFactors {
                 }
                 self.close_block(start);
             } else {
+                // Two factorisations of half the size take a quarter of the work of one.
                 for (matrix, shift) in [(xx, 0), (yy, padded)] {
                     let start = self.open_block();
                     self.places.extend(cells.clone().map(|i| shift + i));
@@ -102,6 +103,7 @@ impl StripFactors {
             .as_ref()
             .is_none_or(|(largest, _)| *largest < size)
         {
+            // The buffer of the largest block so far serves all smaller ones.
             let request =
                 factor::lu_in_place_scratch::<usize, f64>(size, size, Par::Seq, Default::default());
             scratch.stack = Some((size, MemBuffer::new(request)));
@@ -118,6 +120,7 @@ impl StripFactors {
             MemStack::new(stack),
             Default::default(),
         );
+        // The rows are exchanged while values are gathered, so that an application needs no permutation of its own.
         self.pivot_places
             .extend(scratch.pivots.iter().map(|row| self.places[start + row]));
         self.gathered.resize(self.gathered.len().max(size), 0.0);
@@ -152,6 +155,7 @@ impl StripFactors {
                 let (vx, vy) = linear.direction(first + row);
                 out[row] = vx * ux * xx[row] + vy * uy * yy[row];
             }
+            // The equation of a slipping cell is `t·s − D τ = 0`; D of a sticking one is 0.
             out[column] -= linear.stiffness(first + column);
             for (k, row) in stick.iter().enumerate() {
                 out[n + k] = uy * yy[*row];
@@ -183,6 +187,7 @@ impl StripFactors {
 
     /// `x ← P⁻¹ x`, block by block.
     pub fn apply(&mut self, x: &mut [f64]) {
+        // One dispatch for all blocks: the loops inside are compiled for the instruction set of this machine.
         Arch::new().dispatch(Elimination { blocks: self, x });
     }
 }

@@ -123,6 +123,8 @@ impl<'a> RuleSequence<'a> {
                     OwnBlocks::new(equations)
                 });
         let newton = Newton::with_blocks(equations, own);
+        // The trapezoid rule keeps the bounds that the three-point rule has found: its own slips alternate from cell
+        // to cell, and bounds that follow them would do so too.
         match self.fall.filter(|_| equations.rule != Rule::Trapezoid) {
             Some(fall) => newton.falling(&self.bound, &fall),
             None => newton,
@@ -173,6 +175,7 @@ impl<'a> RuleSequence<'a> {
             },
             fall: self.fall.filter(|_| falls),
             area: &self.area,
+            // Small motions cause small tractions: relative to the bounds their residual would look small at once.
             scale: (largest * newton.compliance()).min(1.0),
             tolerance: self.tolerance,
             steps_max: self.steps_max,
@@ -207,18 +210,21 @@ impl<'a> RuleSequence<'a> {
         let rigid = self.rigid(&equations);
         let newton = self.newton(&equations);
         let (mut report, by_fixed_point) = self.rule(&newton, &rigid, t, true)?;
+        // The start may be what hinders the iteration.
         if !report.exit.converged() && started {
             t.fill(0.0);
             report = self.rule(&newton, &rigid, t, false)?.0;
         }
         if !report.exit.converged() {
             t.fill(0.0);
+            // The upwind rule is of first order, but monotone; its solution serves as a start only.
             self.upwind(t)?;
             report = self.rule(&newton, &rigid, t, false)?.0;
         }
         if !report.exit.converged()
             && let Some(fall) = self.fall
         {
+            // All of the fall at once was too much: parts of it follow one another, each from the tractions of the last.
             for drop in CONTINUATION {
                 self.fall = Some(fall.softened(drop));
                 report = self.rule(&newton, &rigid, t, false)?.0;
@@ -241,6 +247,7 @@ impl<'a> RuleSequence<'a> {
         let Some(fall) = self.fall else {
             return Ok(found);
         };
+        // Now, because a second start overwrites the slips in the workspace.
         self.slipping = Some(newton.bounds(&self.bound, &fall, t, self.control.workspace.slip()));
         let other = match newton.stability() > SECOND_START_FROM {
             true => self.other_solution(&newton, &rigid, t)?,
@@ -349,6 +356,7 @@ impl<'a> RuleSequence<'a> {
                 .exit
                 .converged()
             {
+                // The answer is that of the three-point rule, and so is its residual.
                 self.work.residual = residual;
                 return Ok(None);
             }

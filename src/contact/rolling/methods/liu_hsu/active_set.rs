@@ -100,6 +100,7 @@ pub fn run(
     while attempt.outer_iterations < DIVISIONS_MAX {
         attempt.outer_iterations += 1;
         seen.push(division.slips.clone());
+        // Stick tractions are eliminated, and which these are depends on the division: each has a system of its own.
         let system = SlipSystem::new(task, &division.slips, monitor)?;
         if !solve_division(task, &system, &mut attempt, &mut division, monitor)? {
             attempt.exit = ZonesExit::NewtonDiverged;
@@ -114,6 +115,7 @@ pub fn run(
         for cell in misplaced {
             next[cell] = !next[cell];
         }
+        // A division that comes back means that the iteration cycles.
         if seen.contains(&next) {
             attempt.exit = ZonesExit::ZonesRepeat;
             break;
@@ -155,6 +157,7 @@ fn solve_division(
             start(InitialGuess::Continued),
             start(InitialGuess::RigidSlip),
         )?,
+        // The guesses of the paper take its full steps, and whatever root these lead to.
         guess => roots.find(start(guess), StepRule::Full)?,
     };
     attempt.newton_iterations += roots.iterations;
@@ -197,6 +200,7 @@ impl RootChoice<'_> {
         for start in turned.into_iter().chain([second]) {
             let count = |t: &Vec<f64>| opposed(self.system, t).len();
             let least = best.as_ref().map_or(usize::MAX, count);
+            // No traction opposes its slip: there is no better root.
             if least == 0 {
                 break;
             }
