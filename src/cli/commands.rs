@@ -128,7 +128,7 @@ pub enum KeysAction {
         #[command(flatten)]
         database: DatabaseArgs,
     },
-    /// Revoke a key; a running service refuses it within two seconds.
+    /// Revoke a key; a running service refuses it within seconds.
     Revoke {
         /// Id of the key, as `list` shows it.
         #[arg(value_name = "ID")]

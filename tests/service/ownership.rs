@@ -111,7 +111,7 @@ async fn an_expiring_lender_leaves_its_result_to_the_borrower() {
 }
 
 #[tokio::test]
-async fn reads_that_race_with_removal_are_answered_410_and_never_500() {
+async fn reads_that_race_with_removal_are_answered_404_or_410_and_never_500() {
     let (server, _, _) = in_folders().await;
     for round in 0..6 {
         let mut fresh = case("read while it is removed");
