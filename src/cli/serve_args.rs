@@ -158,3 +158,24 @@ impl ServeArgs {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        args: ServeArgs,
+    }
+
+    #[test]
+    fn a_balancer_is_waited_for_and_somebody_at_a_terminal_is_not() {
+        let args = |line: &[&str]| Line::parse_from([&["serve"], line].concat()).args;
+        assert_eq!(args(&[]).drain_delay("SIGTERM"), Duration::from_secs(2));
+        assert_eq!(args(&[]).drain_delay("SIGINT"), Duration::ZERO);
+        let asked = args(&["--drain-delay-s", "7"]);
+        assert_eq!(asked.drain_delay("SIGTERM"), Duration::from_secs(7));
+    }
+}

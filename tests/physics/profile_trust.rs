@@ -261,6 +261,47 @@ fn exchanged_profiles_are_refused_and_a_single_one_is_told() {
         told.and_then(|r| r.pointer.as_deref()),
         Some("/contact/rail")
     );
+    let twice = with(&tread(), &rail_60e1(), &rail_60e1(), 0.0);
+    let told = match check(&twice, &Limits::default()) {
+        Ok(checked) => checked
+            .remarks
+            .iter()
+            .find(|r| r.code == "profile-of-other-body")
+            .and_then(|r| r.pointer.clone()),
+        Err(faults) => faults.0.first().map(|fault| fault.pointer.clone()),
+    };
+    assert_eq!(told.as_deref(), Some("/contact/wheel"));
+}
+
+#[test]
+fn holes_coarse_points_and_waves_are_named_with_their_place() {
+    let mut random = Random(7);
+    for (damage, code) in [
+        (Damage::Hole(8.0), "profile-hole"),
+        (Damage::Coarse(8.0), "profile-spacing"),
+        (Damage::Waves(0.01, 6.0), "profile-waves"),
+    ] {
+        let rail = damage.done_to(&rail_60e1(), CROWN, &mut random);
+        let found = solved(&accepted(&on_rail(&rail)));
+        let told = found.remarks.iter().find(|remark| remark.code == code);
+        let told = told.unwrap_or_else(|| panic!("{code}: {:?}", found.remarks));
+        assert_eq!(told.pointer.as_deref(), Some("/contact/rail"), "{code}");
+        assert!(told.detail.contains("mm"), "{code}: {}", told.detail);
+    }
+}
+
+#[test]
+fn a_target_that_the_measurement_does_not_support_is_told() {
+    let mut random = Random(5);
+    let rail = Damage::Noise(0.01).done_to(&rail_60e1(), CROWN, &mut random);
+    let mut case = with(&tread(), &rail, &s1002(), "auto");
+    case["solver"] = json!({ "target_error": 0.001 });
+    let found = solved(&accepted(&case));
+    assert!(
+        has(&found, "target-below-profile-uncertainty"),
+        "{:?}",
+        found.remarks
+    );
 }
 
 #[test]

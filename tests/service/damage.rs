@@ -70,4 +70,5 @@ async fn a_table_that_is_damaged_under_a_service_is_told_by_probes_metrics_and_r
         "{metrics}"
     );
     assert_eq!(get("/healthz").await.status(), 200);
+    assert_eq!(get("/readyz").await.status(), 503);
 }

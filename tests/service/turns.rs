@@ -194,14 +194,17 @@ async fn a_suspect_is_solved_while_nothing_else_is() {
 #[tokio::test]
 async fn the_time_limit_of_the_operator_holds_for_every_case() {
     let shop = shop(|options| options.time_limit = Duration::from_millis(1)).await;
-    let id = shop
-        .jobs
-        .submit(crate::support::endless_case("no limit of its own"), None)
-        .await;
-    let id = id.unwrap().id;
+    let mut greedy = crate::support::endless_case("asks for more");
+    greedy["solver"]["time_limit_s"] = serde_json::json!(3600);
+    let mut ids = Vec::new();
+    for case in [crate::support::endless_case("no limit of its own"), greedy] {
+        ids.push(shop.jobs.submit(case, None).await.unwrap().id);
+    }
     shop.jobs.start().unwrap();
-    let job = shop.jobs.wait(id, AT_MOST).await.unwrap();
-    assert_eq!(job.failure.unwrap().kind.name(), "out_of_time");
+    for id in ids {
+        let job = shop.jobs.wait(id, AT_MOST).await.unwrap();
+        assert_eq!(job.failure.unwrap().kind.name(), "out_of_time");
+    }
     shop.jobs.shutdown(Duration::from_secs(10)).await;
 }
 

@@ -353,6 +353,24 @@ mod tests {
     }
 
     #[test]
+    fn a_tolerance_that_cannot_be_met_is_said() {
+        let mut workspace = GridWorkspace::<f64>::default();
+        let influence = GridOperator::new([CELLS; 2], [STEP; 2], MODULUS, &mut workspace);
+        let task = PressureTask {
+            gap: &paraboloid(),
+            cell: STEP * STEP,
+            pressing: Pressing::Force(5e4),
+            tolerance: -1.0,
+        };
+        let start = vec![1.0; CELLS * CELLS];
+        match press(&task, &influence, start, &mut workspace, &Unmonitored) {
+            Err(PressureFailure::NotConverged(residual)) => assert!(residual < 1e-6, "{residual}"),
+            Err(PressureFailure::Stopped(_)) => panic!("stopped"),
+            Ok(pressed) => panic!("{}", pressed.residual),
+        }
+    }
+
+    #[test]
     fn the_start_does_not_decide_the_pressure() {
         let even = solved(Pressing::Force(5e4), vec![1.0; CELLS * CELLS]);
         let mut corner = vec![0.0; CELLS * CELLS];

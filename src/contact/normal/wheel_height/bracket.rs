@@ -190,6 +190,18 @@ mod tests {
     }
 
     #[test]
+    fn a_height_that_misses_its_force_is_remarked_on() {
+        let code = |exit: HeightExit| exit.remark().map(|remark| remark.code());
+        assert_eq!(code(HeightExit::Met { missed: 1e-5 }), None);
+        let jump = HeightExit::closed(1.1, 1e-4);
+        assert_eq!(code(jump), Some("force-jumps"));
+        assert!((jump.missed() - 0.1 / 1.1).abs() < 1e-12);
+        let closed = HeightExit::closed(1.002, 1e-4);
+        assert_eq!(code(closed), Some("iteration-inexact"));
+        assert!(!closed.converged());
+    }
+
+    #[test]
     fn hertzian_forces_are_met_in_a_few_steps_from_far_away() {
         for start in [0.01, 0.2, 0.9, 7.0] {
             let (lowering, count) = sought(0.2, 0.0, start);
