@@ -17,8 +17,8 @@ use serde_json::{Value, json};
 
 fn main() -> ExitCode {
     let Some(pair) = pair() else {
-        println!("no reference files");
-        return ExitCode::SUCCESS;
+        println!("no reference files: RAILHEAD_REFERENCE names the folder that they are in");
+        return ExitCode::FAILURE;
     };
     let (mut count, mut failures) = (0, BTreeMap::<String, u32>::new());
     for shift in (0..12).map(|k| -13.0 - 0.2 * f64::from(k)) {

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::time::{Duration, Instant};
 
 use serde_json::json;
-use tokio::io::AsyncWriteExt;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 
 use crate::Row;
@@ -30,7 +30,7 @@ pub async fn run(workers: usize) -> Vec<Row> {
     rows.extend(bodies(workers, false).await);
     rows.extend(bodies(workers, true).await);
     rows.extend(grids(workers, 60, "json", "500x500").await);
-    rows.extend(grids(workers, 40, "csv", "500x500").await);
+    rows.extend(grids(workers, 40, "csv", "1000x1000").await);
     rows.extend(grids(workers, 60, "json", "1000x1000").await);
     rows
 }
@@ -46,9 +46,9 @@ async fn send(service: &Service, request: &str) -> TcpStream {
     stream
 }
 
-/// The slowest of probes and looks of somebody else, each on a new connection, and the most memory meanwhile.
+/// The slowest of the probes and requests of somebody else, each on a new connection, and the most memory so far.
 async fn watched(service: &Service, what: &str, path: &str) -> Vec<Row> {
-    let (mut slowest, mut memory, mut asked) = (0.0_f64, 0.0_f64, 0);
+    let (mut slowest, mut asked) = (0.0_f64, 0);
     let begun = Instant::now();
     while begun.elapsed() < WATCHED {
         for path in ["/healthz", path] {
@@ -57,9 +57,9 @@ async fn watched(service: &Service, what: &str, path: &str) -> Vec<Row> {
             slowest = slowest.max(start.elapsed().as_secs_f64());
             asked += 1;
         }
-        memory = memory.max(service.usage().memory_mb);
         tokio::time::sleep(Duration::from_millis(20)).await;
     }
+    let memory = service.usage().peak_mb;
     vec![
         Row::judged(
             &format!("{what}: slowest of {asked} answers to others"),
@@ -68,7 +68,7 @@ async fn watched(service: &Service, what: &str, path: &str) -> Vec<Row> {
             slowest <= WITHIN,
         ),
         Row::judged(
-            &format!("{what}: memory of the process"),
+            &format!("{what}: most memory of the process"),
             format!("{memory:.0} MB"),
             "below 1 GiB",
             memory < MEMORY_MB,
@@ -76,7 +76,7 @@ async fn watched(service: &Service, what: &str, path: &str) -> Vec<Row> {
     ]
 }
 
-/// 2 000 connections that say nothing and 1 000 followers that read nothing, opened anew as they are closed.
+/// 2 000 connections that say nothing and 1 000 followers that read nothing.
 async fn silent(workers: usize) -> Vec<Row> {
     let service = Service::start(workers, &[]);
     let mut client = Client::new(&service.url);
@@ -148,7 +148,7 @@ async fn bodies(workers: usize, packed: bool) -> Vec<Row> {
 
 /// So many clients that ask for a grid and read nothing of it.
 async fn grids(workers: usize, count: usize, format: &str, grid: &str) -> Vec<Row> {
-    let service = Service::start(workers, &[]);
+    let service = Service::start(workers, &["--grid-max-samples", "1000000"]);
     let mut client = Client::new(&service.url);
     let mut case = meshed(1, 12);
     case["outputs"] = json!(["resultants", "zones", "slip"]);
@@ -156,8 +156,12 @@ async fn grids(workers: usize, count: usize, format: &str, grid: &str) -> Vec<Ro
     let request = format!(
         "GET /v1/jobs/{job}/slip?grid={grid}&format={format} HTTP/1.1\r\nhost: localhost\r\n\r\n"
     );
-    let mut held = Vec::new();
-    for _ in 0..count {
+    let mut first = send(&service, &request).await;
+    let mut head = [0; 15];
+    first.read_exact(&mut head).await.expect("an answer");
+    assert_eq!(&head, b"HTTP/1.1 200 OK", "the grid is answered");
+    let mut held = vec![first];
+    for _ in 1..count {
         held.push(send(&service, &request).await);
     }
     let what = format!("{count} unread {format} grids of {grid}");

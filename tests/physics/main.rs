@@ -57,6 +57,7 @@ mod profile_manchester;
 mod profile_planes;
 mod profile_reference;
 mod profile_reference_files;
+mod profile_remarks;
 mod profile_robustness;
 mod profile_shapes;
 mod profile_solutions;

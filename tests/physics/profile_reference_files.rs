@@ -1,4 +1,5 @@
-//! Reference files that lie beside the checkout; tests pass without them.
+//! Reference files that may be read beside the checkout but not be copied into it. Tests that need them say that they are skipped
+//! where they are missing; others test the same on profiles that are made.
 
 use std::path::PathBuf;
 
@@ -11,5 +12,9 @@ pub fn reference_file(name: &str) -> Option<String> {
             "/../../../shared/reference"
         ))
     });
-    std::fs::read_to_string(folder.join(name)).ok()
+    let text = std::fs::read_to_string(folder.join(name)).ok();
+    if text.is_none() {
+        eprintln!("SKIPPED: there is no {name}; RAILHEAD_REFERENCE names the folder that it is in");
+    }
+    text
 }

@@ -75,7 +75,10 @@ fn targets_are_met_and_estimates_cover_the_error() {
         }
         assert!(missed.len() <= 1, "{} cases miss {target}", missed.len());
         let short = all.len() - certified;
-        assert!(short <= 1, "{short} cases do not say that they meet {target}");
+        assert!(
+            short <= 1,
+            "{short} cases do not say that they meet {target}"
+        );
         assert!(
             uncovered.len() <= 1,
             "{} estimates at {target} are too small",

@@ -239,6 +239,17 @@ fn config_tells_every_setting_and_where_it_comes_from() {
     }
 }
 
+#[test]
+fn a_data_folder_that_is_made_is_for_nobody_else_to_read() {
+    use std::os::unix::fs::PermissionsExt;
+
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("data");
+    let _service = Service::start(&data, &[]);
+    let mode = std::fs::metadata(&data).unwrap().permissions().mode();
+    assert_eq!(mode & 0o777, 0o700);
+}
+
 #[tokio::test]
 async fn a_backup_of_a_working_service_can_be_started() {
     let folder = tempfile::tempdir().unwrap();

@@ -153,6 +153,30 @@ async fn a_tenant_may_follow_and_wait_so_often_and_no_more() {
 }
 
 #[tokio::test]
+async fn a_tenant_may_have_so_many_requests_under_way_and_no_more() {
+    let mut setup = Setup::new();
+    setup.working = false;
+    setup.http.tenant_requests_max = 1;
+    let server = setup.start().await;
+    // A body that does not come: its request is under way until it does.
+    let begun = "POST /v1/jobs HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/json\r\ncontent-length: 2\r\n\r\n";
+    let held = send(server.address, begun).await;
+    while !ask(server.address, "/v1/jobs")
+        .await
+        .contains("/problems/too-many-requests")
+    {
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    drop(held);
+    while !ask(server.address, "/v1/jobs")
+        .await
+        .starts_with("HTTP/1.1 200")
+    {
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+}
+
+#[tokio::test]
 async fn probes_can_have_a_port_of_their_own() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(folder.path(), &["--probe-listen", "127.0.0.1:0"]);
