@@ -17,7 +17,7 @@ COPY src ./src
 RUN touch src/main.rs src/lib.rs src/contact/lib.rs \
     && cargo build --release --locked --bin railhead \
     && install -d /out/data \
-    && strip --strip-debug -o /out/railhead target/release/railhead
+    && strip -o /out/railhead target/release/railhead
 
 FROM ${RUNTIME}
 LABEL org.opencontainers.image.title="railhead" \

@@ -95,6 +95,7 @@ impl Jobs {
                 tasks: TaskTracker::new(),
                 metrics,
                 storage_failing: AtomicBool::new(false),
+                storage_damaged: AtomicBool::new(false),
                 trusted: Mutex::default(),
                 checks: Semaphore::new(available_parallelism().map_or(1, usize::from)),
                 staged: StagedBytes::default(),
@@ -195,7 +196,8 @@ impl Jobs {
             let _ = timeout(STOPPED_WITHIN, cluster.leave(self.shared.node.id)).await;
         }
         self.shared.store.close().await;
-        if self.shared.options.database.is_none() {
+        let damaged = self.shared.storage_damaged.load(Ordering::Relaxed);
+        if self.shared.options.database.is_none() && !damaged {
             note_closed(&self.shared.options.data_dir);
         }
         drop(

@@ -57,6 +57,9 @@ pub(crate) struct Shared {
     pub(crate) metrics: Metrics,
     /// The last write failed because of the disk.
     pub(crate) storage_failing: AtomicBool,
+    /// Something read or written was damaged. Writes that meet no damage succeed still, so only a start, which looks through
+    /// everything, ends this.
+    pub(crate) storage_damaged: AtomicBool,
     /// Keys found good a moment ago.
     pub(crate) trusted: Mutex<Trusted>,
     /// Cases of single jobs that may be checked at the same time.

@@ -35,6 +35,7 @@ impl Shared {
     /// Remembers whether the disk takes what is written.
     pub(crate) fn observe_storage<T>(&self, written: &Result<T, JobsError>) {
         let trouble = match written {
+            Ok(_) if self.storage_damaged.load(Ordering::Relaxed) => return,
             Ok(_) => None,
             Err(error) => match error.storage_fault() {
                 Some(trouble) => Some(trouble),
@@ -42,6 +43,9 @@ impl Shared {
                 None => return,
             },
         };
+        if trouble == Some(StorageFault::Damaged) {
+            self.storage_damaged.store(true, Ordering::Relaxed);
+        }
         let before = self
             .storage_failing
             .swap(trouble.is_some(), Ordering::Relaxed);
@@ -103,6 +107,9 @@ impl Shared {
     pub(crate) async fn require_storage(&self) -> Result<(), JobsError> {
         if !self.storage_failing.load(Ordering::Relaxed) {
             return Ok(());
+        }
+        if self.storage_damaged.load(Ordering::Relaxed) {
+            return Err(StoreError::damaged().into());
         }
         let written = self.store.ready(true).await.map_err(JobsError::from);
         self.observe_storage(&written);

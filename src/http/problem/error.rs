@@ -261,6 +261,10 @@ fn troubled(trouble: StorageFault, reason: &JobsError) -> ApiError {
             ProblemKind::StorageUnwritable,
             "the disk of the service cannot be written at the moment",
         ),
+        StorageFault::Damaged => (
+            ProblemKind::StorageUnwritable,
+            "the job table of the service is damaged; its operator has to restore it",
+        ),
         StorageFault::Unreachable => (
             ProblemKind::StorageUnreachable,
             "the database or the store of results of the service cannot be reached at the moment",

@@ -10,8 +10,10 @@ use thiserror::Error;
 pub enum StorageFault {
     /// No space is left, or a quota is used up.
     Full,
-    /// It is read-only, fails, is damaged, or is locked by another process.
+    /// It is read-only, fails, or is locked by another process.
     Unwritable,
+    /// Its contents are damaged; that does not pass by itself.
+    Damaged,
     /// It is on another machine, and does not answer or takes nothing.
     Unreachable,
 }
@@ -38,6 +40,16 @@ impl StoreError {
             StoreError::Away(fault, _) => Some(*fault),
             StoreError::Failed(_) | StoreError::Corrupt(_) => None,
         }
+    }
+
+    /// Damage was met before.
+    #[must_use]
+    pub fn damaged() -> StoreError {
+        let cause = std::io::Error::new(
+            std::io::ErrorKind::InvalidData,
+            "the job table is damaged; stop the service and restore a backup",
+        );
+        StoreError::Away(StorageFault::Damaged, Arc::new(cause))
     }
 
     /// The store did not answer in time.

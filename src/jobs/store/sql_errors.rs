@@ -82,9 +82,8 @@ fn of_code(code: &str) -> Option<StorageFault> {
     const NOTADB: u32 = 26;
     match code.parse::<u32>().ok()? & 0xff {
         FULL => Some(StorageFault::Full),
-        BUSY | LOCKED | READONLY | IOERR | CORRUPT | CANTOPEN | NOTADB => {
-            Some(StorageFault::Unwritable)
-        }
+        BUSY | LOCKED | READONLY | IOERR | CANTOPEN => Some(StorageFault::Unwritable),
+        CORRUPT | NOTADB => Some(StorageFault::Damaged),
         _ => None,
     }
 }
@@ -112,8 +111,8 @@ mod tests {
         assert_eq!(of_code("778"), Some(StorageFault::Unwritable));
         assert_eq!(of_code("1032"), Some(StorageFault::Unwritable));
         // SQLITE_CORRUPT_INDEX, SQLITE_NOTADB.
-        assert_eq!(of_code("779"), Some(StorageFault::Unwritable));
-        assert_eq!(of_code("26"), Some(StorageFault::Unwritable));
+        assert_eq!(of_code("779"), Some(StorageFault::Damaged));
+        assert_eq!(of_code("26"), Some(StorageFault::Damaged));
         // SQLITE_CONSTRAINT_PRIMARYKEY.
         assert_eq!(of_code("1555"), None);
     }
