@@ -6,6 +6,7 @@ use crate::contact::case::press::PressedContact;
 use crate::contact::case::problem::CheckedCase;
 use crate::contact::error::SolveError;
 use crate::contact::rolling::force_control;
+use crate::contact::rolling::history;
 use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::refinement::levels::Levels;
@@ -43,6 +44,21 @@ fn motions(
     }
     let mut levels = Levels::new(&task, operators);
     let mut assembly = Assembly::new(case, pressed);
+    if let Some(history) = &case.problem.history {
+        let patches = pressed.footprint.patches().iter();
+        let extents: Vec<[f64; 4]> = patches.map(|patch| patch.extent).collect();
+        if let Some(reason) = history::solve::too_long(history, &extents, case.run.steps_max) {
+            return Err(SolveError::NotCovered { reason });
+        }
+        for mut point in history::solve::solve(&task, history, &mut levels, watch)? {
+            if assembly.is_empty() {
+                point.seconds += pressed.report.map_or(0.0, |report| report.seconds);
+            }
+            assembly.add(&levels, &point, watch)?;
+            watch.advance();
+        }
+        return Ok(assembly.finish());
+    }
     let mut before: Option<MotionAnswer> = None;
     for index in 0..case.problem.motions.len() {
         let mut point = force_control::solve(&task, &mut levels, index, before.as_ref(), watch)?;

@@ -26,6 +26,10 @@ const NORMAL_TIMES: f64 = 10.0;
 #[must_use]
 pub fn slices(case: &CheckedCase) -> Vec<Range<usize>> {
     let motions = case.problem.motions.len();
+    // The points of a history follow from each other.
+    if case.problem.history.is_some() {
+        return Vec::from([0..motions]);
+    }
     let SolveTime { whole, normal } = case.solve_time();
     let each = (whole - normal).max(0.0) / motions as f64;
     let wanted = SLICE_SECONDS.max(NORMAL_TIMES * normal) / each.max(f64::MIN_POSITIVE);

@@ -23,7 +23,10 @@ const FORMS: [(&str, &[&str]); 6] = [
             "WheelsetContact",
         ],
     ),
-    ("Motions", &["SweepMotions", "WheelsetMotion"]),
+    (
+        "Motions",
+        &["SweepMotions", "HistoryMotion", "WheelsetMotion"],
+    ),
     ("Material", &["TwoMaterials"]),
     ("Field", &["CellField"]),
     ("GridAxis", &["AxisRange"]),

@@ -1,7 +1,7 @@
 //! Cases to begin with: those of `api/examples`, which the contract shows and `/v1/examples` answers.
 
 /// Name, summary and text of each.
-pub const EXAMPLES: [(&str, &str, &str); 16] = [
+pub const EXAMPLES: [(&str, &str, &str); 17] = [
     (
         "hertz-steel",
         "A wheel on a rail by its radii, with both creepages and spin",
@@ -56,6 +56,11 @@ pub const EXAMPLES: [(&str, &str, &str); 16] = [
         "unlike-bodies",
         "A soft roller driving on steel: bodies whose pressure and tractions depend on each other",
         include_str!("../../api/examples/unlike-bodies.case.json"),
+    ),
+    (
+        "rolling",
+        "Rolling that changes: a shift, driving, then braking, each with what the contact remembers",
+        include_str!("../../api/examples/rolling.case.json"),
     ),
     (
         "pressure-grid",

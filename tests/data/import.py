@@ -384,6 +384,32 @@ def unlike():
     write_lines("unlike.json", records)
 
 
+def transient():
+    """Rolling that changes: forces over the friction limit (lower body) and creepages, each with its uncertainty, in the distance rolled."""
+    records = []
+    for record in json.loads((SOURCE / "reference/extended/transient.json").read_text()):
+        given = record["input"]
+        force, creepage = given["load"].get("FXrel"), given["creepage"] or {}
+        finest = record["grids"][-1]["history"][0]
+        signs = {"distance_mm": 1.0, "Fx_rel": -1.0, "Fy_rel": -1.0, "Mz_rel": -1.0, "xi": 1.0}
+        columns = record["converged_history"]["columns"]
+        table = [dict(zip(columns, row)) for row in record["converged_history"]["rows"]]
+        rows = [[signs[name] * row[name] + 0.0 for name in signs] + [row["unc_" + k] for k in ("Fx", "Fy", "Mz", "xi")] for row in table]
+        records.append({
+            "id": record["id"],
+            "semi_axes_mm": [given["hertz"]["a"], given["hertz"]["b"]],
+            "normal_force_n": given["load"]["FN"],
+            "friction": given["mu"],
+            "shear_modulus_mpa": given["material"]["G"],
+            "poisson_ratio": given["material"]["nu"],
+            "motion": [creepage.get(k, 0.0) for k in ("xi", "eta", "phi")],
+            "force_x": -force if force else None,
+            "shift_mm": finest[4] if force else None,
+            "rows": rows,
+        })
+    write_lines("transient.json", records)
+
+
 for name in CLASSES:
     records = json.loads((SOURCE / f"reference/{name}.json").read_text())
     write_lines(f"{name}.json", [reference_case(r) for r in records])
@@ -396,3 +422,4 @@ subsurface()
 temperature()
 friction()
 unlike()
+transient()

@@ -28,6 +28,8 @@ mod gap_two_patches;
 mod golden;
 mod held_out;
 mod hertz;
+mod histories;
+mod history_faults;
 mod kalker;
 mod kalker_table;
 mod laws;

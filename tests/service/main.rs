@@ -37,6 +37,7 @@ mod guarded;
 mod guides;
 #[cfg(target_os = "linux")]
 mod held_solver;
+mod histories;
 mod http2;
 mod kept_profiles;
 mod keys;

@@ -1,6 +1,7 @@
 //! The checks of a case: each part is checked independently, and all faults are reported together.
 
 use crate::contact::case::after_tasks::AfterWords;
+use crate::contact::case::history::BesideHistory;
 use crate::contact::case::limits::Limits;
 use crate::contact::case::motions::ExpandedMotions;
 use crate::contact::case::resolution::resolution;
@@ -10,7 +11,7 @@ use crate::contact::case::words::friction::Friction;
 use crate::contact::case::words::material::Material;
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::solver::{MethodName, Output, Solver};
-use crate::contact::case::{contact_task, motions, profiles, size, wheelsets};
+use crate::contact::case::{contact_task, history, motions, profiles, size, wheelsets};
 use crate::contact::error::Fault;
 use crate::contact::friction::falling::FallingLaw;
 use crate::contact::friction::law::FrictionLaw;
@@ -19,6 +20,7 @@ use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::patch::Patch;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
+use crate::contact::rolling::history::task::HistoryTask;
 use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::methods::table::solve as table;
 
@@ -81,6 +83,11 @@ impl CheckedParts {
         let motions = motions.and_then(|motions| collect_fault(motions, &mut faults));
         let force = normal_force(task.as_ref().map(|(task, _)| task), given.load);
         faults.extend(motion_faults(&given, motions.as_ref(), force, limits));
+        if let Some(history) = motions.as_ref().and_then(|all| all.history.as_ref()) {
+            let task = task.as_ref().map(|(task, _)| task);
+            let of_history = history_faults(&given, history, elasticity.as_ref(), task, limits);
+            faults.extend(of_history);
+        }
         if let Some(solver) = given.solver {
             let size = SizeInput {
                 method: solver.method.into(),
@@ -91,6 +98,7 @@ impl CheckedParts {
                     .map_or_else(|| vec![1.0], |(task, _)| size::segments(task)),
                 motions: motions.as_ref().map_or(1, |m| m.motions.len())
                     * task.as_ref().map_or(1, |(task, _)| size::positions(task)),
+                history: motions.as_ref().is_some_and(|m| m.history.is_some()),
                 fields: given.outputs.iter().any(|output| output.is_per_cell()),
                 stress_points: given.after.stress_points(),
                 ellipse: task
@@ -127,6 +135,25 @@ impl CheckedParts {
     }
 }
 
+/// Faults of a history beside what it has to go with.
+fn history_faults(
+    given: &PartialCase,
+    history: &HistoryTask,
+    elasticity: Option<&Elasticity>,
+    task: Option<&NormalTask>,
+    limits: &Limits,
+) -> Vec<Fault> {
+    let beside = BesideHistory {
+        contact: given.contact,
+        solver: given.solver,
+        outputs: given.outputs,
+        friction: given.friction,
+        elasticity,
+        patches: &task.map(NormalTask::patches).unwrap_or_default(),
+    };
+    history::faults(history, &beside, limits)
+}
+
 /// The task of a wheel or a wheelset with its remarks; `None` without faults where something it depends on is not known.
 fn on_rails(
     contact: &Contact,
@@ -161,7 +188,9 @@ fn motion_faults(
         .friction
         .is_some_and(|friction| friction.law.is_some())
     {
-        faults.extend(expanded.speed_fault(motion, "friction that falls with slip"));
+        if expanded.history.is_none() {
+            faults.extend(expanded.speed_fault(motion, "friction that falls with slip"));
+        }
         faults.extend(expanded.force_fault(motion));
     }
     faults.extend(given.after.faults(motion, expanded, limits));

@@ -23,6 +23,7 @@ impl CheckedCase {
             resolution: self.run.resolution,
             segments: segments(&self.problem.task),
             motions: self.problem.motions.len() * positions(&self.problem.task),
+            history: self.problem.history.is_some(),
             fields: self.run.outputs.iter().any(|output| output.is_per_cell()),
             stress_points: self.run.after.subsurface.as_ref().map_or(0, places),
             ellipse: length_over_width(&self.problem.task),

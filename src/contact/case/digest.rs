@@ -46,6 +46,10 @@ pub(crate) fn digest(
             Motions::Wheelset { wheelset } => Some(wheelset),
             _ => None,
         },
+        history: match &case.motion {
+            Motions::History { history, start } => Some((history, *start)),
+            _ => None,
+        },
         method: case.solver.method,
         // What is left out means the same as the default.
         traction_bound: case

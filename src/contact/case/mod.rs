@@ -9,6 +9,7 @@ pub mod cost;
 pub mod coupled;
 pub mod digest;
 pub mod elasticity;
+pub mod history;
 pub mod limits;
 pub mod motions;
 pub mod pair_quality;

@@ -1,8 +1,10 @@
 //! Writes out the motions of a case: sweeps become lists.
 
 use crate::contact::case::limits::Limits;
-use crate::contact::case::words::motion::{AskedMotion, Combine, Motions, Range, Sweep, Swept};
+use crate::contact::case::words::history::{History, HistoryCourse, HistoryStartName};
+use crate::contact::case::words::motion::{AskedMotion, Combine, Motions, Sweep, Swept};
 use crate::contact::error::Fault;
+use crate::contact::rolling::history::task::{HistoryStart, HistoryTask};
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 
 /// No creepage.
@@ -24,6 +26,8 @@ pub(crate) struct ExpandedMotions {
     pub(crate) forces: Vec<PrescribedForces>,
     /// Rolling speeds in mm/s, where they are given.
     pub(crate) speeds: Vec<Option<f64>>,
+    /// How they follow each other, where they are one history.
+    pub(crate) history: Option<HistoryTask>,
 }
 
 /// The motions and prescribed forces of a case.
@@ -41,6 +45,10 @@ pub(crate) fn expand(motions: &Motions, limits: &Limits) -> Result<ExpandedMotio
         motions: list.iter().map(motion).collect(),
         forces: list.iter().map(|m| [m.force_x_n, m.force_y_n]).collect(),
         speeds: list.iter().map(|m| m.speed_mm_per_s).collect(),
+        history: match motions {
+            Motions::History { history, start } => Some(history_task(history, *start)),
+            _ => None,
+        },
     })
 }
 
@@ -116,6 +124,7 @@ fn pointer(given: &Motions, index: usize, name: &str) -> String {
     match given {
         Motions::Many(_) => format!("/motion/{index}/{name}"),
         Motions::Sweep { .. } => format!("/motion/sweep/{name}"),
+        Motions::History { .. } => format!("/motion/history/{name}"),
         Motions::One(_) | Motions::Wheelset { .. } => format!("/motion/{name}"),
     }
 }
@@ -130,6 +139,7 @@ fn list(motions: &Motions, limits: &Limits) -> Result<Vec<AskedMotion>, Fault> {
         Motions::One(_) | Motions::Wheelset { .. } => 1,
         Motions::Many(list) => list.len() as u128,
         Motions::Sweep { sweep } => sweep_length(sweep),
+        Motions::History { history, .. } => history.distance_mm.points() as u128,
     };
     if count > limits.motions_max as u128 {
         return Err(Fault::new(
@@ -144,12 +154,65 @@ fn list(motions: &Motions, limits: &Limits) -> Result<Vec<AskedMotion>, Fault> {
         Motions::One(motion) => vec![*motion],
         Motions::Many(list) => list.clone(),
         Motions::Sweep { sweep } => write_out(sweep),
+        Motions::History { history, .. } => point_by_point(history),
         // Every patch gets its own creepages when it is found.
         Motions::Wheelset { wheelset } => vec![AskedMotion {
             speed_mm_per_s: Some(wheelset.speed_mm_per_s),
             ..STILL
         }],
     })
+}
+
+/// The values of a component at so many points, if it is given.
+fn course(course: Option<&HistoryCourse>, points: usize) -> Option<Vec<f64>> {
+    course.map(|course| course.values(points))
+}
+
+/// The motions at the points of a history.
+fn point_by_point(history: &History) -> Vec<AskedMotion> {
+    let points = history.distance_mm.points();
+    let all = [
+        &history.creepage_x,
+        &history.creepage_y,
+        &history.spin_per_mm,
+        &history.force_x_n,
+        &history.force_y_n,
+    ];
+    let [x, y, spin, force_x, force_y] = all.map(|given| course(given.as_ref(), points));
+    let motion = |k: usize| {
+        let at = |values: &Option<Vec<f64>>| values.as_ref().map(|values| values[k]);
+        AskedMotion {
+            creepage_x: at(&x),
+            creepage_y: at(&y),
+            spin_per_mm: at(&spin).unwrap_or(0.0),
+            force_x_n: at(&force_x),
+            force_y_n: at(&force_y),
+            speed_mm_per_s: None,
+        }
+    };
+    (0..points).map(motion).collect()
+}
+
+/// Distances and shifts of a history.
+fn history_task(history: &History, start: HistoryStartName) -> HistoryTask {
+    let points = history.distance_mm.points();
+    let shifts = [&history.shift_x_mm, &history.shift_y_mm, &history.turn_rad];
+    let [x, y, turn] = shifts.map(|given| course(given.as_ref(), points));
+    let at = |values: &Option<Vec<f64>>, k: usize| values.as_ref().map_or(0.0, |values| values[k]);
+    HistoryTask {
+        start: match start {
+            HistoryStartName::Rest => HistoryStart::Rest,
+            HistoryStartName::Steady => HistoryStart::Steady,
+        },
+        distances: history.distance_mm.values(points),
+        shifts: (0..points)
+            .map(|k| Motion {
+                creepage_x: at(&x, k),
+                creepage_y: at(&y, k),
+                spin_per_mm: at(&turn, k),
+            })
+            .collect(),
+    }
 }
 
 fn components(sweep: &Sweep) -> [Option<&Swept>; 3] {
@@ -206,32 +269,16 @@ fn write_out(sweep: &Sweep) -> Vec<AskedMotion> {
 pub(crate) fn swept_values(swept: &Swept) -> Vec<f64> {
     match swept {
         Swept::Constant(value) => vec![*value],
-        Swept::Range(range) => range_values(range),
+        Swept::Range(range) => range.values(),
         Swept::List(list) => list.values.clone(),
     }
-}
-
-/// Equally spaced values; the ends are exact.
-fn range_values(range: &Range) -> Vec<f64> {
-    let last = range.points.saturating_sub(1);
-    (0..range.points)
-        .map(|n| {
-            if n == 0 {
-                range.from
-            } else if n == last {
-                range.to
-            } else {
-                let t = f64::from(n) / f64::from(last);
-                range.from * (1.0 - t) + range.to * t
-            }
-        })
-        .collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::contact::case::words::motion::ValueList;
+    use crate::contact::case::words::range::Range;
 
     fn range(from: f64, to: f64, points: u32) -> Option<Swept> {
         Some(Swept::Range(Range { from, to, points }))

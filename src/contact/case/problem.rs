@@ -25,6 +25,7 @@ use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::remark::entry::{RemarkEntry, merged};
+use crate::contact::rolling::history::task::HistoryTask;
 use crate::contact::rolling::methods::method::{Method, TractionBound};
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::refinement::resolution::Resolution;
@@ -76,6 +77,8 @@ pub struct Problem {
     pub forces: Vec<PrescribedForces>,
     /// Rolling speeds in mm/s, motion by motion, where they are given.
     pub speeds: Vec<Option<f64>>,
+    /// How the motions follow each other, where they are one history.
+    pub history: Option<HistoryTask>,
     checked: Checked,
 }
 
@@ -98,6 +101,8 @@ pub struct Run {
     pub time_limit: Option<Duration>,
     /// Memory the solve may use, in bytes.
     pub memory_bytes: u64,
+    /// Steps that a history may take.
+    pub steps_max: usize,
     /// What to compute, sorted, without repetition.
     pub outputs: Vec<Output>,
     /// What is computed from the solved motions.
@@ -154,6 +159,7 @@ impl CheckedCase {
             motions,
             forces,
             speeds,
+            history,
         } = motions;
         let given = given_creepages(&motions, &forces);
         let implausible = plausibility::of_case(&case.contact, &task.patches(), given);
@@ -171,6 +177,7 @@ impl CheckedCase {
             motions,
             forces,
             speeds,
+            history,
             wheelset: profiles::wheelset(&case.motion),
             drive_torque: profiles::drive_torque(&case.motion),
             checked: Checked,
@@ -237,6 +244,7 @@ fn run(case: &Case, limits: &Limits) -> Run {
         resolution: resolution(&case.solver),
         time_limit: case.solver.time_limit_s.map(Duration::from_secs_f64),
         memory_bytes: limits.memory_bytes,
+        steps_max: limits.motions_max,
         outputs: case.outputs.clone(),
         after: AfterTasks::new(case),
     }

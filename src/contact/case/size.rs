@@ -38,6 +38,9 @@ const STRESS_BYTES: f64 = 150.0;
 /// Bytes per cell and motion of fields, in the answer and in their stored form.
 const FIELDS_BYTES_PER_CELL: f64 = 160.0;
 
+/// Bytes per cell and point of a history on a level: tractions, slips, and which slip.
+const HISTORY_BYTES_PER_CELL: f64 = 33.0;
+
 /// What decides how much memory a solve takes.
 #[derive(Debug, Clone)]
 pub(crate) struct SizeInput {
@@ -52,6 +55,8 @@ pub(crate) struct SizeInput {
     pub(crate) stress_points: usize,
     /// Length over width of an ellipse; nothing for other regions.
     pub(crate) ellipse: Option<f64>,
+    /// Are the motions the points of a history, which is kept whole on two levels?
+    pub(crate) history: bool,
 }
 
 /// Segments per strip of every patch; of a gap, whose patches are not known yet, one for every summit.
@@ -134,8 +139,18 @@ impl SizeInput {
         operator
             + solve
             + cells * (8.0 * VECTORS_PER_CELL + levels * LEVEL_BYTES_PER_CELL)
+            + self.kept_of_history(cells)
             + motions * patches * (MOTION_BYTES + STRESS_BYTES * self.stress_points as f64)
             + fields
+    }
+
+    /// Bytes of the tractions and slips of a history on two levels.
+    fn kept_of_history(&self, cells: f64) -> f64 {
+        if self.history {
+            2.0 * self.motions as f64 * cells * HISTORY_BYTES_PER_CELL
+        } else {
+            0.0
+        }
     }
 
     /// Faults of a case that is too large for the limits or for its method.

@@ -16,6 +16,7 @@ use crate::contact::half_space::strip_operator::kind::Precision;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::wheel_height::task::WheelTask;
+use crate::contact::rolling::history::solve::usual_work;
 use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::refinement::mesh_policy::CELLS_MAX;
@@ -143,6 +144,13 @@ const FALLING_TIMES: f64 = 3.0;
 /// The same with a layer between the bodies: 0.5 to 4 for its five contacts, where the mesh is finer for the factor on the estimate.
 const LAYER_TIMES: f64 = 2.0;
 
+/// Time in s of a step of a history, and for every square of its cells: 33 to 97 points of `tests/data/transient.json` on 72 to 1152 cells.
+const STEP_SECONDS: f64 = 5e-5;
+/// See [`STEP_SECONDS`].
+const STEP_CELLS_SECONDS: f64 = 5e-9;
+/// Times longer where the creepage of a step is sought.
+const STEP_TRIALS: f64 = 2.0;
+
 /// The estimated time of a case, in s on one core of the machine the figures were taken on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SolveTime {
@@ -158,6 +166,7 @@ impl CheckedCase {
     pub fn solve_time(&self) -> SolveTime {
         let (patches, normal) = guesses(&self.problem.task, self.run.resolution.target());
         let tangential = match (self.run.method, self.run.resolution) {
+            _ if self.problem.history.is_some() => self.history_seconds(),
             (Method::BoundaryElement, Resolution::Target(target)) => {
                 self.to_target(&patches, target)
             }
@@ -215,6 +224,31 @@ impl CheckedCase {
     fn is_prescribed(&self, k: usize) -> bool {
         let forces = self.problem.forces.get(k);
         forces.is_some_and(|forces| *forces != [None; 2])
+    }
+
+    /// Time of a history: its steps on the level that a target usually leads to, or on the mesh given, with the coarser one before it.
+    fn history_seconds(&self) -> f64 {
+        let Some(history) = &self.problem.history else {
+            return 0.0;
+        };
+        let extents: Vec<[f64; 4]> = self
+            .problem
+            .task
+            .patches()
+            .iter()
+            .map(|p| p.extent)
+            .collect();
+        let (steps, usual) = usual_work(history, &extents);
+        let cells = match self.run.resolution {
+            Resolution::Target(_) => usual,
+            Resolution::Mesh(_) => self.size_input().cells(),
+        };
+        let trials = if self.is_prescribed(0) {
+            STEP_TRIALS
+        } else {
+            1.0
+        };
+        SECONDS_MIN + steps * trials * (STEP_SECONDS + STEP_CELLS_SECONDS * cells * cells)
     }
 
     fn to_target(&self, patches: &[PatchGuess], target: f64) -> f64 {

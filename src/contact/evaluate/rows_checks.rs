@@ -55,9 +55,9 @@ pub(crate) fn faults_of_case(case: &Value, checked: &CheckedCase) -> Vec<Fault> 
         .iter()
         .any(|forces| *forces != [None; 2]);
     refuse(
-        checked.problem.motions.len() != 1 || asked,
+        checked.problem.motions.len() != 1 || asked || checked.problem.history.is_some(),
         "/motion",
-        "rows have one motion each, given by creepages; sweeps and prescribed forces need a job",
+        "rows have one motion each, given by creepages; sweeps, histories and prescribed forces need a job",
     );
     let by_force = case.pointer(Variable::NormalForce.pointer()).is_some();
     refuse(!by_force, "/load", "rows are loaded by `normal_force_n`");

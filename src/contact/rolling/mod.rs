@@ -2,7 +2,9 @@
 
 pub mod answer;
 pub mod cubic_law;
+pub mod displacement_memory;
 pub mod force_control;
+pub mod history;
 pub(crate) mod layer_slip;
 pub mod linear_theory;
 pub mod load_ellipse;

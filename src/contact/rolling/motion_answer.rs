@@ -23,6 +23,8 @@ pub struct MotionAnswer {
     pub fields: Option<SolvedFields>,
     /// What a table knows beside resultants, for every patch; nothing from other methods.
     pub table: Option<Vec<TableAnswer>>,
+    /// What a history adds to a motion; nothing of steady rolling.
+    pub history: Option<HistoryAnswer>,
     /// Work that was not needed.
     pub skips: Vec<Skip>,
     /// Remarks for the client.
@@ -33,6 +35,23 @@ pub struct MotionAnswer {
     pub method: Method,
     /// Wall time in s.
     pub seconds: f64,
+}
+
+/// What is known of a point of a history beside its forces.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HistoryAnswer {
+    /// Distance rolled since the start in mm.
+    pub distance: f64,
+    /// Displacement of the upper body against the lower one from the point before in mm and rad, where the bodies did not roll.
+    pub shift: Option<Motion>,
+    /// Power of friction over the rolling speed of every patch, in N; 0 of a shift.
+    pub power: Vec<f64>,
+    /// What friction has dissipated since the start in every patch, in N·mm.
+    pub dissipated: Vec<f64>,
+    /// Estimated errors of the creepages that were found.
+    pub creepage_errors: [Option<f64>; 2],
+    /// The same of shifts, in mm.
+    pub shift_errors: [Option<f64>; 2],
 }
 
 /// What a table knows of a patch beside its resultants.

@@ -11,6 +11,7 @@ use crate::contact::half_space::strip_operator::operator::{
 };
 use crate::contact::mesh::strips::Mesh;
 use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::rolling::displacement_memory::DisplacementMemory;
 use crate::contact::rolling::layer_slip::LayerSlip;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::slip_rules::{Rule, Stencils};
@@ -25,6 +26,9 @@ pub struct SlipEquations<'a> {
     stencils: Stencils,
     /// What an elastic layer between the bodies adds.
     layer: Option<LayerSlip>,
+    flexibility: f64,
+    /// What the change of the displacements in time adds, where rolling is not steady.
+    memory: Option<DisplacementMemory<'a>>,
     /// Cells and rows of every segment that has unknowns.
     cells: Vec<std::ops::Range<usize>>,
     rows: Vec<std::ops::Range<usize>>,
@@ -53,6 +57,7 @@ pub struct SlipScratch {
     differences: Vec<f64>,
     operator: OperatorScratch,
     layer: [Vec<f64>; 2],
+    displacement: [Vec<f64>; 2],
 }
 
 impl<'a> SlipEquations<'a> {
@@ -83,6 +88,8 @@ impl<'a> SlipEquations<'a> {
             parity,
             stencils: Stencils::new(rule, mesh, segments),
             layer: None,
+            flexibility: 0.0,
+            memory: None,
             cells: Vec::with_capacity(count),
             rows: Vec::with_capacity(count),
             padded: differences.padded(parity),
@@ -106,6 +113,14 @@ impl<'a> SlipEquations<'a> {
         let segments = &mesh.segments[..self.cells.len()];
         self.layer =
             (flexibility > 0.0).then(|| LayerSlip::new(self.rule, mesh, segments, flexibility));
+        self.flexibility = flexibility;
+        self
+    }
+
+    /// The same for a step in which the displacements change.
+    #[must_use]
+    pub fn with_memory(mut self, memory: DisplacementMemory<'a>) -> SlipEquations<'a> {
+        self.memory = Some(memory);
         self
     }
 
@@ -141,22 +156,81 @@ impl<'a> SlipEquations<'a> {
             differences,
             operator,
             layer: buffers,
+            displacement,
         } = scratch;
         differences.resize(2 * self.row_count, 0.0);
         let (dx, dy) = differences.split_at_mut(self.row_count);
         self.differences
             .apply(self.parity, tx, ty, dx, dy, operator);
-        for (cells, rows) in self.cells.iter().zip(&self.rows) {
-            for (differences, slip) in [(&*dx, &mut *sx), (&*dy, &mut *sy)] {
-                let slip = &mut slip[cells.clone()];
-                self.stencils
-                    .elastic(cells.clone(), &differences[rows.clone()], slip);
+        if self.memory.is_none_or(|memory| memory.rolls) {
+            for (cells, rows) in self.cells.iter().zip(&self.rows) {
+                for (differences, slip) in [(&*dx, &mut *sx), (&*dy, &mut *sy)] {
+                    let slip = &mut slip[cells.clone()];
+                    self.stencils
+                        .elastic(cells.clone(), &differences[rows.clone()], slip);
+                }
+                if let Some(layer) = &self.layer {
+                    layer.add(cells.clone(), &tx[cells.clone()], sx, buffers);
+                    layer.add(cells.clone(), &ty[cells.clone()], sy, buffers);
+                }
             }
-            if let Some(layer) = &self.layer {
-                layer.add(cells.clone(), &tx[cells.clone()], sx, buffers);
-                layer.add(cells.clone(), &ty[cells.clone()], sy, buffers);
+        } else {
+            let cells = self.cells();
+            sx[..cells].fill(0.0);
+            sy[..cells].fill(0.0);
+        }
+        if let Some(memory) = self.memory {
+            let [ux, uy] = displacement;
+            ux.resize(self.padded, 0.0);
+            uy.resize(self.padded, 0.0);
+            self.at_nodes(memory, [tx, ty], [dx, dy], [ux, uy]);
+            for (slip, u) in [(sx, ux), (sy, uy)] {
+                let cells = slip.iter_mut().zip(u).take(self.cells());
+                cells.for_each(|(slip, u)| *slip -= memory.factor * *u);
             }
         }
+    }
+
+    /// Displacements at the nodes from tractions and the differences that they cause.
+    fn at_nodes(
+        &self,
+        memory: DisplacementMemory,
+        [tx, ty]: [&[f64]; 2],
+        [dx, dy]: [&[f64]; 2],
+        [ux, uy]: [&mut [f64]; 2],
+    ) {
+        for (j, (cells, rows)) in self.cells.iter().zip(&self.rows).enumerate() {
+            let (own, rows) = (cells.clone(), rows.clone());
+            let layer = [tx, ty].map(|t| (self.flexibility, &t[own.clone()]));
+            let out = [&mut ux[own.clone()], &mut uy[own]];
+            let differences = [&dx[rows.clone()], &dy[rows]];
+            memory.at_nodes(j, [tx, ty], differences, layer, out);
+        }
+    }
+
+    /// What multiplies the displacements in the slip of a step; 0 without a memory.
+    #[must_use]
+    pub fn memory_factor(&self) -> f64 {
+        self.memory.map_or(0.0, |memory| memory.factor)
+    }
+
+    /// Displacements at the nodes under tractions, those of a layer included, x then y; only of equations with a memory.
+    pub fn displacement(&self, t: &[f64], out: &mut [f64], scratch: &mut SlipScratch) {
+        let Some(memory) = self.memory else {
+            return;
+        };
+        let (tx, ty) = t.split_at(self.padded);
+        let (ux, uy) = out.split_at_mut(self.padded);
+        let SlipScratch {
+            differences,
+            operator,
+            ..
+        } = scratch;
+        differences.resize(2 * self.row_count, 0.0);
+        let (dx, dy) = differences.split_at_mut(self.row_count);
+        self.differences
+            .apply(self.parity, tx, ty, dx, dy, operator);
+        self.at_nodes(memory, [tx, ty], [dx, dy], [ux, uy]);
     }
 
     /// Rigid slip `q` of a motion, in the units of the motion: `(ν_x − φ y, ν_y + φ x)` as the rule samples it.
@@ -219,10 +293,19 @@ impl<'a> SlipEquations<'a> {
             }
             let column = in_segment * n..(in_segment + 1) * n;
             let (xx, yy) = (&mut xx[column.clone()], &mut yy[column]);
-            self.stencils.elastic(own.clone(), dx, xx);
-            self.stencils.elastic(own.clone(), dy, yy);
-            if let Some(layer) = &self.layer {
-                layer.add_column(own.clone(), in_segment, [xx, yy]);
+            if self.memory.is_none_or(|memory| memory.rolls) {
+                self.stencils.elastic(own.clone(), dx, xx);
+                self.stencils.elastic(own.clone(), dy, yy);
+                if let Some(layer) = &self.layer {
+                    layer.add_column(own.clone(), in_segment, [xx, yy]);
+                }
+            } else {
+                xx.fill(0.0);
+                yy.fill(0.0);
+            }
+            if let Some(memory) = self.memory {
+                let place = (own.start + in_segment, in_segment, self.flexibility);
+                memory.add_column(j, place, [&dx[..n], &dy[..n]], [xx, yy]);
             }
         }
     }

@@ -57,6 +57,33 @@ impl Scale {
             spin_per_mm: motion.spin_per_mm * self.length * unit,
         }
     }
+
+    /// The motion about the origin of the case of a dimensionless one.
+    #[must_use]
+    pub fn creepages(&self, motion: &Motion) -> Motion {
+        let unit = self.traction / self.shear_modulus;
+        let spin = motion.spin_per_mm * unit / self.length;
+        Motion {
+            creepage_x: motion.creepage_x * unit + spin * self.origin[1],
+            creepage_y: motion.creepage_y * unit - spin * self.origin[0],
+            spin_per_mm: spin,
+        }
+    }
+
+    /// The displacement of the upper body in mm and rad of a dimensionless one.
+    #[must_use]
+    pub fn shift(&self, motion: &Motion) -> Motion {
+        let Motion {
+            creepage_x,
+            creepage_y,
+            spin_per_mm,
+        } = self.creepages(motion);
+        Motion {
+            creepage_x: creepage_x * self.length,
+            creepage_y: creepage_y * self.length,
+            spin_per_mm: spin_per_mm * self.length,
+        }
+    }
 }
 
 /// A mesh with its pressures and bounds. It is not changed once it is made; its operator is kept by the store of the process.

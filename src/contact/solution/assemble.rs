@@ -14,12 +14,12 @@ use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::skip::Skip;
 use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::solution::cell_values::{patch_cells, point_fields};
+use crate::contact::solution::cell_values::{patch_cells, point_fields, traction_max};
 use crate::contact::solution::maintain;
 use crate::contact::solution::maintain::SolvedMotion;
 use crate::contact::solution::words::{
-    CombinedMaterial, ErrorEstimate, Fields, Gradients, MeshReport, NormalisedMotion, Origin,
-    PatchFields, PatchSolution, PointFields, PointSolution, Solution, SolverReport, Total,
+    CombinedMaterial, ErrorEstimate, Fields, Gradients, HistoryPoint, MeshReport, NormalisedMotion,
+    Origin, PatchFields, PatchSolution, PointFields, PointSolution, Solution, SolverReport, Total,
 };
 
 /// Remarks collected before repetitions are merged.
@@ -61,6 +61,12 @@ impl<'a> Assembly<'a> {
         }
     }
 
+    /// Is no motion in it yet?
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.total.is_empty()
+    }
+
     /// Adds the next motion.
     ///
     /// # Errors
@@ -96,7 +102,11 @@ impl<'a> Assembly<'a> {
                 method: point.method,
                 speed,
             };
-            let kept = maintain::add_rest(case, solved, &mut points, monitor)?;
+            let kept = match point.history {
+                // Slips are those of the step, not of steady rolling.
+                Some(_) => maintain::add_of_history(case, solved, &mut points, monitor)?,
+                None => maintain::add_rest(case, solved, &mut points, monitor)?,
+            };
             if wants_fields(case) {
                 self.add_fields(level, fields, kept);
             }
@@ -222,8 +232,14 @@ fn point_solution(
         });
     let table = point.table.as_ref().map(|table| table[index]);
     let by_table = |share: fn(f64) -> f64| table.map(|table| share(table.stick) * patch.area);
+    let history = point.history.as_ref();
     let power_x = motion.creepage_x * found.force_x;
     let power_y = motion.creepage_y * found.force_y;
+    let of_pressure = |(level, fields)| pressure_power(level, fields, index);
+    let steady_power = || {
+        let of_motion = power_x + power_y + motion.spin_per_mm * found.moment_z;
+        of_motion + on_level.map_or(0.0, of_pressure)
+    };
     PointSolution {
         motion: (*motion).into(),
         normalised: normalised(case, patch, motion),
@@ -251,10 +267,7 @@ fn point_solution(
         stick_cells: areas.map(|a| a.stick_cells),
         slip_cells: areas.map(|a| a.slip_cells),
         traction_max_mpa: on_level.map(|(level, fields)| traction_max(level, fields, index)),
-        friction_power_n: power_x
-            + power_y
-            + motion.spin_per_mm * found.moment_z
-            + on_level.map_or(0.0, |(level, fields)| pressure_power(level, fields, index)),
+        friction_power_n: history.map_or_else(steady_power, |history| history.power[index]),
         friction_power_without_spin_n: power_x.abs() + power_y.abs(),
         solver: SolverReport {
             method: point.method.into(),
@@ -270,17 +283,11 @@ fn point_solution(
         },
         target_met: target_met(case, point),
         saturated: point.saturated,
+        history: history.map(|history| HistoryPoint::of(history, index)),
         subsurface: None,
         damage: None,
         temperature: None,
     }
-}
-
-/// Largest tangential traction in the cells of a patch, in MPa.
-fn traction_max(level: &StripMesh, fields: &SolvedFields, patch: usize) -> f64 {
-    let [x, y] = &fields.tangential.traction;
-    let lengths = level.patch_cells(patch).map(|i| x[i].hypot(y[i]));
-    lengths.fold(0.0, f64::max) * level.scale.traction
 }
 
 /// What was skipped, as the client reads it.

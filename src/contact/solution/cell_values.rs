@@ -3,6 +3,7 @@
 use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::words::solver::Output;
 use crate::contact::rolling::answer::LevelAnswer;
+use crate::contact::rolling::motion_answer::SolvedFields;
 use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::solution::words::{PatchCells, PointFields};
 use crate::contact::solution::zone::Zone;
@@ -59,4 +60,11 @@ pub(crate) fn point_fields(
         traction_y_mpa: traction(1),
         ..PointFields::default()
     }
+}
+
+/// Largest tangential traction in the cells of a patch, in MPa.
+pub(crate) fn traction_max(level: &StripMesh, fields: &SolvedFields, patch: usize) -> f64 {
+    let [x, y] = &fields.tangential.traction;
+    let lengths = level.patch_cells(patch).map(|i| x[i].hypot(y[i]));
+    lengths.fold(0.0, f64::max) * level.scale.traction
 }

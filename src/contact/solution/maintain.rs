@@ -108,14 +108,48 @@ pub(crate) fn add_rest(
             }
         }
     }
-    if let Some(task) = &run.after.subsurface {
-        let found = subsurface(task, solved, monitor)?;
-        for ((point, kept), found) in points.iter_mut().zip(&mut kept).zip(found) {
-            point.subsurface = Some(found.summary);
-            kept.subsurface = Some(found.points);
+    add_stresses(case, solved, points, &mut kept, monitor)?;
+    Ok(kept)
+}
+
+/// The same of a point of a history, whose slips are those of its step.
+pub(crate) fn add_of_history(
+    case: &CheckedCase,
+    solved: SolvedMotion,
+    points: &mut [PointSolution],
+    monitor: &dyn Monitor,
+) -> Result<Vec<PointFields>, Stop> {
+    let mut kept = vec![PointFields::default(); points.len()];
+    if case.run.wants(Output::Slip) {
+        let unit = solved.level.scale.slip();
+        for (k, kept) in kept.iter_mut().enumerate() {
+            let cells = solved.level.patch_cells(k);
+            let slip = |c: usize| solved.answer.slip[c][cells.clone()].iter();
+            let [x, y] = [0, 1].map(|c| slip(c).map(|slip| unit * slip).collect());
+            (kept.slip_x, kept.slip_y) = (Some(x), Some(y));
         }
     }
+    add_stresses(case, solved, points, &mut kept, monitor)?;
     Ok(kept)
+}
+
+/// Stresses below the surface, where they are asked for.
+fn add_stresses(
+    case: &CheckedCase,
+    solved: SolvedMotion,
+    points: &mut [PointSolution],
+    kept: &mut [PointFields],
+    monitor: &dyn Monitor,
+) -> Result<(), Stop> {
+    let Some(task) = &case.run.after.subsurface else {
+        return Ok(());
+    };
+    let found = subsurface(task, solved, monitor)?;
+    for ((point, kept), found) in points.iter_mut().zip(kept).zip(found) {
+        point.subsurface = Some(found.summary);
+        kept.subsurface = Some(found.points);
+    }
+    Ok(())
 }
 
 /// Stresses below one patch.

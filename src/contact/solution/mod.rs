@@ -5,6 +5,7 @@ pub mod cell_values;
 pub mod damage;
 pub mod finish;
 pub mod finite;
+pub(crate) mod history_point;
 pub mod maintain;
 pub mod maintenance;
 pub mod plane_error;

@@ -207,7 +207,8 @@ pub struct PointSolution {
     #[serde(skip_serializing_if = "Option::is_none", default)]
     #[schema(nullable = false)]
     pub traction_max_mpa: Option<f64>,
-    /// Tγ: dissipated power divided by rolling speed, ν_x F_x + ν_y F_y + φ M_z, in N (J/m).
+    /// Tγ: dissipated power divided by rolling speed, ν_x F_x + ν_y F_y + φ M_z, in N (J/m); of a history the sum over the cells at this
+    /// point, where elastic energy grows or falls besides, and 0 of a shift.
     pub friction_power_n: f64,
     /// |ν_x F_x| + |ν_y F_y| in N, the form damage models use.
     pub friction_power_without_spin_n: f64,
@@ -218,6 +219,10 @@ pub struct PointSolution {
     pub target_met: Option<bool>,
     /// A prescribed force could not be reached.
     pub saturated: bool,
+    /// What a history adds: the distance, shifts, and what was dissipated; only of `motion.history`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub history: Option<HistoryPoint>,
     /// Stresses below the surface in short; only with the output `subsurface`.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     #[schema(nullable = false)]
@@ -230,6 +235,43 @@ pub struct PointSolution {
     #[serde(skip_serializing_if = "Option::is_none", default)]
     #[schema(nullable = false)]
     pub temperature: Option<TemperatureSummary>,
+}
+
+/// A point of a history.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+pub struct HistoryPoint {
+    /// Distance rolled since the start in mm.
+    pub distance_mm: f64,
+    /// Displacement of the upper body against the lower one along x from the point before, in mm; only where the bodies did not roll.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub shift_x_mm: Option<f64>,
+    /// The same along y.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub shift_y_mm: Option<f64>,
+    /// Turn about z in rad; only where the bodies did not roll.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub turn_rad: Option<f64>,
+    /// Estimated absolute error of `creepage_x`; only where its force was prescribed.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub creepage_x_error: Option<f64>,
+    /// The same of `creepage_y`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub creepage_y_error: Option<f64>,
+    /// Estimated absolute error of `shift_x_mm`; only where its force was prescribed.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub shift_x_error_mm: Option<f64>,
+    /// The same of `shift_y_mm`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub shift_y_error_mm: Option<f64>,
+    /// What friction has dissipated since the start in this patch, in N·mm.
+    pub dissipated_n_mm: f64,
 }
 
 /// Creepages and spin made dimensionless with c = √(A/π) of the patch (√(ab) for an ellipse).

@@ -5,7 +5,7 @@ use utoipa::ToSchema;
 
 use crate::contact::case::words::motion::MotionWords;
 use crate::contact::solution::profile_quality::ProfileUncertainty;
-use crate::contact::solution::words::{ErrorEstimate, Origin, Solution, Total};
+use crate::contact::solution::words::{ErrorEstimate, HistoryPoint, Origin, Solution, Total};
 
 /// Forces and moments.
 #[derive(Debug, Serialize, ToSchema)]
@@ -54,6 +54,10 @@ pub struct PointResultants {
     pub friction_power_without_spin_n: f64,
     /// A prescribed force could not be reached.
     pub saturated: bool,
+    /// What a history adds; only of `motion.history`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<HistoryPoint>, nullable = false)]
+    pub history: Option<Box<HistoryPoint>>,
 }
 
 impl Resultants {
@@ -86,6 +90,7 @@ impl Resultants {
                             friction_power_n: point.friction_power_n,
                             friction_power_without_spin_n: point.friction_power_without_spin_n,
                             saturated: point.saturated,
+                            history: point.history.map(Box::new),
                         })
                         .collect(),
                 }
@@ -123,6 +128,8 @@ pub struct Sum {
     pub friction_power_without_spin_n: f64,
     /// A prescribed force could not be reached.
     pub saturated: bool,
+    /// What a history adds, with what all patches have dissipated.
+    pub history: Option<HistoryPoint>,
 }
 
 /// Sums over all patches for each motion, of what `total` does not have.
@@ -147,6 +154,12 @@ pub fn sums(solution: &Solution) -> Vec<Sum> {
                 .map(|part| part.friction_power_without_spin_n)
                 .sum(),
             saturated: parts().any(|part| part.saturated),
+            history: first.history.map(|history| HistoryPoint {
+                dissipated_n_mm: parts()
+                    .filter_map(|part| Some(part.history?.dissipated_n_mm))
+                    .sum(),
+                ..history
+            }),
         }
     });
     points.collect()

@@ -5,6 +5,7 @@ use std::ops::Range;
 use axum::body::Body;
 use serde::Serialize;
 
+use crate::contact::solution::words::HistoryPoint;
 use crate::http::dto::resultants::{PatchResultants, Resultants, Sum};
 use crate::http::render::csv::{finish, number};
 use crate::http::render::forces::Forces;
@@ -55,7 +56,8 @@ pub fn json_body(resultants: Resultants) -> Result<Body, serde_json::Error> {
 
 /// One line per patch and motion, then one per motion with the sums over all patches.
 pub fn csv_body(resultants: Resultants, sums: Vec<Sum>) -> Body {
-    let head = head();
+    let with_history = sums.first().is_some_and(|sum| sum.history.is_some());
+    let head = head(with_history);
     let mut parts = Vec::new();
     for (place, patch) in resultants.patches.iter().enumerate() {
         parts.extend(ranges(patch.points.len()).map(|range| Section::Points(place, range)));
@@ -96,10 +98,40 @@ const REST: [&str; 3] = [
     "saturated",
 ];
 
-fn head() -> Result<Vec<u8>, csv::Error> {
+/// Columns of a history, behind all others; other cases do not have them.
+const HISTORY: [&str; 9] = [
+    "distance_mm",
+    "dissipated_n_mm",
+    "shift_x_mm",
+    "shift_y_mm",
+    "turn_rad",
+    "creepage_x_error",
+    "creepage_y_error",
+    "shift_x_error_mm",
+    "shift_y_error_mm",
+];
+
+fn head(with_history: bool) -> Result<Vec<u8>, csv::Error> {
     let mut out = csv::Writer::from_writer(Vec::new());
-    out.write_record(PLACE.iter().chain(&Forces::COLUMNS).chain(&REST))?;
+    let history = if with_history { &HISTORY[..] } else { &[] };
+    let columns = PLACE.iter().chain(&Forces::COLUMNS).chain(&REST);
+    out.write_record(columns.chain(history))?;
     finish(out)
+}
+
+/// The values of the columns of a history.
+fn of_history(history: &HistoryPoint) -> [Option<f64>; 9] {
+    [
+        Some(history.distance_mm),
+        Some(history.dissipated_n_mm),
+        history.shift_x_mm,
+        history.shift_y_mm,
+        history.turn_rad,
+        history.creepage_x_error,
+        history.creepage_y_error,
+        history.shift_x_error_mm,
+        history.shift_y_error_mm,
+    ]
 }
 
 fn patch_lines(patch: &PatchResultants, range: Range<usize>) -> Result<Vec<u8>, csv::Error> {
@@ -112,6 +144,7 @@ fn patch_lines(patch: &PatchResultants, range: Range<usize>) -> Result<Vec<u8>, 
             friction_power_n: point.friction_power_n,
             friction_power_without_spin_n: point.friction_power_without_spin_n,
             saturated: point.saturated,
+            history: point.history.as_deref().copied(),
         };
         let forces = Forces {
             motion: Some(point.motion),
@@ -159,7 +192,10 @@ fn csv_line(
         sum.saturated.to_string(),
     ];
     let place = [patch.to_owned(), point.to_string()];
-    place.into_iter().chain(values).chain(rest)
+    let history = sum.history.as_ref().map(of_history);
+    let text = |value: Option<f64>| value.map_or_else(String::new, number);
+    let history = history.into_iter().flatten().map(text);
+    place.into_iter().chain(values).chain(rest).chain(history)
 }
 
 #[cfg(test)]
@@ -188,6 +224,7 @@ mod tests {
             friction_power_n: 0.0,
             friction_power_without_spin_n: 0.0,
             saturated: false,
+            history: None,
         };
         let points: Vec<_> = (0..points).map(point).collect();
         let total = points.iter().map(|point| Total {
@@ -232,6 +269,7 @@ mod tests {
                 friction_power_n: 0.0,
                 friction_power_without_spin_n: 0.0,
                 saturated: false,
+                history: None,
             };
             let table = csv_body(resultants(patches, points), vec![sum; points]);
             let lines = text(table).await.lines().count();

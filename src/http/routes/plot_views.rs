@@ -92,8 +92,12 @@ fn of_curve(title: String, solution: &Solution) -> Result<Drawing, ApiError> {
     Ok(Box::new(move |width| Ok(curve::draw(&curve, width))))
 }
 
-/// The component that varies most from motion to motion, measured by what it does to the patch, and its values.
+/// The component that varies most from motion to motion, measured by what it does to the patch, and its values; of a history the distance.
 fn varying(points: &[PointSolution]) -> (&'static str, Vec<f64>) {
+    let distance = |point: &PointSolution| Some(point.history?.distance_mm);
+    if let Some(distances) = points.iter().map(distance).collect() {
+        return ("distance rolled in mm", distances);
+    }
     let length = points
         .first()
         .map_or(1.0, |point| point.normalised.length_mm);

@@ -5,6 +5,7 @@ pub mod damage;
 pub mod draft;
 pub mod faults;
 pub mod friction;
+pub mod history;
 pub mod material;
 pub mod motion;
 pub mod object;

@@ -1,13 +1,15 @@
-//! Reads `motion`: one motion, a list of motions, or a sweep.
+//! Reads `motion`: one motion, a list of motions, a sweep, a history or a wheelset.
 
 use serde_json::Value;
 
 use crate::contact::case::read::faults::{Faults, Interval};
+use crate::contact::case::read::history;
 use crate::contact::case::read::object::{Object, join, shown};
 use crate::contact::case::read::samples::{count_rest, numbers};
 use crate::contact::case::words::motion::{
-    AskedMotion, Combine, Motions, Range, Sweep, Swept, ValueList, Wheelset,
+    AskedMotion, Combine, Motions, Sweep, Swept, ValueList, Wheelset,
 };
+use crate::contact::case::words::range::Range;
 
 const CREEPAGE: Interval = Interval::closed(-1e6, 1e6, "");
 const SPIN: Interval = Interval::closed(-1e6, 1e6, "1/mm");
@@ -36,7 +38,7 @@ const FORCES_FROM: usize = 3;
 
 /// Reads the required member `motion` of a case.
 pub(crate) fn read(case: &mut Object) -> Option<Motions> {
-    let what = "an object with at least one of creepage_x, creepage_y, spin_per_mm, force_x_n, force_y_n, an array of such objects, or {\"sweep\": …}";
+    let what = "an object with at least one of creepage_x, creepage_y, spin_per_mm, force_x_n, force_y_n, an array of such objects, {\"sweep\": …} or {\"history\": …}";
     let value = case.required("motion", what)?;
     let kind = case
         .value("contact")
@@ -51,6 +53,9 @@ pub(crate) fn read(case: &mut Object) -> Option<Motions> {
             block.only(&["sweep"], &[]);
             let sweep = sweep(&mut block.child("sweep")?)?;
             Some(Motions::Sweep { sweep })
+        }
+        Value::Object(members) if members.contains_key("history") => {
+            history::read(&mut Object::open(value, pointer, faults)?)
         }
         Value::Object(members) if members.contains_key("wheelset") => {
             let mut block = Object::open(value, pointer, faults)?;

@@ -5,6 +5,7 @@ use serde::Serialize;
 use crate::contact::case::words::contact::{Contact, Load};
 use crate::contact::case::words::damage::DamageWords;
 use crate::contact::case::words::friction::Friction;
+use crate::contact::case::words::history::{History, HistoryStartName};
 use crate::contact::case::words::material::Material;
 use crate::contact::case::words::motion::{MotionWords, Wheelset};
 use crate::contact::case::words::solver::{MeshSizeWords, MethodName, Output, TractionBoundName};
@@ -29,6 +30,8 @@ pub(crate) struct Canonical<'a> {
     pub(crate) forces: Option<&'a [PrescribedForces]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) wheelset: Option<&'a Wheelset>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) history: Option<(&'a History, HistoryStartName)>,
     pub(crate) method: MethodName,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) traction_bound: Option<TractionBoundName>,

@@ -1,7 +1,10 @@
-//! How the bodies roll: one motion, a list, a sweep or a wheelset.
+//! How the bodies roll: one motion, a list, a sweep, a history or a wheelset.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
+
+use crate::contact::case::words::history::{History, HistoryStartName};
+use crate::contact::case::words::range::Range;
 
 /// Rolling motion of the upper body relative to the lower one, divided by the rolling speed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -59,6 +62,14 @@ pub enum Motions {
     Sweep {
         /// The values of its components.
         sweep: Sweep,
+    },
+    /// Rolling that changes: motions or forces in the distance rolled.
+    History {
+        /// Motions, forces and shifts, distance by distance.
+        history: History,
+        /// The state at the distance 0; `rest` when left out.
+        #[schema(required = false)]
+        start: HistoryStartName,
     },
     /// The motion of the wheelset, from which every patch gets its own creepages; for `profiles` and `wheelset`.
     Wheelset {
@@ -156,18 +167,6 @@ pub enum Swept {
     Range(Range),
     /// These values, in this order.
     List(ValueList),
-}
-
-/// Equally spaced values, both ends included.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
-pub struct Range {
-    /// First value.
-    pub from: f64,
-    /// Last value.
-    pub to: f64,
-    /// Number of values, at least 1.
-    #[schema(minimum = 1)]
-    pub points: u32,
 }
 
 /// Values one by one.

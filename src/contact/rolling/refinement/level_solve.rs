@@ -86,6 +86,7 @@ impl From<SolvedLevel> for MotionAnswer {
                 tangential,
             }),
             table: None,
+            history: None,
             work: solved.work,
             method: solved.method,
             seconds: solved.seconds,

@@ -93,6 +93,16 @@ impl<'a> Newton<'a> {
         self
     }
 
+    /// The same with r no larger than slips allow that grow by `gain` on each cell when all tractions grow by one: displacements reach
+    /// far, so that together the tractions of a step move a cell much more than its own does.
+    #[must_use]
+    pub fn far_reaching(mut self, gain: &[f64]) -> Newton<'a> {
+        for (r, gain) in self.parameter.iter_mut().zip(gain) {
+            *r = PROJECTION / (PROJECTION / *r + gain.abs());
+        }
+        self
+    }
+
     /// How fast bounds fall with the slip over how fast slips fall as tractions grow: the largest `|g′| |M_ii|` of a cell. Below 1 every
     /// cell alone has one solution. 0 for bounds that do not fall.
     #[must_use]

@@ -72,6 +72,7 @@ pub fn solve(
         errors,
         fields: None,
         table: Some(found.iter().map(|answer| answer.more).collect()),
+        history: None,
         skips: Vec::new(),
         remarks: Vec::new(),
         work: Work::default(),

@@ -66,12 +66,13 @@ function loadField(app, type) {
 /** @param {App} app @param {string} type */
 function motionFields(app, type) {
   const { motion } = app.store.get().compose.document ?? {};
-  const kind = Array.isArray(motion) ? 'list' : isObject(motion) && 'sweep' in motion ? 'sweep' : isObject(motion) && 'wheelset' in motion ? 'wheelset' : 'one';
+  const kind = Array.isArray(motion) ? 'list' : isObject(motion) && 'sweep' in motion ? 'sweep' : isObject(motion) && 'wheelset' in motion ? 'wheelset' : isObject(motion) && 'history' in motion ? 'history' : 'one';
   const kinds = [...(type === 'profiles' ? [['wheelset', 'Wheelset']] : []), ['one', 'Creepages'], ['sweep', 'Creep curve']];
   return html`
     <div class="segs" role="group" aria-label="Kind of motion">${kinds.map(([key, label]) => html`<label class="seg">
       <input type="radio" name="motion" .checked=${key === kind} @change=${() => change(app, '/motion', startMotion(key, motion))}><span>${label}</span></label>`)}</div>
     ${kind === 'list' ? html`<p class="hint">${/** @type {JsonValue[]} */ (motion).length} motions on the same patch; change them in the JSON.</p>` : nothing}
+    ${kind === 'history' ? html`<p class="hint">A motion that changes as the bodies roll; change it in the JSON.</p>` : nothing}
     ${kind === 'one' ? html`<div class="triple">${COMPONENTS.map(({ key, label, unit, factor }) => field(app, `/motion/${key}`, label, unit, { factor }))}</div>` : nothing}
     ${kind === 'wheelset' ? html`<div class="pair">
       ${field(app, '/motion/wheelset/speed_mm_per_s', 'Speed', 'km/h', { factor: 1e6 / 3600 })}

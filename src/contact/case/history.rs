@@ -1,0 +1,77 @@
+//! What a history goes with: contact, method, material and outputs, and how long it may be.
+
+use crate::contact::case::limits::Limits;
+use crate::contact::case::words::contact::Contact;
+use crate::contact::case::words::friction::Friction;
+use crate::contact::case::words::solver::{MethodName, Output, Solver};
+use crate::contact::error::Fault;
+use crate::contact::half_space::elasticity::Elasticity;
+use crate::contact::normal::patch::Patch;
+use crate::contact::rolling::history::solve::too_long;
+use crate::contact::rolling::history::task::HistoryTask;
+
+/// Outputs that hold for steady rolling only.
+const OUTPUTS_REFUSED: [(Output, &str); 3] = [
+    (Output::Damage, "damage"),
+    (Output::Temperature, "temperature"),
+    (Output::Gradients, "gradients"),
+];
+
+/// What of a case a history has to go with, as far as it could be read.
+pub(crate) struct BesideHistory<'a> {
+    pub(crate) contact: Option<&'a Contact>,
+    pub(crate) solver: Option<&'a Solver>,
+    pub(crate) outputs: &'a [Output],
+    pub(crate) friction: Option<&'a Friction>,
+    pub(crate) elasticity: Option<&'a Elasticity>,
+    /// Those that are known before a solve.
+    pub(crate) patches: &'a [Patch],
+}
+
+/// Faults of a case with a history.
+pub(crate) fn faults(history: &HistoryTask, given: &BesideHistory, limits: &Limits) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    if matches!(
+        given.contact,
+        Some(Contact::Profiles { .. } | Contact::Wheelset { .. })
+    ) {
+        let detail = "given with profiles, whose patches move as the wheel does; give one patch as radii, an ellipse, a gap or a pressure";
+        faults.push(Fault::new("/motion/history", detail));
+    }
+    let method = given.solver.map(|solver| solver.method);
+    if method.is_some_and(|m| !matches!(m, MethodName::Auto | MethodName::BoundaryElement)) {
+        let detail = "only boundary_element (or auto) follows a history";
+        faults.push(Fault::new("/solver/method", detail));
+    }
+    if given.elasticity.is_some_and(|pair| pair.difference != 0.0) {
+        let detail =
+            "bodies of unlike material (K other than 0) given; a history is of like bodies";
+        faults.push(Fault::new("/material", detail));
+    }
+    if given
+        .friction
+        .is_some_and(|friction| friction.largest() == 0.0)
+    {
+        let detail = "no friction given; without tractions nothing is remembered";
+        faults.push(Fault::new("/friction", detail));
+    }
+    if given
+        .friction
+        .is_some_and(|friction| friction.law.is_some())
+    {
+        let detail =
+            "given with a history, which follows a coefficient that does not depend on the slip";
+        faults.push(Fault::new("/friction/law", detail));
+    }
+    for (output, name) in OUTPUTS_REFUSED {
+        if given.outputs.contains(&output) {
+            let detail = format!("{name} given with a history; it is computed for steady rolling");
+            faults.push(Fault::new("/outputs", detail));
+        }
+    }
+    let extents: Vec<[f64; 4]> = given.patches.iter().map(|patch| patch.extent).collect();
+    if let Some(detail) = too_long(history, &extents, limits.motions_max) {
+        faults.push(Fault::new("/motion/history/distance_mm", detail));
+    }
+    faults
+}

@@ -1,0 +1,207 @@
+//! Reads `motion.history`: motions, forces and shifts in the distance rolled.
+
+use serde_json::Value;
+
+use crate::contact::case::read::faults::Interval;
+use crate::contact::case::read::object::{Object, join, shown};
+use crate::contact::case::read::samples::{count_rest, numbers};
+use crate::contact::case::words::history::{History, HistoryCourse, HistoryStartName};
+use crate::contact::case::words::motion::Motions;
+use crate::contact::case::words::range::Range;
+
+const DISTANCE: Interval = Interval::closed(0.0, 1e9, "mm");
+const CREEPAGE: Interval = Interval::closed(-1e6, 1e6, "");
+const SPIN: Interval = Interval::closed(-1e6, 1e6, "1/mm");
+const FORCE: Interval = Interval::closed(-1e15, 1e15, "N");
+const SHIFT: Interval = Interval::closed(-1e6, 1e6, "mm");
+const TURN: Interval = Interval::closed(-10.0, 10.0, "rad");
+/// Most points, before the limit of the service.
+const POINTS_MAX: u32 = 1_000_000;
+/// Components along x, across and about z; each force excludes its creepage and its shift.
+const COMPONENTS: [(&str, Interval); 8] = [
+    ("creepage_x", CREEPAGE),
+    ("creepage_y", CREEPAGE),
+    ("spin_per_mm", SPIN),
+    ("force_x_n", FORCE),
+    ("force_y_n", FORCE),
+    ("shift_x_mm", SHIFT),
+    ("shift_y_mm", SHIFT),
+    ("turn_rad", TURN),
+];
+/// Places of the shifts in [`COMPONENTS`].
+const SHIFTS: std::ops::Range<usize> = 5..8;
+const EXCLUSIVE: [(&str, [&str; 2]); 2] = [
+    ("force_x_n", ["creepage_x", "shift_x_mm"]),
+    ("force_y_n", ["creepage_y", "shift_y_mm"]),
+];
+
+/// Reads the block `{"history": …, "start": …}`.
+pub(crate) fn read(block: &mut Object) -> Option<Motions> {
+    block.only(&["history", "start"], &[]);
+    let words = [
+        ("rest", HistoryStartName::Rest),
+        ("steady", HistoryStartName::Steady),
+    ];
+    let start = match block.has("start") {
+        true => block.word("start", &words, &[]),
+        false => Some(HistoryStartName::Rest),
+    };
+    let history = history(&mut block.child("history")?, start.unwrap_or_default());
+    Some(Motions::History {
+        history: history?,
+        start: start?,
+    })
+}
+
+fn history(block: &mut Object, start: HistoryStartName) -> Option<History> {
+    let names = ["distance_mm"].into_iter();
+    let names: Vec<&str> = names.chain(COMPONENTS.map(|(name, _)| name)).collect();
+    block.only(&names, &[]);
+    block.required("distance_mm", "an array of distances in mm")?;
+    let distance_mm = course(block, "distance_mm", DISTANCE, None);
+    let distances = distance_mm.as_ref().map(|course| course.values(1));
+    let points = distances.as_ref().map(Vec::len);
+    let mut read = [const { None }; COMPONENTS.len()];
+    for (read, (name, allowed)) in read.iter_mut().zip(COMPONENTS) {
+        if block.has(name) {
+            *read = Some(course(block, name, allowed, points));
+        }
+    }
+    let mut sound = !read.contains(&Some(None));
+    for (force, others) in EXCLUSIVE {
+        for other in others {
+            if block.has(force) && block.has(other) {
+                let detail =
+                    format!("given together with {other}; a force is prescribed in its place");
+                block.fault(force, detail);
+                sound = false;
+            }
+        }
+    }
+    if read.iter().all(Option::is_none) {
+        let names = COMPONENTS.map(|(name, _)| name).join(", ");
+        block.fault_here(format!(
+            "no motion given; at least one of {names} is needed"
+        ));
+        return None;
+    }
+    let distances = distances?;
+    sound &= increasing(block, &distances);
+    for k in SHIFTS {
+        if let Some(Some(course)) = &read[k] {
+            sound &= shifted_at_rest(block, COMPONENTS[k].0, course, &distances, start);
+        }
+    }
+    let [
+        creepage_x,
+        creepage_y,
+        spin_per_mm,
+        force_x_n,
+        force_y_n,
+        shift_x_mm,
+        shift_y_mm,
+        turn_rad,
+    ] = read.map(Option::flatten);
+    sound.then_some(History {
+        distance_mm: distance_mm?,
+        creepage_x,
+        creepage_y,
+        spin_per_mm,
+        force_x_n,
+        force_y_n,
+        shift_x_mm,
+        shift_y_mm,
+        turn_rad,
+    })
+}
+
+/// Does the distance never decrease?
+fn increasing(block: &mut Object, distances: &[f64]) -> bool {
+    let pointer = block.pointer_to("distance_mm");
+    let Some(k) = (1..distances.len()).find(|k| distances[*k] < distances[k - 1]) else {
+        return true;
+    };
+    let detail = format!(
+        "{} given after {}; distances may not decrease",
+        distances[k],
+        distances[k - 1]
+    );
+    block.faults().add(join(&pointer, k), detail);
+    false
+}
+
+/// Is a shift 0 wherever the bodies roll, or begin in steady rolling?
+fn shifted_at_rest(
+    block: &mut Object,
+    name: &str,
+    course: &HistoryCourse,
+    distances: &[f64],
+    start: HistoryStartName,
+) -> bool {
+    let values = course.values(distances.len());
+    let rolls = |k: usize| match k {
+        0 => distances[0] > 0.0 || start == HistoryStartName::Steady,
+        _ => distances[k] > distances[k - 1],
+    };
+    let wrong = (0..distances.len()).find(|k| values[*k] != 0.0 && rolls(*k));
+    let Some(k) = wrong else { return true };
+    let pointer = match course {
+        HistoryCourse::Values(_) => join(&block.pointer_to(name), k),
+        _ => block.pointer_to(name),
+    };
+    let detail = format!(
+        "{} given for point {k}, to which the bodies roll; a shift belongs to a point with the distance of the point before, or to a first \
+         point with the distance 0 that starts from \"rest\"",
+        values[k]
+    );
+    block.faults().add(pointer, detail);
+    false
+}
+
+/// A number, an array of one value per point, or `{"from": …, "to": …, "points": …}`.
+fn course(
+    block: &mut Object,
+    name: &str,
+    allowed: Interval,
+    points: Option<usize>,
+) -> Option<HistoryCourse> {
+    let pointer = block.pointer_to(name);
+    let found = match block.value(name)? {
+        Value::Number(_) => return block.number(name, allowed).map(HistoryCourse::Constant),
+        Value::Array(elements) if (1..=POINTS_MAX as usize).contains(&elements.len()) => {
+            let mut refused = 0;
+            let values = numbers(elements, &pointer, allowed, &mut refused, block.faults());
+            count_rest(&pointer, allowed, refused, block.faults());
+            HistoryCourse::Values(values?)
+        }
+        Value::Object(_) => {
+            let mut block = block.child(name)?;
+            block.only(&["from", "to", "points"], &[]);
+            let from = block.required_number("from", allowed);
+            let to = block.required_number("to", allowed);
+            let points = block.required_count("points", 2, POINTS_MAX);
+            HistoryCourse::Range(Range {
+                from: from?,
+                to: to?,
+                points: points?,
+            })
+        }
+        other => {
+            let detail = format!(
+                "{} given; a number, an array of 1 to {POINTS_MAX} numbers or {{\"from\": …, \"to\": …, \"points\": …}} is needed",
+                shown(other)
+            );
+            block.fault(name, detail);
+            return None;
+        }
+    };
+    let count = found.points();
+    if let Some(points) = points.filter(|points| *points != count) {
+        let detail = format!(
+            "{count} values given for {points} distances; as many as distances are needed, or one number"
+        );
+        block.fault(name, detail);
+        return None;
+    }
+    Some(found)
+}

@@ -1,0 +1,95 @@
+//! Rolling that changes, as a client writes it: motions or forces in the distance rolled.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::contact::case::words::range::Range;
+
+/// A motion that changes as the bodies roll. Creepages, spin and forces change linearly from one distance to the next; before the first
+/// distance they are those of the first. The points of the answer are the distances.
+///
+/// Where a distance equals the one before, or is 0 at first, the bodies do not roll but are shifted: by `shift_x_mm`, `shift_y_mm` and
+/// `turn_rad`, or until the prescribed forces are reached. Two equal distances are thus also a jump of a creepage or force.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct History {
+    /// Distance rolled since the start in mm, never decreasing.
+    pub distance_mm: HistoryCourse,
+    /// Longitudinal creepage.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub creepage_x: Option<HistoryCourse>,
+    /// Lateral creepage.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub creepage_y: Option<HistoryCourse>,
+    /// Spin in 1/mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub spin_per_mm: Option<HistoryCourse>,
+    /// Longitudinal force on the lower body in N, in place of `creepage_x`; creepages and shifts that give it are found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub force_x_n: Option<HistoryCourse>,
+    /// Lateral force on the lower body in N, in place of `creepage_y`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub force_y_n: Option<HistoryCourse>,
+    /// Displacement of the upper body against the lower one along x in mm, from the point before; 0 where the bodies roll.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub shift_x_mm: Option<HistoryCourse>,
+    /// The same along y.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub shift_y_mm: Option<HistoryCourse>,
+    /// Turn of the upper body against the lower one about z in rad, from the point before; 0 where the bodies roll.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub turn_rad: Option<HistoryCourse>,
+}
+
+/// A number for all points of a history, or one value per point.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[serde(untagged)]
+#[schema(as = Course)]
+pub enum HistoryCourse {
+    /// The same at every point.
+    Constant(f64),
+    /// Equally spaced values.
+    Range(Range),
+    /// One value per point.
+    Values(Vec<f64>),
+}
+
+impl HistoryCourse {
+    /// Number of values; 1 of a constant.
+    #[must_use]
+    pub fn points(&self) -> usize {
+        match self {
+            HistoryCourse::Constant(_) => 1,
+            HistoryCourse::Range(range) => range.points as usize,
+            HistoryCourse::Values(values) => values.len(),
+        }
+    }
+
+    /// The values at so many points.
+    #[must_use]
+    pub fn values(&self, points: usize) -> Vec<f64> {
+        match self {
+            HistoryCourse::Constant(value) => vec![*value; points],
+            HistoryCourse::Range(range) => range.values(),
+            HistoryCourse::Values(values) => values.clone(),
+        }
+    }
+}
+
+/// The state in which a history begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum HistoryStartName {
+    /// Pressed together without tangential tractions.
+    #[default]
+    Rest,
+    /// In steady rolling with the motion or forces of the first point.
+    Steady,
+}

@@ -1,0 +1,431 @@
+//! A history on one level: step by step, with the displacements that each step remembers.
+
+use std::sync::Arc;
+
+use crate::contact::half_space::strip_operator::kind::Parity;
+use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::rolling::answer::{LevelFailure, Work};
+use crate::contact::rolling::displacement_memory::{DisplacementMemory, LeadingEdges};
+use crate::contact::rolling::history::plan::{HistoryStep, StepKind, steps, weights};
+use crate::contact::rolling::history::record::PointRecord;
+use crate::contact::rolling::history::search::StepSearch;
+use crate::contact::rolling::history::task::HistoryTask;
+use crate::contact::rolling::methods::boundary_element::fixed_point::slide_along;
+use crate::contact::rolling::methods::boundary_element::newton::Newton;
+use crate::contact::rolling::methods::boundary_element::task::{
+    Convergence, NewtonTask, STEPS_MAX,
+};
+use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
+use crate::contact::rolling::motion::{Motion, PrescribedForces};
+use crate::contact::rolling::operator_store::LevelOperator;
+use crate::contact::rolling::slip_equations::{SlipEquations, SlipScratch, SlipSource};
+use crate::contact::rolling::slip_rules::Rule;
+use crate::contact::rolling::strip_mesh::StripMesh;
+use crate::contact::rolling::task::RollingTask;
+
+/// Tangential stiffness of a circular patch over shear modulus and radius, for the first trial of a force: 4/(2 − ν) of both bodies together
+/// (Mindlin 1949). Later trials take what was found.
+const STIFFNESS: f64 = 2.5;
+/// Distance over the half-length after which creepage has brought its force, for the first trial of steady rolling.
+const RELAXATION: f64 = 1.0;
+
+/// What is solved on one level.
+pub struct LevelRun<'a> {
+    pub(super) task: &'a RollingTask<'a>,
+    pub(super) history: &'a HistoryTask,
+    pub(super) level: &'a StripMesh,
+    pub(super) operator: Arc<LevelOperator>,
+    pub(super) parity: Option<Parity>,
+    pub(super) edges: LeadingEdges,
+    /// Cells with unknowns.
+    pub(super) cells: usize,
+    pub(super) bound: Vec<f64>,
+    pub(super) area: Vec<f64>,
+    /// Residual of the tractions, and by how much forces may be missed, both relative.
+    pub(super) tolerance: [f64; 2],
+    pub(super) workspace: &'a mut NewtonWorkspace,
+    pub(super) monitor: &'a dyn Monitor,
+    pub(super) state: RunState,
+}
+
+/// What the next step begins with.
+#[derive(Debug, Clone, Default)]
+pub(super) struct RunState {
+    pub(super) tractions: Vec<f64>,
+    /// Where the next solve starts.
+    pub(super) guess: Vec<f64>,
+    /// Displacements at the nodes, and a step earlier.
+    pub(super) displacement: Vec<f64>,
+    pub(super) earlier: Vec<f64>,
+    /// Dimensionless creepages or shift of the last step.
+    pub(super) motion: Motion,
+    pub(super) power: Vec<f64>,
+    pub(super) dissipated: Vec<f64>,
+    /// Elastic energy of every patch in N·mm, now and a step earlier.
+    pub(super) stored: Vec<[f64; 2]>,
+    pub(super) work: Work,
+    pub(super) saturated: bool,
+}
+
+/// Equations of steps of one kind.
+pub(super) struct StepEquations<'e> {
+    pub(super) kind: StepKind,
+    pub(super) equations: &'e SlipEquations<'e>,
+    pub(super) newton: &'e Newton<'e>,
+}
+
+impl<'a> LevelRun<'a> {
+    /// A run that begins without tractions.
+    ///
+    /// # Errors
+    /// The monitor may stop the work.
+    pub fn new(
+        task: &'a RollingTask<'a>,
+        history: &'a HistoryTask,
+        level: &'a StripMesh,
+        tolerance: [f64; 2],
+        workspace: &'a mut NewtonWorkspace,
+        monitor: &'a dyn Monitor,
+    ) -> Result<LevelRun<'a>, Stop> {
+        let operator = level.operator(monitor)?;
+        let parity = level.parity(&every_motion(task, history));
+        let padded = operator.influence.padded(parity);
+        let resized = |values: &[f64]| {
+            let mut values = values.to_vec();
+            values.resize(padded.max(values.len()), 0.0);
+            values
+        };
+        let patches = task.footprint.patches().len();
+        let zero = vec![0.0; 2 * padded];
+        Ok(LevelRun {
+            cells: match parity {
+                Some(_) => level.mesh.cells() / 2,
+                None => level.mesh.cells(),
+            },
+            edges: LeadingEdges::new(&level.normalised, level.poisson_ratio(), parity),
+            bound: resized(&level.bound),
+            area: resized(&level.normalised.areas()),
+            state: RunState {
+                tractions: zero.clone(),
+                guess: zero.clone(),
+                displacement: zero.clone(),
+                earlier: zero,
+                power: vec![0.0; patches],
+                dissipated: vec![0.0; patches],
+                stored: vec![[0.0; 2]; patches],
+                ..RunState::default()
+            },
+            task,
+            history,
+            level,
+            operator,
+            parity,
+            tolerance,
+            workspace,
+            monitor,
+        })
+    }
+
+    /// Solves all points with steps of at most `longest` mm.
+    ///
+    /// # Errors
+    /// The point to which a step did not converge, or at which the monitor stopped the work.
+    pub fn run(mut self, longest: f64) -> Result<Vec<PointRecord>, (usize, LevelFailure)> {
+        let forced = self.task.forces.iter().any(|forces| *forces != [None; 2]);
+        let steps = steps(self.history, longest, forced);
+        let mut points = Vec::with_capacity(self.history.distances.len());
+        let (level, operator) = (self.level, Arc::clone(&self.operator));
+        let (parity, edges) = (self.parity, self.edges.clone());
+        for alike in steps.chunk_by(|a, b| a.kind == b.kind) {
+            let kind = alike[0].kind;
+            let equations = steady(Rule::ThreePoint, (level, &operator, parity));
+            let equations = equations.with_memory(memory(kind, &edges, level.scale.length));
+            let newton = Newton::new(&equations).far_reaching(&self.gain(&equations));
+            let of = StepEquations {
+                kind,
+                equations: &equations,
+                newton: &newton,
+            };
+            let mut search = self.search(kind);
+            for step in alike {
+                self.step(&of, step, &mut search)
+                    .map_err(|failure| (step.point, failure))?;
+                if step.last {
+                    points.push(self.record(&of));
+                }
+            }
+        }
+        Ok(points)
+    }
+
+    /// By how much the displacements of a step make the slip of each cell fall if all tractions grow by one.
+    fn gain(&self, equations: &SlipEquations) -> Vec<f64> {
+        let mut even = vec![0.0; self.state.tractions.len()];
+        even[..self.cells].fill(1.0);
+        let mut gain = vec![0.0; even.len()];
+        equations.displacement(&even, &mut gain, &mut SlipScratch::default());
+        gain.truncate(self.cells);
+        gain.iter_mut()
+            .for_each(|u| *u *= equations.memory_factor());
+        gain
+    }
+
+    /// The search for the forces of steps of a kind.
+    fn search(&self, kind: StepKind) -> StepSearch {
+        let limit = self.limit();
+        let patch = self.task.footprint.patches()[0].extent;
+        let stiffness = STIFFNESS / limit;
+        let reach = match kind {
+            StepKind::Shift => 1.0,
+            StepKind::Roll { distance, growth } => {
+                distance / (self.level.scale.length * weights(growth)[0])
+            }
+            StepKind::Steady => RELAXATION * 0.5 * (patch[1] - patch[0]) / self.level.scale.length,
+        };
+        let searched = self.task.forces[0].map(|force| force.is_some());
+        StepSearch::new(searched, [1.0 / (stiffness * reach); 2])
+    }
+
+    /// One step: its motion, or the one that gives its forces.
+    fn step(
+        &mut self,
+        of: &StepEquations,
+        step: &HistoryStep,
+        search: &mut StepSearch,
+    ) -> Result<(), LevelFailure> {
+        let (given, forces) = self.asked(step);
+        let memory = self.memory(of);
+        let motion_before = self.state.motion;
+        let mut solved = None;
+        if forces == [None; 2] {
+            solved = Some((given, self.solve(of, &given, &memory)?));
+        } else {
+            let limit = self
+                .task
+                .friction
+                .limit_of_all(self.task.footprint.patches());
+            let wanted = forces.map(|force| force.unwrap_or(0.0) / limit);
+            let start = match of.kind {
+                StepKind::Shift => [given.creepage_x, given.creepage_y],
+                _ => [motion_before.creepage_x, motion_before.creepage_y],
+            };
+            let motion = |place: [f64; 2]| Motion {
+                creepage_x: forces[0].map_or(given.creepage_x, |_| place[0]),
+                creepage_y: forces[1].map_or(given.creepage_y, |_| place[1]),
+                ..given
+            };
+            let found = search.find(start, self.tolerance[1], |place| {
+                let motion = motion(place);
+                let tractions = self.solve(of, &motion, &memory)?;
+                let forces = self.forces(&tractions);
+                solved = Some((motion, tractions));
+                Ok::<_, LevelFailure>([0, 1].map(|k| forces[k] - wanted[k]))
+            })?;
+            self.state.saturated |= found.off > 10.0 * self.tolerance[1];
+        }
+        let Some((motion, tractions)) = solved else {
+            return Ok(());
+        };
+        self.advance(of, motion, tractions);
+        Ok(())
+    }
+
+    /// Dimensionless motion and forces of a step.
+    fn asked(&self, step: &HistoryStep) -> (Motion, PrescribedForces) {
+        let RollingTask {
+            motions, forces, ..
+        } = self.task;
+        let scale = self.level.scale;
+        let point = step.point;
+        let before = point.saturating_sub(1);
+        let (share, rest) = (step.share, 1.0 - step.share);
+        let between = |a: f64, b: f64| rest * a + share * b;
+        let (from, to) = (&forces[before], &forces[point]);
+        let forces = [0, 1].map(|k| to[k].map(|to| between(from[k].unwrap_or(to), to)));
+        if step.kind == StepKind::Shift {
+            let shift = self.history.shifts[point];
+            // A force that is there before the bodies roll.
+            let shift = if step.last { shift } else { Motion::default() };
+            let shift = scale.motion(&shift);
+            let length = scale.length;
+            return (
+                Motion {
+                    creepage_x: shift.creepage_x / length,
+                    creepage_y: shift.creepage_y / length,
+                    spin_per_mm: shift.spin_per_mm / length,
+                },
+                self.task.forces[point],
+            );
+        }
+        let (from, to) = (&motions[before], &motions[point]);
+        let motion = Motion {
+            creepage_x: between(from.creepage_x, to.creepage_x),
+            creepage_y: between(from.creepage_y, to.creepage_y),
+            spin_per_mm: between(from.spin_per_mm, to.spin_per_mm),
+        };
+        (scale.motion(&motion), forces)
+    }
+
+    /// The slip that the displacements before the step add to it.
+    fn memory(&self, of: &StepEquations) -> [Vec<f64>; 2] {
+        let RunState {
+            displacement,
+            earlier,
+            ..
+        } = &self.state;
+        let part: Vec<f64> = match of.kind {
+            StepKind::Steady => vec![0.0; displacement.len()],
+            StepKind::Shift => displacement.clone(),
+            StepKind::Roll { distance, growth } => {
+                let unit = self.level.scale.length / distance;
+                let [_, last, before] = weights(growth).map(|w| w * unit);
+                let both = displacement.iter().zip(earlier);
+                both.map(|(u, earlier)| last * u - before * earlier)
+                    .collect()
+            }
+        };
+        let (x, y) = part.split_at(part.len() / 2);
+        [x.to_vec(), y.to_vec()]
+    }
+
+    /// Tractions of a step under a dimensionless motion.
+    fn solve(
+        &mut self,
+        of: &StepEquations,
+        motion: &Motion,
+        [x, y]: &[Vec<f64>; 2],
+    ) -> Result<Vec<f64>, LevelFailure> {
+        let rigid = of.equations.given(motion, Some(SlipSource { x, y }));
+        let law = NewtonTask {
+            rigid: &rigid,
+            bound: &self.bound,
+            fall: None,
+            area: &self.area,
+            scale: 1.0,
+            tolerance: self.tolerance[0],
+            steps_max: STEPS_MAX,
+        };
+        let mut tractions = self.state.guess.clone();
+        let mut report = of
+            .newton
+            .solve(&law, &mut tractions, self.workspace, self.monitor)?;
+        let mut work = count(&report, of.newton);
+        if !report.exit.converged() {
+            tractions.fill(0.0);
+            if of.kind == StepKind::Steady {
+                let level = (self.level, &*self.operator, self.parity);
+                let equations = steady(Rule::Upwind, level);
+                let newton = Newton::new(&equations);
+                let rigid = &equations.rigid(motion);
+                let law = NewtonTask { rigid, ..law };
+                let report = newton.solve(&law, &mut tractions, self.workspace, self.monitor)?;
+                work.add(count(&report, &newton));
+            }
+            report = of
+                .newton
+                .solve(&law, &mut tractions, self.workspace, self.monitor)?;
+            work.add(count(&report, of.newton));
+        }
+        if !report.exit.converged() {
+            // Every cell slips along what the motion and the past ask for.
+            slide_along(&rigid, &self.bound[..self.cells], None, &mut tractions);
+            report = of
+                .newton
+                .solve(&law, &mut tractions, self.workspace, self.monitor)?;
+            work.add(count(&report, of.newton));
+        }
+        self.state.work.add(work);
+        if !report.exit.converged() {
+            return Err(LevelFailure::NotConverged {
+                work: self.state.work,
+                tolerance: self.tolerance[0],
+                advice: report.advice(),
+            });
+        }
+        self.state.guess.clone_from(&tractions);
+        Ok(tractions)
+    }
+
+    /// Forces of the unknowns over the friction limit.
+    fn forces(&self, tractions: &[f64]) -> [f64; 2] {
+        let (x, y) = tractions.split_at(tractions.len() / 2);
+        let sum = |values: &[f64]| {
+            (0..self.cells)
+                .map(|i| self.area[i] * values[i])
+                .sum::<f64>()
+        };
+        let limit = self.limit();
+        [sum(x) / limit, sum(y) / limit]
+    }
+
+    /// Friction limit of the unknowns, dimensionless.
+    fn limit(&self) -> f64 {
+        let cells = self.area.iter().zip(&self.bound).take(self.cells);
+        cells.map(|(area, bound)| area * bound).sum()
+    }
+
+    /// Takes over the tractions of a step.
+    fn advance(&mut self, of: &StepEquations, motion: Motion, tractions: Vec<f64>) {
+        let mut displacement = vec![0.0; tractions.len()];
+        let mut scratch = SlipScratch::default();
+        of.equations
+            .displacement(&tractions, &mut displacement, &mut scratch);
+        let state = &mut self.state;
+        state.earlier = match of.kind {
+            // Nothing changed before.
+            StepKind::Steady => displacement.clone(),
+            _ => std::mem::take(&mut state.displacement),
+        };
+        state.displacement = displacement;
+        let from = std::mem::replace(&mut state.tractions, tractions);
+        state.motion = motion;
+        self.dissipate(of, &from);
+    }
+}
+
+/// How the displacements enter the slip of a step of this kind, for a unit of length in mm.
+fn memory(kind: StepKind, edges: &LeadingEdges, unit: f64) -> DisplacementMemory<'_> {
+    let (factor, rolls) = match kind {
+        StepKind::Steady => (0.0, true),
+        StepKind::Shift => (1.0, false),
+        StepKind::Roll { distance, growth } => (weights(growth)[0] * unit / distance, true),
+    };
+    DisplacementMemory {
+        edges,
+        factor,
+        rolls,
+    }
+}
+
+/// Equations of steady rolling by a rule.
+fn steady<'e>(
+    rule: Rule,
+    (level, operator, parity): (&StripMesh, &'e LevelOperator, Option<Parity>),
+) -> SlipEquations<'e> {
+    SlipEquations::new(rule, &level.normalised, &operator.influence, parity)
+        .with_layer(&level.normalised, level.layer)
+}
+
+/// A motion that has every component that any motion or shift of a history has.
+fn every_motion(task: &RollingTask, history: &HistoryTask) -> Motion {
+    let mut every = Motion::default();
+    for motion in task.motions.iter().chain(&history.shifts) {
+        every.creepage_x += motion.creepage_x.abs();
+        every.creepage_y += motion.creepage_y.abs();
+        every.spin_per_mm += motion.spin_per_mm.abs();
+    }
+    for forces in task.forces {
+        every.creepage_x += f64::from(u8::from(forces[0].is_some()));
+        every.creepage_y += f64::from(u8::from(forces[1].is_some()));
+    }
+    every
+}
+
+fn count(report: &Convergence, newton: &Newton) -> Work {
+    Work {
+        iterations: report.iterations,
+        products: report.products,
+        entries: u64::from(report.products) * newton.entries() as u64,
+        residual: report.residual,
+    }
+}

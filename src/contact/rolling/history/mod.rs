@@ -1,0 +1,9 @@
+//! Rolling that changes, and shift: one tangential problem per step of distance, each of which remembers the displacements before it.
+
+pub(crate) mod level_record;
+pub mod level_run;
+pub mod plan;
+pub mod record;
+pub(crate) mod search;
+pub mod solve;
+pub mod task;

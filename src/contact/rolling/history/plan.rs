@@ -1,0 +1,185 @@
+//! In which steps a history is solved: equal ones from point to point, short ones where it begins anew.
+//!
+//! Each step is a backward difference of second order in the displacements (BDF2) with the weights for unequal steps (Hairer, Nørsett &
+//! Wanner 1993, §III.5), or of first order where no step was before it.
+
+use crate::contact::rolling::history::task::{HistoryStart, HistoryTask};
+
+/// A step may be longer than the one before by this factor at most; BDF2 is stable up to 1 + √2.
+const GROWTH_MAX: f64 = 2.0;
+
+/// What the bodies do in a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum StepKind {
+    /// They roll in the state that belongs to the motion.
+    Steady,
+    /// They are shifted without rolling.
+    Shift,
+    /// They roll a distance in mm; the step before was longer by 1/growth, which is 0 if there was none.
+    Roll {
+        /// The distance.
+        distance: f64,
+        /// Length over that of the step before.
+        growth: f64,
+    },
+}
+
+/// One step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HistoryStep {
+    /// What it is.
+    pub kind: StepKind,
+    /// The point that it leads to.
+    pub point: usize,
+    /// Which part of the way from the point before is done after it.
+    pub share: f64,
+    /// Does it end at the point?
+    pub last: bool,
+}
+
+/// Weights of a backward difference, over the length of the step: of the displacement at its end, at its beginning, and a step earlier.
+#[must_use]
+pub fn weights(growth: f64) -> [f64; 3] {
+    [
+        (1.0 + 2.0 * growth) / (1.0 + growth),
+        1.0 + growth,
+        growth * growth / (1.0 + growth),
+    ]
+}
+
+/// Steps of a point that is rolled to.
+fn rolled(distance: f64, longest: f64, before: Option<f64>) -> Vec<f64> {
+    let count = (distance / longest).ceil().max(1.0);
+    let even = distance / count;
+    let count = count as usize;
+    match before {
+        // The first of a sequence is divided, since it is of first order.
+        None => {
+            let mut steps = vec![0.25 * even, 0.25 * even, 0.5 * even];
+            steps.extend(std::iter::repeat_n(even, count - 1));
+            steps
+        }
+        Some(before) if even > GROWTH_MAX * before => {
+            let mut steps = Vec::new();
+            let (mut left, mut last) = (distance, before);
+            while left > 0.0 {
+                last = (GROWTH_MAX * last).min(even);
+                let more = (left / last - 1e-9).ceil();
+                if last >= even || more <= 1.0 {
+                    steps.extend(std::iter::repeat_n(left / more, more as usize));
+                    break;
+                }
+                steps.push(last);
+                left -= last;
+            }
+            steps
+        }
+        Some(_) => vec![even; count],
+    }
+}
+
+/// Steps in a history of these distances, none longer than `longest` mm.
+#[must_use]
+pub fn count(history: &HistoryTask, longest: f64) -> f64 {
+    let points = 0..history.distances.len();
+    let steps = points.map(|k| (history.rolled(k) / longest).ceil().max(1.0));
+    3.0 + steps.sum::<f64>()
+}
+
+/// The steps of a history, none longer than `longest` mm. With `forced`, where a force is prescribed, one that is there at once is
+/// brought up by a shift before the bodies roll.
+#[must_use]
+pub fn steps(history: &HistoryTask, longest: f64, forced: bool) -> Vec<HistoryStep> {
+    let mut steps = Vec::new();
+    let whole = |kind, point| HistoryStep {
+        kind,
+        point,
+        share: 1.0,
+        last: false,
+    };
+    match history.start {
+        HistoryStart::Steady => steps.push(whole(StepKind::Steady, 0)),
+        HistoryStart::Rest if forced && history.rolled(0) > 0.0 => {
+            steps.push(whole(StepKind::Shift, 0));
+        }
+        HistoryStart::Rest => {}
+    }
+    let mut before = None;
+    for point in 0..history.distances.len() {
+        let distance = history.rolled(point);
+        if distance > 0.0 {
+            let lengths = rolled(distance, longest, before);
+            let mut done = 0.0;
+            for length in lengths {
+                done += length;
+                let growth = before.map_or(0.0, |before| length / before);
+                // Rounding would make every step one of its own kind.
+                let growth = if (growth - 1.0).abs() < 1e-9 {
+                    1.0
+                } else {
+                    growth
+                };
+                let kind = StepKind::Roll {
+                    distance: length,
+                    growth,
+                };
+                steps.push(HistoryStep {
+                    share: (done / distance).min(1.0),
+                    ..whole(kind, point)
+                });
+                before = Some(length);
+            }
+        } else if point > 0 || history.start == HistoryStart::Rest {
+            steps.push(whole(StepKind::Shift, point));
+            before = None;
+        }
+        if let Some(step) = steps.last_mut() {
+            step.last = true;
+            step.share = 1.0;
+        }
+    }
+    steps
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::rolling::motion::Motion;
+
+    fn history(distances: &[f64]) -> HistoryTask {
+        HistoryTask {
+            start: HistoryStart::Rest,
+            distances: distances.to_vec(),
+            shifts: vec![Motion::default(); distances.len()],
+        }
+    }
+
+    #[test]
+    fn steps_end_at_every_point_and_grow_by_two_at_most() {
+        let history = history(&[0.0, 0.3, 5.0, 5.0, 5.01, 9.0, 100.0]);
+        let steps = steps(&history, 0.7, false);
+        let (mut done, mut points) = (0.0, Vec::new());
+        for step in &steps {
+            if let StepKind::Roll { distance, growth } = step.kind {
+                assert!(growth <= GROWTH_MAX + 1e-9, "{step:?}");
+                assert!(distance <= 0.7 + 1e-12);
+                done += distance;
+            }
+            if step.last {
+                assert!((done - history.distances[step.point]).abs() < 1e-9);
+                points.push(step.point);
+            }
+        }
+        assert_eq!(points, [0, 1, 2, 3, 4, 5, 6]);
+    }
+
+    #[test]
+    fn backward_differences_are_exact_for_parabolas() {
+        for (step, before) in [(0.3, 0.2), (1.0, 1.0), (0.1, 0.5)] {
+            let [now, last, earlier] = weights(step / before);
+            let u = |q: f64| 2.0 * q * q - q;
+            let slope = (now * u(step) - last * u(0.0) + earlier * u(-before)) / step;
+            assert!((slope - (4.0 * step - 1.0)).abs() < 1e-12, "{slope}");
+        }
+    }
+}

@@ -1,0 +1,364 @@
+//! A history on finer and finer levels until two in a row agree.
+
+use crate::contact::error::SolveError;
+use crate::contact::mesh::size::MeshSize;
+use crate::contact::monitor::Monitor;
+use crate::contact::rolling::answer::{LevelAnswer, LevelExit, Work};
+use crate::contact::rolling::history::level_run::LevelRun;
+use crate::contact::rolling::history::plan;
+use crate::contact::rolling::history::record::PointRecord;
+use crate::contact::rolling::history::task::HistoryTask;
+use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::motion_answer::{HistoryAnswer, MotionAnswer, SolvedFields};
+use crate::contact::rolling::refinement::level_solve::named;
+use crate::contact::rolling::refinement::levels::Levels;
+use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::rolling::resultants::Resultants;
+use crate::contact::rolling::task::RollingTask;
+
+// The numbers below are from the four histories of CONTACT in `tests/data/transient.json`, on meshes from 6 × 12 to 24 × 48 with steps of
+// a/5 to a/32, a half the length (`cargo test --test physics -- histories_agree --nocapture` prints what comes of them).
+
+/// Cells along x of the first level. 12 give a change to the second level that misses the usual target.
+const CELLS_FIRST: f64 = 16.0;
+/// From level to level there are so many times more cells along x, strips and steps.
+const FINER: f64 = 1.5;
+/// Levels at most.
+const LEVELS_MAX: i32 = 4;
+/// Cells along x per strip on a patch as long as wide. What travels through the contact is rounded over two cells, so that cells count for
+/// more than strips: with 3 creepages are as exact, moments under spin half as.
+const SHAPE: f64 = 2.0;
+/// Steps per half-length of the patch and cell along x. With twice as many the creepages are off by up to twice as much, since shorter
+/// steps round less in time; forces change by 0.002 of the limit at most.
+const STEPS_PER_CELL: f64 = 1.0 / 3.0;
+/// Resultants are extrapolated by this share of their change from the level before; their error falls a little faster than the width
+/// of the cells. 0.25 and 0.75 leave 1.5 times the error.
+const EXTRAPOLATED: f64 = 0.5;
+/// Error of resultants, and of creepages and shifts that are found, over the change from the level before: 1.2 and 0.9 at 95 % of the
+/// points where the change is that of the neighbourhood alone.
+const ERROR_OVER_CHANGE: f64 = 0.8;
+/// See [`ERROR_OVER_CHANGE`].
+const CREEPAGE_ERROR_OVER_CHANGE: f64 = 1.4;
+/// The error at a point is at least this part of the largest of the history, since what was wrong before is remembered.
+const REMEMBERED: f64 = 0.7;
+/// By how much prescribed forces may be missed, relative to the friction limit, with some room.
+const MISSED: f64 = 2e-5;
+/// The error of creepages and shifts that are found is to be below this many times the target, relative to the largest creepage.
+const CREEPAGE_SHARE: f64 = 10.0;
+
+/// One level of a history.
+#[derive(Debug, Clone, Copy)]
+struct HistoryLevel {
+    size: MeshSize,
+    /// Longest step in mm.
+    longest: f64,
+}
+
+/// A history on one level.
+struct SolvedHistory {
+    /// The number of the level in the levels.
+    level: usize,
+    points: Vec<PointRecord>,
+    /// Wall time in s.
+    seconds: f64,
+}
+
+/// How far two levels are apart at a point.
+#[derive(Debug, Clone, Default)]
+struct Change {
+    /// Of the resultants relative to μN, patch by patch, then of their sum.
+    resultants: Vec<f64>,
+    /// Of the creepages found.
+    creepage: [f64; 2],
+    /// Of the shifts found, in mm.
+    shift: [f64; 2],
+    /// Resultants and shift of the coarser level.
+    coarser: Vec<Resultants>,
+    /// See [`Change::coarser`].
+    coarser_shift: Motion,
+}
+
+/// Why a history takes more steps than are allowed, if it does; `extents` are those of the patches.
+#[must_use]
+pub fn too_long(history: &HistoryTask, extents: &[[f64; 4]], steps_max: usize) -> Option<String> {
+    let half = half_length(extents)?;
+    let longest = half / (STEPS_PER_CELL * CELLS_FIRST);
+    let steps = plan::count(history, longest);
+    (steps > steps_max as f64).then(|| {
+        let rolled = history.distances.last().copied().unwrap_or(0.0);
+        format!(
+            "{rolled} mm are rolled over, which takes {steps:.0} steps of {longest:.3} mm; at most {steps_max} are allowed in one case"
+        )
+    })
+}
+
+/// Steps of a history on the finest level that a target usually leads to, and cells there along x and across.
+#[must_use]
+pub fn usual_work(history: &HistoryTask, extents: &[[f64; 4]]) -> (f64, f64) {
+    let Some(half) = half_length(extents) else {
+        return (history.distances.len() as f64, CELLS_FIRST * CELLS_FIRST);
+    };
+    let cells = CELLS_FIRST * FINER * FINER;
+    let steps = plan::count(history, half / (STEPS_PER_CELL * cells));
+    (steps, cells * cells / SHAPE)
+}
+
+/// Half the length of the shortest patch.
+fn half_length(extents: &[[f64; 4]]) -> Option<f64> {
+    let lengths = extents.iter().map(|e| 0.5 * (e[1] - e[0]));
+    lengths.reduce(f64::min).filter(|half| *half > 0.0)
+}
+
+/// Solves a history: an answer per point.
+///
+/// # Errors
+/// Why there is no answer.
+pub fn solve(
+    task: &RollingTask,
+    history: &HistoryTask,
+    levels: &mut Levels,
+    monitor: &dyn Monitor,
+) -> Result<Vec<MotionAnswer>, SolveError> {
+    let plans = level_plans(task);
+    let mut before: Option<SolvedHistory> = None;
+    let mut seconds = 0.0;
+    let mut work = Work::default();
+    for (k, plan) in plans.iter().enumerate() {
+        let mut found = on_level(task, history, *plan, levels, monitor)?;
+        seconds += found.seconds;
+        found.seconds = seconds;
+        let last = k + 1 == plans.len();
+        let Some(coarser) = before else {
+            before = Some(found);
+            continue;
+        };
+        for point in &coarser.points {
+            work.add(point.work);
+        }
+        let changes = changes(task, &coarser.points, &found.points);
+        if last || is_met(task, &found.points, &changes) {
+            return Ok(answers(task, history, found, &changes, work));
+        }
+        before = Some(found);
+    }
+    unreachable!("there are two levels at least")
+}
+
+/// The levels that a history may be solved on, coarse to fine: those of a target, or a mesh of the client's behind a coarser one.
+fn level_plans(task: &RollingTask) -> Vec<HistoryLevel> {
+    let patches = task.footprint.patches();
+    let extents: Vec<[f64; 4]> = patches.iter().map(|patch| patch.extent).collect();
+    let half = half_length(&extents).unwrap_or(1.0);
+    let plan = |strips: f64, cells: f64| HistoryLevel {
+        size: MeshSize {
+            strips: strips.max(2.0) as u32,
+            cells: cells.max(2.0) as u32,
+        },
+        longest: half / (STEPS_PER_CELL * cells.max(8.0)),
+    };
+    if let Resolution::Mesh(size) = task.resolution {
+        let [strips, cells] = [size.strips, size.cells].map(f64::from);
+        let even = 2.0 * (0.5 * strips / FINER).round();
+        let coarse = plan(even.max(4.0), (cells / FINER).round().max(6.0));
+        return vec![coarse, plan(strips, cells)];
+    }
+    let [x0, x1, y0, y1] = extents[0];
+    let shape = SHAPE * ((x1 - x0) / (y1 - y0)).powf(0.45);
+    let patches = (patches.len() as f64).sqrt();
+    let levels = (0..LEVELS_MAX).map(|k| {
+        let cells = (CELLS_FIRST * FINER.powi(k) / patches).round().max(8.0);
+        let strips = 2.0 * (0.5 * cells / shape).round().max(2.0);
+        plan(strips, cells)
+    });
+    levels.collect()
+}
+
+fn on_level(
+    task: &RollingTask,
+    history: &HistoryTask,
+    plan: HistoryLevel,
+    levels: &mut Levels,
+    monitor: &dyn Monitor,
+) -> Result<SolvedHistory, SolveError> {
+    let began = monitor.elapsed();
+    let number = levels.level(plan.size.into())?;
+    let level = levels.get(number);
+    let forced = task.has_prescribed_forces();
+    let residual = match task.resolution {
+        Resolution::Target(target) => (0.02 * target).clamp(1e-6, 1e-4),
+        Resolution::Mesh(_) => 1e-6,
+    };
+    // What the iteration leaves of a force is a change of the creepage in one step.
+    let tolerance = if forced {
+        [5e-6_f64.min(residual), 1e-5]
+    } else {
+        [residual, 1e-5]
+    };
+    let workspace = &mut levels.workspace;
+    let run = LevelRun::new(task, history, &level, tolerance, workspace, monitor)?;
+    let points = run
+        .run(plan.longest)
+        .map_err(|(point, failure)| named(failure, task, task.first_motion + point))?;
+    Ok(SolvedHistory {
+        level: number,
+        points,
+        seconds: (monitor.elapsed() - began).as_secs_f64(),
+    })
+}
+
+fn sum(resultants: &[Resultants]) -> Resultants {
+    let zero = Resultants::default();
+    resultants.iter().fold(zero, |sum, r| sum.plus(*r))
+}
+
+/// The changes from one level to the next; at every point at least those of its neighbours, since what travels through the contact comes
+/// to a point a little earlier or later on another level, and a part of the largest.
+fn changes(task: &RollingTask, coarse: &[PointRecord], fine: &[PointRecord]) -> Vec<Change> {
+    let patches = task.footprint.patches();
+    let area: f64 = patches.iter().map(|patch| patch.area).sum();
+    let limit = task.friction.limit_of_all(patches);
+    let length = |area: f64| (area / std::f64::consts::PI).sqrt();
+    let own: Vec<Change> = coarse
+        .iter()
+        .zip(fine)
+        .map(|(a, b)| {
+            let each = patches.iter().enumerate().map(|(k, patch)| {
+                let [x0, x1, y0, y1] = patch.extent;
+                let middle = [0.5 * (x0 + x1), 0.5 * (y0 + y1)];
+                let [a, b] = [a, b].map(|point| point.resultants[k].about(middle));
+                a.distance(&b, task.friction.limit(patch), length(patch.area))
+            });
+            let all = sum(&a.resultants).distance(&sum(&b.resultants), limit, length(area));
+            let apart = |of: fn(&PointRecord) -> [f64; 2]| {
+                let (a, b) = (of(a), of(b));
+                [0, 1].map(|k| (a[k] - b[k]).abs())
+            };
+            Change {
+                resultants: each.chain([all]).collect(),
+                creepage: apart(|p| [p.motion.creepage_x, p.motion.creepage_y]),
+                shift: apart(|p| [p.shift.creepage_x, p.shift.creepage_y]),
+                coarser: a.resultants.clone(),
+                coarser_shift: a.shift,
+            }
+        })
+        .collect();
+    (0..own.len())
+        .map(|k| {
+            let near = k.saturating_sub(1)..(k + 2).min(own.len());
+            let largest = |of: &dyn Fn(&Change) -> f64| {
+                let most = |some: &[Change]| some.iter().map(of).fold(0.0, f64::max);
+                most(&own[near.clone()]).max(REMEMBERED * most(&own))
+            };
+            Change {
+                resultants: (0..own[k].resultants.len())
+                    .map(|i| largest(&|change| change.resultants[i]))
+                    .collect(),
+                creepage: [0, 1].map(|i| largest(&|change| change.creepage[i])),
+                shift: own[k].shift,
+                coarser: own[k].coarser.clone(),
+                coarser_shift: own[k].coarser_shift,
+            }
+        })
+        .collect()
+}
+
+/// Are resultants and creepages as exact as is asked?
+fn is_met(task: &RollingTask, points: &[PointRecord], changes: &[Change]) -> bool {
+    let Some(target) = task.target() else {
+        return true;
+    };
+    let forces = changes.iter().filter_map(|change| change.resultants.last());
+    let worst = forces.fold(0.0_f64, |worst, change| worst.max(*change));
+    if ERROR_OVER_CHANGE * worst > target {
+        return false;
+    }
+    (0..2).all(|k| {
+        let at = |point: &PointRecord| [point.motion.creepage_x, point.motion.creepage_y][k];
+        let peak = points
+            .iter()
+            .map(|point| at(point).abs())
+            .fold(0.0, f64::max);
+        let worst = changes
+            .iter()
+            .map(|change| change.creepage[k])
+            .fold(0.0, f64::max);
+        CREEPAGE_ERROR_OVER_CHANGE * worst <= CREEPAGE_SHARE * target * peak
+    })
+}
+
+/// A shift extrapolated as resultants are; what was given is the same on both levels.
+fn beyond(fine: &Motion, coarse: &Motion) -> Motion {
+    let past = |fine: f64, coarse: f64| fine + EXTRAPOLATED * (fine - coarse);
+    Motion {
+        creepage_x: past(fine.creepage_x, coarse.creepage_x),
+        creepage_y: past(fine.creepage_y, coarse.creepage_y),
+        spin_per_mm: past(fine.spin_per_mm, coarse.spin_per_mm),
+    }
+}
+
+/// The answers of the points.
+fn answers(
+    task: &RollingTask,
+    history: &HistoryTask,
+    solved: SolvedHistory,
+    changes: &[Change],
+    coarse: Work,
+) -> Vec<MotionAnswer> {
+    let seconds = solved.seconds / solved.points.len() as f64;
+    let points = solved.points.into_iter().zip(changes).enumerate();
+    points
+        .map(|(k, (point, change))| {
+            let mut work = point.work;
+            if k == 0 {
+                let residual = work.residual;
+                work.add(coarse);
+                work.residual = residual;
+            }
+            let error =
+                |change: &f64| Some(ERROR_OVER_CHANGE * change + task.tolerance().max(MISSED));
+            let forces = task.forces[k];
+            let found = |changes: [f64; 2]| {
+                [0, 1].map(|k| forces[k].map(|_| CREEPAGE_ERROR_OVER_CHANGE * changes[k]))
+            };
+            let patches = task.footprint.patches().iter().zip(&change.coarser);
+            let resultants = point.resultants.iter().zip(patches);
+            let extrapolated = resultants.map(|(fine, (patch, coarse))| {
+                fine.beyond(*coarse, EXTRAPOLATED, task.friction.limit(patch))
+            });
+            MotionAnswer {
+                motion: point.motion,
+                saturated: point.saturated,
+                errors: change.resultants.iter().map(error).collect(),
+                history: Some(HistoryAnswer {
+                    distance: history.distances[k],
+                    shift: (history.rolled(k) == 0.0)
+                        .then(|| beyond(&point.shift, &change.coarser_shift)),
+                    power: point.power,
+                    dissipated: point.dissipated,
+                    creepage_errors: found(change.creepage),
+                    shift_errors: found(change.shift),
+                }),
+                fields: Some(SolvedFields {
+                    level: solved.level,
+                    tangential: LevelAnswer {
+                        traction: point.traction,
+                        second: None,
+                        slip: point.slip,
+                        slips: point.slips,
+                        exit: LevelExit::Solved,
+                        work,
+                        skips: Vec::new(),
+                        remarks: Vec::new(),
+                    },
+                }),
+                resultants: extrapolated.collect(),
+                table: None,
+                skips: Vec::new(),
+                remarks: Vec::new(),
+                work,
+                method: task.method,
+                seconds,
+            }
+        })
+        .collect()
+}

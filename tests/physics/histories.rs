@@ -1,0 +1,377 @@
+//! Rolling that changes: references, closed forms and laws.
+
+use railhead::contact;
+use railhead::contact::case::limits::Limits;
+use railhead::contact::mesh::size::MeshSize;
+use railhead::contact::monitor::Unmonitored;
+use railhead::contact::rolling::history::level_run::LevelRun;
+use railhead::contact::rolling::history::record::PointRecord;
+use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
+use railhead::contact::rolling::strip_mesh::StripMesh;
+use railhead::contact::solution::words::{HistoryPoint, PointSolution, Solution};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use crate::reference::{assert_none, read, solve};
+
+/// A history solved elsewhere: distance, forces over the friction limit, moment over that and √(ab), creepage along x, and the
+/// uncertainties of the last four.
+#[derive(Debug, Deserialize)]
+struct Reference {
+    id: String,
+    semi_axes_mm: [f64; 2],
+    normal_force_n: f64,
+    friction: f64,
+    shear_modulus_mpa: f64,
+    poisson_ratio: f64,
+    motion: [f64; 3],
+    force_x: Option<f64>,
+    /// Of the finest mesh alone.
+    shift_mm: Option<f64>,
+    rows: Vec<[f64; 9]>,
+}
+
+impl Reference {
+    fn case(&self) -> Value {
+        let [a, b] = self.semi_axes_mm;
+        let mut distances: Vec<f64> = self.rows.iter().map(|row| row[0]).collect();
+        let history = match self.force_x {
+            Some(force) => {
+                distances.insert(0, 0.0);
+                json!({ "distance_mm": distances, "force_x_n": force * self.limit() })
+            }
+            None => {
+                let [x, y, spin] = self.motion;
+                json!({ "distance_mm": distances, "creepage_x": x, "creepage_y": y, "spin_per_mm": spin })
+            }
+        };
+        json!({
+            "material": { "shear_modulus_mpa": self.shear_modulus_mpa, "poisson_ratio": self.poisson_ratio },
+            "friction": { "coefficient": self.friction },
+            "contact": { "type": "ellipse", "a_mm": a, "b_mm": b },
+            "load": { "normal_force_n": self.normal_force_n },
+            "motion": { "history": history },
+        })
+    }
+
+    fn limit(&self) -> f64 {
+        self.friction * self.normal_force_n
+    }
+
+    /// Errors of the forces and of the creepage over its peak beyond the uncertainty of the reference, and their estimates.
+    fn errors(&self, point: &PointSolution, row: &[f64; 9]) -> ([f64; 2], [f64; 2]) {
+        let [a, b] = self.semi_axes_mm;
+        let found = [
+            point.force_x_n / self.limit(),
+            point.force_y_n / self.limit(),
+            point.moment_z_n_mm / self.limit() / (a * b).sqrt(),
+            point.motion.creepage_x,
+        ];
+        let off = [0, 1, 2, 3].map(|k| ((found[k] - row[1 + k]).abs() - row[5 + k]).max(0.0));
+        let peak = self
+            .rows
+            .iter()
+            .map(|row| row[4].abs())
+            .fold(1e-9, f64::max);
+        let of_creepage = of_history(point).creepage_x_error;
+        let of_forces = point.error_estimate.unwrap().force_x_n / self.limit();
+        (
+            [off[0].max(off[1]).max(off[2]), off[3] / peak],
+            [of_forces, of_creepage.map_or(1e-6, |error| error / peak)],
+        )
+    }
+}
+
+fn of_history(point: &PointSolution) -> HistoryPoint {
+    point.history.expect("a point of a history")
+}
+
+#[test]
+fn histories_agree_with_contact_and_their_estimates_hold() {
+    let all: Vec<Reference> = read("transient.json");
+    let mut failures = Vec::new();
+    for reference in &all {
+        let began = std::time::Instant::now();
+        let (solution, _) = solve(&reference.case());
+        let seconds = began.elapsed().as_secs_f64();
+        let all = &solution.patches[0].points;
+        let points = &all[all.len() - reference.rows.len()..];
+        let (mut worst, mut most, mut covered) = ([0.0_f64; 2], [0.0_f64; 2], 0);
+        for (point, row) in points.iter().zip(&reference.rows) {
+            let (errors, estimates) = reference.errors(point, row);
+            covered += usize::from(
+                errors[0] <= estimates[0]
+                    && (reference.force_x.is_none() || errors[1] <= estimates[1]),
+            );
+            worst = [0, 1].map(|k| worst[k].max(errors[k]));
+            most = [0, 1].map(|k| most[k].max(estimates[k]));
+        }
+        // The first point of a prescribed force is a shift.
+        let shift = of_history(&all[0]).shift_x_mm.zip(reference.shift_mm);
+        let shift = shift.map_or(0.0, |(found, known)| (found / known - 1.0).abs());
+        println!(
+            "{}: forces off by {:.4} ({:.4} estimated), creepage by {:.3} ({:.3}) of its peak, shift by {shift:.4}; {covered}/{} covered; {:?}, \
+             {} steps of Newton, {seconds:.3} s",
+            reference.id,
+            worst[0],
+            most[0],
+            worst[1],
+            most[1],
+            points.len(),
+            points[0].solver.mesh,
+            all.iter().map(|p| p.solver.iterations).sum::<u32>(),
+        );
+        let met = points.iter().all(|point| point.target_met == Some(true));
+        if worst[0] > 0.015 || worst[1] > 0.05 || shift > 0.005 || !met {
+            failures.push(reference.id.clone());
+        }
+        if 100 * covered < 95 * points.len() {
+            failures.push(format!("{}: {covered} covered", reference.id));
+        }
+    }
+    assert_none("too far from CONTACT", &failures);
+}
+
+/// A sphere on a plane of the same steel with the friction limit 18 kN and the radius of contact 5 mm.
+pub fn sphere(poisson_ratio: f64, history: Value) -> Value {
+    json!({
+        "material": { "shear_modulus_mpa": 82000, "poisson_ratio": poisson_ratio },
+        "friction": { "coefficient": 0.3 },
+        "contact": { "type": "ellipse", "a_mm": 5, "b_mm": 5 },
+        "load": { "normal_force_n": 60000 },
+        "motion": history,
+    })
+}
+
+const LIMIT: f64 = 18_000.0;
+
+/// Cattaneo's shift for a force over the friction limit, in mm (Mindlin 1949).
+fn cattaneo(poisson_ratio: f64, force: f64) -> f64 {
+    let full = 3.0 * LIMIT / (8.0 * 82_000.0 * 5.0) * (2.0 - poisson_ratio);
+    full * (1.0 - (1.0 - force).powf(2.0 / 3.0))
+}
+
+#[test]
+fn a_shift_is_cattaneos_by_force_and_by_displacement() {
+    // The closed form leaves out tractions across, which are 0 for ν = 0 only.
+    for (nu, allowed) in [(0.0, 0.002), (0.28, 0.004)] {
+        let forces = [0.25, 0.5, 0.75];
+        let shifts = forces.map(|force| cattaneo(nu, force));
+        let given = forces.map(|force| force * LIMIT);
+        let still = [0.0; 3];
+        let by_force = json!({ "history": { "distance_mm": still, "force_x_n": given } });
+        let steps = [shifts[0], shifts[1] - shifts[0], shifts[2] - shifts[1]];
+        let by_shift = json!({ "history": { "distance_mm": still, "shift_x_mm": steps } });
+        let on_mesh = |motion: Value| {
+            let mut case = sphere(nu, motion);
+            case["solver"] = json!({ "mesh": { "strips": 20, "cells": 30 } });
+            solve(&case).0
+        };
+        let (of_force, of_shift) = (on_mesh(by_force), on_mesh(by_shift));
+        let mut moved = 0.0;
+        for (k, force) in forces.into_iter().enumerate() {
+            let [by_force, by_shift] = [&of_force, &of_shift].map(|s| &s.patches[0].points[k]);
+            moved += of_history(by_force).shift_x_mm.unwrap();
+            assert!(
+                (moved / shifts[k] - 1.0).abs() < allowed,
+                "{nu} {force}: {moved}"
+            );
+            assert!(
+                (by_shift.force_x_n / LIMIT - force).abs() < 2.0 * allowed,
+                "{nu} {force}"
+            );
+            // The part that sticks is a circle of the radius ∛(1 − F/μN).
+            let stick = by_force.stick_area_mm2.unwrap() / of_force.patches[0].area_mm2;
+            assert!(
+                (stick - (1.0 - force).powf(2.0 / 3.0)).abs() < 0.06,
+                "{nu} {force}: {stick}"
+            );
+        }
+    }
+}
+
+/// Points on one level, with the energies that answers do not have.
+fn on_level(case: &Value, size: MeshSize, longest: f64) -> Vec<PointRecord> {
+    let case = contact::check(case, &Limits::default()).unwrap();
+    let pressed = case.pressed(&Unmonitored).unwrap();
+    let task = case.rolling_task(&pressed.footprint);
+    let level = StripMesh::new(&task, size).unwrap();
+    let history = case.problem.history.as_ref().unwrap();
+    let mut workspace = NewtonWorkspace::default();
+    let run = LevelRun::new(
+        &task,
+        history,
+        &level,
+        [1e-7; 2],
+        &mut workspace,
+        &Unmonitored,
+    );
+    run.unwrap().run(longest).unwrap()
+}
+
+const SIZE: MeshSize = MeshSize {
+    strips: 8,
+    cells: 16,
+};
+
+#[test]
+fn what_motion_gives_is_dissipated_or_stored() {
+    let distances: Vec<f64> = (1..=120).map(|k| 0.125 * f64::from(k)).collect();
+    let history = json!({ "history": { "distance_mm": distances, "creepage_x": 0.001, "spin_per_mm": 0.0002, "creepage_y": -0.0004 } });
+    let points = on_level(&sphere(0.28, history), SIZE, 0.125);
+    let (mut given, mut before) = (0.0, 0.0);
+    for (point, from) in points
+        .iter()
+        .zip(std::iter::once(0.0).chain(distances.iter().copied()))
+    {
+        let (forces, motion) = (point.resultants[0], point.motion);
+        let power = motion.creepage_x * forces.force_x
+            + motion.creepage_y * forces.force_y
+            + motion.spin_per_mm * forces.moment_z;
+        let step = distances[0].min(15.0 - from);
+        given += 0.5 * step * (before + power);
+        before = power;
+    }
+    let last = points.last().unwrap();
+    let kept = last.dissipated[0] + last.elastic;
+    println!(
+        "given {given:.3}, dissipated {:.3}, stored {:.3} N mm",
+        last.dissipated[0], last.elastic
+    );
+    assert!(last.elastic > 0.05 * given, "{}", last.elastic);
+    assert!((kept / given - 1.0).abs() < 0.04, "{kept} of {given}");
+}
+
+#[test]
+fn friction_never_gives_energy_whatever_the_motion_does() {
+    let distances = [0.0, 1.0, 2.0, 2.0, 3.0, 3.0, 5.0, 6.0, 6.5, 6.5, 9.0];
+    let creepage = [
+        0.001, -0.002, 0.0, 0.003, -0.001, 0.0, 0.0005, -0.0005, 0.0, 0.0, 0.0,
+    ];
+    let mut case = sphere(
+        0.28,
+        json!({ "history": {
+            "distance_mm": distances,
+            "creepage_x": creepage,
+            "force_y_n": [0, 4000, -8000, -8000, 9000, -3000, -3000, 0, 0, 12000, 0],
+            "shift_x_mm": [0.004, 0, 0, -0.01, 0, 0.006, 0, 0, 0, -0.002, 0],
+        } }),
+    );
+    case["friction"]["layer"] = json!({ "shear_modulus_mpa": 1500, "thickness_mm": 0.01 });
+    let points = on_level(&case, SIZE, 0.5);
+    let mut before = 0.0;
+    for (k, point) in points.iter().enumerate() {
+        assert!(point.power[0] >= -1e-9, "{k}: {point:?}");
+        assert!(point.dissipated[0] >= before - 1e-9, "{k}");
+        assert!(point.elastic >= -1e-9, "{k}");
+        before = point.dissipated[0];
+        let force = point.resultants[0]
+            .force_x
+            .hypot(point.resultants[0].force_y);
+        assert!(force <= 1.0001 * LIMIT, "{k}: {force}");
+    }
+    let wanted = case["motion"]["history"]["force_y_n"].as_array().unwrap();
+    for (point, wanted) in points.iter().zip(wanted) {
+        let off = point.resultants[0].force_y - wanted.as_f64().unwrap();
+        assert!(off.abs() < 1e-4 * LIMIT, "{off}");
+    }
+}
+
+fn forces(solution: &Solution) -> Vec<[f64; 3]> {
+    let points = solution.patches[0].points.iter();
+    let forces = points.map(|p| [p.force_x_n, p.force_y_n, p.moment_z_n_mm / 5.0]);
+    forces.map(|all| all.map(|force| force / LIMIT)).collect()
+}
+
+#[test]
+fn a_long_way_ends_in_steady_rolling_and_steady_rolling_stays() {
+    let motion = json!({ "creepage_x": 0.0008, "creepage_y": -0.0005, "spin_per_mm": 0.0002 });
+    let with_distances = |distances: Value, start: &str| {
+        let mut history = motion.clone();
+        history["distance_mm"] = distances;
+        sphere(0.28, json!({ "history": history, "start": start }))
+    };
+    let (steady, _) = solve(&sphere(0.28, motion.clone()));
+    let steady = forces(&steady)[0];
+    let (late, _) = solve(&with_distances(json!([5, 10, 20, 40]), "rest"));
+    let (begun, _) = solve(&with_distances(json!([0, 0.5, 3, 9]), "steady"));
+    let begun = forces(&begun);
+    for k in 0..3 {
+        let end = forces(&late)[3][k];
+        // Each within its target of 0.005.
+        assert!((end - steady[k]).abs() < 0.01, "{k}: {end} {}", steady[k]);
+        assert!(
+            begun.iter().all(|at| (at[k] - begun[0][k]).abs() < 1e-3),
+            "{k}: {begun:?}"
+        );
+        assert!((begun[0][k] - steady[k]).abs() < 0.01, "{k}: {begun:?}");
+    }
+    // Forces that steady rolling needs are found as its creepages.
+    let history = json!({ "history": { "distance_mm": [0, 30], "force_x_n": steady[0] * LIMIT, "force_y_n": steady[1] * LIMIT, "spin_per_mm": 0.0002 }, "start": "steady" });
+    let (forced, _) = solve(&sphere(0.28, history));
+    for point in &forced.patches[0].points {
+        assert!(
+            (point.motion.creepage_x / 0.0008 - 1.0).abs() < 0.02,
+            "{:?}",
+            point.motion
+        );
+        assert!(
+            (point.motion.creepage_y / -0.0005 - 1.0).abs() < 0.02,
+            "{:?}",
+            point.motion
+        );
+    }
+}
+
+#[test]
+fn the_reverse_of_a_history_has_the_reverse_forces() {
+    let history = |sign: f64| {
+        let list = |values: [f64; 5]| values.map(|value| sign * value);
+        sphere(
+            0.28,
+            json!({ "history": {
+                "distance_mm": [0, 0, 1.5, 3, 3],
+                "shift_x_mm": list([0.0, 0.006, 0.0, 0.0, -0.004]),
+                "creepage_y": list([0.0, 0.0, 0.001, 0.0, 0.0]),
+                "spin_per_mm": list([0.0, 0.0, 0.0003, 0.0001, 0.0]),
+            } }),
+        )
+    };
+    let there = forces(&solve(&history(1.0)).0);
+    let back = forces(&solve(&history(-1.0)).0);
+    assert_eq!(there[0], [0.0; 3]);
+    for (there, back) in there.iter().zip(&back) {
+        for k in 0..3 {
+            assert!((there[k] + back[k]).abs() < 1e-6, "{there:?} {back:?}");
+        }
+    }
+}
+
+#[test]
+fn other_contacts_and_laws_follow_a_history_too() {
+    let history = json!({ "history": { "distance_mm": { "from": 2, "to": 20, "points": 4 }, "creepage_x": 0.001 } });
+    let mut case = sphere(0.28, history);
+    case["solver"] = json!({ "mesh": { "strips": 10, "cells": 20 } });
+    let of_ellipse = forces(&solve(&case).0);
+    // A coefficient across that is the same everywhere.
+    let mut across = case.clone();
+    across["friction"] = json!({ "across": { "y_mm": [-5, 5], "coefficient": [0.3, 0.3] } });
+    let of_law = forces(&solve(&across).0);
+    // A gap with the ellipse for its patch.
+    let mut gap = case.clone();
+    let radius = 0.5 / 0.001_580_487_8;
+    let y: Vec<f64> = (-20..=20).map(|k| 0.4 * f64::from(k)).collect();
+    let h: Vec<f64> = y.iter().map(|y| y * y / (2.0 * radius)).collect();
+    gap["contact"] = json!({ "type": "gap_profile", "rolling_mm": radius, "y_mm": y, "gap_mm": h });
+    let of_gap = forces(&solve(&gap).0);
+    for k in 0..4 {
+        assert!(
+            (of_law[k][0] - of_ellipse[k][0]).abs() < 1e-4,
+            "{of_law:?} {of_ellipse:?}"
+        );
+        assert!(
+            (of_gap[k][0] - of_ellipse[k][0]).abs() < 0.005,
+            "{of_gap:?} {of_ellipse:?}"
+        );
+    }
+}
