@@ -28,7 +28,7 @@ pub fn slices(case: &CheckedCase) -> Vec<Range<usize>> {
     let motions = case.problem.motions.len();
     // The points of a history follow from each other.
     if case.problem.history.is_some() {
-        return Vec::from([0..motions]);
+        return std::iter::once(0..motions).collect();
     }
     let SolveTime { whole, normal } = case.solve_time();
     let each = (whole - normal).max(0.0) / motions as f64;

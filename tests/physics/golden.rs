@@ -174,15 +174,10 @@ fn made() -> Vec<(&'static str, Value)> {
         ),
         ("pressure grid", case(pressures(), all(), target(0.01))),
         ("pressure grid, mesh", case(pressures(), all(), mesh())),
-        ("ellipse, table", {
-            let mut table = case(ellipse(6.0, 4.0), all(), with("table", json!({})));
-            table["outputs"] = json!(["resultants"]);
-            table
-        }),
     ]
 }
 
-/// Friction beyond one coefficient.
+/// The table, and friction beyond one coefficient.
 fn frictions() -> Vec<(&'static str, Value)> {
     let motion = || json!({ "creepage_x": 0.002, "creepage_y": -0.0005, "spin_per_mm": 0.0004, "speed_mm_per_s": 20_000 });
     let term = json!([{ "coefficient": 0.2, "half_speed_mm_per_s": 400 }]);
@@ -196,7 +191,11 @@ fn frictions() -> Vec<(&'static str, Value)> {
     let across = json!({ "across": { "y_mm": [-2, 2], "coefficient": [0.1, 0.4] } });
     let layer =
         json!({ "coefficient": 0.3, "layer": { "shear_modulus_mpa": 500, "thickness_mm": 0.01 } });
+    let mut table = with(json!({ "coefficient": 0.3 }));
+    table["solver"] = json!({ "method": "table" });
+    table["outputs"] = json!(["resultants"]);
     vec![
+        ("ellipse, table", table),
         ("friction falls", with(falling)),
         ("friction across", with(across)),
         ("friction with a layer", with(layer)),

@@ -117,10 +117,7 @@ impl CheckedParts {
             )
         });
         faults.extend(of_friction);
-        if given
-            .solver
-            .is_some_and(|solver| solver.method == MethodName::Table)
-        {
+        if method == Some(Method::Table) {
             faults.extend(not_in_table(
                 elasticity.as_ref(),
                 task.as_ref().map(|(task, _)| task),

@@ -256,14 +256,7 @@ fn point_solution(
             .or_else(|| by_table(|stick| 1.0 - stick)),
         gradients: table
             .filter(|_| case.run.wants(Output::Gradients))
-            .map(|table| {
-                let [force_x_n, force_y_n, moment_z_n_mm] = table.gradients;
-                Gradients {
-                    force_x_n,
-                    force_y_n,
-                    moment_z_n_mm,
-                }
-            }),
+            .map(|table| Gradients::of(table.gradients)),
         stick_cells: areas.map(|a| a.stick_cells),
         slip_cells: areas.map(|a| a.slip_cells),
         traction_max_mpa: on_level.map(|(level, fields)| traction_max(level, fields, index)),

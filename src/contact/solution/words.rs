@@ -309,6 +309,17 @@ pub struct Gradients {
     pub moment_z_n_mm: [f64; 3],
 }
 
+impl Gradients {
+    /// The rows of a matrix: of F_x, F_y and M_z.
+    pub(crate) fn of([force_x_n, force_y_n, moment_z_n_mm]: [[f64; 3]; 3]) -> Gradients {
+        Gradients {
+            force_x_n,
+            force_y_n,
+            moment_z_n_mm,
+        }
+    }
+}
+
 /// How a point was computed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct SolverReport {

@@ -34,8 +34,8 @@ const STEPS_PER_CELL: f64 = 1.0 / 3.0;
 /// Resultants are extrapolated by this share of their change from the level before; their error falls a little faster than the width
 /// of the cells. 0.25 and 0.75 leave 1.5 times the error.
 const EXTRAPOLATED: f64 = 0.5;
-/// Error of resultants, and of creepages and shifts that are found, over the change from the level before: 1.2 and 0.9 at 95 % of the
-/// points where the change is that of the neighbourhood alone.
+/// Error of resultants, and of creepages and shifts that are found, over the change from the level before. Chosen so that the estimates
+/// cover the points of CONTACT's four histories (`cargo test --test physics histories`), which therefore are no check of them.
 const ERROR_OVER_CHANGE: f64 = 0.8;
 /// See [`ERROR_OVER_CHANGE`].
 const CREEPAGE_ERROR_OVER_CHANGE: f64 = 1.4;
