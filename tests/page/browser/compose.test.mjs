@@ -24,7 +24,8 @@ test('every example can be chosen, is drawn, and is solved to a picture or a cur
     await page.waitForFunction((name) => document.querySelector('#h-drawing')?.textContent === name, example(file).name);
     assert.deepEqual(await json(page), example(file), file);
     await sound(page);
-    await page.locator('.figure svg.drawing, .figure value-grid canvas').first().waitFor();
+    // Where a wheelset stands on its rails is found by the solve.
+    if (example(file).contact.type !== 'wheelset') await page.locator('.figure svg.drawing, .figure value-grid canvas').first().waitFor();
     await page.getByRole('button', { name: /^Solve/ }).click();
     if ((example(file).outputs ?? ['resultants', 'zones']).length > 1) await drawn(page);
     else await page.locator('creep-curve canvas').waitFor();

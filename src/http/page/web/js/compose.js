@@ -81,6 +81,8 @@ function drawing({ understood }, document) {
     case 'gap_grid':
     case 'pressure_grid':
       return drawGrid(document);
+    case 'wheelset':
+      return html`<p class="hint">Both wheels on both rails: the patches of every position are drawn with the result. Change it in the JSON.</p>`;
     default:
       return nothing;
   }

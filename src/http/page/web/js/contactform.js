@@ -32,6 +32,8 @@ export function contactFields(app, type) {
       const member = type === 'gap_grid' ? 'gap_mm' : 'pressure_mpa';
       return dropZone(type === 'gap_grid' ? 'Gap on a grid' : 'Pressure on a grid', pointsOf(app, `/contact/${member}`), `/contact/${member}`, app, (file) => takeGrid(app, file, member));
     }
+    case 'wheelset':
+      return html`<p class="hint">Profiles, shifts and yaw of a wheelset are changed in the JSON.</p>`;
     default:
       return html`<p class="hint">Choose a kind of contact, or drop the files of a rail and a wheel anywhere here.</p>`;
   }

@@ -50,7 +50,7 @@ const steps = (length) => Array.from({ length: Math.ceil(length / STEP) - 1 }, (
 /** @param {JsonObject} document @returns {JsonValue | undefined} */
 function firstMotion(document) {
   const motion = Array.isArray(document.motion) ? document.motion[0] : document.motion;
-  return isObject(motion) && !('sweep' in motion) && !('wheelset' in motion) ? motion : undefined;
+  return isObject(motion) && !('sweep' in motion) && !('wheelset' in motion) && !('history' in motion) ? motion : undefined;
 }
 
 /**
