@@ -1,9 +1,9 @@
 //! What the C library keeps of freed memory: bounded at the start of a process, given back after long tasks.
 
 /// Blocks of at least this size, in bytes, are given back when they are freed. Left alone, glibc raises this limit to 32 MiB with the
-/// blocks that it sees freed, and keeps what is below. 400 mixed cases on four workers peaked at 290 to 380 MB then, and at 190 to
-/// 230 MB with these three numbers, for 3 to 6 % more processor time (`cargo bench --bench load -- memory`, four runs;
-/// 1 MiB instead of the first: 205 to 215 MB for 8 %).
+/// blocks that it sees freed, and keeps what is below. 400 mixed cases on four workers peak at 351 to 361 MB then, and at 255 to
+/// 261 MB with these three numbers, for 7 % more processor time (`cargo bench --bench load -- memory`, two and three runs; 1 MiB instead of the
+/// first costs more).
 const BLOCK_BYTES: i32 = 4 << 20;
 /// Free memory at the end of a heap, in bytes, from which on it is given back.
 const FREE_BYTES: i32 = 32 << 20;
