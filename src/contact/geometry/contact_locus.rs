@@ -45,16 +45,22 @@ pub struct ContactLocus<'g> {
     pub touch: f64,
 }
 
+/// Points `[y, z, s]` of the rail in mm at these parameters, for an [`envelope`].
+pub(crate) fn rail_points(
+    geometry: &WheelRail,
+    parameters: impl IntoIterator<Item = f64>,
+) -> Vec<Option<[f64; 3]>> {
+    let point = |s: f64| {
+        let [y, z] = geometry.rail_at(s).at;
+        Some([y, z, s])
+    };
+    parameters.into_iter().map(point).collect()
+}
+
 /// Places the wheel above the rail and finds the height of first touch.
 fn lines_of(geometry: &WheelRail) -> Result<LocusLines, String> {
     let [rail, wheel] = geometry.parameters(CURVE_STEP);
-    let rail: Vec<_> = rail
-        .into_iter()
-        .map(|s| {
-            let [y, z] = geometry.rail_at(s).at;
-            Some([y, z, s])
-        })
-        .collect();
+    let rail = rail_points(geometry, rail);
     let wheel: Vec<_> = wheel
         .into_iter()
         .map(|s| geometry.lowest(s).map(|[_, y, z]| [y, -z, s]))

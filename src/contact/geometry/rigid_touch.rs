@@ -1,6 +1,6 @@
 //! Where a wheel touches its rail if both are rigid, for many places of the wheelset over the same rail.
 
-use crate::contact::geometry::contact_locus::{CURVE_STEP, Envelope, STEP, envelope};
+use crate::contact::geometry::contact_locus::{CURVE_STEP, Envelope, STEP, envelope, rail_points};
 use crate::contact::geometry::wheel_rail::WheelRail;
 
 /// Spacing of the points of the wheel among which the touching one is looked for, in mm. Two places of contact whose clearances
@@ -38,13 +38,7 @@ pub struct RigidTouch {
 impl RailTop {
     pub(crate) fn new(geometry: &WheelRail) -> RailTop {
         let [rail, _] = geometry.parameters(CURVE_STEP);
-        let rail: Vec<_> = rail
-            .into_iter()
-            .map(|s| {
-                let [y, z] = geometry.rail_at(s).at;
-                Some([y, z, s])
-            })
-            .collect();
+        let rail = rail_points(geometry, rail);
         let [_, wheel] = geometry.parameters(WHEEL_STEP);
         RailTop {
             lines: envelope(&rail),

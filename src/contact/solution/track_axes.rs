@@ -188,11 +188,7 @@ fn sum(so_far: Option<Total>, part: Total) -> Option<Total> {
         error_estimate: so_far
             .error_estimate
             .zip(part.error_estimate)
-            .map(|(a, b)| ErrorEstimate {
-                force_x_n: a.force_x_n + b.force_x_n,
-                force_y_n: a.force_y_n + b.force_y_n,
-                moment_z_n_mm: a.moment_z_n_mm + b.moment_z_n_mm,
-            }),
+            .map(|(a, b)| a.plus(b)),
         profile_uncertainty: None,
     })
 }

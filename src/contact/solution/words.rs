@@ -298,6 +298,17 @@ pub struct ErrorEstimate {
     pub moment_z_n_mm: f64,
 }
 
+impl ErrorEstimate {
+    /// The estimate of a sum, whose error is at most the sum of the errors.
+    pub(crate) fn plus(self, other: ErrorEstimate) -> ErrorEstimate {
+        ErrorEstimate {
+            force_x_n: self.force_x_n + other.force_x_n,
+            force_y_n: self.force_y_n + other.force_y_n,
+            moment_z_n_mm: self.moment_z_n_mm + other.moment_z_n_mm,
+        }
+    }
+}
+
 /// Derivatives of the resultants of a patch, each by `[creepage_x, creepage_y, spin_per_mm]`: the creep coefficients.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 pub struct Gradients {

@@ -175,11 +175,7 @@ fn plus(one: &Total, other: &Total) -> Total {
         error_estimate: one
             .error_estimate
             .zip(other.error_estimate)
-            .map(|(a, b)| ErrorEstimate {
-                force_x_n: a.force_x_n + b.force_x_n,
-                force_y_n: a.force_y_n + b.force_y_n,
-                moment_z_n_mm: a.moment_z_n_mm + b.moment_z_n_mm,
-            }),
+            .map(|(a, b)| a.plus(b)),
         profile_uncertainty: one.profile_uncertainty.zip(other.profile_uncertainty).map(
             |(a, b)| ProfileUncertainty {
                 force_x_n: a.force_x_n + b.force_x_n,
