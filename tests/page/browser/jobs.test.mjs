@@ -23,6 +23,8 @@ test('a job is followed from the queue to its end, and another is cancelled', ()
   await row(page, 'slow two').locator('.state.cancelled').waitFor();
   await page.getByRole('checkbox', { name: 'cancelled', exact: true }).check();
   await row(page, 'slow one').waitFor({ state: 'detached' });
+  // The list is empty until the answer with the new filter is there.
+  await row(page, 'slow two').waitFor();
   assert.equal(await page.locator('.rows.job').count(), 1);
   await page.getByRole('button', { name: 'Delete slow two' }).click();
   await page.getByText('No jobs that are cancelled').waitFor();
