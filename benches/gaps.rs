@@ -11,6 +11,7 @@ use std::hint::black_box;
 
 use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::Unmonitored;
+use railhead::contact::normal_stage;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 
@@ -45,9 +46,9 @@ fn row(case: &Value) -> [f64; 2] {
     let problem = check(&question(case), &Limits::default()).expect("a valid case");
     let time = |work: &dyn Fn()| median((0..REPEATS).map(|_| seconds_of(work).0).collect());
     let normal = time(&|| {
-        let _ = black_box(problem.pressed(&Unmonitored));
+        let _ = black_box(normal_stage::solve(&problem, &Unmonitored));
     });
-    let pressed = problem.pressed(&Unmonitored).expect("a contact");
+    let pressed = normal_stage::solve(&problem, &Unmonitored).expect("a contact");
     let whole = time(&|| {
         let _ = black_box(solve(&problem, &Unmonitored));
     });

@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
-use railhead::contact::case::problem::CheckedCase;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::normal::footprint::Footprint;
 use railhead::contact::normal::normal_task::NormalTask;
 use railhead::contact::normal::patch::Patch;
+use railhead::contact::normal_stage;
+use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::rolling::mesh_plan::Regime;
 use railhead::contact::rolling::refinement::level_solve::{MotionTask, solve_level};
 use railhead::contact::rolling::refinement::levels::Levels;
@@ -41,7 +42,7 @@ pub fn find(class: Class, case: &Value) -> Result<Truth, String> {
     let mut fine = case.clone();
     fine["solver"] = json!({ "target_error": TARGET_GAP });
     let checked = contact::check(&fine, &Limits::default()).map_err(|e| e.to_string())?;
-    let pressed = checked.pressed(&Unmonitored).map_err(|e| e.to_string())?;
+    let pressed = normal_stage::solve(&checked, &Unmonitored).map_err(|e| e.to_string())?;
     let (value, change) = two_meshes(&checked, &pressed.footprint).map_err(|e| e.to_string())?;
     let frame = frame_of(&checked, &pressed.footprint);
     let mut uncertainty = change + LEAST;
@@ -51,7 +52,7 @@ pub fn find(class: Class, case: &Value) -> Result<Truth, String> {
         let mut coarse = case.clone();
         coarse["solver"] = json!({ "target_error": 0.001 });
         let checked = contact::check(&coarse, &Limits::default()).map_err(|e| e.to_string())?;
-        let coarse = checked.pressed(&Unmonitored).map_err(|e| e.to_string())?;
+        let coarse = normal_stage::solve(&checked, &Unmonitored).map_err(|e| e.to_string())?;
         let other = [&pressed, &coarse].map(|pressed| {
             one_mesh(&checked, &pressed.footprint, 256)
                 .map(|(sum, _)| frame.relative(sum))

@@ -4,11 +4,12 @@ use std::f64::consts::PI;
 use std::fmt::Write as _;
 use std::hint::black_box;
 
-use railhead::contact::case::problem::CheckedCase;
 use railhead::contact::half_space::grid_operator::GridWorkspace;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::normal::normal_task::NormalTask;
 use railhead::contact::normal::wheel_height::search::{Accuracy, HeightStart, NormalPass};
+use railhead::contact::normal_stage;
+use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::solution::words::Solution;
 use serde_json::{Value, json};
 
@@ -62,7 +63,7 @@ fn table<'a>(cases: impl Iterator<Item = &'a Value>, lu: f64) -> String {
         let checked = problem(&question(case));
         let (solution, seconds) = timed(&checked, REPEATS);
         let press = || {
-            let _ = black_box(checked.pressed(&Unmonitored));
+            let _ = black_box(normal_stage::solve(&checked, &Unmonitored));
         };
         let pressing = median((0..REPEATS).map(|_| seconds_of(press).0).collect());
         let solution = solution.expect("an answer");

@@ -1,8 +1,8 @@
 //! The reference cases as questions, and the errors of their answers.
 
 use railhead::contact::case::limits::Limits;
-use railhead::contact::case::problem::CheckedCase;
 use railhead::contact::monitor::Unmonitored;
+use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::solution::words::{Solution, Total};
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};

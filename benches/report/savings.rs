@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 use std::hint::black_box;
 use std::sync::Arc;
 
-use railhead::contact::case::problem::CheckedCase;
 use railhead::contact::monitor::Unmonitored;
+use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::rolling::operator_store::OperatorStore;
 use railhead::contact::{solve, solve_with};
 use serde_json::{Value, json};

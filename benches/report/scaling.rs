@@ -7,6 +7,7 @@ use std::sync::Arc;
 use railhead::contact::half_space::strip_operator::kind::Precision;
 use railhead::contact::half_space::strip_operator::operator;
 use railhead::contact::monitor::Unmonitored;
+use railhead::contact::normal_stage;
 use railhead::contact::rolling::refinement::level_solve::MotionTask;
 use railhead::contact::rolling::refinement::levels::Levels;
 use railhead::contact::rolling::refinement::refine;
@@ -44,7 +45,9 @@ pub fn section(lu: f64, pictures: &Path) -> String {
             index: 0,
             motion: checked.problem.motions[0],
         };
-        let footprint = checked.pressed(&Unmonitored).expect("a contact").footprint;
+        let footprint = normal_stage::solve(&checked, &Unmonitored)
+            .expect("a contact")
+            .footprint;
         let task = checked.rolling_task(&footprint);
         let mut levels = Levels::new(&task, &Arc::default());
         let point = refine::solve(&task, &mut levels, asked, &Unmonitored).expect("an answer");

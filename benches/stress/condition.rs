@@ -7,6 +7,7 @@ use railhead::contact::case::limits::Limits;
 use railhead::contact::check;
 use railhead::contact::mesh::size::MeshSize;
 use railhead::contact::monitor::Unmonitored;
+use railhead::contact::normal_stage;
 use railhead::contact::rolling::slip_equations::SlipEquations;
 use railhead::contact::rolling::slip_rules::Rule;
 use railhead::contact::rolling::strip_mesh::StripMesh;
@@ -23,7 +24,9 @@ fn condition(a_over_b: f64, strips: u32, cells: u32, rule: Rule) -> f64 {
         "solver": { "mesh": { "strips": strips, "cells": cells } },
     });
     let problem = check(&case, &Limits::default()).expect("a valid case");
-    let footprint = problem.pressed(&Unmonitored).expect("a contact").footprint;
+    let footprint = normal_stage::solve(&problem, &Unmonitored)
+        .expect("a contact")
+        .footprint;
     let level = StripMesh::new(
         &problem.rolling_task(&footprint),
         MeshSize { strips, cells },

@@ -8,7 +8,6 @@ use std::time::Duration;
 
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
-use railhead::contact::case::problem::CheckedCase;
 use railhead::contact::evaluate::answer::{RowStatus, RowsAnswer};
 use railhead::contact::evaluate::column::Column;
 use railhead::contact::evaluate::many::{ManyTask, solve_many};
@@ -16,6 +15,7 @@ use railhead::contact::evaluate::many_answer::{ManyAnswer, ManyStatus};
 use railhead::contact::evaluate::rows::Rows;
 use railhead::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
 use railhead::contact::monitor::{Monitor, Unmonitored};
+use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::rolling::operator_store::OperatorStore;
 use serde_json::{Value, json};
 

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use railhead::contact::case::limits::Limits;
-use railhead::contact::case::problem::CheckedCase;
 use railhead::contact::monitor::Unmonitored;
+use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::rolling::operator_store::OperatorStore;
 use railhead::contact::{check, solve, solve_with};
 use serde_json::{Value, json};

@@ -27,7 +27,7 @@
 //!
 //! | word | meaning |
 //! |---|---|
-//! | case | the question in the words of a client; checked, it is a [`CheckedCase`](crate::contact::case::problem::CheckedCase) |
+//! | case | the question in the words of a client; checked, it is a [`CheckedCase`](crate::contact::problem::checked_case::CheckedCase) |
 //! | problem, run, label | what a case asks, how it is to be solved, what it is called |
 //! | contact | what the bodies are: ellipse, radii, gap, pressure grid, profiles |
 //! | normal task | what is known of patches and pressures before they are found ([`NormalTask`](crate::contact::normal::normal_task::NormalTask)) |

@@ -1,11 +1,11 @@
 //! What friction will carry of a vertical force, forecast by the table of creep forces, so that the height of a wheel is sought with it.
 
-use crate::contact::case::problem::Problem;
 use crate::contact::error::SolveError;
 use crate::contact::friction::on_rail::in_frame;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::geometry::wheelset::{WheelsetMotion, creepages};
 use crate::contact::normal::wheel_height::pressed::{PressedGap, PressedWheel};
+use crate::contact::problem::physics::Problem;
 use crate::contact::rolling::load_ellipse::LoadEllipse;
 use crate::contact::rolling::methods::table::solve::{forces, tells};
 use crate::contact::rolling::motion::Motion;

@@ -1,12 +1,19 @@
 //! What is the physics? Plain synchronous arithmetic: no async, files, environment or printing.
 //!
-//! A case is [`check`]ed and becomes a [`CheckedCase`]; [`solve`] takes its motions slice by slice through the
-//! [`stages`]: footprint, motions from coarse to fine levels, answer. Frame, signs, units and words: [`conventions`].
+//! Stages in the order in which a case passes them; none is entered again:
+//!
+//! | stage | from | to | where |
+//! |---|---|---|---|
+//! | check | JSON, [`Limits`] | [`CheckedCase`]: [`problem`], run, label | [`case`] |
+//! | region and pressure | [`NormalTask`] | [`SolvedFootprint`](normal_stage::SolvedFootprint) | [`normal_stage`], [`geometry`], [`normal`] |
+//! | motions, from coarse to fine levels | footprint, [`friction`] | [`MotionAnswer`](rolling::motion_answer::MotionAnswer) | [`rolling_stage`], [`rolling`], [`mesh`], [`half_space`] |
+//! | answer | answers of motions | [`Solution`], [`Fields`] | [`post`], [`solution`] |
+//!
+//! Loops around these stages: [`slices`] of long sweeps, [`unlike_bodies`], [`wheel_on_rail`] (in [`profile_trust`]), [`wheelset`].
+//! Frame, signs, units and words: [`conventions`].
 
-pub mod answer;
 pub mod case;
 pub mod conventions;
-pub mod coupling;
 pub mod error;
 pub mod evaluate;
 pub mod forecast;
@@ -16,30 +23,38 @@ pub mod half_space;
 pub mod mesh;
 pub mod monitor;
 pub mod normal;
+pub mod normal_stage;
 pub mod numerics;
 pub mod post;
+pub mod problem;
 pub mod profile_trust;
 pub mod remark;
 pub mod rolling;
+pub mod rolling_stage;
 pub mod slices;
 pub mod solution;
-pub mod stages;
 pub mod time_limit;
-pub mod unlike;
+pub mod unlike_bodies;
+pub mod wheel_on_rail;
 pub mod wheelset;
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use serde_json::Value;
 
 use crate::contact::case::limits::Limits;
-use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::read::draft;
 use crate::contact::error::{CaseError, SolveError};
-use crate::contact::monitor::Monitor;
+use crate::contact::monitor::{Monitor, MonitorPart};
+use crate::contact::normal::normal_task::NormalTask;
+use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::profile_trust::trust;
 use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::slices::{slices, solve_slice};
+use crate::contact::slices::slices;
+use crate::contact::solution::finish::finish;
 use crate::contact::solution::words::{Fields, Solution};
+use crate::contact::time_limit::TimeLimit;
 
 /// Reads and checks a case.
 ///
@@ -54,8 +69,7 @@ pub fn check(case: &Value, limits: &Limits) -> Result<CheckedCase, CaseError> {
     CheckedCase::new(&draft.complete().ok_or(CaseError(faults))?, limits)
 }
 
-/// Solves a checked case: region and pressure where they are not known yet, then every motion from a coarse mesh level
-/// up to the first that meets the target; of a wheel on a rail patch by patch.
+/// Solves a checked case, slice by slice.
 ///
 /// # Errors
 /// A named reason why there is no answer.
@@ -87,4 +101,53 @@ pub fn solve_with(
         unreachable!("a case has at least one slice")
     };
     Ok(answer)
+}
+
+/// Solves one slice of a case: the motions of a range that [`slices`] gives. Motions are numbered as in the case.
+///
+/// # Errors
+/// A named reason why there is no answer.
+pub fn solve_slice(
+    operators: &Arc<OperatorStore>,
+    case: &CheckedCase,
+    range: Range<usize>,
+    monitor: &dyn Monitor,
+) -> Result<(Solution, Fields), SolveError> {
+    let all = case.problem.motions.len();
+    if range == (0..all) {
+        return solve_motions(operators, case, monitor);
+    }
+    let share = MonitorPart {
+        inner: monitor,
+        before: range.start as f64 / all as f64,
+        own: range.len() as f64 / all as f64,
+    };
+    solve_motions(operators, &case.slice(range), &share)
+}
+
+/// The recipe: region and pressure, motions, answer. Every patch of a wheel passes the same two stages in a frame of its own, in rounds
+/// that balance its forces.
+fn solve_motions(
+    operators: &Arc<OperatorStore>,
+    case: &CheckedCase,
+    monitor: &dyn Monitor,
+) -> Result<(Solution, Fields), SolveError> {
+    let began = monitor.elapsed();
+    let answer = match &case.problem.task {
+        NormalTask::Wheel(wheel) => trust::solve(operators, case, wheel, monitor)?,
+        NormalTask::Wheelset(wheelset) => {
+            wheelset::solve::solve(operators, case, wheelset, monitor)?
+        }
+        NormalTask::Hertz(_) | NormalTask::Given(_) | NormalTask::Gap(_) => {
+            let monitor = &TimeLimit::new(monitor, case.run.time_limit, case.problem.motions.len());
+            let footprint = if case.problem.is_coupled(&case.run) {
+                unlike_bodies::solve(operators, case, monitor)
+            } else {
+                normal_stage::solve(case, monitor)
+            };
+            let footprint = footprint.map_err(|error| monitor.explained(error, case))?;
+            rolling_stage::solve(operators, case, &footprint, monitor)?
+        }
+    };
+    finish(case, answer, monitor.elapsed().saturating_sub(began))
 }

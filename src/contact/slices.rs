@@ -4,16 +4,11 @@
 //! its slices were solved, or whether a restart came between: [`solve`](crate::contact::solve) takes the same slices one after the other.
 
 use std::ops::Range;
-use std::sync::Arc;
 
-use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::solve_time::SolveTime;
-use crate::contact::error::SolveError;
-use crate::contact::monitor::{Monitor, MonitorPart};
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::merged;
-use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::solution::words::{Fields, Solution};
-use crate::contact::stages::solve_whole;
 
 /// Estimated time of a slice in s: short for those who wait behind it, long beside what a cut costs (a first motion without a start,
 /// and region and pressure once more).
@@ -39,28 +34,6 @@ pub fn slices(case: &CheckedCase) -> Vec<Range<usize>> {
     (0..parts)
         .map(|part| start(part)..start(part + 1))
         .collect()
-}
-
-/// Solves one slice of a case: the motions of a range that [`slices`] gives. Motions are numbered as in the case.
-///
-/// # Errors
-/// A named reason why there is no answer.
-pub fn solve_slice(
-    operators: &Arc<OperatorStore>,
-    case: &CheckedCase,
-    range: Range<usize>,
-    monitor: &dyn Monitor,
-) -> Result<(Solution, Fields), SolveError> {
-    let all = case.problem.motions.len();
-    if range == (0..all) {
-        return solve_whole(operators, case, monitor);
-    }
-    let share = MonitorPart {
-        inner: monitor,
-        before: range.start as f64 / all as f64,
-        own: range.len() as f64 / all as f64,
-    };
-    solve_whole(operators, &case.slice(range), &share)
 }
 
 impl Solution {

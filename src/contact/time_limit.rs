@@ -4,9 +4,9 @@ use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use crate::contact::case::problem::CheckedCase;
 use crate::contact::error::SolveError;
 use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::problem::checked_case::CheckedCase;
 
 /// The monitor of a whole case: adds the case's own time limit and turns motions done into progress.
 pub(crate) struct TimeLimit<'a> {

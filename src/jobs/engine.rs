@@ -8,12 +8,13 @@ use serde_json::Value;
 
 use crate::contact;
 use crate::contact::case::limits::Limits;
-use crate::contact::case::problem::CheckedCase;
 use crate::contact::error::{CaseError, SolveError};
 use crate::contact::monitor::Monitor;
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::slices::{slices, solve_slice};
+use crate::contact::slices::slices;
 use crate::contact::solution::words::{Fields, Solution};
+use crate::contact::solve_slice;
 
 /// Checks a case against limits.
 pub type Check = dyn Fn(&Value, &Limits) -> Result<CheckedCase, CaseError> + Send + Sync;

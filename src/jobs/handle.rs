@@ -7,8 +7,8 @@ use serde_json::Value;
 use tokio::time::timeout;
 use uuid::Uuid;
 
-use crate::contact::case::problem::CheckedCase;
 use crate::contact::error::CaseError;
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::batch::model::Batch;
 use crate::jobs::error::JobsError;
 use crate::jobs::keys::bound::Labels;

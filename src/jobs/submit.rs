@@ -6,9 +6,9 @@ use bytes::Bytes;
 use opentelemetry::KeyValue;
 use serde_json::Value;
 
-use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::words::solver::Output;
 use crate::contact::error::CaseError;
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::idempotency;

@@ -4,6 +4,7 @@ use railhead::contact;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::mesh::size::MeshSize;
 use railhead::contact::monitor::Unmonitored;
+use railhead::contact::normal_stage;
 use railhead::contact::rolling::methods::boundary_element::newton::Newton;
 use railhead::contact::rolling::methods::boundary_element::task::{NewtonTask, STEPS_MAX};
 use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
@@ -54,7 +55,9 @@ fn one_rule(contact: &Ellipse, rule: Rule) -> Cells {
         strips: 12,
         cells: 12,
     };
-    let footprint = checked.pressed(&Unmonitored).expect("a contact").footprint;
+    let footprint = normal_stage::solve(&checked, &Unmonitored)
+        .expect("a contact")
+        .footprint;
     let level = StripMesh::new(&checked.rolling_task(&footprint), size).expect("a mesh");
     let motion: Motion = level.scale.motion(&checked.problem.motions[0]);
     let operator = level.operator(&Unmonitored).expect("never stopped");

@@ -4,6 +4,7 @@ use railhead::contact;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::mesh::size::MeshSize;
 use railhead::contact::monitor::Unmonitored;
+use railhead::contact::normal_stage;
 use railhead::contact::rolling::history::level_run::LevelRun;
 use railhead::contact::rolling::history::record::PointRecord;
 use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
@@ -193,7 +194,7 @@ fn a_shift_is_cattaneos_by_force_and_by_displacement() {
 /// Points on one level, with the energies that answers do not have.
 fn on_level(case: &Value, size: MeshSize, longest: f64) -> Vec<PointRecord> {
     let case = contact::check(case, &Limits::default()).unwrap();
-    let pressed = case.pressed(&Unmonitored).unwrap();
+    let pressed = normal_stage::solve(&case, &Unmonitored).unwrap();
     let task = case.rolling_task(&pressed.footprint);
     let level = StripMesh::new(&task, size).unwrap();
     let history = case.problem.history.as_ref().unwrap();

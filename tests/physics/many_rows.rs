@@ -40,7 +40,7 @@ fn solved(case: &Value, columns: &[VariedColumn]) -> ManyAnswer {
         limits: &Limits::default(),
         time_limit: Duration::from_secs(60),
     };
-    let solve = |checked: &contact::case::problem::CheckedCase,
+    let solve = |checked: &contact::problem::checked_case::CheckedCase,
                  monitor: &dyn contact::monitor::Monitor| {
         contact::solve_with(&operators, checked, monitor).map(|(solution, _)| solution)
     };

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use railhead::contact::case::limits::Limits;
-use railhead::contact::case::problem::CheckedCase;
 use railhead::contact::monitor::Unmonitored;
+use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::rolling::operator_store::OperatorStore;
 use railhead::contact::solution::words::Solution;
 use railhead::contact::{check, solve_with};

@@ -5,6 +5,7 @@ use railhead::contact::case::limits::Limits;
 use railhead::contact::half_space::strip_operator::kind::Precision;
 use railhead::contact::half_space::strip_operator::operator::StripOperator;
 use railhead::contact::monitor::Unmonitored;
+use railhead::contact::normal_stage;
 use railhead::contact::rolling::methods::boundary_element::newton::Newton;
 use railhead::contact::rolling::methods::boundary_element::solve as boundary_element;
 use railhead::contact::rolling::methods::boundary_element::task::{
@@ -34,7 +35,9 @@ fn distance_to_plain_newton(contact: &Ellipse) -> f64 {
         strips: STRIPS,
         cells: CELLS,
     };
-    let footprint = checked.pressed(&Unmonitored).expect("a contact").footprint;
+    let footprint = normal_stage::solve(&checked, &Unmonitored)
+        .expect("a contact")
+        .footprint;
     let level = StripMesh::new(&checked.rolling_task(&footprint), size).expect("a mesh");
     let motion = level.scale.motion(&checked.problem.motions[0]);
     let mut workspace = NewtonWorkspace::default();

@@ -8,8 +8,9 @@ use railhead::contact::check;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::remark::entry::RemarkEntry;
 use railhead::contact::rolling::operator_store::OperatorStore;
-use railhead::contact::slices::{slices, solve_slice};
+use railhead::contact::slices::slices;
 use railhead::contact::solution::words::{Fields, Solution};
+use railhead::contact::solve_slice;
 use serde_json::{Value, json};
 
 use crate::reference::solve;

@@ -1,10 +1,11 @@
 //! Do iterations and products use the buffers of their workspaces alone, and can threads share what they only read?
 
 use railhead::contact::case::limits::Limits;
-use railhead::contact::case::problem::CheckedCase;
 use railhead::contact::half_space::grid_operator::{GridOperator, GridWorkspace};
 use railhead::contact::mesh::size::MeshSize;
 use railhead::contact::monitor::Unmonitored;
+use railhead::contact::normal_stage;
+use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::rolling::methods::boundary_element::newton::Newton;
 use railhead::contact::rolling::methods::boundary_element::task::{NewtonTask, STEPS_MAX};
 use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
@@ -52,7 +53,9 @@ fn with_equations(precision_target: f64, work: impl Fn(&SlipEquations, [&[f64]; 
         &json!({ "target_error": precision_target }),
         &json!({ "creepage_x": 0.001 }),
     );
-    let footprint = checked.pressed(&Unmonitored).expect("a contact").footprint;
+    let footprint = normal_stage::solve(&checked, &Unmonitored)
+        .expect("a contact")
+        .footprint;
     let task = checked.rolling_task(&footprint);
     let size = MeshSize {
         strips: 12,

@@ -4,9 +4,9 @@ use std::io::Read;
 use std::net::SocketAddr;
 use std::path::Path;
 
-use railhead::contact::case::problem::CheckedCase;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Monitor;
+use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::solution::words::{Fields, Solution};
 use railhead::http::{HttpOptions, router};
 use railhead::jobs::engine::Engine;

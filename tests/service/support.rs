@@ -8,9 +8,9 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::Duration;
 
-use railhead::contact::case::problem::CheckedCase;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Monitor;
+use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::solution::words::{Fields, Solution};
 use railhead::jobs::engine::Engine;
 use railhead::jobs::{Jobs, Options};

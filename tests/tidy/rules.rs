@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::lengths::functions;
 use crate::order::{DOOR, place};
 use crate::sources::{Sources, code, uses};
 
@@ -27,7 +28,7 @@ pub struct Rule {
 }
 
 /// All rules that may have exceptions.
-pub const RULES: [Rule; 9] = [
+pub const RULES: [Rule; 10] = [
     Rule {
         name: "order",
         asks: "modules use only what stands before them in `order.rs`",
@@ -57,6 +58,11 @@ pub const RULES: [Rule; 9] = [
         name: "type names",
         asks: "no type name occurs twice in a room",
         find: type_names,
+    },
+    Rule {
+        name: "checked once",
+        asks: "behind the check only `problem` is used, not the checks of `case`, and nothing else makes a `Problem`",
+        find: checked_once,
     },
     Rule {
         name: "words",
@@ -192,6 +198,43 @@ fn type_names(sources: &Sources) -> Findings {
     found(twice.map(|((_, name), places)| format!("{name}: {}", places.join(", "))))
 }
 
+/// The stages behind the check. Slices are cut, and rows are put together, from cases.
+fn checked_once(sources: &Sources) -> Findings {
+    let before = |module: &str| {
+        let parts = ["case", "evaluate", "slices"];
+        module == "contact"
+            || parts.iter().any(|part| {
+                module
+                    .strip_prefix("contact::")
+                    .is_some_and(|rest| rest.split("::").next() == Some(part))
+            })
+    };
+    let modules = sources.modules();
+    let mut wrong = Vec::new();
+    for (module, targets) in uses(&modules) {
+        if !module.starts_with("contact") || before(&module) {
+            continue;
+        }
+        let checks = targets.iter().filter(|target| {
+            target.starts_with("contact::case") && !target.starts_with("contact::case::words")
+        });
+        wrong.extend(checks.map(|target| format!("{module} uses {target}")));
+    }
+    let makers = ["src/contact/case/", "src/contact/problem/"];
+    for (path, text) in sources.within("src/") {
+        let maker = makers.iter().any(|folder| path.starts_with(folder));
+        let code = code(text);
+        if !maker
+            && ["Checked::without_faults", " Problem {"]
+                .iter()
+                .any(|made| code.contains(made))
+        {
+            wrong.push(format!("{path} makes a `Problem`"));
+        }
+    }
+    found(wrong)
+}
+
 fn words(sources: &Sources) -> Findings {
     let derives = |text: &str| {
         let code = code(text);
@@ -215,42 +258,6 @@ fn file_lines(sources: &Sources) -> Findings {
         .collect()
 }
 
-/// The functions of a text with their lines. As rustfmt writes them, the closing brace stands below the first letter of the declaration.
-fn functions(text: &str) -> Vec<(String, usize)> {
-    let lines: Vec<&str> = text.lines().collect();
-    let mut functions = Vec::new();
-    for (start, line) in lines.iter().enumerate() {
-        let words = line.trim_start();
-        let indent = &line[..line.len() - words.len()];
-        let Some((before, after)) = words.split_once("fn ") else {
-            continue;
-        };
-        let modifiers = [
-            "pub", "const", "async", "unsafe", "extern", "crate", "super", "in",
-        ];
-        let mut before = before.split(|c: char| !c.is_alphanumeric() && c != '_');
-        if !before.all(|word| word.is_empty() || modifiers.contains(&word)) {
-            continue;
-        }
-        let name: String = after
-            .chars()
-            .take_while(|c| c.is_alphanumeric() || *c == '_')
-            .collect();
-        let ends = |line: &&str| {
-            let end = line.strip_prefix(indent).unwrap_or_default();
-            end == "}" || (end.ends_with(';') && !end.starts_with(' '))
-        };
-        // A declaration without a body, or with one on its line.
-        if line.ends_with(';') || line.ends_with('}') {
-            continue;
-        }
-        if let Some(length) = lines[start + 1..].iter().position(ends) {
-            functions.push((name, length + 2));
-        }
-    }
-    functions
-}
-
 fn function_lines(sources: &Sources) -> Findings {
     let mut wrong = Findings::new();
     for (path, text) in sources.within("") {
@@ -270,6 +277,30 @@ mod tests {
 
     fn names(findings: &Findings) -> Vec<&str> {
         findings.keys().map(String::as_str).collect()
+    }
+
+    #[test]
+    fn a_stage_that_checks_again_or_makes_a_problem_is_found() {
+        let planted = Sources::planted(&[
+            (
+                "src/contact/normal_stage.rs",
+                "use crate::contact::case::checks::normal_force;",
+            ),
+            (
+                "src/contact/solution/finish.rs",
+                "use crate::contact::case::words::question::Case;",
+            ),
+            ("src/contact/case/checks.rs", "let asked = Problem {};"),
+            ("src/contact/forecast.rs", "let other = Problem {};"),
+        ]);
+        let found = checked_once(&planted);
+        assert_eq!(
+            names(&found),
+            [
+                "contact::normal_stage uses contact::case::checks",
+                "src/contact/forecast.rs makes a `Problem`",
+            ]
+        );
     }
 
     #[test]

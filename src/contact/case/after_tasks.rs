@@ -6,24 +6,12 @@ use crate::contact::case::subsurface;
 use crate::contact::case::words::damage::{DamageModel, DamageWords};
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::question::Case;
-use crate::contact::case::words::solver::Output;
 use crate::contact::case::words::subsurface::SubsurfaceWords;
 use crate::contact::case::words::thermal::{ThermalBodyWords, ThermalWords};
 use crate::contact::error::Fault;
 use crate::contact::post::damage::figures::DamageTask;
 use crate::contact::post::heat::{ThermalBody, ThermalTask};
-use crate::contact::post::subsurface::task::SubsurfaceTask;
-
-/// What is computed from solved motions; nothing where a case does not ask for it.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct AfterTasks {
-    /// Stresses below the surface.
-    pub subsurface: Option<SubsurfaceTask>,
-    /// Damage.
-    pub damage: Option<DamageTask>,
-    /// Temperatures.
-    pub thermal: Option<ThermalTask>,
-}
+use crate::contact::problem::after_tasks::AfterTasks;
 
 impl Case {
     /// The words of what it asks for.
@@ -45,13 +33,6 @@ impl AfterTasks {
             damage: case.damage.as_ref().map(DamageTask::new),
             thermal: case.thermal.map(ThermalTask::from),
         }
-    }
-
-    /// Is the power of every cell needed?
-    #[must_use]
-    pub fn needs_power(&self, outputs: &[Output]) -> bool {
-        let across = self.damage.as_ref().is_some_and(|task| task.across);
-        across || self.thermal.is_some() || outputs.contains(&Output::Slip)
     }
 }
 

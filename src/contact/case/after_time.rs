@@ -1,7 +1,7 @@
 //! How long what follows from solved motions will take.
 
-use crate::contact::case::problem::CheckedCase;
 use crate::contact::post::subsurface::task::StressPlaces;
+use crate::contact::problem::checked_case::CheckedCase;
 
 /// Time in s for a stress below the surface; for the worst point of a patch; for the power of all cells of a usual mesh; for the rest. Of
 /// `cargo bench --bench stress -- --only after`, medians over 18 ellipses; a fine mesh takes several times as long.

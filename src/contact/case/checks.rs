@@ -5,19 +5,19 @@ use crate::contact::case::history::BesideHistory;
 use crate::contact::case::limits::Limits;
 use crate::contact::case::motions::ExpandedMotions;
 use crate::contact::case::resolution::resolution;
-use crate::contact::case::size::SizeInput;
 use crate::contact::case::words::contact::{Contact, Load};
 use crate::contact::case::words::friction::Friction;
 use crate::contact::case::words::material::Material;
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::solver::{MethodName, Output, Solver};
-use crate::contact::case::{contact_task, history, motions, profiles, size, wheelsets};
+use crate::contact::case::{contact_task, history, motions, profiles, wheelsets};
 use crate::contact::error::Fault;
 use crate::contact::friction::falling::FallingLaw;
 use crate::contact::friction::law::FrictionLaw;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::patch::Patch;
+use crate::contact::problem::memory::{SizeInput, length_over_width, positions, segments};
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::history::task::HistoryTask;
@@ -95,15 +95,13 @@ impl CheckedParts {
                 // Unknown quantities count with their least possible values.
                 segments: task
                     .as_ref()
-                    .map_or_else(|| vec![1.0], |(task, _)| size::segments(task)),
+                    .map_or_else(|| vec![1.0], |(task, _)| segments(task)),
                 motions: motions.as_ref().map_or(1, |m| m.motions.len())
-                    * task.as_ref().map_or(1, |(task, _)| size::positions(task)),
+                    * task.as_ref().map_or(1, |(task, _)| positions(task)),
                 history: motions.as_ref().is_some_and(|m| m.history.is_some()),
                 fields: given.outputs.iter().any(|output| output.is_per_cell()),
                 stress_points: given.after.stress_points(),
-                ellipse: task
-                    .as_ref()
-                    .and_then(|(task, _)| size::length_over_width(task)),
+                ellipse: task.as_ref().and_then(|(task, _)| length_over_width(task)),
             };
             faults.extend(size.faults(limits));
         }
@@ -197,7 +195,7 @@ fn motion_faults(
 /// Faults of a case that the table does not cover, as far as that is known before patches are found.
 fn not_in_table(elasticity: Option<&Elasticity>, task: Option<&NormalTask>) -> Vec<Fault> {
     let unlike = elasticity.and_then(table::unlike);
-    let ratio = task.and_then(size::length_over_width);
+    let ratio = task.and_then(length_over_width);
     let outside = ratio.and_then(table::outside);
     let faults = [("/material", unlike), ("/contact", outside)].into_iter();
     faults

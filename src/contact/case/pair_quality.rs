@@ -1,8 +1,8 @@
 //! How good the points of both profiles of a case are, before anything is solved.
 
-use crate::contact::case::problem::CheckedCase;
-use crate::contact::case::profile_points;
 use crate::contact::normal::normal_task::NormalTask;
+use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::problem::profile_points;
 use crate::contact::solution::profile_quality::PairQuality;
 
 impl CheckedCase {

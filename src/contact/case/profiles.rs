@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use crate::contact::case::profile_points;
 use crate::contact::case::words::contact::{Contact, CrossSection, Load, Smoothing, SmoothingWord};
 use crate::contact::case::words::motion::{Motions, Wheelset};
 use crate::contact::error::Fault;
@@ -13,6 +12,7 @@ use crate::contact::geometry::wheel_rail::{Placement, WheelRail};
 use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::wheel_height::task::{ProfileTrust, WheelLoad, WheelTask};
+use crate::contact::problem::profile_points;
 use crate::contact::remark::entry::RemarkEntry;
 
 /// The task of a wheel on a rail with its remarks; `None` without faults where the load or the contact

@@ -2,7 +2,6 @@
 
 use serde_json::Value;
 
-use crate::contact::case::profile_points;
 use crate::contact::case::profiles::profile;
 use crate::contact::case::read::faults::Faults;
 use crate::contact::case::read::object::Object;
@@ -11,6 +10,7 @@ use crate::contact::error::{CaseError, Fault};
 use crate::contact::geometry::profile::Body;
 use crate::contact::geometry::profile_quality::points::advised_smoothing;
 use crate::contact::geometry::profile_quality::shape::{Looks, looks_like};
+use crate::contact::problem::profile_points;
 use crate::contact::solution::profile_quality::SectionQuality;
 
 /// Contact modulus G/(1 − ν) of steel on steel in MPa, for the smoothing that is suggested.

@@ -1,11 +1,11 @@
 //! What a case is understood as: patches that are known without a solve, and wheel and rail in place.
 
-use crate::contact::case::problem::CheckedCase;
 use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::solution::understanding::{
     FirstTouch, KnownPatch, PlacedProfiles, Understanding,
 };

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use crate::contact::case::limits::Limits;
 use crate::contact::case::motions::swept_values;
-use crate::contact::case::profile_points;
 use crate::contact::case::profiles::{exchanged, profile_at};
 use crate::contact::case::words::contact::{Contact, CrossSection, Load, Smoothing};
 use crate::contact::case::words::motion::{Combine, Swept};
@@ -15,6 +14,7 @@ use crate::contact::geometry::wheel_rail::{Placement, Side, WheelRail};
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::wheel_height::task::{ProfileTrust, WheelLoad, WheelTask};
 use crate::contact::normal::wheel_height::wheelset_task::{KinematicsTask, WheelsetTask};
+use crate::contact::problem::profile_points;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 
 /// The part of the load on the left wheel when nothing is said.

@@ -14,7 +14,6 @@ use serde_json::Value;
 
 use crate::contact;
 use crate::contact::case::limits::Limits;
-use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::solve_time::TABLE_SECONDS;
 use crate::contact::case::words::solver::{MethodName, Output};
 use crate::contact::error::{CaseError, Fault, SolveError};
@@ -24,6 +23,7 @@ use crate::contact::evaluate::many_answer::{ManyAnswer, ManyStatus, RowNumbers};
 use crate::contact::evaluate::rows::Rows;
 use crate::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
 use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::solution::words::Solution;
 
 /// Solves a checked case of one motion.

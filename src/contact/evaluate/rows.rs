@@ -2,7 +2,6 @@
 
 use serde_json::Value;
 
-use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::words::solver::{MethodName, Output};
 use crate::contact::error::{CaseError, Fault, SolveError};
 use crate::contact::evaluate::answer::{RowStatus, RowsAnswer};
@@ -10,6 +9,7 @@ use crate::contact::evaluate::column::Column;
 use crate::contact::evaluate::rows_checks::{FAULTS_MAX, faults_of_case, faults_of_column};
 use crate::contact::evaluate::variable::{Row, Variable};
 use crate::contact::normal::hertz::HertzShape;
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::methods::fastsim::{self, EllipseMesh};
 use crate::contact::rolling::methods::table::evaluate::{Creep, EllipseTable};
 use crate::contact::rolling::methods::table::file::table;

@@ -2,12 +2,12 @@
 
 use serde_json::Value;
 
-use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::words::solver::MethodName;
 use crate::contact::error::{Fault, FaultCode};
 use crate::contact::evaluate::column::Column;
 use crate::contact::evaluate::variable::Variable;
 use crate::contact::normal::normal_task::NormalTask;
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::refinement::resolution::Resolution;
 
 /// Faults of rows that are listed.

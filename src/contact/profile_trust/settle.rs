@@ -1,8 +1,5 @@
 //! `smoothing_mm: "auto"`: the smoothing chosen from the noise of the profiles and the contact pressure.
 
-use crate::contact::case::problem::CheckedCase;
-use crate::contact::case::profile_points;
-use crate::contact::case::profile_points::PRESSURE_USUAL;
 use crate::contact::error::SolveError;
 use crate::contact::geometry::profile::Body;
 use crate::contact::geometry::profile_quality::points::advised_smoothing;
@@ -10,6 +7,9 @@ use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::wheel_height::search::{Accuracy, HeightStart, NormalPass};
 use crate::contact::normal::wheel_height::task::WheelTask;
+use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::problem::profile_points;
+use crate::contact::problem::profile_points::PRESSURE_USUAL;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::time_limit::TimeLimit;

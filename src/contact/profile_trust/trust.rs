@@ -3,9 +3,6 @@
 use std::cell::RefCell;
 use std::sync::Arc;
 
-use crate::contact::case::problem::CheckedCase;
-use crate::contact::coupling;
-use crate::contact::coupling::{Found, Judge};
 use crate::contact::error::SolveError;
 use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::profile::{Body, Profile};
@@ -13,12 +10,15 @@ use crate::contact::geometry::profile_quality::holes::{Hole, holes};
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::wheel_height::pressed::{PressedGap, PressedWheel};
 use crate::contact::normal::wheel_height::task::WheelTask;
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::profile_trust::finding::{Cause, Finding};
 use crate::contact::profile_trust::judge::{FoundPatch, judge};
 use crate::contact::profile_trust::{settle, uncertainty};
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::solution::profile_quality::{PatchQuality, ProfileQuality};
 use crate::contact::solution::words::{Fields, Solution};
+use crate::contact::wheel_on_rail;
+use crate::contact::wheel_on_rail::{Found, Judge};
 
 /// Solves a wheel on a rail and assesses its profiles.
 ///
@@ -34,7 +34,7 @@ pub(crate) fn solve(
     let settled = settle::settled(case, contact, monitor)?;
     let contact = settled.as_ref().unwrap_or(contact);
     let judgement = Judgement::new(contact);
-    let found = coupling::solve(operators, case, contact, &judgement, monitor)?;
+    let found = wheel_on_rail::solve(operators, case, contact, &judgement, monitor)?;
     let found = assessed(operators, case, &judgement, found, monitor)?;
     Ok((found.solution, found.fields))
 }
@@ -49,7 +49,7 @@ pub(crate) fn judged(
     contact: &WheelTask,
     monitor: &dyn Monitor,
 ) -> Result<Found, SolveError> {
-    coupling::solve(operators, case, contact, &Judgement::new(contact), monitor)
+    wheel_on_rail::solve(operators, case, contact, &Judgement::new(contact), monitor)
 }
 
 /// Assesses the profiles under the patches of a wheel that was solved.

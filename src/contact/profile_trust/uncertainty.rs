@@ -8,9 +8,6 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::contact::case::problem::CheckedCase;
-use crate::contact::coupling;
-use crate::contact::coupling::Judge;
 use crate::contact::error::SolveError;
 use crate::contact::geometry::profile::Profile;
 use crate::contact::geometry::profile_quality::flattening::noise_pressure;
@@ -18,12 +15,15 @@ use crate::contact::geometry::profile_quality::points::SMOOTHING_ADVISED;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::wheel_height::pressed::PressedWheel;
 use crate::contact::normal::wheel_height::task::WheelTask;
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::solution::profile_quality::{ProfileQuality, ProfileUncertainty};
 use crate::contact::solution::words::{PatchSolution, Solution};
+use crate::contact::wheel_on_rail;
+use crate::contact::wheel_on_rail::Judge;
 
 /// The companion solves use the smoothing multiplied by these factors.
 const COMPANIONS: [f64; 2] = [0.4, 2.0];
@@ -100,7 +100,7 @@ pub(crate) fn add(
     if suspicious || solution.patches.iter().any(noisy) {
         for smoothing in readings(contact, solution) {
             let other = contact.smoothed(smoothing);
-            match coupling::solve(
+            match wheel_on_rail::solve(
                 operators,
                 &companion(case, &chosen),
                 &other,

@@ -1,10 +1,10 @@
 //! Assembles the answer that a client reads from the results of the stages: with units, and only with the outputs requested.
 
-use crate::contact::case::press::PressedContact;
-use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::words::solver::Output;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::patch::Patch;
+use crate::contact::normal_stage::SolvedFootprint;
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::motion::Motion;
@@ -32,7 +32,7 @@ const FRAME: &str = "x along rolling (leading edge at larger x), y to the left, 
 #[derive(Debug)]
 pub struct Assembly<'a> {
     case: &'a CheckedCase,
-    pressed: &'a PressedContact,
+    solved: &'a SolvedFootprint,
     patches: Vec<Patch>,
     /// Motion by motion, for every patch.
     points: Vec<Vec<PointSolution>>,
@@ -46,12 +46,12 @@ pub struct Assembly<'a> {
 impl<'a> Assembly<'a> {
     /// No motion yet.
     #[must_use]
-    pub fn new(case: &'a CheckedCase, pressed: &'a PressedContact) -> Assembly<'a> {
-        let patches = pressed.footprint.patches().to_vec();
-        let remarks = case.remarks.iter().chain(&pressed.remarks);
+    pub fn new(case: &'a CheckedCase, solved: &'a SolvedFootprint) -> Assembly<'a> {
+        let patches = solved.footprint.patches().to_vec();
+        let remarks = case.remarks.iter().chain(&solved.remarks);
         Assembly {
             case,
-            pressed,
+            solved,
             points: vec![Vec::new(); patches.len()],
             patches,
             total: Vec::new(),
@@ -95,7 +95,7 @@ impl<'a> Assembly<'a> {
         maintain::add_damage(case, &self.patches, speed, &mut points);
         if let Some((level, fields)) = on_level {
             let solved = SolvedMotion {
-                footprint: &self.pressed.footprint,
+                footprint: &self.solved.footprint,
                 level,
                 answer: &fields.tangential,
                 motion: &point.motion,
@@ -160,13 +160,13 @@ impl<'a> Assembly<'a> {
                 .collect(),
             total: self.total,
             remarks: merged(self.remarks),
-            normal: self.pressed.report,
+            normal: self.solved.report,
             wheel_lowering_mm: None,
             wheelset: None,
             origin: Origin {
                 x_mm: 0.0,
                 y_mm: 0.0,
-                meaning: if self.pressed.footprint.is_closed_form() {
+                meaning: if self.solved.footprint.is_closed_form() {
                     "centre of the contact ellipse"
                 } else {
                     "origin of the given coordinates, for all patches"

@@ -1,7 +1,7 @@
 //! Values per cell as the client reads them: with units, and only those requested.
 
-use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::words::solver::Output;
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::answer::LevelAnswer;
 use crate::contact::rolling::motion_answer::SolvedFields;
 use crate::contact::rolling::strip_mesh::StripMesh;

@@ -4,9 +4,9 @@
 use std::f64::consts::PI;
 use std::time::Duration;
 
-use crate::contact::case::plausibility;
-use crate::contact::case::problem::CheckedCase;
 use crate::contact::error::SolveError;
+use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::problem::plausibility;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
 use crate::contact::solution::finite;

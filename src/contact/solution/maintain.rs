@@ -2,7 +2,6 @@
 
 use std::ops::ControlFlow;
 
-use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::words::solver::Output;
 use crate::contact::case::words::subsurface::BodyName;
 use crate::contact::monitor::{Monitor, Stop};
@@ -17,6 +16,7 @@ use crate::contact::post::subsurface::states::{STORED, in_patch_axes, point, sto
 use crate::contact::post::subsurface::surface_load::{LoadResolution, SurfaceLoad};
 use crate::contact::post::subsurface::task::{LoadedBody, StressPlaces, SubsurfaceTask};
 use crate::contact::post::subsurface::worst::worst_place;
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::answer::LevelAnswer;
 use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::motion::Motion;

@@ -7,11 +7,11 @@
 //! gives with those of the plane is summed. Against CONTACT's curved surfaces of contact at a gauge corner (S1002 on UIC60, 75 kN, two
 //! lobes 10 mm apart in one plane) the plane is off by 2.1 to 2.4 % of μN, and this says 2.7 %; on a flange, 0.1 to 0.3 % and less than 0.1 %.
 
-use crate::contact::case::problem::CheckedCase;
 use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::geometry::wheelset::{WheelsetMotion, creepages};
 use crate::contact::normal::wheel_height::pressed::{PressedGap, PressedWheel};
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::solution::words::{Fields, PatchSolution, Solution};

@@ -1,10 +1,10 @@
 //! Merges the answers for the parts of a wheel–rail contact, with their positions and the sums in track axes.
 
-use crate::contact::case::problem::CheckedCase;
 use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::wheel_height::pressed::{PressedGap, PressedWheel};
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
 use crate::contact::solution::plane_error;

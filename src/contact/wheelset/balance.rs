@@ -6,8 +6,6 @@
 
 use std::sync::Arc;
 
-use crate::contact::case::problem::CheckedCase;
-use crate::contact::coupling::Found;
 use crate::contact::error::SolveError;
 use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::geometry::wheelset_pose::RigidPose;
@@ -15,10 +13,12 @@ use crate::contact::monitor::Monitor;
 use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::normal::wheel_height::wheelset_task::WheelsetTask;
 use crate::contact::numerics::bracketed_root::find_root;
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::profile_trust::trust;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::solution::words::{PatchSolution, Solution};
+use crate::contact::wheel_on_rail::Found;
 
 /// The heights of the centre by both wheels may differ by so much in mm. It leaves a roll of 2e-7 rad, which moves a contact by 1e-4 mm.
 const LEVEL: f64 = 3e-4;

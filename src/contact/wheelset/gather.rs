@@ -1,7 +1,7 @@
 //! Gathers the answers for both wheels in all positions into one, with the sums in track axes.
 
-use crate::contact::case::problem::CheckedCase;
 use crate::contact::normal::wheel_height::wheelset_task::WheelsetTask;
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::solution::profile_quality::ProfileUncertainty;
 use crate::contact::solution::track_axes::both;

@@ -4,8 +4,6 @@
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
-use crate::contact::case::profile_points;
-use crate::contact::case::profile_points::PRESSURE_USUAL;
 use crate::contact::error::SolveError;
 use crate::contact::geometry::conicity::RadiusDifference;
 use crate::contact::geometry::profile::Profile;
@@ -15,6 +13,8 @@ use crate::contact::geometry::wheelset_pose::{PairOfRails, RigidPose};
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::normal::wheel_height::wheelset_task::KinematicsTask;
+use crate::contact::problem::profile_points;
+use crate::contact::problem::profile_points::PRESSURE_USUAL;
 use crate::contact::solution::wheelset::{EquivalentConicity, Kinematics, TouchLine};
 
 /// The other reading of a cross-section has its smoothing times this, or one of so many chords.

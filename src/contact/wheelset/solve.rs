@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use crate::contact::case::problem::CheckedCase;
 use crate::contact::error::SolveError;
 use crate::contact::geometry::wheelset_pose::PairOfRails;
 use crate::contact::monitor::{Monitor, MonitorPart};
 use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::normal::wheel_height::wheelset_task::WheelsetTask;
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::profile_trust::settle;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::solution::words::{Fields, Solution};

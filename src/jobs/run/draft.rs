@@ -6,13 +6,13 @@ use std::fs::File;
 use serde_json::Value;
 use tokio::runtime::Handle;
 
-use crate::contact::case::problem::CheckedCase;
 use crate::contact::case::words::solver::Output;
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::evaluate::many::{ManyTask, expected_seconds};
 use crate::contact::evaluate::many_answer::number_names;
 use crate::contact::evaluate::request_faults::{column_pointer, of_first_row, of_values};
 use crate::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::batch::staging::nameless;
 use crate::jobs::batch::upload::BatchUpload;
 use crate::jobs::error::JobsError;

@@ -96,7 +96,7 @@ mod tests {
     use super::*;
     use crate::contact::error::CaseError;
 
-    fn checked() -> crate::contact::case::problem::CheckedCase {
+    fn checked() -> crate::contact::problem::checked_case::CheckedCase {
         let case = serde_json::json!({
             "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
             "friction": { "coefficient": 0.3 },

@@ -5,11 +5,11 @@ use std::time::Duration;
 use bytes::Bytes;
 use serde_json::json;
 
-use crate::contact::case::problem::CheckedCase;
 use crate::contact::error::SolveError;
 use crate::contact::evaluate::many::{ManyTask, solve_many};
 use crate::contact::evaluate::many_answer::ManyAnswer;
 use crate::contact::monitor::Monitor;
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::solution::words::Solution;
 use crate::jobs::codec::parquet::encode;
 use crate::jobs::codec::result::EncodedResult;

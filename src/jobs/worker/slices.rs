@@ -5,7 +5,7 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use crate::contact::case::problem::CheckedCase;
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::store::ending::SliceRecord;
 
 /// A checked case with its slices, of which the first `done` are stored.

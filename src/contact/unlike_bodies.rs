@@ -1,4 +1,4 @@
-//! Solves one motion of bodies that differ: pressure and tractions in turn, until each belongs to the other.
+//! Region and pressure of one motion of bodies that differ: pressure and tractions in turn, until each belongs to the other.
 //!
 //! The pressure of unlike bodies makes the surfaces slip, and their tractions open and close the gap. The tractions are solved with the
 //! slips of the present pressure, the gap is changed by what they open, region and pressure are found anew, and so on (Panagiotopoulos
@@ -7,26 +7,25 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use crate::contact::answer::answer;
-use crate::contact::case::press::PressedContact;
-use crate::contact::case::problem::CheckedCase;
 use crate::contact::error::SolveError;
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::half_space::unlike_bodies::opening;
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::gap::pilot::PilotOnce;
 use crate::contact::normal::gap::surface::GapSurface;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::hertz::{Ellipse, Pressing};
 use crate::contact::normal::normal_task::NormalTask;
+use crate::contact::normal_stage;
+use crate::contact::normal_stage::SolvedFootprint;
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::force_control;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::refinement::levels::Levels;
 use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
-use crate::contact::solution::words::{Fields, NormalReport, Solution};
+use crate::contact::solution::words::NormalReport;
 use crate::contact::time_limit::TimeLimit;
 
 /// Allowed error of the resultants in the rounds, relative to μN: the opening follows from tractions, whose error counts K times. Chosen on the 12
@@ -51,7 +50,7 @@ const AROUND: f64 = 0.25;
 /// Samples of the parabola across that stands for an ellipse, and how far they reach over its semi-axis. Parabolas are reproduced exactly.
 const PARABOLA: (i32, f64) = (8, 6.0);
 
-/// Solves a problem of one motion whose bodies differ and whose gap is known.
+/// Region and pressure of one motion of bodies that differ and whose gap is known.
 ///
 /// # Errors
 /// A named reason why there is no answer; or the monitor stopped the work.
@@ -59,9 +58,9 @@ pub(crate) fn solve(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
     watch: &TimeLimit,
-) -> Result<(Solution, Fields), SolveError> {
+) -> Result<SolvedFootprint, SolveError> {
     let began = watch.elapsed();
-    let mut pressed = case.pressed(watch)?;
+    let mut solved = normal_stage::solve(case, watch)?;
     let task = gap_task(case);
     let rough = CheckedCase {
         run: case.run.for_resultants(TARGET_OF_ROUNDS),
@@ -75,7 +74,7 @@ pub(crate) fn solve(
     let mut before = None;
     let mut left = f64::INFINITY;
     for _ in 0..ROUNDS_MAX {
-        let (gap, force) = opened(operators, &rough, &pressed, &task, watch)?;
+        let (gap, force) = opened(operators, &rough, &solved, &task, watch)?;
         let change = before.map(|before| distance(before, force));
         before = Some(force);
         let task = GapTask {
@@ -83,14 +82,7 @@ pub(crate) fn solve(
             pilot: PilotOnce::default(),
             ..task.clone()
         };
-        let found = task.solve_for(case.run.target(), workspace, watch)?;
-        pressed = PressedContact {
-            footprint: Footprint::computed(found.field, 0.0),
-            report: Some(found.report.with_time(0.0)),
-            coupling_error: 0.0,
-            remarks: found.remarks,
-        };
-        case.fits(&pressed.footprint)?;
+        solved = normal_stage::solve_gap(case, &task, workspace, watch)?;
         if let Some(change) = change {
             left = LEFT * change;
             if left <= PART_OF_TARGET * target {
@@ -98,7 +90,7 @@ pub(crate) fn solve(
             }
         }
     }
-    pressed.coupling_error = left.hypot(LEFT_BY_PRESSURE * case.problem.elasticity.difference);
+    solved.coupling_error = left.hypot(LEFT_BY_PRESSURE * case.problem.elasticity.difference);
     if left > PART_OF_TARGET * target {
         let remark = Remark::IterationInexact {
             iteration: "pressure and tractions of unlike bodies",
@@ -106,13 +98,13 @@ pub(crate) fn solve(
             residual: left,
             tolerance: PART_OF_TARGET * target,
         };
-        pressed.remarks.push(remark.into());
+        solved.remarks.push(remark.into());
     }
     let seconds = (watch.elapsed() - began).as_secs_f64();
-    pressed.report = pressed
+    solved.report = solved
         .report
         .map(|report| NormalReport { seconds, ..report });
-    answer(operators, case, &pressed, watch)
+    Ok(solved)
 }
 
 /// The gap of a case, and how it is loaded; that of an ellipse is a paraboloid.
@@ -152,11 +144,11 @@ fn paraboloid(ellipse: &Ellipse, modulus: f64) -> GapSurface {
 fn opened(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
-    pressed: &PressedContact,
+    solved: &SolvedFootprint,
     task: &GapTask,
     watch: &TimeLimit,
 ) -> Result<(GapSurface, [f64; 2]), SolveError> {
-    let rolling = case.rolling_task(&pressed.footprint);
+    let rolling = case.rolling_task(&solved.footprint);
     if let Some(reason) = rolling.falls_too_fast() {
         return Err(SolveError::NotCovered { reason });
     }
@@ -164,7 +156,7 @@ fn opened(
     let point = force_control::solve(&rolling, &mut levels, 0, None, watch)?;
     let sum = Resultants::default();
     let sum = point.resultants.iter().fold(sum, |sum, r| sum.plus(*r));
-    let patches = pressed.footprint.patches();
+    let patches = solved.footprint.patches();
     let limit = case.problem.friction.limit_of_all(patches);
     let force = [sum.force_x / limit, sum.force_y / limit];
     let Some(fields) = &point.fields else {

@@ -1,10 +1,10 @@
-//! Solves the motions of a problem on its footprint, one after the other.
+//! The stage of the tangential problem: the motions of a problem on its footprint, one after the other, each to its place in the answer.
 
 use std::sync::Arc;
 
-use crate::contact::case::press::PressedContact;
-use crate::contact::case::problem::CheckedCase;
 use crate::contact::error::SolveError;
+use crate::contact::normal_stage::SolvedFootprint;
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::force_control;
 use crate::contact::rolling::history;
 use crate::contact::rolling::motion_answer::MotionAnswer;
@@ -19,40 +19,40 @@ use crate::contact::time_limit::TimeLimit;
 ///
 /// # Errors
 /// Why a motion has no answer; or the monitor stopped the work.
-pub(crate) fn answer(
+pub(crate) fn solve(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
-    pressed: &PressedContact,
+    solved: &SolvedFootprint,
     watch: &TimeLimit,
 ) -> Result<(Solution, Fields), SolveError> {
-    let answer = motions(operators, case, pressed, watch);
+    let answer = solve_motions(operators, case, solved, watch);
     let (mut solution, fields) = answer.map_err(|error| watch.explained(error, case))?;
     share_seconds(&mut solution);
     Ok((solution, fields))
 }
 
-fn motions(
+fn solve_motions(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
-    pressed: &PressedContact,
+    solved: &SolvedFootprint,
     watch: &TimeLimit,
 ) -> Result<(Solution, Fields), SolveError> {
-    let mut task = case.rolling_task(&pressed.footprint);
-    task.resolution = task.resolution.beside(pressed.coupling_error);
+    let mut task = case.rolling_task(&solved.footprint);
+    task.resolution = task.resolution.beside(solved.coupling_error);
     if let Some(reason) = task.falls_too_fast() {
         return Err(SolveError::NotCovered { reason });
     }
     let mut levels = Levels::new(&task, operators);
-    let mut assembly = Assembly::new(case, pressed);
+    let mut assembly = Assembly::new(case, solved);
     if let Some(history) = &case.problem.history {
-        let patches = pressed.footprint.patches().iter();
+        let patches = solved.footprint.patches().iter();
         let extents: Vec<[f64; 4]> = patches.map(|patch| patch.extent).collect();
         if let Some(reason) = history::solve::too_long(history, &extents, case.run.steps_max) {
             return Err(SolveError::NotCovered { reason });
         }
         for mut point in history::solve::solve(&task, history, &mut levels, watch)? {
             if assembly.is_empty() {
-                point.seconds += pressed.report.map_or(0.0, |report| report.seconds);
+                point.seconds += solved.report.map_or(0.0, |report| report.seconds);
             }
             assembly.add(&levels, &point, watch)?;
             watch.advance();
@@ -62,13 +62,13 @@ fn motions(
     let mut before: Option<MotionAnswer> = None;
     for index in 0..case.problem.motions.len() {
         let mut point = force_control::solve(&task, &mut levels, index, before.as_ref(), watch)?;
-        if pressed.coupling_error > 0.0 {
+        if solved.coupling_error > 0.0 {
             let errors = point.errors.iter_mut().flatten();
-            errors.for_each(|error| *error = error.hypot(pressed.coupling_error));
+            errors.for_each(|error| *error = error.hypot(solved.coupling_error));
         }
         if index == 0 {
             // What all motions share is charged to the first.
-            point.seconds += pressed.report.map_or(0.0, |report| report.seconds);
+            point.seconds += solved.report.map_or(0.0, |report| report.seconds);
         }
         assembly.add(&levels, &point, watch)?;
         levels.trim();

@@ -1,7 +1,8 @@
 //! How far pressure and traction of bodies that differ are solved together.
 
-use crate::contact::case::problem::{Problem, Run};
 use crate::contact::normal::normal_task::NormalTask;
+use crate::contact::problem::physics::Problem;
+use crate::contact::problem::run::Run;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::refinement::resolution::Resolution;

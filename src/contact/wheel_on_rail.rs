@@ -3,9 +3,6 @@
 
 use std::sync::Arc;
 
-use crate::contact::answer::answer;
-use crate::contact::case::press::PressedContact;
-use crate::contact::case::problem::{CheckedCase, Run};
 use crate::contact::error::SolveError;
 use crate::contact::forecast::{can_forecast, forecast, motion_in};
 use crate::contact::friction::on_rail::in_frame;
@@ -18,10 +15,14 @@ use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::wheel_height::pressed::{PressedGap, PressedWheel};
 use crate::contact::normal::wheel_height::search::{Accuracy, HeightStart, NormalPass};
 use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
+use crate::contact::normal_stage::SolvedFootprint;
+use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::problem::run::Run;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::rolling_stage;
 use crate::contact::solution::track_axes::merge;
 use crate::contact::solution::words::{Fields, NormalReport, Solution};
 use crate::contact::time_limit::TimeLimit;
@@ -174,7 +175,7 @@ impl WheelSolve<'_> {
                 Some(wheelset) => vec![motion_in(gap, geometry, wheel.centre, wheelset)?],
             };
             let load_error = wheel.load_error.hypot(at_rest.unbalanced);
-            let pressed = PressedContact {
+            let solved = SolvedFootprint {
                 footprint: Footprint::computed(gap.field.clone(), load_error),
                 report: Some(normal),
                 coupling_error: problem.first_order_error(run.method),
@@ -189,8 +190,8 @@ impl WheelSolve<'_> {
                 // Remarks are added once, for the whole contact.
                 remarks: Vec::new(),
             };
-            part.fits(&pressed.footprint)?;
-            let answered = answer(self.operators, &part, &pressed, &watch);
+            part.fits(&solved.footprint)?;
+            let answered = rolling_stage::solve(self.operators, &part, &solved, &watch);
             answers.push(answered.map_err(|error| of_gap(error, gap, geometry))?);
         }
         Ok(answers)

@@ -1,8 +1,10 @@
-//! How much memory a case will take, estimated from its finest mesh, and the faults of one that is too large.
+//! How much memory a case will take, estimated from its finest mesh.
 
-use crate::contact::case::limits::Limits;
-use crate::contact::error::Fault;
+use crate::contact::error::SolveError;
+use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::normal_task::NormalTask;
+use crate::contact::post::subsurface::task::SubsurfaceTask;
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::operator_store::OperatorKind;
 use crate::contact::rolling::refinement::levels::LEVELS_KEPT;
@@ -16,13 +18,6 @@ const TARGET_CELLS: f64 = 160.0;
 const TARGET_GROWTH: f64 = 0.65;
 /// Cells that a patch has at least.
 const PATCH_CELLS_MIN: f64 = 64.0;
-/// Largest length over width of a patch for the fast solver. Its preconditioner treats every strip by itself, so that linear systems no
-/// longer converge where strips lie closer than the cells in them are long. Of ellipses under 20 loads and motions all converged up
-/// to 70, and from 100 on some did not (`cargo bench --bench stress` goes to 50). Wide patches need no bound: b/a 1000 converges in
-/// a few steps.
-const LENGTH_OVER_WIDTH_MAX: f64 = 60.0;
-/// Most cells of the dense method.
-const LIU_HSU_CELLS_MAX: f64 = 1000.0;
 /// Dense square matrices the method of Liu and Hsu holds at once.
 const LIU_HSU_MATRICES: f64 = 4.0;
 /// Doubles per cell of the finest mesh that an iteration holds: the Krylov space, iterates and buffers.
@@ -153,46 +148,8 @@ impl SizeInput {
         }
     }
 
-    /// Faults of a case that is too large for the limits or for its method.
-    pub(crate) fn faults(&self, limits: &Limits) -> Vec<Fault> {
-        let pointer = match self.resolution {
-            Resolution::Mesh(_) => "/solver/mesh",
-            Resolution::Target(_) => "/contact",
-        };
-        let mut faults = Vec::new();
-        let (cells, _) = self.finest();
-        if self.method == Method::LiuHsu && cells > LIU_HSU_CELLS_MAX {
-            faults.push(Fault::new(pointer, format!(
-                    "{cells:.0} cells over all patches; at most {LIU_HSU_CELLS_MAX} are allowed with liu_hsu, \
-                     use boundary_element for more"
-                )));
-        }
-        let fast = matches!(self.method, Method::BoundaryElement);
-        if let Some(ratio) = self
-            .ellipse
-            .filter(|ratio| fast && *ratio > LENGTH_OVER_WIDTH_MAX)
-        {
-            faults.push(Fault::new("/contact", format!(
-                    "a patch {ratio:.1} times as long along rolling as wide; boundary_element solves up to \
-                     {LENGTH_OVER_WIDTH_MAX} times, fastsim any"
-                )));
-        }
-        let bytes = self.bytes() as u64;
-        if bytes > limits.memory_bytes {
-            let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
-            faults.push(Fault::new(pointer, format!(
-                    "{cells:.0} cells over all patches and {} motions need about {:.0} MiB; at most {:.0} MiB are \
-                     allowed for one case",
-                    self.motions,
-                    mebibytes(bytes),
-                    mebibytes(limits.memory_bytes)
-                )));
-        }
-        faults
-    }
-
     /// Cells and segments of the finest mesh over all patches.
-    fn finest(&self) -> (f64, f64) {
+    pub(crate) fn finest(&self) -> (f64, f64) {
         if self.method == Method::Table {
             return (0.0, 0.0);
         }
@@ -220,5 +177,48 @@ impl SizeInput {
             }
             _ => finest,
         }
+    }
+}
+
+impl CheckedCase {
+    /// What decides how much memory this takes.
+    pub(crate) fn size_input(&self) -> SizeInput {
+        let places = |task: &SubsurfaceTask| task.places.count();
+        SizeInput {
+            method: self.run.method,
+            resolution: self.run.resolution,
+            segments: segments(&self.problem.task),
+            motions: self.problem.motions.len() * positions(&self.problem.task),
+            history: self.problem.history.is_some(),
+            fields: self.run.outputs.iter().any(|output| output.is_per_cell()),
+            stress_points: self.run.after.subsurface.as_ref().map_or(0, places),
+            ellipse: length_over_width(&self.problem.task),
+        }
+    }
+
+    /// Checks that a solve stays within the memory allowed, once the number of patches and segments is known.
+    ///
+    /// # Errors
+    /// The solve needs more memory.
+    pub(crate) fn fits(&self, footprint: &Footprint) -> Result<(), SolveError> {
+        let segments = footprint.segments_per_strip();
+        let (patches, sum) = (footprint.patches().len(), segments.iter().sum::<f64>());
+        let bytes = SizeInput {
+            segments,
+            ellipse: None,
+            ..self.size_input()
+        }
+        .bytes() as u64;
+        if bytes > self.run.memory_bytes {
+            return Err(SolveError::NormalProblem {
+                reason: format!(
+                    "the contact falls apart into {patches} patches with {sum:.1} segments per strip, which need about {} MiB; at \
+                     most {} MiB are allowed for one case",
+                    bytes >> 20,
+                    self.run.memory_bytes >> 20
+                ),
+            });
+        }
+        Ok(())
     }
 }

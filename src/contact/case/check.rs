@@ -1,0 +1,130 @@
+//! The last step of a check: words without faults become a [`CheckedCase`].
+
+use std::time::Duration;
+
+use crate::contact::case::checks::{CheckedParts, PartialCase, missing_load, unusual_friction};
+use crate::contact::case::digest::digest;
+use crate::contact::case::limits::Limits;
+use crate::contact::case::motions::ExpandedMotions;
+use crate::contact::case::profiles;
+use crate::contact::case::resolution::resolution;
+use crate::contact::case::words::question::Case;
+use crate::contact::error::CaseError;
+use crate::contact::problem::after_tasks::AfterTasks;
+use crate::contact::problem::checked_case::{CheckedCase, Label};
+use crate::contact::problem::physics::{Checked, MotionPart, Problem};
+use crate::contact::problem::plausibility;
+use crate::contact::problem::run::Run;
+use crate::contact::remark::entry::merged;
+use crate::contact::rolling::motion::{Motion, PrescribedForces};
+use crate::contact::solution::words::Asked;
+
+impl CheckedCase {
+    /// Checks a case against the limits and prepares its numbers.
+    ///
+    /// # Errors
+    /// Every fault found, each with its JSON pointer.
+    pub fn new(case: &Case, limits: &Limits) -> Result<CheckedCase, CaseError> {
+        let given = PartialCase {
+            material: Some(&case.material),
+            friction: Some(&case.friction),
+            contact: Some(&case.contact),
+            load: case.load.as_ref(),
+            motion: Some(&case.motion),
+            solver: Some(&case.solver),
+            outputs: &case.outputs,
+            after: case.after_words(),
+        };
+        let (parts, mut faults) = CheckedParts::check(given, limits);
+        if faults.is_empty() && parts.task.is_none() {
+            faults.push(missing_load());
+        }
+        let (true, Some(elasticity), Some((task, remarks)), Some(motions)) = (
+            faults.is_empty(),
+            parts.elasticity,
+            parts.task,
+            parts.motions,
+        ) else {
+            return Err(CaseError(faults));
+        };
+        let of_material = elasticity.remark(case.solver.method.into());
+        let of_material = of_material.map(|r| r.at_pointer("/material"));
+        let of_case = of_material
+            .into_iter()
+            .chain(unusual_friction(&case.friction));
+        let ExpandedMotions {
+            motions,
+            forces,
+            speeds,
+            history,
+        } = motions;
+        let given = given_creepages(&motions, &forces);
+        let implausible = plausibility::of_case(&case.contact, &task.patches(), given);
+        let remarks = merged(of_case.chain(remarks).chain(implausible));
+        let digest = digest(case, &elasticity, &motions, &forces, &speeds);
+        let problem = Problem {
+            elasticity,
+            friction: (&case.friction).into(),
+            interface: (&case.friction).into(),
+            task,
+            part: MotionPart {
+                before: 0,
+                all: motions.len(),
+            },
+            motions,
+            forces,
+            speeds,
+            history,
+            wheelset: profiles::wheelset(&case.motion),
+            drive_torque: profiles::drive_torque(&case.motion),
+            checked: Checked::without_faults(),
+        };
+        let run = run(case, limits);
+        let first_order = problem.first_order(&run).map(|r| r.at_pointer("/material"));
+        let remarks = merged(remarks.into_iter().chain(first_order));
+        Ok(CheckedCase {
+            problem,
+            run,
+            label: Label {
+                name: case.name.clone(),
+                labels: case.labels.clone(),
+                digest,
+                asked: asked(case),
+            },
+            remarks,
+        })
+    }
+}
+
+/// The motions whose creepages are given; those that are searched are looked at when they are found.
+fn given_creepages<'a>(motions: &'a [Motion], forces: &[PrescribedForces]) -> &'a [Motion] {
+    match forces.iter().all(|forces| *forces == [None; 2]) {
+        true => motions,
+        false => &[],
+    }
+}
+
+/// What of a case stands in its answer.
+fn asked(case: &Case) -> Asked {
+    Asked {
+        contact: case.contact.name().to_owned(),
+        friction_coefficient: case.friction.largest(),
+        friction_varies: case.friction.coefficient.is_none(),
+        load: case.load,
+    }
+}
+
+/// How a case is to be solved, by its words.
+fn run(case: &Case, limits: &Limits) -> Run {
+    Run {
+        method: case.solver.method.into(),
+        method_asked: case.solver.method,
+        traction_bound: case.solver.traction_bound.unwrap_or_default().into(),
+        resolution: resolution(&case.solver),
+        time_limit: case.solver.time_limit_s.map(Duration::from_secs_f64),
+        memory_bytes: limits.memory_bytes,
+        steps_max: limits.motions_max,
+        outputs: case.outputs.clone(),
+        after: AfterTasks::new(case),
+    }
+}

@@ -1,0 +1,105 @@
+//! The stage of the normal problem: a contact whose patches have one frame gets its region and pressure.
+
+use crate::contact::error::SolveError;
+use crate::contact::half_space::grid_operator::GridWorkspace;
+use crate::contact::monitor::Monitor;
+use crate::contact::normal::answer::{NormalError, NormalWork};
+use crate::contact::normal::footprint::Footprint;
+use crate::contact::normal::gap::task::GapTask;
+use crate::contact::normal::normal_task::NormalTask;
+use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::solution::words::NormalReport;
+
+/// The solved normal problem of one frame.
+#[derive(Debug, Clone)]
+pub struct SolvedFootprint {
+    /// Patches and pressures.
+    pub footprint: Footprint,
+    /// How they were found, where they were not known beforehand.
+    pub report: Option<NormalReport>,
+    /// Error of forces relative to μN that pressures leave because they do not quite belong to the tractions.
+    pub coupling_error: f64,
+    /// Remarks on them.
+    pub remarks: Vec<RemarkEntry>,
+}
+
+/// Patches and pressures of a checked case; of a gap they are found.
+///
+/// # Errors
+/// Why there are none, or why the tangential problem on them needs too much memory; or the monitor stopped the work.
+///
+/// # Panics
+/// On a wheel, whose patches have a frame each: see [`wheel_on_rail`](crate::contact::wheel_on_rail).
+pub fn solve(case: &CheckedCase, monitor: &dyn Monitor) -> Result<SolvedFootprint, SolveError> {
+    let known = |footprint| SolvedFootprint {
+        footprint,
+        report: None,
+        coupling_error: case.problem.first_order_error(case.run.method),
+        remarks: Vec::new(),
+    };
+    match &case.problem.task {
+        NormalTask::Hertz(ellipse) => Ok(known(Footprint::hertz(*ellipse))),
+        NormalTask::Given(field) => Ok(known(Footprint::given(field.clone()))),
+        NormalTask::Gap(task) => {
+            let began = monitor.elapsed();
+            let workspace = &mut GridWorkspace::default();
+            let mut found = solve_gap(case, task, workspace, monitor)?;
+            found.coupling_error = case.problem.first_order_error(case.run.method);
+            found.report = found.report.map(|report| NormalReport {
+                seconds: (monitor.elapsed() - began).as_secs_f64(),
+                ..report
+            });
+            Ok(found)
+        }
+        NormalTask::Wheel(_) | NormalTask::Wheelset(_) => {
+            unreachable!("the patches of a wheel have a frame each")
+        }
+    }
+}
+
+/// Patches and pressures of a gap, checked against the memory allowed; nothing is said of coupling and time.
+///
+/// # Errors
+/// As [`solve`].
+pub(crate) fn solve_gap(
+    case: &CheckedCase,
+    task: &GapTask,
+    workspace: &mut GridWorkspace<f32>,
+    monitor: &dyn Monitor,
+) -> Result<SolvedFootprint, SolveError> {
+    let found = task.solve_for(case.run.target(), workspace, monitor)?;
+    let solved = SolvedFootprint {
+        footprint: Footprint::computed(found.field, 0.0),
+        report: Some(found.report.with_time(0.0)),
+        coupling_error: 0.0,
+        remarks: found.remarks,
+    };
+    case.fits(&solved.footprint)?;
+    Ok(solved)
+}
+
+impl From<NormalError> for SolveError {
+    fn from(failure: NormalError) -> Self {
+        match failure {
+            NormalError::Stopped(stop) => stop.into(),
+            NormalError::NoAnswer(reason) => SolveError::NormalProblem { reason },
+        }
+    }
+}
+
+impl NormalWork {
+    /// The report as the client reads it, with the wall time in s.
+    #[must_use]
+    pub fn with_time(self, seconds: f64) -> NormalReport {
+        NormalReport {
+            cells: self.cells.map(|n| u32::try_from(n).unwrap_or(u32::MAX)),
+            iterations: self.iterations,
+            residual: self.residual,
+            grids: u32::try_from(self.grids).unwrap_or(u32::MAX),
+            pressure_change: self.pressure_change,
+            force_residual: 0.0,
+            seconds,
+        }
+    }
+}

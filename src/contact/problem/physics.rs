@@ -1,0 +1,99 @@
+//! What is asked, as checked numbers: no results, no options and no names.
+//!
+//! A [`Problem`] comes from the checks of `case/`, or from a checked one that asked for more: nothing else may put one together.
+
+use std::sync::Arc;
+
+use crate::contact::friction::interface::Interface;
+use crate::contact::friction::law::FrictionLaw;
+use crate::contact::geometry::wheelset::WheelsetMotion;
+use crate::contact::half_space::elasticity::Elasticity;
+use crate::contact::normal::normal_task::NormalTask;
+use crate::contact::normal::wheel_height::task::WheelTask;
+use crate::contact::rolling::history::task::HistoryTask;
+use crate::contact::rolling::motion::{Motion, PrescribedForces};
+
+/// What is asked: the physics.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Problem {
+    /// Combined elastic constants.
+    pub elasticity: Elasticity,
+    /// Bound of the tractions.
+    pub friction: FrictionLaw,
+    /// What lies between the bodies.
+    pub interface: Interface,
+    /// Where patches and pressures come from.
+    pub task: NormalTask,
+    /// The motions, in the order of the case; never empty.
+    pub motions: Vec<Motion>,
+    /// Which motions of the case these are: all of them, unless this is a slice.
+    pub part: MotionPart,
+    /// The motion of the wheelset that stands in place of the one motion above, which is then 0: the creepages of the patches
+    /// follow from it.
+    pub wheelset: Option<WheelsetMotion>,
+    /// Torque about the axle in N mm that the rails are to balance; the angular velocity of the wheelset is then found.
+    pub drive_torque: Option<f64>,
+    /// Forces prescribed instead of creepages, motion by motion.
+    pub forces: Vec<PrescribedForces>,
+    /// Rolling speeds in mm/s, motion by motion, where they are given.
+    pub speeds: Vec<Option<f64>>,
+    /// How the motions follow each other, where they are one history.
+    pub history: Option<HistoryTask>,
+    /// Proof of the checks.
+    pub(crate) checked: Checked,
+}
+
+/// Which motions of a case a problem asks about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MotionPart {
+    /// Motions of the case before the first of these.
+    pub before: usize,
+    /// Motions of the whole case.
+    pub all: usize,
+}
+
+/// Proof that a problem went through the checks. `tests/tidy` allows it, and literals of [`Problem`], in `case/` and here only.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Checked(());
+
+impl Checked {
+    /// The checks found no fault.
+    pub(crate) fn without_faults() -> Checked {
+        Checked(())
+    }
+}
+
+impl Problem {
+    /// The same question about some of the motions, by their places.
+    #[must_use]
+    pub fn with_motions(&self, chosen: &[usize]) -> Problem {
+        Problem {
+            motions: chosen.iter().map(|k| self.motions[*k]).collect(),
+            forces: chosen.iter().map(|k| self.forces[*k]).collect(),
+            speeds: chosen.iter().map(|k| self.speeds[*k]).collect(),
+            ..self.clone()
+        }
+    }
+
+    /// The same question about one wheel of a wheelset that moves as a whole.
+    #[must_use]
+    pub(crate) fn of_wheel(&self, wheel: Arc<WheelTask>, wheelset: WheelsetMotion) -> Problem {
+        Problem {
+            task: NormalTask::Wheel(wheel),
+            wheelset: Some(wheelset),
+            drive_torque: None,
+            ..self.clone()
+        }
+    }
+
+    /// The same question about one gap of a wheel, with friction in its axes and motions about its origin.
+    #[must_use]
+    pub(crate) fn of_gap(&self, friction: FrictionLaw, motions: Vec<Motion>) -> Problem {
+        Problem {
+            friction,
+            motions,
+            wheelset: None,
+            ..self.clone()
+        }
+    }
+}

@@ -1,0 +1,62 @@
+//! How a case is to be solved: method, accuracy, limits and outputs.
+
+use std::time::Duration;
+
+use crate::contact::case::words::solver::{MethodName, Output};
+use crate::contact::problem::after_tasks::AfterTasks;
+use crate::contact::rolling::methods::method::{Method, TractionBound};
+use crate::contact::rolling::refinement::resolution::Resolution;
+
+/// How a case is to be solved: nothing of it changes what is asked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// The method to solve with.
+    pub method: Method,
+    /// The word it was asked for with.
+    pub method_asked: MethodName,
+    /// Where `fastsim` lets tractions slip.
+    pub traction_bound: TractionBound,
+    /// Target or mesh.
+    pub resolution: Resolution,
+    /// Time allowed for the whole case.
+    pub time_limit: Option<Duration>,
+    /// Memory the solve may use, in bytes.
+    pub memory_bytes: u64,
+    /// Steps that a history may take.
+    pub steps_max: usize,
+    /// What to compute, sorted, without repetition.
+    pub outputs: Vec<Output>,
+    /// What is computed from the solved motions.
+    pub after: AfterTasks,
+}
+
+impl Run {
+    /// The same for resultants alone, with this target or a larger one.
+    #[must_use]
+    pub fn for_resultants(&self, target: f64) -> Run {
+        Run {
+            resolution: match self.resolution {
+                Resolution::Target(asked) => Resolution::Target(asked.max(target)),
+                mesh @ Resolution::Mesh(_) => mesh,
+            },
+            outputs: vec![Output::Resultants],
+            after: AfterTasks::default(),
+            ..self.clone()
+        }
+    }
+
+    /// Target of the resultants' error relative to μN; infinite where a mesh is given.
+    #[must_use]
+    pub fn target(&self) -> f64 {
+        match self.resolution {
+            Resolution::Target(target) => target,
+            Resolution::Mesh(_) => f64::INFINITY,
+        }
+    }
+
+    /// Is this output asked for?
+    #[must_use]
+    pub fn wants(&self, output: Output) -> bool {
+        self.outputs.contains(&output)
+    }
+}
