@@ -291,6 +291,7 @@ mod tests {
                 "use crate::contact::case::words::question::Case;",
             ),
             ("src/contact/case/checks.rs", "let asked = Problem {};"),
+            ("src/contact/case/words/question.rs", ""),
             ("src/contact/forecast.rs", "let other = Problem {};"),
         ]);
         let found = checked_once(&planted);
