@@ -9,7 +9,7 @@
 //! | motions, from coarse to fine levels | footprint, [`friction`] | [`MotionAnswer`](rolling::motion_answer::MotionAnswer) | [`rolling_stage`], [`rolling`], [`mesh`], [`half_space`] |
 //! | answer | answers of motions | [`Solution`], [`Fields`] | [`post`], [`solution`] |
 //!
-//! Loops around these stages: [`slices`] of long sweeps, [`unlike_bodies`], [`wheel_on_rail`] (in [`profile_trust`]), [`wheelset`].
+//! Loops around these stages: [`mod@slices`] of long sweeps, [`unlike_bodies`], [`wheel_on_rail`] (in [`profile_trust`]), [`wheelset`].
 //! Frame, signs, units and words: [`conventions`].
 
 pub mod case;
@@ -103,7 +103,7 @@ pub fn solve_with(
     Ok(answer)
 }
 
-/// Solves one slice of a case: the motions of a range that [`slices`] gives. Motions are numbered as in the case.
+/// Solves one slice of a case: the motions of a range that [`slices()`] gives. Motions are numbered as in the case.
 ///
 /// # Errors
 /// A named reason why there is no answer.
