@@ -2,22 +2,18 @@
 //!
 //! The friction law is monotone: while the other components are kept, a force grows with its creepage. A single force is therefore
 //! bracketed between a creepage that gives too little and one that gives too much; for two forces the search for the first runs
-//! inside the search for the second. The unknown is not the creepage but its *place* r: by Vermeulen and Johnson's cubic law with
-//! Kalker's coefficients (Vermeulen & Johnson 1964; Kalker 1990, §2.2.3) the creepage at r gives the force r μN, so that the force
-//! found is close to r. The search starts where the table of creep forces has the forces.
+//! inside the search for the second. The unknown is not the creepage but its *place*, see `force_places`.
 
 use std::time::Duration;
 
 use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
-use crate::contact::numerics::bracketed_root::{PLACE_MAX, RootExit, find_root};
+use crate::contact::numerics::bracketed_root::{RootExit, find_root};
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::answer::Work;
-use crate::contact::rolling::cubic_law::CubicLaw;
-use crate::contact::rolling::load_ellipse::LoadEllipse;
+use crate::contact::rolling::force_places::{ForcePlaces, total};
 use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::methods::method::Method;
-use crate::contact::rolling::methods::table::solve as table;
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::refinement::level_solve::MotionTask;
@@ -51,9 +47,9 @@ const WORSE_MAX: u32 = 3;
 const INNER_TOLERANCE: f64 = 0.3;
 /// How often the levels are chosen anew because the motion that was found does not meet its target on them. Keeps the numbers safe; not tuned.
 const CLIMBS_MAX: u32 = 3;
-/// Largest correction of a starting place by what the cubic law was off at the motion before. Chosen by judgement; how much it matters was not
-/// measured.
-const CORRECTION_MAX: f64 = 0.3;
+/// How often a search is corrected by what the answer judged at its end was extrapolated. Keeps the numbers safe; not tuned: the
+/// extrapolation changes by some per cent of the change of the force, so that two corrections suffice.
+const CORRECTIONS_MAX: u32 = 5;
 
 /// Solves motion `index` of a problem; where forces are prescribed, finds the creepages that give them. `before` is the answer to
 /// the motion before.
@@ -73,24 +69,20 @@ pub fn solve(
     }
     let began = monitor.elapsed();
     let mut search = ForceSearch::new(task, levels, index, monitor);
-    let mut place = search.start(before);
+    let mut place = search.places.start(&task.motions[index], before);
     for _ in 0..CLIMBS_MAX {
         // Refinement chooses the levels; on them the force is one function of the creepage.
         search.path.clear();
-        search.best = None;
-        place = search.find(place)?;
-        // Where the force jumps, other levels do not help either.
-        if search.met() || search.saturated || search.exit == RootExit::BracketClosed {
+        search.plain = false;
+        place = search.find_judged(place)?;
+        // Where the force jumps, or cannot be extrapolated, other levels do not help either.
+        let jumps = search.exit == RootExit::BracketClosed;
+        if search.met() || search.saturated || search.plain || jumps {
             break;
         }
     }
     search.finish(place, began)
 }
-
-/// Steps by which a start is moved to where the table has the forces; they fall short where the force hardly grows with its place.
-const TABLE_STEPS: u32 = 40;
-/// The start is good enough when the table misses the forces by no more than this, relative to μN: about what the table is off.
-const TABLE_MISSED: f64 = 1e-3;
 
 /// The search for the creepages of one motion.
 struct ForceSearch<'a, 'p> {
@@ -101,11 +93,16 @@ struct ForceSearch<'a, 'p> {
     forces: PrescribedForces,
     /// μN of all patches in N.
     limit: f64,
-    law: CubicLaw,
-    /// The ellipses that stand for the patches, where the table can tell a start.
-    ellipses: Vec<LoadEllipse>,
-    /// The levels to solve on, coarse to fine; chosen by the next trial if empty.
+    places: ForcePlaces<'a>,
+    /// The levels to solve on, coarse to fine; chosen by the next answer that is judged if empty.
     path: Vec<MeshPlan>,
+    /// The forces of an answer are extrapolated from companion meshes.
+    extrapolates: bool,
+    /// By how much the forces of the answer judged last exceed those of its tractions, relative to μN. It hardly changes with
+    /// the motion, so that trials need no companions.
+    shift: [f64; 2],
+    /// Forces are not extrapolated, because a companion mesh has answers for some of the motions only.
+    plain: bool,
     /// The answer nearest to the forces, and how far it is from them, relative to μN.
     best: Option<(f64, MotionAnswer)>,
     /// Largest force of the first trial, relative to μN.
@@ -125,21 +122,19 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
     ) -> ForceSearch<'a, 'p> {
         let patches = task.footprint.patches();
         let limit = task.friction.limit_of_all(patches);
-        let ellipses = if table::tells(task.elasticity, task.interface, task.friction) {
-            levels.ellipses().to_vec()
-        } else {
-            Vec::new()
-        };
         ForceSearch {
             task,
-            ellipses,
+            places: ForcePlaces::new(task, levels, limit, task.forces[index]),
             levels,
             index,
             monitor,
             forces: task.forces[index],
             limit,
-            law: CubicLaw::new(task, limit),
             path: Vec::new(),
+            extrapolates: task.method == Method::BoundaryElement
+                && matches!(task.resolution, Resolution::Target(_)),
+            shift: [0.0; 2],
+            plain: false,
             best: None,
             first: None,
             saturated: false,
@@ -148,59 +143,31 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
         }
     }
 
-    /// Places to start from: those of the cubic law, corrected by what the law was off at the motion before.
-    fn start(&self, before: Option<&MotionAnswer>) -> [f64; 2] {
-        let wanted = self.forces.map(|f| f.unwrap_or(0.0) / self.limit);
-        let mut place = self.guess(wanted, &self.task.motions[self.index]);
-        if let Some(before) = before.filter(|point| !point.saturated) {
-            let sum = total(before);
-            let forces = [sum.force_x / self.limit, sum.force_y / self.limit];
-            let had = [0, 1].map(|k| self.forces[k].map_or(0.0, |_| forces[k]));
-            let guess = self.guess(had, &before.motion);
-            let found = self.law.places(&before.motion);
-            for k in 0..2 {
-                let correction = found[k] - guess[k];
-                if correction.abs() < CORRECTION_MAX {
-                    place[k] += correction;
-                }
-            }
+    /// Finds the places at which the forces are as prescribed, with an answer that is judged there.
+    fn find_judged(&mut self, start: [f64; 2]) -> Result<[f64; 2], SolveError> {
+        self.best = None;
+        if !self.extrapolates {
+            return self.find(start);
         }
-        place
-    }
-
-    /// Places of the creepages that give forces relative to μN: by the table with the rest of a motion, or by the cubic law without spin.
-    fn guess(&self, force: [f64; 2], rest: &Motion) -> [f64; 2] {
-        let length = force[0].hypot(force[1]);
-        let linear = if length > 0.0 {
-            CubicLaw::linear(length.min(1.0)) / length
-        } else {
-            0.0
-        };
-        let cubic = [0, 1].map(|k| self.law.place(k, linear * force[k] / self.law.stiffness[k]));
-        self.by_table(force, rest, cubic).unwrap_or(cubic)
-    }
-
-    /// Places at which the table has the forces, from a start: a force is close to its place, so that what is missed is the step.
-    fn by_table(&self, force: [f64; 2], rest: &Motion, start: [f64; 2]) -> Option<[f64; 2]> {
-        let modulus = self.task.interface.reduction * self.task.elasticity.shear_modulus;
-        let poisson_ratio = self.task.elasticity.poisson_ratio;
-        let patches = self.task.footprint.patches();
         let mut place = start;
-        for _ in 0..TABLE_STEPS * u32::from(!self.ellipses.is_empty()) {
-            let motion = self.at(place, rest);
-            let mut found = [0.0; 2];
-            for (ellipse, patch) in self.ellipses.iter().zip(patches) {
-                let limit = self.task.friction.limit(patch);
-                let own = table::forces(modulus, poisson_ratio, ellipse, limit, &motion);
-                found = [0, 1].map(|k| found[k] + own[k] / self.limit);
+        let mut off = self.judge(place)?;
+        for _ in 0..CORRECTIONS_MAX {
+            if length(off) <= self.tolerance() {
+                self.end(RootExit::Found);
+                return Ok(place);
             }
-            let off = [0, 1].map(|k| self.forces[k].map_or(0.0, |_| found[k] - force[k]));
-            if length(off) <= TABLE_MISSED {
-                return Some(place);
+            let shift = self.shift;
+            place = self.find(place)?;
+            off = self.judge(place)?;
+            let corrected = length([0, 1].map(|k| self.shift[k] - shift[k]));
+            if self.exit != RootExit::Found && corrected <= self.tolerance() {
+                return Ok(place);
             }
-            place = [0, 1].map(|k| (place[k] - off[k]).clamp(-PLACE_MAX, PLACE_MAX));
         }
-        None
+        if self.exit == RootExit::Found && length(off) > self.tolerance() {
+            self.end(RootExit::TrialsUsedUp);
+        }
+        Ok(place)
     }
 
     /// Finds the places at which the forces are as prescribed, or as near to that as can be.
@@ -309,34 +276,80 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
         })
     }
 
-    /// Solves the motion of two places; how far its forces are from those prescribed, relative to μN.
+    /// How far the forces of the tractions, moved by what the last judged answer was extrapolated, are from those prescribed, relative to
+    /// μN, at two places.
     fn trial(&mut self, place: [f64; 2]) -> Result<[f64; 2], SolveError> {
-        let asked = MotionTask {
-            index: self.index,
-            motion: self.motion(place),
-        };
-        let found = refine::on_levels(self.task, self.levels, asked, &self.path, self.monitor)?;
-        let point = match found {
-            Some(point) => point,
-            None => refine::solve(self.task, self.levels, asked, self.monitor)?,
+        if !self.extrapolates {
+            return self.judge(place);
+        }
+        let asked = self.asked(place);
+        let sums = self.sums(asked)?;
+        let forces = self.relative(&sums);
+        Ok(self.off([0, 1].map(|k| forces[k] + self.shift[k])))
+    }
+
+    /// Solves the motion of two places with an estimate of its error; how far its forces are from those prescribed, relative to μN.
+    fn judge(&mut self, place: [f64; 2]) -> Result<[f64; 2], SolveError> {
+        let asked = self.asked(place);
+        let path = &self.path;
+        let found = refine::on_levels(self.task, self.levels, asked, path, self.monitor)?;
+        let (mut point, missing) = match found {
+            Some(found) => found,
+            None => (
+                refine::solve(self.task, self.levels, asked, self.monitor)?,
+                false,
+            ),
         };
         if self.path.is_empty() {
             let plan = |number: &usize| self.levels.get(*number).plan;
             self.path = self.levels.path.iter().map(plan).collect();
         }
         self.work.add(point.work);
-        let sum = total(&point);
-        let forces = [sum.force_x / self.limit, sum.force_y / self.limit];
+        let forces = self.relative(&point.resultants);
         self.first.get_or_insert(length(forces));
-        let off = [0, 1].map(|k| self.forces[k].map_or(0.0, |f| forces[k] - f / self.limit));
-        if self
-            .best
-            .as_ref()
-            .is_none_or(|(least, _)| length(off) <= *least)
-        {
+        if self.extrapolates {
+            let sums = self.sums(asked)?;
+            // What was extrapolated at other places cannot be here.
+            self.plain |= missing && length(self.shift) > 0.0;
+            if self.plain {
+                point.resultants.clone_from(&sums);
+            }
+            let (found, summed) = (self.relative(&point.resultants), self.relative(&sums));
+            self.shift = [0, 1].map(|k| found[k] - summed[k]);
+        }
+        let off = self.off(self.relative(&point.resultants));
+        let least = self.best.as_ref().map(|(least, _)| *least);
+        if self.plain || least.is_none_or(|least| length(off) <= least) {
             self.best = Some((length(off), point));
         }
         Ok(off)
+    }
+
+    /// Resultants of the tractions of a motion on the finest level of the path.
+    fn sums(&mut self, asked: MotionTask) -> Result<Vec<Resultants>, SolveError> {
+        let path = &self.path;
+        let (sums, work) =
+            refine::sums_on_finest(self.task, self.levels, asked, path, self.monitor)?;
+        self.work.add(work);
+        Ok(sums)
+    }
+
+    fn asked(&self, place: [f64; 2]) -> MotionTask {
+        MotionTask {
+            index: self.index,
+            motion: self.motion(place),
+        }
+    }
+
+    /// The sum of resultants, relative to μN.
+    fn relative(&self, resultants: &[Resultants]) -> [f64; 2] {
+        let sum = total(resultants);
+        [sum.force_x / self.limit, sum.force_y / self.limit]
+    }
+
+    /// How far forces are from those prescribed.
+    fn off(&self, forces: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|k| self.forces[k].map_or(0.0, |f| forces[k] - f / self.limit))
     }
 
     /// By how much forces may be missed, relative to μN.
@@ -354,20 +367,7 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
     }
 
     fn motion(&self, place: [f64; 2]) -> Motion {
-        self.at(place, &self.task.motions[self.index])
-    }
-
-    /// A motion with the creepages of these places where forces are prescribed.
-    fn at(&self, place: [f64; 2], given: &Motion) -> Motion {
-        let creepage = |k: usize, given: f64| match self.forces[k] {
-            Some(_) => self.law.creepage(k, place[k]),
-            None => given,
-        };
-        Motion {
-            creepage_x: creepage(0, given.creepage_x),
-            creepage_y: creepage(1, given.creepage_y),
-            ..*given
-        }
+        self.places.motion(place, &self.task.motions[self.index])
     }
 
     /// Does the best answer meet the target? Yes if its method or an explicit mesh has none to meet.
@@ -381,13 +381,7 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
     }
 
     fn finish(mut self, place: [f64; 2], began: Duration) -> Result<MotionAnswer, SolveError> {
-        if self.best.is_none() {
-            self.trial(place)?;
-        }
-        let asked = MotionTask {
-            index: self.index,
-            motion: self.motion(place),
-        };
+        let asked = self.asked(place);
         let inexact = self.inexact();
         let mut point = match self.best.take() {
             Some((_, point)) => point,
@@ -399,11 +393,6 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
         point.seconds = (self.monitor.elapsed() - began).as_secs_f64();
         Ok(point)
     }
-}
-
-fn total(point: &MotionAnswer) -> Resultants {
-    let sum = Resultants::default();
-    point.resultants.iter().fold(sum, |sum, r| sum.plus(*r))
 }
 
 fn length([x, y]: [f64; 2]) -> f64 {

@@ -4,6 +4,7 @@ pub mod answer;
 pub mod cubic_law;
 pub mod displacement_memory;
 pub mod force_control;
+pub mod force_places;
 pub mod history;
 pub(crate) mod layer_slip;
 pub mod linear_theory;

@@ -73,6 +73,8 @@ pub struct Measured {
     companions: [Option<Vec<f64>>; 2],
     /// A companion was tried and has no answer.
     missing: bool,
+    /// How far the resultants were extrapolated.
+    extrapolated: Vec<f64>,
     /// From sampling the vortex of the tractions, weighted.
     pole: f64,
     /// Of the sums over cells, where everything slips.
@@ -144,6 +146,7 @@ impl Indicators {
                 .map(|before| change(task, patches, level, found, before)),
             companions: [None, None],
             missing: false,
+            extrapolated: none,
             pole: if sticking { 0.0 } else { POLE_WEIGHT * pole },
             sums,
             normal: match finer.filter(|_| jumps(task)) {
@@ -175,6 +178,19 @@ impl Indicators {
                 apart.iter_mut().for_each(|d| *d *= reach);
                 measured.companions[k] = Some(apart);
             }
+        }
+    }
+
+    /// Whether a companion was tried and has no answer.
+    #[must_use]
+    pub fn companion_missing(&self) -> bool {
+        matches!(self, Indicators::Measured(measured) if measured.missing)
+    }
+
+    /// Adds how far the resultants were extrapolated from those of the tractions: the error is taken as no less.
+    pub fn apart(&mut self, task: &RollingTask, found: &[Resultants], summed: &[Resultants]) {
+        if let Indicators::Measured(measured) = self {
+            measured.extrapolated = distances(task, task.footprint.patches(), found, summed);
         }
     }
 
@@ -213,7 +229,7 @@ impl Measured {
             self.tolerance,
         ];
         let squares: f64 = parts.iter().map(|part| part * part).sum();
-        Some(self.scale * squares.sqrt())
+        Some((self.scale * squares.sqrt()).max(self.extrapolated[k]))
     }
 }
 
@@ -239,9 +255,8 @@ pub fn jumps(task: &RollingTask) -> bool {
     task.footprint.jumps()
 }
 
-/// Errors of region and pressure that were found from a gap, and of the load they carry.
-///
-/// The first falls as the power 3/2 of the cells of the normal problem across a patch.
+/// Errors of region and pressure that were found from a gap, and of the load they carry. The first falls as the power 3/2 of the
+/// cells of the normal problem across a patch.
 fn normal_errors(task: &RollingTask, patches: &[Patch]) -> Vec<f64> {
     let Some(uncertainty) = task.footprint.uncertainty() else {
         return vec![0.0; patches.len() + 1];

@@ -19,6 +19,7 @@ use crate::contact::rolling::refinement::levels::Levels;
 use crate::contact::rolling::refinement::mesh_policy::MeshPolicy;
 use crate::contact::rolling::refinement::resolution::Resolution;
 use crate::contact::rolling::regime::regime;
+use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::task::RollingTask;
 
 /// Explicit meshes of at least so many cells are started from a coarser mesh. On 24 ellipses of `benches/calibrate` with meshes of 720 to
@@ -90,7 +91,8 @@ fn on_mesh(
     solve_level(task, levels, asked, size.into(), coarser, monitor).map(|solved| solved.point)
 }
 
-/// Solves a motion on given levels, one after the other, so that the resultants are one function of the motion.
+/// Solves a motion on given levels, one after the other, and judges it on the finest. Whether a companion that was tried has no answer,
+/// so that the resultants are not extrapolated, is told beside it. Nothing if there are no levels.
 ///
 /// # Errors
 /// Why there is no answer.
@@ -100,17 +102,60 @@ pub fn on_levels(
     asked: MotionTask,
     path: &[MeshPlan],
     monitor: &dyn Monitor,
-) -> Result<Option<MotionAnswer>, SolveError> {
+) -> Result<Option<(MotionAnswer, bool)>, SolveError> {
+    let Some(mut solved) = along_path(task, levels, asked, path, monitor)? else {
+        return Ok(None);
+    };
+    judge(task, levels, asked, &mut solved, None, monitor)?;
+    let missing = solved.indicators.companion_missing();
+    Ok(Some((solved.point.into(), missing)))
+}
+
+/// Resultants of the tractions on the finest of given levels, without companions, and the work; the coarser levels are left out if the
+/// last motion there is near. They are a function of the motion, to the residual.
+///
+/// # Errors
+/// Why there is no answer.
+pub fn sums_on_finest(
+    task: &RollingTask,
+    levels: &mut Levels,
+    asked: MotionTask,
+    path: &[MeshPlan],
+    monitor: &dyn Monitor,
+) -> Result<(Vec<Resultants>, Work), SolveError> {
+    let Some(finest) = path.last() else {
+        unreachable!("an answer that was judged stands on a level")
+    };
+    let number = levels.level(*finest)?;
+    let level = levels.get(number);
+    let motion = level.scale.motion(&asked.motion);
+    let near = levels.sweep.start(number, &level, &motion).is_some();
+    let path = if near {
+        std::slice::from_ref(finest)
+    } else {
+        path
+    };
+    match along_path(task, levels, asked, path, monitor)? {
+        Some(solved) => Ok((solved.point.summed, solved.point.work)),
+        None => unreachable!("the path has levels"),
+    }
+}
+
+/// Solves a motion on given levels, each started from the one before.
+fn along_path(
+    task: &RollingTask,
+    levels: &mut Levels,
+    asked: MotionTask,
+    path: &[MeshPlan],
+    monitor: &dyn Monitor,
+) -> Result<Option<JudgedAnswer>, SolveError> {
     levels.path.clear();
     let mut solved: Option<JudgedAnswer> = None;
     for plan in path {
         let below = solved.map(|solved| solved.point);
         solved = Some(solve_level(task, levels, asked, *plan, below, monitor)?);
     }
-    if let Some(solved) = &mut solved {
-        judge(task, levels, asked, solved, None, monitor)?;
-    }
-    Ok(solved.map(|solved| solved.point.into()))
+    Ok(solved)
 }
 
 /// Solves a motion from the coarsest mesh, or where the last motion of a sweep ended, up to the first mesh that meets the target.
@@ -218,6 +263,11 @@ pub(crate) fn judge(
             let companions = companions.map(|(other, reach)| (other, EXTRAPOLATED * reach));
             point.resultants[p] = point.summed[p].beyond_all(companions, bound);
         }
+        // The tractions that a client may sum are no further from the resultants than the estimate says.
+        solved
+            .indicators
+            .apart(task, &point.resultants, &point.summed);
+        point.errors = solved.indicators.errors();
     }
     point.seconds += (monitor.elapsed() - began).as_secs_f64();
     Ok(())

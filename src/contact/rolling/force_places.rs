@@ -1,0 +1,135 @@
+//! Places of creepages: the unknowns of the search for prescribed forces, and where it starts.
+//!
+//! By Vermeulen and Johnson's cubic law with Kalker's coefficients (Vermeulen & Johnson 1964; Kalker 1990, §2.2.3) the creepage at
+//! place r gives the force r μN, so that the force found is close to r. A search starts where the table of creep forces has the forces.
+
+use crate::contact::numerics::bracketed_root::PLACE_MAX;
+use crate::contact::rolling::cubic_law::CubicLaw;
+use crate::contact::rolling::load_ellipse::LoadEllipse;
+use crate::contact::rolling::methods::table::solve as table;
+use crate::contact::rolling::motion::{Motion, PrescribedForces};
+use crate::contact::rolling::motion_answer::MotionAnswer;
+use crate::contact::rolling::refinement::levels::Levels;
+use crate::contact::rolling::resultants::Resultants;
+use crate::contact::rolling::task::RollingTask;
+
+/// Steps by which a start is moved to where the table has the forces; they fall short where the force hardly grows with its place.
+const TABLE_STEPS: u32 = 40;
+/// The start is good enough when the table misses the forces by no more than this, relative to μN: about what the table is off.
+const TABLE_MISSED: f64 = 1e-3;
+
+/// Largest correction of a starting place by what the cubic law was off at the motion before. Chosen by judgement; how much it matters was not
+/// measured.
+const CORRECTION_MAX: f64 = 0.3;
+
+/// What turns places into motions and back.
+pub(crate) struct ForcePlaces<'a> {
+    task: &'a RollingTask<'a>,
+    forces: PrescribedForces,
+    /// μN of all patches in N.
+    limit: f64,
+    law: CubicLaw,
+    /// The ellipses that stand for the patches, where the table can tell a start.
+    ellipses: Vec<LoadEllipse>,
+}
+
+impl<'a> ForcePlaces<'a> {
+    /// Of forces to be found; `limit` is μN of all patches in N.
+    pub(crate) fn new(
+        task: &'a RollingTask<'a>,
+        levels: &Levels,
+        limit: f64,
+        forces: PrescribedForces,
+    ) -> ForcePlaces<'a> {
+        let ellipses = if table::tells(task.elasticity, task.interface, task.friction) {
+            levels.ellipses().to_vec()
+        } else {
+            Vec::new()
+        };
+        ForcePlaces {
+            task,
+            forces,
+            limit,
+            law: CubicLaw::new(task, limit),
+            ellipses,
+        }
+    }
+
+    /// Places to start from: those of the cubic law, corrected by what the law was off at the motion before.
+    pub(crate) fn start(&self, given: &Motion, before: Option<&MotionAnswer>) -> [f64; 2] {
+        let wanted = self.forces.map(|f| f.unwrap_or(0.0) / self.limit);
+        let mut place = self.guess(wanted, given);
+        if let Some(before) = before.filter(|point| !point.saturated) {
+            let sum = total(&before.resultants);
+            let forces = [sum.force_x / self.limit, sum.force_y / self.limit];
+            let had = [0, 1].map(|k| self.forces[k].map_or(0.0, |_| forces[k]));
+            let guess = self.guess(had, &before.motion);
+            let found = self.law.places(&before.motion);
+            for k in 0..2 {
+                let correction = found[k] - guess[k];
+                if correction.abs() < CORRECTION_MAX {
+                    place[k] += correction;
+                }
+            }
+        }
+        place
+    }
+
+    /// Places of the creepages that give forces relative to μN: by the table with the rest of a motion, or by the cubic law without spin.
+    fn guess(&self, force: [f64; 2], rest: &Motion) -> [f64; 2] {
+        let length = force[0].hypot(force[1]);
+        let linear = if length > 0.0 {
+            CubicLaw::linear(length.min(1.0)) / length
+        } else {
+            0.0
+        };
+        let cubic = [0, 1].map(|k| self.law.place(k, linear * force[k] / self.law.stiffness[k]));
+        self.by_table(force, rest, cubic).unwrap_or(cubic)
+    }
+
+    /// Places at which the table has the forces, from a start: a force is close to its place, so that what is missed is the step.
+    fn by_table(&self, force: [f64; 2], rest: &Motion, start: [f64; 2]) -> Option<[f64; 2]> {
+        let modulus = self.task.interface.reduction * self.task.elasticity.shear_modulus;
+        let poisson_ratio = self.task.elasticity.poisson_ratio;
+        let patches = self.task.footprint.patches();
+        let mut place = start;
+        for _ in 0..TABLE_STEPS * u32::from(!self.ellipses.is_empty()) {
+            let motion = self.motion(place, rest);
+            let mut found = [0.0; 2];
+            for (ellipse, patch) in self.ellipses.iter().zip(patches) {
+                let limit = self.task.friction.limit(patch);
+                let own = table::forces(modulus, poisson_ratio, ellipse, limit, &motion);
+                found = [0, 1].map(|k| found[k] + own[k] / self.limit);
+            }
+            let off = [0, 1].map(|k| self.forces[k].map_or(0.0, |_| found[k] - force[k]));
+            if length(off) <= TABLE_MISSED {
+                return Some(place);
+            }
+            place = [0, 1].map(|k| (place[k] - off[k]).clamp(-PLACE_MAX, PLACE_MAX));
+        }
+        None
+    }
+
+    /// A motion with the creepages of these places where forces are prescribed.
+    pub(crate) fn motion(&self, place: [f64; 2], given: &Motion) -> Motion {
+        let creepage = |k: usize, given: f64| match self.forces[k] {
+            Some(_) => self.law.creepage(k, place[k]),
+            None => given,
+        };
+        Motion {
+            creepage_x: creepage(0, given.creepage_x),
+            creepage_y: creepage(1, given.creepage_y),
+            ..*given
+        }
+    }
+}
+
+/// The sum of the resultants of all patches.
+pub(crate) fn total(resultants: &[Resultants]) -> Resultants {
+    let sum = Resultants::default();
+    resultants.iter().fold(sum, |sum, r| sum.plus(*r))
+}
+
+fn length([x, y]: [f64; 2]) -> f64 {
+    x.hypot(y)
+}
