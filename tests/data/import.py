@@ -309,7 +309,7 @@ def friction_point(creepage, converged, arm):
 
 
 def friction():
-    """Friction that falls with slip or varies across, and elastic layers, in the words of a case."""
+    """Friction that falls with slip or varies across, and layers, in the words of a case."""
     records = []
 
     def add(record, words, points, speed=None):
@@ -349,11 +349,11 @@ def friction():
         add(record, words, [friction_point(creepage, record["converged"], arm)])
     for record, given, arm in load("layer"):
         layer = given["layer"]
-        # The layer named pl_200 never yields; the other plastic one does.
-        if layer["kind"] != "elastic" and record["id"] != "lay_pl_200":
-            continue
         words = {"coefficient": given["mu"],
                  "layer": {"shear_modulus_mpa": layer["G3_MPa"], "thickness_mm": layer["thickness_mm"]}}
+        # The layer named pl_200 never reaches its stress; the other plastic one does.
+        if layer["kind"] != "elastic":
+            words["layer"].update({"yield_mpa": layer["tau_c0_MPa"], "hardening_mpa_per_mm": layer["k_tau"]})
         over_load = {theirs.replace("rel", ours): {k: given["mu"] * record["converged"][theirs][k] for k in ("value", "unc")}
                      for theirs, ours in [("Fx_rel", "FN"), ("Fy_rel", "FN"), ("Mz_rel", "FNc")]}
         creepage = [given["creepage"][k] for k in ("xi", "eta", "phi")]
@@ -382,6 +382,29 @@ def unlike():
             **{ours: {k: converged[theirs][k] for k in ("value", "unc")} for theirs, ours in PRESSED},
         })
     write_lines("unlike.json", records)
+
+
+def cylinders():
+    """Steady rolling of unlike cylinders: the creepage that belongs to a force (lower body) over the friction limit."""
+    records = []
+    for record in json.loads((SOURCE / "reference/extended/dissimilar.json").read_text()):
+        if not record["id"].startswith("bj2d_"):
+            continue
+        given, creepage = record["input"], record["converged"]["xi"]
+        pair, shape = given["material"], given["geometry"]
+        body = lambda k: {"shear_modulus_mpa": pair[f"G{k}"], "poisson_ratio": pair[f"nu{k}"]}
+        records.append({
+            "id": record["id"],
+            "material": {"upper": body(1), "lower": body(2)},
+            "shear_modulus_mpa": pair["G_comb"],
+            "difference": pair["K"],
+            "half_length_mm": shape["half_width_a"],
+            "force_n_per_mm": given["load"]["FN"] / shape["width_mm"],
+            "friction": given["mu"],
+            "force": flipped(given["load"]["FXrel"]),
+            "creepage": {k: creepage[k] for k in ("value", "unc")},
+        })
+    write_lines("cylinders.json", records)
 
 
 def transient():
@@ -422,4 +445,5 @@ subsurface()
 temperature()
 friction()
 unlike()
+cylinders()
 transient()

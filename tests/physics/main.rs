@@ -10,6 +10,7 @@ mod case_faults;
 mod case_mutations;
 mod cases;
 mod convergence_domain;
+mod cylinders;
 #[path = "../../benches/stress/damaged.rs"]
 mod damaged;
 #[path = "../../benches/stress/damaged_trials.rs"]
@@ -19,6 +20,7 @@ mod fastsim;
 mod forces;
 mod friction;
 mod friction_laws;
+mod friction_passage;
 mod gap_faults;
 mod gap_hertz;
 mod gap_reference;

@@ -45,6 +45,7 @@ fn distance_to_plain_newton(contact: &Ellipse) -> f64 {
         level: &level,
         motion: &motion,
         fall: None,
+        passage: None,
         tolerance: 1e-9,
     };
     let shortened = boundary_element::solve(asked, None, &mut workspace, &Unmonitored);

@@ -6,6 +6,7 @@ use crate::contact::case::subsurface;
 use crate::contact::case::words::damage::{DamageModel, DamageWords};
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::question::Case;
+use crate::contact::case::words::solver::Output;
 use crate::contact::case::words::subsurface::SubsurfaceWords;
 use crate::contact::case::words::thermal::{ThermalBodyWords, ThermalWords};
 use crate::contact::error::Fault;
@@ -31,7 +32,10 @@ impl AfterTasks {
         AfterTasks {
             subsurface: subsurface.map(|words| subsurface::task(words, &case.material)),
             damage: case.damage.as_ref().map(DamageTask::new),
-            thermal: case.thermal.map(ThermalTask::from),
+            thermal: case
+                .thermal
+                .filter(|_| case.outputs.contains(&Output::Temperature))
+                .map(ThermalTask::from),
         }
     }
 }

@@ -10,6 +10,7 @@ use crate::contact::case::profiles;
 use crate::contact::case::resolution::resolution;
 use crate::contact::case::words::question::Case;
 use crate::contact::error::CaseError;
+use crate::contact::friction::law::FrictionLaw;
 use crate::contact::problem::after_tasks::AfterTasks;
 use crate::contact::problem::checked_case::{CheckedCase, Label};
 use crate::contact::problem::physics::{Checked, MotionPart, Problem};
@@ -64,7 +65,7 @@ impl CheckedCase {
         let digest = digest(case, &elasticity, &motions, &forces, &speeds);
         let problem = Problem {
             elasticity,
-            friction: (&case.friction).into(),
+            friction: FrictionLaw::new(&case.friction, case.thermal.as_ref()),
             interface: (&case.friction).into(),
             task,
             part: MotionPart {

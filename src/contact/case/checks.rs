@@ -10,9 +10,9 @@ use crate::contact::case::words::friction::Friction;
 use crate::contact::case::words::material::Material;
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::solver::{MethodName, Output, Solver};
+use crate::contact::case::words::thermal::ThermalWords;
 use crate::contact::case::{contact_task, history, motions, profiles, wheelsets};
 use crate::contact::error::Fault;
-use crate::contact::friction::falling::FallingLaw;
 use crate::contact::friction::law::FrictionLaw;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::normal::normal_task::NormalTask;
@@ -109,6 +109,7 @@ impl CheckedParts {
             let patches = task.as_ref()?.0.patches();
             falls_too_fast(
                 given.friction?,
+                given.after.thermal,
                 elasticity?,
                 &patches,
                 &motions.as_ref()?.speeds,
@@ -179,14 +180,12 @@ fn motion_faults(
         .zip(force)
         .map(|(mu, force)| mu.largest() * force);
     let mut faults = expanded.faults(motion, limit, of_profiles);
-    if given
-        .friction
-        .is_some_and(|friction| friction.law.is_some())
-    {
-        if expanded.history.is_none() {
+    if let Some(what) = given.friction.and_then(Friction::falls_with) {
+        // Temperatures need speeds whatever they are for, see `AfterWords::faults`.
+        if expanded.history.is_none() && what == "slip" {
             faults.extend(expanded.speed_fault(motion, "friction that falls with slip"));
         }
-        faults.extend(expanded.force_fault(motion));
+        faults.extend(expanded.force_fault(motion, what));
     }
     faults.extend(given.after.faults(motion, expanded, limits));
     faults
@@ -206,13 +205,14 @@ fn not_in_table(elasticity: Option<&Elasticity>, task: Option<&NormalTask>) -> V
 /// The fault of friction that falls too fast on patches that are known.
 fn falls_too_fast(
     friction: &Friction,
+    thermal: Option<&ThermalWords>,
     elasticity: Elasticity,
     patches: &[Patch],
     speeds: &[Option<f64>],
 ) -> Option<Fault> {
     let modulus = elasticity.shear_modulus * friction.reduction.unwrap_or(1.0);
-    let stability = FrictionLaw::from(friction).stability(patches, modulus, speeds)?;
-    let detail = FallingLaw::too_fast(stability)?;
+    let law = FrictionLaw::new(friction, thermal);
+    let detail = law.too_fast(patches, modulus, speeds)?;
     Some(Fault::new("/friction", detail))
 }
 

@@ -4,13 +4,16 @@ use crate::contact::case::words::contact::{FormatName, SideName};
 use crate::contact::case::words::friction::{FallName, Friction};
 use crate::contact::case::words::motion::MotionWords;
 use crate::contact::case::words::solver::{MeshSizeWords, MethodName, Output, TractionBoundName};
+use crate::contact::case::words::thermal::ThermalWords;
 use crate::contact::friction::across::{AcrossLaw, AcrossPlace};
 use crate::contact::friction::falling::{FallForm, FallTerm, FallingLaw};
-use crate::contact::friction::interface::Interface;
+use crate::contact::friction::interface::{Interface, LayerYield};
 use crate::contact::friction::law::FrictionLaw;
+use crate::contact::friction::passage::HeatedLaw;
 use crate::contact::geometry::formats::format::Format;
 use crate::contact::geometry::wheel_rail::Side;
 use crate::contact::mesh::size::MeshSize;
+use crate::contact::post::heat::ThermalTask;
 use crate::contact::rolling::methods::method::{Method, TractionBound};
 use crate::contact::rolling::motion::Motion;
 
@@ -63,8 +66,16 @@ impl From<FallName> for FallForm {
     }
 }
 
-impl From<&Friction> for FrictionLaw {
-    fn from(words: &Friction) -> FrictionLaw {
+impl FrictionLaw {
+    /// The law of the words of a case; `thermal` belongs to a coefficient that falls with temperature.
+    pub(crate) fn new(words: &Friction, thermal: Option<&ThermalWords>) -> FrictionLaw {
+        if let Some(law) = &words.by_temperature {
+            let task = thermal.map(|words| ThermalTask::from(*words));
+            // Without thermal constants, which is a fault, nothing is heated.
+            let (base, rise) = task.map_or((0.0, 0.0), |t| (t.without_heat(), t.rise_of(1.0)));
+            let heated = HeatedLaw::new(&law.temperature_c, &law.coefficient, base, rise);
+            return FrictionLaw::Heated(heated);
+        }
         if let Some(across) = &words.across {
             let (place, at) = match (&across.angle_rad, &across.y_mm) {
                 (Some(angles), _) => (AcrossPlace::Angle, angles.clone()),
@@ -99,6 +110,12 @@ impl From<&Friction> for Interface {
         Interface {
             reduction: words.reduction.unwrap_or(1.0),
             layer: layer.unwrap_or(0.0),
+            yielding: words.layer.and_then(|layer| {
+                Some(LayerYield {
+                    stress: layer.yield_mpa?,
+                    hardening: layer.hardening_mpa_per_mm.unwrap_or(0.0),
+                })
+            }),
         }
     }
 }

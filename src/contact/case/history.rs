@@ -28,6 +28,21 @@ pub(crate) struct BesideHistory<'a> {
     pub(crate) patches: &'a [Patch],
 }
 
+/// The fault of friction whose bounds depend on slips.
+fn friction_fault(friction: &Friction) -> Option<Fault> {
+    let yields = friction
+        .layer
+        .is_some_and(|layer| layer.yield_mpa.is_some());
+    let pointer = match (friction.law, &friction.by_temperature) {
+        (Some(_), _) => "/friction/law",
+        (None, Some(_)) => "/friction/by_temperature",
+        (None, None) if yields => "/friction/layer/yield_mpa",
+        (None, None) => return None,
+    };
+    let detail = "given with a history, which follows a coefficient that does not depend on slip or temperature and layers that do not yield";
+    Some(Fault::new(pointer, detail))
+}
+
 /// Faults of a case with a history.
 pub(crate) fn faults(history: &HistoryTask, given: &BesideHistory, limits: &Limits) -> Vec<Fault> {
     let mut faults = Vec::new();
@@ -55,14 +70,7 @@ pub(crate) fn faults(history: &HistoryTask, given: &BesideHistory, limits: &Limi
         let detail = "no friction given; without tractions nothing is remembered";
         faults.push(Fault::new("/friction", detail));
     }
-    if given
-        .friction
-        .is_some_and(|friction| friction.law.is_some())
-    {
-        let detail =
-            "given with a history, which follows a coefficient that does not depend on the slip";
-        faults.push(Fault::new("/friction/law", detail));
-    }
+    faults.extend(given.friction.and_then(friction_fault));
     for (output, name) in OUTPUTS_REFUSED {
         if given.outputs.contains(&output) {
             let detail = format!("{name} given with a history; it is computed for steady rolling");

@@ -90,11 +90,13 @@ impl ExpandedMotions {
 
 impl ExpandedMotions {
     /// The fault of the first prescribed force, where friction falls with slip: the force has a maximum, below which two creepages give it.
-    pub(crate) fn force_fault(&self, given: &Motions) -> Option<Fault> {
+    pub(crate) fn force_fault(&self, given: &Motions, what: &str) -> Option<Fault> {
         let mut forces = self.forces.iter().enumerate();
         let (index, k) = forces.find_map(|(index, forces)| Some((index, larger(forces)?)))?;
         let pointer = pointer(given, index, ["force_x_n", "force_y_n"][k]);
-        let detail = "given with friction that falls with slip, where two creepages may give one force; sweep the creepage instead";
+        let detail = format!(
+            "given with friction that falls with {what}, where two creepages may give one force; sweep the creepage instead"
+        );
         Some(Fault::new(pointer, detail))
     }
 

@@ -215,8 +215,9 @@ impl CheckedCase {
 
     /// Time with the friction of the case over that with a coefficient.
     fn friction_times(&self) -> f64 {
-        let falling = self.problem.friction.depends_on_slip();
-        let layer = self.problem.interface.layer > 0.0;
+        let interface = self.problem.interface;
+        let falling = self.problem.friction.depends_on_slip() || interface.yielding.is_some();
+        let layer = interface.layer > 0.0;
         let factor = |is_there, times| if is_there { times } else { 1.0 };
         factor(falling, FALLING_TIMES) * factor(layer, LAYER_TIMES)
     }

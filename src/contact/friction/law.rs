@@ -7,6 +7,7 @@
 
 use crate::contact::friction::across::AcrossLaw;
 use crate::contact::friction::falling::{BoundFall, FallingLaw};
+use crate::contact::friction::passage::HeatedLaw;
 use crate::contact::normal::patch::Patch;
 
 /// How the coefficient of friction varies over the contact.
@@ -18,6 +19,8 @@ pub enum FrictionLaw {
     Falling(FallingLaw),
     /// A coefficient that varies across the contact.
     Across(AcrossLaw),
+    /// A coefficient that falls with the temperature of the contact.
+    Heated(HeatedLaw),
 }
 
 impl FrictionLaw {
@@ -28,6 +31,7 @@ impl FrictionLaw {
             FrictionLaw::Constant(coefficient) => *coefficient,
             FrictionLaw::Falling(law) => law.at_rest(),
             FrictionLaw::Across(law) => law.largest(),
+            FrictionLaw::Heated(law) => law.largest(),
         }
     }
 
@@ -42,37 +46,53 @@ impl FrictionLaw {
     #[must_use]
     pub fn bound_fall(&self, rolling_speed: Option<f64>, slip_unit: f64) -> Option<BoundFall> {
         match self {
-            FrictionLaw::Constant(_) | FrictionLaw::Across(_) => None,
+            FrictionLaw::Constant(_) | FrictionLaw::Across(_) | FrictionLaw::Heated(_) => None,
             FrictionLaw::Falling(law) => {
                 rolling_speed.map(|speed| law.bound_fall(speed, slip_unit))
             }
         }
     }
 
-    /// Does the bound of a cell depend on its slip?
+    /// Do bounds depend on slips, at once or by the heat that they make?
     #[must_use]
     pub fn depends_on_slip(&self) -> bool {
-        matches!(self, FrictionLaw::Falling(_))
+        matches!(self, FrictionLaw::Falling(_) | FrictionLaw::Heated(_))
     }
 
-    /// The largest stability number of a law that falls with slip, see [`FallingLaw::stability`], over patches and motions; nothing for
-    /// other laws, without patches or without speeds.
+    /// Why friction falls too fast for one reliable answer on patches at rolling speeds, if it does: by the largest stability number, see
+    /// [`FallingLaw::stability`] and [`HeatedLaw::stability`]; nothing for other laws, without patches or without speeds.
     #[must_use]
-    pub fn stability(
+    pub fn too_fast(
         &self,
         patches: &[Patch],
         shear_modulus: f64,
         speeds: &[Option<f64>],
-    ) -> Option<f64> {
-        let FrictionLaw::Falling(law) = self else {
-            return None;
-        };
-        let pressure = patches
-            .iter()
-            .map(|patch| patch.pressure_max)
-            .reduce(f64::max)?;
+    ) -> Option<String> {
         let speed = speeds.iter().copied().flatten().reduce(f64::max)?;
-        Some(law.stability(speed, pressure, shear_modulus))
+        let most = |of: &dyn Fn(&Patch) -> f64| patches.iter().map(of).reduce(f64::max);
+        match self {
+            FrictionLaw::Constant(_) | FrictionLaw::Across(_) => None,
+            FrictionLaw::Falling(law) => {
+                let of = |patch: &Patch| law.stability(speed, patch.pressure_max, shear_modulus);
+                FallingLaw::too_fast(most(&of)?)
+            }
+            FrictionLaw::Heated(law) => {
+                let of = |patch: &Patch| {
+                    let half_length = 0.5 * (patch.extent[1] - patch.extent[0]);
+                    law.stability(speed, patch.pressure_max, half_length, shear_modulus)
+                };
+                HeatedLaw::too_fast(most(&of)?)
+            }
+        }
+    }
+
+    /// The law by temperature, where the coefficient falls with it.
+    #[must_use]
+    pub fn heated(&self) -> Option<&HeatedLaw> {
+        match self {
+            FrictionLaw::Heated(law) => Some(law),
+            _ => None,
+        }
     }
 
     /// The table of a coefficient that varies across, where it does.
@@ -80,7 +100,7 @@ impl FrictionLaw {
     pub fn across(&self) -> Option<&AcrossLaw> {
         match self {
             FrictionLaw::Across(law) => Some(law),
-            FrictionLaw::Constant(_) | FrictionLaw::Falling(_) => None,
+            FrictionLaw::Constant(_) | FrictionLaw::Falling(_) | FrictionLaw::Heated(_) => None,
         }
     }
 
@@ -89,7 +109,7 @@ impl FrictionLaw {
     #[must_use]
     pub fn share(&self, loads: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
         match self {
-            FrictionLaw::Constant(_) | FrictionLaw::Falling(_) => 1.0,
+            FrictionLaw::Constant(_) | FrictionLaw::Falling(_) | FrictionLaw::Heated(_) => 1.0,
             FrictionLaw::Across(law) => law.mean(loads) / law.largest(),
         }
     }
@@ -98,7 +118,7 @@ impl FrictionLaw {
     #[must_use]
     pub fn limit(&self, patch: &Patch) -> f64 {
         match self {
-            FrictionLaw::Constant(_) | FrictionLaw::Falling(_) => {
+            FrictionLaw::Constant(_) | FrictionLaw::Falling(_) | FrictionLaw::Heated(_) => {
                 self.largest() * patch.normal_force
             }
             FrictionLaw::Across(law) => law.limit(patch),
@@ -112,7 +132,7 @@ impl FrictionLaw {
             FrictionLaw::Constant(coefficient) => {
                 coefficient * patches.iter().map(|patch| patch.normal_force).sum::<f64>()
             }
-            FrictionLaw::Falling(_) | FrictionLaw::Across(_) => {
+            FrictionLaw::Falling(_) | FrictionLaw::Across(_) | FrictionLaw::Heated(_) => {
                 patches.iter().map(|patch| self.limit(patch)).sum()
             }
         }

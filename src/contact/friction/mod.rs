@@ -5,3 +5,4 @@ pub mod falling;
 pub mod interface;
 pub mod law;
 pub(crate) mod on_rail;
+pub mod passage;

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use crate::contact::error::SolveError;
+use crate::contact::friction::passage::{Passage, PassageLaws};
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::half_space::strip_operator::kind::{Parity, Precision};
 use crate::contact::half_space::unlike_bodies::pressure_slips;
@@ -45,6 +46,12 @@ impl Scale {
         } else {
             1.0
         }
+    }
+
+    /// What changes bounds on the way through the contact, in these units.
+    #[must_use]
+    pub fn passage<'a>(&self, laws: &PassageLaws<'a>) -> Passage<'a> {
+        laws.on_level(self.slip(), self.length, self.traction)
     }
 
     /// A motion about the origin of the case becomes one about [`Scale::origin`], in units of rigid slip.

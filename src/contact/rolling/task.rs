@@ -1,8 +1,9 @@
 //! What the tangential problem of one footprint asks: physics, method and accuracy.
 
-use crate::contact::friction::falling::{BoundFall, FallingLaw};
+use crate::contact::friction::falling::BoundFall;
 use crate::contact::friction::interface::Interface;
 use crate::contact::friction::law::FrictionLaw;
+use crate::contact::friction::passage::PassageLaws;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::half_space::strip_operator::kind::Precision;
 use crate::contact::normal::footprint::Footprint;
@@ -87,13 +88,23 @@ impl RollingTask<'_> {
         self.friction.bound_fall(speed, slip_unit)
     }
 
-    /// Why friction falls too fast with slip for an answer, if it does.
+    /// What changes the bounds of motion `index` on the way through the contact, if anything does.
+    #[must_use]
+    pub fn passage(&self, index: usize) -> Option<PassageLaws<'_>> {
+        let speed = self.speeds.get(index).copied().flatten();
+        let laws = PassageLaws {
+            heated: self.friction.heated().zip(speed),
+            yielding: self.interface.yielding,
+        };
+        (laws.heated.is_some() || laws.yielding.is_some()).then_some(laws)
+    }
+
+    /// Why friction falls too fast with slip or temperature for an answer, if it does.
     #[must_use]
     pub fn falls_too_fast(&self) -> Option<String> {
         let modulus = self.interface.reduction * self.elasticity.shear_modulus;
         let patches = self.footprint.patches();
-        let stability = self.friction.stability(patches, modulus, self.speeds)?;
-        FallingLaw::too_fast(stability)
+        self.friction.too_fast(patches, modulus, self.speeds)
     }
 
     /// Does the pressure make the surfaces slip, because the bodies differ and the method takes account of it?

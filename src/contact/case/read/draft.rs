@@ -151,7 +151,7 @@ fn read(case: &mut Object) -> CaseDraft {
     let outputs = solver::read_outputs(case, without_fields);
     let subsurface = subsurface::read(case, outputs.as_deref());
     let damage = damage::read(case, outputs.as_deref(), without_fields.is_some());
-    let thermal = thermal::read(case, outputs.as_deref());
+    let thermal = thermal::read(case, outputs.as_deref(), friction.as_ref());
     CaseDraft {
         name,
         labels,

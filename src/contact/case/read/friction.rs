@@ -1,4 +1,4 @@
-//! Reads `friction`: a coefficient, a law that falls with slip or a coefficient across, and what lies between the bodies.
+//! Reads `friction`: a coefficient, a law that falls with slip or temperature or a coefficient across, and what lies between the bodies.
 
 use serde_json::Value;
 
@@ -6,7 +6,7 @@ use crate::contact::case::read::faults::Interval;
 use crate::contact::case::read::object::{Object, join, shown};
 use crate::contact::case::read::samples::{count_rest, numbers};
 use crate::contact::case::words::friction::{
-    AcrossWords, FallName, FallTermWords, Friction, LayerWords,
+    AcrossWords, ByTemperatureWords, FallName, FallTermWords, Friction, LayerWords,
 };
 
 const COEFFICIENT: Interval = Interval::closed(0.0, 100.0, "");
@@ -19,10 +19,13 @@ const ANGLE: Interval = Interval::closed(-1.6, 1.6, "rad");
 const MODULUS: Interval = Interval::positive(1e12, "MPa");
 const THICKNESS: Interval = Interval::positive(1e3, "mm");
 const REDUCTION: Interval = Interval::positive(1.0, "");
-/// Points of a coefficient across.
+const TEMPERATURE: Interval = Interval::closed(-273.15, 1e5, "°C");
+const YIELD: Interval = Interval::positive(1e9, "MPa");
+const HARDENING: Interval = Interval::closed(0.0, 1e9, "MPa/mm");
+/// Points of a coefficient across, or by temperature.
 const POINTS: std::ops::RangeInclusive<usize> = 2..=1000;
 /// The ways to give a coefficient.
-const WAYS: [&str; 3] = ["coefficient", "law", "across"];
+const WAYS: [&str; 4] = ["coefficient", "law", "across", "by_temperature"];
 const LAWS: [(&str, FallName); 3] = [
     ("exponential", FallName::Exponential),
     ("rational", FallName::Rational),
@@ -39,6 +42,10 @@ pub(crate) fn read(case: &mut Object) -> Option<Friction> {
         ["law"] => law(&mut block),
         ["across"] => across(&mut block).map(|across| Friction {
             across: Some(across),
+            ..Friction::default()
+        }),
+        ["by_temperature"] => by_temperature(&mut block).map(|law| Friction {
+            by_temperature: Some(law),
             ..Friction::default()
         }),
         [] | [_] => constant(&mut block),
@@ -65,6 +72,14 @@ pub(crate) fn read(case: &mut Object) -> Option<Friction> {
         true => block.number("reduction", REDUCTION).map(Some),
         false => Some(None),
     };
+    let yields = layer
+        .flatten()
+        .is_some_and(|layer| layer.yield_mpa.is_some());
+    if yields && block.has("law") {
+        let detail = "given with a layer that yields; friction that falls with slip goes with a layer that does not";
+        block.fault("law", detail);
+        return None;
+    }
     Some(Friction {
         layer: layer?,
         reduction: reduction?,
@@ -152,15 +167,7 @@ fn across(block: &mut Object) -> Option<AcrossWords> {
     let places = list(&mut across, name, allowed);
     let coefficient = list(&mut across, "coefficient", ACROSS);
     let (places, coefficient) = (places?, coefficient?);
-    if places.len() != coefficient.len() {
-        let detail = format!(
-            "{} values given; one coefficient per {name} is needed, which are {}",
-            coefficient.len(),
-            places.len()
-        );
-        across.fault("coefficient", detail);
-        return None;
-    }
+    as_many(&mut across, name, places.len(), coefficient.len())?;
     if let Some(k) = places.windows(2).position(|pair| pair[1] < pair[0]) {
         let pointer = join(&across.pointer_to(name), k + 1);
         let detail = format!(
@@ -180,6 +187,52 @@ fn across(block: &mut Object) -> Option<AcrossWords> {
     Some(AcrossWords {
         y_mm,
         angle_rad,
+        coefficient,
+    })
+}
+
+/// There is one coefficient for every place of a table.
+fn as_many(block: &mut Object, name: &str, places: usize, coefficients: usize) -> Option<()> {
+    if places == coefficients {
+        return Some(());
+    }
+    let detail = format!(
+        "{coefficients} values given; one coefficient per {name} is needed, which are {places}"
+    );
+    block.fault("coefficient", detail);
+    None
+}
+
+fn by_temperature(block: &mut Object) -> Option<ByTemperatureWords> {
+    let mut law = block.child("by_temperature")?;
+    law.only(&["temperature_c", "coefficient"], &[]);
+    let temperature = list(&mut law, "temperature_c", TEMPERATURE);
+    let coefficient = list(&mut law, "coefficient", ACROSS);
+    let (temperature, coefficient) = (temperature?, coefficient?);
+    as_many(
+        &mut law,
+        "temperature_c",
+        temperature.len(),
+        coefficient.len(),
+    )?;
+    if let Some(k) = temperature.windows(2).position(|pair| pair[1] <= pair[0]) {
+        let pointer = join(&law.pointer_to("temperature_c"), k + 1);
+        let [before, given] = [temperature[k], temperature[k + 1]];
+        let detail = format!("{given} given after {before}; the temperatures have to rise");
+        law.faults().add(pointer, detail);
+        return None;
+    }
+    if let Some(k) = coefficient.windows(2).position(|pair| pair[1] > pair[0]) {
+        let pointer = join(&law.pointer_to("coefficient"), k + 1);
+        let [before, given] = [coefficient[k], coefficient[k + 1]];
+        let detail = format!(
+            "{given} given after {before}; a coefficient that rises with temperature is not covered, because heat and friction may then drive each other"
+        );
+        law.faults().add(pointer, detail);
+        return None;
+    }
+    Some(ByTemperatureWords {
+        temperature_c: temperature,
         coefficient,
     })
 }
@@ -210,11 +263,29 @@ fn numbers_of(
 
 fn layer(block: &mut Object) -> Option<LayerWords> {
     let mut layer = block.child("layer")?;
-    layer.only(&["shear_modulus_mpa", "thickness_mm"], &[]);
-    let modulus = layer.required_number("shear_modulus_mpa", MODULUS);
-    let thickness = layer.required_number("thickness_mm", THICKNESS);
+    let names = [
+        "shear_modulus_mpa",
+        "thickness_mm",
+        "yield_mpa",
+        "hardening_mpa_per_mm",
+    ];
+    layer.only(&names, &[]);
+    let modulus = layer.required_number(names[0], MODULUS);
+    let thickness = layer.required_number(names[1], THICKNESS);
+    let mut optional = |name: &str, allowed| match layer.has(name) {
+        true => layer.number(name, allowed).map(Some),
+        false => Some(None),
+    };
+    let stress = optional(names[2], YIELD);
+    let hardening = optional(names[3], HARDENING);
+    if layer.has(names[3]) && !layer.has(names[2]) {
+        layer.fault(names[3], "given without yield_mpa, to which it belongs");
+        return None;
+    }
     Some(LayerWords {
         shear_modulus_mpa: modulus?,
         thickness_mm: thickness?,
+        yield_mpa: stress?,
+        hardening_mpa_per_mm: hardening?,
     })
 }

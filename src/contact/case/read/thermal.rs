@@ -2,6 +2,7 @@
 
 use crate::contact::case::read::faults::Interval;
 use crate::contact::case::read::object::Object;
+use crate::contact::case::words::friction::Friction;
 use crate::contact::case::words::solver::Output;
 use crate::contact::case::words::thermal::{ThermalBodyWords, ThermalWords};
 
@@ -10,11 +11,16 @@ const DENSITY: Interval = Interval::positive(1e6, "kg/m³");
 const SPECIFIC_HEAT: Interval = Interval::positive(1e6, "J/(kg K)");
 const BULK: Interval = Interval::closed(-273.15, 1e5, "°C");
 
-/// Reads the member `thermal` of a case, which belongs to the output `temperature`.
+/// Reads the member `thermal` of a case, which belongs to the output `temperature` and to friction that falls with temperature.
 ///
 /// The outer `None` says that a fault was found.
-pub(crate) fn read(case: &mut Object, outputs: Option<&[Output]>) -> Option<Option<ThermalWords>> {
-    let wanted = outputs.is_some_and(|outputs| outputs.contains(&Output::Temperature));
+pub(crate) fn read(
+    case: &mut Object,
+    outputs: Option<&[Output]>,
+    friction: Option<&Friction>,
+) -> Option<Option<ThermalWords>> {
+    let heated = friction.is_some_and(|friction| friction.by_temperature.is_some());
+    let wanted = heated || outputs.is_some_and(|outputs| outputs.contains(&Output::Temperature));
     if !case.has("thermal") {
         if wanted {
             case.required(
@@ -24,7 +30,7 @@ pub(crate) fn read(case: &mut Object, outputs: Option<&[Output]>) -> Option<Opti
         }
         return Some(None);
     }
-    if outputs.is_some() && !wanted {
+    if outputs.is_some() && friction.is_some() && !wanted {
         let detail =
             "given without \"temperature\" among the outputs; add it there or leave this out";
         case.fault("thermal", detail);

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// Coulomb friction: exactly one of `coefficient`, `law` (with `limit` and `terms`) and `across`. `layer` and `reduction` make the contact
+/// Coulomb friction: exactly one of `coefficient`, `law` (with `limit` and `terms`), `across` and `by_temperature`. `layer` and `reduction` make the contact
 /// softer to tractions and may stand beside each of them.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, ToSchema)]
 pub struct Friction {
@@ -27,7 +27,11 @@ pub struct Friction {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub across: Option<AcrossWords>,
-    /// An elastic layer between the bodies, such as wet leaves, sand or oxides.
+    /// A coefficient that falls with the temperature of the contact; the case needs `thermal` and every motion its `speed_mm_per_s`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub by_temperature: Option<ByTemperatureWords>,
+    /// A layer between the bodies, such as wet leaves, sand or oxides.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub layer: Option<LayerWords>,
@@ -80,8 +84,22 @@ pub struct AcrossWords {
     pub coefficient: Vec<f64>,
 }
 
+/// A coefficient by the temperature of both surfaces in the contact: linear between points, constant outside. Friction heats the contact,
+/// and every place has the coefficient of the temperature it reaches.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = FrictionByTemperature)]
+pub struct ByTemperatureWords {
+    /// Temperatures in °C, rising.
+    #[schema(min_items = 2, max_items = 1000)]
+    pub temperature_c: Vec<f64>,
+    /// The coefficient at each of them, 1e-12 to 100, never rising.
+    #[schema(min_items = 2, max_items = 1000)]
+    pub coefficient: Vec<f64>,
+}
+
 /// An elastic layer between the bodies, so thin that each of its points shears by itself: the surfaces move apart by
-/// thickness/modulus times the traction, beside what the bodies give.
+/// thickness/modulus times the traction, beside what the bodies give. With `yield_mpa` it transmits no more than that stress, which grows with
+/// the plastic displacement of the layer.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(as = Layer)]
 pub struct LayerWords {
@@ -91,6 +109,14 @@ pub struct LayerWords {
     /// Thickness in mm, more than 0.
     #[schema(exclusive_minimum = 0.0)]
     pub thickness_mm: f64,
+    /// Shear stress in MPa at which the layer yields, more than 0; left out, it never does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    pub yield_mpa: Option<f64>,
+    /// Growth of that stress in MPa per mm of plastic displacement, 0 or more; 0 when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, minimum = 0.0)]
+    pub hardening_mpa_per_mm: Option<f64>,
 }
 
 impl Friction {
@@ -100,7 +126,18 @@ impl Friction {
         let falling = |limit: f64| limit + self.terms.iter().map(|t| t.coefficient).sum::<f64>();
         let across = self.across.iter().flat_map(|across| &across.coefficient);
         let given = self.coefficient.or_else(|| self.limit.map(falling));
+        let across = across.chain(self.by_temperature.iter().flat_map(|law| &law.coefficient));
         across.fold(given.unwrap_or(0.0), |most, value| most.max(*value))
+    }
+
+    /// What the coefficient falls with, if it falls.
+    #[must_use]
+    pub fn falls_with(&self) -> Option<&'static str> {
+        match (self.law, &self.by_temperature) {
+            (Some(_), _) => Some("slip"),
+            (None, Some(_)) => Some("temperature"),
+            (None, None) => None,
+        }
     }
 
     /// The coefficient, if that is all there is.

@@ -81,6 +81,9 @@ impl Companion {
             level: &level,
             motion: &level.scale.motion(&asked.motion),
             fall: task.bound_fall(asked.index, level.scale.slip()),
+            passage: task
+                .passage(asked.index)
+                .map(|laws| level.scale.passage(&laws)),
             tolerance: task.tolerance(),
         };
         match boundary_element::trapezoid(of_level, &start, &mut levels.workspace, monitor) {

@@ -253,6 +253,9 @@ fn run_method(
         level,
         motion: &motion,
         fall: task.bound_fall(asked.index, level.scale.slip()),
+        passage: task
+            .passage(asked.index)
+            .map(|laws| level.scale.passage(&laws)),
         tolerance: task.tolerance(),
     };
     boundary_element::solve(of_level, start.as_ref(), workspace, monitor)

@@ -100,7 +100,7 @@ pub fn trapezoid(
     let mut solve = RuleSequence::new(task, &operator, parity, control);
     let mut t = solve.start(Some(start));
     let mut slips = None;
-    if task.fall.is_none() {
+    if task.fall.is_none() && task.passage.is_none() {
         slips = solve.few_steps(&mut t)?;
     }
     if slips.is_none() {

@@ -1,6 +1,7 @@
 //! What a level and the iteration on it are asked, and how the iteration ended.
 
 use crate::contact::friction::falling::BoundFall;
+use crate::contact::friction::passage::Passage;
 use crate::contact::numerics::gmres::GmresExit;
 use crate::contact::rolling::answer::{LevelAnswer, LevelExit};
 use crate::contact::rolling::methods::full_slip;
@@ -16,6 +17,8 @@ pub struct LevelTask<'a> {
     pub motion: &'a Motion,
     /// How the bounds of the cells fall with their slip, where they do.
     pub fall: Option<BoundFall>,
+    /// What changes the bounds on the way through the contact, if anything does.
+    pub passage: Option<Passage<'a>>,
     /// Residual to reach.
     pub tolerance: f64,
 }
@@ -28,7 +31,8 @@ impl LevelTask<'_> {
         }
         let answer = full_slip::rigid_answer(self.level, self.motion)?;
         let still = answer.exit == LevelExit::NoMotion;
-        (still || self.fall.is_none()).then_some(answer)
+        let constant = self.fall.is_none() && self.passage.is_none();
+        (still || constant).then_some(answer)
     }
 }
 
