@@ -11,8 +11,8 @@ use tempfile::TempDir;
 
 use crate::support::Service;
 
-/// How a program is started: the real one, with what surrounds it.
-type Prepare = Box<dyn Fn() -> Command + Send + Sync>;
+/// How the program of a node is started: the real one, with what surrounds it. It is given the number of the node.
+type Prepare = Box<dyn Fn(usize) -> Command + Send + Sync>;
 
 /// One node; between a kill and a start there is no process.
 struct Node {
@@ -32,7 +32,7 @@ pub struct Cluster {
 }
 
 impl Cluster {
-    pub fn new(prepare: impl Fn() -> Command + Send + Sync + 'static) -> Arc<Cluster> {
+    pub fn new(prepare: impl Fn(usize) -> Command + Send + Sync + 'static) -> Arc<Cluster> {
         let client = Client::builder().timeout(Duration::from_secs(20)).build();
         Arc::new(Cluster {
             prepare: Box::new(prepare),
@@ -65,7 +65,7 @@ impl Cluster {
             (node.role, node.flags.clone(), node.folder.path().to_owned())
         };
         let flags: Vec<&str> = flags.iter().map(String::as_str).collect();
-        let service = Service::start_as(&mut (self.prepare)(), role, &folder, &flags);
+        let service = Service::start_as(&mut (self.prepare)(number), role, &folder, &flags);
         let mut nodes = self.nodes.lock().expect("the nodes");
         nodes[number].service = Some(service);
         self.list(&nodes);
@@ -103,6 +103,20 @@ impl Cluster {
         self.apis.lock().expect("the list").clone()
     }
 
+    /// The status and the text of an answer; `None` if there was none, or not all of it.
+    pub async fn ask_text(
+        &self,
+        api: SocketAddr,
+        method: Method,
+        path: &str,
+        shape: impl FnOnce(reqwest::RequestBuilder) -> reqwest::RequestBuilder,
+    ) -> Option<(u16, String)> {
+        let request = self.client.request(method, format!("http://{api}{path}"));
+        let answer = shape(request).send().await.ok()?;
+        let status = answer.status().as_u16();
+        Some((status, answer.text().await.ok()?))
+    }
+
     /// The status and the JSON of an answer; `None` if there was none.
     pub async fn ask(
         &self,
@@ -111,24 +125,33 @@ impl Cluster {
         path: &str,
         shape: impl FnOnce(reqwest::RequestBuilder) -> reqwest::RequestBuilder,
     ) -> Option<(u16, Value)> {
-        let request = self.client.request(method, format!("http://{api}{path}"));
-        let answer = shape(request).send().await.ok()?;
-        let status = answer.status().as_u16();
-        Some((status, answer.json().await.ok()?))
+        let (status, text) = self.ask_text(api, method, path, shape).await?;
+        Some((status, serde_json::from_str(&text).ok()?))
     }
 
     /// Submits a case under a key, at one API node after the other, until it is accepted; the id of the job, and how often it was
     /// tried again.
-    pub async fn submit(&self, case: &Value, key: &str, mut place: usize) -> (String, usize) {
+    pub async fn submit(&self, case: &Value, key: &str, place: usize) -> (String, usize) {
+        self.submit_to("/v1/jobs", case, key, place).await
+    }
+
+    /// The same for what is submitted elsewhere.
+    pub async fn submit_to(
+        &self,
+        path: &str,
+        body: &Value,
+        key: &str,
+        mut place: usize,
+    ) -> (String, usize) {
         let mut again = 0;
         loop {
             let apis = self.apis();
             place += 1;
             if !apis.is_empty() {
                 let shape = |request: reqwest::RequestBuilder| {
-                    request.header("Idempotency-Key", key).json(case)
+                    request.header("Idempotency-Key", key).json(body)
                 };
-                let asked = self.ask(apis[place % apis.len()], Method::POST, "/v1/jobs", shape);
+                let asked = self.ask(apis[place % apis.len()], Method::POST, path, shape);
                 if let Some((200 | 202, job)) = asked.await {
                     let id = job["id"].as_str().expect("an id");
                     return (id.to_owned(), again);

@@ -1,15 +1,23 @@
 //! Do several nodes keep their promises for long, while everything fails, and what does that cost?
 //!
 //! `cargo bench --bench soak -- NAME …` with PostgreSQL's programs, and for `nodes` SeaweedFS (`weed`), on this machine; the names:
-//! `nodes` (kills, restarts and faults of the object store under load), `queue` (claims with 10⁴ and 10⁶ queued jobs), `snapshot`
+//! `nodes` (kills, restarts and faults of the object store under load; `jobs=` and `rows=` say how many), `clocks` (clocks that are off, and
+//! set meanwhile; needs libfaketime), `starts` (five nodes at once on databases of every age), `skew` (tables are brought forward under load,
+//! then the nodes are replaced; `old=` names a program of an earlier version), `queue` (claims with 10⁴ and 10⁶ queued jobs), `snapshot`
 //! (claims while somebody holds an old snapshot), `rate` (8 workers), `simulation` (1 to 100 nodes with the costs measured here), `network` (hosts that are cut off; needs root or namespaces for users, `ip` and `nft`). Without a name nothing is run. A broken promise ends it with a panic. `--profile dev` takes the build of the tests.
 
 #[path = "../../tests/service/cable.rs"]
 #[allow(dead_code, reason = "shared with the tests")]
 mod cable;
+#[path = "../../tests/service/faketime.rs"]
+#[allow(dead_code, reason = "shared with the tests")]
+mod faketime;
 #[path = "../../tests/service/faulty_server.rs"]
 #[allow(dead_code, reason = "shared with the tests")]
 mod faulty_server;
+#[path = "../../tests/service/old_tables.rs"]
+#[allow(dead_code, reason = "shared with the tests")]
+mod old_tables;
 #[path = "../../tests/service/postgres.rs"]
 #[allow(dead_code, reason = "shared with the tests")]
 mod postgres;
@@ -20,12 +28,16 @@ mod seaweed;
 #[allow(dead_code, reason = "shared with the tests")]
 mod support;
 
+mod clocks;
 mod cluster;
 mod hosts;
 mod network;
 mod nodes;
 mod queue;
+mod rows;
 mod simulation;
+mod skew;
+mod starts;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -47,7 +59,16 @@ fn main() {
     println!("| what | measured |\n|---|---|");
     for name in arguments.iter().filter(|name| !name.contains(['-', '='])) {
         match name.as_str() {
-            "nodes" => runtime.block_on(nodes::run(number("jobs=").unwrap_or(5000))),
+            "nodes" => runtime.block_on(nodes::run(
+                number("jobs=").unwrap_or(5000),
+                number("rows=").unwrap_or(100_000),
+            )),
+            "clocks" => runtime.block_on(clocks::run()),
+            "starts" => runtime.block_on(starts::run()),
+            "skew" => {
+                let old = arguments.iter().find_map(|one| one.strip_prefix("old="));
+                runtime.block_on(skew::run(old.map(str::to_owned)));
+            }
             "queue" => runtime.block_on(queue::depth()),
             "snapshot" => runtime.block_on(queue::snapshot()),
             "rate" => runtime.block_on(queue::rate()),

@@ -11,7 +11,7 @@ use std::path::{Path as FilePath, PathBuf};
 use std::sync::Arc;
 
 use bytes::Bytes;
-use futures_util::stream::BoxStream;
+use futures_util::stream::{self, BoxStream};
 use futures_util::{StreamExt, TryStreamExt};
 use object_store::local::LocalFileSystem;
 use object_store::path::Path;
@@ -27,6 +27,12 @@ use crate::jobs::store::claim::Claim;
 /// The folder of the data folder in which results lie.
 pub(crate) const ROOT: &str = "results";
 
+/// Bytes that one request reads of a solution whose size is not known; larger ones take three.
+const READ_AT_ONCE: u64 = 256 << 10;
+
+/// Bytes that the first request reads of fields: their header, which is rarely longer.
+const FIELDS_AT_ONCE: u64 = 16 << 10;
+
 const SOLUTION: &str = "solution.json";
 
 const FIELDS: &str = "fields.bin";
@@ -37,7 +43,7 @@ const ROWS: &str = "rows.parquet";
 /// The place where results are kept.
 #[derive(Debug, Clone)]
 pub struct Blobs {
-    objects: Arc<dyn ObjectStore>,
+    pub(crate) objects: Arc<dyn ObjectStore>,
     /// The folder, if it is one.
     root: Option<PathBuf>,
 }
@@ -63,23 +69,6 @@ impl Blobs {
     #[must_use]
     pub fn at(objects: Arc<dyn ObjectStore>, root: Option<PathBuf>) -> Blobs {
         Blobs { objects, root }
-    }
-
-    /// Everything that is stored, in the order of the keys: the job, the key, and when it was written, in epoch milliseconds.
-    pub fn listed(&self) -> BoxStream<'static, Result<(Uuid, String, i64), JobsError>> {
-        let listed = self.objects.list(Some(&Path::from(ROOT)));
-        let read = listed
-            .map_err(JobsError::from)
-            .try_filter_map(async |object| {
-                let written = object.last_modified.timestamp_millis();
-                let path = object.location.as_ref();
-                let key = path.rsplit_once('/').map(|(key, _)| key);
-                let job = key.and_then(|key| Uuid::try_parse(key.rsplit('/').nth(1)?).ok());
-                Ok(job
-                    .zip(key)
-                    .map(|(job, key)| (job, key.to_owned(), written)))
-            });
-        read.boxed()
     }
 
     /// Stores a result and returns its key; durable once it returns.
@@ -150,19 +139,39 @@ impl Blobs {
         folder: &str,
     ) -> Result<(usize, BoxStream<'static, Result<Bytes, JobsError>>), JobsError> {
         let path = Path::from(folder).join(SOLUTION);
-        let size = self.objects.head(&path).await?.size;
-        let open = size.saturating_sub(1);
-        let last = self.objects.get_range(&path, open..size).await?;
-        if &*last != b"}" || open == 0 {
-            return Err(JobsError::Damaged(format!("{path} is no object")));
-        }
-        let options = GetOptions {
-            range: Some((0..open).into()),
+        // One request brings all of a solution that is not large, and the size of one that is.
+        let first = GetOptions {
+            range: Some((0..READ_AT_ONCE).into()),
             ..GetOptions::default()
         };
-        let pieces = self.objects.get_opts(&path, options).await?.into_stream();
-        let size = usize::try_from(size).unwrap_or(usize::MAX);
-        Ok((size, pieces.map_err(JobsError::from).boxed()))
+        let found = self.objects.get_opts(&path, first).await?;
+        let size = found.meta.size;
+        let open = size.saturating_sub(1);
+        let damaged = || JobsError::Damaged(format!("{path} is no object"));
+        let bytes = usize::try_from(size).unwrap_or(usize::MAX);
+        if size <= READ_AT_ONCE {
+            let text = found.bytes().await?;
+            if !text.ends_with(b"}") || open == 0 {
+                return Err(damaged());
+            }
+            let open = text.slice(..text.len() - 1);
+            return Ok((bytes, stream::iter([Ok(open)]).boxed()));
+        }
+        let last = self.objects.get_range(&path, open..size).await?;
+        if &*last != b"}" {
+            return Err(damaged());
+        }
+        let rest = GetOptions {
+            range: Some((READ_AT_ONCE..open).into()),
+            ..GetOptions::default()
+        };
+        let objects = self.objects.clone();
+        let rest = stream::once(async move {
+            let rest = objects.get_opts(&path, rest).await?;
+            Ok::<_, object_store::Error>(rest.into_stream())
+        });
+        let pieces = found.into_stream().chain(rest.try_flatten());
+        Ok((bytes, pieces.map_err(JobsError::from).boxed()))
     }
 
     /// Size of a stored solution.
@@ -202,18 +211,18 @@ impl Blobs {
     ) -> Result<PatchFields, JobsError> {
         let path = Path::from(folder).join(FIELDS);
         let damaged = |error: String| JobsError::Damaged(format!("{path}: {error}"));
-        let prefix = self
-            .objects
-            .get_range(&path, 0..PREFIX_BYTES as u64)
-            .await?;
-        let body = (PREFIX_BYTES + header_length(&prefix).map_err(damaged)?) as u64;
-        let header = Header::read(
-            &self
-                .objects
-                .get_range(&path, PREFIX_BYTES as u64..body)
-                .await?,
-        )
-        .map_err(damaged)?;
+        let start = self.objects.get_range(&path, 0..FIELDS_AT_ONCE).await?;
+        let body = PREFIX_BYTES
+            + header_length(&start[..start.len().min(PREFIX_BYTES)]).map_err(damaged)?;
+        let header = match start.get(PREFIX_BYTES..body) {
+            Some(header) => Header::read(header),
+            None => {
+                let range = PREFIX_BYTES as u64..body as u64;
+                Header::read(&self.objects.get_range(&path, range).await?)
+            }
+        };
+        let header = header.map_err(damaged)?;
+        let body = body as u64;
         let points = header.points(patch);
         if point.is_some_and(|point| point >= points) {
             return Err(JobsError::NoSuchPoint { points });
@@ -269,39 +278,6 @@ impl Blobs {
             }
         }
         self.scrub(&folder).await
-    }
-
-    /// The keys of everything that is stored, job by job, month by month.
-    ///
-    /// # Errors
-    /// The store cannot be listed.
-    pub async fn keys(&self, month: &Path) -> Result<Vec<(Uuid, String)>, JobsError> {
-        let mut keys = Vec::new();
-        for job in self.below(month).await? {
-            let Some(id) = job.filename().and_then(|id| Uuid::try_parse(id).ok()) else {
-                continue;
-            };
-            let attempts = self.below(&job).await?;
-            keys.extend(attempts.into_iter().map(|key| (id, key.to_string())));
-        }
-        Ok(keys)
-    }
-
-    /// The months in which something is stored.
-    ///
-    /// # Errors
-    /// The store cannot be listed.
-    pub async fn months(&self) -> Result<Vec<Path>, JobsError> {
-        let mut months = Vec::new();
-        for year in self.below(&Path::from(ROOT)).await? {
-            months.extend(self.below(&year).await?);
-        }
-        Ok(months)
-    }
-
-    async fn below(&self, folder: &Path) -> Result<Vec<Path>, JobsError> {
-        let listed = self.objects.list_with_delimiter(Some(folder)).await?;
-        Ok(listed.common_prefixes)
     }
 
     /// Removes an emptied local folder with what a killed process may have left half-written in it, which the blob

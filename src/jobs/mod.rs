@@ -32,6 +32,7 @@
 
 pub mod backup;
 pub mod batch;
+mod blob_lists;
 pub mod blobs;
 mod bound_access;
 pub mod changes;

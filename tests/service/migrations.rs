@@ -3,16 +3,65 @@
 use railhead::jobs::store::postgres::doctor::examine;
 use railhead::jobs::store::postgres::schema::{Migrated, migrate};
 use sqlx::{Connection, PgConnection};
+use tempfile::TempDir;
 use tokio::task::JoinSet;
 
+use crate::old_tables;
 use crate::postgres::database;
-use crate::support::{Service, case};
+use crate::support::{Service, case, railhead};
 
-/// The tables as the first version made them, with the row that says so.
-const FIRST_FORM: &str = concat!(
-    include_str!("../../src/jobs/store/postgres/schema.sql"),
-    "INSERT INTO deployment (one, form) VALUES (1, 1);"
-);
+/// Starts five nodes at once, each as its unit file does: the tables first, then the node. What the commands said, and the nodes.
+fn five_starts(url: &str) -> Vec<(String, Service, TempDir)> {
+    let start = |number: usize| {
+        let folder = tempfile::tempdir().unwrap();
+        let mut migrate = railhead();
+        let done = migrate.args(["migrate", "--database-url", url]).output();
+        let done = done.unwrap();
+        assert!(done.status.success(), "{done:?}");
+        let role = ["serve", "worker"][number % 2];
+        let workers = ["0", "1"][number % 2];
+        let flags = ["--database-url", url, "--workers", workers];
+        let service = Service::start_as(&mut railhead(), role, folder.path(), &flags);
+        let said = String::from_utf8(done.stdout).unwrap();
+        (said, service, folder)
+    };
+    std::thread::scope(|scope| {
+        let starts: Vec<_> = (0..5)
+            .map(|number| scope.spawn(move || start(number)))
+            .collect();
+        starts
+            .into_iter()
+            .map(|start| start.join().unwrap())
+            .collect()
+    })
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn five_nodes_start_at_once_on_an_empty_and_on_an_old_database() {
+    for (before, says) in [
+        (None, "was made"),
+        (Some(old_tables::newest() - 1), "was brought forward"),
+    ] {
+        let Some(url) = database().await else {
+            return;
+        };
+        if let Some(form) = before {
+            let mut connection = PgConnection::connect(&url).await.unwrap();
+            old_tables::make(&mut connection, form).await;
+        }
+        let nodes = tokio::task::block_in_place(|| five_starts(&url));
+        let (did, found): (Vec<_>, Vec<_>) =
+            nodes.iter().partition(|(said, _, _)| said.contains(says));
+        assert_eq!(did.len(), 1, "{before:?}");
+        assert!(found.iter().all(|(said, _, _)| said.contains("is there")));
+        // Nodes 0, 2 and 4 answer requests, 1 and 3 solve.
+        let apis = [&nodes[0].1, &nodes[2].1, &nodes[4].1];
+        for (number, api) in apis.iter().enumerate() {
+            let id = api.submit(&case(&format!("of node {number}"))).await;
+            apis[(number + 1) % 3].until(&id, "succeeded").await;
+        }
+    }
+}
 
 /// What five commands that run at once say.
 async fn five(url: &str) -> Vec<Migrated> {
@@ -44,10 +93,7 @@ async fn tables_are_made_once_and_old_ones_brought_forward_once_whoever_does_so_
 
     let old = database().await.unwrap();
     let mut connection = PgConnection::connect(&old).await.unwrap();
-    sqlx::raw_sql(FIRST_FORM)
-        .execute(&mut connection)
-        .await
-        .unwrap();
+    old_tables::make(&mut connection, 1).await;
     let key = "INSERT INTO api_keys (id, hash, tenant, created_at) VALUES ('k', 'h', 'north', 0)";
     sqlx::query(key).execute(&mut connection).await.unwrap();
     let refused = examine(&old).await.unwrap_err().to_string();

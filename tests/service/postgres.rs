@@ -156,7 +156,7 @@ fn programs() -> Option<PathBuf> {
 
 /// A shell as somebody that the server runs for, which it refuses for root. There is a user for it where it was installed as a
 /// package; inside a namespace that has no other user than root, another name for that one does.
-fn shell(folder: &Path) -> Command {
+pub fn shell(folder: &Path) -> Command {
     let read = |file: &str| std::fs::read_to_string(file).unwrap_or_default();
     let root = read("/proc/self/status")
         .lines()

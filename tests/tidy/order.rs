@@ -74,6 +74,7 @@ const ORDER: &[&str] = &[
     "jobs::store::postgres",
     "jobs::maintenance::disk_reserve",
     "jobs::blobs",
+    "jobs::blob_lists",
     "jobs::metrics",
     "jobs::result_place",
     "jobs::trace",

@@ -50,6 +50,8 @@ pub(crate) fn session(url: &str) -> Result<PgConnectOptions, JobsError> {
     let options = url::read(url)?.application_name("railhead");
     Ok(options
         .statement_cache_capacity(STATEMENTS_KEPT)
+        // The server's own setting loses no digit, and poolers refuse who begins with another one.
+        .extra_float_digits(None)
         .options(SESSION))
 }
 

@@ -149,7 +149,22 @@ async fn the_sweep_looks_at_old_jobs_only() {
         .await
         .unwrap();
     let steps = plan(&store, EXPIRED).await;
-    assert_eq!(steps, ["SEARCH jobs USING PRIMARY KEY (id<?)"]);
+    assert_eq!(steps[0], "SEARCH jobs USING PRIMARY KEY (id<?)");
+    // Of a chunk, its run and its neighbours that have not ended are looked at.
+    let looks = steps.iter().filter(|step| step.starts_with("SEARCH"));
+    assert_eq!(looks.count(), 3, "{steps:?}");
+    assert!(
+        steps
+            .iter()
+            .any(|step| step.contains("beside") && step.contains("(batch_id=? AND state=?")),
+        "{steps:?}"
+    );
+    assert!(
+        !steps
+            .iter()
+            .any(|step| step.starts_with("SCAN") || step.contains("TEMP B-TREE")),
+        "{steps:?}"
+    );
 }
 
 /// The steps SQLite takes for a statement.

@@ -1,0 +1,183 @@
+//! Nodes whose clocks are 40 s off, and set again and again while they work: is a lease ever lost by that, is a job ended twice, and is a
+//! killed worker noticed as soon as with right clocks?
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use railhead::jobs::store::postgres::schema::migrate;
+use reqwest::Method;
+use sqlx::PgPool;
+use tempfile::TempDir;
+use tokio::task::block_in_place;
+use tokio::time::sleep;
+
+use crate::cluster::{Cluster, counted, note_ends};
+use crate::faketime::{library, set_ahead, with_clock};
+use crate::nodes::{submit, until_all_ended};
+use crate::support::{endless_case, railhead};
+use crate::{postgres, row};
+
+const JOBS: usize = 2000;
+const LEASE: Duration = Duration::from_secs(3);
+
+/// The lease, a round of whoever takes jobs from silent workers (a third of it), one second for everything else.
+const FREE_WITHIN: Duration = Duration::from_secs(5);
+
+/// Roles and how far their clocks are ahead at the start, in seconds.
+const NODES: [(&str, i32); 4] = [
+    ("serve", 0),
+    ("serve", -10),
+    ("worker", 40),
+    ("worker", -40),
+];
+
+/// How long a clock stays as it was set: longer than nodes take to find out, and shorter.
+const SET_EVERY: [Duration; 2] = [Duration::from_secs(7), Duration::from_secs(2)];
+
+const RUNNING: &str = "SELECT COUNT(*) FROM jobs WHERE state = 'running'";
+
+fn clock_of(folder: &TempDir, node: usize) -> std::path::PathBuf {
+    folder.path().join(format!("clock-{node}"))
+}
+
+/// Sets all clocks but the first again and again; how often.
+async fn set_clocks(folder: Arc<TempDir>, stop: Arc<AtomicBool>) -> usize {
+    let mut rounds = 0;
+    while !stop.load(Ordering::Relaxed) {
+        sleep(SET_EVERY[rounds % 2]).await;
+        for (node, (_, ahead)) in NODES.iter().enumerate().skip(1) {
+            let ahead = [-1, 0, 1][rounds % 3] * ahead;
+            set_ahead(&clock_of(&folder, node), ahead);
+        }
+        rounds += 1;
+    }
+    rounds
+}
+
+/// Jobs that no worker ends, one for each; they are running.
+async fn hold(cluster: &Cluster, pool: &PgPool) -> Vec<String> {
+    let mut held = Vec::new();
+    for number in 0..2 {
+        let name = format!(
+            "held-{}-{number}",
+            counted(pool, "SELECT COUNT(*) FROM jobs").await
+        );
+        let (id, _) = cluster.submit(&endless_case(&name), &name, number).await;
+        held.push(id);
+    }
+    let since = Instant::now();
+    while counted(pool, RUNNING).await < 2 {
+        assert!(
+            since.elapsed() < Duration::from_secs(60),
+            "they do not begin"
+        );
+        sleep(Duration::from_millis(20)).await;
+    }
+    held
+}
+
+async fn cancel(cluster: &Cluster, ids: &[String]) {
+    for id in ids {
+        let path = format!("/v1/jobs/{id}/cancel");
+        let api = cluster.apis()[0];
+        cluster
+            .ask(api, Method::POST, &path, |request| request)
+            .await;
+    }
+}
+
+pub async fn run() {
+    let (Some(url), Some(library)) = (postgres::database().await, library()) else {
+        return;
+    };
+    migrate(&url).await.expect("tables");
+    let pool = PgPool::connect(&url).await.expect("the database");
+    note_ends(&pool).await;
+    let folder = Arc::new(tempfile::tempdir().expect("a folder"));
+    for (node, (_, ahead)) in NODES.iter().enumerate() {
+        set_ahead(&clock_of(&folder, node), *ahead);
+    }
+    let cluster = Cluster::new({
+        let folder = folder.clone();
+        move |node| {
+            let mut command = railhead();
+            with_clock(&mut command, &library, &clock_of(&folder, node));
+            command
+        }
+    });
+    for (role, _) in NODES {
+        let workers = if role == "worker" { "1" } else { "0" };
+        let lease = LEASE.as_secs().to_string();
+        let flags = [
+            "--database-url",
+            &url,
+            "--workers",
+            workers,
+            "--lease-s",
+            &lease,
+        ];
+        cluster.add(role, &[&flags[..], &["--cache", "false"]].concat());
+    }
+
+    // Both workers hold a job for many leases, and many small ones pass by, while clocks are set.
+    let held = hold(&cluster, &pool).await;
+    let (began, stop) = (Instant::now(), Arc::new(AtomicBool::new(false)));
+    let setting = tokio::spawn(set_clocks(folder.clone(), stop.clone()));
+    let (ids, again) = submit(&cluster, 0, JOBS).await;
+    while began.elapsed() < 10 * LEASE {
+        sleep(Duration::from_millis(100)).await;
+    }
+    cancel(&cluster, &held).await;
+    until_all_ended(&pool).await;
+    stop.store(true, Ordering::Relaxed);
+    let rounds = setting.await.expect("clocks");
+    row(
+        "jobs, submissions tried again, rounds in which three clocks were set, seconds to the last end",
+        format!(
+            "{}, {again}, {rounds}, {:.0}",
+            ids.len(),
+            began.elapsed().as_secs_f64()
+        ),
+    );
+    assert_eq!(again, 0, "nobody was turned away");
+    let more = "SELECT COUNT(*) FROM jobs WHERE attempt > 1";
+    assert_eq!(counted(&pool, more).await, 0, "a lease was lost");
+    let ended = "SELECT COUNT(*) FROM jobs WHERE state = 'succeeded'";
+    assert_eq!(
+        counted(&pool, ended).await,
+        i64::try_from(JOBS).expect("few")
+    );
+    let twice = "SELECT COUNT(*) FROM (SELECT job FROM soak_ends GROUP BY job HAVING COUNT(*) > 1) AS twice";
+    assert_eq!(counted(&pool, twice).await, 0, "a job ended twice");
+    assert!(cluster.logged("lease ran out").is_empty());
+    freed(&cluster, &pool, &folder).await;
+}
+
+/// How long the job of a killed worker is held whose clock is ahead, and of one whose clock is behind.
+async fn freed(cluster: &Arc<Cluster>, pool: &PgPool, folder: &TempDir) {
+    for (node, what) in [(2, "ahead"), (3, "behind")] {
+        for node in [2, 3] {
+            set_ahead(&clock_of(folder, node), NODES[node].1);
+        }
+        // By then the other worker has found out how its clock was set, and takes jobs from the dead all the same.
+        let held = hold(cluster, pool).await;
+        block_in_place(|| cluster.kill(node));
+        let killed = Instant::now();
+        while counted(pool, RUNNING).await > 1 {
+            assert!(killed.elapsed() < 4 * FREE_WITHIN, "its job is not free");
+            sleep(Duration::from_millis(20)).await;
+        }
+        let free = killed.elapsed();
+        row(
+            &format!(
+                "seconds until the job of a killed worker was free whose clock was 40 s {what}"
+            ),
+            format!("{:.1}", free.as_secs_f64()),
+        );
+        assert!(free < FREE_WITHIN, "{free:?}");
+        cancel(cluster, &held).await;
+        until_all_ended(pool).await;
+        block_in_place(|| cluster.start(node));
+    }
+}

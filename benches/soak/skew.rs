@@ -1,0 +1,142 @@
+//! Tables are brought forward while nodes of the version before work, which are then replaced one by one: does anybody notice?
+//!
+//! Without a program of an earlier version the present one plays it, and the tables become what the next version could make of them.
+
+use std::path::PathBuf;
+use std::process::Command;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use railhead::jobs::store::postgres::schema::migrate;
+use sqlx::PgPool;
+use tokio::task::block_in_place;
+use tokio::time::sleep;
+
+use crate::cluster::{Cluster, counted, note_ends};
+use crate::nodes::{submit, until_all_ended};
+use crate::support::railhead;
+use crate::{postgres, row};
+
+const JOBS: usize = 3000;
+
+/// What a version adds to tables in use: a column, an index, a table. The last does not lock out those who write.
+const NEXT: [&str; 4] = [
+    "SET lock_timeout = '2s'",
+    "ALTER TABLE jobs ADD COLUMN later bigint NOT NULL DEFAULT 0; CREATE TABLE later (id bigint PRIMARY KEY)",
+    "UPDATE deployment SET form = form + 1",
+    "CREATE INDEX CONCURRENTLY jobs_later ON jobs (later) WHERE later > 0",
+];
+
+/// The program of the version before, or the present one.
+fn before(old: Option<&PathBuf>) -> Command {
+    let Some(old) = old else { return railhead() };
+    let mut command = Command::new(old);
+    for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("RAILHEAD_")) {
+        command.env_remove(name);
+    }
+    command
+}
+
+/// Brings the tables forward; tried again where somebody holds them for too long.
+async fn advance(url: &str, old: bool) {
+    if old {
+        migrate(url).await.expect("the tables are brought forward");
+        return;
+    }
+    let pool = PgPool::connect(url).await.expect("the database");
+    let mut connection = pool.acquire().await.expect("a connection");
+    for statement in NEXT {
+        while let Err(error) = sqlx::raw_sql(statement).execute(&mut *connection).await {
+            let code = error.as_database_error().and_then(|error| error.code());
+            assert_eq!(code.as_deref(), Some("55P03"), "{error}");
+        }
+    }
+}
+
+async fn form(pool: &PgPool) -> i64 {
+    counted(pool, "SELECT form FROM deployment").await
+}
+
+pub async fn run(old: Option<String>) {
+    let Some(url) = postgres::database().await else {
+        return;
+    };
+    let old = old.map(PathBuf::from);
+    let made = before(old.as_ref())
+        .args(["migrate", "--database-url", &url])
+        .status();
+    assert!(made.expect("the program").success());
+    let pool = PgPool::connect(&url).await.expect("the database");
+    note_ends(&pool).await;
+    let is_new = Arc::new(AtomicBool::new(false));
+    let cluster = Cluster::new({
+        let (old, is_new) = (old.clone(), is_new.clone());
+        move |_| match is_new.load(Ordering::Relaxed) {
+            true => railhead(),
+            false => before(old.as_ref()),
+        }
+    });
+    let shared = "--cache false --lease-s 5 --shutdown-grace-s 2 --drain-delay-s 0";
+    for (role, workers) in [
+        ("serve", "0"),
+        ("serve", "0"),
+        ("worker", "1"),
+        ("worker", "1"),
+    ] {
+        let flags = ["--database-url", &url, "--workers", workers].into_iter();
+        cluster.add(role, &flags.chain(shared.split(' ')).collect::<Vec<_>>());
+    }
+    let first_form = form(&pool).await;
+
+    let began = Instant::now();
+    let submitting = tokio::spawn({
+        let cluster = cluster.clone();
+        async move { submit(&cluster, 0, JOBS).await }
+    });
+    sleep(Duration::from_secs(3)).await;
+    let advancing = Instant::now();
+    advance(&url, old.is_some()).await;
+    let advanced = advancing.elapsed();
+    assert!(
+        form(&pool).await > first_form,
+        "the tables are of a later form"
+    );
+    sleep(Duration::from_secs(3)).await;
+    assert!(!submitting.is_finished(), "more jobs are needed");
+    // Workers first, then those that answer requests.
+    is_new.store(true, Ordering::Relaxed);
+    for node in [2, 3, 0, 1] {
+        block_in_place(|| cluster.stop(node));
+        block_in_place(|| cluster.start(node));
+    }
+    let (ids, again) = submitting.await.expect("clients");
+    until_all_ended(&pool).await;
+    let jobs = i64::try_from(ids.len()).expect("few");
+    row(
+        "jobs, submissions tried again, forms of the tables, seconds in which they changed, seconds to the last end",
+        format!(
+            "{jobs}, {again}, {first_form} to {}, {:.2}, {:.0}",
+            form(&pool).await,
+            advanced.as_secs_f64(),
+            began.elapsed().as_secs_f64()
+        ),
+    );
+    verify(&cluster, &pool, jobs).await;
+}
+
+/// Each job ended once, at its first attempt, and nobody complained.
+async fn verify(cluster: &Cluster, pool: &PgPool, jobs: i64) {
+    let ended = "SELECT COUNT(*) FROM jobs WHERE state = 'succeeded' AND attempt = 1";
+    assert_eq!(counted(pool, ended).await, jobs, "at the first attempt");
+    let twice = "SELECT COUNT(*) FROM (SELECT job FROM soak_ends GROUP BY job HAVING COUNT(*) > 1) AS twice";
+    assert_eq!(counted(pool, twice).await, 0, "a job ended twice");
+    assert_eq!(counted(pool, "SELECT COUNT(*) FROM jobs").await, jobs);
+    for wrong in ["panicked", "\"ERROR\""] {
+        assert!(
+            cluster.logged(wrong).is_empty(),
+            "{:?}",
+            cluster.logged(wrong)
+        );
+    }
+}

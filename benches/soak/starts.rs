@@ -1,0 +1,100 @@
+//! Five nodes that start at once, tables first, on databases of every age with many jobs in them: are the tables brought forward once, and
+//! do all nodes work afterwards?
+
+use std::time::{Duration, Instant};
+
+use reqwest::Method;
+use serde_json::Value;
+use sqlx::{Connection, PgConnection, PgPool};
+use tempfile::TempDir;
+use tokio::task::block_in_place;
+use tokio::time::sleep;
+
+use crate::queue::fill;
+use crate::support::{Service, case, railhead};
+use crate::{old_tables, postgres, row};
+
+/// Jobs that are in the tables already.
+const JOBS: i64 = 100_000;
+
+/// Ends of a guard: something hangs.
+const WITHIN: Duration = Duration::from_secs(60);
+
+/// The tables first, then the node; what the first command said.
+fn start(url: &str, number: usize) -> (String, Service, TempDir) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut migrate = railhead();
+    let done = migrate.args(["migrate", "--database-url", url]).output();
+    let done = done.expect("the program");
+    assert!(done.status.success(), "{done:?}");
+    let (role, workers) = [("serve", "0"), ("worker", "1")][number % 2];
+    let flags = ["--database-url", url, "--workers", workers];
+    let service = Service::start_as(&mut railhead(), role, folder.path(), &flags);
+    let said = String::from_utf8_lossy(&done.stdout).into_owned();
+    (said, service, folder)
+}
+
+/// Nodes 0, 2 and 4 answer requests: what one takes is told by the next.
+async fn work(nodes: &[(String, Service, TempDir)]) {
+    for number in [0, 2, 4] {
+        let mut urgent = case(&format!("of node {number}"));
+        urgent["load"]["normal_force_n"] = (50_000 + number).into();
+        let (one, other) = (&nodes[number].1, &nodes[(number + 2) % 6].1);
+        let posted = one.request(Method::POST, "/v1/jobs?priority=high");
+        let job: Value = posted
+            .json(&urgent)
+            .send()
+            .await
+            .expect("an answer")
+            .json()
+            .await
+            .expect("a job");
+        let path = format!("/v1/jobs/{}", job["id"].as_str().expect("an id"));
+        let since = Instant::now();
+        while other.get(&path).await["state"] != "succeeded" {
+            assert!(since.elapsed() < WITHIN, "it does not end");
+            sleep(Duration::from_millis(20)).await;
+        }
+    }
+}
+
+pub async fn run() {
+    for form in 0..old_tables::newest() {
+        let Some(url) = postgres::database().await else {
+            return;
+        };
+        if form > 0 {
+            let mut connection = PgConnection::connect(&url).await.expect("the database");
+            old_tables::make(&mut connection, form).await;
+            let pool = PgPool::connect(&url).await.expect("the database");
+            fill(&pool, 0, JOBS).await;
+        }
+        let began = Instant::now();
+        let nodes: Vec<_> = block_in_place(|| {
+            std::thread::scope(|scope| {
+                let url = &url;
+                let starts: Vec<_> = (0..5)
+                    .map(|number| scope.spawn(move || start(url, number)))
+                    .collect();
+                starts
+                    .into_iter()
+                    .map(|start| start.join().expect("a node"))
+                    .collect()
+            })
+        });
+        let seconds = began.elapsed().as_secs_f64();
+        let did = nodes
+            .iter()
+            .filter(|(said, _, _)| !said.contains("is there"));
+        assert_eq!(did.count(), 1, "one makes or changes the tables");
+        work(&nodes).await;
+        let before = match form {
+            0 => "an empty database".to_owned(),
+            form => format!("form {form} with {JOBS} jobs"),
+        };
+        row(
+            &format!("seconds until five nodes were ready on {before}"),
+            format!("{seconds:.1}"),
+        );
+    }
+}

@@ -1,0 +1,95 @@
+//! Nodes behind a pooler in transaction mode, which gives each transaction whichever session is free: does everything still work?
+
+use std::time::{Duration, Instant};
+
+use railhead::jobs::store::postgres::schema::migrate;
+use reqwest::Method;
+use serde_json::{Value, json};
+
+use crate::pgbouncer::Pooler;
+use crate::postgres::database;
+use crate::support::{Service, case, endless_case, railhead};
+
+/// Fewer sessions than the nodes have connections, so that they change hands all the time.
+const SESSIONS: u32 = 4;
+
+/// An end that is heard of takes milliseconds; one that is looked for, up to a second.
+const HEARD_WITHIN: Duration = Duration::from_millis(700);
+
+#[tokio::test(flavor = "multi_thread")]
+async fn nodes_behind_a_pooler_in_transaction_mode_work_and_hear_each_other() {
+    let Some(direct) = database().await else {
+        return;
+    };
+    let Some(pooler) = Pooler::before(&direct, SESSIONS) else {
+        return;
+    };
+    let url = pooler.url(&direct);
+    migrate(&url).await.unwrap();
+    let folders: [_; 3] = std::array::from_fn(|_| tempfile::tempdir().unwrap());
+    let start = |number: usize, role: &str, workers: &str| {
+        let flags = ["--database-url", &url, "--database-direct-url", &direct];
+        let more = ["--workers", workers, "--cache", "false", "--lease-s", "2"];
+        let flags = [&flags[..], &more].concat();
+        Service::start_as(&mut railhead(), role, folders[number].path(), &flags)
+    };
+    let one = start(0, "serve", "0");
+    let other = start(1, "serve", "0");
+    let worker = start(2, "worker", "1");
+
+    let lines: Vec<String> = (0..60)
+        .map(|number| case(&format!("line {number}")).to_string())
+        .collect();
+    let batch = one
+        .request(Method::POST, "/v1/batches")
+        .header("Content-Type", "application/x-ndjson")
+        .body(lines.join("\n"));
+    let batch: Value = batch.send().await.unwrap().json().await.unwrap();
+    let batch = format!("/v1/batches/{}", batch["id"].as_str().unwrap());
+    let mut ids = Vec::new();
+    for number in 0..40 {
+        let api = [&one, &other][number % 2];
+        ids.push(api.submit(&case(&format!("case {number}"))).await);
+    }
+    for id in &ids {
+        let job = other.until(id, "succeeded").await;
+        assert_eq!(job["attempt"], 1, "{job}");
+        let result = one.get(&format!("/v1/jobs/{id}/result")).await;
+        assert!(result["patches"].is_array(), "{result}");
+    }
+    while other.get(&batch).await["states"]["succeeded"] != json!(60) {
+        crate::support::pause().await;
+    }
+    assert_heard(&one, &other).await;
+    for node in [&one, &other, &worker] {
+        let log = node.log_text();
+        assert!(
+            !log.contains("\"ERROR\"") && !log.contains("prepared"),
+            "{log}"
+        );
+    }
+}
+
+/// Who waits at one node hears of an end at the other without looking.
+async fn assert_heard(one: &Service, other: &Service) {
+    let mut fastest = Duration::MAX;
+    for number in 0..3 {
+        let id = one
+            .submit(&endless_case(&format!("waited for {number}")))
+            .await;
+        one.until(&id, "running").await;
+        let waiting = one
+            .request(Method::GET, &format!("/v1/jobs/{id}"))
+            .header("Prefer", "wait=30");
+        let waiting = tokio::spawn(waiting.send());
+        // The wait begins before the end.
+        tokio::time::sleep(Duration::from_millis(100)).await;
+        let asked = Instant::now();
+        let cancel = format!("/v1/jobs/{id}/cancel");
+        other.request(Method::POST, &cancel).send().await.unwrap();
+        let job: Value = waiting.await.unwrap().unwrap().json().await.unwrap();
+        assert_eq!(job["state"], "cancelled", "{job}");
+        fastest = fastest.min(asked.elapsed());
+    }
+    assert!(fastest < HEARD_WITHIN, "{fastest:?}");
+}

@@ -1,0 +1,67 @@
+//! What is removed together once its time is over?
+
+use std::collections::HashSet;
+
+use railhead::jobs::run::lane::rows_lane;
+use railhead::jobs::store::claim::Claim;
+use railhead::jobs::store::retention::RetentionRule;
+use railhead::jobs::store::submission::{BatchBegun, NewJob, QueueBounds};
+
+use crate::store::{
+    LEASE, StoreKind, Table, claim_up_to, conformance, new_batch, new_job, success,
+};
+
+conformance!(the_chunks_of_a_run_expire_together_with_the_last_of_them);
+
+async fn end(table: &Table, claim: &Claim, now: i64) {
+    let ends = [(claim.clone(), success())];
+    assert_eq!(table.store.finish(&ends, now).await.unwrap().len(), 1);
+}
+
+/// How many jobs are removed of those that ended at a time or before.
+async fn expire(table: &Table, ended_before: i64) -> u64 {
+    let rule = RetentionRule {
+        now: ended_before,
+        ended_before,
+        forget_before: 0,
+        jobs: 100,
+    };
+    table.store.expire(rule).await.unwrap()
+}
+
+async fn the_chunks_of_a_run_expire_together_with_the_last_of_them(kind: StoreKind) {
+    let table = Table::new(kind).await;
+    let job = table.add(new_job()).await;
+    let begun = job.created_at;
+    let claim = table.claim(begun).await.unwrap();
+    end(&table, &claim, begun + 1000).await;
+
+    let lane = rows_lane("anonymous");
+    let run = new_batch(&lane, 3);
+    let none = HashSet::new();
+    let created = table.store.begin_batch(&run, &none, QueueBounds::NONE);
+    assert_eq!(created.await.unwrap(), BatchBegun::Created);
+    let chunk = |index| {
+        let chunk = NewJob {
+            tenant: lane.clone(),
+            ..new_job()
+        };
+        (index, chunk)
+    };
+    let chunks = [chunk(0), chunk(1), chunk(2)];
+    table.store.fill_batch(run.id, &chunks).await.unwrap();
+    table.store.complete_batch(run.id).await.unwrap();
+    let claims = claim_up_to(&*table.store, begun, 100 * LEASE, 3).await;
+    assert_eq!(claims.len(), 3);
+    end(&table, &claims[0], begun + 1000).await;
+    end(&table, &claims[1], begun + 5000).await;
+    assert_eq!(expire(&table, begun + 2000).await, 1, "the job alone");
+    // The last chunk is still running.
+    assert_eq!(expire(&table, begun + 6000).await, 0);
+    end(&table, &claims[2], begun + 9000).await;
+    assert_eq!(expire(&table, begun + 8999).await, 0);
+    assert!(table.store.batch(&lane, run.id).await.unwrap().is_some());
+    assert_eq!(expire(&table, begun + 9000).await, 3);
+    assert!(table.store.batch(&lane, run.id).await.unwrap().is_none());
+    assert!(table.store.has_expired(&lane, run.id).await.unwrap());
+}
