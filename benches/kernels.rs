@@ -124,7 +124,7 @@ fn cases(c: &mut Criterion) {
         });
         let problem = check(&case, &Limits::default()).expect("a valid case");
         group.bench_function(name, |b| {
-            b.iter(|| solve(black_box(&problem), &Unmonitored))
+            b.iter(|| solve(black_box(&problem), &Unmonitored));
         });
     }
     group.finish();

@@ -138,7 +138,7 @@ fn files_compiled_into(source: &Path) -> Vec<PathBuf> {
             let mut file = source.parent().unwrap().to_owned();
             for part in Path::new(path).components() {
                 match part {
-                    Component::ParentDir => assert!(file.pop(), "{path} in {source:?}"),
+                    Component::ParentDir => assert!(file.pop(), "{path} in {}", source.display()),
                     other => file.push(other),
                 }
             }

@@ -54,12 +54,11 @@ impl Client {
                 tokio::time::sleep(REFUSED).await;
                 continue;
             }
-            if !statuses.contains(&status) {
-                panic!(
-                    "{method} {path}: {status} {}",
-                    answer.text().await.unwrap_or_default()
-                );
-            }
+            assert!(
+                statuses.contains(&status),
+                "{method} {path}: {status} {}",
+                answer.text().await.unwrap_or_default()
+            );
             return answer;
         }
     }

@@ -76,7 +76,7 @@ impl Service {
         let stat = std::fs::read_to_string(process.join("stat")).expect("the process lives");
         // Fields 14 and 15, in ticks; the second, a name, may have spaces and ends with a bracket.
         let ticks = stat.rsplit(')').next().expect("its fields").split(' ');
-        let processor = ticks.skip(12).take(2).map(|field| field.parse::<f64>());
+        let processor = ticks.skip(12).take(2).map(str::parse::<f64>);
         let descriptors = std::fs::read_dir(process.join("fd")).expect("its descriptors");
         let (files, bytes) = below(&self.data);
         Usage {

@@ -114,12 +114,12 @@ fn one_shape(lu: f64) -> String {
         })
         .collect();
     let store = Arc::new(OperatorStore::default());
-    let (alone, _) = seconds_of(|| {
+    let (alone, ()) = seconds_of(|| {
         for checked in &problems {
             let _ = black_box(solve(checked, &Unmonitored));
         }
     });
-    let (kept, _) = seconds_of(|| {
+    let (kept, ()) = seconds_of(|| {
         for checked in &problems {
             let _ = black_box(solve_with(&store, checked, &Unmonitored));
         }

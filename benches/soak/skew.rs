@@ -48,7 +48,9 @@ async fn advance(url: &str, old: bool) {
     let mut connection = pool.acquire().await.expect("a connection");
     for statement in NEXT {
         while let Err(error) = sqlx::raw_sql(statement).execute(&mut *connection).await {
-            let code = error.as_database_error().and_then(|error| error.code());
+            let code = error
+                .as_database_error()
+                .and_then(sqlx::error::DatabaseError::code);
             assert_eq!(code.as_deref(), Some("55P03"), "{error}");
         }
     }

@@ -35,7 +35,9 @@ pub fn tables(seed: u64) -> String {
             for (kind, row) in rows.iter().enumerate() {
                 let _ = writeln!(text, "{}", line(Damage::NAMES[kind], row));
             }
-            let all = rows.iter().fold(Counts::default(), |sum, row| sum.and(row));
+            let all = rows
+                .iter()
+                .fold(Counts::default(), super::damaged_trials::Counts::and);
             let _ = writeln!(text, "{}\n", line("all", &all));
         }
     }

@@ -107,11 +107,11 @@ fn row(name: &str, part: &[&Judged]) {
 
 /// Prints the table of errors by region.
 pub fn print(all: &[Judged]) {
+    type Test = fn(&Judged) -> bool;
     println!(
         "| region | motions | F_x 50/90/99 %/max | F_y | M_z | largest | <= 0.004 % | <= 0.01 % | stick | truth's estimate |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|");
-    type Test = fn(&Judged) -> bool;
     let regions: [(&str, Test); 9] = [
         ("all", |_| true),
         ("a/b 0.3 to 3", |j| (0.3..3.0).contains(&j.ratio)),

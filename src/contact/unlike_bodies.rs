@@ -23,7 +23,7 @@ use crate::contact::remark::list::Remark;
 use crate::contact::rolling::force_control;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::refinement::levels::Levels;
-use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::solution::words::NormalReport;
 use crate::contact::time_limit::TimeLimit;

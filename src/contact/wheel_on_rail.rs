@@ -21,7 +21,7 @@ use crate::contact::problem::run::Run;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling_stage;
 use crate::contact::solution::track_axes::merge;
 use crate::contact::solution::words::{Fields, NormalReport, Solution};

@@ -2,7 +2,7 @@
 
 use railhead::contact::case::words::question::Case;
 use railhead::contact::case::words::solver::Output;
-use railhead::contact::rolling::refinement::resolution::Resolution;
+use railhead::contact::rolling::resolution::Resolution;
 use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, faults, good, good_with, problem, with};

@@ -162,7 +162,7 @@ proptest! {
             prop_assert!(!checked.problem.motions.is_empty() && !checked.run.outputs.is_empty());
             prop_assert!(checked.cost().bytes <= Limits::default().memory_bytes);
             prop_assert!(checked.cost().seconds.is_finite());
-            for patch in checked.problem.task.patches() {
+            for patch in checked.problem.task.known_patches().into_iter().flatten() {
                 prop_assert!(patch.normal_force.is_finite() && patch.normal_force > 0.0, "{patch:?}");
                 prop_assert!(patch.area.is_finite() && patch.area > 0.0, "{patch:?}");
             }

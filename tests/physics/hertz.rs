@@ -190,7 +190,7 @@ fn a_case_of_radii_becomes_the_worked_ellipse() {
         "motion": { "creepage_x": 0.001 },
     });
     let checked = check(&case, &Limits::default()).unwrap();
-    let patch = checked.problem.task.patches()[0];
+    let patch = checked.problem.task.known_patches().expect("known")[0];
     assert!(close(patch.normal_force, 80_000.0, 1e-13));
     assert!(close(patch.pressure_max, 1148.85, 1e-5));
     assert!(close(patch.approach.unwrap(), 0.089727, 1e-5));

@@ -16,7 +16,7 @@ fn trials(pairs: &[Pair], seed: u64, places: usize, kind: Option<usize>) -> Coun
     };
     let mut rows = [Counts::default(); Damage::KINDS];
     let sound = rows_of(pairs, seed, places, kind, &smoothing, &mut rows);
-    rows.iter().fold(sound, |sum, row| sum.and(row))
+    rows.iter().fold(sound, Counts::and)
 }
 
 #[test]

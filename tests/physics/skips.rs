@@ -31,7 +31,7 @@ fn answered(contact: &Ellipse) -> PointSolution {
 fn distance_to_plain_newton(contact: &Ellipse) -> f64 {
     let case = contact.case(STRIPS, CELLS);
     let checked = contact::check(&case, &Limits::default()).expect("a valid case");
-    let size = railhead::contact::mesh::size::MeshSize {
+    let size = contact::mesh::size::MeshSize {
         strips: STRIPS,
         cells: CELLS,
     };

@@ -25,7 +25,7 @@ async fn a_table_that_was_damaged_is_refused_after_an_unclean_end() {
     match Jobs::open(Options::new(folder.path())).await {
         Err(JobsError::TableDamaged(_)) => {}
         Err(JobsError::Store(error)) => {
-            assert!(error.to_string().contains("malformed"), "{error}")
+            assert!(error.to_string().contains("malformed"), "{error}");
         }
         other => panic!("{other:?}"),
     }

@@ -179,7 +179,10 @@ async fn cases_of_a_batch_belong_to_its_trace() {
     states.sort();
     assert_eq!(states, ["failed", "succeeded"]);
     let failed = spans.iter().filter(|span| {
-        let status = span.status.as_ref().map(|status| status.code());
+        let status = span
+            .status
+            .as_ref()
+            .map(opentelemetry_proto::tonic::trace::v1::Status::code);
         span.name == "solve" && status == Some(StatusCode::Error)
     });
     assert_eq!(failed.count(), 1);

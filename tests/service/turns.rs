@@ -22,7 +22,7 @@ struct Shop {
     let_go: Arc<AtomicBool>,
     /// Solvers at work at this moment, and the most there ever were.
     working: Arc<[AtomicUsize; 2]>,
-    _folder: tempfile::TempDir,
+    folder: tempfile::TempDir,
 }
 
 async fn shop(change: impl FnOnce(&mut Options)) -> Shop {
@@ -60,7 +60,7 @@ async fn shop(change: impl FnOnce(&mut Options)) -> Shop {
         jobs,
         let_go,
         working,
-        _folder: folder,
+        folder,
     }
 }
 
@@ -152,7 +152,7 @@ async fn a_waiting_solve_can_be_cancelled_and_is_handed_back_at_the_end() {
     let job = other.wait(theirs, AT_MOST).await.unwrap();
     assert_eq!(job.state, State::Succeeded);
     jobs.shutdown(Duration::from_millis(50)).await;
-    let again = Jobs::open(Options::new(shop._folder.path())).await.unwrap();
+    let again = Jobs::open(Options::new(shop.folder.path())).await.unwrap();
     for id in [ids[0], ids[2]] {
         let job = again.get(id).await.unwrap();
         assert_eq!((job.state, job.attempt), (State::Queued, 0));
@@ -163,7 +163,7 @@ async fn a_waiting_solve_can_be_cancelled_and_is_handed_back_at_the_end() {
 async fn a_suspect_is_solved_while_nothing_else_is() {
     let shop = shop(|options| options.workers = 3).await;
     let jobs = &shop.jobs;
-    let store = open_beside(shop._folder.path()).await;
+    let store = open_beside(shop.folder.path()).await;
     let mut ids = Vec::new();
     for number in 0..3 {
         ids.push(

@@ -50,9 +50,8 @@ impl CheckedCase {
         };
         let of_material = elasticity.remark(case.solver.method.into());
         let of_material = of_material.map(|r| r.at_pointer("/material"));
-        let of_case = of_material
-            .into_iter()
-            .chain(unusual_friction(&case.friction));
+        let of_case = unusual_friction(&case.friction);
+        let of_case = of_material.into_iter().chain(of_case);
         let ExpandedMotions {
             motions,
             forces,
@@ -60,7 +59,8 @@ impl CheckedCase {
             history,
         } = motions;
         let given = given_creepages(&motions, &forces);
-        let implausible = plausibility::of_case(&case.contact, &task.patches(), given);
+        let patches = task.known_patches().unwrap_or_default();
+        let implausible = plausibility::of_case(&case.contact, &patches, given);
         let remarks = merged(of_case.chain(remarks).chain(implausible));
         let digest = digest(case, &elasticity, &motions, &forces, &speeds);
         let problem = Problem {

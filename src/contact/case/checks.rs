@@ -106,7 +106,7 @@ impl CheckedParts {
             faults.extend(size.faults(limits));
         }
         let of_friction = friction_fault(&given).or_else(|| {
-            let patches = task.as_ref()?.0.patches();
+            let patches = task.as_ref()?.0.known_patches().unwrap_or_default();
             falls_too_fast(
                 given.friction?,
                 given.after.thermal,
@@ -145,7 +145,7 @@ fn history_faults(
         outputs: given.outputs,
         friction: given.friction,
         elasticity,
-        patches: &task.map(NormalTask::patches).unwrap_or_default(),
+        patches: &task.and_then(NormalTask::known_patches).unwrap_or_default(),
     };
     history::faults(history, &beside, limits)
 }
@@ -289,9 +289,10 @@ pub(crate) fn normal_task(
 /// The normal force of all patches in N, where it is known before the patches are.
 fn normal_force(task: Option<&NormalTask>, load: Option<&Load>) -> Option<f64> {
     let given = load.and_then(|load| load.normal_force_n);
-    let patches = task.map(NormalTask::patches).unwrap_or_default();
-    let sum = || patches.iter().map(|patch| patch.normal_force).sum();
-    given.or_else(|| (!patches.is_empty()).then(sum))
+    given.or_else(|| {
+        let patches = task?.known_patches()?;
+        Some(patches.iter().map(|patch| patch.normal_force).sum())
+    })
 }
 
 pub(crate) fn missing_load() -> Fault {

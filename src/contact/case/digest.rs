@@ -7,7 +7,7 @@ use crate::contact::case::words::question::Case;
 use crate::contact::case::words::solver::TractionBoundName;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
-use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::rolling::resolution::Resolution;
 
 /// Raised whenever a change moves numbers that clients get: equal cases share one answer, and answers of an older revision are not theirs.
 /// `tests/physics/golden.rs` fails if numbers move without it, and says how to record the new ones.

@@ -2,7 +2,7 @@
 
 use crate::contact::case::words::solver::{MethodName, Solver};
 use crate::contact::rolling::methods::fastsim;
-use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::rolling::resolution::Resolution;
 
 /// Allowed error of the resultants when nothing else is asked for, relative to μN.
 pub(crate) const TARGET_ERROR_DEFAULT: f64 = 0.005;

@@ -4,7 +4,7 @@ use crate::contact::case::limits::Limits;
 use crate::contact::error::Fault;
 use crate::contact::problem::memory::SizeInput;
 use crate::contact::rolling::methods::method::Method;
-use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::rolling::resolution::Resolution;
 
 /// Largest length over width of a patch for the fast solver. Its preconditioner treats every strip by itself, so that linear systems no
 /// longer converge where strips lie closer than the cells in them are long. Of ellipses under 20 loads and motions all converged up

@@ -20,7 +20,7 @@ use crate::contact::rolling::history::solve::usual_work;
 use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::refinement::mesh_policy::CELLS_MAX;
-use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::task::precision_of;
 
 /// The time of a motion within a sweep relative to a single one: a start from the motion before saves work, but with spin every motion
@@ -235,8 +235,9 @@ impl CheckedCase {
         let extents: Vec<[f64; 4]> = self
             .problem
             .task
-            .patches()
+            .known_patches()
             .iter()
+            .flatten()
             .map(|p| p.extent)
             .collect();
         let (steps, usual) = usual_work(history, &extents);

@@ -12,7 +12,7 @@ use crate::contact::post::subsurface::task::{LoadedBody, StressPlaces, Subsurfac
 pub(crate) fn count(words: &SubsurfaceWords) -> usize {
     let grid = |grid: &StressGrid| {
         let sides = [&grid.x_mm, &grid.y_mm, &grid.depths_mm];
-        let counts = sides.map(|axis| axis.count());
+        let counts = sides.map(GridAxis::count);
         counts.into_iter().fold(1, usize::saturating_mul)
     };
     let points = words.points_mm.as_ref().map(Vec::len);
@@ -59,7 +59,7 @@ fn places(words: &SubsurfaceWords) -> StressPlaces {
         return StressPlaces::Points(points.clone());
     }
     if let Some(grid) = &words.plane {
-        let [xs, ys] = [&grid.x_mm, &grid.y_mm].map(|axis| axis.values());
+        let [xs, ys] = [&grid.x_mm, &grid.y_mm].map(GridAxis::values);
         let mut points = Vec::with_capacity(count(words));
         for depth in grid.depths_mm.values() {
             for y in &ys {

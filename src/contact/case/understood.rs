@@ -21,15 +21,17 @@ impl CheckedCase {
     /// # Errors
     /// A sentence, if no part of the wheel lies above the rail.
     pub fn understood(&self) -> Result<Understanding, String> {
-        let patches = self.problem.task.patches();
+        let patches = self.problem.task.known_patches();
         let friction = &self.problem.friction;
         let placement = match &self.problem.task {
             NormalTask::Wheel(task) => Some(placed(task)?),
             _ => None,
         };
         Ok(Understanding {
-            friction_limit_n: (!patches.is_empty()).then(|| friction.limit_of_all(&patches)),
-            patches: patches.iter().map(known).collect(),
+            friction_limit_n: patches
+                .as_ref()
+                .map(|patches| friction.limit_of_all(patches)),
+            patches: patches.iter().flatten().map(known).collect(),
             placement,
         })
     }

@@ -14,7 +14,7 @@ use crate::contact::rolling::methods::fastsim::{self, EllipseMesh};
 use crate::contact::rolling::methods::table::evaluate::{Creep, EllipseTable};
 use crate::contact::rolling::methods::table::file::table;
 use crate::contact::rolling::methods::table::solve::{RATIO_MAX, RATIO_MIN};
-use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::rolling::resolution::Resolution;
 
 /// Rows that can be evaluated.
 #[derive(Debug)]

@@ -8,7 +8,7 @@ use crate::contact::evaluate::column::Column;
 use crate::contact::evaluate::variable::Variable;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::rolling::resolution::Resolution;
 
 /// Faults of rows that are listed.
 pub(crate) const FAULTS_MAX: usize = 20;

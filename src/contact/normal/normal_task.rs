@@ -25,13 +25,13 @@ pub enum NormalTask {
 }
 
 impl NormalTask {
-    /// The patches, in order of their smallest y; none where they have to be found.
+    /// The patches, in order of their smallest y and at least one; nothing where they have to be found.
     #[must_use]
-    pub fn patches(&self) -> Vec<Patch> {
+    pub fn known_patches(&self) -> Option<Vec<Patch>> {
         match self {
-            NormalTask::Hertz(ellipse) => vec![ellipse.patch()],
-            NormalTask::Given(field) => field.patches(),
-            NormalTask::Gap(_) | NormalTask::Wheel(_) | NormalTask::Wheelset(_) => Vec::new(),
+            NormalTask::Hertz(ellipse) => Some(vec![ellipse.patch()]),
+            NormalTask::Given(field) => Some(field.patches()),
+            NormalTask::Gap(_) | NormalTask::Wheel(_) | NormalTask::Wheelset(_) => None,
         }
     }
 }

@@ -20,10 +20,13 @@ pub trait Number:
     /// The nearest number of this precision.
     fn of(value: f64) -> Self;
     /// Square root.
+    #[must_use]
     fn sqrt(self) -> Self;
     /// Magnitude.
+    #[must_use]
     fn abs(self) -> Self;
     /// Natural logarithm of a normal, positive number; see the implementations for their errors.
+    #[must_use]
     fn ln(self) -> Self;
 }
 

@@ -43,7 +43,7 @@ impl Strips {
     ///
     /// # Panics
     /// If the vectors of the cells differ in length.
-    pub fn new(fields: &PatchCells) -> Strips {
+    pub(crate) fn new(fields: &PatchCells) -> Strips {
         let n = fields.x_mm.len();
         assert!(
             [
@@ -88,7 +88,7 @@ impl Strips {
     }
 
     /// Whether every strip has one segment and touches the next strip.
-    pub fn is_simple(&self) -> bool {
+    pub(crate) fn is_simple(&self) -> bool {
         !self.segments.is_empty()
             && self.strips.iter().all(|strip| strip.len() == 1)
             && self.segments[1..]
@@ -102,7 +102,7 @@ impl Strips {
     /// The squared half-length is extrapolated through up to three strips, as a parabola in y (exact for an
     /// ellipse), the centre as a line; the half-length stays between 0 and that of the segment. Where segments
     /// branch, the ends of the segment are returned unchanged.
-    pub fn tip(&self, segment: usize, upper: bool) -> (f64, f64) {
+    pub(crate) fn tip(&self, segment: usize, upper: bool) -> (f64, f64) {
         let first = &self.segments[segment];
         let branches = if upper {
             first.branches_above
@@ -185,7 +185,13 @@ pub(crate) mod samples {
     use crate::contact::solution::words::PatchCells;
 
     /// Adds a segment with the given cell edges to a patch.
-    pub fn push_segment(fields: &mut PatchCells, strip: u32, y: f64, dy: f64, edges: &[f64]) {
+    pub(crate) fn push_segment(
+        fields: &mut PatchCells,
+        strip: u32,
+        y: f64,
+        dy: f64,
+        edges: &[f64],
+    ) {
         for pair in edges.windows(2) {
             fields.x_mm.push(0.5 * (pair[0] + pair[1]));
             fields.dx_mm.push(pair[1] - pair[0]);
@@ -196,7 +202,7 @@ pub(crate) mod samples {
     }
 
     /// Strips with cosine-graded cells on an ellipse whose centre line is `x = lean · y`.
-    pub fn ellipse(a: f64, b: f64, lean: f64, strips: u32, cells: u32) -> PatchCells {
+    pub(crate) fn ellipse(a: f64, b: f64, lean: f64, strips: u32, cells: u32) -> PatchCells {
         let mut fields = PatchCells::default();
         let dy = 2.0 * b / f64::from(strips);
         for j in 0..strips {

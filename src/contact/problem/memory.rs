@@ -9,7 +9,7 @@ use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::operator_store::OperatorKind;
 use crate::contact::rolling::refinement::levels::LEVELS_KEPT;
 use crate::contact::rolling::refinement::mesh_policy::{CELLS_MAX, MeshPolicy};
-use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::task::precision_of;
 
 /// Cells of the finest mesh for a target of 0.02, on average.

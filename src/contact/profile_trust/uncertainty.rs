@@ -19,7 +19,7 @@ use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::rolling::resolution::Resolution;
 use crate::contact::solution::profile_quality::{ProfileQuality, ProfileUncertainty};
 use crate::contact::solution::words::{PatchSolution, Solution};
 use crate::contact::wheel_on_rail;

@@ -19,7 +19,7 @@ use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::refinement::level_solve::MotionTask;
 use crate::contact::rolling::refinement::levels::Levels;
 use crate::contact::rolling::refinement::refine;
-use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::task::RollingTask;
 

@@ -4,9 +4,11 @@ use crate::contact::remark::list::Remark;
 use crate::contact::rolling::answer::{LevelAnswer, Work};
 use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::motion::Motion;
-use crate::contact::rolling::refinement::error_estimate::RelativeErrors;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::skip::Skip;
+
+/// Relative errors of every patch, then of the sum over them; nothing where there is nothing to compare with.
+pub type RelativeErrors = Vec<Option<f64>>;
 
 /// The answer for one motion.
 #[derive(Debug, Clone)]

@@ -9,7 +9,7 @@ use crate::contact::half_space::strip_operator::kind::Precision;
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::rolling::methods::method::{Method, TractionBound};
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
-use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::rolling::resolution::Resolution;
 
 /// Targets from here on are met with an operator in single precision. Chosen by judgement; how much it matters was not measured.
 const SINGLE_PRECISION_FROM: f64 = 5e-4;

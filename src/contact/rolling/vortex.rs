@@ -45,7 +45,7 @@ mod tests {
     #[test]
     fn a_rigid_rotation_has_its_vortex_at_its_centre() {
         let (x, y) = grid();
-        let weight: Vec<f64> = (0..36).map(|i| 1.0 + (i % 5) as f64).collect();
+        let weight: Vec<f64> = (0..36).map(|i| 1.0 + f64::from(i % 5)).collect();
         for [px, py] in [[0.13, -0.4], [3.0, 1.0]] {
             for sign in [-1.0, 1.0] {
                 let tx = y.iter().map(|y| -sign * (y - py));

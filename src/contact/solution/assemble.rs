@@ -10,7 +10,7 @@ use crate::contact::remark::list::Remark;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::motion_answer::{MotionAnswer, SolvedFields};
 use crate::contact::rolling::refinement::levels::Levels;
-use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::skip::Skip;
 use crate::contact::rolling::strip_mesh::StripMesh;

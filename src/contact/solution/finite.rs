@@ -26,22 +26,17 @@ fn first_in(value: &impl Serialize) -> Option<String> {
 }
 
 fn first_in_fields(fields: &Fields) -> Option<String> {
-    let patches = fields.patches.iter().enumerate();
-    patches
-        .filter_map(|(p, patch)| Some(format!("patches[{p}].{}", first_in_patch(patch)?)))
-        .next()
+    let mut patches = fields.patches.iter().enumerate();
+    patches.find_map(|(p, patch)| Some(format!("patches[{p}].{}", first_in_patch(patch)?)))
 }
 
 fn first_in_patch(patch: &PatchFields) -> Option<String> {
-    let meshes = patch.meshes.iter().enumerate();
-    let in_meshes = meshes
-        .filter_map(|(k, mesh)| Some(format!("meshes[{k}].{}", first_in_cells(mesh)?)))
-        .next();
-    let points = patch.points.iter().enumerate();
+    let mut meshes = patch.meshes.iter().enumerate();
+    let in_meshes =
+        meshes.find_map(|(k, mesh)| Some(format!("meshes[{k}].{}", first_in_cells(mesh)?)));
+    let mut points = patch.points.iter().enumerate();
     in_meshes.or_else(|| {
-        points
-            .filter_map(|(k, point)| Some(format!("points[{k}].{}", first_in_point(point)?)))
-            .next()
+        points.find_map(|(k, point)| Some(format!("points[{k}].{}", first_in_point(point)?)))
     })
 }
 

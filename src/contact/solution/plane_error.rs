@@ -13,7 +13,7 @@ use crate::contact::geometry::wheelset::{WheelsetMotion, creepages};
 use crate::contact::normal::wheel_height::pressed::{PressedGap, PressedWheel};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::list::Remark;
-use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::rolling::resolution::Resolution;
 use crate::contact::solution::words::{Fields, PatchSolution, Solution};
 
 /// Strips of a patch.

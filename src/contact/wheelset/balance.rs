@@ -16,7 +16,7 @@ use crate::contact::numerics::bracketed_root::find_root;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::profile_trust::trust;
 use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::rolling::resolution::Resolution;
 use crate::contact::solution::words::{PatchSolution, Solution};
 use crate::contact::wheel_on_rail::Found;
 

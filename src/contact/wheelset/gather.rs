@@ -89,8 +89,8 @@ impl<'a> WheelsetGathering<'a> {
             // A remark on all patches of a wheel is told at the first.
             let patch = Some(first + remark.patch.unwrap_or(0));
             RemarkEntry {
-                pointer,
                 patch,
+                pointer,
                 ..remark
             }
         }));

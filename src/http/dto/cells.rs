@@ -179,9 +179,9 @@ pub fn gridded(
         answer.zone = Some(grid.values);
     }
     GriddedField {
+        pressure_mpa,
         traction_x_mpa,
         traction_y_mpa,
-        pressure_mpa,
         slip_x,
         slip_y,
         temperature_c,

@@ -222,7 +222,9 @@ impl Query {
             }
         };
         for (name, value) in pairs {
-            if !known.contains(&name.as_str()) {
+            if known.contains(&name.as_str()) {
+                query.pairs.push((name, value));
+            } else {
                 let allowed = if known.is_empty() {
                     "none".to_owned()
                 } else {
@@ -235,8 +237,6 @@ impl Query {
                     allowed: known.iter().map(ToString::to_string).collect(),
                     ..Fault::parameter(&name, detail)
                 });
-            } else {
-                query.pairs.push((name, value));
             }
         }
         query

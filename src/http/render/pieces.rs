@@ -137,7 +137,7 @@ fn values(table: &Table, column: ColumnName, rows: Range<usize>) -> String {
         }
         match (column, &table.rows) {
             (ColumnName::Place(number), Rows::Cells { places, .. }) => {
-                push(&mut out, places[number][row], table.precision)
+                push(&mut out, places[number][row], table.precision);
             }
             (ColumnName::Strip, Rows::Cells { strip, .. }) => {
                 // Writing to a string cannot fail.

@@ -94,6 +94,7 @@ fn of_curve(title: String, solution: &Solution) -> Result<Drawing, ApiError> {
 
 /// The component that varies most from motion to motion, measured by what it does to the patch, and its values; of a history the distance.
 fn varying(points: &[PointSolution]) -> (&'static str, Vec<f64>) {
+    type Component = fn(&PointSolution) -> f64;
     let distance = |point: &PointSolution| Some(point.history?.distance_mm);
     if let Some(distances) = points.iter().map(distance).collect() {
         return ("distance rolled in mm", distances);
@@ -101,7 +102,6 @@ fn varying(points: &[PointSolution]) -> (&'static str, Vec<f64>) {
     let length = points
         .first()
         .map_or(1.0, |point| point.normalised.length_mm);
-    type Component = fn(&PointSolution) -> f64;
     let components: [(&str, f64, Component); 3] = [
         ("creepage x", 1.0, |point| point.motion.creepage_x),
         ("creepage y", 1.0, |point| point.motion.creepage_y),

@@ -220,7 +220,7 @@ impl Block {
                         .iter()
                         .map(|code| zone_of(*code))
                         .collect::<Result<_, _>>()?,
-                )
+                );
             }
             "traction_x_mpa" => point.traction_x_mpa = Some(read_f64(values)),
             "traction_y_mpa" => point.traction_y_mpa = Some(read_f64(values)),

@@ -137,9 +137,7 @@ impl Jobs {
             }
             let place = head.columns.iter().position(|column| column.name == name);
             let column = match (name.as_str(), place) {
-                ("row", _) => {
-                    TableColumn::Integers(rows.clone().map(|row| row.cast_signed()).collect())
-                }
+                ("row", _) => TableColumn::Integers(rows.clone().map(u64::cast_signed).collect()),
                 ("status", _) => {
                     TableColumn::Texts(vec![chunk.why.unwrap_or("lost").to_owned(); count])
                 }

@@ -25,7 +25,7 @@ pub(crate) fn read(text: &str) -> Result<ProfileFile, String> {
             match name.trim() {
                 "ColumnDef" => {
                     columns =
-                        places(value).ok_or_else(|| unreadable(k, line, "a list with X and Y"))?
+                        places(value).ok_or_else(|| unreadable(k, line, "a list with X and Y"))?;
                 }
                 "XYPoints" => expected = value.trim().parse::<usize>().ok(),
                 _ => {}

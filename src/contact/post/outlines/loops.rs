@@ -65,8 +65,8 @@ fn take_next(
 fn turn(a: Corner, b: Corner, c: Corner) -> i64 {
     let step = |from: Corner, to: Corner| {
         (
-            (to.0 > from.0) as i64 - (to.0 < from.0) as i64,
-            (to.1 > from.1) as i64 - (to.1 < from.1) as i64,
+            i64::from(to.0 > from.0) - i64::from(to.0 < from.0),
+            i64::from(to.1 > from.1) - i64::from(to.1 < from.1),
         )
     };
     let (p, q) = (step(a, b), step(b, c));

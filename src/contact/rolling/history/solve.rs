@@ -12,7 +12,7 @@ use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::motion_answer::{HistoryAnswer, MotionAnswer, SolvedFields};
 use crate::contact::rolling::refinement::level_solve::named;
 use crate::contact::rolling::refinement::levels::Levels;
-use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::task::RollingTask;
 

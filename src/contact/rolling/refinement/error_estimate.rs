@@ -7,6 +7,7 @@ use crate::contact::rolling::mesh_plan::Regime;
 use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::methods::{fastsim, full_slip};
 use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::motion_answer::RelativeErrors;
 use crate::contact::rolling::refinement::caution::caution;
 use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;
 use crate::contact::rolling::refinement::constants::{
@@ -15,17 +16,14 @@ use crate::contact::rolling::refinement::constants::{
     SAMPLED, SAMPLED_DECAY, SHARE_LARGE, STRIPS_FEW, SURPRISES, WITHOUT_COMPANION,
 };
 use crate::contact::rolling::refinement::mesh_policy::CELLS_FIRST;
-use crate::contact::rolling::refinement::resolution::Resolution;
-use crate::contact::rolling::regime::pole_error;
+use crate::contact::rolling::refinement::regime::pole_error;
+use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::rolling::task::RollingTask;
 
 /// Relative error where everything slips along the rigid slip.
 const RIGID: f64 = 1e-6;
-/// Relative errors of every patch, then of the sum over them; nothing where there is nothing to compare with.
-pub type RelativeErrors = Vec<Option<f64>>;
-
 /// The coarser level that was solved before this one, if it is coarse enough to compare with.
 #[derive(Debug, Clone, Copy)]
 pub struct CoarserLevel<'a> {

@@ -12,16 +12,17 @@ use crate::contact::rolling::methods::liu_hsu::on_level;
 use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::methods::{fastsim, full_slip};
 use crate::contact::rolling::motion::Motion;
-use crate::contact::rolling::motion_answer::{MotionAnswer, SolvedFields};
+use crate::contact::rolling::motion_answer::{MotionAnswer, RelativeErrors, SolvedFields};
 use crate::contact::rolling::refinement::constants::LEVEL_RATIO_MIN;
 use crate::contact::rolling::refinement::error_estimate;
 use crate::contact::rolling::refinement::error_estimate::{
-    CoarserLevel, EstimateContext, Indicators, RelativeErrors,
+    CoarserLevel, EstimateContext, Indicators,
 };
 use crate::contact::rolling::refinement::levels::Levels;
 use crate::contact::rolling::refinement::slender::slender;
-use crate::contact::rolling::refinement::warm_start::{Start, nested_start};
+use crate::contact::rolling::refinement::warm_start::nested_start;
 use crate::contact::rolling::resultants::Resultants;
+use crate::contact::rolling::start::Start;
 use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::rolling::task::RollingTask;
 

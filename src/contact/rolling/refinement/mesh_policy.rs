@@ -7,7 +7,7 @@ use crate::contact::rolling::mesh_plan::{MeshPlan, Regime};
 use crate::contact::rolling::methods::fastsim;
 use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::refinement::constants::{MARGIN, SLACK, SLACK_POLE};
-use crate::contact::rolling::refinement::resolution::Resolution;
+use crate::contact::rolling::resolution::Resolution;
 
 /// Cells of the first mesh of a patch that is not slender. On the first 160 ellipses of `cargo bench --bench calibrate ellipse` at the
 /// targets 0.005 and 0.001, 48 takes 4 to 10 % more work and 90 takes 15 % less, with one case more or less covered.

@@ -10,6 +10,6 @@ pub mod level_solve;
 pub mod levels;
 pub mod mesh_policy;
 pub mod refine;
-pub mod resolution;
+pub mod regime;
 pub mod slender;
 pub mod warm_start;

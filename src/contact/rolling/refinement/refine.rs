@@ -17,8 +17,8 @@ use crate::contact::rolling::refinement::level_solve::{
 };
 use crate::contact::rolling::refinement::levels::Levels;
 use crate::contact::rolling::refinement::mesh_policy::MeshPolicy;
-use crate::contact::rolling::refinement::resolution::Resolution;
-use crate::contact::rolling::regime::regime;
+use crate::contact::rolling::refinement::regime::regime;
+use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::task::RollingTask;
 

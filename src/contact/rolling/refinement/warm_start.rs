@@ -3,6 +3,7 @@
 use crate::contact::rolling::answer::LevelAnswer;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::refinement::interpolate;
+use crate::contact::rolling::start::Start;
 use crate::contact::rolling::strip_mesh::StripMesh;
 
 /// A start is extrapolated only for motions on the line through the last two; the distance from it may be this fraction of the step.
@@ -15,15 +16,6 @@ const STEP_MAX: f64 = 1.5;
 /// of `benches/calibrate`, 0.12 takes 6 % more products and 0.5 takes 6 % fewer; on 40 straight sweeps, where starts are extrapolated, 0.5
 /// changes products by less than 0.3 %.
 const NEAR: f64 = 0.25;
-
-/// First iterates of both rules, dimensionless, one value per cell.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Start {
-    /// For the three-point rule.
-    pub mirror: [Vec<f64>; 2],
-    /// For the trapezoid rule, if there is a better one than the three-point solution.
-    pub trapezoid: Option<[Vec<f64>; 2]>,
-}
 
 /// The answers of the last two motions on every level.
 #[derive(Debug, Default)]

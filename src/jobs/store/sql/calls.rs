@@ -43,7 +43,7 @@ impl Store for SqlStore {
     }
 
     async fn close(&self) {
-        self.close().await
+        self.close().await;
     }
 
     async fn enqueue(&self, new: &NewJob, bounds: QueueBounds) -> Result<Enqueued, StoreError> {

@@ -13,8 +13,8 @@ use crate::contact::rolling::answer::{
 use crate::contact::rolling::methods::boundary_element::rule_sequence::{Control, RuleSequence};
 use crate::contact::rolling::methods::boundary_element::task::LevelTask;
 use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
-use crate::contact::rolling::refinement::warm_start::Start;
 use crate::contact::rolling::skip::Skip;
+use crate::contact::rolling::start::Start;
 
 /// Solves one motion on one level, from a start or from zero tractions.
 ///
