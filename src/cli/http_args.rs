@@ -89,6 +89,18 @@ pub struct HttpArgs {
     #[arg(long, env = "RAILHEAD_PARSED_CASE_MAX_MB", default_value_t = 96, value_name = "MIB",
           value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     pub parsed_case_max_mb: u32,
+    /// Body of one case in MiB, or of one case of a batch; beyond: 413.
+    #[arg(long, env = "RAILHEAD_BODY_MAX_MIB", default_value_t = 8, value_name = "MIB",
+          value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub body_max_mib: u32,
+    /// Body of one batch in MiB; beyond: 413.
+    #[arg(long, env = "RAILHEAD_BATCH_MAX_MIB", default_value_t = 1024, value_name = "MIB",
+          value_parser = clap::value_parser!(u32).range(1..=65536))]
+    pub batch_max_mib: u32,
+    /// Cases of one batch; beyond: 413.
+    #[arg(long, env = "RAILHEAD_BATCH_MAX_CASES", default_value_t = 200_000, value_name = "N",
+          value_parser = clap::value_parser!(u32).range(1..))]
+    pub batch_max_cases: u32,
     /// Pictures, grids and tables made at the same time [default: half of the cores, at least 1].
     #[arg(long, env = "RAILHEAD_RENDERINGS", value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub renderings: Option<u16>,
@@ -154,6 +166,9 @@ impl HttpArgs {
             parsed_max_bytes: bytes(self.parsed_case_max_mb),
             renderings: self.renderings.map_or(default.renderings, usize::from),
             renderings_waiting_max: count(self.renderings_waiting_max),
+            body_max_bytes: bytes(self.body_max_mib),
+            batch_max_bytes: u64::from(self.batch_max_mib) << 20,
+            batch_max_cases: self.batch_max_cases,
             grid_max_samples: count(self.grid_max_samples),
             evaluate_max_bytes: bytes(self.evaluate_max_mib),
             evaluate_max_rows: count(self.evaluate_max_rows),

@@ -16,6 +16,7 @@ use railhead::contact::error::SolveError;
 use railhead::contact::half_space::kernels::{Rectangle, rectangle};
 use railhead::contact::monitor::{Monitor, Stop, Unmonitored};
 use railhead::contact::normal::gap::surface::GapSurface;
+use railhead::contact::remark::figure::Figure;
 use railhead::contact::solution::words::{Fields, Solution};
 use serde_json::{Value, json};
 
@@ -266,4 +267,74 @@ impl Monitor for Late {
         self.0.set(self.0.get() + 1);
         Duration::from_millis(if self.0.get() > 10 { 1500 } else { 0 })
     }
+}
+
+/// The case of a gap across the rail under a load in N, resultants only.
+fn across_gap(y: &[f64], gap: &[f64], force: f64) -> Value {
+    json!({
+        "contact": { "type": "gap_profile", "rolling_mm": 460.0, "y_mm": y, "gap_mm": gap },
+        "material": { "shear_modulus_mpa": G, "poisson_ratio": NU },
+        "friction": { "coefficient": 0.3 },
+        "load": { "normal_force_n": force },
+        "motion": { "creepage_x": 0.001 },
+        "outputs": ["resultants"],
+        "solver": { "target_error": 0.02 },
+    })
+}
+
+/// Places from −12 to 12 mm.
+fn places(count: usize) -> Vec<f64> {
+    (0..count)
+        .map(|i| -12.0 + 24.0 * i as f64 / (count - 1) as f64)
+        .collect()
+}
+
+fn answer(case: &Value) -> Solution {
+    let checked = check(case, &Limits::default()).expect("a case");
+    contact::solve(&checked, &Unmonitored).expect("an answer").0
+}
+
+#[test]
+fn patches_that_end_with_few_cells_say_so_with_their_numbers() {
+    // Eleven crests that share a load.
+    let y = places(81);
+    let teeth = |y: &f64| 0.038_6 * (std::f64::consts::PI * y / 0.6).sin().abs();
+    let gap: Vec<f64> = y.iter().map(|y| y * y / 2_000.0 + teeth(y)).collect();
+    let found = answer(&across_gap(&y, &gap, 5_000.0));
+    let coarse: Vec<_> = found
+        .remarks
+        .iter()
+        .filter(|remark| remark.code == "patch-coarse")
+        .collect();
+    assert!(coarse.len() > 1, "{:?}", found.remarks);
+    for remark in coarse {
+        let figure = |name: &str| match remark.figures[name] {
+            Figure::Number(number) => number,
+            ref other => panic!("{name}: {other:?}"),
+        };
+        let (cells, share) = (figure("cells_across"), figure("load_share"));
+        assert!(cells < 20.0 && share > 0.0 && share < 1.0, "{remark:?}");
+        assert!(
+            remark
+                .patch
+                .is_some_and(|patch| patch < found.patches.len())
+        );
+    }
+}
+
+#[test]
+fn a_contact_whose_pressure_still_changes_is_called_rough() {
+    let mut random = Random(15);
+    let y = places(81);
+    let gap: Vec<f64> = y
+        .iter()
+        .map(|y| y * y / 600.0 + 0.005_4 * random.part())
+        .collect();
+    let found = answer(&across_gap(&y, &gap, 17_000.0));
+    let codes: Vec<&str> = found.remarks.iter().map(|r| r.code.as_str()).collect();
+    assert!(codes.contains(&"gap-rough"), "{codes:?}");
+    // Where the surface is smooth there is nothing to say.
+    let smooth: Vec<f64> = y.iter().map(|y| y * y / 600.0).collect();
+    let found = answer(&across_gap(&y, &smooth, 17_000.0));
+    assert!(found.remarks.is_empty(), "{:?}", found.remarks);
 }

@@ -1,6 +1,7 @@
 //! Remarks on profiles by their codes: each kind of damage gets its own, at the profile that has it.
 
 use railhead::contact::remark::entry::RemarkEntry;
+use railhead::contact::remark::figure::Figure;
 use serde_json::json;
 
 use crate::damaged::{Damage, with};
@@ -49,4 +50,30 @@ fn a_target_that_the_measurement_does_not_support_is_told() {
         "{:?}",
         found.remarks
     );
+}
+
+/// Beside the patch there are no points, and the curve through those that are left lies so near the wheel that it might touch.
+#[test]
+fn a_hole_beside_the_patch_is_told_with_its_place_and_length() {
+    let points = rail_60e1();
+    let whole = solved(&on_rail(&points));
+    let under = whole.patches[0].quality.clone().expect("a quality").rail;
+    for (from, to) in [
+        (under.y_mm[1] + 0.3, under.y_mm[1] + 20.3),
+        (under.y_mm[0] - 20.3, under.y_mm[0] - 0.3),
+    ] {
+        let kept = |p: &&[f64; 2]| p[0] < from || p[0] > to || p[1] > 20.0;
+        let rail: Vec<[f64; 2]> = points.iter().filter(kept).copied().collect();
+        let found = solved(&accepted(&on_rail(&rail)));
+        let told = found.remarks.iter().find(|r| r.code == "profile-hole");
+        let told = told.unwrap_or_else(|| panic!("{from} {to}: {:?}", found.remarks));
+        assert_eq!(told.pointer.as_deref(), Some("/contact/rail"));
+        let Figure::Number(length) = told.figures["hole_mm"] else {
+            panic!("{told:?}")
+        };
+        // Measured along the curve, from the last point before the hole to the first behind it.
+        assert!((20.0..23.0).contains(&length), "{length}");
+        let quality = found.patches[0].quality.clone().expect("a quality").rail;
+        assert_eq!(quality.hole_mm, Some(length));
+    }
 }

@@ -24,7 +24,7 @@ use crate::jobs::submit_options::{CaseOptions, SubmitOptions};
 const FAULTY_KEPT: usize = 1000;
 
 /// Good cases of a batch that are staged before places are reserved: a batch that small is refused early enough when it
-/// is queued.
+/// is queued, and a repeated submission with its idempotency key finds the batch even if the queue is full by then.
 const UNRESERVED_MAX: u32 = 1000;
 
 /// A faulty case of a batch.
