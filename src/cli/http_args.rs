@@ -198,4 +198,20 @@ mod tests {
         let given = Only::try_parse_from(["x"]).unwrap();
         assert_eq!(given.http.options(), HttpOptions::default());
     }
+
+    #[test]
+    fn sizes_of_bodies_and_batches_are_flags() {
+        let flags = ["--body-max-mib", "--batch-max-mib", "--batch-max-cases"];
+        let words = flags.iter().flat_map(|flag| [*flag, "3"]);
+        let given = Only::try_parse_from(std::iter::once("x").chain(words)).unwrap();
+        let options = given.http.options();
+        assert_eq!(
+            (
+                options.body_max_bytes,
+                options.batch_max_bytes,
+                options.batch_max_cases
+            ),
+            (3 << 20, 3 << 20, 3)
+        );
+    }
 }

@@ -191,6 +191,18 @@ async fn a_second_signal_ends_the_service_at_once() {
 }
 
 #[tokio::test]
+async fn a_second_signal_ends_a_service_that_waits_for_its_load_balancer() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &["--drain-delay-s", "3600"]);
+    service.signal("TERM");
+    while service.logged("stopping") == 0 {
+        pause().await;
+    }
+    service.signal("TERM");
+    assert_eq!(service.wait().code(), Some(130));
+}
+
+#[tokio::test]
 async fn a_service_says_that_it_is_not_ready_before_its_port_closes() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(folder.path(), &["--drain-delay-s", "2"]);
