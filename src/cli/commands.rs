@@ -39,6 +39,8 @@ pub enum Command {
     Backup(BackupArgs),
     /// Move what is in a data folder, which no service uses, into a database that several nodes share.
     Move(MoveArgs),
+    /// Move the large results of a database, which no node uses, to another place.
+    MoveResults(MoveResultsArgs),
     /// Print the settings that `serve` would run with and where each comes from, as JSON; takes the flags of `serve`.
     Config(ServeArgs),
     /// Ask a running service whether it is ready; exit code 0 if it is, 1 if not.
@@ -74,6 +76,15 @@ pub struct MoveArgs {
         value_name = "FOLDER"
     )]
     pub data_dir: PathBuf,
+    #[command(flatten)]
+    pub database: DatabaseUrlArgs,
+    #[command(flatten)]
+    pub results: ResultsArgs,
+}
+
+/// Settings of `move-results`.
+#[derive(Debug, Clone, Args)]
+pub struct MoveResultsArgs {
     #[command(flatten)]
     pub database: DatabaseUrlArgs,
     #[command(flatten)]

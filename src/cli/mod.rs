@@ -53,6 +53,7 @@ pub fn run() -> ExitCode {
             _ => unreachable!("the subcommand was read from these"),
         },
         Command::Move(args) => relocate::run(&args),
+        Command::MoveResults(args) => relocate::run_results(&args),
         Command::Backup(args) => backup::run(&args),
         Command::Keys(args) => keys::run(&args),
         Command::Healthcheck(args) => healthcheck::run(&args),

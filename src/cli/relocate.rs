@@ -1,25 +1,23 @@
-//! `railhead move`: from a data folder into a database that several nodes share.
+//! `railhead move`: from a data folder into a database that several nodes share. `railhead move-results`: its results elsewhere.
 
 use std::process::ExitCode;
 
 use anyhow::Context;
+use tokio::runtime::Runtime;
 
-use crate::cli::commands::MoveArgs;
+use crate::cli::commands::{MoveArgs, MoveResultsArgs};
 use crate::cli::output::print;
 use crate::jobs::relocate::relocate;
+use crate::jobs::result_place::change::move_results;
 
 /// Moves everything and says what it was.
 pub(super) fn run(args: &MoveArgs) -> anyhow::Result<ExitCode> {
     let place = args.results.place();
-    let moved = tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-        .context("the async runtime could not be started")?
-        .block_on(relocate(
-            &args.data_dir,
-            &args.database.database_url,
-            place.as_ref(),
-        ))?;
+    let moved = runtime()?.block_on(relocate(
+        &args.data_dir,
+        &args.database.database_url,
+        place.as_ref(),
+    ))?;
     let mut lines: Vec<String> = moved
         .rows
         .iter()
@@ -29,4 +27,32 @@ pub(super) fn run(args: &MoveArgs) -> anyhow::Result<ExitCode> {
     lines.push(format!("bytes of these\t{}", moved.result_bytes));
     lines.push(format!("large results that are missing\t{}", moved.missing));
     print(&lines.join("\n"))
+}
+
+/// Moves the results and says how many there were.
+pub(super) fn run_results(args: &MoveResultsArgs) -> anyhow::Result<ExitCode> {
+    let place = args
+        .results
+        .place()
+        .context("say by --results-url where the results are to be")?;
+    let moved = runtime()?.block_on(move_results(&args.database.database_url, &place))?;
+    let from = match moved.from.as_str() {
+        "" => "the database",
+        place => place,
+    };
+    let lines = [
+        format!("from\t{from}"),
+        format!("to\t{}", place.url),
+        format!("large results\t{}", moved.results),
+        format!("bytes of these\t{}", moved.bytes),
+        format!("large results that are missing\t{}", moved.missing),
+    ];
+    print(&lines.join("\n"))
+}
+
+fn runtime() -> anyhow::Result<Runtime> {
+    tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .context("the async runtime could not be started")
 }

@@ -8,6 +8,7 @@ use reqwest::Method;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
+use crate::cable::Cable;
 use crate::postgres;
 use crate::support::{Service, case, endless_case, long_case, pause, railhead};
 
@@ -35,7 +36,9 @@ impl Nodes {
     fn start(&mut self, worker: bool, flags: &[&str]) -> Service {
         let folder = tempfile::tempdir().unwrap();
         let mut all = vec!["--database-url", &self.url, "--lease-s", "2"];
-        all.extend(["--cache", "false"]);
+        if !flags.contains(&"--cache") {
+            all.extend(["--cache", "false"]);
+        }
         all.extend(flags);
         let service = match worker {
             true => Service::start_worker(folder.path(), &all),
@@ -160,7 +163,7 @@ async fn each_job_ends_once_and_is_read_everywhere_although_a_worker_and_an_api_
 }
 
 #[tokio::test]
-async fn a_job_is_cancelled_waited_for_and_streamed_at_a_node_that_does_not_solve_it() {
+async fn a_job_is_cancelled_and_waited_for_at_a_node_that_does_not_solve_it() {
     let Some(mut nodes) = Nodes::new().await else {
         return;
     };
@@ -205,6 +208,105 @@ async fn a_job_is_cancelled_waited_for_and_streamed_at_a_node_that_does_not_solv
     assert!(worker.wait().success());
     let job = one.until(&endless, "queued").await;
     assert_eq!(job["attempt"], 0, "{job}");
+}
+
+/// Reads a stream of events until one of them passes.
+async fn until_event(stream: &mut reqwest::Response, passes: impl Fn(&Value) -> bool) -> Value {
+    let mut text = String::new();
+    loop {
+        let piece = tokio::time::timeout(WITHIN, stream.chunk()).await;
+        let piece = piece.expect("events come").unwrap().expect("more events");
+        text += std::str::from_utf8(&piece).unwrap();
+        while let Some((event, rest)) = text.split_once("\n\n") {
+            let data = event.lines().find_map(|line| line.strip_prefix("data: "));
+            let data: Option<Value> = data.map(|data| serde_json::from_str(data).unwrap());
+            text = rest.to_owned();
+            if let Some(data) = data.filter(&passes) {
+                return data;
+            }
+        }
+    }
+}
+
+#[tokio::test]
+async fn progress_and_events_are_seen_and_results_used_again_at_every_node() {
+    let Some(mut nodes) = Nodes::new().await else {
+        return;
+    };
+    let flags = ["--workers", "0", "--cache", "true"];
+    let (one, other) = (nodes.start(false, &flags), nodes.start(false, &flags));
+    let _worker = nodes.start(true, &["--workers", "1", "--cache", "true"]);
+    let watched = one.submit(&endless_case("watched")).await;
+    let events = other.request(Method::GET, &format!("/v1/jobs/{watched}/events"));
+    let mut events = events.send().await.unwrap();
+    until_event(&mut events, |job| job["progress"].as_f64() > Some(0.0)).await;
+    let cancel = format!("/v1/jobs/{watched}/cancel");
+    one.request(Method::POST, &cancel).send().await.unwrap();
+    until_event(&mut events, |job| job["state"] == "cancelled").await;
+
+    let solved = one.submit(&case("solved once")).await;
+    one.until(&solved, "succeeded").await;
+    let again = other.request(Method::POST, "/v1/jobs").json(&case("again"));
+    let again: Value = again.send().await.unwrap().json().await.unwrap();
+    assert_eq!(again["cached"], true, "{again}");
+}
+
+#[tokio::test]
+async fn a_worker_that_stood_still_for_longer_than_its_lease_changes_nothing() {
+    let Some(mut nodes) = Nodes::new().await else {
+        return;
+    };
+    let api = nodes.api();
+    let paused = nodes.worker();
+    let id = api.submit(&long_case("taken over", 60)).await;
+    let path = format!("/v1/jobs/{id}");
+    api.until(&id, "running").await;
+    paused.signal("STOP");
+    let other = nodes.worker();
+    let job = api.until(&id, "succeeded").await;
+    let result = api.get(&format!("{path}/result")).await;
+    other.signal("TERM");
+    assert!(other.wait().success());
+    paused.signal("CONT");
+    // It works on: with what it held it is done.
+    let next = api.submit(&case("next")).await;
+    api.until(&next, "succeeded").await;
+    assert_eq!(api.get(&path).await, job);
+    assert_eq!(api.get(&format!("{path}/result")).await, result);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn rows_of_a_worker_that_was_cut_off_inside_a_transaction_are_free_soon() {
+    let Some(mut nodes) = Nodes::new().await else {
+        return;
+    };
+    // The first claim takes a second; a sequence counts those that are rolled back, too.
+    let slow = "CREATE SEQUENCE claims; CREATE FUNCTION slow() RETURNS trigger LANGUAGE plpgsql AS $$ \
+         BEGIN IF nextval('claims') = 1 THEN PERFORM pg_sleep(1); END IF; RETURN NULL; END $$; \
+         CREATE TRIGGER slow AFTER UPDATE ON jobs FOR EACH ROW \
+         WHEN (NEW.state = 'running' AND OLD.state = 'queued') EXECUTE FUNCTION slow()";
+    let pool = sqlx::PgPool::connect(&nodes.url).await.unwrap();
+    sqlx::raw_sql(slow).execute(&pool).await.unwrap();
+    let direct = nodes.url.clone();
+    let (with_port, port) = postgres::at_port(&direct);
+    let cable = Cable::to(port).await;
+    let api = nodes.api();
+    nodes.url = with_port(cable.address.port());
+    let _cut_off = nodes.worker();
+    nodes.url.clone_from(&direct);
+    let id = api.submit(&case("claimed twice")).await;
+    let sleeping = "SELECT COUNT(*) FROM pg_stat_activity WHERE datname = current_database() AND wait_event = 'PgSleep'";
+    until("the claim is under way", async || {
+        let count: i64 = sqlx::query_scalar(sleeping).fetch_one(&pool).await.unwrap();
+        count > 0
+    })
+    .await;
+    cable.swallow();
+    let _other = nodes.worker();
+    let since = Instant::now();
+    let job = api.until(&id, "succeeded").await;
+    assert_eq!(job["attempt"], 1, "the first claim never happened: {job}");
+    assert!(since.elapsed() < WITHIN);
 }
 
 #[tokio::test]

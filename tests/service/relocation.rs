@@ -158,3 +158,86 @@ async fn a_data_folder_moves_into_a_database_with_all_that_is_in_it() {
     ]);
     assert!(!moved && said.contains("has jobs"), "{said}");
 }
+
+/// Ends a service in good order, so that it is not counted as a living node.
+fn stop(service: Service) {
+    service.signal("TERM");
+    assert!(service.wait().success());
+}
+
+#[tokio::test]
+async fn results_of_a_database_move_to_another_place_and_from_there_to_a_third() {
+    let Some(url) = database().await else {
+        return;
+    };
+    let [node, first, second] = [(); 3].map(|()| tempfile::tempdir().unwrap());
+    assert!(say(&["migrate", "--database-url", &url]).0);
+    let places =
+        [first, second].map(|folder| (format!("file://{}", folder.path().display()), folder));
+    let flags = [
+        "--database-url",
+        &url,
+        "--workers",
+        "1",
+        "--drain-delay-s",
+        "0",
+    ];
+    let mut service = Service::start(node.path(), &flags);
+    let paths = fill(&service).await;
+    let known = read(&service, &paths).await;
+    for (place, _) in &places {
+        let words = [
+            "move-results",
+            "--database-url",
+            &url,
+            "--results-url",
+            place,
+        ];
+        let (moved, said) = say(&words);
+        assert!(!moved && said.contains("--results-shared"), "{said}");
+        let words = [&words[..], &["--results-shared"]].concat();
+        let (moved, said) = say(&words);
+        assert!(!moved && said.contains("1 nodes"), "{said}");
+        stop(service);
+        let (moved, said) = say(&words);
+        assert!(
+            moved && said.contains("large results\t1\n") && said.contains("missing\t0"),
+            "{said}"
+        );
+        let (moved, said) = say(&words);
+        assert!(!moved && said.contains("already"), "{said}");
+        let there = ["--results-url", place, "--results-shared"];
+        service = Service::start(node.path(), &[&flags[..], &there].concat());
+        assert_eq!(read(&service, &paths).await, known);
+    }
+    let pool = sqlx::PgPool::connect(&url).await.unwrap();
+    let left: i64 = sqlx::query_scalar("SELECT COUNT(*) FROM objects")
+        .fetch_one(&pool)
+        .await
+        .unwrap();
+    assert_eq!(left, 0, "what was in the database is not kept twice");
+    // Not into the place of another database.
+    let other = database().await.unwrap();
+    assert!(say(&["migrate", "--database-url", &other]).0);
+    let folder = tempfile::tempdir().unwrap();
+    stop(Service::start(
+        folder.path(),
+        &[
+            "--database-url",
+            &other,
+            "--workers",
+            "0",
+            "--drain-delay-s",
+            "0",
+        ],
+    ));
+    let words = [
+        "move-results",
+        "--database-url",
+        &other,
+        "--results-url",
+        &places[1].0,
+    ];
+    let (moved, said) = say(&[&words[..], &["--results-shared"]].concat());
+    assert!(!moved && said.contains("another database"), "{said}");
+}

@@ -5,7 +5,9 @@
 //! | the URL, and the store that it names | [`url`] |
 //! | how requests to an object store are sent, and how long they are waited for | [`client`] |
 //! | what ties a database and the place of its results together | [`settle`] |
+//! | how all results go to another place | [`change`] |
 
+pub mod change;
 pub(crate) mod client;
 pub(crate) mod settle;
 pub mod url;

@@ -23,11 +23,11 @@ const MARKER: &str = "railhead.json";
 const SETTLED_WITHIN: Duration = Duration::from_secs(60);
 
 /// What the database says if its results are in itself.
-const INSIDE: &str = "";
+pub(super) const INSIDE: &str = "";
 
 #[derive(Debug, Serialize, Deserialize)]
-struct Marker {
-    deployment: String,
+pub(super) struct Marker {
+    pub(super) deployment: String,
 }
 
 /// The place of the results of a database; on the first call for a database it is decided.
@@ -43,19 +43,25 @@ pub(crate) async fn settle(
         let Some(place) = place else {
             return settle_inside(cluster).await;
         };
-        if let (ResultsUrl::Folder(path), false) = (&place.url, place.shared) {
-            return Err(JobsError::ResultPlace(format!(
-                "{} is a folder of this machine, and the nodes of a database have their results in common; say --results-shared if \
-                 every node has the same folder there (NFS), or use an object store",
-                path.display()
-            )));
-        }
+        on_this_machine_alone(place)?;
         let objects = place.url.open(requests)?;
         settle_outside(cluster, &place.url, &*objects).await?;
         Ok(Blobs::at(objects, place.url.folder()))
     };
     let settled = timeout(SETTLED_WITHIN, settled).await;
     settled.map_err(|_| JobsError::ResultPlace("it does not answer".to_owned()))?
+}
+
+/// Refuses a folder that is not said to be the same on every node.
+pub(super) fn on_this_machine_alone(place: &ResultsPlace) -> Result<(), JobsError> {
+    match (&place.url, place.shared) {
+        (ResultsUrl::Folder(path), false) => Err(JobsError::ResultPlace(format!(
+            "{} is a folder of this machine, and the nodes of a database have their results in common; say --results-shared if \
+             every node has the same folder there (NFS), or use an object store",
+            path.display()
+        ))),
+        _ => Ok(()),
+    }
 }
 
 async fn settle_inside(cluster: &dyn Cluster) -> Result<Blobs, JobsError> {
@@ -113,7 +119,11 @@ async fn settle_outside(
     }
 }
 
-async fn decide(cluster: &dyn Cluster, before: &Deployment, place: &str) -> Result<(), JobsError> {
+pub(super) async fn decide(
+    cluster: &dyn Cluster,
+    before: &Deployment,
+    place: &str,
+) -> Result<(), JobsError> {
     let known = before.results_place.as_deref();
     if cluster.place_results(known, place).await? {
         tracing::info!(place, "the place of the results was decided");
@@ -127,7 +137,7 @@ async fn decide(cluster: &dyn Cluster, before: &Deployment, place: &str) -> Resu
     }
 }
 
-async fn marker(objects: &dyn ObjectStore) -> Result<Option<Marker>, JobsError> {
+pub(super) async fn marker(objects: &dyn ObjectStore) -> Result<Option<Marker>, JobsError> {
     let found = match objects.get(&Path::from(MARKER)).await {
         Ok(found) => found.bytes().await?,
         Err(Error::NotFound { .. }) => return Ok(None),
@@ -139,7 +149,7 @@ async fn marker(objects: &dyn ObjectStore) -> Result<Option<Marker>, JobsError> 
     })
 }
 
-async fn mark(
+pub(super) async fn mark(
     objects: &dyn ObjectStore,
     deployment: &Deployment,
     place: &str,

@@ -52,4 +52,23 @@ impl PostgresStore {
         .await?;
         Ok(taken.rows_affected() > 0)
     }
+
+    /// The keys of all results outside the table, each once, in order.
+    pub(crate) async fn result_keys(&self) -> Result<Vec<String>, StoreError> {
+        let keys = "SELECT DISTINCT key FROM blobs WHERE key IS NOT NULL ORDER BY key";
+        let mut connection = self.writer.acquire().await?;
+        // For a command of the operator, which may take its time.
+        sqlx::raw_sql("SET statement_timeout = 0")
+            .execute(&mut *connection)
+            .await?;
+        Ok(sqlx::query_scalar(keys).fetch_all(&mut *connection).await?)
+    }
+
+    /// Removes all large results that are in the database.
+    pub(crate) async fn remove_objects(&self) -> Result<(), StoreError> {
+        sqlx::raw_sql("TRUNCATE objects")
+            .execute(&self.writer)
+            .await?;
+        Ok(())
+    }
 }
