@@ -216,7 +216,11 @@ async fn results_of_a_database_move_to_another_place_and_from_there_to_a_third()
         .await
         .unwrap();
     assert_eq!(left, 0, "what was in the database is not kept twice");
-    // Not into the place of another database.
+    assert_refused_to_another(&places[1].0).await;
+}
+
+/// The place of a database is not given to another one.
+async fn assert_refused_to_another(place: &str) {
     let other = database().await.unwrap();
     assert!(say(&["migrate", "--database-url", &other]).0);
     let folder = tempfile::tempdir().unwrap();
@@ -236,7 +240,7 @@ async fn results_of_a_database_move_to_another_place_and_from_there_to_a_third()
         "--database-url",
         &other,
         "--results-url",
-        &places[1].0,
+        place,
     ];
     let (moved, said) = say(&[&words[..], &["--results-shared"]].concat());
     assert!(!moved && said.contains("another database"), "{said}");
