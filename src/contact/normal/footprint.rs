@@ -115,9 +115,17 @@ impl Footprint {
     /// `strips` lists `(y, dy)` of the strips from smaller to larger y; all lengths in mm.
     #[must_use]
     pub fn chords(&self, patch: usize, strips: &[(f64, f64)]) -> Vec<Chord> {
+        let mut chords = Vec::new();
+        self.chords_into(patch, strips, &mut chords);
+        chords
+    }
+
+    /// The same in a buffer, instead of what was in it.
+    pub fn chords_into(&self, patch: usize, strips: &[(f64, f64)], chords: &mut Vec<Chord>) {
+        chords.clear();
         match &self.shape {
-            FootprintShape::Hertz(ellipse) => ellipse.chords(strips),
-            FootprintShape::Sampled(field) => field.chords(patch, strips),
+            FootprintShape::Hertz(ellipse) => ellipse.add_chords(strips, chords),
+            FootprintShape::Sampled(field) => chords.extend(field.chords(patch, strips)),
         }
     }
 

@@ -126,6 +126,13 @@ impl Ellipse {
     /// Chords on the given strips, each `(y, dy)` with its mid-line at y; strips that miss the patch have none.
     #[must_use]
     pub fn chords(&self, strips: &[(f64, f64)]) -> Vec<Chord> {
+        let mut chords = Vec::new();
+        self.add_chords(strips, &mut chords);
+        chords
+    }
+
+    /// The same behind those in a buffer.
+    pub fn add_chords(&self, strips: &[(f64, f64)], chords: &mut Vec<Chord>) {
         let chord = |(strip, &(y, dy)): (usize, &(f64, f64))| {
             let half = self.half_chord(y);
             (half > 0.0).then_some(Chord {
@@ -137,7 +144,7 @@ impl Ellipse {
                 right: half,
             })
         };
-        strips.iter().enumerate().filter_map(chord).collect()
+        chords.extend(strips.iter().enumerate().filter_map(chord));
     }
 
     /// Mean pressure in MPa over `x0 < x < x1` on the line of a chord, in closed form; 0 outside the ellipse.

@@ -21,7 +21,8 @@ impl OwnBlocks {
     /// Collects the blocks.
     #[must_use]
     pub fn new(equations: &SlipEquations) -> OwnBlocks {
-        let mut starts = vec![0];
+        let mut starts = Vec::with_capacity(equations.segments() + 1);
+        starts.push(0);
         for j in 0..equations.segments() {
             starts.push(starts[j] + equations.segment(j).len().pow(2));
         }

@@ -286,6 +286,8 @@ impl<'a> SlipEquations<'a> {
         for (in_segment, cell) in cells.enumerate() {
             dx.clear();
             dy.clear();
+            dx.reserve(rows.len());
+            dy.reserve(rows.len());
             for row in rows.clone() {
                 let (x, y) = self.differences.own(row, cell, self.parity);
                 dx.push(x);

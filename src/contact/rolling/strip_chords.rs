@@ -67,8 +67,9 @@ pub fn chords(footprint: &Footprint, patch: usize, strips: &[(f64, f64)]) -> Vec
         .fold(0.0, f64::max);
     let width: f64 = strips.iter().map(|(_, dy)| dy).sum();
     let share = 0.5 / (1.0 + 0.5 * (longest / width).powi(2));
+    let mut across = Vec::new();
     let fit = |line: &Chord| {
-        let strip = alone(line).then(|| StripLoad::of(footprint, patch, line));
+        let strip = alone(line).then(|| StripLoad::of(footprint, patch, line, &mut across));
         let mean = strip.and_then(|strip| strip.length);
         let length = line.right - line.left;
         let half = 0.5 * ((1.0 - share) * length + share * mean.unwrap_or(length));
@@ -99,18 +100,18 @@ struct StripLoad {
 }
 
 impl StripLoad {
-    /// The strip about a line.
-    fn of(footprint: &Footprint, patch: usize, line: &Chord) -> StripLoad {
+    /// The strip about a line; the buffer is for its chords.
+    fn of(footprint: &Footprint, patch: usize, line: &Chord, across: &mut Vec<Chord>) -> StripLoad {
         let (mut length, mut load, mut moment) = (Some(0.0), 0.0, 0.0);
         for (place, weight) in FOUR_POINTS {
             let y = line.y + 0.5 * line.dy * place;
-            let across = footprint.chords(patch, &[(y, line.dy)]);
+            footprint.chords_into(patch, &[(y, line.dy)], across);
             if across.len() > 1 {
                 length = None;
             }
-            for chord in across {
+            for chord in &*across {
                 let long = 0.5 * weight * (chord.right - chord.left);
-                let share = long * footprint.mean_pressure(&chord, chord.left, chord.right);
+                let share = long * footprint.mean_pressure(chord, chord.left, chord.right);
                 length = length.map(|sum: f64| sum + long);
                 load += share;
                 moment += share * (y - line.y);
